@@ -1,0 +1,63 @@
+"""A capture: the photos taken around a head and what is known about each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hairkit.stored import Float64Array, UInt8Array, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One photo of the turn, upright, at working size."""
+
+    name: str
+    """`front`, `front-left`, `left`, `back-left`, `back`, `back-right`, `right`, `front-right`, or as named."""
+    azimuth_deg: float
+    """Nominal azimuth: 0 in front, positive towards the subject's left."""
+    image: UInt8Array
+    """(H, W, 3) RGB."""
+    focal_px: float | None = None
+    """Focal length in pixels of `image`, from EXIF or capture.toml; None when unknown."""
+    landmarks: Float64Array | None = None
+    """(68, 2) iBUG points in pixels of `image`, NaN-free, or None."""
+    mask_path: Path | None = None
+    strokes_path: Path | None = None
+    photo_path: Path | None = None
+    photo_size: tuple[int, int] = (0, 0)
+    """(width, height) of the photo on disk after EXIF rotation; masks and strokes are in those pixels."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "image", frozen_array(self.image, np.uint8, (None, None, 3), f"photo {self.name}")
+        )
+        if self.photo_size == (0, 0):
+            object.__setattr__(self, "photo_size", (self.image.shape[1], self.image.shape[0]))
+        if self.landmarks is not None:
+            object.__setattr__(
+                self,
+                "landmarks",
+                frozen_array(self.landmarks, np.float64, (68, 2), f"landmarks of {self.name}"),
+            )
+
+    @property
+    def width(self) -> int:
+        """Width of `image` in pixels."""
+        return int(self.image.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Height of `image` in pixels."""
+        return int(self.image.shape[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """The views of one head, in the order of the turn."""
+
+    views: tuple[View, ...]
+    orthographic: bool = False
+    """True when capture.toml says that the pictures are orthographic."""

@@ -1,0 +1,31 @@
+"""Errors a user can meet: one line each, saying what is wrong, what was wanted and what to do."""
+
+from __future__ import annotations
+
+
+class HairkitError(Exception):
+    """Base of every error hairkit raises on purpose; its text is one line for the user."""
+
+
+class InputError(HairkitError, ValueError):
+    """A file, value or array that the user gave cannot be used as it is."""
+
+
+class FormatError(InputError):
+    """A file is not, or not wholly, in the format its name or header claims."""
+
+
+class OptionError(InputError):
+    """An option is unknown, of the wrong type or out of bounds."""
+
+
+class PluginError(HairkitError, LookupError):
+    """A plugin is missing, broken or does not implement the stage asked of it."""
+
+
+class MissingExtraError(HairkitError, ImportError):
+    """An optional dependency is not installed; the text names the pip command that installs it."""
+
+
+class RenderError(HairkitError, RuntimeError):
+    """No OpenGL context could be made, or drawing failed."""

@@ -1,0 +1,109 @@
+"""The contract: every stage of the road from photos to a groom is a hook that a plugin implements.
+
+A plugin is a module (or object) with functions marked `@hairkit.hookimpl` and, if it has any settings, a frozen
+dataclass named `Options`. An implementation names only the arguments it needs; pluggy passes those by name.
+Stage hooks are called on one plugin, chosen by name in the recipe; notifications go to all plugins.
+`options` is the plugin's own `Options` instance (None when it has none).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pluggy
+
+if TYPE_CHECKING:
+    from hairkit.capture import Capture, View
+    from hairkit.groom import Groom
+    from hairkit.head import Head, Roots
+    from hairkit.mask import Mask
+    from hairkit.orientation import OrientationMap
+    from hairkit.scene import Scene
+    from hairkit.strands import Strands
+    from hairkit.volume import Hull, OrientationField
+
+PROJECT = "hairkit"
+hookspec = pluggy.HookspecMarker(PROJECT)
+hookimpl = pluggy.HookimplMarker(PROJECT)
+
+
+@hookspec(firstresult=True)
+def segment(view: View, options: Any) -> Mask | None:
+    """Label one photo: hair, the rest of the person, background. The mask has the photo's size."""
+
+
+@hookspec(firstresult=True)
+def estimate_scene(
+    capture: Capture, masks: tuple[Mask, ...], head: Head, options: Any
+) -> Scene | None:
+    """Find the cameras of all views and the head's size and place; `head` is the head before fitting."""
+
+
+@hookspec(firstresult=True)
+def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: Any) -> Scene | None:
+    """Bend the scene's head to the photos; cameras may be touched up too. Topology stays as it is."""
+
+
+@hookspec(firstresult=True)
+def orient(view: View, mask: Mask, options: Any) -> OrientationMap | None:
+    """Find the strand's 2D orientation at every hair pixel of one photo."""
+
+
+@hookspec(firstresult=True)
+def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Any) -> Hull | None:
+    """Carve the volume that hair fills out of the masks of all views."""
+
+
+@hookspec(firstresult=True)
+def solve_field(
+    scene: Scene,
+    masks: tuple[Mask, ...],
+    orientations: tuple[OrientationMap, ...],
+    hull: Hull,
+    options: Any,
+) -> OrientationField | None:
+    """Fuse the 2D orientations of all views into 3D and fill the rest of the hull."""
+
+
+@hookspec(firstresult=True)
+def track(
+    scene: Scene,
+    masks: tuple[Mask, ...],
+    orientations: tuple[OrientationMap, ...],
+    hull: Hull,
+    field: OrientationField,
+    roots: Roots,
+    options: Any,
+) -> Strands | None:
+    """Grow one strand from every root; strand s belongs to root s."""
+
+
+@hookspec(firstresult=True)
+def enhance_texture(texture: Any, options: Any) -> Any:
+    """Improve a texture (H, W, 3) uint8 RGB: more resolution or detail."""
+
+
+@hookspec(firstresult=True)
+def make_simulator(groom: Groom, options: Any) -> Any:
+    """Return a simulator of the groom's guides (see `hairkit.simulate`)."""
+
+
+@hookspec(firstresult=True)
+def export_groom(groom: Groom, path: Path, options: Any) -> bool | None:
+    """Write the groom to `path` atomically and return True."""
+
+
+@hookspec(firstresult=True)
+def import_groom(path: Path, options: Any) -> Groom | None:
+    """Read a file as a groom."""
+
+
+@hookspec
+def stage_finished(stage: str, seconds: float, result: Any) -> None:
+    """Notification: a stage has ended, with its result."""
+
+
+@hookspec
+def groom_ready(groom: Groom) -> None:
+    """Notification: the pipeline has made a groom."""

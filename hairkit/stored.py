@@ -1,0 +1,175 @@
+"""Frozen types that can be written to one `.npz` and read back: the lossless native form."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import os
+import tempfile
+import types
+import typing
+import zipfile
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import FormatError, InputError
+
+Float32Array = npt.NDArray[np.float32]
+Float64Array = npt.NDArray[np.float64]
+Int32Array = npt.NDArray[np.int32]
+Int64Array = npt.NDArray[np.int64]
+UInt8Array = npt.NDArray[np.uint8]
+BoolArray = npt.NDArray[np.bool_]
+
+MAX_UNPACKED_BYTES = 4 * 2**30
+"""Refuse archives that claim to unpack to more than this many bytes."""
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+def frozen_array(
+    value: npt.ArrayLike, dtype: npt.DTypeLike, shape: tuple[int | None, ...], name: str
+) -> npt.NDArray[Any]:
+    """Return `value` as a read-only contiguous array of `dtype`; `None` in `shape` matches any size.
+
+    Raises `InputError` naming the array when the shape differs or a float is not finite.
+    """
+    array = np.ascontiguousarray(value, dtype=dtype)
+    if array.ndim != len(shape) or any(
+        want is not None and want != have for want, have in zip(shape, array.shape, strict=True)
+    ):
+        wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
+        raise InputError(f"{name} has shape {array.shape}, expected {wanted}")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise InputError(
+            f"{name} holds {np.count_nonzero(~np.isfinite(array))} values that are not finite"
+        )
+    if array is value or array.base is not None:
+        array = array.copy()
+    array.setflags(write=False)
+    return array
+
+
+class Stored:
+    """Base of the frozen dataclasses between stages: gives them `save` and `load`.
+
+    Fields may be arrays, numbers, strings, `None`, other `Stored` types and tuples of them.
+    """
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write every field to `path` (npz, compressed), atomically and byte for byte repeatably."""
+        write_npz(path, _to_arrays(self, ""))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read what `save` wrote; raises `FormatError` naming `path` when it is anything else."""
+        arrays = read_npz(path)
+        try:
+            return typing.cast(Self, _from_arrays(cls, arrays, ""))
+        except (KeyError, TypeError, InputError) as error:
+            raise FormatError(f"{path}: not a stored {cls.__name__}: {error}") from error
+
+
+def write_npz(path: str | os.PathLike[str], arrays: dict[str, npt.NDArray[Any]]) -> None:
+    """Write arrays to an npz file with fixed time stamps, through a temporary file and a rename."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, array in arrays.items():
+            member = io.BytesIO()
+            np.lib.format.write_array(member, np.asarray(array), allow_pickle=False)
+            info = zipfile.ZipInfo(name + ".npy", _EPOCH)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(info, member.getvalue())
+    write_bytes(path, buffer.getvalue())
+
+
+def read_npz(path: str | os.PathLike[str]) -> dict[str, npt.NDArray[Any]]:
+    """Read every array of an npz file, refusing pickles, bombs and damaged files with `FormatError`."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            unpacked = sum(info.file_size for info in archive.infolist())
+        if unpacked > MAX_UNPACKED_BYTES:
+            raise FormatError(
+                f"{path}: claims to unpack to {unpacked} bytes, more than {MAX_UNPACKED_BYTES}"
+            )
+        with np.load(path, allow_pickle=False) as data:
+            return {name: data[name] for name in data.files}
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: no such file") from error
+    except (zipfile.BadZipFile, ValueError, OSError, EOFError, MemoryError, zipfile.error) as error:
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError(f"{path}: not a readable .npz file ({error})") from error
+
+
+def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+    """Write `data` to `path` so that the file is either the old one or the whole new one."""
+    target = Path(path)
+    handle, temporary = tempfile.mkstemp(
+        prefix=f".{target.name}.", suffix=".part", dir=target.parent
+    )
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write UTF-8 text as `write_bytes` does."""
+    write_bytes(path, text.encode())
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _to_arrays(value: Any, prefix: str) -> dict[str, npt.NDArray[Any]]:
+    if value is None:
+        return {}
+    if isinstance(value, tuple):
+        arrays = {prefix + "count": np.asarray(len(value))}
+        for index, item in enumerate(value):
+            arrays |= _to_arrays(item, f"{prefix}{index}.")
+        return arrays
+    if isinstance(value, Stored):
+        arrays = {}
+        for field in dataclasses.fields(typing.cast(Any, value)):
+            arrays |= _to_arrays(getattr(value, field.name), f"{prefix}{field.name}.")
+        return arrays
+    return {prefix[:-1]: np.asarray(value)}
+
+
+def _from_arrays(kind: Any, arrays: dict[str, npt.NDArray[Any]], prefix: str) -> Any:
+    if typing.get_origin(kind) in (typing.Union, types.UnionType):
+        kinds = [option for option in typing.get_args(kind) if option is not types.NoneType]
+        present = any(name == prefix[:-1] or name.startswith(prefix) for name in arrays)
+        return _from_arrays(kinds[0], arrays, prefix) if present else None
+    if typing.get_origin(kind) is tuple:
+        item = typing.get_args(kind)[0]
+        return tuple(
+            _from_arrays(item, arrays, f"{prefix}{i}.")
+            for i in range(int(arrays[prefix + "count"]))
+        )
+    if isinstance(kind, type) and issubclass(kind, Stored):
+        hints = typing.get_type_hints(kind)
+        names = [field.name for field in dataclasses.fields(typing.cast(Any, kind))]
+        return kind(
+            **{name: _from_arrays(hints[name], arrays, f"{prefix}{name}.") for name in names}
+        )
+    array = arrays[prefix[:-1]]
+    return kind(array[()]) if kind in (bool, int, float, str) else _scalar_or_array(kind, array)
+
+
+def _scalar_or_array(kind: Any, array: npt.NDArray[Any]) -> Any:
+    return str(array[()]) if typing.get_origin(kind) is typing.Literal else array
