@@ -1,0 +1,163 @@
+"""Filters that respect a mask, and averages of undirected angles: the ground under every orienter.
+
+An undirected angle t is averaged as the vector (cos 2t, sin 2t), so that 179 and 1 degree meet at 0
+and not at 90. Values beyond a mask count for nothing: sums run over the mask and are divided by how
+much of the kernel lies on it (normalised convolution, Knutsson and Westin 1993).
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import InputError
+from hairkit.orientation import wrap_angle
+from hairkit.stored import BoolArray, Float32Array, UInt8Array
+
+REFERENCE_HEIGHT = 1080
+"""Lengths in pixels given to the orienters are for pictures of this height."""
+
+COHERENT_WINDOW = 9
+COHERENT_RESULTANT = 0.8
+
+
+def picture_scale(height: int) -> float:
+    """Return what a length in pixels of a picture `REFERENCE_HEIGHT` high is multiplied with.
+
+    >>> picture_scale(540)
+    0.5
+    """
+    return height / REFERENCE_HEIGHT
+
+
+def luminance(image: UInt8Array) -> Float32Array:
+    """Return the (H, W) luma of an (H, W, 3) RGB image as float32 in [0, 1] (Rec. 601 weights)."""
+    grey = cv2.transform(image, np.array([[0.299, 0.587, 0.114]], np.float32) / 255)
+    return np.asarray(grey, np.float32)
+
+
+def blur(values: Float32Array, sigma: float) -> Float32Array:
+    """Return `values` under a Gaussian of `sigma` pixels, mirrored at the picture's border."""
+    return np.asarray(
+        cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_REFLECT_101), np.float32
+    )
+
+
+def masked_blur(
+    values: Float32Array, weight: Float32Array | BoolArray, sigma: float
+) -> Float32Array:
+    """Return the Gaussian mean of `values` weighted with `weight`: normalised convolution.
+
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C)
+    weight : (H, W)
+        At least 0; a mask counts as 0 and 1.
+    sigma : float
+        Of the Gaussian, in pixels.
+
+    Returns
+    -------
+    (H, W) or (H, W, C) float32
+        0 where no weight lies within reach of the kernel.
+    """
+    weight = np.asarray(weight, np.float32)
+    total = blur(weight, sigma)
+    inverse = np.divide(1, total, out=np.zeros_like(total), where=total > 1e-6)
+    if values.ndim == 3:
+        return blur(values * weight[..., None], sigma) * inverse[..., None]
+    return blur(values * weight, sigma) * inverse
+
+
+def fill_beyond(values: Float32Array, mask: BoolArray, sigma: float) -> Float32Array:
+    """Return `values` with everything beyond `mask` replaced by means of the nearest masked values.
+
+    The means come from normalised convolution with ever wider kernels (`sigma`, then double),
+    so the fill meets the mask's edge without a step and fades to the mean of the mask.
+
+    Raises `InputError` when the mask is empty or of another shape.
+    """
+    if mask.shape != values.shape or not mask.any():
+        raise InputError(
+            f"cannot fill values of shape {values.shape} beyond a mask of shape {mask.shape} "
+            f"with {np.count_nonzero(mask)} pixels: wanted the same shape and at least one pixel"
+        )
+    filled = np.where(mask, values, values[mask].mean(dtype=np.float64)).astype(np.float32)
+    reach, open_pixels = sigma, ~mask
+    for _ in range(2):
+        weight = blur(mask.astype(np.float32), reach)
+        near = open_pixels & (weight > 1e-3)
+        filled[near] = masked_blur(values, mask, reach)[near]
+        open_pixels, reach = open_pixels & ~near, 2 * reach
+    return filled
+
+
+def double_angle(angle: npt.ArrayLike, weight: npt.ArrayLike = 1.0) -> Float32Array:
+    """Return `weight * (cos 2 angle, sin 2 angle)` as (..., 2) float32: angles fit for adding."""
+    twice = 2 * np.asarray(angle, np.float32)
+    vectors = np.stack([np.cos(twice), np.sin(twice)], axis=-1)
+    return np.asarray(vectors * np.asarray(weight, np.float32)[..., None], np.float32)
+
+
+def single_angle(vectors: Float32Array) -> Float32Array:
+    """Return the undirected angles in [0, pi) of (..., 2) double-angle vectors.
+
+    >>> single_angle(double_angle([0.5, 3.0])).round(3).tolist()
+    [0.5, 3.0]
+    """
+    return wrap_angle(0.5 * np.arctan2(vectors[..., 1], vectors[..., 0]))
+
+
+def smooth_angles(
+    angle: Float32Array, weight: Float32Array | BoolArray, sigma: float
+) -> tuple[Float32Array, Float32Array]:
+    """Return the Gaussian mean of undirected angles and how well the angles agree.
+
+    Parameters
+    ----------
+    angle, weight : (H, W)
+        Angles in radians and what each counts for; 0 beyond the mask.
+    sigma : float
+        Of the Gaussian, in pixels.
+
+    Returns
+    -------
+    angle, coherence : (H, W) float32
+        Angles in [0, pi); length of the mean resultant in [0, 1], 1 where all angles are equal.
+    """
+    mean = masked_blur(double_angle(angle), weight, sigma)
+    return single_angle(mean), np.minimum(np.hypot(mean[..., 0], mean[..., 1]), 1)
+
+
+def coherent_truth(
+    angle: Float32Array,
+    mask: BoolArray,
+    window: int = COHERENT_WINDOW,
+    resultant: float = COHERENT_RESULTANT,
+) -> BoolArray:
+    """Return where a true orientation is coherent enough to be scored against.
+
+    A pixel is coherent when the double-angle vectors of the known pixels in the box of edge
+    `window` around it have a mean of length at least `resultant`: crossing strands have no single
+    orientation that an orienter could be asked for.
+
+    Parameters
+    ----------
+    angle : (H, W)
+        True strand angles in radians.
+    mask : (H, W)
+        Where the truth is known.
+    window, resultant
+        Edge of the box in pixels, least length of the mean in [0, 1].
+    """
+    weight = mask.astype(np.float32)
+
+    def box(values: Float32Array) -> Float32Array:
+        return np.asarray(
+            cv2.blur(values, (window, window), borderType=cv2.BORDER_CONSTANT), np.float32
+        )
+
+    total = box(double_angle(angle, weight))
+    length = np.hypot(total[..., 0], total[..., 1])
+    return np.asarray(mask & (length >= resultant * box(weight)))
