@@ -33,8 +33,8 @@ def picture_scale(height: int) -> float:
 
 def luminance(image: UInt8Array) -> Float32Array:
     """Return the (H, W) luma of an (H, W, 3) RGB image as float32 in [0, 1] (Rec. 601 weights)."""
-    grey = cv2.transform(image, np.array([[0.299, 0.587, 0.114]], np.float32) / 255)
-    return np.asarray(grey, np.float32)
+    red, green, blue = cv2.split(np.asarray(image, np.float32))
+    return (0.299 * red + 0.587 * green + 0.114 * blue) * np.float32(1 / 255)
 
 
 def blur(values: Float32Array, sigma: float) -> Float32Array:
