@@ -1,0 +1,160 @@
+"""The command line: one verb, one small file `hairkit/cli/VERB.py` with `register` and `run`.
+
+`register(subparsers)` adds the verb's parser, its description beginning with an example;
+`run(args)` does the work and returns the exit code. Only the verb that is asked for is imported.
+Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 2 one line says why.
+"""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import errno
+import importlib
+import logging
+import os
+import re
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from hairkit.errors import HairkitError
+
+VERBS = {
+    "reconstruct": "turn eight photos into a groom",
+    "evaluate": "score a groom against the truth",
+    "synth": "make a procedural groom and photos of it, with their truth",
+    "render": "draw a groom on its head",
+    "export": "write a groom in an engine's format",
+    "info": "say what a file holds",
+    "plugins": "list the plugins, or tell about one",
+    "new-plugin": "start a plugin of your own",
+    "doctor": "check this machine and say what to install",
+}
+
+_EXAMPLE = "Example: hairkit reconstruct photos/ -o out/"
+
+
+class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """Keeps the description's lines and leaves room for the longest command."""
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **{"max_help_position": 28, **settings})
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose help begins with the example and whose errors are one line."""
+
+    def __init__(self, **settings: Any) -> None:
+        settings.setdefault("formatter_class", _HelpFormatter)
+        settings.setdefault("allow_abbrev", False)
+        super().__init__(**settings)
+
+    def format_help(self) -> str:
+        """Return the help, the description (which begins with an example) before the usage."""
+        description, self.description = self.description, None
+        try:
+            return f"{description or _EXAMPLE}\n\n{super().format_help()}"
+        finally:
+            self.description = description
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line on stderr and leave with exit code 2."""
+        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code; `argv` is `sys.argv[1:]` by default."""
+    words = list(sys.argv[1:] if argv is None else argv)
+    debug = "--debug" in words
+    words = [word for word in words if word != "--debug"]
+    _log_to_stderr(logging.DEBUG if debug else logging.WARNING)
+    try:
+        return _run(words)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # so that the exit's flush stays quiet too
+        return 0
+    except (Exception, KeyboardInterrupt) as error:
+        if debug:
+            traceback.print_exc()
+        line, code = explain(error)
+        print(f"hairkit: {line}", file=sys.stderr)
+        return code
+
+
+def explain(error: BaseException) -> tuple[str, int]:
+    """Return the one line that tells a user about an error, and the exit code."""
+    if isinstance(error, HairkitError):
+        return _one_line(error), 2
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted; run it again to go on where it stopped", 2
+    if isinstance(error, MemoryError):
+        return f"out of memory; use smaller pictures or larger voxels ({_one_line(error)})", 2
+    if isinstance(error, OSError):
+        named = f"{error.filename}: " if error.filename is not None else ""
+        cure = "; free some space and run it again" if error.errno == errno.ENOSPC else ""
+        return f"{named}{error.strerror or _one_line(error)}{cure}", 2
+    kind = type(error).__name__
+    return f"unexpected {kind}: {_one_line(error)}; run it again with --debug to see where", 1
+
+
+def _run(words: list[str]) -> int:
+    verb = next((word for word in words if not word.startswith("-")), None)
+    if verb is not None and verb not in VERBS:
+        close = difflib.get_close_matches(verb, VERBS, 1)
+        hint = f" (did you mean {close[0]!r}?)" if close else ""
+        raise _UsageError(f"no command {verb!r}{hint}; commands: {', '.join(VERBS)}")
+    parser, verb_parser, module = _build(verb)
+    if verb is None and not {"-h", "--help", "--version"} & set(words):
+        parser.print_help(sys.stderr)
+        return 2
+    args, unknown = parser.parse_known_args(words)
+    if unknown:
+        _refuse(verb_parser or parser, unknown)
+    return int(module.run(args))
+
+
+class _UsageError(HairkitError):
+    """The command line itself cannot be understood."""
+
+
+def _build(verb: str | None) -> tuple[Parser, Parser | None, Any]:
+    """Make the parser; only the module of `verb` is imported."""
+    from hairkit import __version__
+
+    parser = Parser(prog="hairkit", description=_EXAMPLE)
+    parser.add_argument("--version", action="version", version=f"hairkit {__version__}")
+    parser.add_argument("--debug", action="store_true", help="show tracebacks and debug messages")
+    verbs = parser.add_subparsers(title="commands", metavar="COMMAND", parser_class=Parser)
+    module = None
+    for name, summary in VERBS.items():
+        if name == verb:
+            module = importlib.import_module(f"hairkit.cli.{name.replace('-', '_')}")
+            module.register(verbs)
+        else:
+            verbs.add_parser(name, help=summary)
+    return parser, verbs.choices[verb] if verb is not None else None, module
+
+
+def _refuse(parser: Parser, unknown: list[str]) -> NoReturn:
+    known = sorted(set(re.findall(r"--[\w-]+", parser.format_help())))
+    word = unknown[0]
+    if not word.startswith("-"):
+        parser.error(f"unexpected argument {word!r}")
+    close = difflib.get_close_matches(word.partition("=")[0], known, 1)
+    hint = f" (did you mean {close[0]!r}?)" if close else ""
+    parser.error(f"no option {word!r}{hint}")
+
+
+def _log_to_stderr(level: int) -> None:
+    logger = logging.getLogger("hairkit")
+    logger.setLevel(level)
+    if not logger.handlers:
+        handler = logging.StreamHandler()
+        handler.setFormatter(logging.Formatter("hairkit: %(levelname)s: %(message)s"))
+        logger.addHandler(handler)
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,110 @@
+"""`hairkit plugins [NAME]`: list the plugins by stage, or tell about one and its options."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from typing import Any
+
+from hairkit.manager import STAGES, Manager, PluginInfo
+from hairkit.options import OptionInfo
+
+_DESCRIPTION = """\
+Example: hairkit plugins gabor
+
+List the installed plugins by stage, or tell about one: where it comes from, what it does, and
+its options with their defaults and bounds."""
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser("plugins", help="list the plugins", description=_DESCRIPTION)
+    parser.add_argument("name", nargs="?", metavar="NAME", help="a plugin, or a stage's hook")
+    parser.add_argument(
+        "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
+    )
+    parser.add_argument("--json", action="store_true", help="print for machines")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the list, or one plugin; a broken plugin asked for by name gives exit code 2."""
+    manager = Manager.loaded(args.plugin)
+    if args.name is None or args.name in STAGES:
+        wanted = [i for i in manager.plugins() if args.name is None or args.name in i.stages]
+        print(_as_json(wanted) if args.json else _listing(wanted))
+        return 0
+    info = manager.info(args.name)
+    print(_as_json([info]) if args.json else _details(info))
+    return 2 if info.broken else 0
+
+
+def _listing(infos: list[PluginInfo]) -> str:
+    lines = []
+    for stage in STAGES:
+        members = [info for info in infos if stage in info.stages]
+        if members:
+            lines += [stage, *(f"  {_row(info)}" for info in members)]
+    listeners = [info for info in infos if not info.stages and not info.broken]
+    if listeners:
+        lines += ["notifications only", *(f"  {_row(info)}" for info in listeners)]
+    broken = [info for info in infos if info.broken]
+    if broken:
+        lines += ["broken", *(f"  {i.name:<20} {i.origin}: {i.broken}" for i in broken)]
+    return "\n".join(lines) or "no plugin"
+
+
+def _row(info: PluginInfo) -> str:
+    return f"{info.name:<20} {info.origin:<16} {info.summary}"
+
+
+def _details(info: PluginInfo) -> str:
+    lines = [f"{info.name}: {info.summary}" if info.summary else info.name, f"from {info.origin}"]
+    if info.broken:
+        return "\n".join([*lines, f"broken: {info.broken}"])
+    lines.append(f"stages: {', '.join(info.stages) or 'none'}")
+    if info.notifications:
+        lines.append(f"listens to: {', '.join(info.notifications)}")
+    lines.append("options:" if info.options else "no options")
+    for option in info.options:
+        lines += [f"  {option.name} = {_shown(option)}  ({option.wanted})", f"      {option.doc}"]
+    if info.options:
+        first = info.options[0]
+        lines.append(f"set one with --set {info.name}.{first.name}={_shown(first)}")
+    return "\n".join(lines)
+
+
+def _shown(option: OptionInfo) -> str:
+    if isinstance(option.default, tuple):
+        return ",".join(str(item) for item in option.default)
+    if isinstance(option.default, bool):
+        return str(option.default).lower()
+    return "none" if option.default is None else str(option.default)
+
+
+def _as_json(infos: list[PluginInfo]) -> str:
+    entries = [
+        {
+            "name": info.name,
+            "distribution": info.distribution,
+            "version": info.version,
+            "summary": info.summary,
+            "stages": info.stages,
+            "notifications": info.notifications,
+            "broken": info.broken,
+            "options": [
+                {
+                    "name": option.name,
+                    "default": option.default,
+                    "wanted": option.wanted,
+                    "low": option.low,
+                    "high": option.high,
+                    "choices": option.choices,
+                    "unit": option.unit,
+                    "doc": option.doc,
+                }
+                for option in info.options
+            ],
+        }
+        for info in infos
+    ]
+    return json.dumps(entries, indent=1, default=str)
