@@ -16,7 +16,9 @@ CameraModel = Literal["perspective", "orthographic"]
 
 @dataclass(frozen=True, eq=False)
 class Camera(Stored):
-    """A camera that sees the head: +x right, +y down, +z forward; pixel (0, 0) is the first pixel's outer corner.
+    """A camera that sees the head: +x right, +y down, +z forward.
+
+    Pixel (0, 0) is the outer corner of the first pixel.
 
     Perspective: `u = focal x / z + centre_x`; orthographic: `u = focal x + centre_x`.
     """
@@ -49,7 +51,8 @@ class Camera(Stored):
             )
         if not (np.isfinite(self.focal) and self.focal > 0 and self.width > 0 and self.height > 0):
             raise InputError(
-                f"camera needs focal, width and height above 0, got {self.focal}, {self.width}, {self.height}"
+                f"camera needs focal, width and height above 0, got"
+                f" {self.focal}, {self.width}, {self.height}"
             )
         object.__setattr__(self, "camera_from_head", matrix)
         object.__setattr__(self, "centre", frozen_array(self.centre, np.float64, (2,), "centre"))
@@ -73,11 +76,12 @@ class Camera(Stored):
     @property
     def forward(self) -> Float64Array:
         """(3,) unit optical axis in the head frame, away from the camera."""
-        return self.rotation[2]
+        result: Float64Array = self.rotation[2]
+        return result
 
     @property
     def azimuth_deg(self) -> float:
-        """Azimuth of the camera seen from the head: 0 in front, positive towards the subject's left."""
+        """Azimuth of the camera seen from the head: 0 in front, positive to the subject's left."""
         x, _, z = -self.forward
         return float(np.degrees(np.arctan2(x, z)))
 
@@ -92,7 +96,9 @@ class Camera(Stored):
         return result
 
     def project(self, points: npt.ArrayLike) -> Float64Array:
-        """Project head-frame points (..., 3) to pixels (..., 2); points behind a perspective camera give NaN.
+        """Project head-frame points (..., 3) to pixels (..., 2).
+
+        Points behind a perspective camera give NaN.
 
         >>> camera = Camera.on_turn(0.0, distance=1.0, focal=1000.0, width=800, height=600)
         >>> camera.project([0.1, 0.0, 0.0]).tolist()  # the subject's left is on the image's right
@@ -113,7 +119,7 @@ class Camera(Stored):
         return result
 
     def unproject(self, pixels: npt.ArrayLike, depth: npt.ArrayLike) -> Float64Array:
-        """Return the head-frame points (..., 3) seen at `pixels` (..., 2) at axial `depth` (...,)."""
+        """Return the points (..., 3) of the head frame at `pixels` (..., 2) and axial `depth` (...,)."""
         xy = (np.asarray(pixels, np.float64) - self.centre) / self.focal
         z = np.asarray(depth, np.float64)[..., None]
         local = np.concatenate([xy * z if self.model == "perspective" else xy + 0 * z, z], axis=-1)
@@ -121,7 +127,7 @@ class Camera(Stored):
         return result
 
     def rays(self, pixels: npt.ArrayLike) -> tuple[Float64Array, Float64Array]:
-        """Return ray origins (..., 3) and unit directions (..., 3) through `pixels` (..., 2), head frame."""
+        """Return origins (..., 3) and unit directions (..., 3) of the rays through `pixels` (..., 2)."""
         near = self.unproject(pixels, np.zeros(np.shape(pixels)[:-1]))
         far = self.unproject(pixels, np.ones(np.shape(pixels)[:-1]))
         return near, (far - near) / np.linalg.norm(far - near, axis=-1, keepdims=True)
@@ -135,7 +141,7 @@ class Camera(Stored):
         return result
 
     def resized(self, width: int, height: int) -> Camera:
-        """Return the same camera for its picture scaled to `width` x `height` pixels (equal aspect)."""
+        """Return the same camera for its picture scaled to `width` x `height` px (equal aspect)."""
         scale = width / self.width
         size = np.array([width / self.width, height / self.height])
         return replace(
@@ -143,7 +149,7 @@ class Camera(Stored):
         )
 
     def to_json(self, name: str) -> dict[str, Any]:
-        """Return the camera as the captures' `truth.json` writes it: R, t, fx, fy, cx, cy or scale_px_per_m."""
+        """Return the camera in the form of `truth.json`: R, t, fx, fy, cx, cy or scale_px_per_m."""
         pose = {
             "R": self.rotation.tolist(),
             "t": self.translation.tolist(),
@@ -165,7 +171,7 @@ class Camera(Stored):
 
     @classmethod
     def from_json(cls, entry: dict[str, Any]) -> Camera:
-        """Read one view of a `truth.json` or `scene.json`; raises `InputError` where a key is missing."""
+        """Read one view of a `truth.json` or `scene.json`; `InputError` where a key is missing."""
         try:
             matrix = np.eye(4)
             matrix[:3, :3] = entry["R"]

@@ -15,7 +15,8 @@ class View:
     """One photo of the turn, upright, at working size."""
 
     name: str
-    """`front`, `front-left`, `left`, `back-left`, `back`, `back-right`, `right`, `front-right`, or as named."""
+    """`front`, `front-left`, `left`, `back-left`, `back`, `back-right`, `right`, `front-right`,
+    or as `capture.toml` says."""
     azimuth_deg: float
     """Nominal azimuth: 0 in front, positive towards the subject's left."""
     image: UInt8Array
@@ -28,7 +29,7 @@ class View:
     strokes_path: Path | None = None
     photo_path: Path | None = None
     photo_size: tuple[int, int] = (0, 0)
-    """(width, height) of the photo on disk after EXIF rotation; masks and strokes are in those pixels."""
+    """(width, height) of the photo on disk after EXIF rotation: the pixels of masks and strokes."""
 
     def __post_init__(self) -> None:
         object.__setattr__(

@@ -1,4 +1,4 @@
-"""The head: a closed or open triangle mesh with scalp, texture coordinates, landmarks, skeleton and capsules."""
+"""The head: a triangle mesh, closed or open, with scalp, uv, landmarks, skeleton and capsules."""
 
 from __future__ import annotations
 

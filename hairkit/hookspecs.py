@@ -1,7 +1,8 @@
 """The contract: every stage of the road from photos to a groom is a hook that a plugin implements.
 
-A plugin is a module (or object) with functions marked `@hairkit.hookimpl` and, if it has any settings, a frozen
-dataclass named `Options`. An implementation names only the arguments it needs; pluggy passes those by name.
+A plugin is a module (or object) with functions marked `@hairkit.hookimpl` and, if it has any
+settings, a frozen dataclass named `Options`. An implementation names only the arguments it needs;
+pluggy passes those by name.
 Stage hooks are called on one plugin, chosen by name in the recipe; notifications go to all plugins.
 `options` is the plugin's own `Options` instance (None when it has none).
 """
@@ -37,12 +38,12 @@ def segment(view: View, options: Any) -> Mask | None:
 def estimate_scene(
     capture: Capture, masks: tuple[Mask, ...], head: Head, options: Any
 ) -> Scene | None:
-    """Find the cameras of all views and the head's size and place; `head` is the head before fitting."""
+    """Find the cameras of all views and the head's size and place; `head` is not fitted yet."""
 
 
 @hookspec(firstresult=True)
 def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: Any) -> Scene | None:
-    """Bend the scene's head to the photos; cameras may be touched up too. Topology stays as it is."""
+    """Bend the scene's head to the photos, touch up the cameras; the topology stays as it is."""
 
 
 @hookspec(firstresult=True)

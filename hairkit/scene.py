@@ -21,7 +21,7 @@ class Scene(Stored):
     cameras: tuple[Camera, ...]
     head: Head
     residual_px: float | None = None
-    """Root mean square misfit of the cameras in pixels of the working pictures; None when never measured."""
+    """Root mean square misfit of the cameras in working pixels; None when never measured."""
 
     def __post_init__(self) -> None:
         if len(self.names) != len(self.cameras) or not self.cameras:
@@ -30,7 +30,7 @@ class Scene(Stored):
             )
 
     def write_json(self, path: str | os.PathLike[str]) -> None:
-        """Write cameras and head joints as JSON, cameras in the form of a capture's `truth.json`."""
+        """Write cameras and head joints as JSON, cameras in the form of `truth.json`."""
         views = [
             camera.to_json(name) for name, camera in zip(self.names, self.cameras, strict=True)
         ]

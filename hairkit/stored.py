@@ -33,7 +33,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 def frozen_array(
     value: npt.ArrayLike, dtype: npt.DTypeLike, shape: tuple[int | None, ...], name: str
 ) -> npt.NDArray[Any]:
-    """Return `value` as a read-only contiguous array of `dtype`; `None` in `shape` matches any size.
+    """Return `value` as a read-only contiguous array; `None` in `shape` matches any size.
 
     Raises `InputError` naming the array when the shape differs or a float is not finite.
     """
@@ -60,7 +60,7 @@ class Stored:
     """
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write every field to `path` (npz, compressed), atomically and byte for byte repeatably."""
+        """Write every field to `path` (npz, compressed), atomically and byte for byte the same."""
         write_npz(path, _to_arrays(self, ""))
 
     @classmethod
@@ -87,7 +87,7 @@ def write_npz(path: str | os.PathLike[str], arrays: dict[str, npt.NDArray[Any]])
 
 
 def read_npz(path: str | os.PathLike[str]) -> dict[str, npt.NDArray[Any]]:
-    """Read every array of an npz file, refusing pickles, bombs and damaged files with `FormatError`."""
+    """Read every array of an npz file; `FormatError` for pickles, bombs and damaged files."""
     try:
         with zipfile.ZipFile(path) as archive:
             unpacked = sum(info.file_size for info in archive.infolist())

@@ -104,7 +104,7 @@ class Strands(Stored):
         return result
 
     def tangents(self) -> Float32Array:
-        """Return (P, 3) unit directions root to tip: forward differences, the last point repeats its segment."""
+        """Return (P, 3) unit directions root to tip: forward differences, repeated at the tip."""
         difference = np.zeros((len(self.points), 3))
         difference[:-1] = np.diff(self.points.astype(np.float64), axis=0)
         last = self.offsets[1:] - 1
@@ -130,13 +130,13 @@ class Strands(Stored):
         )
 
     def resampled(self, count: int) -> Strands:
-        """Return strands of `count` points at equal arc length each; ends stay, widths are interpolated."""
+        """Return strands of `count` points at equal arc length; ends stay, widths are mixed."""
         if count < 2:
             raise InputError(f"a strand needs at least 2 points, got {count}")
         return self._at(np.full(len(self), count))
 
     def resampled_by_length(self, step: float) -> Strands:
-        """Return strands with points about `step` metres apart (equal within a strand, ends stay)."""
+        """Return strands with points about `step` metres apart, equal in a strand; ends stay."""
         if not step > 0:
             raise InputError(f"resampling step is {step}, expected metres above 0")
         return self._at(np.maximum(np.ceil(self.lengths() / step - 1e-9).astype(np.int64), 1) + 1)

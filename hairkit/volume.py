@@ -1,4 +1,4 @@
-"""Volumes in the head frame: the grid, the hull that hair fills, and the field of orientations in it."""
+"""Volumes in the head frame: the grid, the hull that hair fills, the orientations in it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class VoxelGrid(Stored):
 
     @classmethod
     def around(cls, low: npt.ArrayLike, high: npt.ArrayLike, spacing: float) -> VoxelGrid:
-        """Return the smallest grid of `spacing` that covers the box from `low` (3,) to `high` (3,)."""
+        """Return the smallest grid of `spacing` over the box from `low` (3,) to `high` (3,)."""
         lowest, highest = np.asarray(low, np.float64), np.asarray(high, np.float64)
         shape = np.maximum(np.ceil((highest - lowest) / spacing), 1).astype(int)
         return cls(lowest, spacing, tuple(shape.tolist()))
@@ -62,7 +62,10 @@ class VoxelGrid(Stored):
         return np.clip(index, 0, np.array(self.shape) - 1)
 
     def sample(self, values: npt.NDArray[np.float32], points: npt.ArrayLike) -> Float32Array:
-        """Interpolate `values` (X, Y, Z) or (X, Y, Z, C) trilinearly at points (N, 3), clamped at the border."""
+        """Interpolate `values` (X, Y, Z) or (X, Y, Z, C) trilinearly at points (N, 3).
+
+        Outside the grid the nearest border value holds.
+        """
         index = np.clip(self.index_from_head(points), 0, np.array(self.shape) - 1)
         low = np.minimum(index.astype(np.int64), np.maximum(np.array(self.shape) - 2, 0))
         t = (index - low).astype(np.float32)
@@ -81,7 +84,7 @@ class VoxelGrid(Stored):
 
 @dataclass(frozen=True, eq=False)
 class Hull(Stored):
-    """Where hair is: the dense body of hair, the looser volume that still may hold strands, and the head."""
+    """Where hair is: its dense body, the looser volume that may hold strands, and the head."""
 
     grid: VoxelGrid
     dense: BoolArray
@@ -97,7 +100,8 @@ class Hull(Stored):
         loose = frozen_array(self.loose, np.bool_, shape, "hull loose")
         if not dense.any():
             raise InputError(
-                "the hull is empty: the masks of the views do not overlap in space; check masks and cameras"
+                "the hull is empty: the masks of the views do not overlap in space;"
+                " check masks and cameras"
             )
         if (dense & ~loose).any():
             raise InputError("hull: every dense cell must be a loose cell")
@@ -117,11 +121,11 @@ class OrientationField(Stored):
 
     grid: VoxelGrid
     tensor: Float32Array
-    """(X, Y, Z, 6) xx, yy, zz, xy, xz, yz; the strand runs along the eigenvector of the largest eigenvalue."""
+    """(X, Y, Z, 6) xx, yy, zz, xy, xz, yz; the strand runs along the main eigenvector."""
     confidence: Float32Array
     """(X, Y, Z) in [0, 1]; 0 where nothing is known."""
     growth: Float32Array
-    """(X, Y, Z) potential that grows with the distance from the scalp through the hair; settles the sign."""
+    """(X, Y, Z) potential, growing with the distance from the scalp through the hair: the sign."""
 
     def __post_init__(self) -> None:
         shape = self.grid.shape

@@ -126,7 +126,7 @@ def _build(verb: str | None) -> tuple[Parser, Parser | None, Any]:
     parser = Parser(prog="hairkit", description=_EXAMPLE)
     parser.add_argument("--version", action="version", version=f"hairkit {__version__}")
     parser.add_argument("--debug", action="store_true", help="show tracebacks and debug messages")
-    verbs = parser.add_subparsers(title="commands", metavar="COMMAND", parser_class=Parser)
+    verbs = parser.add_subparsers(title="commands", metavar="COMMAND [-h]", parser_class=Parser)
     module = None
     for name, summary in VERBS.items():
         if name == verb:
