@@ -119,7 +119,7 @@ class Camera(Stored):
         return result
 
     def unproject(self, pixels: npt.ArrayLike, depth: npt.ArrayLike) -> Float64Array:
-        """Return the points (..., 3) of the head frame at `pixels` (..., 2) and axial `depth` (...,)."""
+        """Return head-frame points (..., 3) at `pixels` (..., 2) and axial `depth` (...,)."""
         xy = (np.asarray(pixels, np.float64) - self.centre) / self.focal
         z = np.asarray(depth, np.float64)[..., None]
         local = np.concatenate([xy * z if self.model == "perspective" else xy + 0 * z, z], axis=-1)
@@ -127,7 +127,7 @@ class Camera(Stored):
         return result
 
     def rays(self, pixels: npt.ArrayLike) -> tuple[Float64Array, Float64Array]:
-        """Return origins (..., 3) and unit directions (..., 3) of the rays through `pixels` (..., 2)."""
+        """Return origins and unit directions, both (..., 3), of rays through `pixels` (..., 2)."""
         near = self.unproject(pixels, np.zeros(np.shape(pixels)[:-1]))
         far = self.unproject(pixels, np.ones(np.shape(pixels)[:-1]))
         return near, (far - near) / np.linalg.norm(far - near, axis=-1, keepdims=True)
