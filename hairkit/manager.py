@@ -124,7 +124,7 @@ class Manager:
             self._load_file(Path(file))
 
     def register(
-        self, plugin: object, name: str, distribution: str = "", version: str = ""
+        self, plugin: object, name: str, distribution: str = "this program", version: str = ""
     ) -> None:
         """Add a plugin object; raises `PluginError` when it breaks the contract."""
         if name in self._infos:

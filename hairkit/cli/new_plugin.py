@@ -1,0 +1,37 @@
+"""`hairkit new-plugin STAGE NAME`: write a working plugin package to start from."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from hairkit.manager import STAGES
+from hairkit.recipe import HOOKS
+from hairkit.scaffold import new_plugin
+
+_DESCRIPTION = """\
+Example: hairkit new-plugin orient my_method
+
+Write a working plugin package with its entry point, its options and its test. Nothing that
+exists is overwritten."""
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "new-plugin", help="start a plugin of your own", description=_DESCRIPTION
+    )
+    others = [stage for stage in STAGES if stage not in HOOKS.values()]
+    stages = f"a stage of the recipe ({', '.join(HOOKS)}) or a hook ({', '.join(others)})"
+    parser.add_argument("stage", metavar="STAGE", help=stages)
+    parser.add_argument("name", metavar="NAME", help="the plugin's name: lower_case_words")
+    parser.add_argument("-o", "--output", metavar="FOLDER", help="default: hairkit-NAME")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the package and say what to do with it."""
+    folder = new_plugin(args.stage, args.name, args.output)
+    print(f"wrote {folder}")
+    print(f"install it: pip install -e {folder}")
+    print(f"test it:    python -m pytest {folder}")
+    return 0

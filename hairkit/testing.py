@@ -1,0 +1,211 @@
+"""A small made-up head with hair, for the tests of plugins: the arguments of every stage.
+
+The head is a ball of 10 cm, the hair a shell around its upper half, combed straight down, seen by
+eight cameras of the nominal turn. Nothing here is random.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairkit.camera import Camera
+from hairkit.capture import Capture, View
+from hairkit.groom import Groom
+from hairkit.head import Capsules, Head, Roots
+from hairkit.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.orientation import OrientationMap, wrap_angle
+from hairkit.scene import Scene
+from hairkit.stored import BoolArray, Float32Array
+from hairkit.strands import Strands
+from hairkit.volume import Hull, OrientationField, VoxelGrid, outer_products
+
+VIEW_NAMES = (
+    "front",
+    "front-left",
+    "left",
+    "back-left",
+    "back",
+    "back-right",
+    "right",
+    "front-right",
+)
+"""Views of the nominal turn, 45 degrees apart, towards the subject's left."""
+
+_WIDTH, _HEIGHT = 96, 128
+_BALL, _HAIR = 0.1, 0.125
+
+
+def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
+    """Return the arguments of a stage hook, `options` apart, all made from the same small head.
+
+    Parameters
+    ----------
+    stage
+        Name of the hook: `orient`.
+    folder
+        An empty folder, for `export_groom` and `import_groom`, which read and write a file.
+    """
+    capture, scene = turn_capture(), turn_scene()
+    masks = tuple(ball_mask(camera) for camera in scene.cameras)
+    if stage in ("enhance_texture", "make_simulator", "export_groom", "import_groom"):
+        return _groom_arguments(stage, folder)
+    every: dict[str, Any] = {
+        "capture": capture,
+        "view": capture.views[0],
+        "mask": masks[0],
+        "masks": masks,
+        "head": scene.head,
+        "scene": scene,
+        "orientations": tuple(combed_orientation(mask) for mask in masks),
+        "hull": shell_hull(),
+        "field": combed_field(),
+        "roots": scalp_roots(scene.head),
+    }
+    wanted = {
+        "segment": ("view",),
+        "estimate_scene": ("capture", "masks", "head"),
+        "fit_head": ("capture", "masks", "scene"),
+        "orient": ("view", "mask"),
+        "build_hull": ("scene", "masks"),
+        "solve_field": ("scene", "masks", "orientations", "hull"),
+        "track": ("scene", "masks", "orientations", "hull", "field", "roots"),
+    }
+    return {name: every[name] for name in wanted[stage]}
+
+
+def striped_view(angle_deg: float, *, name: str = "front", azimuth_deg: float = 0.0) -> View:
+    """Return a photo whose strands all run at `angle_deg`, from +x towards +y (y down)."""
+    row, column = np.mgrid[:_HEIGHT, :_WIDTH] + 0.5
+    angle = np.radians(angle_deg)
+    across = -np.sin(angle) * column + np.cos(angle) * row
+    grey = 110 + 60 * np.sin(2 * np.pi * across / 6) + 20 * np.sin(2 * np.pi * across / 17)
+    image = np.repeat(grey[..., None], 3, axis=-1).astype(np.uint8)
+    return View(name, azimuth_deg, image, focal_px=200.0)
+
+
+def turn_capture() -> Capture:
+    """Return the eight photos of the turn, with upright stripes."""
+    views = enumerate(VIEW_NAMES)
+    return Capture(tuple(striped_view(90.0, name=n, azimuth_deg=45.0 * i) for i, n in views))
+
+
+def turn_scene() -> Scene:
+    """Return the eight true cameras and the ball head."""
+    cameras = tuple(
+        Camera.on_turn(45.0 * i, distance=0.6, focal=200.0, width=_WIDTH, height=_HEIGHT)
+        for i in range(len(VIEW_NAMES))
+    )
+    return Scene(VIEW_NAMES, cameras, ball_head())
+
+
+def ball_head(rings: int = 12) -> Head:
+    """Return a ball of 10 cm as a closed mesh of `2 * rings` meridians, its scalp above y = 0."""
+    segments = 2 * rings
+    polar = np.linspace(0, np.pi, rings + 1)[1:-1, None]
+    around = np.linspace(0, 2 * np.pi, segments, endpoint=False)[None, :]
+    y, ring = np.cos(polar) + 0 * around, np.sin(polar)
+    sides = np.stack([ring * np.sin(around), y, ring * np.cos(around)], axis=-1).reshape(-1, 3)
+    poles = np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, -1.0, 0.0]])
+    vertices = (_BALL * np.concatenate([poles[0], sides, poles[1]])).astype(np.float32)
+    here = 1 + np.arange((rings - 2) * segments)
+    beside = 1 + (here - 1) // segments * segments + here % segments
+    first, last = 1 + np.arange(segments), len(vertices) - 1 - segments + np.arange(segments)
+    faces = [
+        np.stack([0 * first, first, np.roll(first, -1)], axis=-1),
+        np.stack([here, here + segments, beside], axis=-1),
+        np.stack([beside, here + segments, beside + segments], axis=-1),
+        np.stack([last, np.full(segments, len(vertices) - 1), np.roll(last, -1)], axis=-1),
+    ]
+    centre = np.zeros((1, 3), np.float32)
+    return Head(
+        vertices,
+        np.concatenate(faces),
+        (0.5 + 0.5 * vertices[:, [0, 2]] / _BALL).astype(np.float32),
+        (vertices[:, 1] > 0.0).astype(np.float32),
+        None,
+        np.array([[0.0, -0.2, 0.0], [0.0, -0.1, 0.0], [0.0, 0.0, 0.0]], np.float32),
+        Capsules(centre, centre, np.full((1, 2), _BALL, np.float32)),
+    )
+
+
+def ball_mask(camera: Camera) -> Mask:
+    """Return the true labels of the ball and its hair in a camera."""
+    column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    start, way = camera.rays(np.stack([column, row], axis=-1))
+    nearest = start - way * np.sum(start * way, axis=-1, keepdims=True)
+    distance = np.linalg.norm(nearest, axis=-1)
+    labels = np.where(distance < _BALL, PERSON, BACKGROUND)
+    labels[(distance < _HAIR) & (nearest[..., 1] > 0)] = HAIR
+    return Mask(labels, True)
+
+
+def combed_orientation(mask: Mask) -> OrientationMap:
+    """Return upright strands, certain wherever hair is."""
+    upright = np.full(mask.labels.shape, np.pi / 2)
+    return OrientationMap(wrap_angle(upright), mask.hair.astype(np.float32))
+
+
+def shell_hull(spacing: float = 0.01) -> Hull:
+    """Return the shell of hair around the upper half of the ball, as cells."""
+    grid = VoxelGrid.around(np.full(3, -0.15), np.full(3, 0.15), spacing)
+    distance, shell = _shell(grid, _HAIR)
+    return Hull(grid, shell, _shell(grid, _HAIR + spacing)[1], distance)
+
+
+def combed_field(spacing: float = 0.01) -> OrientationField:
+    """Return the field of hair combed along the ball, straight down."""
+    grid = VoxelGrid.around(np.full(3, -0.15), np.full(3, 0.15), spacing)
+    centres = grid.centres().astype(np.float64)
+    out = centres / np.linalg.norm(centres, axis=-1, keepdims=True)
+    down = np.array([0.0, -1.0, 0.0]) + out * out[..., 1:2]
+    down /= np.maximum(np.linalg.norm(down, axis=-1, keepdims=True), 1e-9)
+    growth = np.arccos(np.clip(out[..., 1], -1, 1)) * _HAIR
+    confidence = _shell(grid, _HAIR)[1].astype(np.float32)
+    tensor = outer_products(down).astype(np.float32)
+    return OrientationField(grid, tensor, confidence, growth.astype(np.float32))
+
+
+def scalp_roots(head: Head) -> Roots:
+    """Return one root in the middle of every face of the scalp."""
+    triangle = np.flatnonzero((head.scalp[head.faces] > 0.5).all(axis=1)).astype(np.int32)
+    barycentric = np.full((len(triangle), 3), 1 / 3, np.float32)
+    corners = head.faces[triangle]
+    normals = head.normals()[corners].mean(axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    positions, uv = head.vertices[corners].mean(axis=1), head.uv[corners].mean(axis=1)
+    return Roots(positions, normals, uv, triangle, barycentric)
+
+
+def bristle_groom() -> Groom:
+    """Return straight strands of 3 cm along the scalp's normals, bound to the ball head."""
+    head = ball_head()
+    roots = scalp_roots(head)
+    along = np.linspace(0.0, 0.03, 5, dtype=np.float32)[None, :, None]
+    points = roots.positions[:, None] + along * roots.normals[:, None]
+    offsets = np.arange(len(roots) + 1) * 5
+    strands = Strands(points.reshape(-1, 3), offsets, root_uv=roots.uv)
+    return Groom(strands, head, roots.triangle, roots.barycentric)
+
+
+def _shell(grid: VoxelGrid, radius: float) -> tuple[Float32Array, BoolArray]:
+    centres = grid.centres().astype(np.float64)
+    distance = np.linalg.norm(centres, axis=-1)
+    hair = (distance > _BALL) & (distance < radius) & (centres[..., 1] > 0)
+    return (distance - _BALL).astype(np.float32), hair
+
+
+def _groom_arguments(stage: str, folder: Path | None) -> dict[str, Any]:
+    if stage == "enhance_texture":
+        return {"texture": striped_view(90.0).image}
+    groom = bristle_groom()
+    if stage == "make_simulator":
+        return {"groom": groom}
+    if folder is None:
+        raise ValueError(f"stage_arguments({stage!r}) needs a folder to put the file in")
+    if stage == "export_groom":
+        return {"groom": groom, "path": folder / "groom.out"}
+    groom.save(folder / "groom.npz")
+    return {"path": folder / "groom.npz"}
