@@ -1,0 +1,180 @@
+"""`hairkit doctor`: say what works on this machine and what to install for the rest."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import importlib.metadata
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from hairkit import __version__
+from hairkit.manager import Manager
+
+_DESCRIPTION = """\
+Example: hairkit doctor
+
+Check Python, the packages, OpenGL, caches and plugins, and say what to install. The exit code is
+0 when hairkit's core works; what is only optional gets a note."""
+
+_MODULES = {"opencv-contrib-python-headless": "cv2"}
+"""Distributions whose module has another name."""
+
+_GL_CURE = "on Debian: apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6"
+
+# Each backend gets a process of its own: only one can be loaded in a process, and drivers crash.
+_TRY_GL = """
+from hairkit.render.context import renderer
+with renderer() as found:
+    print(found.description)
+"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at."""
+
+    topic: str
+    verdict: Literal["ok", "note", "FAIL"]
+    text: str
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser("doctor", help="check this machine", description=_DESCRIPTION)
+    parser.add_argument("--json", action="store_true", help="print for machines")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what was found; 2 when something that hairkit cannot do without is broken."""
+    findings = list(examine())
+    if args.json:
+        print(json.dumps([asdict(finding) for finding in findings], indent=1))
+    else:
+        for finding in findings:
+            print(f"{finding.verdict:<5} {finding.topic:<31} {finding.text}")
+    return 2 if any(finding.verdict == "FAIL" for finding in findings) else 0
+
+
+def examine() -> Iterator[Finding]:
+    """Look at everything, one finding after the other."""
+    system = f"{platform.python_version()} at {sys.executable} on {platform.platform()}"
+    yield Finding("python", "ok" if sys.version_info >= (3, 11) else "FAIL", system)
+    yield Finding("hairkit", "ok", f"{__version__} at {Path(__file__).parents[1]}")
+    core, extras = _requirements()
+    yield from (_package(name) for name in core)
+    yield _opencv_wheels([d.name for d in importlib.metadata.distributions()])
+    yield from _graphics()
+    yield from (_extra(extra, names) for extra, names in extras.items())
+    yield _kernel_cache()
+    yield from _plugins()
+
+
+def _requirements() -> tuple[list[str], dict[str, list[str]]]:
+    """Return what hairkit needs, and what each of its extras adds, by distribution name."""
+    core: list[str] = []
+    extras: dict[str, list[str]] = {}
+    for line in importlib.metadata.requires("hairkit") or []:
+        name = re.split(r"[^\w.-]", line, maxsplit=1)[0]
+        extra = re.search(r"extra == ['\"]([\w-]+)['\"]", line)
+        (extras.setdefault(extra[1], []) if extra else core).append(name)
+    return core, extras
+
+
+def _package(name: str) -> Finding:
+    try:
+        version = importlib.metadata.version(name)
+        importlib.import_module(_MODULES.get(name, name.replace("-", "_")))
+    except Exception as error:  # a broken package may raise anything while it is imported
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        return Finding(name, "FAIL", f"{reason}; pip install --force-reinstall {name}")
+    return Finding(name, "ok", version)
+
+
+def _opencv_wheels(installed: list[str]) -> Finding:
+    """Look for several wheels that share the folder cv2: the last one installed broke the first."""
+    wheels = sorted({name.lower() for name in installed if name.lower().startswith("opencv-")})
+    if len(wheels) > 1:
+        cure = f"pip uninstall -y {' '.join(wheels)} && pip install opencv-contrib-python-headless"
+        return Finding("opencv wheels", "FAIL", f"several share the folder cv2; {cure}")
+    return Finding("opencv wheels", "ok", f"one: {', '.join(wheels) or 'a build without pip'}")
+
+
+def _graphics() -> Iterator[Finding]:
+    shown = {backend: _try_backend(backend) for backend in ("egl", "osmesa")}
+    works = any(success for success, _ in shown.values())
+    for backend, (success, text) in shown.items():
+        if success:
+            yield Finding(f"OpenGL by {backend}", "ok", text)
+        else:
+            yield Finding(
+                f"OpenGL by {backend}", "note" if works else "FAIL", f"{text}; {_GL_CURE}"
+            )
+
+
+def _try_backend(backend: str) -> tuple[bool, str]:
+    try:
+        result = subprocess.run(
+            [sys.executable, "-c", _TRY_GL],
+            env={**os.environ, "HAIRKIT_GL": backend},
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return False, "no answer within 60 seconds"
+    lines = (result.stdout if result.returncode == 0 else result.stderr).strip().splitlines()
+    return result.returncode == 0, lines[-1] if lines else f"crashed ({result.returncode})"
+
+
+def _extra(extra: str, names: list[str]) -> Finding:
+    missing = [name for name in names if name != "hairkit" and not _installed(name)]
+    if missing:
+        cure = f'pip install "hairkit[{extra}]"'
+        return Finding(f"extra {extra}", "note", f"not there: {', '.join(missing)}; {cure}")
+    return Finding(f"extra {extra}", "ok", ", ".join(names))
+
+
+def _installed(name: str) -> bool:
+    try:
+        importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return False
+    return True
+
+
+def _kernel_cache() -> Finding:
+    """Look whether Numba can keep what it compiles: beside the sources or in its own folder."""
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    beside = Path(__file__).parents[1]
+    folders = [Path(named)] if named else [beside, Path.home() / ".cache"]
+    for folder in folders:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return Finding("compiled kernels", "ok", f"can be kept under {folder}")
+        except OSError:
+            continue
+    cure = "every start compiles anew; set NUMBA_CACHE_DIR to a folder that can be written"
+    return Finding("compiled kernels", "note", f"{folders[0]} cannot be written: {cure}")
+
+
+def _plugins() -> Iterator[Finding]:
+    infos = Manager.loaded().plugins()
+    working = [info.name for info in infos if not info.broken]
+    yield Finding("plugins", "ok" if working else "FAIL", ", ".join(working) or "none works")
+    for info in infos:
+        if info.broken:
+            own = info.distribution == "hairkit"
+            text = f"{info.broken}; pip install --force-reinstall {info.distribution}"
+            yield Finding(f"plugin {info.name}", "FAIL" if own else "note", text)
