@@ -1,0 +1,111 @@
+"""The one place that makes OpenGL contexts: offscreen, EGL first, OSMesa second, one per process."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from collections.abc import Iterator
+from importlib import resources
+
+import moderngl
+
+from hairkit.errors import RenderError
+from hairkit.render.osmesa import OSMesaContext
+
+REQUIRED_VERSION = 430
+"""OpenGL 4.3, for buffers read by vertex shaders."""
+
+BACKENDS = ("egl", "osmesa")
+"""Tried in this order; `HAIRKIT_GL` picks one."""
+
+_CURE = (
+    "install a software renderer with: apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6"
+)
+
+
+class Renderer:
+    """An offscreen context with its compiled programs; use it through `renderer()`."""
+
+    def __init__(self, context: moderngl.Context, backend: str) -> None:
+        self.context = context
+        self.backend = backend
+        """Which of `BACKENDS` made the context."""
+        self.home = context.simple_framebuffer((1, 1))
+        """Bound between pictures: moderngl goes back to the last bound frame buffer, released or not."""
+        self.home.use()
+        self._programs: dict[str, moderngl.Program] = {}
+
+    @property
+    def description(self) -> str:
+        """Backend, renderer and version in one line."""
+        info = self.context.info
+        return f"{self.backend}: {info['GL_RENDERER']}, OpenGL {info['GL_VERSION']}"
+
+    def program(self, name: str, fragment: str | None = None) -> moderngl.Program:
+        """Return the program of `name.vert` and `fragment.frag` (`name.frag` when None), compiled once."""
+        key = f"{name}/{fragment or name}"
+        if key not in self._programs:
+            try:
+                self._programs[key] = self.context.program(
+                    vertex_shader=shader_source(f"{name}.vert"),
+                    fragment_shader=shader_source(f"{fragment or name}.frag"),
+                )
+            except moderngl.Error as error:
+                raise RenderError(f"shader {key} does not compile: {error}") from error
+        return self._programs[key]
+
+
+@contextlib.contextmanager
+def renderer() -> Iterator[Renderer]:
+    """Give the process's renderer to the calling thread until the block ends.
+
+    Raises `RenderError` when no context can be made, or when the block left an OpenGL error.
+    """
+    global _renderer
+    with _lock:
+        if _renderer is None or _owner != os.getpid():
+            _renderer = _create()
+        with _renderer.context:
+            yield _renderer
+            error = _renderer.context.error
+        if error != "GL_NO_ERROR":
+            raise RenderError(f"drawing failed: OpenGL reports {error} ({_renderer.backend})")
+
+
+def shader_source(name: str) -> str:
+    """Return the text of a shader; lines `#include "other.glsl"` are replaced by that file."""
+    text = resources.files("hairkit.shaders").joinpath(name).read_text()
+    lines = [
+        shader_source(line.split('"')[1]) if line.startswith("#include") else line
+        for line in text.splitlines()
+    ]
+    return "\n".join(lines)
+
+
+_lock = threading.RLock()
+_renderer: Renderer | None = None
+_owner = 0
+
+
+def _create() -> Renderer:
+    global _owner
+    asked = os.environ.get("HAIRKIT_GL")
+    if asked is not None and asked not in BACKENDS:
+        raise RenderError(f"HAIRKIT_GL is {asked!r}, expected one of {', '.join(BACKENDS)}")
+    failures = []
+    for backend in BACKENDS if asked is None else (asked,):
+        try:
+            context = _open(backend)
+        except Exception as error:  # any failure of a driver: the next backend may work
+            failures.append(f"{backend}: {' '.join(str(error).split())}")
+        else:
+            _owner = os.getpid()
+            return Renderer(context, backend)
+    raise RenderError(f"no OpenGL 4.3 context ({'; '.join(failures)}); {_CURE}")
+
+
+def _open(backend: str) -> moderngl.Context:
+    if backend == "egl":
+        return moderngl.create_context(REQUIRED_VERSION, standalone=True, backend="egl")
+    return moderngl.create_context(REQUIRED_VERSION, standalone=True, context=OSMesaContext())
