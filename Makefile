@@ -1,0 +1,52 @@
+# `make test` and `make demo` need Python 3.11 or newer and make; what else they need they fetch:
+# into .venv by pip and, as root on Debian or Ubuntu, the OpenGL libraries by apt.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+DEMO := demo-out
+EXAMPLE := examples/hairkit-sobel
+LIBRARIES := libegl1 libgl1 libgl1-mesa-dri libosmesa6
+
+.PHONY: test demo lint bench clean
+
+test: $(VENV)/.tests
+	$(BIN)/python -m pytest
+
+demo: $(VENV)/.hairkit
+	$(BIN)/hairkit reconstruct hairkit/sample -o $(DEMO)
+	@echo "Your hair is in $(DEMO)/: open the contact sheet there to see it, load the .apx in a"
+	@echo "HairWorks viewer, or go on with: $(BIN)/hairkit info $(DEMO)/groom.npz"
+
+lint: $(VENV)/.lint
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: $(VENV)/.tests
+	@for program in benchmarks/*.py; do echo "== $$program"; $(BIN)/python $$program || exit 1; done
+
+clean:
+	rm -rf $(VENV) $(DEMO) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -o -name '*.egg-info' | xargs rm -rf
+
+$(VENV)/.python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "hairkit needs Python 3.11 or newer; name one: make PYTHON=python3.12" >&2; exit 1; }
+	@sh .ci/libraries $(LIBRARIES)
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || sh .ci/libraries python3-venv
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.hairkit: $(VENV)/.python pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+$(VENV)/.tests: $(VENV)/.hairkit $(wildcard $(EXAMPLE)/*.*)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps ./$(EXAMPLE)
+	@touch $@
+
+$(VENV)/.lint: $(VENV)/.hairkit
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@
