@@ -1,0 +1,34 @@
+"""What tests of several rooms need."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from hairkit.manager import Manager
+
+PROJECT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def captures() -> Path:
+    """The folder of captures with truth, which does not ship with the project."""
+    named = os.environ.get("HAIRKIT_CAPTURES")
+    folder = Path(named) if named else PROJECT.parent / "shared" / "captures"
+    if not (folder / "straight_long").is_dir():
+        pytest.skip(f"no captures in {folder}; name their folder in HAIRKIT_CAPTURES")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def project() -> Path:
+    """The project's checkout."""
+    return PROJECT
+
+
+@pytest.fixture(scope="session")
+def manager() -> Manager:
+    """The plugins that ship with hairkit; not for tests that register others."""
+    return Manager.loaded(autoload=False)
