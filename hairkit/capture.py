@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hairkit.errors import InputError
 from hairkit.stored import Float64Array, UInt8Array, frozen_array
 
 
@@ -62,3 +63,23 @@ class Capture:
     views: tuple[View, ...]
     orthographic: bool = False
     """True when capture.toml says that the pictures are orthographic."""
+    head_pose: Float64Array | None = None
+    """(4, 4) similarity that places the head by hand, `scene_from_head`, metres; None when not given."""
+
+    def __post_init__(self) -> None:
+        if not self.views:
+            raise InputError("a capture needs at least one view")
+        if self.head_pose is not None:
+            pose = frozen_array(self.head_pose, np.float64, (4, 4), "head_pose")
+            object.__setattr__(self, "head_pose", _similarity(pose))
+
+
+def _similarity(matrix: Float64Array) -> Float64Array:
+    """Return the matrix when it is a rotation, one scale and a shift; raise `InputError` otherwise."""
+    square = matrix[:3, :3] @ matrix[:3, :3].T
+    scale = float(np.trace(square)) / 3
+    alike = np.allclose(square, scale * np.eye(3), atol=1e-6 * scale, rtol=0)
+    upright = np.linalg.det(matrix[:3, :3]) > 0 and np.array_equal(matrix[3], [0, 0, 0, 1])
+    if not (alike and upright):
+        raise InputError("head_pose is no similarity, expected rotation, one scale and a shift")
+    return matrix

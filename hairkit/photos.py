@@ -75,7 +75,7 @@ def focal_from_equivalent(focal_mm: float, width: int, height: int) -> float:
 
 
 def read_header(path: str | os.PathLike[str]) -> PhotoHeader:
-    """Return what the picture's header says; `InputError` when it is no JPEG or PNG, or too large."""
+    """Return what the picture's header says; `InputError` when it is unusable."""
     return _header(_read_bytes(Path(path)), Path(path))
 
 
@@ -108,12 +108,14 @@ def read_photo(
     scale = min(1.0, (max_edge or math.inf) / max(header.width, header.height))
     # a JPEG decoder halves pictures almost for free; never below the size that is wanted
     mode = cv2.IMREAD_REDUCED_COLOR_2 if scale <= 0.5 else cv2.IMREAD_COLOR
-    image = cv2.cvtColor(_decode(data, mode, Path(path)), cv2.COLOR_BGR2RGB)
+    image = _decode(data, mode, Path(path))[..., ::-1]
     upright = _upright(image, header.exif.orientation)
     if scale < 1:
         size = [max(1, round(edge * scale)) for edge in (header.width, header.height)]
-        upright = cv2.resize(upright, size, interpolation=cv2.INTER_AREA)
-    return np.ascontiguousarray(upright, np.uint8), header
+        upright = cv2.resize(upright, size, interpolation=cv2.INTER_AREA).astype(
+            np.uint8, copy=False
+        )
+    return upright, header
 
 
 def read_drawing(path: str | os.PathLike[str]) -> UInt8Array:

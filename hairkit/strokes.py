@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 from dataclasses import dataclass
@@ -38,10 +39,10 @@ class Stroke:
     """(N, 2) pixels (x, y); one point is a dot."""
 
     def sampled(self, step: float = 2.0) -> Float64Array:
-        """Return points (M, 2) at most `step` pixels apart along the stroke, an area's outline closed."""
+        """Return points (M, 2) at most `step` pixels apart on the stroke, an area's outline closed."""
         path = np.concatenate([self.points, self.points[: int(self.area)]])
         pieces = [path[:1]]
-        for start, end in zip(path[:-1], path[1:], strict=True):
+        for start, end in itertools.pairwise(path):
             count = min(int(np.ceil(np.linalg.norm(end - start) / step)), _MAX_SAMPLES)
             pieces.append(start + (end - start) * np.linspace(0, 1, count + 1)[1:, None])
         return np.concatenate(pieces)
@@ -97,7 +98,7 @@ def read_strokes(path: str | os.PathLike[str]) -> Strokes:
 
 
 def rasterise(stroke: Stroke, width: int, height: int, thickness: float) -> BoolArray:
-    """Return the pixels (height, width) that a stroke covers: an area, or a line `thickness` px wide."""
+    """Return the pixels (height, width) under a stroke: an area, or a line `thickness` px wide."""
     canvas = np.zeros((height, width), np.uint8)
     # pixel centres lie at +0.5 here and at whole numbers in OpenCV
     points = np.rint(np.clip(stroke.points, -_FAR, _FAR) - 0.5).astype(np.int32)
@@ -133,8 +134,8 @@ def _shape(entry: Any, where: str) -> tuple[Any, str, Float64Array]:
     if kind not in _LEAST_POINTS:
         raise InputError(f"{where}: {unknown_name('shape_type', kind, _LEAST_POINTS)}")
     try:
-        points = frozen_array(entry.get("points"), np.float64, (None, 2), "points")
-    except (TypeError, ValueError) as error:
+        points = frozen_array(entry["points"], np.float64, (None, 2), "points")
+    except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"{where}: points are no list of pixel pairs ({error})") from error
     if len(points) < _LEAST_POINTS[kind]:
         raise InputError(f"{where}: {len(points)} points, a {kind} needs {_LEAST_POINTS[kind]}")
@@ -149,5 +150,6 @@ def _outline(kind: str, points: Float64Array) -> Float64Array:
     if kind == "circle":  # labelme: the centre and a point on the circle
         turn = np.linspace(0, 2 * np.pi, 32, endpoint=False)
         radius = np.linalg.norm(points[1] - points[0])
-        return points[0] + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        circle: Float64Array = points[0] + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        return circle
     return points
