@@ -2,6 +2,15 @@
 
 from __future__ import annotations
 
+from hairkit.render.light import Lights
 from hairkit.render.measured import draw_coverage, draw_directions, draw_layers
+from hairkit.render.picture import draw, draw_views
 
-__all__ = ["draw_coverage", "draw_directions", "draw_layers"]
+__all__ = [
+    "Lights",
+    "draw",
+    "draw_coverage",
+    "draw_directions",
+    "draw_layers",
+    "draw_views",
+]

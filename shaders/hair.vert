@@ -1,0 +1,29 @@
+#version 430
+#include "ribbon.glsl"
+#include "lighting.glsl"
+#include "marschner.glsl"
+#include "tone.glsl"
+
+uniform vec3 u_eye;             // camera centre, head frame
+uniform vec3 u_forward;         // optical axis, head frame
+uniform vec3 u_root_colour;
+uniform vec3 u_tip_colour;
+
+out vec3 v_colour;
+
+void main() {
+    Ribbon r = ribbon_vertex();
+    vec3 position = r.point.position.xyz;
+    vec3 to_eye = u_perspective > 0.5 ? normalize(u_eye - position) : -u_forward;
+    float random = r.point.look.y;
+    float other = fract(random * 61.8034);
+    vec3 colour = mix(u_root_colour, u_tip_colour, r.point.position.w);
+    colour = pow(colour, vec3(0.85 + 0.3 * random)) * (0.8 + 0.4 * other);
+
+    vec3 reached = light_at(position);
+    vec3 key = fibre(r.tangent, u_key_direction, to_eye, colour, random) * u_key_colour * reached.r;
+    vec3 rim = fibre(r.tangent, u_rim_direction, to_eye, colour, other) * u_rim_colour * reached.g;
+    vec3 sky = colour * ambient(0.3) * reached.b;
+    v_colour = tone(key + rim + sky);
+    gl_Position = r.clip;
+}
