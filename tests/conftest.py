@@ -5,9 +5,14 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from hairkit.manager import Manager
+
+# No deadline: what is slow on a busy machine is not wrong.
+hypothesis.settings.register_profile("hairkit", deadline=None, max_examples=50)
+hypothesis.settings.load_profile("hairkit")
 
 PROJECT = Path(__file__).parents[1]
 

@@ -178,9 +178,7 @@ def test_a_broken_plugin_is_recorded_and_the_rest_loads(monkeypatch: pytest.Monk
     assert infos["exits"].broken is not None
     assert infos["bad"].origin == "studio-hair 1.2"
     assert manager.names("orient") == ("good",)
-    with pytest.raises(
-        PluginError, match=r"plugin 'bad' of studio-hair 1.2 is broken: ImportError"
-    ):
+    with pytest.raises(PluginError, match=r"plugin .bad. of studio-hair 1\.2 is broken: Imp"):
         manager.call("orient", "bad")
 
 
