@@ -11,12 +11,20 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.capture import View
 from hairkit.errors import InputError
+from hairkit.mask import Mask
 from hairkit.orientation import wrap_angle
 from hairkit.stored import BoolArray, Float32Array, UInt8Array
 
 REFERENCE_HEIGHT = 1080
 """Lengths in pixels given to the orienters are for pictures of this height."""
+
+_LOG_FLOOR = 0.15
+"""Added to brightness before its logarithm, as a share of the mean: keeps noise in shadows low."""
+
+_LEAST_CONTRAST = 0.25
+"""Local deviation, as a share of the typical one, below which contrast is not raised further."""
 
 COHERENT_WINDOW = 9
 COHERENT_RESULTANT = 0.8
@@ -31,10 +39,25 @@ def picture_scale(height: int) -> float:
     return height / REFERENCE_HEIGHT
 
 
+def hair_of(view: View, mask: Mask) -> BoolArray:
+    """Return the (H, W) hair pixels of `mask`.
+
+    Raises `InputError` when the mask is not as large as the photo.
+    """
+    hair = mask.hair
+    if hair.shape != (view.height, view.width):
+        raise InputError(
+            f"mask of {view.name} is {hair.shape[1]} x {hair.shape[0]} pixels, "
+            f"expected {view.width} x {view.height} as the photo"
+        )
+    return hair
+
+
 def luminance(image: UInt8Array) -> Float32Array:
     """Return the (H, W) luma of an (H, W, 3) RGB image as float32 in [0, 1] (Rec. 601 weights)."""
     red, green, blue = cv2.split(np.asarray(image, np.float32))
-    return (0.299 * red + 0.587 * green + 0.114 * blue) * np.float32(1 / 255)
+    grey = 0.299 * red + 0.587 * green + 0.114 * blue
+    return np.asarray(grey * (1 / 255), np.float32)
 
 
 def blur(values: Float32Array, sigma: float) -> Float32Array:
@@ -68,6 +91,61 @@ def masked_blur(
     if values.ndim == 3:
         return blur(values * weight[..., None], sigma) * inverse[..., None]
     return blur(values * weight, sigma) * inverse
+
+
+def bounding_box(mask: BoolArray, margin: int) -> tuple[slice, slice]:
+    """Return the rows and columns that hold `mask`, grown by `margin` pixels within the picture.
+
+    Raises `InputError` when the mask is empty.
+    """
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    if not rows.size:
+        raise InputError(f"mask of shape {mask.shape} is empty, wanted at least one pixel")
+    return (
+        slice(max(int(rows[0]) - margin, 0), int(rows[-1]) + 1 + margin),
+        slice(max(int(columns[0]) - margin, 0), int(columns[-1]) + 1 + margin),
+    )
+
+
+def well_inside(mask: BoolArray, sigma: float, share: float = 0.9) -> BoolArray:
+    """Return the part of `mask` whose surroundings (Gaussian `sigma`) lie on it by `share` or more.
+
+    A mask too thin to have such a part comes back whole.
+    """
+    if sigma <= 0:
+        return mask
+    core = mask & (blur(mask.astype(np.float32), sigma) >= share)
+    return core if core.any() else mask
+
+
+def local_contrast(grey: Float32Array, weight: Float32Array, sigma: float) -> Float32Array:
+    """Return brightness freed of shading: log, minus its local mean, over its local deviation.
+
+    Means are taken by normalised convolution with a Gaussian of `sigma` pixels, so what lies beyond
+    the weight, and the step at its edge, leave no trace. A change of exposure changes nothing.
+
+    Parameters
+    ----------
+    grey, weight : (H, W)
+        Linear or gamma-coded brightness in [0, 1]; 1 where it counts and 0 elsewhere.
+    sigma : float
+        In pixels.
+
+    Returns
+    -------
+    (H, W) float32
+        About unit deviation and at most 3; 0 beyond the weight and where brightness is constant.
+    """
+    inside = weight > 0
+    mean = float(grey[inside].mean(dtype=np.float64))
+    floor = _LOG_FLOOR * max(mean, 1 / 255)
+    logarithm = np.log(grey + floor)
+    detail = (logarithm - masked_blur(logarithm, weight, sigma)) * weight
+    variance = masked_blur(detail * detail, weight, sigma)
+    typical = float(variance[inside].mean(dtype=np.float64))
+    least = max(_LEAST_CONTRAST**2 * typical, (0.25 / 255 / (mean + floor)) ** 2)
+    scaled = detail / np.sqrt(np.maximum(variance, least))
+    return np.asarray(np.clip(scaled, -3, 3), np.float32)
 
 
 def fill_beyond(values: Float32Array, mask: BoolArray, sigma: float) -> Float32Array:
