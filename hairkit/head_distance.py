@@ -52,7 +52,9 @@ def signed_distance(head: Head, grid: VoxelGrid, band: float | None = None) -> F
     distance = _measured(label, feet, owner, corners, centre0, grid.spacing, reach)
     votes = np.zeros(grid.shape, np.int8)
     for axis in range(3):
-        votes += np.cumsum(_winding(corners, centre0, grid.spacing, shape, axis), axis, np.int8) != 0
+        votes += (
+            np.cumsum(_winding(corners, centre0, grid.spacing, shape, axis), axis, np.int8) != 0
+        )
     np.negative(distance, out=distance, where=votes >= 2)
     return distance
 

@@ -50,7 +50,10 @@ def build_tree(vertices: npt.ArrayLike, faces: npt.ArrayLike) -> TriangleTree:
         lowest.append(lowest[-1].reshape(-1, 2, 3).min(axis=1))
         highest.append(highest[-1].reshape(-1, 2, 3).max(axis=1))
     return TriangleTree(
-        np.concatenate(lowest[::-1]), np.concatenate(highest[::-1]), corners, face[order].astype(np.int64)
+        np.concatenate(lowest[::-1]),
+        np.concatenate(highest[::-1]),
+        corners,
+        face[order].astype(np.int64),
     )
 
 
@@ -153,7 +156,11 @@ def triangle_distance(
     u0, u1, u2 = triangle[1, 0] - a0, triangle[1, 1] - a1, triangle[1, 2] - a2
     v0, v1, v2 = triangle[2, 0] - a0, triangle[2, 1] - a1, triangle[2, 2] - a2
     p0, p1, p2 = point[0] - a0, point[1] - a1, point[2] - a2
-    uu, uv, vv = u0 * u0 + u1 * u1 + u2 * u2, u0 * v0 + u1 * v1 + u2 * v2, v0 * v0 + v1 * v1 + v2 * v2
+    uu, uv, vv = (
+        u0 * u0 + u1 * u1 + u2 * u2,
+        u0 * v0 + u1 * v1 + u2 * v2,
+        v0 * v0 + v1 * v1 + v2 * v2,
+    )
     d1, d2 = u0 * p0 + u1 * p1 + u2 * p2, v0 * p0 + v1 * p1 + v2 * p2
     d3, d4, d5, d6 = d1 - uu, d2 - uv, d1 - uv, d2 - vv
     va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
