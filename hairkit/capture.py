@@ -64,7 +64,7 @@ class Capture:
     orthographic: bool = False
     """True when capture.toml says that the pictures are orthographic."""
     head_pose: Float64Array | None = None
-    """(4, 4) similarity that places the head by hand, `scene_from_head`, metres; None when not given."""
+    """(4, 4) similarity that places the head by hand, `scene_from_head`, metres, or None."""
 
     def __post_init__(self) -> None:
         if not self.views:
@@ -75,7 +75,7 @@ class Capture:
 
 
 def _similarity(matrix: Float64Array) -> Float64Array:
-    """Return the matrix when it is a rotation, one scale and a shift; raise `InputError` otherwise."""
+    """Return a rotation, one scale and a shift as it is; `InputError` for anything else."""
     square = matrix[:3, :3] @ matrix[:3, :3].T
     scale = float(np.trace(square)) / 3
     alike = np.allclose(square, scale * np.eye(3), atol=1e-6 * scale, rtol=0)

@@ -40,7 +40,7 @@ WORKING_EDGE = 1440
 """Long edge in pixels that photos are scaled down to."""
 
 SMALLEST_SHARE = 0.85
-"""The smallest photo's edges may be this share of the largest photo's: cropping, not another photo."""
+"""The smallest photo's edges may be this share of the largest photo's: a little cropping."""
 
 _PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png")
 _OTHER_SUFFIXES = (".heic", ".heif", ".webp", ".tif", ".tiff", ".bmp", ".gif", ".dng", ".avif")
@@ -274,7 +274,7 @@ def _view(
 
 
 def _focal(entry: ViewEntry, settings: CaptureFile, header: PhotoHeader) -> float | None:
-    """Return pixels of the photo on disk: the view's word first, then the capture's, then EXIF's."""
+    """Return pixels of the photo on disk, as the view says, or else the capture, or else EXIF."""
     for said in (entry.focal, settings.focal):
         if said.px is not None:
             return said.px

@@ -61,29 +61,61 @@ class Stored:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write every field to `path` (npz, compressed), atomically and byte for byte the same."""
-        write_npz(path, _to_arrays(self, ""))
+        write_npz(path, to_arrays(self))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Read what `save` wrote; raises `FormatError` naming `path` when it is anything else."""
-        arrays = read_npz(path)
-        try:
-            return typing.cast(Self, _from_arrays(cls, arrays, ""))
-        except (KeyError, TypeError, InputError) as error:
-            raise FormatError(f"{path}: not a stored {cls.__name__}: {error}") from error
+        return from_arrays(cls, read_npz(path), str(path))
 
 
-def write_npz(path: str | os.PathLike[str], arrays: dict[str, npt.NDArray[Any]]) -> None:
-    """Write arrays to an npz file with fixed time stamps, through a temporary file and a rename."""
+_StoredType = typing.TypeVar("_StoredType", bound=Stored)
+
+
+def to_arrays(value: Stored) -> dict[str, npt.NDArray[Any]]:
+    """Return every field as an array, named `field` or `field.field`; None is left out."""
+    return _to_arrays(value, "")
+
+
+def from_arrays(
+    kind: type[_StoredType], arrays: dict[str, npt.NDArray[Any]], source: str
+) -> _StoredType:
+    """Return the object that `to_arrays` took apart; `FormatError` begins with `source`."""
+    try:
+        return typing.cast(_StoredType, _from_arrays(kind, arrays, ""))
+    except (KeyError, TypeError, ValueError) as error:
+        raise FormatError(f"{source}: not a stored {kind.__name__}: {error}") from error
+
+
+def write_npz(
+    path: str | os.PathLike[str],
+    arrays: dict[str, npt.NDArray[Any]],
+    *,
+    packed: bool = True,
+    durable: bool = True,
+) -> None:
+    """Write arrays to an npz file with fixed time stamps, through a temporary file and a rename.
+
+    Parameters
+    ----------
+    path
+        The file; it is either the old one or the whole new one at any moment.
+    arrays
+        Arrays by name.
+    packed
+        False leaves the arrays uncompressed, which is many times faster.
+    durable
+        False does not wait for the disk: a power failure, not a crash, may lose the file.
+    """
+    method = zipfile.ZIP_DEFLATED if packed else zipfile.ZIP_STORED
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+    with zipfile.ZipFile(buffer, "w", method, compresslevel=1) as archive:
         for name, array in arrays.items():
-            member = io.BytesIO()
-            np.lib.format.write_array(member, np.asarray(array), allow_pickle=False)
             info = zipfile.ZipInfo(name + ".npy", _EPOCH)
-            info.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(info, member.getvalue())
-    write_bytes(path, buffer.getvalue())
+            info.compress_type = method
+            with archive.open(info, "w", force_zip64=array.nbytes > 2**31) as member:
+                np.lib.format.write_array(member, np.asarray(array), allow_pickle=False)
+    write_bytes(path, buffer.getbuffer(), durable=durable)
 
 
 def read_npz(path: str | os.PathLike[str]) -> dict[str, npt.NDArray[Any]]:
@@ -105,7 +137,9 @@ def read_npz(path: str | os.PathLike[str]) -> dict[str, npt.NDArray[Any]]:
         raise FormatError(f"{path}: not a readable .npz file ({error})") from error
 
 
-def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+def write_bytes(
+    path: str | os.PathLike[str], data: bytes | memoryview, *, durable: bool = True
+) -> None:
     """Write `data` to `path` so that the file is either the old one or the whole new one."""
     target = Path(path)
     handle, temporary = tempfile.mkstemp(
@@ -115,7 +149,8 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
         with os.fdopen(handle, "wb") as file:
             file.write(data)
             file.flush()
-            os.fsync(file.fileno())
+            if durable:
+                os.fsync(file.fileno())
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, target)
     except BaseException:

@@ -39,7 +39,7 @@ class Stroke:
     """(N, 2) pixels (x, y); one point is a dot."""
 
     def sampled(self, step: float = 2.0) -> Float64Array:
-        """Return points (M, 2) at most `step` pixels apart on the stroke, an area's outline closed."""
+        """Return points (M, 2) at most `step` pixels apart on the stroke; an area is closed."""
         path = np.concatenate([self.points, self.points[: int(self.area)]])
         pieces = [path[:1]]
         for start, end in itertools.pairwise(path):
