@@ -95,6 +95,27 @@ def first_hits_by_hand(
     return free, signed
 
 
+def most_followed(
+    grid: HashGrid,
+    owner: Int64Array,
+    points: npt.NDArray[np.float32],
+    directions: npt.NDArray[np.float32],
+    bounds: Int64Array,
+    distance: float,
+    cosine: float,
+) -> Float64Array:
+    """Return for each query strand the largest share of its samples that one owner matches.
+
+    Strand s is the samples `bounds[s]:bounds[s + 1]`; `owner` (N,) are the strands of the grid's
+    samples, in the grid's order; matches are sign-free.
+    """
+    result: Float64Array = _most_followed(
+        grid.points, grid.directions, grid.start, grid.cell, owner,
+        points, directions, bounds, distance, cosine,
+    )  # fmt: skip
+    return result
+
+
 @njit(cache=True)
 def _row(y: int, z: int) -> int:  # pragma: no cover - compiled
     """Spread the rows of cells along x over the buckets (primes of Teschner et al. 2003)."""
@@ -179,3 +200,42 @@ def _search(
                     if want_free and dot <= -cosine:
                         best = 1
     return best
+
+
+@njit(cache=True, parallel=True)
+def _most_followed(
+    points: npt.NDArray[np.float32],
+    directions: npt.NDArray[np.float32],
+    start: Int64Array,
+    cell: float,
+    owner: Int64Array,
+    queries: npt.NDArray[np.float32],
+    headings: npt.NDArray[np.float32],
+    bounds: Int64Array,
+    distance: float,
+    cosine: float,
+) -> Float64Array:  # pragma: no cover - compiled
+    mask = len(start) - 2
+    result = np.zeros(len(bounds) - 1)
+    owners = owner.max() + 1
+    for s in prange(len(bounds) - 1):
+        followed = np.zeros(owners, np.int64)
+        last = np.full(owners, -1, np.int64)
+        for q in range(bounds[s], bounds[s + 1]):
+            qx, qy, qz = queries[q, 0], queries[q, 1], queries[q, 2]
+            for y in range(_cell_of(qy - distance, cell), _cell_of(qy + distance, cell) + 1):
+                for z in range(_cell_of(qz - distance, cell), _cell_of(qz + distance, cell) + 1):
+                    row = _row(y, z)
+                    x_last = _cell_of(qx + distance, cell)
+                    for x in range(_cell_of(qx - distance, cell), x_last + 1):
+                        key = (row + x) & mask
+                        for i in range(start[key], start[key + 1]):
+                            if last[owner[i]] == q:
+                                continue
+                            gap = points[i] - queries[q]
+                            dot = abs(np.sum(directions[i] * headings[q]))
+                            if np.sum(gap * gap) <= distance * distance and dot >= cosine:
+                                last[owner[i]] = q
+                                followed[owner[i]] += 1
+        result[s] = followed.max() / (bounds[s + 1] - bounds[s])
+    return result

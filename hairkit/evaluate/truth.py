@@ -14,8 +14,9 @@ from hairkit.camera import Camera
 from hairkit.errors import FormatError, InputError
 from hairkit.evaluate.scores import SHORTEST_STRAND, sample_strands
 from hairkit.evaluate.surface import Surface, first_surface
+from hairkit.head import Capsules, Head
 from hairkit.scene import read_cameras
-from hairkit.stored import Float32Array, Int32Array, UInt8Array, read_npz
+from hairkit.stored import UInt8Array, read_npz
 from hairkit.strands import Strands
 
 
@@ -30,24 +31,21 @@ class Truth:
     strands: Strands
     visible: UInt8Array
     """(P,) nonzero where some camera saw that point of `strands`."""
-    head_vertices: Float32Array
-    """(V, 3) metres."""
-    head_faces: Int32Array
-    """(F, 3) triangles."""
+    head: Head
+    """The true mesh; its scalp, texture coordinates and joints are not known and mean nothing."""
 
     @cached_property
     def surfaces(self) -> tuple[Surface, ...]:
         """First visible surface of every view: true strands and head, seen by the true cameras."""
         points = sample_strands(self.strands, shortest=SHORTEST_STRAND, name="true").points
-        mesh = (self.head_vertices, self.head_faces)
-        return tuple(first_surface(camera, points, mesh) for camera in self.cameras)
+        return tuple(first_surface(camera, points, self.head) for camera in self.cameras)
 
     def orientation(self, view: int) -> UInt8Array:
         """Return (H, W) strand angles of a view: 1..255 for [0, pi), 0 where there is no hair."""
         return _picture(self.folder / "orientation", view)
 
     def hair_mask(self, view: int) -> UInt8Array:
-        """Return (H, W) true labels of a view: 255 hair, 128 the rest of the person, 0 background."""
+        """Return (H, W) true labels of a view: 255 hair, 128 the rest of the person, 0 neither."""
         return _picture(self.folder.parent / "masks", view)
 
 
@@ -67,8 +65,7 @@ def read_truth(folder: str | os.PathLike[str]) -> Truth:
             )
     names, cameras = read_cameras(base / "truth.json")
     strands, visible = _read_strands(base / "strands.npz")
-    vertices, faces = _read_obj(base / "head.obj")
-    return Truth(base, names, cameras, strands, visible, vertices, faces)
+    return Truth(base, names, cameras, strands, visible, _read_head(base / "head.obj"))
 
 
 def _read_strands(path: Path) -> tuple[Strands, UInt8Array]:
@@ -83,7 +80,7 @@ def _read_strands(path: Path) -> tuple[Strands, UInt8Array]:
     return strands, visible
 
 
-def _read_obj(path: Path) -> tuple[Float32Array, Int32Array]:
+def _read_head(path: Path) -> Head:
     vertices: list[list[float]] = []
     faces: list[list[int]] = []
     try:
@@ -102,7 +99,11 @@ def _read_obj(path: Path) -> tuple[Float32Array, Int32Array]:
         raise FormatError(f"{path}: not a readable OBJ mesh ({error})") from error
     if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points):
         raise FormatError(f"{path}: its faces are missing or name vertices that do not exist")
-    return points, triangles
+    blank = np.zeros((len(points), 2), np.float32)
+    none = np.zeros((0, 3), np.float32)
+    capsules = Capsules(none, none, none[:, :2])
+    everywhere = np.ones(len(points), np.float32)
+    return Head(points, triangles, blank, everywhere, None, np.zeros((3, 3), np.float32), capsules)
 
 
 def _picture(folder: Path, view: int) -> UInt8Array:
