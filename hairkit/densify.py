@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from hairkit.errors import InputError
 from hairkit.groom import Groom, HairMaterial
 from hairkit.head import Roots
+from hairkit.scalp import sample_roots
 from hairkit.stored import Float32Array, Float64Array, Int64Array
 from hairkit.strands import Strands
 
@@ -55,8 +56,8 @@ def densify(
     seed
         Equal seeds give equal hair.
     roots
-        Where the new strands start, (count - S,) at least, as `Roots` or positions (N, 3). By default
-        they are sampled on the groom's scalp, or between neighbouring guides of bare strands.
+        Where the new strands start, count - S at least, as `Roots` or positions (N, 3). By
+        default sampled on the groom's scalp, or between neighbouring guides of bare strands.
     scatter
         Root mean square wander of a new strand's tip, metres; 0 mixes the guides exactly.
     material
@@ -93,7 +94,7 @@ class _Bundle:
 
     @property
     def points(self) -> int:
-        return self.course.shape[1]
+        return int(self.course.shape[1])
 
     @classmethod
     def of(cls, even: Strands) -> _Bundle:
@@ -112,7 +113,7 @@ class _Mix:
 
 
 def _smoothing(m: int) -> Float32Array:
-    """Return the (m, m) Gaussian smoothing that keeps both ends: values are mirrored through them."""
+    """Return the (m, m) Gaussian smoothing that keeps both ends by mirroring through them."""
     sigma = COURSE_SIGMA * (m - 1)
     reach = int(np.ceil(3 * sigma))
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(sigma, 1e-9)) ** 2)
@@ -140,8 +141,6 @@ def _new_roots(
     generator: np.random.Generator,
 ) -> tuple[Float32Array, Float32Array | None]:
     if roots is None and isinstance(guides, Groom):
-        from hairkit.scalp import sample_roots
-
         roots = sample_roots(guides.head, count, int(generator.integers(2**31)))
     if isinstance(roots, Roots):
         positions, uv = roots.positions, roots.uv
@@ -175,7 +174,7 @@ def _choose_guides(bundle: _Bundle, positions: Float32Array) -> _Mix:
     order = np.argsort(~agrees, axis=1, kind="stable")[:, :MIXED]
     near, distance = np.take_along_axis(near, order, 1), np.take_along_axis(distance, order, 1)
     agrees = np.take_along_axis(agrees, order, 1)
-    # a guide's weight falls to nothing at the first guide left out: hair changes smoothly from root to root
+    # far guides weigh little, so that hair changes smoothly from root to root
     reach = np.where(agrees, distance, 0).max(axis=1, keepdims=True) * 1.05 + 1e-6
     weight = np.where(agrees, (1 / np.maximum(distance, 5e-4) - 0.5 / reach) ** 2, 0)
     weight /= weight.sum(axis=1, keepdims=True)

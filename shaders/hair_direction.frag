@@ -1,7 +1,8 @@
 #version 430
-// The strand's direction in the picture (y down) and 1 where hair is.
+// The strand's direction in the picture (y down), its axial depth in metres, and 1 where hair is.
 
 in vec2 v_direction;
-out vec4 out_direction;
+in float v_depth;
+out vec4 out_measured;
 
-void main() { out_direction = vec4(normalize(v_direction), 1.0, 1.0); }
+void main() { out_measured = vec4(normalize(v_direction), v_depth, 1.0); }

@@ -28,7 +28,7 @@ vec3 lit(vec3 normal, vec3 to_eye, vec3 direction, vec3 light) {
 void main() {
     vec3 to_eye = u_perspective > 0.5 ? normalize(u_eye - v_position) : -u_forward;
     vec3 normal = normalize(v_normal);
-    normal *= dot(normal, to_eye) < 0.0 ? -1.0 : 1.0;
+    normal *= gl_FrontFacing ? -1.0 : 1.0;   // pictures are drawn upside down: fronts turn clockwise
     vec3 reached = light_at(v_position + LIFT * normal);
     vec3 light = lit(normal, to_eye, u_key_direction, u_key_colour * reached.r)
                + lit(normal, to_eye, u_rim_direction, u_rim_colour * reached.g)

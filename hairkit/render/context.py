@@ -1,4 +1,4 @@
-"""The one place that makes OpenGL contexts: offscreen, EGL first, OSMesa second, one per process."""
+"""The one place that makes OpenGL contexts: offscreen, EGL first, OSMesa second, one a process."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import threading
 from collections.abc import Iterator
 from importlib import resources
+from typing import Any
 
 import moderngl
 
@@ -32,7 +33,7 @@ class Renderer:
         self.backend = backend
         """Which of `BACKENDS` made the context."""
         self.home = context.simple_framebuffer((1, 1))
-        """Bound between pictures: moderngl goes back to the last bound frame buffer, released or not."""
+        """Bound between pictures: moderngl goes back to the last bound one, released or not."""
         self.home.use()
         self._programs: dict[str, moderngl.Program] = {}
 
@@ -43,7 +44,7 @@ class Renderer:
         return f"{self.backend}: {info['GL_RENDERER']}, OpenGL {info['GL_VERSION']}"
 
     def program(self, name: str, fragment: str | None = None) -> moderngl.Program:
-        """Return the program of `name.vert` and `fragment.frag` (`name.frag` when None), compiled once."""
+        """Return the program of `name.vert` and `fragment.frag` (None: `name.frag`)."""
         key = f"{name}/{fragment or name}"
         if key not in self._programs:
             try:
@@ -106,6 +107,6 @@ def _create() -> Renderer:
 
 
 def _open(backend: str) -> moderngl.Context:
-    if backend == "egl":
-        return moderngl.create_context(REQUIRED_VERSION, standalone=True, backend="egl")
-    return moderngl.create_context(REQUIRED_VERSION, standalone=True, context=OSMesaContext())
+    # moderngl's stubs type its free keyword settings as one dict
+    settings: Any = {"backend": "egl"} if backend == "egl" else {"context": OSMesaContext()}
+    return moderngl.create_context(REQUIRED_VERSION, standalone=True, **settings)

@@ -31,8 +31,14 @@ class RibbonBuffers:
 @contextlib.contextmanager
 def ribbons(
     gl: Renderer, strands: Strands, width: float | npt.ArrayLike
-) -> Iterator[RibbonBuffers]:
-    """Keep strands on the GPU for a block, drawn `width` metres wide (a number or (P,) one a point)."""
+) -> Iterator[RibbonBuffers | None]:
+    """Keep strands on the GPU for a block, `width` metres wide (a number or (P,)).
+
+    Yields `None`, which draws nothing, when there is no strand.
+    """
+    if not len(strands):
+        yield None
+        return
     points = gl.context.buffer(_point_records(strands, width))
     indices = gl.context.buffer(_strip_indices(strands))
     try:
@@ -44,7 +50,7 @@ def ribbons(
 
 def draw_ribbons(
     gl: Renderer,
-    buffers: RibbonBuffers,
+    buffers: RibbonBuffers | None,
     program: moderngl.Program,
     camera: Camera,
     depth: DepthRange,
@@ -53,6 +59,8 @@ def draw_ribbons(
     **uniforms: Any,
 ) -> None:
     """Draw all ribbons with `program` (whose vertex shader includes `ribbon.glsl`)."""
+    if buffers is None:
+        return
     set_camera(program, camera, depth)
     set_uniforms(program, u_min_width_px=min_width_px, **uniforms)
     buffers.points.bind_to_storage_buffer(0)
@@ -64,7 +72,8 @@ def draw_ribbons(
 def strand_numbers(count: int) -> Float32Array:
     """Return one random-looking number in [0, 1) a strand, the same in every run (golden ratio)."""
     golden = 0.6180339887498949
-    return np.mod(np.arange(count) * golden, 1.0).astype(np.float32)
+    numbers: Float32Array = np.mod(np.arange(count) * golden, 1.0).astype(np.float32)
+    return numbers
 
 
 def _point_records(strands: Strands, width: float | npt.ArrayLike) -> Float32Array:

@@ -15,7 +15,6 @@ from hairkit.render.context import Renderer
 from hairkit.render.projection import DepthRange, set_camera, set_uniforms
 from hairkit.stored import Float32Array, Int32Array
 
-
 SKIN = (0.42, 0.24, 0.17)
 """Linear RGB of skin."""
 SCALP_TINT = 0.75
@@ -51,8 +50,8 @@ class Solid:
 
 
 def head_solid(head: Head, material: HairMaterial) -> Solid:
-    """Return the head with skin, its scalp tinted as the hair so that gaps between strands do not glare."""
-    colours = np.tile(np.float32(SKIN), (len(head.vertices), 1))
+    """Return the head with skin, its scalp tinted so that gaps between strands do not glare."""
+    colours = np.tile(np.array(SKIN, np.float32), (len(head.vertices), 1))
     scalp = np.clip(head.scalp, 0, 1)[:, None] * np.float32(SCALP_TINT)
     colours = (1 - scalp) * colours + scalp * (0.5 * material.root_colour)
     return Solid(head.vertices, head.faces, head.normals().astype(np.float32), colours)
@@ -81,5 +80,6 @@ def draw_solid(
     faces = gl.context.buffer(np.ascontiguousarray(mesh.faces, np.uint32))
     array = gl.context.vertex_array(program, used, index_buffer=faces)
     array.render(moderngl.TRIANGLES)
-    for resource in (array, faces, *[buffer for buffer, _, _ in used]):
-        resource.release()
+    array.release()
+    for buffer in (faces, *[buffer for buffer, _, _ in used]):
+        buffer.release()

@@ -1,13 +1,14 @@
 """Lights, and how much of each reaches every place: hair and head dim it, summed up in a volume.
 
-Optical depth is summed through a grid of hair density along each light's direction, a coarse form of
-opacity shadow maps (Kim and Neumann 2001) that needs no pass on the GPU.
+Optical depth is summed through a grid of hair density along each light's direction, a coarse form
+of opacity shadow maps (Kim and Neumann 2001) that needs no pass on the GPU.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,8 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter
 
 from hairkit.camera import Camera
-from hairkit.head import Head
 from hairkit.render.head import Mesh
-from hairkit.stored import Float32Array, Float64Array
+from hairkit.stored import Float32Array
 from hairkit.strands import Strands
 from hairkit.volume import VoxelGrid
 
@@ -39,7 +39,7 @@ SOLID = 250.0
 
 @dataclass(frozen=True)
 class Lights:
-    """A key light, a rim light and the sky; directions point towards the light, head frame, unit."""
+    """Key light, rim light and sky; directions point towards the light, head frame, unit."""
 
     key_direction: tuple[float, float, float]
     rim_direction: tuple[float, float, float]
@@ -80,7 +80,13 @@ class LightVolume:
 
     grid: VoxelGrid
     reached: Float32Array
-    """(X, Y, Z, 3): transmittance towards the key and the rim light, and the share of the sky seen."""
+    """(X, Y, Z, 3): transmittance towards key and rim light, share of the sky seen."""
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        """Number of cells along x, y, z."""
+        x, y, z = self.grid.shape
+        return x, y, z
 
     def texels(self) -> bytes:
         """Return the values in OpenGL's order, x fastest."""
@@ -149,15 +155,18 @@ def _mark_under(marks: Float32Array, grid: VoxelGrid, solid: Mesh) -> None:
 
 
 def _depth_towards(
-    taken: Float32Array, grid: VoxelGrid, inside: npt.NDArray[np.bool_], direction: Float64Array
+    taken: Float32Array,
+    grid: VoxelGrid,
+    inside: npt.NDArray[np.bool_],
+    direction: npt.NDArray[np.float64],
 ) -> Float32Array:
-    """Return (N,) the optical depth from each cell of `inside` towards `direction`, steps growing."""
+    """Return (N,) the optical depth from each cell of `inside` on, in growing steps."""
     start = np.argwhere(inside).astype(np.float32)
     edges = np.cumsum(1.08 ** np.arange(STEPS + 1)) * 0.9
     limit = np.array(grid.shape)
     total = np.zeros(len(start), np.float32)
     padded = np.pad(taken, 1)
-    for near, far in zip(edges[:-1], edges[1:], strict=True):
+    for near, far in pairwise(edges):
         at = np.rint(start + (0.5 * (near + far) * direction).astype(np.float32)).astype(np.int32)
         at = np.clip(at, -1, limit) + 1
         total += padded[at[:, 0], at[:, 1], at[:, 2]] * np.float32((far - near) * grid.spacing)

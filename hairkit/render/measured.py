@@ -1,60 +1,63 @@
-"""Pictures to measure with: how much of a pixel hair covers, and which way the visible hair runs."""
+"""Pictures to measure with: what hair covers, which way the visible hair runs, what is seen."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from hairkit.camera import Camera
-from hairkit.head import Head
 from hairkit.orientation import wrap_angle
-from hairkit.render.context import renderer
+from hairkit.render.context import Renderer, renderer
 from hairkit.render.hair import draw_ribbons, ribbons
-from hairkit.render.head import draw_solid
+from hairkit.render.head import Mesh, draw_solid
 from hairkit.render.projection import DepthRange
 from hairkit.render.target import SUPERSAMPLE, averaged, supersampled, target
-from hairkit.stored import BoolArray, Float32Array
+from hairkit.stored import BoolArray, Float32Array, UInt8Array
 from hairkit.strands import Strands
 
-HEAD_PUSH = 0.002
-"""The head is drawn this much behind its surface, metres, so that it never hides roots."""
+Solids = Mesh | Sequence[Mesh] | None
+"""What hides hair behind it: a head, several meshes, or nothing."""
 
-_HAIR, _HEAD = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)
+HEAD_PUSH = 0.002
+"""Solids are drawn this much behind their surface, metres, so that they never hide roots."""
+SEEN_TOLERANCE = 0.001
+"""A point this far behind the first strand at its pixel still counts as seen, metres."""
+
+_NOTHING, _HAIR, _SOLID = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)
 
 
 def draw_layers(
     strands: Strands,
-    head: Head | None,
+    solids: Solids,
     camera: Camera,
     *,
     width: float = 5e-4,
     min_width_px: float = 1.0,
     supersample: int = SUPERSAMPLE,
 ) -> tuple[Float32Array, Float32Array]:
-    """Return the shares (H, W) in [0, 1] of each pixel that visible hair and the bare head cover.
+    """Return the shares (H, W) in [0, 1] of each pixel that visible hair and bare solids cover.
 
     `width` is the drawn diameter of every strand in metres, `min_width_px` its least in pixels.
     """
     fine = supersampled(camera, supersample)
-    depth = DepthRange.around(fine, strands.points, head.vertices if head else ())
+    meshes = _meshes(solids)
+    depth = DepthRange.around(fine, strands.points, *[mesh.vertices for mesh in meshes])
     with renderer() as gl, target(gl, fine) as picture:
-        if head is not None:
-            draw_solid(
-                gl, head, gl.program("solid", "flat"), fine, depth, HEAD_PUSH, u_colour=_HEAD
-            )
-        if len(strands):
-            least = min_width_px * supersample
-            program = gl.program("hair_flat", "flat")
-            with ribbons(gl, strands, width) as buffers:
-                draw_ribbons(gl, buffers, program, fine, depth, min_width_px=least, u_colour=_HAIR)
-        share = averaged(np.asarray(picture.read(), np.uint8)[..., :2], camera)
-    shares = share.astype(np.float32) / 255
+        _draw_solids(gl, meshes, fine, depth, _SOLID)
+        least = min_width_px * supersample
+        program = gl.program("hair_flat", "flat")
+        with ribbons(gl, strands, width) as buffers:
+            draw_ribbons(gl, buffers, program, fine, depth, min_width_px=least, u_colour=_HAIR)
+        samples: UInt8Array = np.asarray(picture.read(), np.uint8)[..., :2]
+    shares = averaged(samples, camera).astype(np.float32) / np.float32(255)
     return shares[..., 0], shares[..., 1]
 
 
 def draw_coverage(
     strands: Strands,
-    head: Head | None,
+    head: Solids,
     camera: Camera,
     *,
     width: float = 5e-4,
@@ -66,28 +69,73 @@ def draw_coverage(
 
 def draw_directions(
     strands: Strands,
-    head: Head | None,
+    head: Solids,
     camera: Camera,
     *,
     width: float = 2e-4,
     min_width_px: float = 1.0,
 ) -> tuple[Float32Array, BoolArray]:
-    """Return the 2D angle (H, W) of the strand seen at each pixel's centre, and where one is seen.
+    """Return the 2D angle (H, W) of the strand seen at each pixel, and where one is seen.
 
-    Angles are undirected, in [0, pi), from +x towards +y, as in `OrientationMap`; 0 where no hair is.
+    Angles are undirected, in [0, pi), from +x towards +y, as in `OrientationMap`; 0 without hair.
     """
-    depth = DepthRange.around(camera, strands.points, head.vertices if head else ())
-    with renderer() as gl, target(gl, camera, "f4") as picture:
-        if head is not None:
-            black = (0.0, 0.0, 0.0, 0.0)
-            draw_solid(
-                gl, head, gl.program("solid", "flat"), camera, depth, HEAD_PUSH, u_colour=black
-            )
-        if len(strands):
-            program = gl.program("hair_direction")
-            with ribbons(gl, strands, width) as buffers:
-                draw_ribbons(gl, buffers, program, camera, depth, min_width_px=min_width_px)
-        direction = np.asarray(picture.read(), np.float32)
-    seen: npt.NDArray[np.bool_] = direction[..., 2] > 0.5
-    angle = wrap_angle(np.arctan2(direction[..., 1], direction[..., 0]))
+    measured = _measure(strands, head, camera, width, min_width_px)
+    seen: BoolArray = measured[..., 3] > 0.5
+    angle = wrap_angle(np.arctan2(measured[..., 1], measured[..., 0]))
     return np.where(seen, angle, np.float32(0)), seen
+
+
+def draw_depth(
+    strands: Strands,
+    head: Solids,
+    camera: Camera,
+    *,
+    width: float = 2e-4,
+    min_width_px: float = 1.0,
+) -> Float32Array:
+    """Return the axial depth (H, W) in metres of the strand seen at each pixel, else infinity."""
+    measured = _measure(strands, head, camera, width, min_width_px)
+    return np.where(measured[..., 3] > 0.5, measured[..., 2], np.float32(np.inf))
+
+
+def visible_points(strands: Strands, head: Solids, camera: Camera) -> BoolArray:
+    """Return (P,) which points of the strands the camera sees before other hair and the head."""
+    depth = draw_depth(strands, head, camera)
+    pixels = camera.project(strands.points)
+    inside = (pixels >= 0).all(axis=1) & (pixels < [camera.width, camera.height]).all(axis=1)
+    column, row = np.where(inside[:, None], pixels, 0).astype(np.int64).T
+    front = np.where(inside & np.isfinite(depth[row, column]), depth[row, column], -np.inf)
+    seen: BoolArray = camera.depth(strands.points) <= front + SEEN_TOLERANCE
+    return seen
+
+
+def _meshes(solids: Solids) -> Sequence[Mesh]:
+    if solids is None:
+        return ()
+    return solids if isinstance(solids, Sequence) else (solids,)
+
+
+def _draw_solids(
+    gl: Renderer,
+    meshes: Sequence[Mesh],
+    camera: Camera,
+    depth: DepthRange,
+    colour: tuple[float, float, float, float],
+) -> None:
+    program = gl.program("solid", "flat")
+    for mesh in meshes:
+        draw_solid(gl, mesh, program, camera, depth, HEAD_PUSH, u_colour=colour)
+
+
+def _measure(
+    strands: Strands, solids: Solids, camera: Camera, width: float, min_width_px: float
+) -> npt.NDArray[np.float32]:
+    """Return (H, W, 4): direction x, y, axial depth, and 1 where the first thing seen is hair."""
+    meshes = _meshes(solids)
+    depth = DepthRange.around(camera, strands.points, *[mesh.vertices for mesh in meshes])
+    with renderer() as gl, target(gl, camera, "f4") as picture:
+        _draw_solids(gl, meshes, camera, depth, _NOTHING)
+        program = gl.program("hair_direction")
+        with ribbons(gl, strands, width) as buffers:
+            draw_ribbons(gl, buffers, program, camera, depth, min_width_px=min_width_px)
+        return np.asarray(picture.read(), np.float32)

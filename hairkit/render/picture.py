@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -90,8 +91,12 @@ def draw_views(
     backgrounds: Sequence[UInt8Array] | None = None,
     solids: Sequence[Solid] = (),
     supersample: int = SUPERSAMPLE,
+    show_direction: bool = False,
 ) -> list[UInt8Array]:
-    """Return one picture a camera, as `draw` makes them, preparing hair and head only once."""
+    """Return one picture a camera, as `draw` makes them, preparing hair and head only once.
+
+    With `show_direction` strands are coloured by their direction, (1 + direction) / 2 as RGB.
+    """
     strands = hair.strands if isinstance(hair, Groom) else hair
     if isinstance(hair, Groom):
         head = hair.head if head is None else head
@@ -100,12 +105,17 @@ def draw_views(
     shown = (*([head_solid(head, material)] if head is not None else []), *solids)
     density = hair_density(strands, shown)
     volume = light_volume(density, lights) if lights is not None else None
+    look = {
+        "u_root_colour": tuple(material.root_colour.tolist()),
+        "u_tip_colour": tuple(material.tip_colour.tolist()),
+        "u_show_direction": float(show_direction),
+    }
     pictures = []
     with renderer() as gl, ribbons(gl, strands, _drawn_width(strands, material)) as buffers:
         for index, camera in enumerate(cameras):
             shot = _Shot(supersampled(camera, supersample), lights or Lights.at_camera(camera))
             light = volume or light_volume(density, shot.lights)
-            samples = _shoot(gl, shot, strands, buffers, material, shown, light)
+            samples = _shoot(gl, shot, strands, buffers, look, shown, light)
             background = backgrounds[index] if backgrounds is not None else backdrop(camera)
             pictures.append(_over(averaged(samples, camera), background))
     return pictures
@@ -149,19 +159,19 @@ def _shoot(
     gl: Renderer,
     shot: _Shot,
     strands: Strands,
-    buffers: RibbonBuffers,
-    material: HairMaterial,
+    buffers: RibbonBuffers | None,
+    look: dict[str, Any],
     solids: Sequence[Solid],
     light: LightVolume,
 ) -> UInt8Array:
     """Return the samples (k H, k W, 4), alpha 255 where something was drawn."""
     camera = shot.camera
     depth = DepthRange.around(camera, strands.points, *[solid.vertices for solid in solids])
-    texture = gl.context.texture3d(light.grid.shape, 3, light.texels(), dtype="f4", alignment=1)
+    texture = gl.context.texture3d(light.size, 3, light.texels(), dtype="f4", alignment=1)
     texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
     texture.repeat_x = texture.repeat_y = texture.repeat_z = False
     texture.use(0)
-    uniforms = {
+    uniforms: dict[str, Any] = {
         **shot.lights.uniforms(),
         **light.uniforms(),
         "u_light": 0,
@@ -172,12 +182,8 @@ def _shoot(
             for solid in solids:
                 skin = uniforms | {"u_scatter": solid.scatter}
                 draw_solid(gl, solid, gl.program("skin"), camera, depth, HEAD_PUSH, **skin)
-            colours = {
-                "u_root_colour": tuple(material.root_colour.tolist()),
-                "u_tip_colour": tuple(material.tip_colour.tolist()),
-            }
             program = gl.program("hair")
-            draw_ribbons(gl, buffers, program, camera, depth, **uniforms, **colours)
+            draw_ribbons(gl, buffers, program, camera, depth, **uniforms, **look)
             return np.asarray(picture.read(), np.uint8)
     finally:
         texture.release()

@@ -60,6 +60,7 @@ def set_camera(program: moderngl.Program, camera: Camera, depth: DepthRange) -> 
         program,
         u_clip_from_head=_columns(clip_from_camera(camera, depth) @ camera.camera_from_head),
         u_forward=tuple(camera.forward.tolist()),
+        u_depth_offset=float(camera.translation[2]),
         u_size_px=(camera.width, camera.height),
         u_focal_px=camera.focal,
         u_perspective=float(camera.model == "perspective"),

@@ -30,8 +30,10 @@ class Target:
     def read(self) -> npt.NDArray[np.uint8] | Float32Array:
         """Return (H, W, 4): uint8, or float32 for a target of kind `f4`."""
         data = self._framebuffer.read(components=4, dtype=self._kind)
-        dtype = np.uint8 if self._kind == "f1" else np.float32
-        return np.frombuffer(data, dtype).reshape(*self._framebuffer.size[::-1], 4)
+        shape = (*self._framebuffer.size[::-1], 4)
+        if self._kind == "f1":
+            return np.frombuffer(data, np.uint8).reshape(shape)
+        return np.frombuffer(data, np.float32).reshape(shape)
 
 
 @contextlib.contextmanager
