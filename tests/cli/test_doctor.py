@@ -1,0 +1,57 @@
+"""Laws of `hairkit doctor`."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from hairkit.cli import doctor, main
+from hairkit.cli.doctor import Finding
+
+
+def test_it_looks_at_everything_and_its_code_says_whether_the_core_works(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Every requirement, both OpenGL backends, extras, cache and plugins are there; 2 on FAIL."""
+    code = main(["doctor", "--json"])
+    findings = {each["topic"]: each for each in json.loads(capsys.readouterr().out)}
+    topics = {"python", "hairkit", "numpy", "opencv wheels", "OpenGL by egl", "OpenGL by osmesa"}
+    assert topics | {"extra test", "compiled kernels", "plugins"} <= set(findings)
+    assert findings["numpy"]["verdict"] == "ok"
+    failed = [each for each in findings.values() if each["verdict"] == "FAIL"]
+    assert code == (2 if failed else 0)
+
+
+@pytest.mark.parametrize(("verdict", "code"), [("ok", 0), ("note", 0), ("FAIL", 2)])
+def test_only_a_failure_fails(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], verdict: str, code: int
+) -> None:
+    """What is optional is noted and does not change the exit code."""
+    finding = Finding("x", verdict, "a text")  # type: ignore[arg-type]  # a parameter of the test
+    monkeypatch.setattr(doctor, "examine", lambda: [finding])
+    assert main(["doctor"]) == code
+    assert capsys.readouterr().out.split() == [verdict, "x", "a", "text"]
+
+
+def test_two_opencv_wheels_are_a_failure_with_its_cure() -> None:
+    """Two wheels that share the folder cv2 are found, and the cure names them."""
+    found = doctor._opencv_wheels(["numpy", "opencv-python", "opencv-contrib-python-headless"])
+    assert found.verdict == "FAIL"
+    assert "pip uninstall -y opencv-contrib-python-headless opencv-python" in found.text
+    assert doctor._opencv_wheels(["opencv-contrib-python-headless"]).verdict == "ok"
+
+
+def test_a_missing_package_is_named_with_pip() -> None:
+    """The cure is a command that can be copied."""
+    found = doctor._package("no-such-distribution")
+    assert found.verdict == "FAIL"
+    assert "pip install --force-reinstall no-such-distribution" in found.text
+    assert 'pip install "hairkit[x]"' in doctor._extra("x", ["no-such-distribution"]).text
+
+
+def test_a_backend_that_does_not_exist_is_reported() -> None:
+    """The reason is the last line of what the driver said."""
+    success, text = doctor._try_backend("no-such-backend")
+    assert not success
+    assert "no-such-backend" in text
