@@ -67,7 +67,7 @@ class Options:
         0.7, low=0.3, high=10.0, doc="Gaussian under the finest gradient.", unit="px"
     )
     gradient_scales: int = option(
-        2, low=1, high=5, doc="How many gradients are added, each twice as wide as the last."
+        1, low=1, high=5, doc="How many gradients are added, each twice as wide as the last."
     )
     magnitude_power: float = option(
         1.0, low=0.0, high=2.0, doc="Gradients count by their length to this power; 2 is classic."
