@@ -71,6 +71,8 @@ class PluginInfo:
     options: tuple[OptionInfo, ...] = ()
     source: Path | None = None
     """The plugin's Python file, where there is one."""
+    suffixes: tuple[str, ...] = ()
+    """File name endings that it reads or writes, from the module's `SUFFIXES`: `(".apx",)`."""
     broken: str | None = None
     """Why the plugin cannot be used, or None."""
 
@@ -327,7 +329,13 @@ def _inspect(plugin: object, name: str, distribution: str, version: str) -> Plug
     summary = (inspect.getdoc(plugin) or "").partition("\n")[0]
     file = getattr(plugin, "__file__", None)
     return PluginInfo(
-        name, distribution, version, summary, options=options, source=Path(file) if file else None
+        name,
+        distribution,
+        version,
+        summary,
+        options=options,
+        source=Path(file) if file else None,
+        suffixes=tuple(getattr(plugin, "SUFFIXES", ())),
     )
 
 

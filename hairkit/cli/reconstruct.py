@@ -1,0 +1,117 @@
+"""`hairkit reconstruct PHOTOS -o OUT`: turn eight photos into a groom."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from hairkit.errors import InputError
+
+_DESCRIPTION = """\
+Example: hairkit reconstruct photos/ -o out/
+
+Turn eight photos into a groom. PHOTOS is a folder with the photos of the turn: front, then
+every 45 degrees towards the subject's left; or a folder with photos/ and, where present, masks/,
+strokes/ and landmarks.json, matched by name, and a capture.toml. OUT gets groom.npz, scene.json,
+the recipe's exports and hairkit.log. Run it again after an interruption: it goes on where it stopped."""
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "reconstruct", help="turn eight photos into a groom", description=_DESCRIPTION
+    )
+    add = parser.add_argument
+    add("photos", nargs="?", metavar="PHOTOS", help="folder of the capture")
+    add("-o", "--out", required=True, metavar="OUT", help="folder for what is made")
+    add("--sample", action="store_true", help="use the capture that ships with hairkit")
+    add("--recipe", default="default", metavar="R", help="default, thesis or a .toml file")
+    add("--set", action="append", default=[], metavar="X=V", help="plugin.option=V or stage=PLUGIN")
+    add("--head", metavar="FILE", help="your head: OBJ, PLY or GLB with a scalp")
+    add("--head-units", default="m", metavar="U", help="units of the head file (default m)")
+    add("--guides", type=int, default=600, metavar="N", help="number of guide hairs (default 600)")
+    add("--seed", type=int, default=0, metavar="N", help="seed of the roots' places (default 0)")
+    add("--max-edge", type=int, default=0, metavar="PX", help="scale larger photos to this edge")
+    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+    add("--no-cache", action="store_true", help="run every stage again")
+    add("--quiet", action="store_true", help="say nothing on stderr but errors")
+    add("--json", action="store_true", help="print what was made for machines")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Reconstruct, and print what was made."""
+    from hairkit.capture_reader import WORKING_EDGE, read_capture
+    from hairkit.manager import Manager
+    from hairkit.pipeline import export_paths, reconstruct
+    from hairkit.progress import Recorder, progress_for
+    from hairkit.recipe import load_recipe
+
+    began = time.perf_counter()
+    manager = Manager.loaded(args.plugin)
+    recipe = load_recipe(args.recipe).with_set(args.set)
+    recipe.check(manager)
+    head = _head(args)
+    capture = read_capture(_photos(args), _max_edge(args, WORKING_EDGE))
+    with progress_for(sys.stderr, quiet=args.quiet or args.json) as shown:
+        record = Recorder(shown)
+        groom = reconstruct(
+            capture,
+            args.out,
+            recipe,
+            manager,
+            head=head,
+            guides=args.guides,
+            seed=args.seed,
+            progress=record,
+            reuse=not args.no_cache,
+        )
+    lengths = groom.strands.lengths()
+    summary = {
+        "groom": str(Path(args.out) / "groom.npz"),
+        "scene": str(Path(args.out) / "scene.json"),
+        "exports": {name: str(path) for name, path in export_paths(args.out, recipe, manager)},
+        "strands": len(groom.strands),
+        "roots": args.guides,
+        "mean_length_m": round(float(lengths.mean()), 4),
+        "stages": record.stages,
+        "seconds": round(time.perf_counter() - began, 3),
+    }
+    print(json.dumps(summary, indent=1) if args.json else _told(summary))
+    return 0
+
+
+def _photos(args: argparse.Namespace) -> Path:
+    from hairkit.capture_reader import sample_folder
+
+    if args.sample == (args.photos is not None):
+        raise InputError("give either a folder of photos or --sample")
+    return sample_folder() if args.sample else Path(args.photos)
+
+
+def _max_edge(args: argparse.Namespace, default: int) -> int:
+    if args.max_edge and not 128 <= args.max_edge <= 8192:
+        raise InputError(f"--max-edge is {args.max_edge}, expected 128 to 8192 pixels")
+    return args.max_edge or default
+
+
+def _head(args: argparse.Namespace) -> Any:
+    if args.head is None:
+        return None
+    from hairkit.head_files import read_head
+
+    return read_head(args.head, units=args.head_units)
+
+
+def _told(summary: dict[str, Any]) -> str:
+    files = [summary["groom"], summary["scene"], *summary["exports"].values()]
+    return "\n".join(
+        [
+            f"{summary['strands']} guides of {summary['roots']} roots,"
+            f" mean length {100 * summary['mean_length_m']:.1f} cm, in {summary['seconds']:.1f} s",
+            *files,
+        ]
+    )

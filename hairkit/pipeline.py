@@ -1,0 +1,146 @@
+"""The whole road from photos to a groom: one function that runs a recipe, stage after stage."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+from hairkit.assemble import assemble_groom
+from hairkit.capture import Capture
+from hairkit.default_head import default_head
+from hairkit.errors import InputError
+from hairkit.groom import Groom
+from hairkit.groom_file import write_groom
+from hairkit.head import Head
+from hairkit.manager import Manager
+from hairkit.mask import Mask
+from hairkit.orientation import OrientationMap
+from hairkit.progress import Progress, Silent
+from hairkit.recipe import Recipe
+from hairkit.run_log import RunLog
+from hairkit.scalp import sample_roots
+from hairkit.scene import Scene
+from hairkit.stages import Argument, Given, StageRunner
+from hairkit.strands import Strands
+from hairkit.volume import Hull, OrientationField
+from hairkit.workfolder import WorkFolder
+
+MAX_GUIDES = 100_000
+
+
+def reconstruct(
+    capture: Capture,
+    out: str | os.PathLike[str],
+    recipe: Recipe,
+    manager: Manager,
+    *,
+    head: Head | None = None,
+    guides: int = 600,
+    seed: int = 0,
+    progress: Progress | None = None,
+    reuse: bool = True,
+) -> Groom:
+    """Run a recipe on a capture and return the groom.
+
+    Parameters
+    ----------
+    capture
+        The photos, see `hairkit.capture_reader`.
+    out
+        Folder for `groom.npz`, `scene.json`, the recipe's exports and `hairkit.log`; its `work/`
+        keeps what the stages found, so that unchanged stages are not run again.
+    recipe, manager
+        Which plugin does each stage, and the plugins.
+    head
+        The head to fit, the default head when None.
+    guides
+        Number of roots, each of which grows a strand.
+    seed
+        Seed of the roots' places.
+    progress
+        Is told how the run goes on.
+    reuse
+        False runs every stage again.
+
+    Raises
+    ------
+    HairkitError
+        The recipe, the photos or a plugin is at fault; its text is one line.
+    OSError
+        A file cannot be written. Files are written whole or not at all.
+    """
+    recipe.check(manager)
+    if not 1 <= guides <= MAX_GUIDES:
+        raise InputError(f"{guides} guides, expected 1 to {MAX_GUIDES}")
+    log = RunLog(progress or Silent())
+    folder = Path(out)
+    work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(_waiting(folder)))
+    with work, ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool:
+        run = StageRunner(recipe, manager, work, log, pool)
+        try:
+            groom, scene = _grow(run, capture, head or default_head(), guides, seed)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+        work.flush()
+        write_groom(folder / "groom.npz", groom)
+        _in_photo_pixels(scene, capture).write_json(folder / "scene.json")
+        for plugin, path in export_paths(folder, recipe, manager):
+            run.export(plugin, groom, path)
+        manager.notify("groom_ready", groom=groom)
+        log.write(folder / "hairkit.log", recipe, manager)
+    return groom
+
+
+def export_paths(
+    out: str | os.PathLike[str], recipe: Recipe, manager: Manager
+) -> tuple[tuple[str, Path], ...]:
+    """Return plugin and path of every file that the recipe exports into a folder."""
+    stage = recipe.stage("export")
+    names = [choice.plugin for choice in stage.choices] if stage is not None else []
+    suffixes = [(manager.info(name).suffixes or (f".{name}",))[0] for name in names]
+    return tuple(
+        (name, Path(out) / f"groom{suffix}") for name, suffix in zip(names, suffixes, strict=True)
+    )
+
+
+def _grow(
+    run: StageRunner, capture: Capture, head: Head, guides: int, seed: int
+) -> tuple[Groom, Scene]:
+    """Run the stages; views are worked on side by side while later stages wait for them."""
+    photos, views = Given.of(capture), [Given.of(view) for view in capture.views]
+    masks = run.every_view("segment", Mask, views)
+    orientations = run.every_view("orient", OrientationMap, views, mask=masks)
+    scene = run.once("scene", Scene, capture=photos, masks=masks, head=Given.of(head))
+    if run.has("head"):
+        scene = run.once("head", Scene, capture=photos, masks=masks, scene=scene)
+    hull = run.once("hull", Hull, scene=scene, masks=masks)
+    seen: dict[str, Argument] = {
+        "scene": scene,
+        "masks": masks,
+        "orientations": orientations,
+        "hull": hull,
+    }
+    field = run.once("field", OrientationField, **seen)
+    roots = Given.of(sample_roots(scene.value.head, guides, seed))
+    strands = run.once("track", Strands, **seen, field=field, roots=roots)
+    groom = assemble_groom(
+        capture.views,
+        [mask.result().value for mask in masks],
+        scene.value.head,
+        roots.value,
+        strands.value,
+    )
+    return groom, scene.value
+
+
+def _in_photo_pixels(scene: Scene, capture: Capture) -> Scene:
+    """Return the scene with its cameras for the photos as they are on disk."""
+    pairs = zip(scene.cameras, capture.views, strict=True)
+    return replace(scene, cameras=tuple(c.resized(*view.photo_size) for c, view in pairs))
+
+
+def _waiting(folder: Path) -> str:
+    return f"{folder}: another run is working here; waiting for it to end"
