@@ -13,6 +13,7 @@ import numpy as np
 
 from hairkit.camera import Camera
 from hairkit.capture import Capture, View
+from hairkit.capture_reader import TURN
 from hairkit.groom import Groom
 from hairkit.head import Capsules, Head, Roots
 from hairkit.mask import BACKGROUND, HAIR, PERSON, Mask
@@ -22,16 +23,7 @@ from hairkit.stored import BoolArray, Float32Array
 from hairkit.strands import Strands
 from hairkit.volume import Hull, OrientationField, VoxelGrid, outer_products
 
-VIEW_NAMES = (
-    "front",
-    "front-left",
-    "left",
-    "back-left",
-    "back",
-    "back-right",
-    "right",
-    "front-right",
-)
+VIEW_NAMES = tuple(TURN)
 """Views of the nominal turn, 45 degrees apart, towards the subject's left."""
 
 _WIDTH, _HEIGHT = 96, 128
