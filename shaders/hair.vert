@@ -8,7 +8,7 @@ uniform vec3 u_eye;             // camera centre, head frame
 uniform vec3 u_forward;         // optical axis, head frame
 uniform vec3 u_root_colour;
 uniform vec3 u_tip_colour;
-uniform float u_show_direction; // 1: colours tell the strand's 3D direction, as normal maps do
+uniform float u_show_direction; // 1: red runs left and right, green front and back, blue up and down
 
 out vec3 v_colour;
 
@@ -25,7 +25,7 @@ void main() {
     vec3 key = fibre(r.tangent, u_key_direction, to_eye, colour, random) * u_key_colour * reached.r;
     vec3 rim = fibre(r.tangent, u_rim_direction, to_eye, colour, other) * u_rim_colour * reached.g;
     vec3 sky = colour * ambient(0.3) * reached.b;
-    vec3 shown = (0.5 + 0.5 * r.tangent) * (0.45 + 0.55 * reached.b) * (0.8 + 0.2 * other);
+    vec3 shown = (0.2 + 0.8 * abs(r.tangent.xzy)) * (0.5 + 0.5 * reached.b) * (0.8 + 0.2 * other);
     v_colour = mix(tone(key + rim + sky), shown, u_show_direction);
     gl_Position = r.clip;
 }

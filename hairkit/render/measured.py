@@ -102,7 +102,7 @@ def visible_points(strands: Strands, head: Solids, camera: Camera) -> BoolArray:
     """Return (P,) which points of the strands the camera sees before other hair and the head."""
     depth = draw_depth(strands, head, camera)
     pixels = camera.project(strands.points)
-    inside = (pixels >= 0).all(axis=1) & (pixels < [camera.width, camera.height]).all(axis=1)
+    inside = np.all((pixels >= 0) & (pixels < [camera.width, camera.height]), axis=1)
     column, row = np.where(inside[:, None], pixels, 0).astype(np.int64).T
     front = np.where(inside & np.isfinite(depth[row, column]), depth[row, column], -np.inf)
     seen: BoolArray = camera.depth(strands.points) <= front + SEEN_TOLERANCE

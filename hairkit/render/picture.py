@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -95,7 +96,8 @@ def draw_views(
 ) -> list[UInt8Array]:
     """Return one picture a camera, as `draw` makes them, preparing hair and head only once.
 
-    With `show_direction` strands are coloured by their direction, (1 + direction) / 2 as RGB.
+    With `show_direction` strands are coloured by their direction as in tractography: red runs left
+    and right, green front and back, blue up and down.
     """
     strands = hair.strands if isinstance(hair, Groom) else hair
     if isinstance(hair, Groom):
@@ -104,18 +106,25 @@ def draw_views(
     material = material or HairMaterial()
     shown = (*([head_solid(head, material)] if head is not None else []), *solids)
     density = hair_density(strands, shown)
-    volume = light_volume(density, lights) if lights is not None else None
     look = {
         "u_root_colour": tuple(material.root_colour.tolist()),
         "u_tip_colour": tuple(material.tip_colour.tolist()),
         "u_show_direction": float(show_direction),
     }
     pictures = []
-    with renderer() as gl, ribbons(gl, strands, _drawn_width(strands, material)) as buffers:
+    with (
+        renderer() as gl,
+        ribbons(gl, strands, _drawn_width(strands, material)) as buffers,
+        contextlib.ExitStack() as kept,
+    ):
+        volume: LightVolume | None = None
         for index, camera in enumerate(cameras):
             shot = _Shot(supersampled(camera, supersample), lights or Lights.at_camera(camera))
-            light = volume or light_volume(density, shot.lights)
-            samples = _shoot(gl, shot, strands, buffers, look, shown, light)
+            if volume is None or lights is None:
+                kept.close()
+                volume = light_volume(density, shot.lights)
+                kept.enter_context(_light_texture(gl, volume))
+            samples = _shoot(gl, shot, strands, buffers, look, shown, volume)
             background = backgrounds[index] if backgrounds is not None else backdrop(camera)
             pictures.append(_over(averaged(samples, camera), background))
     return pictures
@@ -155,6 +164,18 @@ def _drawn_width(strands: Strands, material: HairMaterial) -> float | Float32Arr
     return wider * (material.width if strands.widths is None else strands.widths)
 
 
+@contextlib.contextmanager
+def _light_texture(gl: Renderer, light: LightVolume) -> Iterator[None]:
+    texture = gl.context.texture3d(light.size, 3, light.texels(), dtype="f4", alignment=1)
+    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    texture.repeat_x = texture.repeat_y = texture.repeat_z = False
+    texture.use(0)
+    try:
+        yield
+    finally:
+        texture.release()
+
+
 def _shoot(
     gl: Renderer,
     shot: _Shot,
@@ -167,26 +188,18 @@ def _shoot(
     """Return the samples (k H, k W, 4), alpha 255 where something was drawn."""
     camera = shot.camera
     depth = DepthRange.around(camera, strands.points, *[solid.vertices for solid in solids])
-    texture = gl.context.texture3d(light.size, 3, light.texels(), dtype="f4", alignment=1)
-    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-    texture.repeat_x = texture.repeat_y = texture.repeat_z = False
-    texture.use(0)
     uniforms: dict[str, Any] = {
         **shot.lights.uniforms(),
         **light.uniforms(),
         "u_light": 0,
         "u_eye": tuple(camera.position.tolist()),
     }
-    try:
-        with target(gl, camera) as picture:
-            for solid in solids:
-                skin = uniforms | {"u_scatter": solid.scatter}
-                draw_solid(gl, solid, gl.program("skin"), camera, depth, HEAD_PUSH, **skin)
-            program = gl.program("hair")
-            draw_ribbons(gl, buffers, program, camera, depth, **uniforms, **look)
-            return np.asarray(picture.read(), np.uint8)
-    finally:
-        texture.release()
+    with target(gl, camera) as picture:
+        for solid in solids:
+            skin = uniforms | {"u_scatter": solid.scatter}
+            draw_solid(gl, solid, gl.program("skin"), camera, depth, HEAD_PUSH, **skin)
+        draw_ribbons(gl, buffers, gl.program("hair"), camera, depth, **uniforms, **look)
+        return np.asarray(picture.read(), np.uint8)
 
 
 def _over(picture: UInt8Array, background: UInt8Array) -> UInt8Array:

@@ -1,0 +1,178 @@
+"""`hairkit render GROOM -o picture.png`: draw a groom on its head."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from hairkit.camera import Camera
+from hairkit.densify import densify
+from hairkit.errors import InputError
+from hairkit.groom import Groom
+from hairkit.render import Lights, draw_views
+from hairkit.scene import read_cameras
+from hairkit.stored import UInt8Array, write_bytes
+from hairkit.strands import Strands
+
+_DESCRIPTION = """\
+Example: hairkit render out/groom.npz -o front-left.png --camera front-left
+
+Draw a groom on its head, its guides interpolated to full hair. The camera is a name of the turn,
+"azimuth,elevation" in degrees, or a view of a scene.json. --turntable 24 writes 24 pictures."""
+
+TURN = {
+    "front": 0.0,
+    "front-left": 45.0,
+    "left": 90.0,
+    "back-left": 135.0,
+    "back": 180.0,
+    "back-right": 225.0,
+    "right": 270.0,
+    "front-right": 315.0,
+}
+"""Azimuths of the named cameras, degrees."""
+VERTICAL_ANGLE = np.radians(26.0)
+"""Field of view of a named camera over the picture's height."""
+MARGIN = 1.12
+"""Room around the groom in the picture."""
+MOST_HAIRS = 200_000
+LARGEST = 8192
+"""Longest edge of a picture, pixels."""
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser("render", help="draw a groom", description=_DESCRIPTION)
+    parser.add_argument("groom", metavar="GROOM", type=Path, help="a groom (.npz)")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="PNG")
+    parser.add_argument(
+        "--camera", default=None, help="front, left, ... or azimuth,elevation (front)"
+    )
+    parser.add_argument("--scene", type=Path, metavar="FILE", help="scene.json with cameras")
+    parser.add_argument("--view", metavar="NAME", help="the view of the scene (its first)")
+    parser.add_argument("--hairs", type=int, default=20_000, metavar="N", help="strands (20000)")
+    parser.add_argument("--size", metavar="WxH", help="pixels (1280x720; the scene's own size)")
+    parser.add_argument("--turntable", type=int, metavar="N", help="N pictures all around")
+    parser.add_argument("--seed", type=int, default=0, help="of the interpolated hair (0)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw and print the names of the pictures."""
+    groom = Groom.load(args.groom)
+    if not 1 <= args.hairs <= MOST_HAIRS:
+        raise InputError(f"--hairs is {args.hairs}, expected 1 to {MOST_HAIRS}")
+    hair = densify(groom, args.hairs, args.seed)
+    cameras = _cameras(args, groom.head.vertices, hair)
+    paths = _paths(args.output, len(cameras))
+    light = Lights.at_camera(cameras[0]) if len(cameras) > 1 else None
+    for path, camera in zip(paths, cameras, strict=True):
+        picture = draw_views(hair, groom.head, [camera], material=groom.material, lights=light)[0]
+        write_picture(path, picture)
+        print(path)
+        print(f"{path.name}: {len(hair)} strands, {camera.width}x{camera.height}", file=sys.stderr)
+    return 0
+
+
+def write_picture(path: Path, picture: UInt8Array) -> None:
+    """Write a picture (H, W, 3) RGB in the format that the name ends in, PNG or JPEG, atomically."""
+    kind = path.suffix.lower()
+    if kind not in (".png", ".jpg", ".jpeg"):
+        raise InputError(f"{path}: pictures are written as .png or .jpg, not {kind or 'without'}")
+    done, data = cv2.imencode(kind, picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 95])
+    if not done:
+        raise InputError(f"{path}: the picture of {picture.shape[:2]} cannot be encoded")
+    write_bytes(path, data.tobytes())
+
+
+def framing_camera(
+    points: np.ndarray[Any, Any],
+    azimuth_deg: float,
+    elevation_deg: float,
+    width: int,
+    height: int,
+) -> Camera:
+    """Return the camera from which all points (N, 3) fill the picture, whatever the direction."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high) / 2
+    radius = float(np.linalg.norm(points - middle, axis=1).max()) * MARGIN
+    tangent = np.tan(VERTICAL_ANGLE / 2) * min(1.0, width / height)
+    return Camera.on_turn(
+        azimuth_deg,
+        elevation_deg=elevation_deg,
+        distance=radius / float(np.sin(np.arctan(tangent))),
+        target=middle,
+        focal=height / 2 / float(np.tan(VERTICAL_ANGLE / 2)),
+        width=width,
+        height=height,
+    )
+
+
+def _cameras(args: argparse.Namespace, head: Any, hair: Strands) -> list[Camera]:
+    if args.scene is not None:
+        if args.camera or args.turntable:
+            raise InputError("--scene names its own cameras; leave --camera and --turntable out")
+        return [_scene_camera(args.scene, args.view, args.size)]
+    if args.view is not None:
+        raise InputError(f"--view {args.view} needs --scene scene.json")
+    width, height = _size(args.size or "1280x720")
+    azimuth, elevation = _direction(args.camera or "front")
+    if args.turntable is None:
+        turn = [azimuth]
+    elif 1 <= args.turntable <= 3600:
+        turn = (azimuth + 360 * np.arange(args.turntable) / args.turntable).tolist()
+    else:
+        raise InputError(f"--turntable is {args.turntable}, expected 1 to 3600 pictures")
+    points = np.concatenate([head, hair.points])
+    return [framing_camera(points, a, elevation, width, height) for a in turn]
+
+
+def _scene_camera(path: Path, view: str | None, size: str | None) -> Camera:
+    names, cameras = read_cameras(path)
+    wanted = names[0] if view is None else view
+    if wanted not in names:
+        raise InputError(f"{path} has no view {wanted!r}; it has {', '.join(names)}")
+    camera = cameras[names.index(wanted)]
+    if size is None:
+        return camera
+    width, height = _size(size)
+    scale = min(width / camera.width, height / camera.height)
+    fitted = camera.resized(round(camera.width * scale), round(camera.height * scale))
+    shift = (np.array([width, height]) - [fitted.width, fitted.height]) / 2
+    return replace(fitted, centre=fitted.centre + shift, width=width, height=height)
+
+
+def _direction(text: str) -> tuple[float, float]:
+    if text in TURN:
+        return TURN[text], 0.0
+    parts = text.split(",")
+    try:
+        azimuth, elevation = (float(part) for part in parts)
+    except ValueError as error:
+        names = ", ".join(TURN)
+        raise InputError(
+            f"--camera is {text!r}, expected azimuth,elevation in degrees or one of {names}"
+        ) from error
+    if not (np.isfinite(azimuth) and abs(elevation) < 90):
+        raise InputError(f"--camera is {text!r}, expected an elevation between -90 and 90 degrees")
+    return azimuth, elevation
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
+    if not match or not all(1 <= int(n) <= LARGEST for n in match.groups()):
+        raise InputError(f"--size is {text!r}, expected WIDTHxHEIGHT up to {LARGEST}, as 1280x720")
+    return int(match[1]), int(match[2])
+
+
+def _paths(output: Path, count: int) -> list[Path]:
+    if count == 1:
+        return [output]
+    digits = len(str(count - 1))
+    return [output.with_stem(f"{output.stem}_{i:0{digits}d}") for i in range(count)]

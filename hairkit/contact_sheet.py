@@ -1,0 +1,199 @@
+"""One picture that tells how a groom came about: photos, masks, orientation, hull, guides, hair."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import binary_erosion, gaussian_filter
+
+from hairkit.camera import Camera
+from hairkit.capture import Capture
+from hairkit.densify import densify
+from hairkit.errors import InputError
+from hairkit.groom import Groom
+from hairkit.mask import HAIR, PERSON, Mask
+from hairkit.orientation import OrientationMap
+from hairkit.render import Lights, draw_views
+from hairkit.scene import Scene
+from hairkit.stored import Float32Array, UInt8Array, write_bytes
+from hairkit.volume import Hull
+
+TILE_WIDTH = 160
+"""Width of one picture on the sheet, pixels."""
+GAP = 4
+"""Pixels between pictures."""
+HEADER = 24
+"""Height of the line of view names, pixels."""
+HAIRS = 2500
+"""Strands of the hair in the last row: a pixel of a tile is millimetres wide."""
+GUIDE_POINTS = 20
+"""Points a strand in the pictures."""
+
+PAPER, INK = 250, 60
+_HAIR_TINT, _PERSON_TINT = (232, 60, 132), (70, 130, 235)
+_ROWS = ("photo", "mask", "orientation", "hull", "guides", "hair")
+
+
+def write_contact_sheet(
+    path: str | os.PathLike[str],
+    capture: Capture,
+    masks: Sequence[Mask],
+    orientations: Sequence[OrientationMap],
+    hull: Hull,
+    groom: Groom,
+    scene: Scene,
+) -> None:
+    """Write the sheet to `path` (PNG): one column a view, one row a stage.
+
+    Masks and orientation maps may have any size; they are shown over the photos of `capture`.
+    """
+    sheet = contact_sheet(capture, masks, orientations, hull, groom, scene)
+    done, data = cv2.imencode(".png", sheet[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    if not done:
+        raise InputError(f"{path}: the contact sheet of {sheet.shape[:2]} pixels cannot be encoded")
+    write_bytes(path, data.tobytes())
+
+
+def contact_sheet(
+    capture: Capture,
+    masks: Sequence[Mask],
+    orientations: Sequence[OrientationMap],
+    hull: Hull,
+    groom: Groom,
+    scene: Scene,
+) -> UInt8Array:
+    """Return the sheet (H, W, 3) RGB that `write_contact_sheet` writes."""
+    size = _tile_size(scene.cameras)
+    photos = [_fit(view.image, size) for view in capture.views]
+    cameras = [camera.resized(*size) for camera in scene.cameras]
+    rows = (
+        photos,
+        [_mask_picture(photo, mask) for photo, mask in zip(photos, masks, strict=True)],
+        [_orientation_picture(map_, size) for map_ in orientations],
+        _hull_pictures(hull, cameras),
+        _guide_pictures(groom, cameras),
+        _hair_pictures(groom, cameras),
+    )
+    return _arranged(rows, [view.name for view in capture.views], size)
+
+
+def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
+    return TILE_WIDTH, round(TILE_WIDTH * cameras[0].height / cameras[0].width)
+
+
+def _fit(image: npt.NDArray[np.uint8], size: tuple[int, int]) -> UInt8Array:
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _mask_picture(photo: UInt8Array, mask: Mask) -> UInt8Array:
+    """Return the photo, hair tinted pink and the rest of the person blue."""
+    size = (photo.shape[1], photo.shape[0])
+    hair = _fit(cv2.compare(mask.labels, HAIR, cv2.CMP_EQ), size)[..., None] / 255 * 0.6
+    person = _fit(cv2.compare(mask.labels, PERSON, cv2.CMP_EQ), size)[..., None] / 255 * 0.35
+    grey = photo.mean(axis=2, keepdims=True) * (1 - hair - person)
+    return np.asarray(grey + hair * _HAIR_TINT + person * _PERSON_TINT).astype(np.uint8)
+
+
+def _orientation_picture(map_: OrientationMap, size: tuple[int, int]) -> UInt8Array:
+    """Return hue for the angle and brightness for the confidence."""
+    fine = (2 * size[0], 2 * size[1])
+    angle = cv2.resize(map_.angle, fine, interpolation=cv2.INTER_NEAREST)
+    sure = np.sqrt(cv2.resize(map_.confidence, fine, interpolation=cv2.INTER_NEAREST))
+    hsv = np.stack([angle * (180 / np.pi), np.full_like(angle, 200), sure * 255], axis=-1)
+    rgb = cv2.cvtColor(hsv.astype(np.uint8), cv2.COLOR_HSV2RGB)
+    return _fit(np.asarray(rgb, np.uint8), size)
+
+
+def _hull_pictures(hull: Hull, cameras: Sequence[Camera]) -> list[UInt8Array]:
+    """Return the dense cells from each camera as shaded clay, splatted from far to near."""
+    surface = hull.dense & ~binary_erosion(hull.dense)
+    cells = np.argwhere(surface)
+    centres = hull.grid.origin + (cells + 0.5) * hull.grid.spacing
+    normals = _outward_normals(hull, cells)
+    return [_splatted(camera, centres, normals, hull.grid.spacing) for camera in cameras]
+
+
+def _outward_normals(hull: Hull, cells: npt.NDArray[np.int64]) -> Float32Array:
+    smooth = gaussian_filter(hull.dense.astype(np.float32), 2.0)
+    padded = np.pad(smooth, 1)
+    at = tuple((cells + 1).T)
+    slopes = []
+    for axis in range(3):
+        step = np.eye(3, dtype=np.int64)[axis][:, None]
+        slopes.append(padded[tuple(at + step)] - padded[tuple(at - step)])
+    normals = -np.stack(slopes, axis=1)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    result: Float32Array = (normals / np.maximum(length, 1e-9)).astype(np.float32)
+    return result
+
+
+def _splatted(
+    camera: Camera,
+    centres: npt.NDArray[np.float64],
+    normals: Float32Array,
+    spacing: float,
+) -> UInt8Array:
+    depth = camera.depth(centres)
+    order = np.argsort(-depth)  # near cells are written last and so stay
+    facing = np.clip(-(normals * camera.view_direction(centres)).sum(axis=1), 0, 1)
+    light = camera.rotation.T @ np.array([-0.5, -0.6, -0.62])
+    shade = 40 + 70 * facing + 120 * np.clip(normals @ light, 0, 1)
+    pixels = camera.project(centres)[order]
+    scale = camera.focal / (depth.min() if camera.model == "perspective" else 1.0)
+    reach = int(np.ceil(0.87 * spacing * scale))  # half a diagonal: oblique rows leave no gaps
+    picture = np.full((camera.height + 2 * reach, camera.width + 2 * reach), 20, np.uint8)
+    nearest = np.floor(pixels).astype(np.int64)
+    inside = ((nearest >= 0) & (nearest < [camera.width, camera.height])).all(axis=1)
+    column, row = nearest[inside].T
+    value = shade[order][inside].astype(np.uint8)
+    for dy in range(2 * reach):
+        for dx in range(2 * reach):
+            picture[row + dy, column + dx] = value
+    picture = np.asarray(cv2.medianBlur(picture, 3))  # cells at one depth leave specks
+    cropped = picture[reach : reach + camera.height, reach : reach + camera.width]
+    return np.repeat(cropped[..., None], 3, axis=2)
+
+
+def _guide_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
+    guides = groom.strands.resampled(GUIDE_POINTS)
+    lights = Lights.studio((0.4, 0.8, 0.6), (-0.4, 0.7, -0.6))
+    return draw_views(
+        guides, groom.head, cameras, material=groom.material, lights=lights, show_direction=True
+    )
+
+
+def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
+    hair = densify(groom, HAIRS).resampled(GUIDE_POINTS)
+    lights = Lights.studio((0.4, 0.8, 0.6), (-0.4, 0.7, -0.6))
+    return draw_views(hair, groom.head, cameras, material=groom.material, lights=lights)
+
+
+def _arranged(
+    rows: Iterable[Sequence[UInt8Array]], names: Sequence[str], size: tuple[int, int]
+) -> UInt8Array:
+    width, height = size
+    count = len(names)
+    sheet_width = count * (width + GAP) + GAP
+    sheet = np.full((HEADER + len(_ROWS) * (height + GAP), sheet_width, 3), PAPER, np.uint8)
+    for column, name in enumerate(names):
+        _write(sheet, name, (GAP + column * (width + GAP) + 2, HEADER - 8), INK)
+    for index, tiles in enumerate(rows):
+        top = HEADER + index * (height + GAP)
+        for column, tile in enumerate(tiles):
+            left = GAP + column * (width + GAP)
+            sheet[top : top + height, left : left + width] = tile
+        _write(sheet, _ROWS[index], (GAP + 5, top + 15), 255, outline=True)
+    return sheet
+
+
+def _write(
+    sheet: UInt8Array, text: str, at: tuple[int, int], grey: int, outline: bool = False
+) -> None:
+    font = cv2.FONT_HERSHEY_SIMPLEX
+    if outline:
+        cv2.putText(sheet, text, at, font, 0.45, (0, 0, 0), 3, cv2.LINE_AA)
+    cv2.putText(sheet, text, at, font, 0.45, (grey, grey, grey), 1, cv2.LINE_AA)
