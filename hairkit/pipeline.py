@@ -78,6 +78,7 @@ def reconstruct(
     folder = Path(out)
     work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(_waiting(folder)))
     with work, ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool:
+        _sweep(folder)
         run = StageRunner(recipe, manager, work, log, pool)
         try:
             groom, scene = _grow(run, capture, head or default_head(), guides, seed)
@@ -134,6 +135,13 @@ def _grow(
         strands.value,
     )
     return groom, scene.value
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a run that was killed had not finished writing."""
+    for name in ("groom", "scene.json", "hairkit.log"):
+        for leftover in folder.glob(f".{name}*.part"):
+            leftover.unlink(missing_ok=True)
 
 
 def _in_photo_pixels(scene: Scene, capture: Capture) -> Scene:

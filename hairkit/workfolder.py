@@ -11,6 +11,7 @@ import hashlib
 import os
 import threading
 import time
+import zipfile
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -114,12 +115,11 @@ class WorkFolder:
     def get(self, kind: type[_Found], digest: str, stage: str, view: str = "") -> _Found | None:
         """Return what is kept under this digest, or None; a damaged file counts as none."""
         path = self._file(stage, view)
-        if not (self._reuse and path.exists()):
+        if not self._reuse or _kept_digest(path) != digest:
             return None
         try:
             arrays = read_npz(path)
-            if str(arrays.pop(_DIGEST, "")) != digest:
-                return None
+            del arrays[_DIGEST]
             return from_arrays(kind, arrays, str(path))
         except HairkitError:
             return None
@@ -145,6 +145,15 @@ class WorkFolder:
 def _write(path: Path, value: Stored, digest: str) -> None:
     arrays = to_arrays(value) | {_DIGEST: np.asarray(digest)}
     write_npz(path, arrays, packed=False, durable=False)
+
+
+def _kept_digest(path: Path) -> str | None:
+    """Return the digest that a stage file was kept under, without reading the rest of it."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return str(data[_DIGEST])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
 
 
 def _lock(path: Path, waiting: Callable[[], None]) -> int | None:

@@ -14,10 +14,11 @@ from hairkit.errors import InputError
 _DESCRIPTION = """\
 Example: hairkit reconstruct photos/ -o out/
 
-Turn eight photos into a groom. PHOTOS is a folder with the photos of the turn: front, then
-every 45 degrees towards the subject's left; or a folder with photos/ and, where present, masks/,
-strokes/ and landmarks.json, matched by name, and a capture.toml. OUT gets groom.npz, scene.json,
-the recipe's exports and hairkit.log. Run it again after an interruption: it goes on where it stopped."""
+Turn eight photos into a groom. PHOTOS is a folder with the photos of the turn: front, then every
+45 degrees towards the subject's left; or a folder with photos/ and, where present, masks/, strokes/
+and landmarks.json, matched by name, and a capture.toml. OUT gets groom.npz, scene.json, the
+recipe's exports and hairkit.log. Run it again after an interruption: it goes on where it stopped.
+"""
 
 
 def register(subparsers: Any) -> None:

@@ -1,0 +1,173 @@
+"""`hairkit info FILE`: say what a groom, a capture, a scene or a head file holds."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.stored import Float32Array
+
+_DESCRIPTION = """\
+Example: hairkit info out/groom.npz
+
+Say what a file holds: a groom (.npz or what an import plugin reads), a scene.json, a head (.obj,
+.ply, .glb), or a capture's folder. Lengths are in metres."""
+
+_HEADS = (".obj", ".ply", ".glb")
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser("info", help="say what a file holds", description=_DESCRIPTION)
+    parser.add_argument("file", metavar="FILE", help="a file, or the folder of a capture")
+    parser.add_argument(
+        "--head-units", default="m", metavar="U", help="units of a head file (default m)"
+    )
+    parser.add_argument(
+        "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
+    )
+    parser.add_argument("--json", action="store_true", help="print for machines")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what the file holds."""
+    facts = _facts(Path(args.file), args)
+    print(json.dumps(facts, indent=1) if args.json else "\n".join(_lines(facts)))
+    return 0
+
+
+def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
+    if path.is_dir():
+        return _capture(path)
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if path.suffix == ".json":
+        return _scene(path)
+    if path.suffix.lower() in _HEADS:
+        return _head_file(path, args.head_units)
+    return _groom(path, args.plugin)
+
+
+def _groom(path: Path, plugin_files: list[str]) -> dict[str, Any]:
+    from hairkit.groom_file import read_groom
+
+    if path.suffix == ".npz":
+        groom = read_groom(path)
+    else:
+        from hairkit.cli.export import plugin_for
+        from hairkit.manager import Manager
+
+        manager = Manager.loaded(plugin_files)
+        groom = manager.call("import_groom", plugin_for(manager, "import_groom", path), path=path)
+    lengths, counts = groom.strands.lengths(), groom.strands.counts
+    look = groom.material
+    return {
+        "kind": "groom",
+        "strands": len(groom.strands),
+        "points": len(groom.strands.points),
+        "points_per_strand": _range(counts),
+        "length_m": _range(lengths),
+        "mean_length_m": round(float(lengths.mean()), 4) if len(lengths) else None,
+        "bounds_m": _bounds(groom.strands.points),
+        "width_m": look.width,
+        "root_colour": [round(float(c), 4) for c in look.root_colour],
+        "tip_colour": [round(float(c), 4) for c in look.tip_colour],
+        "head": _head(groom.head),
+    }
+
+
+def _scene(path: Path) -> dict[str, Any]:
+    from hairkit.scene import read_cameras
+
+    names, cameras = read_cameras(path)
+    views = {
+        name: {
+            "model": camera.model,
+            "size_px": f"{camera.width} x {camera.height}",
+            "focal": round(camera.focal, 1),
+            "azimuth_deg": round(camera.azimuth_deg, 2),
+            "elevation_deg": round(camera.elevation_deg, 2),
+            "distance_m": round(float(np.linalg.norm(camera.position)), 4),
+        }
+        for name, camera in zip(names, cameras, strict=True)
+    }
+    return {"kind": "scene", "views": views}
+
+
+def _capture(path: Path) -> dict[str, Any]:
+    from hairkit.capture_reader import read_capture
+
+    capture = read_capture(path)
+    views = {
+        view.name: {
+            "photo": view.photo_path.name if view.photo_path is not None else "",
+            "size_px": f"{view.photo_size[0]} x {view.photo_size[1]}",
+            "azimuth_deg": view.azimuth_deg,
+            "focal_px": None if view.focal_px is None else round(view.focal_px, 1),
+            "mask": view.mask_path is not None,
+            "strokes": view.strokes_path is not None,
+            "landmarks": view.landmarks is not None,
+        }
+        for view in capture.views
+    }
+    cameras = "orthographic" if capture.orthographic else "perspective"
+    return {"kind": "capture", "cameras": cameras, "views": views}
+
+
+def _head_file(path: Path, units: str) -> dict[str, Any]:
+    from hairkit.head_files import read_head
+
+    return {"kind": "head", **_head(read_head(path, units=units))}
+
+
+def _head(head: Any) -> dict[str, Any]:
+    return {
+        "vertices": len(head.vertices),
+        "faces": len(head.faces),
+        "scalp_vertices": int(np.count_nonzero(head.scalp > 0.5)),
+        "landmarks": head.landmark_vertices is not None,
+        "capsules": len(head.capsules.radius),
+        "bounds_m": _bounds(head.vertices),
+    }
+
+
+def _range(values: Any, digits: int = 4) -> dict[str, float]:
+    if not len(values):
+        return {}
+    least, most = values.min().item(), values.max().item()
+    return {"least": round(least, digits), "most": round(most, digits)}
+
+
+def _bounds(points: Float32Array) -> list[list[float]]:
+    if not len(points):
+        return []
+    return [[round(float(v), 4) for v in corner] for corner in (points.min(0), points.max(0))]
+
+
+def _lines(facts: dict[str, Any], indent: str = "") -> list[str]:
+    """Return `name: value` lines; tables within tables are indented, flat ones are one line."""
+    lines = []
+    for name, value in facts.items():
+        if not isinstance(value, dict):
+            lines.append(f"{indent}{name}: {_shown(value)}")
+        elif any(isinstance(item, dict) for item in value.values()):
+            lines += [f"{indent}{name}:", *_lines(value, indent + "  ")]
+        else:
+            inner = ", ".join(f"{key} {_shown(item)}" for key, item in value.items())
+            lines.append(f"{indent}{name}: {inner}")
+    return lines
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return " to ".join(_shown(item) for item in value)
+    if isinstance(value, list):
+        return f"({', '.join(str(item) for item in value)})"
+    return "unknown" if value is None else str(value)
