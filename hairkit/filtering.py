@@ -143,7 +143,7 @@ def local_contrast(grey: Float32Array, weight: Float32Array, sigma: float) -> Fl
     detail = (logarithm - masked_blur(logarithm, weight, sigma)) * weight
     variance = masked_blur(detail * detail, weight, sigma)
     typical = float(variance[inside].mean(dtype=np.float64))
-    least = max(_LEAST_CONTRAST**2 * typical, (0.25 / 255 / (mean + floor)) ** 2)
+    least = max(_LEAST_CONTRAST**2 * typical, (0.5 / 255 / (mean + floor)) ** 2)
     scaled = detail / np.sqrt(np.maximum(variance, least))
     return np.asarray(np.clip(scaled, -3, 3), np.float32)
 

@@ -7,7 +7,8 @@ The method of the thesis (hair from eight photos, chapter 5.1; the filter is Jai
     a = (u cos t + v sin t) / sigma_u,    b = (v cos t - u sin t) / sigma_v
 
 turned by t in equal steps over [0, pi), and a pixel takes the t of the largest |K * I|. The carrier
-waves along t, so the strand runs at t + pi / 2. The thesis prints the carrier on the unturned u
+waves along t, so the strand runs at t + pi / 2. The confidence, over its 99th percentile, is then
+filtered as if it was the photo, three times. The thesis prints the carrier on the unturned u
 (`carrier = "as_printed"`) and leaves the kernel's mean in (`zero_mean = false`).
 
 Where this differs: beyond the hair the picture is filled, not black, so that the silhouette makes
@@ -85,15 +86,17 @@ def orient(view: View, mask: Mask, options: Options) -> OrientationMap:
     banks = gabor_kernels(options)
     bases = [_basis(bank) for bank in banks]
     least = _LEAST_RIPPLE * float(np.abs(banks).sum(axis=(2, 3)).mean()) * options.angles / 4
+    strength = 1.0
     for _ in range(options.iterations + 1):
         filled = fill_beyond(picture, core, radius)
         angle, weight = _strongest(filled, hair[box], bases, options)
-        confidence = _normalised(weight, core, least)
-        picture, least = confidence, 1e-6
+        top = float(np.quantile(weight[core], 0.99))
+        strength *= min(top / least, 1.0)
+        picture = np.minimum(weight / max(top, 1e-12), 1).astype(np.float32)
 
     angle_map, confidence_map = np.zeros((2, *hair.shape), np.float32)
     angle_map[box] = angle
-    confidence_map[box] = confidence * _share_inside(core, radius) * hair[box]
+    confidence_map[box] = picture * strength * _share_inside(core, radius) * hair[box]
     return OrientationMap(angle_map, confidence_map)
 
 
@@ -197,12 +200,6 @@ def angle_and_confidence(
         bend = np.maximum(2 * peak - before - after, 1e-12)
         turn += np.clip(0.5 * (after - before) / bend, -0.5, 0.5)
     return wrap_angle(turn * np.pi / count + np.pi / 2), np.maximum(weight, 0)
-
-
-def _normalised(weight: Float32Array, core: BoolArray, least: float) -> Float32Array:
-    """Return confidences over the picture's 99th percentile, cut at 1; `least` guards against 0."""
-    top = float(np.quantile(weight[core], 0.99))
-    return np.asarray(np.minimum(weight / max(top, least), 1), np.float32)
 
 
 def _share_inside(core: BoolArray, radius: int) -> Float32Array:

@@ -9,7 +9,7 @@ Photos of hair need four things more:
 
 1. shading, highlights and silhouettes must not vote: log luminance, minus its masked mean, over its
    local deviation; pixels of the mask's edge hold background too and are left out;
-2. strands have many widths: gradients of several scales are added;
+2. the finest gradient sees strands best; wider ones may be added for blurred or noisy photos;
 3. one outlier must not outvote its window: gradients count by their length, not its square;
 4. no window suits both straight hair and curls. The mean over the widest window is refined by every
    narrower one as far as the difference exceeds what noise explains (the Wiener gain of Lee 1980 on
@@ -85,7 +85,7 @@ class Options:
         5.0, low=1.0, high=50.0, doc="Gaussian of the local mean and deviation.", unit="px"
     )
     edge_sigma: float = option(
-        1.0, low=0.0, high=10.0, doc="How wide a seam of the mask is left out.", unit="px"
+        2.0, low=0.0, high=10.0, doc="How wide a seam of the mask is left out.", unit="px"
     )
 
 
@@ -194,7 +194,7 @@ def _confidence(
 ) -> Float32Array:
     """Return how sure each angle is, in [0, 1]: coherent windows whose neighbours agree.
 
-    Divided by the picture's 95th percentile, but never by less than a tenth: a picture of nothing
+    Divided by the picture's 95th percentile, but never by less than a quarter: a picture of nothing
     but noise stays unsure.
     """
     squared = (vectors**2).sum(axis=-1)
@@ -205,7 +205,7 @@ def _confidence(
     confidence = agreement * squared / (squared + _SURE_COHERENCE**2)
     on_hair = confidence[weight > 0.5]
     top = float(np.quantile(on_hair, 0.95)) if on_hair.size else 1.0
-    return np.asarray(np.clip(confidence / max(top, 0.1), 0, 1), np.float32)
+    return np.asarray(np.clip(confidence / max(top, 0.25), 0, 1), np.float32)
 
 
 def _resized(values: Float32Array, shape: tuple[int, ...]) -> Float32Array:
