@@ -20,26 +20,26 @@ _LEVELS = np.array(
     [
         # angle  front        side               back         exponents
         [0.0, 70.0, -9.0, 0.0, 70.0, -9.0, 70.0, -9.0, 2.00, 2.00],
-        [25.0, 62.0, 36.0, 34.5, 62.0, -10.0, 62.0, -48.0, 2.00, 2.05],
-        [45.0, 45.0, 64.5, 58.0, 45.0, -11.0, 45.0, -70.0, 2.05, 2.20],
-        [65.0, 21.0, 83.0, 72.5, 21.0, -11.0, 21.0, -85.0, 2.10, 2.25],
-        [82.0, -3.0, 90.5, 77.2, -3.0, -11.0, -3.0, -91.5, 2.20, 2.25],
-        [90.0, -15.0, 91.5, 77.8, -15.0, -10.0, -15.0, -92.3, 2.25, 2.25],
-        [98.0, -34.0, 90.5, 76.0, -31.0, -7.0, -28.0, -91.5, 2.40, 2.20],
-        [108.0, -58.0, 88.0, 73.3, -51.0, 2.0, -45.0, -88.5, 2.60, 2.10],
-        [118.0, -82.0, 91.0, 69.0, -71.0, 9.0, -62.0, -83.0, 2.50, 2.00],
-        [128.0, -105.0, 92.5, 65.0, -90.0, 16.0, -78.0, -75.0, 2.30, 2.00],
-        [136.0, -123.0, 91.5, 61.5, -104.0, 18.0, -92.0, -67.5, 2.20, 2.00],
-        [142.0, -138.0, 89.0, 58.0, -113.0, 15.0, -104.0, -62.5, 2.10, 2.05],
-        [146.5, -146.5, 78.0, 56.0, -120.0, 8.0, -113.0, -60.0, 2.10, 2.10],
-        [151.0, -149.0, 64.0, 54.5, -127.0, 0.0, -122.0, -58.5, 2.10, 2.20],
-        [155.0, -154.0, 51.0, 53.5, -139.0, -5.0, -136.0, -58.0, 2.10, 2.20],
-        [160.0, -174.0, 39.5, 54.0, -162.0, -9.0, -160.0, -61.0, 2.10, 2.20],
-        [165.0, -203.0, 32.5, 57.0, -195.0, -12.0, -194.0, -66.0, 2.10, 2.20],
-        [169.0, -228.0, 30.5, 61.0, -226.0, -14.0, -226.0, -70.0, 2.10, 2.20],
-        [172.0, -245.0, 30.0, 63.0, -245.0, -15.0, -245.0, -72.0, 2.10, 2.20],
-        [174.0, -250.0, 23.0, 54.0, -250.0, -16.0, -250.0, -64.0, 2.10, 2.20],
-        [177.0, -250.0, 1.0, 27.0, -250.0, -18.0, -250.0, -40.0, 2.05, 2.10],
+        [25.0, 61.8, 36.0, 34.3, 61.8, -10.0, 61.8, -47.6, 2.00, 2.05],
+        [45.0, 45.0, 64.7, 57.5, 45.0, -11.0, 45.0, -69.5, 2.00, 2.15],
+        [65.0, 21.0, 83.2, 72.2, 21.0, -11.0, 21.0, -83.9, 2.08, 2.17],
+        [82.0, -3.0, 90.5, 77.0, -3.0, -11.0, -3.0, -90.2, 2.20, 2.16],
+        [90.0, -15.0, 91.3, 77.5, -15.0, -10.0, -15.0, -91.0, 2.26, 2.15],
+        [98.0, -34.0, 90.7, 76.0, -31.0, -8.0, -28.0, -90.2, 2.33, 2.18],
+        [108.0, -58.0, 88.5, 73.0, -51.0, 1.0, -45.0, -87.3, 2.42, 2.23],
+        [118.0, -82.0, 90.5, 69.0, -71.0, 9.0, -62.0, -81.8, 2.40, 2.15],
+        [128.0, -105.0, 92.0, 64.8, -90.0, 13.0, -78.0, -74.0, 2.24, 2.02],
+        [136.0, -123.0, 91.5, 60.2, -104.0, 8.5, -92.0, -68.0, 2.02, 1.94],
+        [142.0, -138.0, 89.0, 55.0, -115.0, -1.0, -104.0, -64.3, 1.80, 1.92],
+        [146.5, -146.0, 77.5, 53.2, -123.0, -7.0, -113.0, -62.3, 1.72, 1.92],
+        [151.0, -148.7, 62.5, 52.7, -131.0, -11.0, -122.0, -61.5, 1.68, 1.95],
+        [155.0, -153.5, 48.0, 52.8, -141.0, -12.0, -136.0, -62.0, 1.68, 2.05],
+        [160.0, -174.0, 39.0, 54.0, -162.0, -13.0, -160.0, -65.0, 1.72, 2.20],
+        [165.0, -203.0, 32.5, 57.0, -195.0, -14.0, -194.0, -69.5, 1.80, 2.20],
+        [169.0, -228.0, 30.5, 61.0, -226.0, -15.0, -226.0, -73.0, 1.90, 2.20],
+        [172.0, -245.0, 30.0, 63.0, -245.0, -15.0, -245.0, -75.0, 2.00, 2.20],
+        [174.0, -250.0, 23.0, 54.0, -250.0, -16.0, -250.0, -66.0, 2.00, 2.20],
+        [177.0, -250.0, 1.0, 27.0, -250.0, -18.0, -250.0, -42.0, 2.00, 2.10],
         [180.0, -250.0, -18.0, 0.0, -250.0, -18.0, -250.0, -18.0, 2.00, 2.00],
     ]
 )
@@ -47,39 +47,45 @@ _LEVELS = np.array(
 # Height, how far the ridge of the nose stands out of the face, and its half width.
 _NOSE = np.array(
     [
-        [-28.0, 0.0, 9.0],
-        [-36.0, 1.5, 8.0],
-        [-45.0, 9.5, 8.0],
-        [-55.0, 18.5, 9.0],
-        [-62.0, 24.5, 10.5],
-        [-67.0, 26.0, 11.5],
-        [-72.0, 22.5, 12.0],
-        [-77.0, 14.0, 11.0],
-        [-82.0, 7.0, 9.0],
+        [-20.0, 0.0, 8.0],
+        [-26.0, 1.0, 8.0],
+        [-35.0, 4.0, 7.0],
+        [-45.0, 11.7, 7.0],
+        [-55.0, 19.5, 7.5],
+        [-62.0, 25.5, 8.5],
+        [-67.0, 27.0, 9.5],
+        [-72.0, 24.0, 10.0],
+        [-77.0, 15.5, 9.5],
+        [-82.0, 8.7, 9.0],
         [-87.0, 4.5, 8.0],
-        [-95.0, 0.0, 8.0],
+        [-95.0, 0.0, 7.0],
     ]
 )
 
-# Centre (x, y, z), reach (x, y, z), displacement (x, y, z); those off the median plane are mirrored.
+_NOSE_CURVES = PchipInterpolator(_NOSE[::-1, 0], _NOSE[::-1, 1:])
+
+# Centre (x, y, z), reach (x, y, z), displacement (x, y, z); those beside the middle are mirrored.
 _BUMPS = np.array(
     [
-        [31.0, -38.0, 82.0, 15.0, 9.0, 30.0, 0.0, 0.0, -13.0],  # eye sockets
-        [31.0, -37.5, 84.0, 10.0, 7.5, 30.0, 0.0, 0.0, 8.5],  # eyeballs under their lids
-        [17.0, -38.0, 88.0, 5.0, 8.0, 30.0, 0.0, 0.0, -5.0],  # inner corners of the eyes
-        [30.0, -14.0, 88.0, 17.0, 6.0, 30.0, 0.0, 0.5, 2.5],  # brow ridges
-        [0.0, -13.0, 92.0, 12.0, 8.0, 30.0, 0.0, 0.0, 1.5],  # glabella
-        [52.0, -56.0, 62.0, 14.0, 10.0, 25.0, 1.0, 0.0, 2.0],  # cheekbones
-        [60.0, 5.0, 58.0, 12.0, 22.0, 22.0, -1.0, 0.0, -1.5],  # temples
-        [36.0, -92.0, 80.0, 12.0, 14.0, 25.0, 0.0, 0.0, -2.0],  # hollows of the cheeks
-        [13.0, -75.0, 92.0, 5.0, 5.0, 25.0, 1.5, 0.0, 6.0],  # wings of the nose
-        [0.0, -97.0, 93.0, 15.0, 4.5, 25.0, 0.0, 0.0, 7.0],  # upper lip
-        [0.0, -108.5, 93.0, 13.0, 4.5, 25.0, 0.0, 0.0, 5.5],  # lower lip
-        [0.0, -102.0, 93.0, 17.0, 2.2, 25.0, 0.0, 0.0, -3.5],  # between the lips
-        [0.0, -89.5, 93.0, 3.0, 5.0, 25.0, 0.0, 0.0, -1.0],  # philtrum
-        [0.0, -119.0, 92.0, 18.0, 5.0, 25.0, 0.0, 0.0, -1.5],  # below the lower lip
-        [0.0, -136.0, 90.0, 14.0, 9.0, 25.0, 0.0, 0.0, 2.0],  # chin
-        [60.0, -100.0, -20.0, 25.0, 20.0, 16.0, -6.0, 0.0, 0.0],  # behind the angle of the jaw
+        [31.0, -37.5, 82.0, 14.5, 8.0, 30.0, 0.0, 0.0, -14.0],  # eye sockets
+        [31.0, -36.5, 84.0, 8.5, 6.0, 30.0, 0.0, 0.0, 9.5],  # eyeballs under their lids
+        [15.5, -37.0, 88.0, 5.0, 8.0, 30.0, 0.0, 0.0, -5.5],  # inner corners of the eyes
+        [44.0, -36.0, 74.0, 5.0, 5.0, 30.0, 0.0, 0.0, -1.5],  # outer corners of the eyes
+        [33.0, -14.0, 88.0, 17.0, 6.0, 30.0, 0.0, 0.0, 4.0],  # brow ridges
+        [0.0, -13.0, 92.0, 10.0, 9.0, 30.0, 0.0, 0.0, 1.7],  # glabella
+        [50.0, -58.0, 66.0, 13.0, 10.0, 25.0, 0.5, 0.0, 1.8],  # cheekbones
+        [24.0, -56.0, 84.0, 8.0, 9.0, 30.0, 0.0, 0.0, -2.5],  # beside the nose
+        [66.0, -24.0, 42.0, 14.0, 24.0, 20.0, -1.5, 0.0, -1.5],  # temples
+        [27.0, -96.0, 80.0, 10.0, 16.0, 25.0, 0.0, 0.0, -2.0],  # beside the mouth
+        [14.0, -75.0, 92.0, 4.5, 4.5, 25.0, 1.5, 0.0, 7.0],  # wings of the nose
+        [20.5, -76.0, 88.0, 4.0, 7.0, 25.0, 0.0, 0.0, -2.0],  # beside the wings
+        [5.5, -79.0, 96.0, 3.0, 2.5, 25.0, 0.0, 0.0, -1.0],  # nostrils
+        [0.0, -96.0, 93.0, 13.0, 4.2, 25.0, 0.0, 0.0, 10.5],  # upper lip
+        [0.0, -108.5, 93.0, 12.0, 4.2, 25.0, 0.0, 0.0, 8.5],  # lower lip
+        [0.0, -102.3, 93.0, 14.0, 2.3, 25.0, 0.0, 0.0, -5.0],  # between the lips
+        [0.0, -89.0, 93.0, 3.2, 5.0, 25.0, 0.0, 0.0, -1.2],  # philtrum
+        [0.0, -119.0, 92.0, 15.0, 4.5, 25.0, 0.0, 0.0, -2.0],  # below the lower lip
+        [0.0, -134.0, 90.0, 13.0, 9.0, 25.0, 0.0, 0.0, 2.5],  # chin
     ]
 )
 
@@ -115,6 +121,7 @@ _HAIRLINE = np.array(
         [180.0, -97.0],
     ]
 )
+_HAIRLINE_CURVE = PchipInterpolator(_HAIRLINE[:, 0], _HAIRLINE[:, 1])
 _HAIRLINE_FADE = 8.0
 
 
@@ -131,12 +138,13 @@ def head_surface(polar: Float64Array, azimuth: Float64Array) -> Float64Array:
 
 
 def scalp_weight(points: Float64Array) -> Float64Array:
-    """Return (N,) how surely hair grows at surface points (N, 3), metres: 1, 0.5 at the hairline, 0."""
+    """Return (N,) how surely hair grows at points (N, 3), metres: 1, 0.5 at the hairline, 0."""
     x, y, z = points.T * 1e3
     azimuth = np.degrees(np.arctan2(np.abs(x), z + 10.0))
-    line = PchipInterpolator(_HAIRLINE[:, 0], _HAIRLINE[:, 1])
-    slope = np.degrees(line.derivative()(azimuth)) / np.maximum(np.hypot(x, z + 10.0), 20.0)
-    beyond = (y - line(azimuth)) / np.sqrt(1 + slope**2)
+    slope = np.degrees(_HAIRLINE_CURVE.derivative()(azimuth)) / np.maximum(
+        np.hypot(x, z + 10.0), 20.0
+    )
+    beyond = (y - _HAIRLINE_CURVE(azimuth)) / np.sqrt(1 + slope**2)
     t = np.clip(0.5 + beyond / _HAIRLINE_FADE, 0, 1)
     result: Float64Array = t * t * (3 - 2 * t)
     return result
@@ -145,14 +153,13 @@ def scalp_weight(points: Float64Array) -> Float64Array:
 def _level_curves(polar: Float64Array, azimuth: Float64Array) -> Float64Array:
     """Points (N, 3) of the smooth head without features, mm."""
     angle = np.degrees(polar)
-    front, back = _median_profile(angle), _median_profile(-angle)
-    side, exponents = _side_profile(angle), CubicSpline(_LEVELS[:, 0], _LEVELS[:, 8:10])(angle)
-    cosine, sine = np.cos(azimuth), np.abs(np.sin(azimuth))
-    ahead = cosine > 0
-    power = np.where(ahead, exponents[:, 0], exponents[:, 1])
-    radius = (np.abs(cosine) ** power + sine**power) ** (-1 / power)
-    along, across = radius * np.abs(cosine), radius * sine
-    end = np.where(ahead[:, None], front, back)
+    front, back, side = _PROFILES(angle), _PROFILES(-angle), _PROFILES(angle)[:, :3]
+    ahead = np.cos(azimuth) > 0
+    power = np.where(ahead, front[:, 5], back[:, 5])
+    cosine, sine = np.abs(np.cos(azimuth)), np.abs(np.sin(azimuth))
+    radius = (cosine**power + sine**power) ** (-1 / power)
+    along, across = radius * cosine, radius * sine
+    end = np.where(ahead[:, None], front[:, 3:5], back[:, 3:5])
     result: Float64Array = np.stack(
         [
             side[:, 0] * across * np.sign(np.sin(azimuth)),
@@ -164,27 +171,23 @@ def _level_curves(polar: Float64Array, azimuth: Float64Array) -> Float64Array:
     return result
 
 
-def _median_profile(angle: Float64Array) -> Float64Array:
-    """(y, z) of the closed median curve; the front has positive angles, the back negative ones."""
+def _profiles() -> CubicSpline:
+    """Side (x, y, z), median (y, z) and exponent over the angle: in front above 0, behind below.
+
+    One closed curve through both poles, so that the surface is smooth there; x is odd.
+    """
+    front = _LEVELS[:, [3, 4, 5, 1, 2, 8]]
+    back = _LEVELS[:0:-1, [3, 4, 5, 6, 7, 9]] * [-1, 1, 1, 1, 1, 1]
     angles = np.concatenate([-_LEVELS[:0:-1, 0], _LEVELS[:, 0]])
-    knots = np.concatenate([_LEVELS[:0:-1, 6:8], _LEVELS[:, 1:3]])
-    result: Float64Array = CubicSpline(angles, knots, bc_type="periodic")(angle)
-    return result
+    return CubicSpline(angles, np.concatenate([back, front]), bc_type="periodic")
 
 
-def _side_profile(angle: Float64Array) -> Float64Array:
-    """(x, y, z) of the line of greatest breadth on the left; x odd, y and z even across the crown."""
-    angles = np.concatenate([-_LEVELS[:0:-1, 0], _LEVELS[:, 0]])
-    mirrored = _LEVELS[:0:-1, 3:6] * [-1, 1, 1]
-    knots = np.concatenate([mirrored, _LEVELS[:, 3:6]])
-    result: Float64Array = CubicSpline(angles, knots, bc_type="periodic")(angle)
-    return result
+_PROFILES = _profiles()
 
 
 def _nose(base: Float64Array) -> Float64Array:
     x, y, z = base.T
-    height = PchipInterpolator(_NOSE[:, 0][::-1], _NOSE[::-1, 1:], extrapolate=False)(y)
-    height = np.where(np.isnan(height), [0.0, 9.0], height)
+    height = _NOSE_CURVES(np.clip(y, _NOSE[-1, 0], _NOSE[0, 0]))
     out = np.where(z > 40, height[:, 0], 0) * np.exp(-((np.abs(x) / height[:, 1]) ** 2.2))
     result: Float64Array = np.stack([np.zeros_like(out), np.zeros_like(out), out], axis=1)
     return result
@@ -207,11 +210,11 @@ def _ears(base: Float64Array) -> Float64Array:
     forward = (np.sin(_EAR_TILT) * y + np.cos(_EAR_TILT) * z) / _EAR_HALF[1]
     forward = forward * np.where(up < 0, 1 - 0.45 * up, 1.0)  # the lobe is narrower
     distance = np.hypot(up, forward)
-    plateau = _smoothstep((1.15 - distance) / 0.4)
-    bowl = np.exp(-0.5 * ((up + 0.05) ** 2 + (forward - 0.1) ** 2) / 0.32**2)
-    lift = plateau * (10.5 - 8.5 * forward.clip(-1, 1)) - 9.0 * bowl * plateau
+    plateau = _smoothstep((1.3 - distance) / 0.55)
+    bowl = np.exp(-0.5 * (((up + 0.1) / 0.45) ** 2 + ((forward - 0.15) / 0.4) ** 2))
+    lift = plateau * (12.0 - 9.0 * forward.clip(-1, 1) - 9.0 * bowl)
     side = np.sign(base[:, 0]) * (np.abs(base[:, 0]) > 40)
-    result: Float64Array = np.stack([lift * side, 0 * lift, -0.35 * plateau * 10 * side**2], axis=1)
+    result: Float64Array = np.stack([lift * side, 0 * lift, -5.0 * plateau * side**2], axis=1)
     return result
 
 

@@ -66,7 +66,7 @@ def roots_at(head: Head, triangle: npt.ArrayLike, barycentric: npt.ArrayLike) ->
 
 
 def bind(points: npt.ArrayLike, head: Head) -> tuple[Int32Array, Float32Array]:
-    """Return the face (N,) and barycentric weights (N, 3) of the surface nearest to points (N, 3)."""
+    """Return the face (N,) nearest to each of points (N, 3) and the barycentric weights (N, 3)."""
     triangle, weights, _ = nearest_on_surface(build_tree(head.vertices, head.faces), points)
     return triangle, weights.astype(np.float32)
 
@@ -123,7 +123,9 @@ def _random_points(
     if not area.sum() > 0:
         raise InputError("the head's scalp has no area: mark whole faces, not single vertices")
     total = np.cumsum(area)
-    faces, weights, found = [], [], 0
+    faces: list[Int32Array] = []
+    weights: list[Float64Array] = []
+    found = 0
     for _ in range(64):
         # Evenly stepped along the summed area: fewer clumps than independent draws.
         drawn = wanted + wanted // 8
@@ -134,14 +136,14 @@ def _random_points(
         keep = (scalp[face] * weight).sum(axis=1) > 0.5
         faces.append(face[keep].astype(np.int32))
         weights.append(weight[keep])
-        found += np.count_nonzero(keep)
+        found += int(np.count_nonzero(keep))
         if found >= wanted:
             return np.concatenate(faces), np.concatenate(weights)
     raise InputError("the head's scalp has almost no area: mark more of it")
 
 
 def _spread(points: Float64Array, count: int) -> Int64Array:
-    """Indices (count,) of points (M, 3), in random order, as far from each other as bisection finds.
+    """Indices (count,) of points (M, 3), given in random order, that are far from each other.
 
     Points are taken in turn if none taken before is within a radius (Cook 1986); the largest radius
     that still yields `count` is searched for, and of those it yields the last few are dropped.
@@ -167,7 +169,7 @@ def _spread(points: Float64Array, count: int) -> Int64Array:
 
 @njit(cache=True)
 def scattered(points: Float64Array, radius: float) -> Int64Array:  # pragma: no cover - compiled
-    """Return the points (M, 3), as indices, that have no earlier one of the returned within `radius`.
+    """Return which points (M, 3) have none of the earlier returned ones within `radius`: indices.
 
     Taken points hang in chains, one for each cubic cell of that edge.
     """
@@ -238,4 +240,5 @@ def _short(points: Float64Array, faces: Int32Array) -> Int32Array:
         if not used[faces[face]].all():
             keep[face] = True
             used[faces[face]] = True
-    return faces[keep]
+    kept: Int32Array = faces[keep]
+    return kept

@@ -151,7 +151,7 @@ def box_distance(point: Float64Array, low: Float64Array, high: Float64Array) -> 
 def triangle_distance(
     point: Float64Array, triangle: Float64Array
 ) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
-    """Return squared distance and barycentric weights of the nearest point (Ericson 2004, 5.1.5)."""
+    """Return the squared distance and the nearest point's weights (Ericson 2004, section 5.1.5)."""
     a0, a1, a2 = triangle[0, 0], triangle[0, 1], triangle[0, 2]
     u0, u1, u2 = triangle[1, 0] - a0, triangle[1, 1] - a1, triangle[1, 2] - a2
     v0, v1, v2 = triangle[2, 0] - a0, triangle[2, 1] - a1, triangle[2, 2] - a2
