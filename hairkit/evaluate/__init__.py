@@ -5,7 +5,7 @@ from __future__ import annotations
 from hairkit.evaluate.evaluation import Evaluation, evaluate
 from hairkit.evaluate.images import mask_iou, orientation_error
 from hairkit.evaluate.prediction import Prediction, read_prediction
-from hairkit.evaluate.scores import Score, StrandScores, strand_hits, strand_scores
+from hairkit.evaluate.scores import Score, StrandScores, strand_scores
 from hairkit.evaluate.truth import Truth, read_truth
 
 __all__ = [
@@ -19,6 +19,5 @@ __all__ = [
     "orientation_error",
     "read_prediction",
     "read_truth",
-    "strand_hits",
     "strand_scores",
 ]

@@ -37,9 +37,9 @@ from hairkit.evaluate.scores import (
     Hits,
     Samples,
     StrandScores,
+    sample_hits,
     sample_strands,
     scores_of_hits,
-    strand_hits,
 )
 from hairkit.evaluate.truth import Truth
 from hairkit.groom import Groom
@@ -144,10 +144,9 @@ def evaluate(prediction: Prediction, truth: Truth, *, consistency: bool = False)
     """
     prediction = prediction.in_order_of(truth)
     groom, similarity, cameras = _aligned(prediction, truth)
-    precision, recall = strand_hits(
-        groom.strands, truth.strands, visible=truth.visible, surfaces=truth.surfaces
-    )
-    directions = _directions(precision.samples, truth)
+    samples = sample_strands(groom.strands, name="predicted")
+    precision, recall = sample_hits(samples, truth.samples, surfaces=truth.surfaces, visible=True)
+    directions = _directions(samples, truth)
     silhouettes, dense = _silhouettes(groom, truth)
     return Evaluation(
         strands=len(groom.strands),
@@ -155,8 +154,8 @@ def evaluate(prediction: Prediction, truth: Truth, *, consistency: bool = False)
         cameras=cameras,
         scores=scores_of_hits(precision, recall),
         lengths=length_measures(groom.strands, truth.strands),
-        true_head=head_measures(groom.strands, truth.head),
-        own_head=head_measures(groom.strands, groom.head),
+        true_head=head_measures(groom.strands, samples, truth.head),
+        own_head=head_measures(groom.strands, samples, groom.head),
         direction_views=tuple(direction_share([view]) for view in directions),
         direction_share=direction_share(directions),
         silhouette_views=tuple(
@@ -166,7 +165,7 @@ def evaluate(prediction: Prediction, truth: Truth, *, consistency: bool = False)
         orientation_views=_orientation(prediction, truth),
         mask_views=_masks(prediction, truth),
         consistency=strand_consistency(groom.strands, truth.strands) if consistency else None,
-        evidence=Evidence(precision, recall, precision.samples, directions, silhouettes),
+        evidence=Evidence(precision, recall, samples, directions, silhouettes),
     )
 
 

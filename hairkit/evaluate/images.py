@@ -24,6 +24,8 @@ DIRECTION_LIMIT_DEG = 20.0
 """A drawn strand is right when its direction is within this of the truth's."""
 VISIBLE_DEPTH = 0.003
 """A drawn sample is visible at most this far behind the first surface, metres."""
+DRAWN_FOOTPRINT_PX = 9
+"""Edge of the square a drawn sample hides: guides are few, and must hide those of the far side."""
 HAIR_WIDTH = 0.0015
 """Width at which hair is drawn into silhouettes, metres."""
 EDGE_PX = 4
@@ -83,13 +85,13 @@ def orientation_error(
     """
     if truth.shape != hair.shape:
         raise InputError(f"true orientation has shape {truth.shape}, the hair mask {hair.shape}")
-    angle, confidence = _sized(orientation.angle, truth), _sized(orientation.confidence, truth)
     edge = np.ones((2 * EDGE_PX + 1, 2 * EDGE_PX + 1), np.uint8)
     inner = (cv2.erode(hair.astype(np.uint8), edge) > 0) & (truth > 0)
     coherent = inner & (coherence(truth) > COHERENT)
     if not coherent.any():
         raise InputError("no pixel of true hair is left to take the orientation error over")
-    error = np.degrees(angle_between(angle, truth_angle(truth)))
+    error = orientation_gap(orientation, truth)
+    confidence = _sized(orientation.confidence, truth)
     sure = coherent & (confidence >= np.median(confidence[coherent]))
     return OrientationError(
         mean_deg=float(error[coherent].mean()),
@@ -97,6 +99,13 @@ def orientation_error(
         mean_everywhere_deg=float(error[inner].mean()),
         confident_mean_deg=float(error[sure].mean()),
     )
+
+
+def orientation_gap(
+    orientation: OrientationMap, truth: npt.NDArray[np.uint8]
+) -> npt.NDArray[np.float64]:
+    """Return (H, W) degrees in [0, 90] between a map and the true picture, hair or not."""
+    return np.degrees(angle_between(_sized(orientation.angle, truth), truth_angle(truth)))
 
 
 def truth_angle(truth: npt.NDArray[np.uint8]) -> Float64Array:
@@ -159,7 +168,7 @@ def drawn_directions(
     A sample is visible at most 3 mm behind the first surface of the strands themselves and `head`;
     it is judged where the truth has hair.
     """
-    surface = first_surface(camera, samples.points, head)
+    surface = first_surface(camera, samples.points, head, footprint=DRAWN_FOOTPRINT_PX)
     return judge_directions(surface, samples, truth)
 
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from hairkit.evaluate.matching import HashGrid, most_followed
-from hairkit.evaluate.scores import SAMPLE_STEP, THRESHOLDS, sample_strands
+from hairkit.evaluate.scores import THRESHOLDS, Samples, sample_strands
 from hairkit.head import Head
 from hairkit.head_distance import distance_to
 from hairkit.stored import BoolArray
@@ -84,16 +84,15 @@ def broken(strands: Strands) -> BoolArray:
     return short
 
 
-def head_measures(strands: Strands, head: Head) -> HeadMeasures:
-    """Measure roots and depth of strands against a head in the same frame."""
+def head_measures(strands: Strands, samples: Samples, head: Head) -> HeadMeasures:
+    """Measure roots and depth of strands and of their samples against a head in the same frame."""
     roots = 1000 * np.abs(distance_to(head, strands.roots))
-    samples = strands.resampled_by_length(SAMPLE_STEP).points
     return HeadMeasures(
         root_distance_mean_mm=float(roots.mean()),
         root_distance_95_mm=float(np.percentile(roots, 95)),
         root_distance_max_mm=float(roots.max()),
         points_inside=int(deeper_than(head, strands.points, INSIDE_DEPTH).sum()),
-        samples_inside=int(deeper_than(head, samples, INSIDE_DEPTH).sum()),
+        samples_inside=int(deeper_than(head, samples.points, INSIDE_DEPTH).sum()),
         samples=len(samples),
     )
 

@@ -6,16 +6,22 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from hairkit.camera import Camera
 from hairkit.errors import InputError
 from hairkit.evaluate.truth import Truth
 from hairkit.groom import Groom
+from hairkit.groom_file import read_groom
 from hairkit.mask import Mask
 from hairkit.orientation import OrientationMap
 from hairkit.scene import read_cameras
+from hairkit.stored import Stored, from_arrays, read_npz
 
-GROOM, SCENE = "groom.npz", "scene.json"
+GROOM, SCENE, WORK = "groom.npz", "scene.json", "work"
+"""Names in the folder that `hairkit reconstruct` writes."""
+
+_Kind = TypeVar("_Kind", bound=Stored)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,19 +83,25 @@ def read_prediction(
             "name them with --scene"
         )
     names, cameras = read_cameras(scene_path)
-    return Prediction(Groom.load(groom_path), names, cameras)
-
-
-def with_stages(
-    prediction: Prediction,
-    orientations: Sequence[OrientationMap] | None,
-    masks: Sequence[Mask] | None,
-) -> Prediction:
-    """Return the prediction with the results of its orient and segment stages, one a view."""
+    folder = groom_path.parent
     return Prediction(
-        prediction.groom,
-        prediction.names,
-        prediction.cameras,
-        None if orientations is None else tuple(orientations),
-        None if masks is None else tuple(masks),
+        read_groom(groom_path),
+        names,
+        cameras,
+        _stage_results(folder, "orient", names, OrientationMap),
+        _stage_results(folder, "segment", names, Mask),
     )
+
+
+def _stage_results(
+    folder: Path, stage: str, names: Sequence[str], kind: type[_Kind]
+) -> tuple[_Kind, ...] | None:
+    """Read what a stage found in every view, or None where a view is not there."""
+    paths = [folder / WORK / f"{stage}-{_file_name(name)}.npz" for name in names]
+    if not all(path.is_file() for path in paths):
+        return None
+    return tuple(from_arrays(kind, read_npz(path), str(path)) for path in paths)
+
+
+def _file_name(view: str) -> str:
+    return "".join(c if c.isalnum() or c in "-_" else "_" for c in view)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import InputError
-from hairkit.evaluate.matching import FIRST_HIT_NONE, HashGrid, first_hits
+from hairkit.evaluate.matching import HashGrid, first_hits
 from hairkit.evaluate.surface import Surface, near_some_surface
 from hairkit.stored import BoolArray, Float32Array, Int64Array, UInt8Array
 from hairkit.strands import Strands
@@ -112,33 +112,31 @@ def strand_scores(
     InputError
         When no strand is left on a side, or thresholds do not grow.
     """
-    precision, recall = strand_hits(
-        pred, true, visible=visible, surfaces=surfaces, thresholds=thresholds, shortest=shortest
+    predicted = sample_strands(pred, shortest=shortest, name="predicted")
+    truth = sample_strands(true, marked=visible, shortest=shortest, name="true")
+    precision, recall = sample_hits(
+        predicted, truth, surfaces=surfaces, visible=visible is not None, thresholds=thresholds
     )
     return scores_of_hits(precision, recall, thresholds)
 
 
-def strand_hits(
-    pred: Strands,
-    true: Strands,
+def sample_hits(
+    predicted: Samples,
+    truth: Samples,
     *,
-    visible: npt.ArrayLike | None = None,
     surfaces: Sequence[Surface] | None = None,
+    visible: bool = False,
     thresholds: Sequence[tuple[float, float]] = THRESHOLDS,
-    shortest: float = SHORTEST_STRAND,
 ) -> tuple[Hits, Hits]:
     """Return the hits of every predicted sample (precision) and of every true one (recall).
 
-    Parameters are those of `strand_scores`.
+    `visible` says that the marks of `truth` are what cameras saw; the rest is as `strand_scores` has it.
     """
-    predicted = sample_strands(pred, shortest=shortest, name="predicted")
-    truth = sample_strands(true, marked=visible, shortest=shortest, name="true")
-    pred_outer = (
-        None if surfaces is None else near_some_surface(predicted.points, surfaces, OUTER_DEPTH)
-    )
-    true_outer = None if visible is None else truth.marked
-    precision = Hits(predicted, *_match(predicted, truth, thresholds), pred_outer)
-    recall = Hits(truth, *_match(truth, predicted, thresholds), true_outer)
+    outer = None
+    if surfaces is not None:
+        outer = near_some_surface(predicted.points, surfaces, OUTER_DEPTH)
+    precision = Hits(predicted, *_match(predicted, truth, thresholds), outer)
+    recall = Hits(truth, *_match(truth, predicted, thresholds), truth.marked if visible else None)
     return precision, recall
 
 
@@ -216,17 +214,3 @@ def _table(
         )
         rows.append(Score(1000 * distance, angle, precision, recall))
     return tuple(rows)
-
-
-__all__ = [
-    "FIRST_HIT_NONE",
-    "THRESHOLDS",
-    "Hits",
-    "Samples",
-    "Score",
-    "StrandScores",
-    "sample_strands",
-    "scores_of_hits",
-    "strand_hits",
-    "strand_scores",
-]

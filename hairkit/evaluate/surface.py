@@ -13,10 +13,13 @@ from numba import njit, prange
 from hairkit.camera import Camera
 from hairkit.head import Head
 from hairkit.projection import head_depth, pack_cameras, project_row
-from hairkit.stored import BoolArray, Float32Array, Float64Array
+from hairkit.stored import BoolArray, Float32Array, Float64Array, UInt8Array
 
 HAIR_FOOTPRINT_PX = 5
 """Edge of the square a sample covers: samples 1 mm apart close up at 1 to 3 pixels a mm."""
+
+HEAD_TOLERANCE = 0.003
+"""Pictures show hair at most this far under the head's surface, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,3 +116,41 @@ def _splat(
             for x in range(max(0, int(u - reach)), min(width, int(u + reach) + 1)):
                 if (x + 0.5 - u) ** 2 + (y + 0.5 - v) ** 2 <= reach * reach:
                     depth[y, x] = min(depth[y, x], z)
+
+
+def front_values(
+    camera: Camera,
+    points: npt.NDArray[np.float32],
+    values: npt.NDArray[np.uint8],
+    head: Head | None = None,
+) -> UInt8Array:
+    """Return (H, W) the value (N,) of the front sample within a pixel of each pixel.
+
+    0 where there is none or `head` stands before it, so values should begin at 1.
+    """
+    depth = np.full((camera.height, camera.width), np.inf, np.float32)
+    picture = np.zeros(depth.shape, np.uint8)
+    if head is not None:
+        depth = head_depth(head, camera) + np.float32(HEAD_TOLERANCE)
+    _paint(_packed(camera), points, values, depth, picture)
+    return picture
+
+
+@njit(cache=True)
+def _paint(
+    row: Float64Array,
+    points: npt.NDArray[np.float32],
+    values: npt.NDArray[np.uint8],
+    depth: Float32Array,
+    picture: npt.NDArray[np.uint8],
+) -> None:  # pragma: no cover - compiled
+    height, width = depth.shape
+    for i in range(len(points)):
+        u, v, z = project_row(row, points[i, 0], points[i, 1], points[i, 2])
+        if not (u >= 0 and v >= 0 and u < width and v < height):
+            continue
+        for y in range(max(0, int(v) - 1), min(height, int(v) + 2)):
+            for x in range(max(0, int(u) - 1), min(width, int(u) + 2)):
+                if z < depth[y, x]:
+                    depth[y, x] = z
+                    picture[y, x] = values[i]

@@ -12,7 +12,7 @@ import numpy as np
 
 from hairkit.camera import Camera
 from hairkit.errors import FormatError, InputError
-from hairkit.evaluate.scores import SHORTEST_STRAND, sample_strands
+from hairkit.evaluate.scores import Samples, sample_strands
 from hairkit.evaluate.surface import Surface, first_surface
 from hairkit.head import Capsules, Head
 from hairkit.scene import read_cameras
@@ -35,9 +35,14 @@ class Truth:
     """The true mesh; its scalp, texture coordinates and joints are not known and mean nothing."""
 
     @cached_property
+    def samples(self) -> Samples:
+        """Samples of the true strands, marked where a camera saw them."""
+        return sample_strands(self.strands, marked=self.visible, name="true")
+
+    @cached_property
     def surfaces(self) -> tuple[Surface, ...]:
         """First visible surface of every view: true strands and head, seen by the true cameras."""
-        points = sample_strands(self.strands, shortest=SHORTEST_STRAND, name="true").points
+        points = self.samples.points
         return tuple(first_surface(camera, points, self.head) for camera in self.cameras)
 
     def orientation(self, view: int) -> UInt8Array:
