@@ -186,8 +186,7 @@ class Manager:
     def fingerprint(self, name: str) -> str:
         """Return a text that changes when the plugin's distribution, version or source changes."""
         info = self.info(name)
-        source = info.source.read_bytes() if info.source is not None else b""
-        return f"{info.distribution} {info.version} {hashlib.sha256(source).hexdigest()}"
+        return f"{info.distribution} {info.version} {_source_digest(info.source)}"
 
     def call(self, stage: str, plugin: str, options: Any = None, **arguments: Any) -> Any:
         """Run one stage on one plugin and return its result.
@@ -337,6 +336,15 @@ def _inspect(plugin: object, name: str, distribution: str, version: str) -> Plug
         source=Path(file) if file else None,
         suffixes=tuple(getattr(plugin, "SUFFIXES", ())),
     )
+
+
+def _source_digest(source: Path | None) -> str:
+    """Return a digest of a plugin's file, or of all files of a plugin that is a folder."""
+    if source is None:
+        return ""
+    folder = source.name == "__init__.py"
+    files = sorted(source.parent.rglob("*.py")) if folder else [source]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def _notifications() -> list[str]:

@@ -12,6 +12,7 @@ angles = 64                          # options of the only plugin
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import importlib.resources
 import os
@@ -187,9 +188,9 @@ def stage_digest(manager: Manager, stage: Stage) -> str:
     """Return a hex digest of plugins, versions and options: equal digests, equal behaviour.
 
     Options are taken with their defaults filled in; a file that an option names counts with its
-    content.
+    content, and so do hairkit's modules that plugins build on.
     """
-    digest = hashlib.sha256(stage.hook.encode())
+    digest = hashlib.sha256(f"{stage.hook} {_ground_digest()}".encode())
     for choice in stage.choices:
         options = manager.options(choice.plugin, choice.options)
         digest.update(f"\n{choice.plugin} {manager.fingerprint(choice.plugin)}".encode())
@@ -199,6 +200,12 @@ def stage_digest(manager: Manager, stage: Stage) -> str:
             if isinstance(value, Path) and value.is_file():
                 digest.update(hashlib.sha256(value.read_bytes()).digest())
     return digest.hexdigest()
+
+
+@functools.cache
+def _ground_digest() -> str:
+    files = sorted(Path(__file__).parent.glob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def _stage(table: str, content: object, source: str) -> Stage:
