@@ -7,6 +7,8 @@ much of the kernel lies on it (normalised convolution, Knutsson and Westin 1993)
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +27,10 @@ _LOG_FLOOR = 0.15
 
 _LEAST_CONTRAST = 0.25
 """Local deviation, as a share of the typical one, below which contrast is not raised further."""
+
+_WIDE_SIGMA = 4.0
+_HALVING_VARIANCE = 1.0
+"""Square pixels that averaging 2 x 2 pixels and interpolating back add to a Gaussian."""
 
 COHERENT_WINDOW = 9
 COHERENT_RESULTANT = 0.8
@@ -55,16 +61,26 @@ def hair_of(view: View, mask: Mask) -> BoolArray:
 
 def luminance(image: UInt8Array) -> Float32Array:
     """Return the (H, W) luma of an (H, W, 3) RGB image as float32 in [0, 1] (Rec. 601 weights)."""
-    red, green, blue = cv2.split(np.asarray(image, np.float32))
-    grey = 0.299 * red + 0.587 * green + 0.114 * blue
-    return np.asarray(grey * (1 / 255), np.float32)
+    scaled = np.asarray(image, np.float32) * np.float32(1 / 255)
+    return np.asarray(cv2.cvtColor(scaled, cv2.COLOR_RGB2GRAY), np.float32)
 
 
 def blur(values: Float32Array, sigma: float) -> Float32Array:
-    """Return `values` under a Gaussian of `sigma` pixels, mirrored at the picture's border."""
-    return np.asarray(
-        cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_REFLECT_101), np.float32
-    )
+    """Return `values` (H, W) or (H, W, C) under a Gaussian of `sigma` pixels.
+
+    The picture is mirrored at its border. Wide Gaussians (above `_WIDE_SIGMA`) are taken on a grid
+    half as fine, several times as fast and right to about one percent of the range.
+    """
+    height, width = values.shape[:2]
+    if sigma <= _WIDE_SIGMA or min(height, width) < 2:
+        blurred = cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_REFLECT_101)
+    else:
+        even = cv2.copyMakeBorder(values, 0, height % 2, 0, width % 2, cv2.BORDER_REFLECT_101)
+        size = (even.shape[1], even.shape[0])
+        half = cv2.resize(even, (size[0] // 2, size[1] // 2), interpolation=cv2.INTER_AREA)
+        half = blur(np.asarray(half, np.float32), math.sqrt(sigma**2 - _HALVING_VARIANCE) / 2)
+        blurred = cv2.resize(half, size, interpolation=cv2.INTER_LINEAR)[:height, :width]
+    return np.asarray(blurred, np.float32).reshape(values.shape)
 
 
 def masked_blur(

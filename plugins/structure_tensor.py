@@ -102,8 +102,8 @@ def orient(view: View, mask: Mask, options: Options) -> OrientationMap:
     confidence = _confidence(vectors, levels[0].weight, options, scale)
 
     angle_map, confidence_map = np.zeros((2, *hair.shape), np.float32)
-    angle_map[box] = single_angle(_resized(vectors, core.shape)) * hair[box]
-    confidence_map[box] = _resized(confidence, core.shape) * hair[box]
+    angle_map[hair] = single_angle(_resized(vectors, core.shape)[hair[box]])
+    confidence_map[hair] = _resized(confidence, core.shape)[hair[box]]
     return OrientationMap(angle_map, confidence_map)
 
 
@@ -124,7 +124,7 @@ def _tensor(
 
     Each scale is divided by what white noise would give, so that all count alike.
     """
-    tensor = np.zeros((*detail.shape, 4), np.float32)
+    parts = [np.zeros_like(detail) for _ in range(3)]
     for index in range(options.gradient_scales):
         sigma = options.gradient_sigma * scale * 2**index
         gain = math.sqrt(8 * math.pi) * max(sigma, 0.7) ** 2 / _SCHARR_GAIN
@@ -133,12 +133,11 @@ def _tensor(
         along_y = cv2.Scharr(smooth, cv2.CV_32F, 0, 1, scale=gain)
         square_x, square_y = along_x * along_x, along_y * along_y
         energy = square_x + square_y
-        weight = core * np.power(energy + _LEAST_ENERGY, options.magnitude_power / 2 - 1)
-        tensor[..., 0] += (square_y - square_x) * weight
-        tensor[..., 1] -= 2 * along_x * along_y * weight
-        tensor[..., 2] += energy * weight
-    tensor[..., 3] = core
-    return tensor
+        weight = core * cv2.pow(energy + _LEAST_ENERGY, options.magnitude_power / 2 - 1)
+        parts[0] += (square_y - square_x) * weight
+        parts[1] -= 2 * along_x * along_y * weight
+        parts[2] += energy * weight
+    return np.dstack([*parts, core])
 
 
 def _window_means(tensor: Float32Array, options: Options, scale: float) -> list[_Level]:
