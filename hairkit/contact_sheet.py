@@ -92,8 +92,8 @@ def _fit(image: npt.NDArray[np.uint8], size: tuple[int, int]) -> UInt8Array:
 def _mask_picture(photo: UInt8Array, mask: Mask) -> UInt8Array:
     """Return the photo, hair tinted pink and the rest of the person blue."""
     size = (photo.shape[1], photo.shape[0])
-    hair = _fit(cv2.compare(mask.labels, HAIR, cv2.CMP_EQ), size)[..., None] / 255 * 0.6
-    person = _fit(cv2.compare(mask.labels, PERSON, cv2.CMP_EQ), size)[..., None] / 255 * 0.35
+    hair = _fit((mask.labels == HAIR) * np.uint8(255), size)[..., None] / 255 * 0.6
+    person = _fit((mask.labels == PERSON) * np.uint8(255), size)[..., None] / 255 * 0.35
     grey = photo.mean(axis=2, keepdims=True) * (1 - hair - person)
     return np.asarray(grey + hair * _HAIR_TINT + person * _PERSON_TINT).astype(np.uint8)
 

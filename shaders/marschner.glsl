@@ -21,10 +21,10 @@ vec3 fibre(vec3 tangent, vec3 to_light, vec3 to_eye, vec3 colour, float jitter) 
         * inversesqrt(dot(light_across, light_across) * dot(eye_across, eye_across) + 1e-6);
     float cos_half_phi = sqrt(0.5 + 0.5 * clamp(cos_phi, -1.0, 1.0));
 
-    float r = 0.25 * cos_half_phi * lobe(half_theta + 2.0 * TILT, ROUGHNESS_R);
+    float r = 0.16 * cos_half_phi * lobe(half_theta + 2.0 * TILT, ROUGHNESS_R);
     float tt = exp(4.0 * (-cos_phi - 1.0)) * lobe(half_theta - TILT, ROUGHNESS_R);
     float trt = exp(3.0 * (cos_phi - 1.0)) * lobe(half_theta - 3.0 * TILT, 2.0 * ROUGHNESS_R);
     float cos_in = sqrt(max(1.0 - sin_in * sin_in, 0.0));
     vec3 single = FRESNEL * r + TT_SHARE * colour * tt + TRT_SHARE * colour * sqrt(colour) * trt;
-    return cos_in * (single + colour * (0.3 + 0.3 * cos_half_phi));
+    return cos_in * (single + colour * (0.26 + 0.26 * cos_half_phi));
 }

@@ -13,7 +13,7 @@ in vec3 v_normal;
 in vec3 v_albedo;
 out vec4 out_colour;
 
-const vec3 WRAP = vec3(0.35, 0.18, 0.12);   // how far red, green and blue reach past the terminator
+const vec3 WRAP = vec3(0.28, 0.18, 0.14);   // how far red, green and blue reach past the terminator
 const float SHEEN_POWER = 18.0;
 const float SHEEN = 0.12;
 const float LIFT = 0.007;   // metres off the skin, out of its own shadow in the coarse volume

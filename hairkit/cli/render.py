@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import re
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from hairkit.camera import Camera
 from hairkit.densify import densify
@@ -81,37 +83,52 @@ def run(args: argparse.Namespace) -> int:
 
 
 def write_picture(path: Path, picture: UInt8Array) -> None:
-    """Write a picture (H, W, 3) RGB in the format that the name ends in, PNG or JPEG, atomically."""
+    """Write a picture (H, W, 3) RGB as PNG or JPEG, as the name says, atomically."""
     kind = path.suffix.lower()
     if kind not in (".png", ".jpg", ".jpeg"):
         raise InputError(f"{path}: pictures are written as .png or .jpg, not {kind or 'without'}")
-    done, data = cv2.imencode(kind, picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 95])
+    done, data = cv2.imencode(kind, picture[..., ::-1])
     if not done:
         raise InputError(f"{path}: the picture of {picture.shape[:2]} cannot be encoded")
     write_bytes(path, data.tobytes())
 
 
-def framing_camera(
-    points: np.ndarray[Any, Any],
-    azimuth_deg: float,
-    elevation_deg: float,
-    width: int,
-    height: int,
-) -> Camera:
-    """Return the camera from which all points (N, 3) fill the picture, whatever the direction."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle = (low + high) / 2
-    radius = float(np.linalg.norm(points - middle, axis=1).max()) * MARGIN
-    tangent = np.tan(VERTICAL_ANGLE / 2) * min(1.0, width / height)
-    return Camera.on_turn(
-        azimuth_deg,
-        elevation_deg=elevation_deg,
-        distance=radius / float(np.sin(np.arctan(tangent))),
-        target=middle,
-        focal=height / 2 / float(np.tan(VERTICAL_ANGLE / 2)),
-        width=width,
-        height=height,
-    )
+def framing_cameras(
+    points: npt.ArrayLike, turn: Sequence[tuple[float, float]], width: int, height: int
+) -> list[Camera]:
+    """Return a camera for each (azimuth, elevation) in degrees, all as near as shows all.
+
+    Every point (N, 3) lies inside every picture, with a margin.
+    """
+    cloud = np.asarray(points, np.float64)
+    middle = (cloud.min(axis=0) + cloud.max(axis=0)) / 2
+    half = np.tan(VERTICAL_ANGLE / 2)
+    slopes = np.array([half * width / height, half]) / MARGIN
+    cameras = [
+        Camera.on_turn(
+            azimuth,
+            elevation_deg=elevation,
+            distance=0.0,
+            target=middle,
+            focal=height / 2 / float(half),
+            width=width,
+            height=height,
+        )
+        for azimuth, elevation in turn
+    ]
+    distance = 0.0
+    for camera in cameras:
+        local = camera.to_camera(cloud)
+        needed = (np.abs(local[:, :2]) / slopes).max(axis=1) - local[:, 2]
+        distance = max(distance, float(needed.max()))
+    return [moved_back(camera, distance) for camera in cameras]
+
+
+def moved_back(camera: Camera, distance: float) -> Camera:
+    """Return the camera moved `distance` metres against its view."""
+    matrix = camera.camera_from_head.copy()
+    matrix[2, 3] += distance
+    return replace(camera, camera_from_head=matrix)
 
 
 def _cameras(args: argparse.Namespace, head: Any, hair: Strands) -> list[Camera]:
@@ -130,7 +147,7 @@ def _cameras(args: argparse.Namespace, head: Any, hair: Strands) -> list[Camera]
     else:
         raise InputError(f"--turntable is {args.turntable}, expected 1 to 3600 pictures")
     points = np.concatenate([head, hair.points])
-    return [framing_camera(points, a, elevation, width, height) for a in turn]
+    return framing_cameras(points, [(a, elevation) for a in turn], width, height)
 
 
 def _scene_camera(path: Path, view: str | None, size: str | None) -> Camera:
