@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import os
 import struct
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -200,19 +201,21 @@ def _scan_jpeg(data: bytes) -> tuple[int, int, bytes]:
 
 
 def _scan_png(data: bytes) -> tuple[int, int, bytes]:
-    """Return width, height and the EXIF block of a PNG file; `ValueError` when it is cut short."""
+    """Return width, height and the EXIF block of a PNG file; `ValueError` when it is damaged."""
     if data[12:16] != b"IHDR":
         raise ValueError("no IHDR")
     width, height = struct.unpack_from(">II", data, 16)
     position, exif = 8, b""
     while True:
         (length,) = struct.unpack_from(">I", data, position)
-        name = data[position + 4 : position + 8]
+        name, end = data[position + 4 : position + 8], position + 8 + length
+        if struct.unpack_from(">I", data, end) != (zlib.crc32(data[position + 4 : end]),):
+            raise ValueError("a chunk's checksum is wrong")
         if name == b"eXIf":
-            exif = data[position + 8 : position + 8 + length]
+            exif = data[position + 8 : end]
         if name == b"IEND":
             return width, height, exif
-        position += 12 + length
+        position = end + 4
 
 
 def _decode(data: bytes, mode: int, path: Path) -> UInt8Array:

@@ -192,6 +192,5 @@ def _check_size(plugin: str, view: View, result: Mask | OrientationMap) -> None:
 
 @cache
 def _own_digest() -> str:
-    """Return a digest of hairkit itself and of the libraries whose versions change results."""
-    versions = hairkit.__version__, np.__version__, cv2.__version__
-    return digest_of(*versions, sorted(Path(__file__).parent.glob("*.py")))
+    """Return a digest of the versions of hairkit and of the libraries that change results."""
+    return digest_of(hairkit.__version__, np.__version__, cv2.__version__)

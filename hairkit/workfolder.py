@@ -150,7 +150,7 @@ def _write(path: Path, value: Stored, digest: str) -> None:
 def _kept_digest(path: Path) -> str | None:
     """Return the digest that a stage file was kept under, without reading the rest of it."""
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             return str(data[_DIGEST])
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None

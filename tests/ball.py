@@ -1,0 +1,31 @@
+"""A capture of the made-up head as a folder, and the recipe that runs the test plugin on it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hairkit.testing import VIEW_NAMES, ball_mask, turn_capture, turn_scene
+
+PLUGIN_FILE = Path(__file__).with_name("ball_plugin.py")
+TABLES = ("segment", "scene", "head", "orient", "hull", "field", "track", "export")
+RECIPE = "".join(f'[{table}]\nplugin = "ball_plugin"\n' for table in TABLES)
+
+
+def write_capture(folder: Path, *, masks: bool = False) -> Path:
+    """Write eight photos `0_front.png`, ... into `folder/photos`, and masks beside; return it."""
+    (folder / "photos").mkdir(parents=True)
+    for index, view in enumerate(turn_capture().views):
+        cv2.imwrite(str(folder / "photos" / f"{index}_{view.name}.png"), view.image[..., ::-1])
+    if masks:
+        (folder / "masks").mkdir()
+        for index, (name, camera) in enumerate(zip(VIEW_NAMES, turn_scene().cameras, strict=True)):
+            write_grey(folder / "masks" / f"{index}_{name}.png", ball_mask(camera).labels)
+    return folder
+
+
+def write_grey(path: Path, values: np.ndarray) -> None:
+    """Write an array (H, W) or (H, W, C) as PNG."""
+    assert cv2.imwrite(str(path), values)
