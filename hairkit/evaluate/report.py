@@ -36,7 +36,7 @@ figure { margin: 0 } figcaption { font-size: 12px; color: #555 }
 def write_report(
     folder: str | os.PathLike[str], evaluation: Evaluation, prediction: Prediction, truth: Truth
 ) -> tuple[Path, Path]:
-    """Write `evaluation.json` and `report.html` into `folder`, made if need be; return both paths."""
+    """Write `evaluation.json` and `report.html` into `folder`, made if need be; return both."""
     base = Path(folder)
     base.mkdir(parents=True, exist_ok=True)
     figures_path, report_path = base / "evaluation.json", base / "report.html"

@@ -130,7 +130,7 @@ def sample_hits(
 ) -> tuple[Hits, Hits]:
     """Return the hits of every predicted sample (precision) and of every true one (recall).
 
-    `visible` says that the marks of `truth` are what cameras saw; the rest is as `strand_scores` has it.
+    `visible` says that the marks of `truth` are what cameras saw; the rest as in `strand_scores`.
     """
     outer = None
     if surfaces is not None:
