@@ -103,7 +103,12 @@ class StageRunner:
         options = next(choice.options for choice in stage.choices if choice.plugin == plugin)
         started = time.perf_counter()
         self._log.started(plugin, 1)
-        self._manager.call("export_groom", plugin, options, groom=groom, path=path)
+        try:
+            self._manager.call("export_groom", plugin, options, groom=groom, path=path)
+        except PluginError as error:
+            if isinstance(error.__cause__, OSError):  # the disk is at fault, not the plugin
+                raise error.__cause__ from None
+            raise
         self._log.finished(plugin, time.perf_counter() - started, False)
 
     def call(self, stage: Stage, values: dict[str, Any]) -> Any:

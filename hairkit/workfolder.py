@@ -106,7 +106,7 @@ class WorkFolder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._writer.shutdown(wait=True, cancel_futures=kind is KeyboardInterrupt)
+        self._writer.shutdown(wait=True)  # what is done stays done, whatever ended the run
         if self._lock is not None:
             os.close(self._lock)
         if kind is None:

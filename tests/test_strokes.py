@@ -70,8 +70,8 @@ def test_an_area_covers_its_inside_and_a_line_its_thickness() -> None:
     )
     line = Stroke("foreground", False, np.array([[5.0, 20.0], [55.0, 20.0]]))
     assert 5 <= rasterise(line, 60, 40, 5)[:, 30].sum() <= 7  # OpenCV's ends are round and wide
-    far = Stroke("foreground", False, np.array([[-1e12, 20.0], [1e12, 20.0]]))
-    assert rasterise(far, 60, 40, 1)[19].all()
+    far = Stroke("foreground", False, np.array([[-1e12, 20.5], [1e12, 20.5]]))
+    assert rasterise(far, 60, 40, 1)[20].all()
 
 
 @pytest.mark.parametrize(
