@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.camera import Camera
+from hairkit.capture import Capture
 from hairkit.errors import InputError
 from hairkit.stored import Float64Array, frozen_array
 
@@ -139,6 +140,17 @@ class Turn:
     focal_ratios: Float64Array
     """(V,) focal length of each view over the first one's."""
 
+    @classmethod
+    def of(cls, capture: Capture) -> Turn:
+        """Return the turn of a capture: its nominal azimuths and sizes, focal lengths from EXIF or by size."""
+        sizes = np.array([(view.width, view.height) for view in capture.views])
+        focal = np.hypot(*sizes.T)
+        known = [view.focal_px for view in capture.views if view.focal_px is not None]
+        if len(known) == len(sizes):
+            focal = np.array(known, np.float64)
+        azimuths = np.radians([view.azimuth_deg for view in capture.views])
+        return cls(azimuths, sizes, focal / focal[0])
+
     @property
     def size(self) -> int:
         """Length of the vector."""
@@ -172,6 +184,12 @@ class Turn:
             result[:, 3:6, column] = (shifted - translation) / step - np.cross(w, translation)
             result[:, 6, column] = np.log(zoomed / focal) / step
         return result
+
+    def nominal(self, magnification: float, perspective: float) -> tuple[Camera, ...]:
+        """Return level cameras on the nominal turn about the origin: pixels per metre there, and 1 / distance."""
+        vector = np.zeros(self.size)
+        vector[LOG_MAGNIFICATION], vector[PERSPECTIVE] = np.log(magnification), perspective
+        return self.cameras(vector)
 
     def cameras(self, vector: Float64Array) -> tuple[Camera, ...]:
         """Return the cameras of a vector; `MIN_PERSPECTIVE` and less gives orthographic ones."""

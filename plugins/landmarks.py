@@ -1,0 +1,93 @@
+"""Cameras from landmarks alone, as in the thesis: the turn is taken at its word, only the head is placed in it.
+
+Landmarks of two or more views are intersected in space by least squares, with cameras exactly on the nominal turn
+(orthographic as in the thesis, or perspective); a weighted similarity (Umeyama 1991) brings the head's landmarks to
+them; the cameras are then expressed in the head's frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
+from hairkit.errors import InputError
+from hairkit.options import option
+from hairkit.pose import Turn, fit_similarity, triangulate
+from hairkit.stored import Float64Array
+
+JAW = 17
+"""The first landmarks trace the jaw."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of the landmark pose."""
+
+    model: str = option(
+        "orthographic", choices=("orthographic", "perspective"), doc="Kind of the nominal cameras."
+    )
+    focal_equivalent: float = option(
+        42.0, low=10, high=1000, doc="Focal length for perspective without EXIF, full frame.", unit="mm"
+    )
+    distance: float = option(
+        0.7, low=0.1, high=20, doc="Usual distance of perspective cameras.", unit="m"
+    )
+    jaw_weight: float = option(0.25, low=0, high=1, doc="Weight of the 17 jaw points; others have 1.")
+
+
+@hookimpl
+def estimate_scene(
+    capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
+) -> Scene:
+    """Return the nominal turn seen from the head that the landmarks place in it."""
+    pixels, known = _seen(capture)
+    if head.landmark_vertices is None:
+        raise InputError(
+            "the head has no landmark_vertices for the plugin 'landmarks'; use the plugin 'manual'"
+        )
+    cameras = _nominal(capture, options)
+    weights = np.where(np.arange(68) < JAW, options.jaw_weight, 1.0)
+    points = triangulate(cameras, pixels, np.broadcast_to(known[:, None], pixels.shape[:2]))
+    scene_from_head = fit_similarity(head.vertices[head.landmark_vertices], points, weights)
+    to_head = scene_from_head.inverse()
+    fitted = tuple(to_head.moved_camera(camera) for camera in cameras)
+    residual = _residual_px(fitted, to_head.apply(points), pixels, known)
+    return Scene(tuple(view.name for view in capture.views), fitted, head, residual)
+
+
+def _seen(capture: Capture) -> tuple[Float64Array, Float64Array]:
+    """Return landmarks (V, 68, 2), zero where unknown, and 1 for views that have them (V,)."""
+    known = np.array([float(view.landmarks is not None) for view in capture.views])
+    if known.sum() < 2:
+        raise InputError(
+            f"landmarks are known in {int(known.sum())} views, the plugin 'landmarks' needs 2 or more;"
+            " add landmarks.json or use the plugin 'silhouette'"
+        )
+    pixels = np.zeros((len(known), 68, 2))
+    for index, view in enumerate(capture.views):
+        if view.landmarks is not None:
+            pixels[index] = view.landmarks
+    return pixels, known
+
+
+def _nominal(capture: Capture, options: Options) -> tuple[Camera, ...]:
+    """Return the nominal turn at a scale that only has to be plausible: the similarity finds it."""
+    turn = Turn.of(capture)
+    view = capture.views[0]
+    usual = options.focal_equivalent / np.hypot(36, 24) * np.hypot(view.width, view.height)
+    focal = view.focal_px or usual
+    perspective = 1 / options.distance if options.model == "perspective" else 0.0
+    return turn.nominal(focal / options.distance, perspective)
+
+
+def _residual_px(
+    cameras: tuple[Camera, ...], points: Float64Array, pixels: Float64Array, known: Float64Array
+) -> float:
+    misfit = [
+        camera.project(points) - seen
+        for camera, seen, has in zip(cameras, pixels, known, strict=True)
+        if has
+    ]
+    return float(np.sqrt(np.mean(np.sum(np.square(misfit), axis=-1))))

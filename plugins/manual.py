@@ -1,0 +1,49 @@
+"""The head placed by hand: the pose in `capture.toml`, with cameras exactly on the nominal turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit import Capture, Head, Mask, Scene, hookimpl
+from hairkit.errors import InputError
+from hairkit.options import option
+from hairkit.pose import Similarity, Turn
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of the nominal cameras; EXIF or capture.toml's focal length goes before `focal_equivalent`."""
+
+    model: str = option(
+        "perspective", choices=("orthographic", "perspective"), doc="Kind of the nominal cameras."
+    )
+    focal_equivalent: float = option(
+        42.0, low=10, high=1000, doc="Focal length where the photos do not tell, full frame.", unit="mm"
+    )
+    distance: float = option(
+        0.7, low=0.1, high=20, doc="From the cameras to the turn's centre.", unit="m"
+    )
+
+
+@hookimpl
+def estimate_scene(
+    capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
+) -> Scene:
+    """Return the nominal turn seen from the head; `InputError` when the capture gives no pose."""
+    if capture.head_pose is None:
+        raise InputError(
+            "the capture gives no head pose for the plugin 'manual';"
+            " add [head] to capture.toml or use the plugin 'silhouette'"
+        )
+    view = capture.views[0]
+    usual = options.focal_equivalent / np.hypot(36, 24) * np.hypot(view.width, view.height)
+    orthographic = options.model == "orthographic" or capture.orthographic
+    perspective = 0.0 if orthographic else 1 / options.distance
+    cameras = Turn.of(capture).nominal((view.focal_px or usual) / options.distance, perspective)
+    matrix = capture.head_pose
+    scale = float(np.cbrt(np.linalg.det(matrix[:3, :3])))
+    to_head = Similarity(scale, matrix[:3, :3] / scale, matrix[:3, 3]).inverse()
+    names = tuple(view.name for view in capture.views)
+    return Scene(names, tuple(to_head.moved_camera(camera) for camera in cameras), head)

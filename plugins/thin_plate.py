@@ -1,0 +1,186 @@
+"""The head bent to the photos by a thin plate spline (Bookstein 1989; in 3D its kernel is the distance).
+
+Landmarks are intersected with the refined cameras and pull the head's landmarks; points on the cranium, which no
+landmark tells about, hold still softly. Then the scalp is pushed inside every silhouette, for hair always lies outside
+the head, and skin outlines are brought on to the silhouette's edge. Each push is a smooth spline again, so the scalp
+stays smooth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+
+from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
+from hairkit.coherence import Outlines
+from hairkit.mask import PERSON
+from hairkit.options import option
+from hairkit.pose import triangulate
+from hairkit.stored import Float32Array, Float64Array, Int64Array
+
+JAW = 17
+"""The first landmarks trace the jaw, which detectors place less surely."""
+JAW_LOOSENESS = 3.0
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of the bend."""
+
+    smoothing: float = option(
+        0.02, low=0, high=10, doc="How far landmarks may be missed for a smoother bend.", unit="m"
+    )
+    anchor_smoothing: float = option(
+        1.0, low=0, high=100, doc="The same for the cranium's points, which hold still.", unit="m"
+    )
+    anchors: int = option(60, low=4, high=1000, doc="Points that hold the cranium.")
+    controls: int = option(240, low=10, high=2000, doc="Points pushed by silhouettes.")
+    margin: float = option(
+        0.002, low=0, high=0.02, doc="How far the scalp stays inside silhouettes.", unit="m"
+    )
+    outline_gate: float = option(
+        0.008, low=0, high=0.1, doc="Skin outlines farther off than this are left alone.", unit="m"
+    )
+    rounds: int = option(2, low=0, high=10, doc="Rounds of silhouette pushes; 0 for landmarks only.")
+
+
+@hookimpl
+def fit_head(
+    capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: Options
+) -> Scene:
+    """Bend the scene's head to the landmarks and into the silhouettes."""
+    head = _bend_to_landmarks(capture, scene, options)
+    if options.rounds and all(mask.person_known for mask in masks):
+        outlines = Outlines.of(masks, count=20)
+        controls = _spread(head, options.controls)
+        for _ in range(options.rounds):
+            head = _bend_to_outlines(head, scene.cameras, masks, outlines, controls, options)
+    return replace(scene, head=head)
+
+
+def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head:
+    head = scene.head
+    seen = [view.landmarks is not None for view in capture.views]
+    if sum(seen) < 2 or head.landmark_vertices is None:
+        return head
+    pixels = np.stack([view.landmarks for view in capture.views if view.landmarks is not None])
+    cameras = [camera for camera, has in zip(scene.cameras, seen, strict=True) if has]
+    points = triangulate(cameras, pixels)
+    source = head.vertices[head.landmark_vertices].astype(np.float64)
+    anchors = head.vertices[_farthest(head, _cranium(head), options.anchors)].astype(np.float64)
+    loose = np.where(np.arange(68) < JAW, JAW_LOOSENESS, 1.0) * options.smoothing
+    smoothing = np.concatenate([loose, np.full(len(anchors), options.anchor_smoothing)])
+    places = np.concatenate([source, anchors])
+    moves = np.concatenate([points - source, np.zeros_like(anchors)])
+    return _moved(head, places, moves, smoothing)
+
+
+def _cranium(head: Head) -> Int64Array:
+    """Return scalp vertices behind the ears' plane: what the landmarks know nothing about."""
+    return np.nonzero((head.scalp > 0.5) & (head.vertices[:, 2] < np.median(head.vertices[:, 2])))[0]
+
+
+def _spread(head: Head, count: int) -> Int64Array:
+    """Return `count` vertices spread evenly over the head above the neck."""
+    low = head.joints[1, 1]
+    return _farthest(head, np.nonzero(head.vertices[:, 1] > low)[0], count)
+
+
+def _farthest(head: Head, candidates: Int64Array, count: int) -> Int64Array:
+    """Return vertices chosen one by one, each farthest from those before (Gonzalez 1985)."""
+    points = head.vertices[candidates].astype(np.float64)
+    chosen = [0]
+    distance = ((points - points[0]) ** 2).sum(1)
+    while len(chosen) < min(count, len(points)):
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(1))
+    return candidates[chosen]
+
+
+def _bend_to_outlines(
+    head: Head,
+    cameras: tuple[Camera, ...],
+    masks: tuple[Mask, ...],
+    outlines: Outlines,
+    controls: Int64Array,
+    options: Options,
+) -> Head:
+    """Push controls that stick out of a silhouette inwards, and skin outlines on to its edge."""
+    places = head.vertices[controls].astype(np.float64)
+    normals = head.normals()[controls]
+    scalp = head.scalp[controls] > 0.5
+    push = np.zeros(len(places))
+    smoothing = np.full(len(places), options.anchor_smoothing)
+    for view, camera in enumerate(cameras):
+        inside, slope = _inside_by(outlines.fields[view], outlines.scale, camera, places, normals)
+        excess = np.where(scalp, options.margin, 0.0) - inside
+        sticking = (excess > 0) & (slope < -0.3)
+        facing = np.abs((normals * camera.view_direction(places)).sum(1))
+        skin = _skin_nearby(masks[view], camera, places) & ~scalp
+        touching = skin & (facing < 0.25) & (np.abs(inside) < options.outline_gate)
+        wanted = np.where(sticking, -excess / np.maximum(-slope, 0.3), 0.0)
+        wanted = np.where(touching & (slope < -0.5), inside / -slope, wanted)
+        wanted = np.clip(wanted, -options.outline_gate, options.outline_gate)
+        stronger = np.abs(wanted) > np.abs(push)
+        push[stronger] = wanted[stronger]
+        smoothing[stronger | touching] = options.smoothing
+    return _moved(head, places, push[:, None] * normals, smoothing)
+
+
+def _inside_by(
+    field: Float32Array, scale: float, camera: Camera, places: Float64Array, normals: Float64Array
+) -> tuple[Float64Array, Float64Array]:
+    """Return how far places lie inside the silhouette (metres, infinity off the picture), and its slope along normals."""
+    step = 0.002
+    metres = camera.focal if camera.model == "orthographic" else camera.focal / camera.depth(places)
+    values = []
+    for moved in (places, places + step * normals):
+        column, row = np.nan_to_num(camera.project(moved) * scale - 0.5, nan=-1).T
+        values.append(_bilinear(field, column, row) / metres)
+    slope = np.where(np.isfinite(values[0]) & np.isfinite(values[1]), values[1], 0.0)
+    slope = (slope - np.where(np.isfinite(values[0]) & np.isfinite(values[1]), values[0], 0.0)) / step
+    return values[0], slope
+
+
+def _bilinear(field: Float32Array, column: Float64Array, row: Float64Array) -> Float64Array:
+    height, width = field.shape
+    inside = (column >= 0) & (row >= 0) & (column < width - 1) & (row < height - 1)
+    i = np.where(inside, row, 0).astype(int)
+    j = np.where(inside, column, 0).astype(int)
+    y, x = row - i, column - j
+    upper = field[i, j] * (1 - x) + field[i, j + 1] * x
+    lower = field[i + 1, j] * (1 - x) + field[i + 1, j + 1] * x
+    return np.where(inside, upper * (1 - y) + lower * y, np.inf)
+
+
+def _skin_nearby(mask: Mask, camera: Camera, places: Float64Array) -> np.ndarray:
+    """Return True where the person but no hair is seen within a few pixels of the projected places."""
+    height, width = mask.labels.shape
+    column, row = np.nan_to_num(camera.project(places), nan=-1).astype(int).T
+    skin = np.zeros(len(places), bool)
+    hair = np.zeros(len(places), bool)
+    reach = max(2, height // 180)
+    for dy in (-reach, 0, reach):
+        for dx in (-reach, 0, reach):
+            y, x = (row + dy).clip(0, height - 1), (column + dx).clip(0, width - 1)
+            skin |= mask.labels[y, x] == PERSON
+            hair |= mask.hair[y, x]
+    return skin & ~hair
+
+
+def _moved(head: Head, places: Float64Array, moves: Float64Array, smoothing: Float64Array) -> Head:
+    """Return the head, its joints and capsules carried along by the spline through `moves` at `places`."""
+    spline = RBFInterpolator(places, moves, smoothing=smoothing, kernel="linear", degree=1)
+
+    def carry(points: Float32Array) -> Float32Array:
+        result: Float32Array = (points + spline(points.astype(np.float64))).astype(np.float32)
+        return result
+
+    capsules = replace(
+        head.capsules, first=carry(head.capsules.first), second=carry(head.capsules.second)
+    )
+    return replace(
+        head, vertices=carry(head.vertices), joints=carry(head.joints), capsules=capsules
+    )
