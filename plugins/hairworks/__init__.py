@@ -25,6 +25,8 @@ from .writer import asset_text
 
 __all__ = ["ApxAsset", "Options", "asset_text", "asset_to_groom", "groom_to_asset", "read_apx"]
 
+SUFFIXES = (".apx",)
+
 
 @dataclass(frozen=True)
 class Options:
