@@ -80,6 +80,20 @@ def label_from_seeds(
     InputError
         No seed is hair, or all are.
     """
+    labels = coarse_labels(image, seeds, hair_allowed, settings)
+    return refine_labels(image, labels, seeds, hair_allowed)
+
+
+def coarse_labels(
+    image: UInt8Array,
+    seeds: UInt8Array,
+    hair_allowed: BoolArray,
+    settings: LabelSettings | None = None,
+) -> UInt8Array:
+    """Return the labels (h, w) of the reduced picture, before edges are settled at full size.
+
+    Parameters and errors are those of `label_from_seeds`.
+    """
     settings = settings or LabelSettings()
     classes = [label for label in (HAIR, PERSON, BACKGROUND) if (seeds == label).any()]
     if HAIR not in classes or len(classes) < 2:
@@ -93,9 +107,10 @@ def label_from_seeds(
     for _ in range(settings.rounds):
         evidence = class_evidence(features, known, classes, settings)
         probability = _probability(evidence, prior, seeds, classes, hair_allowed, settings)
-        labels = np.asarray(classes, np.uint8)[probability.argmax(axis=-1)]
+        labels = np.take(np.asarray(classes, np.uint8), probability.argmax(axis=-1))
         known = _certain(labels, probability.max(axis=-1), seeds)
-    return refine_labels(image, labels, seeds, hair_allowed)
+    result: UInt8Array = labels
+    return result
 
 
 def appearance(image: UInt8Array, width: int, height: int) -> tuple[Float32Array, Float32Array]:

@@ -1,0 +1,218 @@
+"""Segmentation without strokes: what a portrait usually looks like gives the seeds.
+
+The picture's upper border shows the backdrop, its middle the subject; skin is smooth, bright and of
+skin's hue; hair lies along the upper outline of the subject and is not skin; clothes are at the
+bottom and unlike the hair. From these seeds the labelling goes on as from a user's strokes
+(`hairkit.labelling`, after Rother et al. 2004). No model file is needed; a beard between cheeks and
+neck counts as face. Landmarks, where a view has them, mark the face for certain.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from hairkit.capture import View
+from hairkit.errors import InputError
+from hairkit.hookspecs import hookimpl
+from hairkit.labelling import (
+    UNKNOWN,
+    LabelSettings,
+    appearance,
+    coarse_labels,
+    label_from_seeds,
+    reduced_size,
+)
+from hairkit.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.options import option
+from hairkit.stored import BoolArray, Float32Array, Float64Array, UInt8Array
+
+_SKIN_HUE_DEG = (15.0, 80.0)
+_SKIN_CHROMA, _SKIN_BRIGHTER = 9.0, 22.0
+_SMALLEST_SKIN = 0.005
+_UNLIKE_HAIR = 4.0
+_FIRST_INNER_LANDMARK = 27
+_FEWEST = 30
+_SPECK = 1e-4
+_NOTICEABLE = 3.0
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of the segmentation without strokes."""
+
+    reduced_height: int = option(
+        360, low=120, high=1080, doc="Rows of the picture that is segmented first.", unit="px"
+    )
+    border: float = option(
+        0.03, low=0.005, high=0.2, doc="Share of the picture at its border that is backdrop."
+    )
+    side_height: float = option(
+        0.35, low=0.0, high=1.0, doc="Share of the picture's sides, from the top, that is backdrop."
+    )
+    rim: float = option(
+        0.07, low=0.01, high=0.3, doc="Depth of the hair under the outline, in picture heights."
+    )
+    seed: int = option(1, low=0, high=2**31 - 1, doc="Seed of the colour clustering.")
+
+
+@hookimpl
+def segment(view: View, options: Options) -> Mask:
+    """Label a photo from what portraits have in common.
+
+    Raises
+    ------
+    InputError
+        No hair was found.
+    """
+    width, height = reduced_size(view.width, view.height, options.reduced_height)
+    settings = LabelSettings(seed=options.seed)
+    subject = _subject(view.image, width, height, options, settings)
+    seeds = _seeds(view, subject, options)
+    if np.count_nonzero(seeds == HAIR) < _FEWEST:
+        raise InputError(
+            f"no hair found in photo {view.name}; draw strokes on it or give a mask file"
+        )
+    labels = label_from_seeds(view.image, seeds, subject, settings)
+    within = cv2.erode(subject.astype(np.uint8), np.ones((7, 7)))
+    within = cv2.resize(within, (view.width, view.height), interpolation=cv2.INTER_NEAREST)
+    lost = (within > 0) & (labels == BACKGROUND)
+    lost |= _astray(labels == HAIR, seeds == HAIR)
+    return Mask(np.where(lost, np.uint8(PERSON), labels), person_known=True)
+
+
+def _subject(
+    image: UInt8Array, width: int, height: int, options: Options, settings: LabelSettings
+) -> BoolArray:
+    """Return where the person is (h, w): two classes, the border against the middle."""
+    seeds = np.full((height, width), UNKNOWN, np.uint8)
+    strip = max(round(options.border * height), 1)
+    seeds[:strip] = BACKGROUND
+    sides = round(options.side_height * height)
+    seeds[:sides, :strip] = BACKGROUND
+    seeds[:sides, -strip:] = BACKGROUND
+    middle = slice(round(0.42 * width), round(0.58 * width))
+    seeds[round(0.4 * height) :, middle] = HAIR
+    labels = coarse_labels(image, seeds, np.ones(seeds.shape, np.bool_), settings)
+    area = (labels == HAIR).astype(np.uint8)
+    _, parts, stats, _ = cv2.connectedComponentsWithStats(area)
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    return _filled(parts == largest)
+
+
+def _seeds(view: View, subject: BoolArray, options: Options) -> UInt8Array:
+    """Return seeds (h, w) of the three classes from the subject's outline and colours."""
+    height, width = subject.shape
+    colour, _ = appearance(view.image, width, height)
+    inner = cv2.erode(subject.astype(np.uint8), np.ones((5, 5))) > 0
+    skin = _skin(colour, inner)
+    hair = _upper_rim(subject, options.rim) & inner & ~_grown(skin, 2)
+    seeds = np.full(subject.shape, UNKNOWN, np.uint8)
+    seeds[~_grown(subject, 6)] = BACKGROUND
+    seeds[_clothes(colour, hair, inner)] = PERSON
+    if _differ(colour[hair], colour[seeds == BACKGROUND]):
+        seeds[hair] = HAIR
+    seeds[_face(skin, subject)] = PERSON
+    if view.landmarks is not None:
+        seeds[_inner_face(view, view.landmarks, width, height)] = PERSON
+    return seeds
+
+
+def _differ(hair: Float32Array, backdrop: Float32Array) -> bool:
+    """Tell whether the eye could part hair (N, 3) from backdrop (M, 3), both Lab."""
+    if not (len(hair) and len(backdrop)):
+        return False
+    apart = np.linalg.norm(np.median(hair, axis=0) - np.median(backdrop, axis=0))
+    return bool(apart > _NOTICEABLE)
+
+
+def _skin(colour: Float32Array, inner: BoolArray) -> BoolArray:
+    """Return skin (h, w): of skin's hue, and clearly brighter than the darkest of the head."""
+    hue = np.degrees(np.arctan2(colour[..., 2], colour[..., 1]))
+    chroma = np.hypot(colour[..., 1], colour[..., 2])
+    hued = (hue > _SKIN_HUE_DEG[0]) & (hue < _SKIN_HUE_DEG[1]) & (chroma > _SKIN_CHROMA) & inner
+    darkest = np.quantile(colour[..., 0][inner], 0.1) if inner.any() else 0.0
+    skin = (hued & (colour[..., 0] > darkest + _SKIN_BRIGHTER)).astype(np.uint8)
+    opened = np.asarray(cv2.morphologyEx(skin, cv2.MORPH_OPEN, np.ones((7, 7))), np.uint8)
+    _, parts, stats, _ = cv2.connectedComponentsWithStats(opened)
+    large = stats[:, cv2.CC_STAT_AREA] > _SMALLEST_SKIN * skin.size
+    return np.asarray((opened > 0) & large[parts], np.bool_)
+
+
+def _astray(hair: BoolArray, seeds: BoolArray) -> BoolArray:
+    """Return parts of the hair (H, W), specks apart, that hold no seed: brows, glasses, a beard.
+
+    Parts less than a hundredth of the picture's height apart are one.
+    """
+    height, width = hair.shape
+    large = cv2.resize(seeds.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
+    bridged = _grown(hair, height // 200).astype(np.uint8)
+    count, parts, stats, _ = cv2.connectedComponentsWithStats(bridged)
+    held = np.bincount(parts[large > 0], minlength=count) > 0
+    astray = ~held & (stats[:, cv2.CC_STAT_AREA] > _SPECK * hair.size)
+    astray[0] = False
+    return np.asarray(hair & astray[parts], np.bool_)
+
+
+def _upper_rim(subject: BoolArray, rim: float) -> BoolArray:
+    """Return the band under the outline of the upper third of the subject."""
+    height = subject.shape[0]
+    depth = cv2.distanceTransform(subject.astype(np.uint8), cv2.DIST_L2, 3)
+    rows = np.flatnonzero(subject.any(axis=1))
+    lowest = rows[0] + 0.35 * (height - rows[0])
+    above = np.arange(height)[:, None] < lowest
+    return np.asarray(subject & (depth < rim * height) & above, np.bool_)
+
+
+def _clothes(colour: Float32Array, hair: BoolArray, inner: BoolArray) -> BoolArray:
+    """Return the subject's lowest rows where they are unlike the hair (Mahalanobis 1936)."""
+    low = inner.copy()
+    low[: round(0.93 * len(low))] = False
+    if np.count_nonzero(hair) < _FEWEST:
+        return low
+    middle = np.median(colour[hair], axis=0)
+    precision = np.linalg.inv(np.cov(colour[hair].T) + 4.0 * np.eye(3))
+    offset = colour - middle
+    squared = np.einsum("hwa,ab,hwb->hw", offset, precision, offset)
+    return np.asarray(low & (squared > _UNLIKE_HAIR**2))
+
+
+def _face(skin: BoolArray, subject: BoolArray) -> BoolArray:
+    """Return skin and what has skin above and below it: eyes and mouth, lower down a beard."""
+    height = len(skin)
+    top = int(np.flatnonzero(subject.any(axis=1))[0])
+    short = cv2.morphologyEx(
+        skin.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((max(height // 16, 1) | 1, 3))
+    )
+    cheeks = skin & (np.arange(height)[:, None] > top + 0.45 * (height - top))
+    columns = np.flatnonzero(cheeks.any(axis=0))
+    if len(columns):
+        left, right = np.quantile(columns, [0.25, 0.75]).astype(int)
+        cheeks[:, :left] = cheeks[:, right:] = False
+    above = np.maximum.accumulate(cheeks, axis=0)
+    below = np.maximum.accumulate(cheeks[::-1], axis=0)[::-1]
+    return np.asarray((short > 0) | (above & below))
+
+
+def _inner_face(view: View, landmarks: Float64Array, width: int, height: int) -> BoolArray:
+    """Return the hull of the landmarks of nose, eyes and mouth."""
+    scale = np.array([width / view.width, height / view.height])
+    points = landmarks[_FIRST_INNER_LANDMARK:] * scale - 0.5
+    canvas = np.zeros((height, width), np.uint8)
+    cv2.fillConvexPoly(canvas, cv2.convexHull(np.rint(points).astype(np.int32)), 1)
+    return canvas > 0
+
+
+def _filled(area: BoolArray) -> BoolArray:
+    """Return the area without holes."""
+    padded = np.pad(~area, 1, constant_values=True).astype(np.uint8)
+    cv2.floodFill(padded, None, (0, 0), 2)
+    return np.asarray(padded[1:-1, 1:-1] != 2, np.bool_)
+
+
+def _grown(area: BoolArray, radius: int) -> BoolArray:
+    size = (2 * radius + 1, 2 * radius + 1)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, size)
+    return np.asarray(cv2.dilate(area.astype(np.uint8), disc) > 0)
