@@ -20,6 +20,8 @@ roots, silhouettes, directions and cameras. Photos fix no scale or frame, so the
 moved by the one similarity with which the true cameras see it as its own cameras did.
 A high score needs many strands: reconstruct with --guides 8000 to compare with others."""
 
+_PLAIN_WIDTH = 100
+"""Columns of a table that goes to a file or a pipe."""
 _MARKS = {"aim": "[green]aim[/]", "must": "[yellow]must[/]", "missed": "[red]missed[/]", "": ""}
 
 
@@ -65,6 +67,8 @@ def _print(evaluation: Evaluation) -> None:
     from rich.console import Console
 
     console = Console()
+    if not console.is_terminal:
+        console = Console(width=_PLAIN_WIDTH)
     console.print(_score_table(evaluation))
     console.print(_figure_table(evaluation))
     if evaluation.consistency is not None:

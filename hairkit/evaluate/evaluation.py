@@ -125,7 +125,13 @@ class Evaluation:
         return figures | {name: getattr(self, name) for name in means}
 
 
-def evaluate(prediction: Prediction, truth: Truth, *, consistency: bool = False) -> Evaluation:
+def evaluate(
+    prediction: Prediction,
+    truth: Truth,
+    *,
+    consistency: bool = False,
+    dense_strands: int = DENSE_STRANDS,
+) -> Evaluation:
     """Score a prediction against the truth by the protocol of docs/evaluation.md.
 
     Parameters
@@ -136,6 +142,8 @@ def evaluate(prediction: Prediction, truth: Truth, *, consistency: bool = False)
         Of the same capture; both must have the same views.
     consistency : bool
         Measure strand consistency too, which takes some seconds.
+    dense_strands : int
+        Hair is densified to this many strands for its silhouette.
 
     Raises
     ------
@@ -147,7 +155,7 @@ def evaluate(prediction: Prediction, truth: Truth, *, consistency: bool = False)
     samples = sample_strands(groom.strands, name="predicted")
     precision, recall = sample_hits(samples, truth.samples, surfaces=truth.surfaces, visible=True)
     directions = _directions(samples, truth)
-    silhouettes, dense = _silhouettes(groom, truth)
+    silhouettes, dense = _silhouettes(groom, truth, dense_strands)
     return Evaluation(
         strands=len(groom.strands),
         similarity=similarity,
@@ -188,9 +196,9 @@ def _directions(samples: Samples, truth: Truth) -> tuple[DrawnDirections, ...]:
     )
 
 
-def _silhouettes(groom: Groom, truth: Truth) -> tuple[tuple[BoolArray, ...], int]:
+def _silhouettes(groom: Groom, truth: Truth, count: int) -> tuple[tuple[BoolArray, ...], int]:
     """Draw the densified hair into every view."""
-    dense: Strands = densify(groom, DENSE_STRANDS)
+    dense: Strands = densify(groom, count)
     samples = sample_strands(dense, shortest=0.0, name="densified")
     drawn = tuple(
         hair_silhouette(camera, samples, truth.head, clothes=truth.hair_mask(view) == PERSON)
