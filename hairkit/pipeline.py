@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hairkit.assemble import assemble_groom
@@ -81,18 +81,29 @@ def reconstruct(
         _sweep(folder)
         run = StageRunner(recipe, manager, work, log, pool)
         try:
-            groom, scene = _grow(run, capture, head or default_head(), guides, seed)
+            made = _grow(run, capture, head or default_head(), guides, seed)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
         work.flush()
-        write_groom(folder / "groom.npz", groom)
-        _in_photo_pixels(scene, capture).write_json(folder / "scene.json")
+        write_groom(folder / "groom.npz", made.groom)
+        _in_photo_pixels(made.scene, capture).write_json(folder / "scene.json")
         for plugin, path in export_paths(folder, recipe, manager):
-            run.export(plugin, groom, path)
-        manager.notify("groom_ready", groom=groom)
+            run.export(plugin, made.groom, path)
+        manager.notify("groom_ready", groom=made.groom)
         log.write(folder / "hairkit.log", recipe, manager)
-    return groom
+    return made.groom
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """What the stages of one run have made."""
+
+    masks: tuple[Mask, ...]
+    orientations: tuple[OrientationMap, ...]
+    hull: Hull
+    scene: Scene
+    groom: Groom
 
 
 def export_paths(
@@ -107,9 +118,7 @@ def export_paths(
     )
 
 
-def _grow(
-    run: StageRunner, capture: Capture, head: Head, guides: int, seed: int
-) -> tuple[Groom, Scene]:
+def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int) -> _Made:
     """Run the stages; views are worked on side by side while later stages wait for them."""
     photos, views = Given.of(capture), [Given.of(view) for view in capture.views]
     masks = run.every_view("segment", Mask, views)
@@ -118,23 +127,14 @@ def _grow(
     if run.has("head"):
         scene = run.once("head", Scene, capture=photos, masks=masks, scene=scene)
     hull = run.once("hull", Hull, scene=scene, masks=masks)
-    seen: dict[str, Argument] = {
-        "scene": scene,
-        "masks": masks,
-        "orientations": orientations,
-        "hull": hull,
-    }
-    field = run.once("field", OrientationField, **seen)
+    seen: dict[str, Argument] = {"scene": scene, "masks": masks, "orientations": orientations}
+    field = run.once("field", OrientationField, **seen, hull=hull)
     roots = Given.of(sample_roots(scene.value.head, guides, seed))
-    strands = run.once("track", Strands, **seen, field=field, roots=roots)
-    groom = assemble_groom(
-        capture.views,
-        [mask.result().value for mask in masks],
-        scene.value.head,
-        roots.value,
-        strands.value,
-    )
-    return groom, scene.value
+    strands = run.once("track", Strands, **seen, hull=hull, field=field, roots=roots)
+    labels = tuple(mask.result().value for mask in masks)
+    angles = tuple(orientation.result().value for orientation in orientations)
+    groom = assemble_groom(capture.views, labels, scene.value.head, roots.value, strands.value)
+    return _Made(labels, angles, hull.value, scene.value, groom)
 
 
 def _sweep(folder: Path) -> None:
