@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.camera import Camera
+from hairkit.capture_reader import TURN
 from hairkit.densify import densify
 from hairkit.errors import InputError
 from hairkit.groom import Groom
@@ -29,17 +30,6 @@ Example: hairkit render out/groom.npz -o front-left.png --camera front-left
 Draw a groom on its head, its guides interpolated to full hair. The camera is a name of the turn,
 "azimuth,elevation" in degrees, or a view of a scene.json. --turntable 24 writes 24 pictures."""
 
-TURN = {
-    "front": 0.0,
-    "front-left": 45.0,
-    "left": 90.0,
-    "back-left": 135.0,
-    "back": 180.0,
-    "back-right": 225.0,
-    "right": 270.0,
-    "front-right": 315.0,
-}
-"""Azimuths of the named cameras, degrees."""
 VERTICAL_ANGLE = np.radians(26.0)
 """Field of view of a named camera over the picture's height."""
 MARGIN = 1.12
@@ -138,7 +128,7 @@ def _cameras(args: argparse.Namespace, head: Any, hair: Strands) -> list[Camera]
         return [_scene_camera(args.scene, args.view, args.size)]
     if args.view is not None:
         raise InputError(f"--view {args.view} needs --scene scene.json")
-    width, height = _size(args.size or "1280x720")
+    width, height = parse_size(args.size or "1280x720")
     azimuth, elevation = _direction(args.camera or "front")
     if args.turntable is None:
         turn = [azimuth]
@@ -158,7 +148,7 @@ def _scene_camera(path: Path, view: str | None, size: str | None) -> Camera:
     camera = cameras[names.index(wanted)]
     if size is None:
         return camera
-    width, height = _size(size)
+    width, height = parse_size(size)
     scale = min(width / camera.width, height / camera.height)
     fitted = camera.resized(round(camera.width * scale), round(camera.height * scale))
     shift = (np.array([width, height]) - [fitted.width, fitted.height]) / 2
@@ -181,7 +171,8 @@ def _direction(text: str) -> tuple[float, float]:
     return azimuth, elevation
 
 
-def _size(text: str) -> tuple[int, int]:
+def parse_size(text: str) -> tuple[int, int]:
+    """Return width and height of `WIDTHxHEIGHT`."""
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
     if not match or not all(1 <= int(n) <= LARGEST for n in match.groups()):
         raise InputError(f"--size is {text!r}, expected WIDTHxHEIGHT up to {LARGEST}, as 1280x720")

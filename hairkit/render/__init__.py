@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+from hairkit.render.head import Solid
 from hairkit.render.light import Lights
 from hairkit.render.measured import (
+    Measured,
     draw_coverage,
     draw_depth,
     draw_directions,
     draw_layers,
+    draw_measured,
+    points_at_depth,
     visible_points,
 )
-from hairkit.render.picture import draw, draw_views
+from hairkit.render.picture import draw, draw_views, drawn_width
 
 __all__ = [
     "Lights",
+    "Measured",
+    "Solid",
     "draw",
     "draw_coverage",
     "draw_depth",
     "draw_directions",
     "draw_layers",
+    "draw_measured",
     "draw_views",
+    "drawn_width",
+    "points_at_depth",
     "visible_points",
 ]

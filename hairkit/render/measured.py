@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.camera import Camera
 from hairkit.orientation import wrap_angle
@@ -33,13 +33,14 @@ def draw_layers(
     solids: Solids,
     camera: Camera,
     *,
-    width: float = 5e-4,
+    width: float | Float32Array = 5e-4,
     min_width_px: float = 1.0,
     supersample: int = SUPERSAMPLE,
 ) -> tuple[Float32Array, Float32Array]:
     """Return the shares (H, W) in [0, 1] of each pixel that visible hair and bare solids cover.
 
-    `width` is the drawn diameter of every strand in metres, `min_width_px` its least in pixels.
+    `width` is the drawn diameter in metres, one for all or (P,) one a point; `min_width_px` its
+    least in pixels.
     """
     fine = supersampled(camera, supersample)
     meshes = _meshes(solids)
@@ -55,12 +56,50 @@ def draw_layers(
     return shares[..., 0], shares[..., 1]
 
 
+@dataclass(frozen=True)
+class Measured:
+    """What is known at every pixel's centre about the strand seen there."""
+
+    angle: Float32Array
+    """(H, W) radians in [0, pi), as in `OrientationMap`; 0 without hair."""
+    depth: Float32Array
+    """(H, W) axial depth in metres, infinity without hair."""
+    seen: BoolArray
+    """(H, W) true where hair is the first thing seen."""
+
+
+def draw_measured(
+    strands: Strands,
+    solids: Solids,
+    camera: Camera,
+    *,
+    width: float | Float32Array = 2e-4,
+    min_width_px: float = 1.0,
+) -> Measured:
+    """Return direction and depth of the strand seen at each pixel, in one drawing."""
+    meshes = _meshes(solids)
+    depth = DepthRange.around(camera, strands.points, *[mesh.vertices for mesh in meshes])
+    with renderer() as gl, target(gl, camera, "f4") as picture:
+        _draw_solids(gl, meshes, camera, depth, _NOTHING)
+        program = gl.program("hair_direction")
+        with ribbons(gl, strands, width) as buffers:
+            draw_ribbons(gl, buffers, program, camera, depth, min_width_px=min_width_px)
+        values: Float32Array = np.asarray(picture.read(), np.float32)
+    seen: BoolArray = values[..., 3] > 0.5
+    angle = wrap_angle(np.arctan2(values[..., 1], values[..., 0]))
+    return Measured(
+        np.where(seen, angle, np.float32(0)),
+        np.where(seen, values[..., 2], np.float32(np.inf)),
+        seen,
+    )
+
+
 def draw_coverage(
     strands: Strands,
     head: Solids,
     camera: Camera,
     *,
-    width: float = 5e-4,
+    width: float | Float32Array = 5e-4,
     min_width_px: float = 1.0,
 ) -> Float32Array:
     """Return the share (H, W) in [0, 1] of each pixel that hair in front of the head covers."""
@@ -72,17 +111,15 @@ def draw_directions(
     head: Solids,
     camera: Camera,
     *,
-    width: float = 2e-4,
+    width: float | Float32Array = 2e-4,
     min_width_px: float = 1.0,
 ) -> tuple[Float32Array, BoolArray]:
     """Return the 2D angle (H, W) of the strand seen at each pixel, and where one is seen.
 
     Angles are undirected, in [0, pi), from +x towards +y, as in `OrientationMap`; 0 without hair.
     """
-    measured = _measure(strands, head, camera, width, min_width_px)
-    seen: BoolArray = measured[..., 3] > 0.5
-    angle = wrap_angle(np.arctan2(measured[..., 1], measured[..., 0]))
-    return np.where(seen, angle, np.float32(0)), seen
+    measured = draw_measured(strands, head, camera, width=width, min_width_px=min_width_px)
+    return measured.angle, measured.seen
 
 
 def draw_depth(
@@ -90,17 +127,20 @@ def draw_depth(
     head: Solids,
     camera: Camera,
     *,
-    width: float = 2e-4,
+    width: float | Float32Array = 2e-4,
     min_width_px: float = 1.0,
 ) -> Float32Array:
     """Return the axial depth (H, W) in metres of the strand seen at each pixel, else infinity."""
-    measured = _measure(strands, head, camera, width, min_width_px)
-    return np.where(measured[..., 3] > 0.5, measured[..., 2], np.float32(np.inf))
+    return draw_measured(strands, head, camera, width=width, min_width_px=min_width_px).depth
 
 
 def visible_points(strands: Strands, head: Solids, camera: Camera) -> BoolArray:
     """Return (P,) which points of the strands the camera sees before other hair and the head."""
-    depth = draw_depth(strands, head, camera)
+    return points_at_depth(strands, draw_depth(strands, head, camera), camera)
+
+
+def points_at_depth(strands: Strands, depth: Float32Array, camera: Camera) -> BoolArray:
+    """Return (P,) which points lie no further than the `depth` (H, W) that `draw_depth` gave."""
     pixels = camera.project(strands.points)
     inside = np.all((pixels >= 0) & (pixels < [camera.width, camera.height]), axis=1)
     column, row = np.where(inside[:, None], pixels, 0).astype(np.int64).T
@@ -125,17 +165,3 @@ def _draw_solids(
     program = gl.program("solid", "flat")
     for mesh in meshes:
         draw_solid(gl, mesh, program, camera, depth, HEAD_PUSH, u_colour=colour)
-
-
-def _measure(
-    strands: Strands, solids: Solids, camera: Camera, width: float, min_width_px: float
-) -> npt.NDArray[np.float32]:
-    """Return (H, W, 4): direction x, y, axial depth, and 1 where the first thing seen is hair."""
-    meshes = _meshes(solids)
-    depth = DepthRange.around(camera, strands.points, *[mesh.vertices for mesh in meshes])
-    with renderer() as gl, target(gl, camera, "f4") as picture:
-        _draw_solids(gl, meshes, camera, depth, _NOTHING)
-        program = gl.program("hair_direction")
-        with ribbons(gl, strands, width) as buffers:
-            draw_ribbons(gl, buffers, program, camera, depth, min_width_px=min_width_px)
-        return np.asarray(picture.read(), np.float32)

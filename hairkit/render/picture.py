@@ -114,7 +114,7 @@ def draw_views(
     pictures = []
     with (
         renderer() as gl,
-        ribbons(gl, strands, _drawn_width(strands, material)) as buffers,
+        ribbons(gl, strands, drawn_width(strands, material)) as buffers,
         contextlib.ExitStack() as kept,
     ):
         volume: LightVolume | None = None
@@ -159,7 +159,8 @@ def _sized(camera: Camera, width: int | None, height: int | None) -> Camera:
     return camera.resized(width, height)
 
 
-def _drawn_width(strands: Strands, material: HairMaterial) -> float | Float32Array:
+def drawn_width(strands: Strands, material: HairMaterial) -> float | Float32Array:
+    """Return the width in metres, or (P,) widths, that strands have in pictures."""
     wider = float(np.clip(np.sqrt(SHOWN_HAIRS / max(len(strands), 1)), 1.0, WIDEST))
     return wider * (material.width if strands.widths is None else strands.widths)
 

@@ -1,0 +1,267 @@
+"""Photos of a groom with everything known: a capture for tests, laid out like a real one.
+
+`photos/`, `masks/` and `landmarks.json` are what a method may read; `truth/` is for scoring.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.bust import Bust
+from hairkit.camera import Camera
+from hairkit.capture_reader import TURN
+from hairkit.errors import InputError
+from hairkit.groom import Groom
+from hairkit.head import Head
+from hairkit.mask import BACKGROUND, HAIR, PERSON
+from hairkit.render import (
+    Lights,
+    Measured,
+    Solid,
+    draw_layers,
+    draw_measured,
+    draw_views,
+    drawn_width,
+    points_at_depth,
+)
+from hairkit.stored import Float64Array, UInt8Array, write_bytes, write_npz, write_text
+
+DISTANCE = 0.756
+"""From the camera to the head, metres."""
+FOCAL_PER_HEIGHT = 1.38
+"""Focal length over the picture's height: a phone held upright, 47 mm equivalent."""
+TARGET = (0.0, -0.10, 0.0)
+"""Where the photographer aims."""
+AZIMUTH_JITTER, ELEVATION_JITTER, ROLL_JITTER = 4.0, 3.0, 2.0
+"""Degrees at most off the nominal turn."""
+DISTANCE_JITTER, TARGET_JITTER = 0.05, 0.006
+"""Share of the distance at most; metres, standard deviation."""
+LANDMARK_VIEWS = (0, 1, 7)
+"""Views in which a face detector finds landmarks."""
+LANDMARK_NOISE = 0.003
+"""Standard deviation of a detected landmark, share of the picture's width."""
+SENSOR_NOISE = 2.2
+"""Standard deviation of a pixel's noise, of 255."""
+CLOTHS = ((0.045, 0.075, 0.16), (0.21, 0.03, 0.04), (0.32, 0.31, 0.29), (0.05, 0.13, 0.09))
+"""Linear RGB of the clothes."""
+SMALLEST, LARGEST = 64, 8192
+"""Pixels along a photo's edge."""
+
+
+def photograph(
+    groom: Groom,
+    folder: str | os.PathLike[str],
+    *,
+    seed: int = 0,
+    size: tuple[int, int] = (810, 1080),
+    jitter: float = 1.0,
+    orthographic: bool = False,
+) -> None:
+    """Take eight photos of a groom and write them with masks, landmarks and truth into `folder`.
+
+    Parameters
+    ----------
+    groom
+        Hair and head; hair is photographed as it is, strand by strand.
+    folder
+        Made where it is missing; its files are replaced.
+    seed
+        Of the cameras' jitter, the lights, the background and the noise.
+    size
+        Width and height of a photo in pixels.
+    jitter
+        Times the usual deviation of the cameras from the nominal turn; 0 is a perfect turn.
+    orthographic
+        Parallel rays, as the thesis assumes, instead of a phone's.
+    """
+    if not all(SMALLEST <= edge <= LARGEST for edge in size):
+        raise InputError(f"photos of {size} pixels, expected {SMALLEST} to {LARGEST} a side")
+    base = Path(folder)
+    for name in ("photos", "masks", "truth/orientation"):
+        (base / name).mkdir(parents=True, exist_ok=True)
+    generator = np.random.default_rng([seed, 7])
+    shoot = _Shoot.prepared(groom, generator)
+    cameras = _cameras(size, jitter, orthographic, generator)
+    stems = [f"{index}_{name}" for index, name in enumerate(TURN)]
+    seen = np.zeros(len(groom.strands.points), np.uint8)
+    for index, (stem, camera) in enumerate(zip(stems, cameras, strict=True)):
+        write_bytes(base / "photos" / f"{stem}.jpg", _jpeg(shoot.photo(camera, generator)))
+        write_bytes(base / "masks" / f"{stem}.png", _png(shoot.labels(camera)))
+        measured = shoot.measured(camera)
+        write_bytes(base / "truth" / "orientation" / f"{stem}.png", _png(_angle_codes(measured)))
+        visible = points_at_depth(groom.strands, measured.depth, camera)
+        seen |= visible.astype(np.uint8) << np.uint8(index)
+    _write_landmarks(base, groom.head, stems, cameras, generator)
+    _write_truth(base / "truth", groom, cameras, seen)
+
+
+@dataclass(frozen=True)
+class _Shoot:
+    """What stays the same in all photos."""
+
+    groom: Groom
+    torso: Solid
+    lights: Lights
+
+    @classmethod
+    def prepared(cls, groom: Groom, generator: np.random.Generator) -> _Shoot:
+        bust = Bust.under(groom.head)
+        cloth = np.array(CLOTHS[generator.integers(len(CLOTHS))], np.float32)
+        colours = np.broadcast_to(cloth, bust.vertices.shape).copy()
+        torso = Solid(bust.vertices, bust.faces, bust.normals, colours, scatter=0.0)
+        key = np.radians([generator.uniform(-50, 50), 42.0])
+        rim = np.radians([generator.uniform(110, 250), 48.0])
+        lights = Lights.studio(_direction(*key), _direction(*rim))
+        return cls(groom, torso, replace(lights, sky_colour=(1.1, 1.12, 1.18)))
+
+    def photo(self, camera: Camera, generator: np.random.Generator) -> UInt8Array:
+        """Return the photo (H, W, 3) RGB: room, person, sensor noise."""
+        room = _cluttered_room(camera, generator)
+        picture = draw_views(
+            self.groom, None, [camera], lights=self.lights, backgrounds=[room], solids=[self.torso]
+        )[0]
+        soft = cv2.GaussianBlur(picture, (0, 0), 0.45).astype(np.float32)
+        noisy = soft + SENSOR_NOISE * generator.standard_normal(soft.shape, dtype=np.float32)
+        return np.asarray(np.clip(np.rint(noisy), 0, 255), np.uint8)
+
+    def labels(self, camera: Camera) -> UInt8Array:
+        """Return the true labels (H, W): what covers at least half of a pixel."""
+        strands, material = self.groom.strands, self.groom.material
+        hair, solid = draw_layers(
+            strands, self._solids(), camera, width=drawn_width(strands, material)
+        )
+        labels = np.where(hair + solid >= 0.5, PERSON, BACKGROUND)
+        return np.where(hair >= 0.5, HAIR, labels).astype(np.uint8)
+
+    def measured(self, camera: Camera) -> Measured:
+        """Return direction and depth of the hair at every pixel, drawn as in the photo."""
+        width = drawn_width(self.groom.strands, self.groom.material)
+        return draw_measured(self.groom.strands, self._solids(), camera, width=width)
+
+    def _solids(self) -> list[Head | Solid]:
+        return [self.groom.head, self.torso]
+
+
+def _cameras(
+    size: tuple[int, int], jitter: float, orthographic: bool, generator: np.random.Generator
+) -> list[Camera]:
+    width, height = size
+    focal = FOCAL_PER_HEIGHT * height
+    cameras = []
+    for azimuth in TURN.values():
+        turn = jitter * generator.uniform(-1, 1, 4)
+        aim = np.array(TARGET) + jitter * TARGET_JITTER * generator.standard_normal(3)
+        cameras.append(
+            Camera.on_turn(
+                azimuth + AZIMUTH_JITTER * turn[0],
+                elevation_deg=ELEVATION_JITTER * turn[1],
+                roll_deg=ROLL_JITTER * turn[2],
+                distance=DISTANCE * (1 + DISTANCE_JITTER * turn[3]),
+                target=aim,
+                focal=focal / DISTANCE if orthographic else focal,
+                width=width,
+                height=height,
+                model="orthographic" if orthographic else "perspective",
+            )
+        )
+    return cameras
+
+
+def _direction(azimuth: float, elevation: float) -> Float64Array:
+    flat = np.cos(elevation)
+    return np.array([np.sin(azimuth) * flat, np.sin(elevation), np.cos(azimuth) * flat])
+
+
+def _cluttered_room(camera: Camera, generator: np.random.Generator) -> UInt8Array:
+    """Return an out-of-focus background (H, W, 3): a wall, furniture, now and then a window."""
+    size = np.array([camera.width, camera.height])
+    wall = generator.uniform(140, 190) + generator.uniform(-12, 12, 3)
+    room = np.broadcast_to(wall, (camera.height, camera.width, 3)).astype(np.float32).copy()
+    for _ in range(generator.integers(5, 10)):
+        corner = generator.uniform(-0.2, 0.9, 2) * size
+        other = corner + generator.uniform(0.1, 0.6, 2) * size
+        colour = generator.uniform(70, 200) + generator.uniform(-40, 40, 3)
+        if generator.random() < 0.15:
+            colour = np.array([228.0, 234.0, 242.0])
+        first, second = np.rint(corner).astype(int).tolist(), np.rint(other).astype(int).tolist()
+        cv2.rectangle(room, first, second, colour.tolist(), cv2.FILLED)
+    blurred = cv2.GaussianBlur(room, (0, 0), camera.width * 0.028)
+    return np.clip(blurred, 0, 255).astype(np.uint8)
+
+
+def _write_landmarks(
+    base: Path,
+    head: Head,
+    stems: list[str],
+    cameras: list[Camera],
+    generator: np.random.Generator,
+) -> None:
+    """Write what a detector would find: 68 points in the views that show the face."""
+    if head.landmark_vertices is None:
+        return
+    points = head.vertices[head.landmark_vertices]
+    views = {}
+    for index in LANDMARK_VIEWS:
+        noise = LANDMARK_NOISE * cameras[index].width * generator.standard_normal((68, 2))
+        views[stems[index]] = np.round(cameras[index].project(points) + noise, 2).tolist()
+    document = {"scheme": "68 points, iBUG/Multi-PIE order", "views": views}
+    write_text(base / "landmarks.json", json.dumps(document) + "\n")
+
+
+def _angle_codes(measured: Measured) -> UInt8Array:
+    """Return the true strand angles (H, W): 1 to 255 for [0, pi), 0 where no hair is."""
+    coded = 1 + np.mod(np.rint(measured.angle / np.pi * 255), 255)
+    return np.where(measured.seen, coded, 0).astype(np.uint8)
+
+
+def _write_truth(folder: Path, groom: Groom, cameras: list[Camera], seen: UInt8Array) -> None:
+    views: list[dict[str, Any]] = []
+    for (name, nominal), camera in zip(TURN.items(), cameras, strict=True):
+        views.append({**camera.to_json(name), "nominal_azimuth": nominal})
+    document = {
+        "units": "metres",
+        "frame": "head: +X subject's left, +Y up, +Z out of the face",
+        "image_coordinates": "x right, y down, (0,0) = outer corner of the first pixel",
+        "camera_model": "Xc = R X + t; u = fx x/z + cx, or u = scale_px_per_m x + cx",
+        "orientation_map": "1..255 = strand angle in [0, pi) from +x towards +y, 0 = no hair",
+        "renderer": "hairkit synth",
+        "strands": len(groom.strands),
+        "mean_length_m": float(groom.strands.lengths().mean()),
+        "views": views,
+    }
+    write_text(folder / "truth.json", json.dumps(document, indent=1) + "\n")
+    radius = groom.material.width / 2
+    arrays: dict[str, npt.NDArray[Any]] = {
+        "points": groom.strands.points,
+        "offsets": groom.strands.offsets,
+        "visible": seen,
+        "radius": np.array([radius, radius], np.float32),
+    }
+    write_npz(folder / "strands.npz", arrays)
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in groom.head.vertices.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (groom.head.faces + 1).tolist()]
+    head = "\n".join(["# metres, +Y up, +Z out of the face", *lines, ""])
+    write_text(folder / "head.obj", head)
+
+
+def _jpeg(picture: UInt8Array) -> bytes:
+    return _encoded(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 94])
+
+
+def _png(picture: UInt8Array) -> bytes:
+    return _encoded(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 4])
+
+
+def _encoded(kind: str, picture: UInt8Array, settings: list[int]) -> bytes:
+    done, data = cv2.imencode(kind, picture, settings)
+    if not done:
+        raise InputError(f"a {kind} picture of {picture.shape} cannot be encoded")
+    return bytes(data.tobytes())

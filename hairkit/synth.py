@@ -1,0 +1,279 @@
+"""Procedural grooms: strands grown from the scalp under combing, gravity and bodies in the way.
+
+Meant for tests and for users without photos; `hairkit.photograph` takes pictures of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from hairkit.bust import Bust, Obstacle
+from hairkit.errors import InputError
+from hairkit.groom import Groom, HairMaterial
+from hairkit.head import Head, Roots
+from hairkit.scalp import sample_roots
+from hairkit.stored import Float32Array, Int64Array
+from hairkit.strands import Strands
+
+StyleName = Literal["straight", "wavy", "curly", "short", "parted"]
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a head of hair grows; metres unless stated."""
+
+    length: float
+    points: int
+    """Points a strand."""
+    parting: float | None
+    """Place of the parting, +x the subject's left; None combs away from the crown."""
+    lift: float
+    """Weight of the scalp's normal in the first direction; the rest is combing."""
+    bend: float
+    """Length over which gravity turns a strand down; infinity for hair that stands."""
+    layer: float
+    """Thickness of the hair over the head."""
+    cut: float | None
+    """Height below which hair is cut off."""
+    wave_radius: float
+    wave_pitch: float
+    coil: float
+    """0 waves in a plane, 1 round coils."""
+    clumps: int
+    clumping: float
+    """How far strands gather in their clump at the tip, 0 to 1."""
+    frizz: float
+    colour: tuple[float, float, float]
+    """Linear RGB."""
+    length_spread: float = 0.08
+    """Standard deviation of strand lengths, share of the length."""
+
+
+STYLES: dict[StyleName, Style] = {
+    "straight": Style(
+        length=0.38, points=72, parting=0.0, lift=0.3, bend=0.028, layer=0.014, cut=-0.30,
+        wave_radius=0.0, wave_pitch=0.0, coil=0.0, clumps=500, clumping=0.35, frizz=0.0012,
+        colour=(0.060, 0.036, 0.022),
+    ),
+    "wavy": Style(
+        length=0.36, points=96, parting=0.015, lift=0.35, bend=0.03, layer=0.018, cut=-0.27,
+        wave_radius=0.0065, wave_pitch=0.070, coil=0.4, clumps=180, clumping=0.6, frizz=0.002,
+        colour=(0.115, 0.062, 0.030),
+    ),
+    "curly": Style(
+        length=0.21, points=128, parting=-0.02, lift=0.5, bend=0.022, layer=0.026, cut=-0.20,
+        wave_radius=0.0075, wave_pitch=0.034, coil=1.0, clumps=420, clumping=0.75, frizz=0.003,
+        colour=(0.030, 0.019, 0.013),
+    ),
+    "short": Style(
+        length=0.035, points=24, parting=None, lift=0.55, bend=0.12, layer=0.004, cut=None,
+        wave_radius=0.0, wave_pitch=0.0, coil=0.0, clumps=900, clumping=0.3, frizz=0.0008,
+        colour=(0.100, 0.058, 0.032), length_spread=0.15,
+    ),
+    "parted": Style(
+        length=0.20, points=56, parting=0.03, lift=0.35, bend=0.03, layer=0.013, cut=-0.135,
+        wave_radius=0.0, wave_pitch=0.0, coil=0.0, clumps=420, clumping=0.35, frizz=0.001,
+        colour=(0.300, 0.190, 0.095),
+    ),
+}  # fmt: skip
+
+CROWN_BACK = 0.035
+"""The crown lies this far behind the head's origin."""
+COMB_REACH = 0.05
+"""Arc length over which combing fades."""
+ROOT_REACH = 0.03
+"""Arc length over which a strand reaches its layer, its wave and its clump."""
+SKIN_GAP = 0.001
+"""Hair keeps this far off the skin."""
+MOST_STRANDS = 200_000
+
+_DOWN = np.array([0, -1, 0], np.float32)
+_LEVEL = np.array([1, 0, 1], np.float32)
+
+
+def grow(style: StyleName, head: Head, strands: int = 10_000, seed: int = 0) -> Groom:
+    """Return a groom of a style, `strands` hairs on a head; equal seeds give equal hair.
+
+    Raises
+    ------
+    InputError
+        The style is none of `STYLES`, or the number of strands is out of bounds.
+    """
+    if style not in STYLES:
+        raise InputError(f"no style {style!r}; styles: {', '.join(get_args(StyleName))}")
+    if not 1 <= strands <= MOST_STRANDS:
+        raise InputError(f"{strands} strands asked for, expected 1 to {MOST_STRANDS}")
+    look = STYLES[style]
+    generator = np.random.default_rng(seed)
+    roots = sample_roots(head, strands, seed)
+    obstacle = Obstacle.of(head, Bust.under(head))
+    start = _start_directions(look, head, roots, generator)
+    paths = _grow_paths(look, roots, start, obstacle, generator)
+    paths = _cut(look, paths, generator)
+    clump = _clumps(look, roots, start, generator)
+    paths = _gathered(look, paths, clump, generator)
+    paths = _waved(look, paths, clump, generator) + _frizz(look, strands, generator)
+    paths = _kept_off(paths, obstacle)
+    paths[:, 0] = roots.positions
+    return Groom(
+        Strands(paths.reshape(-1, 3), np.arange(strands + 1) * look.points, root_uv=roots.uv),
+        head,
+        roots.triangle,
+        roots.barycentric,
+        _material(look),
+    )
+
+
+def _start_directions(
+    look: Style, head: Head, roots: Roots, generator: np.random.Generator
+) -> Float32Array:
+    """Return (N, 3) first directions: the normal, and combing along the skin."""
+    top = float(head.vertices[:, 1].max())
+    crown = np.array([0.0, top, -CROWN_BACK], np.float32)
+    away = roots.positions - crown
+    if look.parting is not None:
+        from_parting = roots.positions[:, 0] - look.parting
+        side = np.where(from_parting >= 0, 1.0, -1.0)
+        behind = np.clip(
+            -roots.positions[:, 2] / 0.08, 0, 1
+        )  # at the back hair falls from the crown
+        parted = np.stack([side, np.full_like(side, -0.25), np.full_like(side, -0.45)], axis=1)
+        away = (1 - behind[:, None]) * parted + behind[:, None] * _unit(away)
+    along = away - (away * roots.normals).sum(axis=1, keepdims=True) * roots.normals
+    jitter = 0.12 * generator.standard_normal((len(roots), 3))
+    return _unit(look.lift * roots.normals + _unit(along) + jitter)
+
+
+def _grow_paths(
+    look: Style,
+    roots: Roots,
+    start: Float32Array,
+    obstacle: Obstacle,
+    generator: np.random.Generator,
+) -> Float32Array:
+    """Return (N, m, 3) smooth strands: each step turns towards gravity and slides over bodies."""
+    count, m = len(roots), look.points
+    spread = generator.standard_normal((count, 1)) * look.length_spread
+    length = (look.length * np.clip(1 + spread, 0.5, 1.5)).astype(np.float32)
+    step = length / (m - 1)
+    # hair from higher roots lies over hair from lower ones
+    height = roots.positions[:, 1:2]
+    rank = (height - height.min()) / max(float(np.ptp(height)), 1e-6)
+    layer = look.layer * (0.1 + 0.6 * rank + 0.3 * generator.random((count, 1)))
+    paths = np.empty((count, m, 3), np.float32)
+    paths[:, 0] = roots.positions
+    direction = start
+    for i in range(1, m):
+        arc = step * i
+        pull = _DOWN + 0.6 * np.exp(-arc / COMB_REACH) * start
+        direction = _unit(direction + step / look.bend * pull)
+        ahead = paths[:, i - 1] + step * direction
+        distance, outward = obstacle.at(ahead.astype(np.float32))
+        wanted = np.maximum(layer * np.minimum(arc / ROOT_REACH, 1), SKIN_GAP)
+        ahead = ahead + np.clip(wanted - distance, 0, step) * outward
+        direction = _unit(ahead - paths[:, i - 1])
+        paths[:, i] = paths[:, i - 1] + step * direction
+    return paths
+
+
+def _cut(look: Style, paths: Float32Array, generator: np.random.Generator) -> Float32Array:
+    """Return the strands cut off where they first come below the line, points spread again."""
+    if look.cut is None:
+        return paths
+    count, m, _ = paths.shape
+    line = look.cut + 0.008 * generator.standard_normal((count, 1))
+    below = paths[..., 1] < line
+    last = np.where(below.any(axis=1), np.maximum(below.argmax(axis=1), 2), m - 1)
+    place = np.linspace(0, 1, m)[None, :] * last[:, None]
+    low = np.minimum(place.astype(np.int64), m - 2)
+    t = (place - low)[..., None].astype(np.float32)
+    rows = np.arange(count)[:, None]
+    cut: Float32Array = paths[rows, low] * (1 - t) + paths[rows, low + 1] * t
+    return cut
+
+
+def _clumps(
+    look: Style, roots: Roots, start: Float32Array, generator: np.random.Generator
+) -> Int64Array:
+    """Return (N,) the strand that leads each strand's clump: near, and combed to the same side."""
+    place = roots.positions + 0.03 * start
+    leaders = generator.permutation(len(roots))[: min(look.clumps, len(roots))]
+    nearest: Int64Array = leaders[cKDTree(place[leaders]).query(place)[1]]
+    return nearest
+
+
+def _gathered(
+    look: Style, paths: Float32Array, clump: Int64Array, generator: np.random.Generator
+) -> Float32Array:
+    t = np.linspace(0, 1, look.points, dtype=np.float32)[None, :, None]
+    strength = look.clumping * generator.random((len(paths), 1, 1), dtype=np.float32) ** 0.5
+    return paths + strength * t * (paths[clump] - paths)
+
+
+def _waved(
+    look: Style, paths: Float32Array, clump: Int64Array, generator: np.random.Generator
+) -> Float32Array:
+    """Return strands wound about their paths; a clump waves together."""
+    if look.wave_radius == 0:
+        return paths
+    count = len(paths)
+    first, second = _frames(paths)
+    step = np.linalg.norm(np.diff(paths, axis=1), axis=2)
+    arc = np.concatenate([np.zeros((count, 1)), np.cumsum(step, axis=1)], axis=1)
+    # neighbouring clumps wave nearly together, as hair does that lies in layers
+    phase = paths[clump, 0] @ np.array([30.0, 20.0, 40.0])
+    phase += 0.9 * generator.standard_normal(count)[clump] + 0.35 * generator.standard_normal(count)
+    pitch = look.wave_pitch * (1 + 0.12 * generator.standard_normal(count)[clump])
+    radius = look.wave_radius * (1 + 0.2 * generator.standard_normal(count)[clump])
+    turn = phase[:, None] + 2 * np.pi * arc / pitch[:, None]
+    swell = radius[:, None] * np.minimum(arc / (2 * ROOT_REACH), 1)
+    wave = np.cos(turn)[..., None] * first + look.coil * np.sin(turn)[..., None] * second
+    return np.asarray(paths + swell[..., None] * wave, np.float32)
+
+
+def _frames(paths: Float32Array) -> tuple[Float32Array, Float32Array]:
+    """Return two (N, m, 3) unit vectors across each path, the first level and along the head."""
+    tangent = _unit(np.gradient(paths, axis=1))
+    outward = paths.mean(axis=1, keepdims=True) * _LEVEL
+    sideways = np.cross(np.broadcast_to(-_DOWN, outward.shape), outward)
+    across = sideways - (sideways * tangent).sum(axis=2, keepdims=True) * tangent
+    first = _unit(across)
+    return first, np.cross(tangent, first).astype(np.float32)
+
+
+def _frizz(look: Style, count: int, generator: np.random.Generator) -> Float32Array:
+    """Return (N, m, 3) small random offsets, a few strands flying away further."""
+    t = np.linspace(0, 1, look.points)[None, :, None]
+    amount = look.frizz * np.where(generator.random((count, 1, 1)) < 0.02, 5.0, 1.0)
+    total = np.zeros((count, look.points, 3))
+    for turns in (1.5, 4.0, 9.0):
+        axis = generator.standard_normal((count, 1, 3))
+        phase = 2 * np.pi * generator.random((count, 1, 1))
+        total += axis * np.sin(phase + 2 * np.pi * turns * t) / turns
+    return np.asarray(amount * np.sqrt(t) * total, np.float32)
+
+
+def _kept_off(paths: Float32Array, obstacle: Obstacle) -> Float32Array:
+    """Return the strands with every point pushed out of head and torso."""
+    points = paths.reshape(-1, 3)
+    for _ in range(2):
+        distance, outward = obstacle.at(points)
+        points = points + np.maximum(SKIN_GAP - distance, 0) * outward
+    return points.reshape(paths.shape)
+
+
+def _material(look: Style) -> HairMaterial:
+    root = np.array(look.colour)
+    return HairMaterial(
+        root, np.minimum(root * 1.25, 1), curl_radius=look.wave_radius, curl_pitch=look.wave_pitch
+    )
+
+
+def _unit(vectors: npt.NDArray[np.floating]) -> Float32Array:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.maximum(length, 1e-9), np.float32)
