@@ -67,7 +67,7 @@ class CameraError:
     rotation_deg: float
     """Angle of the rotation between the two cameras."""
     position_m: float
-    """Distance of the camera centres; for orthographic cameras across the viewing axis only."""
+    """Distance of the camera centres; where one is orthographic, of the two axes at the hair."""
     reprojection_px: float
     """Root mean square distance between the pictures of the fitted points."""
 
@@ -117,13 +117,14 @@ def camera_errors(
     """Return the error of each view's camera after alignment; `points` as given to `align`."""
     errors = []
     moved = similarity.apply(points)
+    middle = moved.mean(axis=0, dtype=np.float64)
     for name, mine, other in zip(names, predicted, true, strict=True):
         aligned = similarity.apply_to_camera(_like(mine, other))
         turn = (aligned.azimuth_deg - other.azimuth_deg + 180.0) % 360.0 - 180.0
         rotation = Rotation.from_matrix(aligned.rotation @ other.rotation.T).magnitude()
         offset = aligned.position - other.position
         if "orthographic" in (aligned.model, other.model):
-            offset = offset - other.forward * (offset @ other.forward)
+            offset = _on_axis(aligned, middle) - _on_axis(other, middle)
         gap = aligned.project(moved) - other.project(moved)
         error = CameraError(
             name=name,
@@ -135,6 +136,12 @@ def camera_errors(
         )
         errors.append(error)
     return tuple(errors)
+
+
+def _on_axis(camera: Camera, point: Float64Array) -> Float64Array:
+    """Return the point (3,) of the optical axis beside `point`."""
+    beside: Float64Array = camera.position + camera.forward * camera.depth(point)
+    return beside
 
 
 def _like(camera: Camera, other: Camera) -> Camera:

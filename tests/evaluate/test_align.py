@@ -76,6 +76,20 @@ def test_one_turned_camera_is_named_with_its_error() -> None:
     assert found.residual_px > 0
 
 
+def test_how_far_off_an_orthographic_camera_stands_does_not_matter() -> None:
+    """Its centre may lie anywhere on its axis: only the axes are compared, at the hair."""
+    true = turn_scene().cameras
+    for away in (1.0, 100.0):
+        flat = [
+            Camera.on_turn(
+                45.0 * i + 1, distance=away, focal=333.0, width=96, height=128, model="orthographic"
+            )
+            for i in range(8)
+        ]
+        errors = camera_errors(VIEW_NAMES, flat, true, NOTHING, POINTS)
+        assert max(error.position_m for error in errors) < 0.01
+
+
 def test_the_size_of_working_pictures_does_not_matter() -> None:
     """Cameras of pictures at half size align as those of whole ones."""
     true = turn_scene().cameras
