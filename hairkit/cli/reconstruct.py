@@ -34,6 +34,8 @@ def register(subparsers: Any) -> None:
     add("--set", action="append", default=[], metavar="X=V", help="plugin.option=V or stage=PLUGIN")
     add("--head", metavar="FILE", help="your head: OBJ, PLY or GLB with a scalp")
     add("--head-units", default="m", metavar="U", help="units of the head file (default m)")
+    add("--head-scalp", metavar="NAME", help="the scalp: a group of it, or a mask picture")
+    add("--head-up", default="y", metavar="AXIS", help="axis that points up in it (default y)")
     add("--guides", type=int, default=600, metavar="N", help="number of guide hairs (default 600)")
     add("--seed", type=int, default=0, metavar="N", help="seed of the roots' places (default 0)")
     add("--max-edge", type=int, default=0, metavar="PX", help="scale larger photos to this edge")
@@ -104,7 +106,7 @@ def _head(args: argparse.Namespace) -> Any:
         return None
     from hairkit.head_files import read_head
 
-    return read_head(args.head, units=args.head_units)
+    return read_head(args.head, units=args.head_units, scalp=args.head_scalp, up=args.head_up)
 
 
 def _told(summary: dict[str, Any]) -> str:
