@@ -91,9 +91,10 @@ def photograph(
     shoot = _Shoot.prepared(groom, generator)
     cameras = _cameras(size, jitter, orthographic, generator)
     stems = [f"{index}_{name}" for index, name in enumerate(TURN)]
+    photos = shoot.photos(cameras, generator)
     seen = np.zeros(len(groom.strands.points), np.uint8)
     for index, (stem, camera) in enumerate(zip(stems, cameras, strict=True)):
-        write_bytes(base / "photos" / f"{stem}.jpg", _jpeg(shoot.photo(camera, generator)))
+        write_bytes(base / "photos" / f"{stem}.jpg", _jpeg(photos[index]))
         write_bytes(base / "masks" / f"{stem}.png", _png(shoot.labels(camera)))
         measured = shoot.measured(camera)
         write_bytes(base / "truth" / "orientation" / f"{stem}.png", _png(_angle_codes(measured)))
@@ -122,15 +123,13 @@ class _Shoot:
         lights = Lights.studio(_direction(*key), _direction(*rim))
         return cls(groom, torso, replace(lights, sky_colour=(1.1, 1.12, 1.18)))
 
-    def photo(self, camera: Camera, generator: np.random.Generator) -> UInt8Array:
-        """Return the photo (H, W, 3) RGB: room, person, sensor noise."""
-        room = _cluttered_room(camera, generator)
-        picture = draw_views(
-            self.groom, None, [camera], lights=self.lights, backgrounds=[room], solids=[self.torso]
-        )[0]
-        soft = cv2.GaussianBlur(picture, (0, 0), 0.45).astype(np.float32)
-        noisy = soft + SENSOR_NOISE * generator.standard_normal(soft.shape, dtype=np.float32)
-        return np.asarray(np.clip(np.rint(noisy), 0, 255), np.uint8)
+    def photos(self, cameras: list[Camera], generator: np.random.Generator) -> list[UInt8Array]:
+        """Return the photos (H, W, 3) RGB: room, person, sensor noise."""
+        rooms = [_cluttered_room(camera, generator) for camera in cameras]
+        pictures = draw_views(
+            self.groom, None, cameras, lights=self.lights, backgrounds=rooms, solids=[self.torso]
+        )
+        return [_as_sensed(picture, generator) for picture in pictures]
 
     def labels(self, camera: Camera) -> UInt8Array:
         """Return the true labels (H, W): what covers at least half of a pixel."""
@@ -178,6 +177,13 @@ def _cameras(
 def _direction(azimuth: float, elevation: float) -> Float64Array:
     flat = np.cos(elevation)
     return np.array([np.sin(azimuth) * flat, np.sin(elevation), np.cos(azimuth) * flat])
+
+
+def _as_sensed(picture: UInt8Array, generator: np.random.Generator) -> UInt8Array:
+    """Return a picture (H, W, 3) with a lens' blur and a sensor's noise."""
+    soft = cv2.GaussianBlur(picture, (0, 0), 0.45).astype(np.float32)
+    noisy = soft + SENSOR_NOISE * generator.standard_normal(soft.shape, dtype=np.float32)
+    return np.asarray(np.clip(np.rint(noisy), 0, 255), np.uint8)
 
 
 def _cluttered_room(camera: Camera, generator: np.random.Generator) -> UInt8Array:

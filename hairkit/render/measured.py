@@ -14,7 +14,7 @@ from hairkit.render.hair import draw_ribbons, ribbons
 from hairkit.render.head import Mesh, draw_solid
 from hairkit.render.projection import DepthRange
 from hairkit.render.target import SUPERSAMPLE, averaged, supersampled, target
-from hairkit.stored import BoolArray, Float32Array, UInt8Array
+from hairkit.stored import BoolArray, Float32Array
 from hairkit.strands import Strands
 
 Solids = Mesh | Sequence[Mesh] | None
@@ -51,8 +51,8 @@ def draw_layers(
         program = gl.program("hair_flat", "flat")
         with ribbons(gl, strands, width) as buffers:
             draw_ribbons(gl, buffers, program, fine, depth, min_width_px=least, u_colour=_HAIR)
-        samples: UInt8Array = np.asarray(picture.read(), np.uint8)[..., :2]
-    shares = averaged(samples, camera).astype(np.float32) / np.float32(255)
+        samples = np.asarray(picture.read()[..., :2], np.float32)
+    shares = averaged(samples, camera) / np.float32(255)
     return shares[..., 0], shares[..., 1]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from typing import Literal
+from typing import Literal, TypeVar
 
 import cv2
 import moderngl
@@ -15,6 +15,8 @@ from hairkit.camera import Camera
 from hairkit.errors import RenderError
 from hairkit.render.context import Renderer
 from hairkit.stored import Float32Array
+
+Sample = TypeVar("Sample", np.uint8, np.float32)
 
 SUPERSAMPLE = 2
 """Samples along each edge of a pixel: measured faster and better here than multisampling."""
@@ -65,9 +67,9 @@ def supersampled(camera: Camera, factor: int) -> Camera:
     return camera.resized(camera.width * factor, camera.height * factor)
 
 
-def averaged(samples: npt.NDArray[np.uint8], camera: Camera) -> npt.NDArray[np.uint8]:
-    """Return samples (k H, k W, C) averaged over each pixel of `camera`, (H, W, C)."""
+def averaged(samples: npt.NDArray[Sample], camera: Camera) -> npt.NDArray[Sample]:
+    """Return samples (k H, k W, C), uint8 or float32, averaged over each pixel, (H, W, C)."""
     if samples.shape[:2] == (camera.height, camera.width):
         return samples
     size = (camera.width, camera.height)
-    return np.asarray(cv2.resize(samples, size, interpolation=cv2.INTER_AREA), np.uint8)
+    return np.asarray(cv2.resize(samples, size, interpolation=cv2.INTER_AREA), samples.dtype)
