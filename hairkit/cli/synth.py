@@ -10,8 +10,7 @@ from typing import Any
 from hairkit.cli.render import parse_size
 from hairkit.default_head import default_head
 from hairkit.errors import InputError
-from hairkit.photograph import photograph
-from hairkit.synth import STYLES, grow
+from hairkit.synth import STYLES, grow, photograph
 
 _DESCRIPTION = """\
 Example: hairkit synth wavy -o wavy/

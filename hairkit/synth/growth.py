@@ -1,6 +1,6 @@
 """Procedural grooms: strands grown from the scalp under combing, gravity and bodies in the way.
 
-Meant for tests and for users without photos; `hairkit.photograph` takes pictures of them.
+Meant for tests and for users without photos; `hairkit.synth.photograph` takes pictures of them.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from hairkit.bust import Bust, Obstacle
 from hairkit.errors import InputError
 from hairkit.groom import Groom, HairMaterial
 from hairkit.head import Head, Roots
 from hairkit.scalp import sample_roots
 from hairkit.stored import Float32Array, Int64Array
 from hairkit.strands import Strands
+from hairkit.synth.bust import Bust, Obstacle
 
 StyleName = Literal["straight", "wavy", "curly", "short", "parted"]
 

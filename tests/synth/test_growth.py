@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairkit.bust import Bust, Obstacle
 from hairkit.default_head import default_head
 from hairkit.errors import InputError
 from hairkit.scalp import evaluate
 from hairkit.synth import STYLES, StyleName, grow
+from hairkit.synth.bust import Bust, Obstacle
 
 
 @pytest.mark.parametrize("style", list(STYLES))

@@ -15,7 +15,6 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.bust import Bust
 from hairkit.camera import Camera
 from hairkit.capture_reader import TURN
 from hairkit.errors import InputError
@@ -33,6 +32,7 @@ from hairkit.render import (
     points_at_depth,
 )
 from hairkit.stored import Float64Array, UInt8Array, write_bytes, write_npz, write_text
+from hairkit.synth.bust import Bust
 
 DISTANCE = 0.756
 """From the camera to the head, metres."""

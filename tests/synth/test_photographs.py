@@ -15,8 +15,7 @@ from hairkit.errors import InputError
 from hairkit.evaluate.truth import read_truth
 from hairkit.groom import Groom
 from hairkit.orientation import angle_between
-from hairkit.photograph import photograph
-from hairkit.synth import grow
+from hairkit.synth import grow, photograph
 
 SIZE = (90, 120)
 
