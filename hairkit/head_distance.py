@@ -182,61 +182,74 @@ def _sweep(
 ) -> None:  # pragma: no cover - compiled
     """Lower envelope of the parabolas (x - foot)^2 + rest^2 of each line (B, C, A), in place."""
     length = lines.shape[2]
-    apex, rest = np.empty(length), np.empty(length)
-    name, kept = np.empty(length, np.int32), np.empty(length, np.int64)
-    begins = np.empty(length)
+    apex, rest, begins = np.empty(length), np.empty(length), np.empty(length)
+    name = np.empty(length, np.int32)
     for i in range(lines.shape[0]):
         at_b = centre0[1] + i * spacing
         for j in range(lines.shape[1]):
-            at_c = centre0[2] + j * spacing
             line = lines[i, j]
-            count = 0
-            for k in range(length):
-                which = line[k]
-                if which < 0 or (count and name[count - 1] == which):
-                    continue
-                x = feet[which, 0]
-                height = (feet[which, 1] - at_b) ** 2 + (feet[which, 2] - at_c) ** 2
-                slot = count
-                while slot > 0 and apex[slot - 1] > x:
-                    apex[slot], rest[slot], name[slot] = (
-                        apex[slot - 1],
-                        rest[slot - 1],
-                        name[slot - 1],
-                    )
-                    slot -= 1
-                apex[slot], rest[slot], name[slot] = x, height, which
-                count += 1
+            at_c = centre0[2] + j * spacing
+            count = _parabolas(line, feet, at_b, at_c, apex, rest, name)
             if count == 0:
                 continue
-            top = 0
-            for m in range(count):
-                begin = -_FAR
-                replaced = False
-                while top > 0:
-                    p = kept[top - 1]
-                    gap = apex[m] - apex[p]
-                    if gap <= 1e-12:
-                        if rest[m] >= rest[p]:
-                            replaced = True
-                            break
-                        top -= 1
-                        continue
-                    begin = 0.5 * (apex[m] + apex[p] + (rest[m] - rest[p]) / gap)
-                    if begin > begins[top - 1]:
-                        break
-                    top -= 1
-                if replaced:
-                    continue
-                kept[top] = m
-                begins[top] = begin if top > 0 else -_FAR
-                top += 1
+            count = _envelope(count, apex, rest, name, begins)
             current = 0
             for k in range(length):
                 x = centre0[0] + k * spacing
-                while current + 1 < top and begins[current + 1] <= x:
+                while current + 1 < count and begins[current + 1] <= x:
                     current += 1
-                line[k] = name[kept[current]]
+                line[k] = name[current]
+
+
+@njit(cache=True)
+def _parabolas(
+    line: Int32Array,
+    feet: Float64Array,
+    at_b: float,
+    at_c: float,
+    apex: Float64Array,
+    rest: Float64Array,
+    name: Int32Array,
+) -> int:  # pragma: no cover - compiled
+    """Sort a line's feet by where they lie along it; they nearly are, so by insertion."""
+    count = 0
+    for which in line:
+        if which < 0 or (count and name[count - 1] == which):
+            continue
+        x = feet[which, 0]
+        slot = count
+        while slot > 0 and apex[slot - 1] > x:
+            apex[slot], rest[slot], name[slot] = apex[slot - 1], rest[slot - 1], name[slot - 1]
+            slot -= 1
+        apex[slot], name[slot] = x, which
+        rest[slot] = (feet[which, 1] - at_b) ** 2 + (feet[which, 2] - at_c) ** 2
+        count += 1
+    return count
+
+
+@njit(cache=True)
+def _envelope(
+    count: int, apex: Float64Array, rest: Float64Array, name: Int32Array, begins: Float64Array
+) -> int:  # pragma: no cover - compiled
+    """Keep, in place, the parabolas that are lowest somewhere, and from where on each one is."""
+    top = 0
+    for m in range(count):
+        begin = -_FAR
+        while top > 0:
+            gap = apex[m] - apex[top - 1]
+            if gap <= 1e-12:
+                # Feet at one place along the line: the nearer to it hides the other.
+                begin = _FAR if rest[m] >= rest[top - 1] else -_FAR
+            else:
+                begin = 0.5 * (apex[m] + apex[top - 1] + (rest[m] - rest[top - 1]) / gap)
+            if begin > begins[top - 1]:
+                break
+            top -= 1
+            begin = -_FAR
+        if begin < _FAR:
+            apex[top], rest[top], name[top], begins[top] = apex[m], rest[m], name[m], begin
+            top += 1
+    return top
 
 
 @njit(cache=True)

@@ -60,13 +60,7 @@ def read_head(
         The file is damaged or of another format.
     """
     file = Path(path)
-    if units not in UNITS:
-        raise InputError(f"head units are {units!r}, expected one of {', '.join(UNITS)}")
-    if up not in ("y", "z"):
-        raise InputError(f"the head's up axis is {up!r}, expected y or z")
-    if file.suffix.lower() not in _READERS:
-        raise FormatError(f"{file}: a head must be an .obj, .ply or .glb file")
-    mesh = _READERS[file.suffix.lower()](file)
+    mesh = _file_mesh(file, units, up)
     weight = _scalp_weight(mesh, file, scalp)
     vertices = _in_metres(mesh.vertices, units, up)
     faces = _wound_outward(vertices, mesh.faces.astype(np.int32))
@@ -105,6 +99,16 @@ def write_head_obj(path: str | os.PathLike[str], head: Head) -> None:
         write_text(
             _beside(Path(path), "landmarks.json"), json.dumps(head.landmark_vertices.tolist())
         )
+
+
+def _file_mesh(file: Path, units: str, up: str) -> FileMesh:
+    if units not in UNITS:
+        raise InputError(f"head units are {units!r}, expected one of {', '.join(UNITS)}")
+    if up not in ("y", "z"):
+        raise InputError(f"the head's up axis is {up!r}, expected y or z")
+    if file.suffix.lower() not in _READERS:
+        raise FormatError(f"{file}: a head must be an .obj, .ply or .glb file")
+    return _READERS[file.suffix.lower()](file)
 
 
 def _beside(file: Path, ending: str) -> Path:

@@ -171,7 +171,7 @@ def _spread(points: Float64Array, count: int) -> Int64Array:
 def scattered(points: Float64Array, radius: float) -> Int64Array:  # pragma: no cover - compiled
     """Return which points (M, 3) have none of the earlier returned ones within `radius`: indices.
 
-    Taken points hang in chains, one for each cubic cell of that edge.
+    Taken points hang in chains, one for each cubic cell of about that edge.
     """
     low, shape = np.empty(3), np.empty(3, np.int64)
     edge = radius
@@ -180,35 +180,41 @@ def scattered(points: Float64Array, radius: float) -> Int64Array:  # pragma: no 
         edge = max(edge, (points[:, k].max() - low[k]) / 200)
     for k in range(3):
         shape[k] = int((points[:, k].max() - low[k]) / edge) + 3
-    heads = np.full(shape[0] * shape[1] * shape[2], -1, np.int64)
+    heads = np.full((shape[0], shape[1], shape[2]), -1, np.int64)
     following = np.full(len(points), -1, np.int64)
     taken = np.empty(len(points), np.int64)
     count = 0
     for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        a, b, c = int((x - low[0]) / edge), int((y - low[1]) / edge), int((z - low[2]) / edge)
-        free = True
-        for u in range(a, a + 3):
-            for v in range(b, b + 3):
-                row = (u * shape[1] + v) * shape[2]
-                for w in range(row + c, row + c + 3):
-                    other = heads[w]
-                    while other >= 0 and free:
-                        gap = (points[other, 0] - x) ** 2 + (points[other, 1] - y) ** 2
-                        free = gap + (points[other, 2] - z) ** 2 >= radius * radius
-                        other = following[other]
-                    if not free:
-                        break
-                if not free:
-                    break
-            if not free:
-                break
-        if free:
-            cell = ((a + 1) * shape[1] + b + 1) * shape[2] + c + 1
-            following[i], heads[cell] = heads[cell], i
+        cell = ((points[i] - low) / edge).astype(np.int64) + 1
+        if _is_free(points, i, cell, heads, following, radius):
+            following[i] = heads[cell[0], cell[1], cell[2]]
+            heads[cell[0], cell[1], cell[2]] = i
             taken[count] = i
             count += 1
     return taken[:count].copy()
+
+
+@njit(cache=True)
+def _is_free(
+    points: Float64Array,
+    i: int,
+    cell: Int64Array,
+    heads: Int64Array,
+    following: Int64Array,
+    radius: float,
+) -> bool:  # pragma: no cover - compiled
+    """Whether no taken point of the 27 cells around is within the radius of point i."""
+    x, y, z = points[i, 0], points[i, 1], points[i, 2]
+    for a in range(cell[0] - 1, cell[0] + 2):
+        for b in range(cell[1] - 1, cell[1] + 2):
+            for c in range(cell[2] - 1, cell[2] + 2):
+                other = heads[a, b, c]
+                while other >= 0:
+                    gap = (points[other, 0] - x) ** 2 + (points[other, 1] - y) ** 2
+                    if gap + (points[other, 2] - z) ** 2 < radius * radius:
+                        return False
+                    other = following[other]
+    return True
 
 
 def _flattened(points: Float64Array, normals: Float64Array) -> Float64Array:
