@@ -1,15 +1,15 @@
 #version 430
-#include "ribbon.glsl"
+#include "ribbon_vertex.glsl"
 
-uniform vec3 u_forward;         // optical axis, head frame
-uniform float u_depth_offset;   // depth of the head frame's origin, metres
+uniform vec2 u_size_px;
 
 out vec2 v_direction;
 out float v_depth;
 
 void main() {
-    Ribbon r = ribbon_vertex();
-    v_direction = r.direction_px;
-    v_depth = dot(u_forward, r.point.position.xyz) + u_depth_offset;
-    gl_Position = r.clip;
+    RibbonPoint r = ribbon_point();
+    vec2 across_px = r.across * u_size_px;
+    v_direction = normalize(vec2(across_px.y, -across_px.x));
+    v_depth = r.depth;
+    gl_Position = ribbon_edge(r);
 }

@@ -1,5 +1,5 @@
 #version 430
 // Ribbons in one colour, for masks.
-#include "ribbon.glsl"
+#include "ribbon_vertex.glsl"
 
-void main() { gl_Position = ribbon_vertex().clip; }
+void main() { gl_Position = ribbon_edge(ribbon_point()); }

@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import resources
-from typing import Any
+from typing import Any, TypeVar
 
 import moderngl
 
@@ -16,6 +16,8 @@ from hairkit.render.osmesa import OSMesaContext
 
 REQUIRED_VERSION = 430
 """OpenGL 4.3, for buffers read by vertex shaders."""
+
+Compiled = TypeVar("Compiled")
 
 BACKENDS = ("egl", "osmesa")
 """Tried in this order; `HAIRKIT_GL` picks one."""
@@ -36,6 +38,7 @@ class Renderer:
         """Bound between pictures: moderngl goes back to the last bound one, released or not."""
         self.home.use()
         self._programs: dict[str, moderngl.Program] = {}
+        self._computes: dict[str, moderngl.ComputeShader] = {}
 
     @property
     def description(self) -> str:
@@ -47,14 +50,22 @@ class Renderer:
         """Return the program of `name.vert` and `fragment.frag` (None: `name.frag`)."""
         key = f"{name}/{fragment or name}"
         if key not in self._programs:
-            try:
-                self._programs[key] = self.context.program(
+            self._programs[key] = _compiled(
+                key,
+                lambda: self.context.program(
                     vertex_shader=shader_source(f"{name}.vert"),
                     fragment_shader=shader_source(f"{fragment or name}.frag"),
-                )
-            except moderngl.Error as error:
-                raise RenderError(f"shader {key} does not compile: {error}") from error
+                ),
+            )
         return self._programs[key]
+
+    def compute(self, name: str) -> moderngl.ComputeShader:
+        """Return the compute shader `name.comp`."""
+        if name not in self._computes:
+            self._computes[name] = _compiled(
+                name, lambda: self.context.compute_shader(shader_source(f"{name}.comp"))
+            )
+        return self._computes[name]
 
 
 @contextlib.contextmanager
@@ -82,6 +93,13 @@ def shader_source(name: str) -> str:
         for line in text.splitlines()
     ]
     return "\n".join(lines)
+
+
+def _compiled(name: str, compile_: Callable[[], Compiled]) -> Compiled:
+    try:
+        return compile_()
+    except moderngl.Error as error:
+        raise RenderError(f"shader {name} does not compile: {error}") from error
 
 
 _lock = threading.RLock()

@@ -18,6 +18,8 @@ from hairkit.stored import Float32Array
 from hairkit.strands import Strands
 
 _RESTART = 0xFFFFFFFF
+_GROUP = 64  # local_size_x of ribbon_shape.glsl
+_SHAPED_BYTES = 32  # a RibbonPoint of ribbon.glsl
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,9 @@ class RibbonBuffers:
     """A strand set on the GPU."""
 
     points: moderngl.Buffer
+    shaped: moderngl.Buffer
     indices: moderngl.Buffer
+    count: int
 
 
 @contextlib.contextmanager
@@ -40,12 +44,13 @@ def ribbons(
         yield None
         return
     points = gl.context.buffer(_point_records(strands, width))
+    shaped = gl.context.buffer(reserve=_SHAPED_BYTES * len(strands.points))
     indices = gl.context.buffer(_strip_indices(strands))
     try:
-        yield RibbonBuffers(points, indices)
+        yield RibbonBuffers(points, shaped, indices, len(strands.points))
     finally:
-        points.release()
-        indices.release()
+        for buffer in (points, shaped, indices):
+            buffer.release()
 
 
 def draw_ribbons(
@@ -55,15 +60,25 @@ def draw_ribbons(
     camera: Camera,
     depth: DepthRange,
     *,
+    shader: str = "ribbon",
     min_width_px: float = 1.0,
     **uniforms: Any,
 ) -> None:
-    """Draw all ribbons with `program` (whose vertex shader includes `ribbon.glsl`)."""
+    """Shape all ribbons by `shader.comp`, then draw them with `program`.
+
+    The program's vertex shader includes `ribbon_vertex.glsl`. Shaping is a pass of its own because
+    compute shaders run on all cores of a software renderer, vertex shaders on one.
+    """
     if buffers is None:
         return
-    set_camera(program, camera, depth)
-    set_uniforms(program, u_min_width_px=min_width_px, **uniforms)
+    shape = gl.compute(shader)
+    for part in (shape, program):
+        set_camera(part, camera, depth)
+        set_uniforms(part, u_min_width_px=min_width_px, u_count=buffers.count, **uniforms)
     buffers.points.bind_to_storage_buffer(0)
+    buffers.shaped.bind_to_storage_buffer(1)
+    shape.run(-(-buffers.count // _GROUP))
+    gl.context.memory_barrier()
     array = gl.context.vertex_array(program, [], index_buffer=buffers.indices)
     array.render(moderngl.TRIANGLE_STRIP)
     array.release()
@@ -80,7 +95,7 @@ def _point_records(strands: Strands, width: float | npt.ArrayLike) -> Float32Arr
     arc = strands.arc_lengths()
     length = np.repeat(arc[strands.offsets[1:] - 1], strands.counts)
     fraction = arc / np.maximum(length, 1e-9)
-    # ribbon.glsl tells roots and tips by exactly 0 and 1, and inner points by anything between
+    # ribbon_shape.glsl tells roots and tips by exactly 0 and 1
     fraction = np.clip(fraction, 1e-6, 1 - 1e-6)
     fraction[strands.offsets[:-1]] = 0
     fraction[strands.offsets[1:] - 1] = 1

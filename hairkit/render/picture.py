@@ -199,7 +199,9 @@ def _shoot(
         for solid in solids:
             skin = uniforms | {"u_scatter": solid.scatter}
             draw_solid(gl, solid, gl.program("skin"), camera, depth, HEAD_PUSH, **skin)
-        draw_ribbons(gl, buffers, gl.program("hair"), camera, depth, **uniforms, **look)
+        draw_ribbons(
+            gl, buffers, gl.program("hair"), camera, depth, shader="hair", **uniforms, **look
+        )
         return np.asarray(picture.read(), np.uint8)
 
 

@@ -15,6 +15,8 @@ import numpy.typing as npt
 from hairkit.camera import Camera
 from hairkit.stored import Float64Array
 
+Program = moderngl.Program | moderngl.ComputeShader
+
 
 @dataclass(frozen=True)
 class DepthRange:
@@ -54,7 +56,7 @@ def clip_from_camera(camera: Camera, depth: DepthRange) -> Float64Array:
     return matrix
 
 
-def set_camera(program: moderngl.Program, camera: Camera, depth: DepthRange) -> None:
+def set_camera(program: Program, camera: Camera, depth: DepthRange) -> None:
     """Set those of the camera uniforms that a program has."""
     set_uniforms(
         program,
@@ -67,7 +69,7 @@ def set_camera(program: moderngl.Program, camera: Camera, depth: DepthRange) -> 
     )
 
 
-def set_uniforms(program: moderngl.Program, **values: object) -> None:
+def set_uniforms(program: Program, **values: object) -> None:
     """Set uniforms by name, passing over those the compiler dropped because nothing reads them."""
     for name, value in values.items():
         if name in program:
