@@ -35,7 +35,7 @@ class LabelSettings:
 
     rounds: int = 2
     """How often the mixtures are learnt."""
-    components: int = 8
+    components: int = 12
     """Normal distributions in the mixture of each class."""
     distance_weight: float = 1.0
     """Log-likelihood that one unit of distance from the seeds takes away."""
@@ -103,9 +103,12 @@ def coarse_labels(
     costs = edge_costs(blur(colour, 1.0), 0.02, 0.25)
     distance = np.stack([seed_distance(costs, seeds == label) for label in classes], axis=-1)
     prior = -np.float32(settings.distance_weight) * np.minimum(distance, settings.distance_cap)
+    flat = features.reshape(height * width, -1)
+    flat = (flat - flat.mean(axis=0)) / (flat.std(axis=0) + np.float32(1e-3))
+    terms = polynomial_terms(flat)
     known = seeds
     for _ in range(settings.rounds):
-        evidence = class_evidence(features, known, classes, settings)
+        evidence = class_evidence(flat, terms, known, classes, settings)
         probability = _probability(evidence, prior, seeds, classes, hair_allowed, settings)
         labels = np.take(np.asarray(classes, np.uint8), probability.argmax(axis=-1))
         known = _certain(labels, probability.max(axis=-1), seeds)
@@ -133,32 +136,50 @@ def appearance(image: UInt8Array, width: int, height: int) -> tuple[Float32Array
 
 
 def class_evidence(
-    features: Float32Array, known: UInt8Array, classes: list[int], settings: LabelSettings
+    features: Float32Array,
+    terms: Float32Array,
+    known: UInt8Array,
+    classes: list[int],
+    settings: LabelSettings,
 ) -> Float32Array:
     """Return (h, w, K) the log-likelihood of every pixel under the mixture of each class.
 
     Each mixture is learnt by k-means from the pixels of (h, w) `known` with its label; a pixel is
     scored by its best component, as GrabCut does.
+
+    Parameters
+    ----------
+    features : (N, F)
+        Of every pixel, each feature with mean 0 and deviation 1.
+    terms : (M, N)
+        From `polynomial_terms`.
     """
-    height, width = known.shape
-    flat = features.reshape(height * width, -1)
-    flat = (flat - flat.mean(axis=0)) / (flat.std(axis=0) + 1e-3)
-    upper = np.triu_indices(flat.shape[1])
-    monomials = np.hstack([flat[:, upper[0]] * flat[:, upper[1]], flat])
-    evidence = np.empty((height * width, len(classes)), np.float32)
+    evidence = np.empty((*known.shape, len(classes)), np.float32)
     for index, label in enumerate(classes):
-        samples = flat[known.ravel() == label]
+        samples = features[known.ravel() == label]
         pick = np.random.default_rng(settings.seed).permutation(len(samples))[:_SAMPLES]
         weights, offsets = _mixture(samples[pick], settings)
-        evidence[:, index] = (monomials @ weights + offsets).max(axis=1)
-    return evidence.reshape(height, width, len(classes))
+        score = (weights @ terms + offsets[:, None]).max(axis=0)
+        evidence[..., index] = score.reshape(known.shape)
+    return evidence
+
+
+def polynomial_terms(features: Float32Array) -> Float32Array:
+    """Return (M, N) the products of two features (N, F) and the features themselves.
+
+    A normal distribution's log density is linear in these.
+    """
+    rows = np.ascontiguousarray(features.T)
+    first, second = np.triu_indices(len(rows))
+    terms = np.empty((len(first) + len(rows), rows.shape[1]), np.float32)
+    for index, (one, other) in enumerate(zip(first, second, strict=True)):
+        np.multiply(rows[one], rows[other], out=terms[index])
+    terms[len(first) :] = rows
+    return terms
 
 
 def _mixture(samples: Float32Array, settings: LabelSettings) -> tuple[Float32Array, Float32Array]:
-    """Return a mixture as weights (M, J) of monomials and offsets (J,).
-
-    The log density of a normal distribution is linear in the monomials of degree one and two.
-    """
+    """Return a mixture of J components as weights (J, M) of `polynomial_terms` and offsets (J,)."""
     count, size = samples.shape
     clusters = _clusters(samples, min(settings.components, max(count // _MIN_CLUSTER, 1)), settings)
     upper = np.triu_indices(size)
@@ -174,7 +195,7 @@ def _mixture(samples: Float32Array, settings: LabelSettings) -> tuple[Float32Arr
         offsets.append(
             0.5 * determinant - 0.5 * mean @ precision @ mean + np.log(len(members) / count)
         )
-    return np.stack(weights, axis=1).astype(np.float32), np.asarray(offsets, np.float32)
+    return np.stack(weights).astype(np.float32), np.asarray(offsets, np.float32)
 
 
 def _clusters(samples: Float32Array, count: int, settings: LabelSettings) -> list[Float64Array]:

@@ -18,7 +18,7 @@ _SIGMAS = (4.0, 12.0, 36.0)
 _FADE = 0.02
 _NOISE = 30.0
 _PER_PIXEL = 0.15
-HAIR_OVER_BACKGROUND, HAIR_OVER_PERSON = 0.35, 0.55
+HAIR_OVER_BACKGROUND, HAIR_OVER_PERSON = 0.3, 0.6
 """Share of hair from which on a pixel is hair. A wisp before a far backdrop is lit from behind and
 looks thinner than it is; hair on skin throws a shadow and looks thicker."""
 
