@@ -139,9 +139,10 @@ def _splatted(
 ) -> UInt8Array:
     depth = camera.depth(centres)
     order = np.argsort(-depth)  # near cells are written last and so stay
-    facing = np.clip(-(normals * camera.view_direction(centres)).sum(axis=1), 0, 1)
+    facing = -(normals * camera.view_direction(centres)).sum(axis=1)
+    normals = normals * np.where(facing < 0, -1, 1)[:, None]  # thin hair shows its inside too
     light = camera.rotation.T @ np.array([-0.5, -0.6, -0.62])
-    shade = 40 + 70 * facing + 120 * np.clip(normals @ light, 0, 1)
+    shade = 40 + 70 * np.abs(facing) + 120 * np.clip(normals @ light, 0, 1)
     pixels = camera.project(centres)[order]
     scale = camera.focal / (depth.min() if camera.model == "perspective" else 1.0)
     reach = int(np.ceil(0.87 * spacing * scale))  # half a diagonal: oblique rows leave no gaps
@@ -186,14 +187,16 @@ def _arranged(
         for column, tile in enumerate(tiles):
             left = GAP + column * (width + GAP)
             sheet[top : top + height, left : left + width] = tile
-        _write(sheet, _ROWS[index], (GAP + 5, top + 15), 255, outline=True)
+        _write(sheet, _ROWS[index], (GAP + 5, top + 15), 255, boxed=True)
     return sheet
 
 
 def _write(
-    sheet: UInt8Array, text: str, at: tuple[int, int], grey: int, outline: bool = False
+    sheet: UInt8Array, text: str, at: tuple[int, int], grey: int, boxed: bool = False
 ) -> None:
     font = cv2.FONT_HERSHEY_SIMPLEX
-    if outline:
-        cv2.putText(sheet, text, at, font, 0.45, (0, 0, 0), 3, cv2.LINE_AA)
+    if boxed:
+        (width, height), _ = cv2.getTextSize(text, font, 0.45, 1)
+        low = (at[0] - 4, at[1] + 6)
+        cv2.rectangle(sheet, low, (at[0] + width + 4, at[1] - height - 4), (40, 40, 40), cv2.FILLED)
     cv2.putText(sheet, text, at, font, 0.45, (grey, grey, grey), 1, cv2.LINE_AA)
