@@ -11,10 +11,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+from numba import njit, prange
 
 from hairkit.errors import InputError
 from hairkit.stored import BoolArray, Float32Array, Int32Array
+
+CHUNKS = 64
+"""Sums are taken over this many parts of the cells, whatever the number of threads."""
+COARSEST_CELLS = 4000
+"""Below this many cells no coarser grid is made."""
 
 
 def solve_screened(
@@ -40,7 +45,7 @@ def solve_screened(
     tolerance
         Stop when the residual of every column fell below this share of the right-hand side.
     start
-        (N, C) first guess; zeros when None.
+        (N, C) first guess; the solution on cells twice as large when None.
 
     Raises `InputError` when shapes disagree or no weight is positive (then there is no unique answer).
     """
@@ -51,17 +56,41 @@ def solve_screened(
         )
     if not (weight > 0).any():
         raise InputError("diffusion needs at least one cell with a weight above 0")
-    neighbours = cell_neighbours(occupied)
-    guess = np.zeros(data.shape, np.float32) if start is None else start.astype(np.float32)
+    guess = start if start is not None else _coarse_guess(occupied, data, weight, smoothness)
     return _conjugate_gradients(
-        neighbours,
+        cell_neighbours(occupied),
         np.ascontiguousarray(data, np.float32),
         np.ascontiguousarray(weight, np.float32),
         np.float32(smoothness),
         np.float32(tolerance),
         max_iterations,
-        np.ascontiguousarray(guess),
+        np.array(guess, np.float32, order="C"),
     )
+
+
+def _coarse_guess(
+    occupied: BoolArray, data: Float32Array, weight: Float32Array, smoothness: float
+) -> Float32Array:
+    """Return (N, C) the solution on cells twice as large: nested iteration (Brandt 1977).
+
+    Eight cells merge into one: weights add up, data average by weight, and the factor between neighbours doubles
+    (four times the face, twice the distance).
+    """
+    shape = tuple(-(-n // 2) for n in occupied.shape)
+    if len(data) < COARSEST_CELLS:
+        mean = (weight[:, None] * data).sum(axis=0) / weight.sum()
+        return np.broadcast_to(mean, data.shape).astype(np.float32)
+    cell = np.ravel_multi_index(tuple(index // 2 for index in np.nonzero(occupied)), shape)
+    merged, row = np.unique(cell, return_inverse=True)
+    coarse = np.zeros(shape, bool)
+    coarse.ravel()[merged] = True
+    total = np.bincount(row, weight, len(merged))
+    columns = [np.bincount(row, weight * column, len(merged)) for column in data.T]
+    mean = np.stack(columns, axis=1) / np.maximum(total, 1e-30)[:, None]
+    solved = solve_screened(
+        coarse, mean.astype(np.float32), total.astype(np.float32), 2 * smoothness, tolerance=1e-2
+    )
+    return solved[row]
 
 
 def cell_neighbours(occupied: BoolArray) -> Int32Array:
@@ -86,33 +115,72 @@ def apply_operator(
     return weight[:, None] * values + smoothness * (degree * values - total)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _operate(neighbours, weight, smoothness, values, result):  # type: ignore[no-untyped-def]
+@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+def _operate(neighbours, weight, smoothness, values, result, partial):  # type: ignore[no-untyped-def]
+    """Write `A values` into result and the chunks' sums of values * result into partial (CHUNKS, C)."""
     count, channels = values.shape
-    for i in range(count):
+    size = (count + CHUNKS - 1) // CHUNKS
+    for chunk in prange(CHUNKS):
+        partial[chunk] = 0
+        for i in range(chunk * size, min((chunk + 1) * size, count)):
+            degree = weight[i]
+            for k in range(6):
+                if neighbours[i, k] >= 0:
+                    degree += smoothness
+            for c in range(channels):
+                result[i, c] = degree * values[i, c]
+            for k in range(6):
+                j = neighbours[i, k]
+                if j >= 0:
+                    for c in range(channels):
+                        result[i, c] -= smoothness * values[j, c]
+            for c in range(channels):
+                partial[chunk, c] += values[i, c] * result[i, c]
+
+
+@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+def _advance(x, r, p, ap, inverse, alpha, squares, products):  # type: ignore[no-untyped-def]
+    """Step x and r along p; chunks' sums of r * r and r * r / diagonal go to squares and products."""
+    count, channels = x.shape
+    size = (count + CHUNKS - 1) // CHUNKS
+    for chunk in prange(CHUNKS):
+        squares[chunk] = 0
+        products[chunk] = 0
+        for i in range(chunk * size, min((chunk + 1) * size, count)):
+            for c in range(channels):
+                x[i, c] += alpha[c] * p[i, c]
+                residual = r[i, c] - alpha[c] * ap[i, c]
+                r[i, c] = residual
+                squares[chunk, c] += residual * residual
+                products[chunk, c] += residual * residual * inverse[i]
+
+
+@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+def _turn(p, r, inverse, beta):  # type: ignore[no-untyped-def]
+    count, channels = p.shape
+    for i in prange(count):
         for c in range(channels):
-            result[i, c] = weight[i] * values[i, c]
-        for k in range(6):
-            j = neighbours[i, k]
-            if j >= 0:
-                for c in range(channels):
-                    result[i, c] += smoothness * (values[i, c] - values[j, c])
+            p[i, c] = inverse[i] * r[i, c] + beta[c] * p[i, c]
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _conjugate_gradients(neighbours, data, weight, smoothness, tolerance, max_iterations, x):  # type: ignore[no-untyped-def]
-    """Jacobi-preconditioned conjugate gradients, one scalar recursion a column, columns in step."""
+    """Jacobi-preconditioned conjugate gradients, one scalar recursion a column, columns in step.
+
+    Sums are taken over a fixed number of chunks, so the result does not depend on the number of threads.
+    """
     count, channels = data.shape
     inverse = np.empty(count, np.float32)
     for i in range(count):
-        degree = 0
+        diagonal = weight[i]
         for k in range(6):
             if neighbours[i, k] >= 0:
-                degree += 1
-        diagonal = weight[i] + smoothness * degree
-        inverse[i] = 1 / diagonal if diagonal > 0 else 1.0
+                diagonal += smoothness
+        inverse[i] = 1 / diagonal if diagonal > 0 else np.float32(1.0)
     ap = np.empty_like(x)
-    _operate(neighbours, weight, smoothness, x, ap)
+    first = np.zeros((CHUNKS, channels))
+    second = np.zeros((CHUNKS, channels))
+    _operate(neighbours, weight, smoothness, x, ap, first)
     r = np.empty_like(x)
     p = np.empty_like(x)
     rz = np.zeros(channels)
@@ -127,31 +195,19 @@ def _conjugate_gradients(neighbours, data, weight, smoothness, tolerance, max_it
     alpha = np.zeros(channels, np.float32)
     beta = np.zeros(channels, np.float32)
     for _ in range(max_iterations):
-        _operate(neighbours, weight, smoothness, p, ap)
-        curvature = np.zeros(channels)
-        for i in range(count):
-            for c in range(channels):
-                curvature[c] += p[i, c] * ap[i, c]
+        _operate(neighbours, weight, smoothness, p, ap, first)
+        curvature = first.sum(axis=0)
         for c in range(channels):
             alpha[c] = rz[c] / curvature[c] if curvature[c] > 0 else 0.0
-        rr = np.zeros(channels)
-        new = np.zeros(channels)
-        for i in range(count):
-            for c in range(channels):
-                x[i, c] += alpha[c] * p[i, c]
-                residual = r[i, c] - alpha[c] * ap[i, c]
-                r[i, c] = residual
-                rr[c] += residual * residual
-                new[c] += residual * residual * inverse[i]
+        _advance(x, r, p, ap, inverse, alpha, first, second)
+        squares, products = first.sum(axis=0), second.sum(axis=0)
         done = True
         for c in range(channels):
-            if rr[c] > tolerance * tolerance * size[c]:
+            if squares[c] > tolerance * tolerance * size[c]:
                 done = False
-            beta[c] = new[c] / rz[c] if rz[c] > 0 else 0.0
-            rz[c] = new[c]
+            beta[c] = products[c] / rz[c] if rz[c] > 0 else 0.0
+            rz[c] = products[c]
         if done:
             break
-        for i in range(count):
-            for c in range(channels):
-                p[i, c] = inverse[i] * r[i, c] + beta[c] * p[i, c]
+        _turn(p, r, inverse, beta)
     return x

@@ -9,17 +9,17 @@ small angle, are smoothed after Iben et al. 2013, cut where they turn up into a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit, prange
 from scipy import ndimage
 
-from hairkit import Hull, OrientationField, Roots, Scene, Strands, hookimpl
-from hairkit.combing import combing_direction
+from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, Strands, hookimpl
+from hairkit.combing import combing_direction, gradient, hair_length, scalp_way
 from hairkit.options import option
-from hairkit.stored import BoolArray, Float32Array, Float64Array, Int64Array
+from hairkit.stored import Float32Array, Float64Array, Int64Array
+from hairkit.waves import add_waves, measure_waves
 
 
 @dataclass(frozen=True)
@@ -38,47 +38,82 @@ class Options:
         0.3, low=0, high=0.95, doc="Share of the previous direction in the next one."
     )
     start: str = option(
-        "combed", choices=("combed", "bent_normal"), doc="First direction: combing prior or bent normal."
+        "combed",
+        choices=("combed", "bent_normal"),
+        doc="First direction: combing prior or bent normal.",
     )
     bend_deg: float = option(
         50.0, low=0, high=90, unit="deg", doc="Bend of the scalp normal for start = bent_normal."
     )
     lift: float = option(0.6, low=0, high=5, doc="Outward part of the combed first direction.")
     slide_sine: float = option(
-        0.35, low=0, high=1, doc="Slide along the hull when the sine of the exit angle is below this; 0 never."
+        0.9,
+        low=0,
+        high=1,
+        doc="Slide along the hull when the sine of the exit angle is below this; 0 never.",
     )
-    slide_length: float = option(
-        0.06, low=0, high=2, unit="m", doc="Only strands longer than this slide."
+    slide_share: float = option(
+        1.0,
+        low=0,
+        high=5,
+        doc="Strands slide while shorter than this share of the longest way through the hair.",
     )
     clearance: float = option(0.001, low=0, high=0.02, unit="m", doc="Distance kept from the head.")
     max_length: float = option(1.2, low=0.01, high=5, unit="m", doc="Longest strand.")
     smoothing: int = option(5, low=0, high=50, doc="Smoothing iterations.")
     u_share: float = option(
-        0.3, low=0, high=1, doc="Share of upward steps that marks a U-shaped strand (mu); 1 never trims."
+        0.3,
+        low=0,
+        high=1,
+        doc="Share of upward steps that marks a U-shaped strand (mu); 1 never trims.",
     )
+    waves: bool = option(True, doc="Wind the strands as the photos' waves do.")
     points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
 
 
 @hookimpl
 def track(
-    scene: Scene, hull: Hull, field: OrientationField, roots: Roots, options: Options
+    scene: Scene,
+    masks: tuple[Mask, ...],
+    orientations: tuple[OrientationMap, ...],
+    hull: Hull,
+    field: OrientationField,
+    roots: Roots,
+    options: Options,
 ) -> Strands:
-    """Grow one strand from every root, trim and smooth it."""
-    directions = _start_directions(scene, roots, options)
-    points, counts = _grow(hull, field, roots, directions, options)
+    """Grow one strand from every root, trim and smooth it, wind it into waves, keep it out of the head."""
+    directions = _start_directions(scene, hull, field, roots, options)
+    points, counts = _grow(scene, hull, field, roots, directions, options)
     points, counts = _trimmed(points, counts, options.u_share)
     offsets = np.concatenate([[0], np.cumsum(counts)])
     rows = np.arange(points.shape[1])[None, :] < counts[:, None]
     strands = Strands(points[rows], offsets).resampled(options.points)
     smooth = _smoothed(strands.points.reshape(len(roots), options.points, 3), options.smoothing)
-    return Strands(smooth.reshape(-1, 3), strands.offsets, root_uv=roots.uv)
+    result = Strands(smooth.reshape(-1, 3), strands.offsets, root_uv=roots.uv)
+    if options.waves:
+        result = add_waves(result, measure_waves(orientations, masks, scene.cameras))
+    return _outside_head(result, hull, options.clearance)
 
 
-def _start_directions(scene: Scene, roots: Roots, options: Options) -> Float64Array:
+def _outside_head(strands: Strands, hull: Hull, clearance: float) -> Strands:
+    """Return strands whose points, but for the roots, keep `clearance` metres from the head."""
+    points = strands.points.astype(np.float64)
+    free = np.ones(len(points), bool)
+    free[strands.offsets[:-1]] = False
+    for _ in range(3):
+        lack = clearance - hull.grid.sample(hull.head_distance, points)
+        near = np.flatnonzero((lack > 0) & free)
+        points[near] += lack[near, None] * gradient(hull.grid, hull.head_distance, points[near])
+    return replace(strands, points=points.astype(np.float32))
+
+
+def _start_directions(
+    scene: Scene, hull: Hull, field: OrientationField, roots: Roots, options: Options
+) -> Float64Array:
     """Return unit first directions (N, 3)."""
     normals = roots.normals.astype(np.float64)
     if options.start == "combed":
-        return combing_direction(scene.head, roots.positions, normals, options.lift)
+        return combing_direction(scene.head, hull, field.growth, roots.positions, options.lift)
     # thesis 6.1: the normal turned by G about n x (0, -1, 0); where that axis vanishes the normal stays
     axis = np.cross(normals, [0.0, -1.0, 0.0])
     length = np.linalg.norm(axis, axis=1, keepdims=True)
@@ -90,20 +125,41 @@ def _start_directions(scene: Scene, roots: Roots, options: Options) -> Float64Ar
 
 
 def _grow(
-    hull: Hull, field: OrientationField, roots: Roots, directions: Float64Array, options: Options
+    scene: Scene,
+    hull: Hull,
+    field: OrientationField,
+    roots: Roots,
+    directions: Float64Array,
+    options: Options,
 ) -> tuple[Float32Array, Int64Array]:
     """Return padded points (N, M, 3) and how many of each strand are real (N,), at least two."""
     step = options.step * field.grid.spacing
     steps = int(np.ceil(options.max_length / step)) + 1
     inside = ndimage.binary_dilation(hull.dense) & hull.loose
     outward = ndimage.gaussian_filter(inside.astype(np.float32), 1.5)
+    slide_length = options.slide_share * hair_length(hull, scalp_way(scene.head, hull))
     points = np.zeros((len(roots), steps + 1, 3), np.float32)
     counts = np.zeros(len(roots), np.int64)
     _track_all(
-        field.grid.origin, field.grid.spacing, field.tensor, field.growth, inside, outward,
-        hull.head_distance, roots.positions.astype(np.float64), directions, step,
-        np.cos(np.radians(options.max_turn_deg)), options.max_score, options.blind_steps,
-        options.inertia, options.slide_sine, options.slide_length, options.clearance, points, counts,
+        field.grid.origin,
+        field.grid.spacing,
+        field.tensor,
+        field.growth,
+        inside,
+        outward,
+        hull.head_distance,
+        roots.positions.astype(np.float64),
+        directions,
+        step,
+        np.cos(np.radians(options.max_turn_deg)),
+        options.max_score,
+        options.blind_steps,
+        options.inertia,
+        options.slide_sine,
+        slide_length,
+        options.clearance,
+        points,
+        counts,
     )
     return points[:, : max(int(counts.max()), 2)], counts
 
@@ -121,11 +177,9 @@ def _sample(origin, spacing, values, p, result):  # type: ignore[no-untyped-def]
         low = (values[ix, iy, iz, c] * (1 - tz) + values[ix, iy, iz + 1, c] * tz) * (1 - ty) + (
             values[ix, iy + 1, iz, c] * (1 - tz) + values[ix, iy + 1, iz + 1, c] * tz
         ) * ty
-        high = (
-            values[ix + 1, iy, iz, c] * (1 - tz) + values[ix + 1, iy, iz + 1, c] * tz
-        ) * (1 - ty) + (
-            values[ix + 1, iy + 1, iz, c] * (1 - tz) + values[ix + 1, iy + 1, iz + 1, c] * tz
-        ) * ty
+        high = (values[ix + 1, iy, iz, c] * (1 - tz) + values[ix + 1, iy, iz + 1, c] * tz) * (
+            1 - ty
+        ) + (values[ix + 1, iy + 1, iz, c] * (1 - tz) + values[ix + 1, iy + 1, iz + 1, c] * tz) * ty
         result[c] = low * (1 - tx) + high * tx
 
 
@@ -168,8 +222,25 @@ def _principal(tensor, direction, result):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
 def _track_all(  # type: ignore[no-untyped-def]
-    origin, spacing, tensors, growth, inside, density, head_distance, starts, directions, step,
-    min_cosine, max_score, blind_steps, inertia, slide_sine, slide_length, clearance, points, counts,
+    origin,
+    spacing,
+    tensors,
+    growth,
+    inside,
+    density,
+    head_distance,
+    starts,
+    directions,
+    step,
+    min_cosine,
+    max_score,
+    blind_steps,
+    inertia,
+    slide_sine,
+    slide_length,
+    clearance,
+    points,
+    counts,
 ):
     shape = np.array(inside.shape)
     density4 = density.reshape((*density.shape, 1))
@@ -220,16 +291,17 @@ def _track_all(  # type: ignore[no-untyped-def]
                 for axis in range(3):
                     d[axis] = keep * d[axis] + (1 - keep) * found[axis]
             # slide along the hull's skin instead of leaving it at a small angle
-            if certain and not blind and slide_sine > 0 and count * step > slide_length:
+            if slide_sine > 0 and count * step < slide_length:
                 for axis in range(3):
                     middle[axis] = p[axis] + spacing * d[axis]
                 _sample(origin, spacing, density4, middle, one)
-                if one[0] < 0.5:
+                if one[0] < 0.6:
                     _gradient(origin, spacing, density4, p, normal)
                     sine = -(d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2])
-                    if 0 < sine < slide_sine:
+                    if sine < slide_sine:
+                        pull = max(sine, 0.0) + 0.6 - one[0]
                         for axis in range(3):
-                            d[axis] += sine * normal[axis]
+                            d[axis] += pull * normal[axis]
             norm = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
             if norm < 1e-6:
                 break

@@ -18,11 +18,12 @@ from numba import njit, prange
 from scipy import ndimage
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
-from hairkit.combing import combing_direction
+from hairkit.combing import combing_direction, growth_potential
 from hairkit.diffusion import solve_screened
 from hairkit.options import option
 from hairkit.projection import pack_cameras, project_row, splat_depth
 from hairkit.stored import BoolArray, Float32Array, Float64Array
+from hairkit.waves import measure_waves, without_slant
 from hairkit.volume import outer_products, symmetric_matrices
 
 DEPTH_SHRINK = 3
@@ -34,24 +35,40 @@ class Options:
     """Settings of fusion and diffusion."""
 
     see_through: float = option(
-        0.02, low=0, high=0.2, unit="m", doc="Depth behind the first hair at which a view's weight falls to 1/e; 0 for visible cells only."
+        0.02,
+        low=0,
+        high=0.2,
+        unit="m",
+        doc="Depth behind the first hair at which a view's weight falls to 1/e; 0 for visible cells only.",
     )
     free_depth: float = option(
         0.006, low=0, high=0.05, unit="m", doc="Depth behind the first hair that costs no weight."
     )
     min_views: int = option(1, low=1, high=8, doc="Views a cell needs to be fused.")
-    tangency: float = option(
-        0.0, low=0, high=2, doc="Weight of the hull's tangent plane beside the views' planes."
+    unslant: bool = option(
+        True, doc="Take off the slant that the near halves of waves show in every view."
     )
-    smoothness: float = option(0.2, low=1e-4, high=100, doc="Weight of the diffusion.")
+    pool: float = option(
+        0.15,
+        low=0,
+        high=1,
+        doc="Gaussian, as a share of the waves' pitch, over which planes of wavy hair are pooled.",
+    )
+    smoothness: float = option(0.4, low=1e-4, high=100, doc="Weight of the diffusion.")
     scalp_weight: float = option(
-        0.03, low=0, high=100, doc="Weight of the combing prior at the scalp; large values fix it."
+        0.1, low=0, high=100, doc="Weight of the combing prior at the scalp; large values fix it."
     )
     scalp_reach: float = option(
         0.010, low=0, high=0.1, unit="m", doc="Distance from the scalp within which the prior acts."
     )
     scalp_lift: float = option(
         0.6, low=0, high=5, doc="Outward part of the prior against its tangential part."
+    )
+    tip_share: float = option(
+        0.6,
+        low=0.05,
+        high=1,
+        doc="Cells this far along the longest way from the scalp count as tips.",
     )
     tolerance: float = option(1e-3, low=1e-8, high=0.1, doc="Relative residual of the solver.")
 
@@ -65,9 +82,14 @@ def solve_field(
     options: Options,
 ) -> OrientationField:
     """Fuse, add the scalp prior, diffuse over the loose hull, and measure the way from the scalp."""
+    waves = measure_waves(orientations, masks, scene.cameras)
+    if options.unslant:
+        orientations = tuple(without_slant(found, waves) for found in orientations)
+    growth = growth_potential(scene.head, hull, options.tip_share)
     planes, views = _fuse(scene, masks, orientations, hull, options)
+    planes = _pooled(planes, hull, options.pool * waves.pitch)
     tensor, certainty = _directions(planes, views, options)
-    data, weight = _with_prior(scene, hull, tensor, certainty, options)
+    data, weight = _with_prior(scene, hull, growth, tensor, certainty, options)
     solved = solve_screened(
         hull.loose, data, weight, options.smoothness, tolerance=options.tolerance
     )
@@ -75,7 +97,7 @@ def solve_field(
     field[hull.loose] = solved
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
-    return OrientationField(hull.grid, field, confidence, scalp_way(scene, hull))
+    return OrientationField(hull.grid, field, confidence, growth)
 
 
 def _fuse(
@@ -97,10 +119,35 @@ def _fuse(
         splat_depth(row, surface, 0.75 * hull.grid.spacing, front)
         certainty = found.confidence * mask.hair
         _add_planes(
-            row, points, inner, found.angle, certainty, front,
-            options.see_through, options.free_depth, planes, count,
+            row,
+            points,
+            inner,
+            found.angle,
+            certainty,
+            front,
+            options.see_through,
+            options.free_depth,
+            planes,
+            count,
         )
     return planes, count
+
+
+def _pooled(planes: Float64Array, hull: Hull, sigma: float) -> Float64Array:
+    """Return the planes (N, 6) averaged over a Gaussian neighbourhood of `sigma` metres.
+
+    Planes of two views 45 degrees apart amplify disagreement into depth, and strands that wave out of step
+    disagree. Pooled before they are intersected, their angles average; afterwards the amplified error would.
+    """
+    if sigma <= 0:
+        return planes
+    volume = np.zeros(hull.grid.shape, np.float32)
+    result = np.empty_like(planes)
+    for component in range(6):
+        volume[hull.loose] = planes[:, component]
+        smooth = ndimage.gaussian_filter(volume, sigma / hull.grid.spacing, truncate=2.5)
+        result[:, component] = smooth[hull.loose]
+    return result
 
 
 @njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
@@ -163,7 +210,12 @@ def _directions(
 
 
 def _with_prior(
-    scene: Scene, hull: Hull, tensor: Float32Array, certainty: Float32Array, options: Options
+    scene: Scene,
+    hull: Hull,
+    growth: Float32Array,
+    tensor: Float32Array,
+    certainty: Float32Array,
+    options: Options,
 ) -> tuple[Float32Array, Float32Array]:
     """Return wanted tensors and weights after adding the combing prior near the scalp."""
     distance = hull.head_distance[hull.loose]
@@ -171,80 +223,9 @@ def _with_prior(
     if not options.scalp_weight or not near.any():
         return tensor, certainty
     points = hull.grid.centres()[hull.loose][near]
-    normals = distance_gradient(hull, points)
-    comb = combing_direction(scene.head, points, normals, options.scalp_lift)
+    comb = combing_direction(scene.head, hull, growth, points, options.scalp_lift)
     data, weight = tensor.copy(), certainty.copy()
     weight[near] += options.scalp_weight
     share = (options.scalp_weight / weight[near])[:, None]
     data[near] = (1 - share) * tensor[near] + share * outer_products(comb)
     return data, weight
-
-
-def distance_gradient(hull: Hull, points: npt.ArrayLike) -> Float64Array:
-    """Return the unit gradient (N, 3) of the head's distance at points (N, 3): away from the head."""
-    at = np.asarray(points, np.float64)
-    h = hull.grid.spacing
-    gradient = np.stack(
-        [
-            hull.grid.sample(hull.head_distance, at + h * axis)
-            - hull.grid.sample(hull.head_distance, at - h * axis)
-            for axis in np.eye(3)
-        ],
-        axis=1,
-    ).astype(np.float64)
-    result: Float64Array = gradient / np.maximum(np.linalg.norm(gradient, axis=1, keepdims=True), 1e-9)
-    return result
-
-
-def scalp_way(scene: Scene, hull: Hull) -> Float32Array:
-    """Return (X, Y, Z) the shortest way from the scalp through loose cells, metres; 0 outside them.
-
-    Sweeps of the chamfer distance in alternating orders (Borgefors 1986) until nothing changes.
-    """
-    start = np.zeros(hull.grid.shape, bool)
-    cells = hull.grid.nearest_cell(scene.head.vertices[scene.head.scalp > 0.5])
-    start[tuple(cells.T)] = True
-    start = ndimage.binary_dilation(start, iterations=2)
-    way = _chamfer(hull.loose, start & hull.loose, np.float32(hull.grid.spacing))
-    return np.where(np.isfinite(way), way, 0).astype(np.float32)
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _chamfer(occupied, start, spacing):  # type: ignore[no-untyped-def]
-    nx, ny, nz = occupied.shape
-    way = np.full(occupied.shape, np.inf, np.float32)
-    for ix in range(nx):
-        for iy in range(ny):
-            for iz in range(nz):
-                if start[ix, iy, iz]:
-                    way[ix, iy, iz] = 0
-    for _ in range(12):
-        changed = False
-        for turn in range(8):
-            sx = 1 if turn & 1 else -1
-            sy = 1 if turn & 2 else -1
-            sz = 1 if turn & 4 else -1
-            for kx in range(nx):
-                ix = kx if sx > 0 else nx - 1 - kx
-                for ky in range(ny):
-                    iy = ky if sy > 0 else ny - 1 - ky
-                    for kz in range(nz):
-                        iz = kz if sz > 0 else nz - 1 - kz
-                        if not occupied[ix, iy, iz]:
-                            continue
-                        best = way[ix, iy, iz]
-                        for corner in range(1, 8):
-                            jx = ix - sx * (corner & 1)
-                            jy = iy - sy * (corner >> 1 & 1)
-                            jz = iz - sz * (corner >> 2 & 1)
-                            if jx < 0 or jy < 0 or jz < 0 or jx >= nx or jy >= ny or jz >= nz:
-                                continue
-                            if occupied[jx, jy, jz]:
-                                steps = (corner & 1) + (corner >> 1 & 1) + (corner >> 2 & 1)
-                                best = min(best, way[jx, jy, jz] + spacing * np.sqrt(np.float32(steps)))
-                        if best < way[ix, iy, iz] - 1e-7:
-                            way[ix, iy, iz] = best
-                            changed = True
-        if not changed:
-            break
-    return way

@@ -34,16 +34,20 @@ class Options:
     """Settings of the hull."""
 
     mode: str = option("labels", choices=("labels", "votes"), doc="How views decide on a cell.")
-    voxel_size: float = option(
-        0.003, low=0.001, high=0.02, doc="Edge length of a cell.", unit="m"
-    )
+    voxel_size: float = option(0.003, low=0.001, high=0.02, doc="Edge length of a cell.", unit="m")
     min_views: int = option(2, low=1, high=64, doc="Views that must see hair in a cell.")
     forgive: int = option(
-        -1, low=-1, high=8, doc="Views that may call a hair cell empty; -1 lets the scene's misfit decide."
+        -1,
+        low=-1,
+        high=8,
+        doc="Views that may call a hair cell empty; -1 lets the scene's misfit decide.",
     )
     slack: float = option(2.0, low=0, high=30, doc="Growth of the hair masks.", unit="px")
     opening: float = option(
         7.0, low=0, high=40, doc="Opening of the masks that carve the dense hull.", unit="px"
+    )
+    loose_cells: int = option(
+        3, low=1, high=100, doc="Cells that the loose hull may reach beyond the dense one."
     )
     front_margin: float = option(
         0.006, low=0, high=0.05, doc="A cell this far in front of seen skin is empty.", unit="m"
@@ -85,7 +89,9 @@ class _Views:
     @classmethod
     def of(cls, scene: Scene, masks: tuple[Mask, ...], options: Options) -> _Views:
         if len(masks) != len(scene.cameras):
-            raise InputError(f"the scene has {len(scene.cameras)} cameras but {len(masks)} masks came")
+            raise InputError(
+                f"the scene has {len(scene.cameras)} cameras but {len(masks)} masks came"
+            )
         height = max(mask.labels.shape[0] for mask in masks)
         width = max(mask.labels.shape[1] for mask in masks)
         shape = (len(masks), height, width)
@@ -106,9 +112,7 @@ def _touched_edges(mask: Mask) -> list[bool]:
     return [bool(edge.any()) for edge in (hair[:, 0], hair[0], hair[:, -1], hair[-1])]
 
 
-def _labels(
-    mask: Mask, depth: Float32Array, options: Options
-) -> tuple[UInt8Array, UInt8Array]:
+def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Array, UInt8Array]:
     """Return the label pictures (H, W) that carve the loose and the dense hull."""
     scale = mask.labels.shape[0] / REFERENCE_HEIGHT
     hair = mask.hair.astype(np.uint8)
@@ -147,14 +151,23 @@ def _bounding_box(
     high = scene.head.vertices.max(axis=0).astype(np.float64) + [0.3, 0.3, 0.3]
     coarse = VoxelGrid.around(low, high, 4 * options.voxel_size)
     everywhere = np.ones(coarse.shape, bool)
-    occupied = _carve(coarse, everywhere, views, views.loose, options, _forgiven(None, options, len(views.cameras)))
+    occupied = _carve(
+        coarse,
+        everywhere,
+        views,
+        views.loose,
+        options,
+        _forgiven(None, options, len(views.cameras)),
+    )
     cells = np.argwhere(_largest_part(occupied))
     if not len(cells):
         raise InputError(
             "the hull is empty: the masks of the views do not overlap in space; check masks and cameras"
         )
     shell = 0.012  # room for the shell over the scalp and for strands that leave the hull
-    corners = coarse.origin + np.array([cells.min(axis=0) - 1, cells.max(axis=0) + 2]) * coarse.spacing
+    corners = (
+        coarse.origin + np.array([cells.min(axis=0) - 1, cells.max(axis=0) + 2]) * coarse.spacing
+    )
     scalp = scene.head.vertices[scene.head.scalp > 0.5]
     return (
         np.minimum(corners[0], scalp.min(axis=0) - shell),
@@ -168,7 +181,11 @@ def _carve_both(
     forgive = _forgiven(None, options, len(views.cameras))
     if options.mode == "votes":
         voted = _carve(grid, outside, views, views.loose, options, len(views.cameras))
-        voted = ndimage.binary_erosion(voted, iterations=options.erosions) if options.erosions else voted
+        voted = (
+            ndimage.binary_erosion(voted, iterations=options.erosions)
+            if options.erosions
+            else voted
+        )
         if options.dilations:
             voted = ndimage.binary_dilation(voted, iterations=options.dilations) & outside
         voted = _largest_part(voted)
@@ -176,7 +193,9 @@ def _carve_both(
     body = _clothes_depth(grid, views, options)
     loose = _largest_part(_carve(grid, outside, body, views.loose, options, forgive))
     dense = _carve(grid, loose, body, views.dense, options, forgive)
-    return loose, _largest_part(dense) if dense.any() else loose
+    dense = _largest_part(dense) if dense.any() else loose
+    reach = ndimage.binary_dilation(dense, iterations=options.loose_cells)
+    return loose & reach, dense
 
 
 def _forgiven(residual_px: float | None, options: Options, views: int) -> int:
@@ -229,7 +248,17 @@ def _carve(
 
 @njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
 def _carve_cells(  # type: ignore[no-untyped-def]
-    origin, spacing, candidates, cameras, sizes, open_edges, labels, surface, margin, min_views, forgive
+    origin,
+    spacing,
+    candidates,
+    cameras,
+    sizes,
+    open_edges,
+    labels,
+    surface,
+    margin,
+    min_views,
+    forgive,
 ):
     size_x, size_y, size_z = candidates.shape
     views = labels.shape[0]
@@ -250,7 +279,10 @@ def _carve_cells(  # type: ignore[no-untyped-def]
                     if u < 0 or v < 0 or right or bottom:
                         edge = open_edges[view]
                         unknown = (
-                            (u < 0 and edge[0]) or (v < 0 and edge[1]) or (right and edge[2]) or (bottom and edge[3])
+                            (u < 0 and edge[0])
+                            or (v < 0 and edge[1])
+                            or (right and edge[2])
+                            or (bottom and edge[3])
                         )
                         if not unknown:
                             empty += 1
@@ -262,7 +294,8 @@ def _carve_cells(  # type: ignore[no-untyped-def]
                     if label == 2:
                         hair += 1
                     elif label == 0 or (
-                        label == 1 and depth < surface[view, line, column] - margin
+                        label == 1
+                        and depth < surface[view, line, column] - margin
                         and surface[view, line, column] < 1e9
                     ):
                         empty += 1
