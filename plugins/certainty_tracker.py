@@ -30,7 +30,7 @@ class Options:
     max_turn_deg: float = option(
         60.0, low=5, high=90, unit="deg", doc="A sharper turn in one step is uncertain."
     )
-    max_score: int = option(4, low=1, high=100, doc="Uncertain steps in a row that end a strand.")
+    max_score: int = option(8, low=1, high=100, doc="Uncertain steps in a row that end a strand.")
     blind_steps: int = option(
         8, low=0, high=50, doc="Steps after the root that are never uncertain."
     )

@@ -59,7 +59,7 @@ class Options:
         0.1, low=0, high=100, doc="Weight of the combing prior at the scalp; large values fix it."
     )
     scalp_reach: float = option(
-        0.010, low=0, high=0.1, unit="m", doc="Distance from the scalp within which the prior acts."
+        0.02, low=0, high=0.1, unit="m", doc="Distance from the scalp within which the prior acts."
     )
     scalp_lift: float = option(
         0.6, low=0, high=5, doc="Outward part of the prior against its tangential part."

@@ -44,7 +44,7 @@ class Options:
     )
     slack: float = option(2.0, low=0, high=30, doc="Growth of the hair masks.", unit="px")
     opening: float = option(
-        7.0, low=0, high=40, doc="Opening of the masks that carve the dense hull.", unit="px"
+        4.0, low=0, high=40, doc="Opening of the masks that carve the dense hull.", unit="px"
     )
     loose_cells: int = option(
         3, low=1, high=100, doc="Cells that the loose hull may reach beyond the dense one."
