@@ -18,7 +18,7 @@ from numba import njit, prange
 from scipy import ndimage
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
-from hairkit.combing import combing_direction, growth_potential
+from hairkit.combing import combing_direction, gradient, growth_potential
 from hairkit.diffusion import solve_screened
 from hairkit.options import option
 from hairkit.projection import pack_cameras, project_row, splat_depth
@@ -28,6 +28,9 @@ from hairkit.volume import outer_products, symmetric_matrices
 
 DEPTH_SHRINK = 3
 """Depth maps of the hull are this much smaller than the pictures: cells are larger than pixels."""
+
+HARD_WEIGHT = 1e3
+"""Weight against `smoothness` that keeps a cell as it is."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,10 @@ class Options:
     scalp_reach: float = option(
         0.02, low=0, high=0.1, unit="m", doc="Distance from the scalp within which the prior acts."
     )
+    scalp: str = option(
+        "combed", choices=("combed", "normal"), doc="Direction at the scalp: combed, or its normal."
+    )
+    hard: bool = option(False, doc="Keep fused cells and the scalp as they are (Dirichlet).")
     scalp_lift: float = option(
         0.6, low=0, high=5, doc="Outward part of the prior against its tangential part."
     )
@@ -90,6 +97,8 @@ def solve_field(
     planes = _pooled(planes, hull, options.pool * waves.pitch)
     tensor, certainty = _directions(planes, views, options)
     data, weight = _with_prior(scene, hull, growth, tensor, certainty, options)
+    if options.hard:
+        weight = np.where(weight > 0, HARD_WEIGHT, 0).astype(np.float32)
     solved = solve_screened(
         hull.loose, data, weight, options.smoothness, tolerance=options.tolerance
     )
@@ -223,7 +232,10 @@ def _with_prior(
     if not options.scalp_weight or not near.any():
         return tensor, certainty
     points = hull.grid.centres()[hull.loose][near]
-    comb = combing_direction(scene.head, hull, growth, points, options.scalp_lift)
+    if options.scalp == "normal":
+        comb = gradient(hull.grid, hull.head_distance, points)
+    else:
+        comb = combing_direction(scene.head, hull, growth, points, options.scalp_lift)
     data, weight = tensor.copy(), certainty.copy()
     weight[near] += options.scalp_weight
     share = (options.scalp_weight / weight[near])[:, None]
