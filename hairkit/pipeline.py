@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 from hairkit.assemble import assemble_groom
 from hairkit.capture import Capture
 from hairkit.default_head import default_head
-from hairkit.errors import InputError
+from hairkit.errors import InputError, RenderError
 from hairkit.groom import Groom
 from hairkit.groom_file import write_groom
 from hairkit.head import Head
@@ -28,6 +29,8 @@ from hairkit.volume import Hull, OrientationField
 from hairkit.workfolder import WorkFolder
 
 MAX_GUIDES = 100_000
+SHEET = "contact_sheet.png"
+"""Name of the picture that shows what every stage has found."""
 
 
 def reconstruct(
@@ -41,6 +44,7 @@ def reconstruct(
     seed: int = 0,
     progress: Progress | None = None,
     reuse: bool = True,
+    sheet: bool = True,
 ) -> Groom:
     """Run a recipe on a capture and return the groom.
 
@@ -49,8 +53,9 @@ def reconstruct(
     capture
         The photos, see `hairkit.capture_reader`.
     out
-        Folder for `groom.npz`, `scene.json`, the recipe's exports and `hairkit.log`; its `work/`
-        keeps what the stages found, so that unchanged stages are not run again.
+        Folder for `groom.npz`, `scene.json`, the recipe's exports, `contact_sheet.png` and
+        `hairkit.log`; its `work/` keeps what the stages found, so that unchanged stages are not
+        run again.
     recipe, manager
         Which plugin does each stage, and the plugins.
     head
@@ -63,6 +68,8 @@ def reconstruct(
         Is told how the run goes on.
     reuse
         False runs every stage again.
+    sheet
+        Draw the contact sheet; where there is no OpenGL one line of progress says so.
 
     Raises
     ------
@@ -90,6 +97,9 @@ def reconstruct(
         _in_photo_pixels(made.scene, capture).write_json(folder / "scene.json")
         for plugin, path in export_paths(folder, recipe, manager):
             run.export(plugin, made.groom, path)
+        (folder / SHEET).unlink(missing_ok=True)  # an old one would show another groom
+        if sheet:
+            _draw_sheet(folder / SHEET, capture, made, log)
         manager.notify("groom_ready", groom=made.groom)
         log.write(folder / "hairkit.log", recipe, manager)
     return made.groom
@@ -137,9 +147,23 @@ def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int
     return _Made(labels, angles, hull.value, scene.value, groom)
 
 
+def _draw_sheet(path: Path, capture: Capture, made: _Made, log: RunLog) -> None:
+    from hairkit.contact_sheet import write_contact_sheet  # loads OpenGL
+
+    began = time.perf_counter()
+    log.started("sheet", 1)
+    try:
+        write_contact_sheet(
+            path, capture, made.masks, made.orientations, made.hull, made.groom, made.scene
+        )
+    except RenderError as error:
+        log.message(f"no contact sheet: {error}")
+    log.finished("sheet", time.perf_counter() - began, False)
+
+
 def _sweep(folder: Path) -> None:
     """Remove what a run that was killed had not finished writing."""
-    for name in ("groom", "scene.json", "hairkit.log"):
+    for name in ("groom", "scene.json", "hairkit.log", SHEET):
         for leftover in folder.glob(f".{name}*.part"):
             leftover.unlink(missing_ok=True)
 

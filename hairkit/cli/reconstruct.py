@@ -17,7 +17,8 @@ Example: hairkit reconstruct photos/ -o out/
 Turn eight photos into a groom. PHOTOS is a folder with the photos of the turn: front, then every
 45 degrees towards the subject's left; or a folder with photos/ and, where present, masks/, strokes/
 and landmarks.json, matched by name, and a capture.toml. OUT gets groom.npz, scene.json, the
-recipe's exports and hairkit.log. Run it again after an interruption: it goes on where it stopped.
+recipe's exports, contact_sheet.png and hairkit.log. Run it again after an interruption: it goes on
+where it stopped.
 """
 
 
@@ -41,6 +42,7 @@ def register(subparsers: Any) -> None:
     add("--max-edge", type=int, default=0, metavar="PX", help="scale larger photos to this edge")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--no-cache", action="store_true", help="run every stage again")
+    add("--no-sheet", action="store_true", help="draw no contact sheet")
     add("--quiet", action="store_true", help="say nothing on stderr but errors")
     add("--json", action="store_true", help="print what was made for machines")
 
@@ -49,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     """Reconstruct, and print what was made."""
     from hairkit.capture_reader import WORKING_EDGE, read_capture
     from hairkit.manager import Manager
-    from hairkit.pipeline import export_paths, reconstruct
+    from hairkit.pipeline import SHEET, export_paths, reconstruct
     from hairkit.progress import Recorder, progress_for
     from hairkit.recipe import load_recipe
 
@@ -71,12 +73,15 @@ def run(args: argparse.Namespace) -> int:
             seed=args.seed,
             progress=record,
             reuse=not args.no_cache,
+            sheet=not args.no_sheet,
         )
+    sheet = Path(args.out) / SHEET
     lengths = groom.strands.lengths()
     summary = {
         "groom": str(Path(args.out) / "groom.npz"),
         "scene": str(Path(args.out) / "scene.json"),
         "exports": {name: str(path) for name, path in export_paths(args.out, recipe, manager)},
+        "contact_sheet": str(sheet) if sheet.exists() else None,
         "strands": len(groom.strands),
         "roots": args.guides,
         "mean_length_m": round(float(lengths.mean()), 4),
@@ -111,6 +116,7 @@ def _head(args: argparse.Namespace) -> Any:
 
 def _told(summary: dict[str, Any]) -> str:
     files = [summary["groom"], summary["scene"], *summary["exports"].values()]
+    files += [summary["contact_sheet"]] if summary["contact_sheet"] else []
     return "\n".join(
         [
             f"{summary['strands']} guides of {summary['roots']} roots,"
