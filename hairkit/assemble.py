@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -15,6 +16,7 @@ from hairkit.head import Head, Roots
 from hairkit.mask import Mask
 from hairkit.stored import Float32Array, Float64Array
 from hairkit.strands import Strands
+from hairkit.waves import Waves
 
 SHORTEST = 1e-3
 """Strands shorter than this are no strands, metres."""
@@ -28,7 +30,12 @@ _log = logging.getLogger("hairkit")
 
 
 def assemble_groom(
-    views: Sequence[View], masks: Sequence[Mask], head: Head, roots: Roots, strands: Strands
+    views: Sequence[View],
+    masks: Sequence[Mask],
+    head: Head,
+    roots: Roots,
+    strands: Strands,
+    waves: Waves | None = None,
 ) -> Groom:
     """Return the groom of tracked strands, bound to the head, with the colour of the photos.
 
@@ -42,6 +49,8 @@ def assemble_groom(
         Where the strands start; strand s belongs to root s.
     strands
         What tracking gave; strands shorter than `SHORTEST` are dropped.
+    waves
+        What the photos show of the hair's waves; None means straight hair.
 
     Raises
     ------
@@ -60,7 +69,10 @@ def assemble_groom(
         )
     if kept < ENOUGH * len(roots):
         _log.warning("%d of %d roots gave no strand", len(roots) - kept, len(roots))
-    material = measure_colour(views, masks)
+    curl = waves or Waves()
+    material = replace(
+        measure_colour(views, masks), curl_radius=curl.radius, curl_pitch=curl.pitch
+    )
     grown = strands.select(long_enough)
     packed = Strands(
         grown.points,

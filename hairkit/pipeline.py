@@ -26,6 +26,7 @@ from hairkit.scene import Scene
 from hairkit.stages import Argument, Given, StageRunner
 from hairkit.strands import Strands
 from hairkit.volume import Hull, OrientationField
+from hairkit.waves import measure_waves
 from hairkit.workfolder import WorkFolder
 
 MAX_GUIDES = 100_000
@@ -143,7 +144,10 @@ def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int
     strands = run.once("track", Strands, **seen, hull=hull, field=field, roots=roots)
     labels = tuple(mask.result().value for mask in masks)
     angles = tuple(orientation.result().value for orientation in orientations)
-    groom = assemble_groom(capture.views, labels, scene.value.head, roots.value, strands.value)
+    waves = measure_waves(angles, labels, scene.value.cameras)
+    groom = assemble_groom(
+        capture.views, labels, scene.value.head, roots.value, strands.value, waves
+    )
     return _Made(labels, angles, hull.value, scene.value, groom)
 
 
