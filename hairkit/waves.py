@@ -26,10 +26,14 @@ from hairkit.orientation import OrientationMap, wrap_angle
 from hairkit.stored import Float64Array
 from hairkit.strands import Strands
 
-HIGH_PASS = 25.0
-"""Gaussian in pixels of a picture 1080 high that tells the average direction from the swing."""
-LONGEST_LAG, LINE_LENGTH, LINES = 110, 240, 500
-"""Pixels (of a picture 1080 high) of the autocorrelation and of the lines it is taken on; lines a view."""
+HEIGHT = 540
+"""Waves are measured on maps of this height, where they still span tens of pixels."""
+HIGH_PASS = 12.5
+"""Gaussian in pixels of such a map that tells the average direction from the swing."""
+LONGEST_LAG, LINE_LENGTH, LINES = 55, 120, 500
+"""Pixels of the autocorrelation and of the lines it is taken on; lines a view."""
+SHORTEST_LAG = 5
+"""Half turns of fewer pixels are noise."""
 TROUGH = -0.09
 """Autocorrelation below which there are waves; straight hair has -0.03, noise 0."""
 SWING_LOSS = 1.6
@@ -69,11 +73,14 @@ def measure_waves(
         squares.append(swing)
         slants.append(_mean_slant(found, mask))
         distance = 1.0 if camera.model == "orthographic" else float(camera.depth(np.zeros(3)))
-        metres.append(found.angle.shape[0] / 1080 * distance / camera.focal)
+        metres.append(found.angle.shape[0] / HEIGHT * distance / camera.focal)
     if correlation[0] <= 0:
         return Waves()
     trough = int(np.argmin(correlation))
-    if correlation[trough] > TROUGH * correlation[0] or not 8 <= trough < LONGEST_LAG - 1:
+    if (
+        correlation[trough] > TROUGH * correlation[0]
+        or not SHORTEST_LAG <= trough < LONGEST_LAG - 1
+    ):
         return Waves()
     pitch = 2 * trough * float(np.median(metres))
     mean, error = np.mean(slants), np.std(slants) / np.sqrt(len(slants))
@@ -124,12 +131,12 @@ def add_waves(strands: Strands, waves: Waves, seed: int = 0, ramp: float = 0.03)
 
 def _swing(found: OrientationMap, mask: Mask) -> tuple[float, Float64Array]:
     """Return the mean square of the angle's swing, radians squared, and its autocorrelation (LAGS,)."""
-    scale = found.angle.shape[0] / 1080
-    size = (round(found.angle.shape[1] / scale), 1080)
-    radius = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (15, 15))
-    weight = cv2.resize(found.confidence * cv2.erode(mask.hair.astype(np.uint8), radius), size)
+    size = (round(found.angle.shape[1] * HEIGHT / found.angle.shape[0]), HEIGHT)
+    inside = cv2.resize(mask.hair.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+    inside = cv2.erode(inside, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7)))
+    weight = cv2.resize(found.confidence, size, interpolation=cv2.INTER_AREA) * inside
     vector = np.stack([np.cos(2 * found.angle), np.sin(2 * found.angle)], axis=-1)
-    vector = cv2.resize(vector, size) * weight[..., None]
+    vector = cv2.resize(vector, size, interpolation=cv2.INTER_AREA) * weight[..., None]
     smooth = cv2.GaussianBlur(vector, (0, 0), HIGH_PASS)
     average = 0.5 * np.arctan2(smooth[..., 1], smooth[..., 0])
     angle = 0.5 * np.arctan2(vector[..., 1], vector[..., 0])

@@ -77,7 +77,7 @@ class Options:
         high=1,
         doc="Cells this far along the longest way from the scalp count as tips.",
     )
-    tolerance: float = option(1e-3, low=1e-8, high=0.1, doc="Relative residual of the solver.")
+    tolerance: float = option(2e-2, low=1e-8, high=0.1, doc="Relative residual of the solver.")
 
 
 @hookimpl
