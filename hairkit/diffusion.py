@@ -43,7 +43,8 @@ def solve_screened(
     smoothness
         The factor `s` above 0 of the neighbour differences.
     tolerance
-        Stop when the residual of every column fell below this share of the right-hand side.
+        Stop when the residual of every column fell below this share of the right-hand side, both
+        over the diagonal: fixed cells, whose weight is huge, would else hide unsolved others.
     start
         (N, C) first guess; the solution on cells twice as large when None.
 
@@ -140,7 +141,7 @@ def _operate(neighbours, weight, smoothness, values, result, partial):  # type: 
 
 @njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
 def _advance(x, r, p, ap, inverse, alpha, squares, products):  # type: ignore[no-untyped-def]
-    """Step x and r along p; chunks' sums of r * r and r * r / diagonal go to squares and products."""
+    """Step x, r along p; sum chunks' (r / diagonal)^2 into squares, r^2 / diagonal into products."""
     count, channels = x.shape
     size = (count + CHUNKS - 1) // CHUNKS
     for chunk in prange(CHUNKS):
@@ -151,8 +152,9 @@ def _advance(x, r, p, ap, inverse, alpha, squares, products):  # type: ignore[no
                 x[i, c] += alpha[c] * p[i, c]
                 residual = r[i, c] - alpha[c] * ap[i, c]
                 r[i, c] = residual
-                squares[chunk, c] += residual * residual
-                products[chunk, c] += residual * residual * inverse[i]
+                step = residual * inverse[i]
+                squares[chunk, c] += step * step
+                products[chunk, c] += residual * step
 
 
 @njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
@@ -188,7 +190,7 @@ def _conjugate_gradients(neighbours, data, weight, smoothness, tolerance, max_it
     for i in range(count):
         for c in range(channels):
             b = weight[i] * data[i, c]
-            size[c] += b * b
+            size[c] += (b * inverse[i]) ** 2
             r[i, c] = b - ap[i, c]
             p[i, c] = inverse[i] * r[i, c]
             rz[c] += r[i, c] * p[i, c]
