@@ -78,7 +78,10 @@ def _rasterize(row, vertices, faces, depth):  # type: ignore[no-untyped-def]
                 wb = ((u[c] - px) * (v[a] - py) - (v[c] - py) * (u[a] - px)) / area
                 wc = 1.0 - wa - wb
                 if wa >= -1e-9 and wb >= -1e-9 and wc >= -1e-9:
-                    z = wa * d[a] + wb * d[b] + wc * d[c]
+                    if row[15] > 0.5:
+                        z = wa * d[a] + wb * d[b] + wc * d[c]
+                    else:  # in perspective 1 / z is linear in the picture, z is not
+                        z = 1.0 / (wa / d[a] + wb / d[b] + wc / d[c])
                     if z < depth[y, x]:
                         depth[y, x] = z
 
