@@ -33,7 +33,7 @@ _HALVING_VARIANCE = 1.0
 """Square pixels that averaging 2 x 2 pixels and interpolating back add to a Gaussian."""
 
 COHERENT_WINDOW = 9
-COHERENT_RESULTANT = 0.8
+COHERENT_RESULTANT = 0.85
 
 
 def picture_scale(height: int) -> float:
