@@ -159,7 +159,7 @@ def test_a_good_start_needs_no_iteration_and_a_bad_one_no_luck() -> None:
 
 @pytest.mark.parametrize("size", [4, 16])
 def test_parts_without_data_stay_in_the_range_of_the_others(size: int) -> None:
-    """Two blocks that do not touch: where nothing is known values are finite and no new extremes."""
+    """Two blocks that do not touch: where nothing is known values are no new extremes."""
     occupied = np.ones((2 * size + 2, size, size), bool)
     occupied[size : size + 2] = False
     data, weight = problem(occupied, columns=1)
@@ -173,7 +173,7 @@ def test_parts_without_data_stay_in_the_range_of_the_others(size: int) -> None:
 
 @given(st.integers(0, 1000), st.floats(0.1, 1))
 def test_neighbours_are_mutual_and_one_cell_away(seed: int, filled: float) -> None:
-    """The neighbour of my neighbour across the same face is me; all occupied neighbours are found."""
+    """The neighbour of my neighbour across the same face is me; none is missed."""
     occupied = porous((4, 5, 3), filled, seed)
     occupied[0, 0, 0] = True
     neighbours = cell_neighbours(occupied)
