@@ -1,7 +1,8 @@
 """How hair flows where photos say little: ways through the hair from the scalp and to its tips.
 
-The way from the scalp and the way to the tips are chamfer distances through the hull (Borgefors 1986), so hair
-flows from every root along the shortest way to where it ends: partings and bare faces appear by themselves.
+The way from the scalp and the way to the tips are chamfer distances through the hull (Borgefors
+1986), so hair flows from every root along the shortest way to where it ends: partings and bare
+faces appear by themselves.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ from hairkit.stored import BoolArray, Float32Array, Float64Array
 from hairkit.volume import Hull, VoxelGrid
 
 WHORL_BEHIND = 0.03
-"""Metres behind the highest point of the head where the vertical axis of the crown's whorl stands."""
+"""Metres behind the highest point of the head where the vertical axis of the crown's whorl
+stands."""
 SHORT_HAIR, LONG_HAIR = 0.03, 0.1
-"""Ways to the tips in metres below which hair is combed from the crown, and above which by the flow."""
+"""Ways to the tips in metres below which hair is combed from the crown, and above which by the
+flow."""
 FLOW_SMOOTHING = 2.0
 """Standard deviation in cells that makes the chamfer distance's gradient smooth."""
 
@@ -26,11 +29,12 @@ FLOW_SMOOTHING = 2.0
 def combing_direction(
     head: Head, hull: Hull, growth: Float32Array, points: npt.ArrayLike, lift: float
 ) -> Float64Array:
-    """Return unit directions (N, 3), root to tip, in which hair leaves the scalp near `points` (N, 3).
+    """Return unit directions (N, 3), root to tip, in which hair leaves the scalp near `points` (N,
+    3).
 
-    Long hair: the tangential part of the growth potential's gradient. Hair shorter than `SHORT_HAIR`, which ends
-    everywhere: "0.7 away from the crown's axis + 1 down". In between a blend; made unit, plus `lift` times the
-    outward normal.
+    Long hair: the tangential part of the growth potential's gradient. Hair shorter than
+    `SHORT_HAIR`, which ends everywhere: "0.7 away from the crown's axis + 1 down". In between a
+    blend; made unit, plus `lift` times the outward normal.
     """
     at = np.asarray(points, np.float64)
     outward = gradient(hull.grid, hull.head_distance, at)
@@ -59,7 +63,8 @@ def _from_crown(head: Head, at: Float64Array, outward: Float64Array) -> Float64A
 
 
 def gradient(grid: VoxelGrid, values: Float32Array, points: npt.ArrayLike) -> Float64Array:
-    """Return the unit gradient (N, 3) of values (X, Y, Z) at points (N, 3); zero where it vanishes."""
+    """Return the unit gradient (N, 3) of values (X, Y, Z) at points (N, 3); zero where it
+    vanishes."""
     at, h = np.asarray(points, np.float64), grid.spacing
     slope = np.stack(
         [
@@ -74,7 +79,8 @@ def gradient(grid: VoxelGrid, values: Float32Array, points: npt.ArrayLike) -> Fl
 
 
 def growth_potential(head: Head, hull: Hull, tip_share: float) -> Float32Array:
-    """Return (X, Y, Z) minus the way to the tips through the hair, metres, smoothed; it grows root to tip.
+    """Return (X, Y, Z) minus the way to the tips through the hair, metres, smoothed; it grows root
+    to tip.
 
     Tips are the dense cells whose way from the scalp is at least `tip_share` of the hair's length.
     """
@@ -86,16 +92,19 @@ def growth_potential(head: Head, hull: Hull, tip_share: float) -> Float32Array:
     weight = ndimage.gaussian_filter(known.astype(np.float32), FLOW_SMOOTHING)
     total = ndimage.gaussian_filter(np.where(known, left, 0).astype(np.float32), FLOW_SMOOTHING)
     smooth = total / np.maximum(weight, 1e-6)
-    return np.where(weight > 1e-3, -smooth, -smooth.max()).astype(np.float32)
+    growth: Float32Array = np.where(weight > 1e-3, -smooth, -smooth.max()).astype(np.float32)
+    return growth
 
 
 def hair_length(hull: Hull, way: Float32Array) -> float:
-    """Return how long hair can be: nearly the longest way (its 98th percentile) from the scalp, metres."""
+    """Return how long hair can be: nearly the longest way (its 98th percentile) from the scalp,
+    metres."""
     return float(np.percentile(way[hull.dense], 98))
 
 
 def scalp_way(head: Head, hull: Hull) -> Float32Array:
-    """Return (X, Y, Z) the shortest way from the scalp through loose cells, metres; 0 where there is none."""
+    """Return (X, Y, Z) the shortest way from the scalp through loose cells, metres; 0 where
+    there is none."""
     start = np.zeros(hull.grid.shape, bool)
     cells = hull.grid.nearest_cell(head.vertices[head.scalp > 0.5])
     start[tuple(cells.T)] = True
@@ -105,15 +114,17 @@ def scalp_way(head: Head, hull: Hull) -> Float32Array:
 
 
 def chamfer_way(occupied: BoolArray, start: BoolArray, spacing: float) -> Float32Array:
-    """Return (X, Y, Z) the shortest way through occupied cells from the start cells; infinite where none.
+    """Return (X, Y, Z) the shortest way through occupied cells from the start cells; infinite where
+    none.
 
-    Sweeps in the eight diagonal orders until nothing changes, steps along edges and diagonals of cells.
+    Sweeps in the eight diagonal orders until nothing changes, steps along edges and diagonals of
+    cells.
     """
     way: Float32Array = _chamfer(occupied, start, np.float32(spacing))
     return way
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _chamfer(occupied, start, spacing):  # type: ignore[no-untyped-def]
     nx, ny, nz = occupied.shape
     way = np.full(occupied.shape, np.inf, np.float32)

@@ -1,8 +1,10 @@
-"""Screened diffusion on the cells of a mask: the one linear solver that fields and potentials share.
+"""Screened diffusion on the cells of a mask: the one linear solver that fields and potentials
+share.
 
-Minimises `sum_i c_i |u_i - d_i|^2 + s * sum_(i,j) |u_i - u_j|^2` over the occupied cells, the sum over pairs of
-face neighbours inside the mask (no flux through its border). This is the tensor diffusion of Paris et al. 2008
-("Hair photobooth", section 4) with soft instead of hard constraints; a very large `c` makes a cell fixed.
+Minimises `sum_i c_i |u_i - d_i|^2 + s * sum_(i,j) |u_i - u_j|^2` over the occupied cells, the sum
+over pairs of face neighbours inside the mask (no flux through its border). This is the tensor
+diffusion of Paris et al. 2008 ("Hair photobooth", section 4) with soft instead of hard constraints;
+a very large `c` makes a cell fixed.
 """
 
 from __future__ import annotations
@@ -48,7 +50,8 @@ def solve_screened(
     start
         (N, C) first guess; the solution on cells twice as large when None.
 
-    Raises `InputError` when shapes disagree or no weight is positive (then there is no unique answer).
+    Raises `InputError` when shapes disagree or no weight is positive (then there is no unique
+    answer).
     """
     count = int(np.count_nonzero(occupied))
     if data.shape[:1] != (count,) or weight.shape != (count,):
@@ -58,7 +61,7 @@ def solve_screened(
     if not (weight > 0).any():
         raise InputError("diffusion needs at least one cell with a weight above 0")
     guess = start if start is not None else _coarse_guess(occupied, data, weight, smoothness)
-    return _conjugate_gradients(
+    solution: Float32Array = _conjugate_gradients(
         cell_neighbours(occupied),
         np.ascontiguousarray(data, np.float32),
         np.ascontiguousarray(weight, np.float32),
@@ -67,6 +70,7 @@ def solve_screened(
         max_iterations,
         np.array(guess, np.float32, order="C"),
     )
+    return solution
 
 
 def _coarse_guess(
@@ -74,8 +78,8 @@ def _coarse_guess(
 ) -> Float32Array:
     """Return (N, C) the solution on cells twice as large: nested iteration (Brandt 1977).
 
-    Eight cells merge into one: weights add up, data average by weight, and the factor between neighbours doubles
-    (four times the face, twice the distance).
+    Eight cells merge into one: weights add up, data average by weight, and the factor between
+    neighbours doubles (four times the face, twice the distance).
     """
     shape = tuple(-(-n // 2) for n in occupied.shape)
     if len(data) < COARSEST_CELLS:
@@ -95,7 +99,8 @@ def _coarse_guess(
 
 
 def cell_neighbours(occupied: BoolArray) -> Int32Array:
-    """Return (N, 6) the row of each occupied cell's face neighbours (-x, +x, -y, +y, -z, +z), -1 for none."""
+    """Return (N, 6) the row of each occupied cell's face neighbours (-x, +x, -y, +y, -z, +z), -1
+    for none."""
     number = np.full(np.add(occupied.shape, 2), -1, np.int32)
     inner = number[1:-1, 1:-1, 1:-1]
     inner[occupied] = np.arange(np.count_nonzero(occupied), dtype=np.int32)
@@ -109,16 +114,18 @@ def cell_neighbours(occupied: BoolArray) -> Int32Array:
 def apply_operator(
     neighbours: Int32Array, weight: npt.NDArray[Any], smoothness: float, values: npt.NDArray[Any]
 ) -> npt.NDArray[Any]:
-    """Return `(diag(c) + s L) u` for `values` (N, C): the readable twin of the compiled operator."""
+    """Return `(diag(c) + s L) u` for `values` (N, C): the compiled operator's readable twin."""
     padded = np.concatenate([values, np.zeros_like(values[:1])])
     degree = (neighbours >= 0).sum(axis=1)[:, None]
     total = sum(padded[neighbours[:, k]] for k in range(6))
-    return weight[:, None] * values + smoothness * (degree * values - total)
+    result: npt.NDArray[Any] = weight[:, None] * values + smoothness * (degree * values - total)
+    return result
 
 
-@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, parallel=True)
 def _operate(neighbours, weight, smoothness, values, result, partial):  # type: ignore[no-untyped-def]
-    """Write `A values` into result and the chunks' sums of values * result into partial (CHUNKS, C)."""
+    """Write `A values` into result and the chunks' sums of values * result into partial (CHUNKS,
+    C)."""
     count, channels = values.shape
     size = (count + CHUNKS - 1) // CHUNKS
     for chunk in prange(CHUNKS):
@@ -139,9 +146,10 @@ def _operate(neighbours, weight, smoothness, values, result, partial):  # type: 
                 partial[chunk, c] += values[i, c] * result[i, c]
 
 
-@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, parallel=True)
 def _advance(x, r, p, ap, inverse, alpha, squares, products):  # type: ignore[no-untyped-def]
-    """Step x, r along p; sum chunks' (r / diagonal)^2 into squares, r^2 / diagonal into products."""
+    """Step x, r along p; sum chunks' (r / diagonal)^2 into squares, r^2 / diagonal into
+    products."""
     count, channels = x.shape
     size = (count + CHUNKS - 1) // CHUNKS
     for chunk in prange(CHUNKS):
@@ -157,7 +165,7 @@ def _advance(x, r, p, ap, inverse, alpha, squares, products):  # type: ignore[no
                 products[chunk, c] += residual * step
 
 
-@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, parallel=True)
 def _turn(p, r, inverse, beta):  # type: ignore[no-untyped-def]
     count, channels = p.shape
     for i in prange(count):
@@ -165,11 +173,12 @@ def _turn(p, r, inverse, beta):  # type: ignore[no-untyped-def]
             p[i, c] = inverse[i] * r[i, c] + beta[c] * p[i, c]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _conjugate_gradients(neighbours, data, weight, smoothness, tolerance, max_iterations, x):  # type: ignore[no-untyped-def]
     """Jacobi-preconditioned conjugate gradients, one scalar recursion a column, columns in step.
 
-    Sums are taken over a fixed number of chunks, so the result does not depend on the number of threads.
+    Sums are taken over a fixed number of chunks, so the result does not depend on the number of
+    threads.
     """
     count, channels = data.shape
     inverse = np.empty(count, np.float32)

@@ -1,4 +1,5 @@
-"""Compiled projection shared by carving, fusion and depth maps: cameras packed as rows of numbers."""
+"""Compiled projection shared by carving, fusion and depth maps: cameras packed as rows of
+numbers."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ PERSPECTIVE, ORTHOGRAPHIC = 0.0, 1.0
 
 
 def pack_cameras(cameras: Sequence[Camera]) -> Float64Array:
-    """Return (V, 20): rotation row by row (9), translation (3), focal, centre (2), model, position (3), height.
+    """Return (V, 20): rotation row by row (9), translation (3), focal, centre (2), model, position
+    (3), height.
 
     Model is 0 for perspective and 1 for orthographic. `project_row` reads these rows.
     """
@@ -31,9 +33,10 @@ def pack_cameras(cameras: Sequence[Camera]) -> Float64Array:
     return rows
 
 
-@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
+@njit(cache=True, inline="always")
 def project_row(row, x, y, z):  # type: ignore[no-untyped-def]
-    """Return pixel u, v and axial depth of a head-frame point; depth <= 0 means behind the camera."""
+    """Return pixel u, v and axial depth of a head-frame point; depth <= 0 means behind the
+    camera."""
     cx = row[0] * x + row[1] * y + row[2] * z + row[9]
     cy = row[3] * x + row[4] * y + row[5] * z + row[10]
     cz = row[6] * x + row[7] * y + row[8] * z + row[11]
@@ -45,13 +48,14 @@ def project_row(row, x, y, z):  # type: ignore[no-untyped-def]
 
 
 def head_depth(head: Head, camera: Camera) -> Float32Array:
-    """Return (H, W) the axial depth of the head's first surface at every pixel, infinity where none is."""
+    """Return (H, W) the axial depth of the head's first surface at every pixel, infinity where
+    none is."""
     depth = np.full((camera.height, camera.width), np.inf, np.float32)
     _rasterize(pack_cameras([camera])[0], head.vertices.astype(np.float64), head.faces, depth)
     return depth
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _rasterize(row, vertices, faces, depth):  # type: ignore[no-untyped-def]
     height, width = depth.shape
     n = len(vertices)
@@ -86,7 +90,7 @@ def _rasterize(row, vertices, faces, depth):  # type: ignore[no-untyped-def]
                         depth[y, x] = z
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def splat_depth(row, points, radius, depth):  # type: ignore[no-untyped-def]
     """Lower `depth` (h, w) to the axial depth of points (N, 3) drawn as squares of `radius` metres.
 

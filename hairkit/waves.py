@@ -1,12 +1,13 @@
 """Waves of the hair: measured in the orientation maps of the photos, and put back on tracked axes.
 
-Strands of wavy hair are helices whose neighbours are out of step. Eight photos cannot resolve them one by one,
-but they show three numbers. Along the average direction the angle swings, so its autocorrelation has a trough at
-half a turn: that is the pitch. The near half of a helix faces the camera and slants all one way, in every view
-alike, by `tan(slant) = 4 radius / pitch` on average (the mean of a cosine over its half turn is 2 / pi): where
-hair turns one way, the slant gives radius and handedness, and it must be taken off before views are fused,
-since it is no direction that hair grows in. Where hair turns both ways the slants cancel, and the swing's rms
-gives the radius.
+Strands of wavy hair are helices whose neighbours are out of step. Eight photos cannot resolve them
+one by one, but they show three numbers. Along the average direction the angle swings, so its
+autocorrelation has a trough at half a turn: that is the pitch. The near half of a helix faces the
+camera and slants all one way, in every view alike, by `tan(slant) = 4 radius / pitch` on average
+(the mean of a cosine over its half turn is 2 / pi): where hair turns one way, the slant gives
+radius and handedness, and it must be taken off before views are fused, since it is no direction
+that hair grows in. Where hair turns both ways the slants cancel, and the swing's rms gives the
+radius.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ SHORTEST_LAG = 5
 TROUGH = -0.09
 """Autocorrelation below which there are waves; straight hair has -0.03, noise 0."""
 SWING_LOSS = 1.6
-"""Orientation maps average strands that are out of step; the swing they keep is smaller by about this."""
+"""Orientation maps average strands that are out of step; the swing they keep is smaller by about
+this."""
 FULL_HAIR = 0.003
 """Roots closer than this, metres, carry every strand its own phase; see `add_waves`."""
 SURE_SLANT = 2.5
@@ -101,9 +103,9 @@ def without_slant(found: OrientationMap, waves: Waves) -> OrientationMap:
 def add_waves(strands: Strands, waves: Waves, seed: int = 0, ramp: float = 0.03) -> Strands:
     """Wind strands of equal point counts around their own axes.
 
-    The helix grows in over `ramp` metres from the root. Phases vary smoothly over the scalp, so that guides can be
-    interpolated; strands closer than `FULL_HAIR` are no guides but hair, and are out of step as real ones are.
-    Without a handedness, wisps turn either way.
+    The helix grows in over `ramp` metres from the root. Phases vary smoothly over the scalp, so
+    that guides can be interpolated; strands closer than `FULL_HAIR` are no guides but hair, and are
+    out of step as real ones are. Without a handedness, wisps turn either way.
     """
     if waves.radius <= 0 or waves.pitch <= 0 or len(strands) == 0:
         return strands
@@ -130,7 +132,8 @@ def add_waves(strands: Strands, waves: Waves, seed: int = 0, ramp: float = 0.03)
 
 
 def _swing(found: OrientationMap, mask: Mask) -> tuple[float, Float64Array]:
-    """Return the mean square of the angle's swing, radians squared, and its autocorrelation (LAGS,)."""
+    """Return the mean square of the angle's swing, radians squared, and its autocorrelation
+    (LAGS,)."""
     size = (round(found.angle.shape[1] * HEIGHT / found.angle.shape[0]), HEIGHT)
     inside = cv2.resize(mask.hair.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     inside = cv2.erode(inside, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7)))
@@ -151,7 +154,7 @@ def _swing(found: OrientationMap, mask: Mask) -> tuple[float, Float64Array]:
     return float(mean[0]), np.where(count > LINES, mean, 0)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _autocorrelation(average, swing, weight, starts, length, lags):  # type: ignore[no-untyped-def]
     """Sum swing[i] * swing[i + lag] along lines that follow `average`; and the number of terms."""
     height, width = swing.shape
@@ -181,7 +184,8 @@ def _autocorrelation(average, swing, weight, starts, length, lags):  # type: ign
 
 
 def _mean_slant(found: OrientationMap, mask: Mask) -> float:
-    """Return the mean angle of the strands off the vertical, radians, positive from +y towards -x."""
+    """Return the mean angle of the strands off the vertical, radians, positive from +y towards
+    -x."""
     weight = found.confidence * mask.hair
     turned = 2 * (found.angle - np.float32(np.pi / 2))
     return 0.5 * float(np.arctan2((weight * np.sin(turned)).sum(), (weight * np.cos(turned)).sum()))
@@ -203,7 +207,8 @@ def _transported_frames(points: Float64Array) -> tuple[Float64Array, Float64Arra
 
 
 def _disorder(roots: Float64Array) -> float:
-    """Return 0 for roots further apart than guides' 2 `FULL_HAIR`, 1 for those closer than `FULL_HAIR`."""
+    """Return 0 for roots further apart than guides' 2 `FULL_HAIR`, 1 for those closer than
+    `FULL_HAIR`."""
     if len(roots) < 2:
         return 0.0
     spacing = float(np.median(cKDTree(roots).query(roots, k=2)[0][:, 1]))

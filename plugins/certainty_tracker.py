@@ -1,15 +1,18 @@
-"""Strand tracking through the orientation field with certain and uncertain states (thesis 6.1 and 6.2).
+"""Strand tracking through the orientation field with certain and uncertain states (thesis 6.1 and
+6.2).
 
-From each root a strand follows the field in small steps, its sign kept along the growth. A step is uncertain when
-it lies outside the hair or the field turns too sharply; a strand then goes straight on and ends after `max_score`
-uncertain steps in a row (the rules of the thesis, whose field sampling is replaced by trilinear tensors and
-midpoint steps). Strands are pushed out of the head, may slide along the skin of the hull when they meet it at a
-small angle, are smoothed after Iben et al. 2013, cut where they turn up into a U, and resampled.
+From each root a strand follows the field in small steps, its sign kept along the growth. A step is
+uncertain when it lies outside the hair or the field turns too sharply; a strand then goes straight
+on and ends after `max_score` uncertain steps in a row (the rules of the thesis, whose field
+sampling is replaced by trilinear tensors and midpoint steps). Strands are pushed out of the head,
+may slide along the skin of the hull when they meet it at a small angle, are smoothed after Iben et
+al. 2013, cut where they turn up into a U, and resampled.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -17,9 +20,17 @@ from scipy import ndimage
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, Strands, hookimpl
 from hairkit.combing import combing_direction, gradient, hair_length, scalp_way
+from hairkit.field_sampling import gradient_at, make_unit, principal_direction, sample_at
 from hairkit.options import option
-from hairkit.stored import Float32Array, Float64Array, Int64Array
+from hairkit.stored import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.waves import add_waves, measure_waves
+
+ROOT_STEPS, ROOT_INERTIA = 4, 0.7
+"""Near the scalp the field is weak: the first steps keep more of their direction."""
+ACROSS = 0.2
+"""Cosine below which a strand and the field are nearly square to each other."""
+SKIN_SMOOTHING, SKIN_LEVEL = 1.5, 0.6
+"""Gaussian in cells of the hull's occupancy, and its level that strands slide along."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +92,8 @@ def track(
     roots: Roots,
     options: Options,
 ) -> Strands:
-    """Grow one strand from every root, trim and smooth it, wind it into waves, keep it out of the head."""
+    """Grow one strand from every root, trim and smooth it, wind it into waves, keep it out of
+    the head."""
     directions = _start_directions(scene, hull, field, roots, options)
     points, counts = _grow(scene, hull, field, roots, directions, options)
     points, counts = _trimmed(points, counts, options.u_share)
@@ -114,7 +126,7 @@ def _start_directions(
     normals = roots.normals.astype(np.float64)
     if options.start == "combed":
         return combing_direction(scene.head, hull, field.growth, roots.positions, options.lift)
-    # thesis 6.1: the normal turned by G about n x (0, -1, 0); where that axis vanishes the normal stays
+    # thesis 6.1: the normal turned by G about n x (0, -1, 0); where that axis vanishes it stays
     axis = np.cross(normals, [0.0, -1.0, 0.0])
     length = np.linalg.norm(axis, axis=1, keepdims=True)
     axis = axis / np.maximum(length, 1e-9)
@@ -134,211 +146,183 @@ def _grow(
 ) -> tuple[Float32Array, Int64Array]:
     """Return padded points (N, M, 3) and how many of each strand are real (N,), at least two."""
     step = options.step * field.grid.spacing
-    steps = int(np.ceil(options.max_length / step)) + 1
     inside = ndimage.binary_dilation(hull.dense) & hull.loose
-    outward = ndimage.gaussian_filter(inside.astype(np.float32), 1.5)
-    slide_length = options.slide_share * hair_length(hull, scalp_way(scene.head, hull))
-    points = np.zeros((len(roots), steps + 1, 3), np.float32)
-    counts = np.zeros(len(roots), np.int64)
-    _track_all(
+    skin = ndimage.gaussian_filter(inside.astype(np.float32), SKIN_SMOOTHING)
+    volumes = _Volumes(
         field.grid.origin,
         field.grid.spacing,
         field.tensor,
-        field.growth,
+        field.growth[..., None],
         inside,
-        outward,
-        hull.head_distance,
-        roots.positions.astype(np.float64),
-        directions,
+        skin[..., None],
+        hull.head_distance[..., None],
+    )
+    rules = _Rules(
         step,
-        np.cos(np.radians(options.max_turn_deg)),
+        float(np.cos(np.radians(options.max_turn_deg))),
         options.max_score,
         options.blind_steps,
         options.inertia,
         options.slide_sine,
-        slide_length,
+        options.slide_share * hair_length(hull, scalp_way(scene.head, hull)),
         options.clearance,
-        points,
-        counts,
     )
+    points = np.zeros((len(roots), int(np.ceil(options.max_length / step)) + 2, 3), np.float32)
+    counts = np.zeros(len(roots), np.int64)
+    _track_all(volumes, rules, roots.positions.astype(np.float64), directions, points, counts)
     return points[:, : max(int(counts.max()), 2)], counts
 
 
-@njit(cache=True, inline="always")  # type: ignore[untyped-decorator]
-def _sample(origin, spacing, values, p, result):  # type: ignore[no-untyped-def]
-    """Trilinear sample of values (X, Y, Z, C) at p into result (C,)."""
-    nx, ny, nz, channels = values.shape
-    fx = min(max((p[0] - origin[0]) / spacing - 0.5, 0.0), nx - 1.001)
-    fy = min(max((p[1] - origin[1]) / spacing - 0.5, 0.0), ny - 1.001)
-    fz = min(max((p[2] - origin[2]) / spacing - 0.5, 0.0), nz - 1.001)
-    ix, iy, iz = int(fx), int(fy), int(fz)
-    tx, ty, tz = fx - ix, fy - iy, fz - iz
-    for c in range(channels):
-        low = (values[ix, iy, iz, c] * (1 - tz) + values[ix, iy, iz + 1, c] * tz) * (1 - ty) + (
-            values[ix, iy + 1, iz, c] * (1 - tz) + values[ix, iy + 1, iz + 1, c] * tz
-        ) * ty
-        high = (values[ix + 1, iy, iz, c] * (1 - tz) + values[ix + 1, iy, iz + 1, c] * tz) * (
-            1 - ty
-        ) + (values[ix + 1, iy + 1, iz, c] * (1 - tz) + values[ix + 1, iy + 1, iz + 1, c] * tz) * ty
-        result[c] = low * (1 - tx) + high * tx
+class _Volumes(NamedTuple):
+    """What the compiled walk reads; scalars have a last axis of one."""
+
+    origin: Float64Array
+    spacing: float
+    tensors: Float32Array
+    growth: Float32Array
+    inside: BoolArray
+    skin: Float32Array
+    head_distance: Float32Array
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _gradient(origin, spacing, values, p, result):  # type: ignore[no-untyped-def]
-    """Central difference of values (X, Y, Z, 1) at p, made unit, into result (3,); zero where flat."""
-    at = np.empty(3)
-    one = np.empty(1)
-    for axis in range(3):
-        at[:] = p
-        at[axis] = p[axis] + spacing
-        _sample(origin, spacing, values, at, one)
-        high = one[0]
-        at[axis] = p[axis] - spacing
-        _sample(origin, spacing, values, at, one)
-        result[axis] = high - one[0]
-    norm = np.sqrt(result[0] ** 2 + result[1] ** 2 + result[2] ** 2)
-    if norm > 1e-9:
+class _Rules(NamedTuple):
+    """The options in the units of the walk: metres, cosines, steps."""
+
+    step: float
+    min_cosine: float
+    max_score: int
+    blind_steps: int
+    inertia: float
+    slide_sine: float
+    slide_length: float
+    clearance: float
+
+
+@njit(cache=True, parallel=True)
+def _track_all(volumes, rules, starts, directions, points, counts):  # type: ignore[no-untyped-def]
+    for s in prange(len(starts)):
+        counts[s] = _track_one(volumes, rules, starts[s], directions[s], points[s])
+
+
+@njit(cache=True)
+def _track_one(volumes, rules, start, direction, points):  # type: ignore[no-untyped-def]
+    """Write one strand into points (M, 3); returns its number of points up to the last sure one."""
+    p, d, found = start.copy(), direction.copy(), np.empty(3)
+    points[0] = p
+    points[1] = p + rules.step * d
+    sure, score = 1, rules.max_score
+    for i in range(1, len(points)):
+        if not _in_grid(volumes, p):
+            break
+        blind = i <= rules.blind_steps
+        cosine = _follow(volumes, rules, p, d, found)
+        certain = blind or (cosine >= rules.min_cosine and _in_hair(volumes, p))
+        if cosine >= rules.min_cosine or (blind and cosine > -1):
+            keep = rules.inertia if i > ROOT_STEPS else max(rules.inertia, ROOT_INERTIA)
+            for axis in range(3):
+                d[axis] = keep * d[axis] + (1 - keep) * found[axis]
+        if i * rules.step < rules.slide_length:
+            _slide(volumes, rules, p, d)
+        if not make_unit(d):
+            break
         for axis in range(3):
-            result[axis] /= norm
+            p[axis] += rules.step * d[axis]
+        if not _push_out(volumes, rules, p, d):
+            break
+        points[i] = p
+        if certain:
+            score = rules.max_score
+            sure = i + 1
+        else:
+            score -= 1
+            if score <= 0:
+                break
+    return max(sure, 2)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _principal(tensor, direction, result):  # type: ignore[no-untyped-def]
-    """Power iteration from `direction`; returns False where the tensor vanishes or says nothing."""
-    x, y, z = direction[0], direction[1], direction[2]
-    for _ in range(6):
-        a = tensor[0] * x + tensor[3] * y + tensor[4] * z
-        b = tensor[3] * x + tensor[1] * y + tensor[5] * z
-        c = tensor[4] * x + tensor[5] * y + tensor[2] * z
-        norm = np.sqrt(a * a + b * b + c * c)
-        if norm < 1e-6:
+@njit(cache=True)
+def _follow(volumes, rules, p, d, found):  # type: ignore[no-untyped-def]
+    """Write the field's direction half a step on (midpoint rule) into found (3,), signed along d.
+
+    Returns its cosine with d: negative where the growth potential turned the sign against d, -1
+    where the field knows nothing.
+    """
+    tensor, middle = np.empty(6), np.empty(3)
+    sample_at(volumes.origin, volumes.spacing, volumes.tensors, p, tensor)
+    if not principal_direction(tensor, d, found):
+        return -1.0
+    for axis in range(3):
+        middle[axis] = p[axis] + 0.5 * rules.step * found[axis]
+    sample_at(volumes.origin, volumes.spacing, volumes.tensors, middle, tensor)
+    if not principal_direction(tensor, found, found):
+        return -1.0
+    cosine = found[0] * d[0] + found[1] * d[1] + found[2] * d[2]
+    if cosine < 0:
+        found[:] = -found
+        cosine = -cosine
+    if cosine < ACROSS:  # the previous direction cannot tell the ends apart: the growth does
+        gradient_at(volumes.origin, volumes.spacing, volumes.growth, p, middle)
+        if found[0] * middle[0] + found[1] * middle[1] + found[2] * middle[2] < 0:
+            found[:] = -found
+            cosine = -cosine
+    return cosine
+
+
+@njit(cache=True)
+def _slide(volumes, rules, p, d):  # type: ignore[no-untyped-def]
+    """Bend d along the hull's skin where the next cell lies beyond it and the angle is small."""
+    ahead, normal, inside = np.empty(3), np.empty(3), np.empty(1)
+    for axis in range(3):
+        ahead[axis] = p[axis] + volumes.spacing * d[axis]
+    sample_at(volumes.origin, volumes.spacing, volumes.skin, ahead, inside)
+    if inside[0] >= SKIN_LEVEL:
+        return
+    gradient_at(volumes.origin, volumes.spacing, volumes.skin, p, normal)
+    sine = -(d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2])
+    if sine < rules.slide_sine:
+        pull = max(sine, 0.0) + SKIN_LEVEL - inside[0]
+        for axis in range(3):
+            d[axis] += pull * normal[axis]
+
+
+@njit(cache=True)
+def _push_out(volumes, rules, p, d):  # type: ignore[no-untyped-def]
+    """Lift p to the clearance over the head and take d's inward part; False where d vanishes."""
+    distance, normal = np.empty(1), np.empty(3)
+    sample_at(volumes.origin, volumes.spacing, volumes.head_distance, p, distance)
+    if distance[0] >= rules.clearance:
+        return True
+    gradient_at(volumes.origin, volumes.spacing, volumes.head_distance, p, normal)
+    inward = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]
+    for axis in range(3):
+        p[axis] += (rules.clearance - distance[0]) * normal[axis]
+        if inward < 0:
+            d[axis] -= inward * normal[axis]
+    return make_unit(d)
+
+
+@njit(cache=True)
+def _in_grid(volumes, p):  # type: ignore[no-untyped-def]
+    for axis in range(3):
+        cell = int(np.floor((p[axis] - volumes.origin[axis]) / volumes.spacing))
+        if cell < 0 or cell >= volumes.inside.shape[axis]:
             return False
-        x, y, z = a / norm, b / norm, c / norm
-    if x * direction[0] + y * direction[1] + z * direction[2] < 0:
-        x, y, z = -x, -y, -z
-    result[0], result[1], result[2] = x, y, z
     return True
 
 
-@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
-def _track_all(  # type: ignore[no-untyped-def]
-    origin,
-    spacing,
-    tensors,
-    growth,
-    inside,
-    density,
-    head_distance,
-    starts,
-    directions,
-    step,
-    min_cosine,
-    max_score,
-    blind_steps,
-    inertia,
-    slide_sine,
-    slide_length,
-    clearance,
-    points,
-    counts,
-):
-    shape = np.array(inside.shape)
-    density4 = density.reshape((*density.shape, 1))
-    head4 = head_distance.reshape((*head_distance.shape, 1))
-    growth4 = growth.reshape((*growth.shape, 1))
-    for s in prange(len(starts)):
-        p = starts[s].copy()
-        d = directions[s].copy()
-        tensor, six = np.empty(6), np.empty(6)
-        found, middle, normal, one = np.empty(3), np.empty(3), np.empty(3), np.empty(1)
-        points[s, 0] = p
-        count, sure, score = 1, 1, max_score
-        for i in range(points.shape[1] - 1):
-            # the field here and half a step on (midpoint rule)
-            _sample(origin, spacing, tensors, p, tensor)
-            known = _principal(tensor, d, found)
-            if known:
-                for axis in range(3):
-                    middle[axis] = p[axis] + 0.5 * step * found[axis]
-                _sample(origin, spacing, tensors, middle, six)
-                known = _principal(six, found, found)
-            cosine = 0.0
-            if known:
-                cosine = found[0] * d[0] + found[1] * d[1] + found[2] * d[2]
-                if cosine < 0:
-                    found[:] = -found
-                    cosine = -cosine
-                if cosine < 0.2:  # nearly across: the way from the scalp decides which end leads on
-                    _gradient(origin, spacing, growth4, p, normal)
-                    if found[0] * normal[0] + found[1] * normal[1] + found[2] * normal[2] < 0:
-                        found[:] = -found
-                        cosine = -cosine
-            blind = i < blind_steps
-            ok = True
-            for axis in range(3):
-                cell = int(np.floor((p[axis] - origin[axis]) / spacing))
-                ok = ok and 0 <= cell < shape[axis]
-            if not ok:
-                break
-            here = inside[
-                int((p[0] - origin[0]) / spacing),
-                int((p[1] - origin[1]) / spacing),
-                int((p[2] - origin[2]) / spacing),
-            ]
-            certain = known and cosine >= min_cosine and (here or blind)
-            if known and (cosine >= min_cosine or blind):
-                keep = inertia if i >= 4 else max(inertia, 0.7)
-                for axis in range(3):
-                    d[axis] = keep * d[axis] + (1 - keep) * found[axis]
-            # slide along the hull's skin instead of leaving it at a small angle
-            if slide_sine > 0 and count * step < slide_length:
-                for axis in range(3):
-                    middle[axis] = p[axis] + spacing * d[axis]
-                _sample(origin, spacing, density4, middle, one)
-                if one[0] < 0.6:
-                    _gradient(origin, spacing, density4, p, normal)
-                    sine = -(d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2])
-                    if sine < slide_sine:
-                        pull = max(sine, 0.0) + 0.6 - one[0]
-                        for axis in range(3):
-                            d[axis] += pull * normal[axis]
-            norm = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
-            if norm < 1e-6:
-                break
-            for axis in range(3):
-                d[axis] /= norm
-                p[axis] += step * d[axis]
-            _sample(origin, spacing, head4, p, one)
-            if one[0] < clearance:
-                _gradient(origin, spacing, head4, p, normal)
-                inward = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]
-                for axis in range(3):
-                    p[axis] += (clearance - one[0]) * normal[axis]
-                    if inward < 0:
-                        d[axis] -= inward * normal[axis]
-                norm = np.sqrt(d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
-                if norm < 1e-6:
-                    break
-                for axis in range(3):
-                    d[axis] /= norm
-            points[s, count] = p
-            count += 1
-            if certain or blind:
-                score = max_score
-                sure = count
-            else:
-                score -= 1
-                if score <= 0:
-                    break
-        counts[s] = max(sure, 2)
-        if sure < 2:
-            points[s, 1] = starts[s] + step * directions[s]
+@njit(cache=True)
+def _in_hair(volumes, p):  # type: ignore[no-untyped-def]
+    x = int((p[0] - volumes.origin[0]) / volumes.spacing)
+    y = int((p[1] - volumes.origin[1]) / volumes.spacing)
+    z = int((p[2] - volumes.origin[2]) / volumes.spacing)
+    return volumes.inside[x, y, z]
 
 
 def _trimmed(
     points: Float32Array, counts: Int64Array, share: float
 ) -> tuple[Float32Array, Int64Array]:
-    """Cut strands that turn up into a U (thesis 6.2): at the first upward step after the first downward one."""
+    """Cut strands that turn up into a U (thesis 6.2): at the first upward step after the first
+    downward one."""
     if share >= 1:
         return points, counts
     rise = np.diff(points[:, :, 1], axis=1)
@@ -352,10 +336,11 @@ def _trimmed(
 
 
 def _smoothed(points: Float32Array, iterations: int) -> Float32Array:
-    """Smooth strands (N, M, 3) after Iben et al. 2013: edge vectors by a recursive low-pass, root fixed.
+    """Smooth strands (N, M, 3) after Iben et al. 2013: edge vectors by a recursive low-pass, root
+    fixed.
 
-    Each pass filters the edges from the root on and back again, then puts the edges together; edge lengths are
-    restored, so that a strand keeps its length.
+    Each pass filters the edges from the root on and back again, then puts the edges together; edge
+    lengths are restored, so that a strand keeps its length.
     """
     if iterations == 0 or points.shape[1] < 3:
         return points

@@ -1,11 +1,13 @@
-"""3D orientation field: planes of all views fused by confidence, the rest of the hair filled by tensor diffusion.
+"""3D orientation field: planes of all views fused by confidence, the rest of the hair filled by
+tensor diffusion.
 
-A 2D orientation and the ray through its pixel span a plane that holds the strand; with plane normals N_i the
-direction D minimises `sum w_i (N_i . D)^2` (Wei et al. 2005; thesis 5.3 with the weights the right way round).
-Every view may speak about a cell, with a weight that falls with the cell's depth behind the first hair the view
-sees ("see-through"). D D^T is diffused with its certainty (Paris et al. 2008; thesis 5.4); near the scalp, where
-photos say nothing, a weak combing prior says how hair leaves the head. A potential that grows with the way
-through the hair from the scalp settles later which end of a strand is the tip.
+A 2D orientation and the ray through its pixel span a plane that holds the strand; with plane
+normals N_i the direction D minimises `sum w_i (N_i . D)^2` (Wei et al. 2005; thesis 5.3 with the
+weights the right way round). Every view may speak about a cell, with a weight that falls with the
+cell's depth behind the first hair the view sees ("see-through"). D D^T is diffused with its
+certainty (Paris et al. 2008; thesis 5.4); near the scalp, where photos say nothing, a weak combing
+prior says how hair leaves the head. A potential that grows with the way through the hair from the
+scalp settles later which end of a strand is the tip.
 """
 
 from __future__ import annotations
@@ -22,9 +24,9 @@ from hairkit.combing import combing_direction, gradient, growth_potential
 from hairkit.diffusion import solve_screened
 from hairkit.options import option
 from hairkit.projection import pack_cameras, project_row, splat_depth
-from hairkit.stored import BoolArray, Float32Array, Float64Array
-from hairkit.waves import measure_waves, without_slant
+from hairkit.stored import Float32Array, Float64Array
 from hairkit.volume import outer_products, symmetric_matrices
+from hairkit.waves import measure_waves, without_slant
 
 DEPTH_SHRINK = 3
 """Depth maps of the hull are this much smaller than the pictures: cells are larger than pixels."""
@@ -42,7 +44,7 @@ class Options:
         low=0,
         high=0.2,
         unit="m",
-        doc="Depth behind the first hair at which a view's weight falls to 1/e; 0 for visible cells only.",
+        doc="Depth behind the first hair at which a view's weight falls to 1/e; 0: visible only.",
     )
     free_depth: float = option(
         0.006, low=0, high=0.05, unit="m", doc="Depth behind the first hair that costs no weight."
@@ -88,7 +90,8 @@ def solve_field(
     hull: Hull,
     options: Options,
 ) -> OrientationField:
-    """Fuse, add the scalp prior, diffuse over the loose hull, and measure the way from the scalp."""
+    """Fuse, add the scalp prior, diffuse over the loose hull, and measure the way from the
+    scalp."""
     waves = measure_waves(orientations, masks, scene.cameras)
     if options.unslant:
         orientations = tuple(without_slant(found, waves) for found in orientations)
@@ -145,8 +148,9 @@ def _fuse(
 def _pooled(planes: Float64Array, hull: Hull, sigma: float) -> Float64Array:
     """Return the planes (N, 6) averaged over a Gaussian neighbourhood of `sigma` metres.
 
-    Planes of two views 45 degrees apart amplify disagreement into depth, and strands that wave out of step
-    disagree. Pooled before they are intersected, their angles average; afterwards the amplified error would.
+    Planes of two views 45 degrees apart amplify disagreement into depth, and strands that wave out
+    of step disagree. Pooled before they are intersected, their angles average; afterwards the
+    amplified error would.
     """
     if sigma <= 0:
         return planes
@@ -159,7 +163,7 @@ def _pooled(planes: Float64Array, hull: Hull, sigma: float) -> Float64Array:
     return result
 
 
-@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, parallel=True)
 def _add_planes(  # type: ignore[no-untyped-def]
     row, points, inner, angle, certainty, front, see_through, free_depth, planes, count
 ):

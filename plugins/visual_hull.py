@@ -1,15 +1,18 @@
-"""Visual hull of the hair: votes of silhouettes, or the three-label carve that also cuts out head and body.
+"""Visual hull of the hair: votes of silhouettes, or the three-label carve that also cuts out head
+and body.
 
-`votes` is the thesis's hull (5.2, after Laurentini 1994): a cell is hair when at least `min_views` views see hair
-there, then erosions and dilations. `labels` uses all that a mask says: a view empties a cell where it sees
-background, and where it sees the person *behind* the cell; a surface in front of the cell says nothing. Hair that
-a view shows only as wisps does not fill a volume: `dense` is carved with opened masks, `loose` with the masks as
-they are. Cells that are empty in at most `forgive` views are kept, which survives camera errors.
+`votes` is the thesis's hull (5.2, after Laurentini 1994): a cell is hair when at least `min_views`
+views see hair there, then erosions and dilations. `labels` uses all that a mask says: a view
+empties a cell where it sees background, and where it sees the person *behind* the cell; a surface
+in front of the cell says nothing. Hair that a view shows only as wisps does not fill a volume:
+`dense` is carved with opened masks, `loose` with the masks as they are. Cells that are empty in at
+most `forgive` views are kept, which survives camera errors.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -25,6 +28,8 @@ from hairkit.projection import head_depth, pack_cameras, project_row, splat_dept
 from hairkit.stored import BoolArray, Float32Array, UInt8Array
 
 EMPTY, PERSON, HAIR, UNSEEN = 0, 1, 2, 3
+POOR_CAMERAS = 8.0
+"""Misfit in pixels of a picture 1080 high above which one empty vote is forgiven."""
 REFERENCE_HEIGHT = 1080
 """Pixel options are stated for pictures this high and scaled to others."""
 
@@ -83,8 +88,11 @@ class _Views:
     loose: UInt8Array
     dense: UInt8Array
     surface: Float32Array
+    forgive: int
+    """Views that may call a hair cell empty."""
     open_edges: BoolArray
-    """(V, 4) hair touches the picture's left, top, right, bottom edge: nothing is known beyond it."""
+    """(V, 4) hair touches the picture's left, top, right, bottom edge: nothing is known beyond
+    it."""
 
     @classmethod
     def of(cls, scene: Scene, masks: tuple[Mask, ...], options: Options) -> _Views:
@@ -104,7 +112,8 @@ class _Views:
             loose[i, :h, :w], dense[i, :h, :w] = _labels(mask, depth, options)
         edges = np.array([_touched_edges(mask) for mask in masks])
         sizes = np.array([mask.labels.shape[::-1] for mask in masks], np.float64)
-        return cls(pack_cameras(scene.cameras), sizes, loose, dense, surface, edges)
+        forgive = _forgiven(scene, options)
+        return cls(pack_cameras(scene.cameras), sizes, loose, dense, surface, forgive, edges)
 
 
 def _touched_edges(mask: Mask) -> list[bool]:
@@ -121,11 +130,10 @@ def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Arr
     if not mask.person_known:
         rest[np.isfinite(depth)] = PERSON
         rest[_below_head(depth) :] = PERSON
-    if options.mode == "votes" or not options.opening:
-        core = hair
-    else:
-        core = cv2.erode(hair, _disc(options.opening * scale), borderValue=1)
-        core = cv2.dilate(core, _disc((options.opening + options.slack) * scale))
+    core: npt.NDArray[Any] = hair
+    if options.mode == "labels" and options.opening:
+        eroded = cv2.erode(hair, _disc(options.opening * scale), borderValue=1)
+        core = cv2.dilate(eroded, _disc((options.opening + options.slack) * scale))
     bare = np.where(hair > 0, EMPTY, rest)
     return (
         np.where(grown > 0, HAIR, rest).astype(np.uint8),
@@ -148,7 +156,7 @@ def _bounding_box(
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return the corners of the box that holds the hair, found on cells four times as large."""
     low = scene.head.vertices.min(axis=0).astype(np.float64) - [0.3, 0.5, 0.3]
-    high = scene.head.vertices.max(axis=0).astype(np.float64) + [0.3, 0.3, 0.3]
+    high = [*scene.head.vertices.max(axis=0).astype(np.float64), 0.3, 0.3, 0.3]
     coarse = VoxelGrid.around(low, high, 4 * options.voxel_size)
     everywhere = np.ones(coarse.shape, bool)
     occupied = _carve(
@@ -157,12 +165,13 @@ def _bounding_box(
         views,
         views.loose,
         options,
-        _forgiven(None, options, len(views.cameras)),
+        views.forgive,
     )
     cells = np.argwhere(_largest_part(occupied))
     if not len(cells):
         raise InputError(
-            "the hull is empty: the masks of the views do not overlap in space; check masks and cameras"
+            "the hull is empty: the masks of the views do not overlap in space; "
+            "check masks and cameras"
         )
     shell = 0.012  # room for the shell over the scalp and for strands that leave the hull
     corners = (
@@ -178,7 +187,7 @@ def _bounding_box(
 def _carve_both(
     grid: VoxelGrid, outside: BoolArray, views: _Views, options: Options
 ) -> tuple[BoolArray, BoolArray]:
-    forgive = _forgiven(None, options, len(views.cameras))
+    forgive = views.forgive
     if options.mode == "votes":
         voted = _carve(grid, outside, views, views.loose, options, len(views.cameras))
         voted = (
@@ -198,12 +207,17 @@ def _carve_both(
     return loose & reach, dense
 
 
-def _forgiven(residual_px: float | None, options: Options, views: int) -> int:
-    return options.forgive if options.forgive >= 0 else 0
+def _forgiven(scene: Scene, options: Options) -> int:
+    """Return how many empty votes a cell survives: the option, or one if cameras are poor."""
+    if options.forgive >= 0:
+        return options.forgive
+    limit = POOR_CAMERAS * scene.cameras[0].height / REFERENCE_HEIGHT
+    return int(scene.residual_px is not None and scene.residual_px > limit)
 
 
 def _clothes_depth(grid: VoxelGrid, views: _Views, options: Options) -> _Views:
-    """Return the views with a surface where they see clothes: the person's hull plus `body_margin`."""
+    """Return the views with a surface where they see clothes: the person's hull plus
+    `body_margin`."""
     person = np.where(views.loose == EMPTY, EMPTY, np.where(views.loose == UNSEEN, UNSEEN, HAIR))
     everything = np.ones(grid.shape, bool)
     hull = _carve(grid, everything, views, person.astype(np.uint8), options, 0)
@@ -229,7 +243,8 @@ def _carve(
     options: Options,
     forgive: int,
 ) -> BoolArray:
-    """Return the candidate cells (X, Y, Z) with enough hair votes and at most `forgive` empty ones."""
+    """Return the candidate cells (X, Y, Z) with enough hair votes and at most `forgive` empty
+    ones."""
     kept: BoolArray = _carve_cells(
         grid.origin,
         grid.spacing,
@@ -246,7 +261,7 @@ def _carve(
     return kept
 
 
-@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, parallel=True)
 def _carve_cells(  # type: ignore[no-untyped-def]
     origin,
     spacing,
@@ -306,12 +321,13 @@ def _carve_cells(  # type: ignore[no-untyped-def]
 
 
 def _largest_part(occupied: BoolArray) -> BoolArray:
-    """Return the largest connected part and every other one at least a tenth as large, holes filled."""
+    """Return the largest connected part and every other one at least a tenth as large, holes
+    filled."""
     parts, count = ndimage.label(occupied)
     if count == 0:
         return occupied
     sizes = np.bincount(parts.ravel())[1:]
-    keep = np.concatenate([[False], sizes >= 0.1 * sizes.max()])
+    keep = np.array([False, *(sizes >= 0.1 * sizes.max())])
     return np.asarray(keep[parts], bool)
 
 
