@@ -70,9 +70,7 @@ def assemble_groom(
     if kept < ENOUGH * len(roots):
         _log.warning("%d of %d roots gave no strand", len(roots) - kept, len(roots))
     curl = waves or Waves()
-    material = replace(
-        measure_colour(views, masks), curl_radius=curl.radius, curl_pitch=curl.pitch
-    )
+    material = replace(measure_colour(views, masks), curl_radius=curl.radius, curl_pitch=curl.pitch)
     grown = strands.select(long_enough)
     packed = Strands(
         grown.points,

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_erosion, gaussian_filter
 
 from hairkit.camera import Camera
 from hairkit.capture import Capture
@@ -17,10 +17,12 @@ from hairkit.errors import InputError
 from hairkit.groom import Groom
 from hairkit.mask import HAIR, PERSON, Mask
 from hairkit.orientation import OrientationMap
-from hairkit.render import Lights, draw_views
+from hairkit.render import Lights, Solid, draw_views
 from hairkit.scene import Scene
-from hairkit.stored import Float32Array, UInt8Array, write_bytes
+from hairkit.stored import UInt8Array, write_bytes
+from hairkit.strands import Strands
 from hairkit.volume import Hull
+from hairkit.volume_surface import volume_surface
 
 TILE_WIDTH = 160
 """Width of one picture on the sheet, pixels."""
@@ -32,6 +34,9 @@ HAIRS = 2500
 """Strands of the hair in the last row: a pixel of a tile is millimetres wide."""
 GUIDE_POINTS = 20
 """Points a strand in the pictures."""
+CLAY = (0.16, 0.15, 0.14)
+"""Linear RGB of the hull."""
+EXPOSURE = 1.0
 
 PAPER, INK = 250, 60
 _HAIR_TINT, _PERSON_TINT = (232, 60, 132), (70, 130, 235)
@@ -109,68 +114,31 @@ def _orientation_picture(map_: OrientationMap, size: tuple[int, int]) -> UInt8Ar
 
 
 def _hull_pictures(hull: Hull, cameras: Sequence[Camera]) -> list[UInt8Array]:
-    """Return the dense cells from each camera as shaded clay, splatted from far to near."""
-    surface = hull.dense & ~binary_erosion(hull.dense)
-    cells = np.argwhere(surface)
-    centres = hull.grid.origin + (cells + 0.5) * hull.grid.spacing
-    normals = _outward_normals(hull, cells)
-    return [_splatted(camera, centres, normals, hull.grid.spacing) for camera in cameras]
-
-
-def _outward_normals(hull: Hull, cells: npt.NDArray[np.int64]) -> Float32Array:
-    smooth = gaussian_filter(hull.dense.astype(np.float32), 2.0)
-    padded = np.pad(smooth, 1)
-    at = tuple((cells + 1).T)
-    slopes = []
-    for axis in range(3):
-        step = np.eye(3, dtype=np.int64)[axis][:, None]
-        slopes.append(padded[tuple(at + step)] - padded[tuple(at - step)])
-    normals = -np.stack(slopes, axis=1)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    result: Float32Array = (normals / np.maximum(length, 1e-9)).astype(np.float32)
-    return result
-
-
-def _splatted(
-    camera: Camera,
-    centres: npt.NDArray[np.float64],
-    normals: Float32Array,
-    spacing: float,
-) -> UInt8Array:
-    depth = camera.depth(centres)
-    order = np.argsort(-depth)  # near cells are written last and so stay
-    facing = -(normals * camera.view_direction(centres)).sum(axis=1)
-    normals = normals * np.where(facing < 0, -1, 1)[:, None]  # thin hair shows its inside too
-    light = camera.rotation.T @ np.array([-0.5, -0.6, -0.62])
-    shade = 40 + 70 * np.abs(facing) + 120 * np.clip(normals @ light, 0, 1)
-    pixels = camera.project(centres)[order]
-    scale = camera.focal / (depth.min() if camera.model == "perspective" else 1.0)
-    reach = int(np.ceil(0.87 * spacing * scale))  # half a diagonal: oblique rows leave no gaps
-    picture = np.full((camera.height + 2 * reach, camera.width + 2 * reach), 20, np.uint8)
-    nearest = np.floor(pixels).astype(np.int64)
-    inside = ((nearest >= 0) & (nearest < [camera.width, camera.height])).all(axis=1)
-    column, row = nearest[inside].T
-    value = shade[order][inside].astype(np.uint8)
-    for dy in range(2 * reach):
-        for dx in range(2 * reach):
-            picture[row + dy, column + dx] = value
-    picture = np.asarray(cv2.medianBlur(picture, 3))  # cells at one depth leave specks
-    cropped = picture[reach : reach + camera.height, reach : reach + camera.width]
-    return np.repeat(cropped[..., None], 3, axis=2)
+    """Return the dense cells from each camera, as clay."""
+    vertices, faces, normals = volume_surface(hull.grid, hull.dense)
+    clay = Solid(
+        vertices, faces, normals, np.tile(np.float32(CLAY), (len(vertices), 1)), scatter=0.0
+    )
+    nothing = Strands(np.empty((0, 3), np.float32), np.zeros(1, np.int64))
+    return draw_views(nothing, None, cameras, solids=[clay], lights=_lights())
 
 
 def _guide_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
     guides = groom.strands.resampled(GUIDE_POINTS)
-    lights = Lights.studio((0.4, 0.8, 0.6), (-0.4, 0.7, -0.6))
     return draw_views(
-        guides, groom.head, cameras, material=groom.material, lights=lights, show_direction=True
+        guides, groom.head, cameras, material=groom.material, lights=_lights(), show_direction=True
     )
 
 
 def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
     hair = densify(groom, HAIRS).resampled(GUIDE_POINTS)
-    lights = Lights.studio((0.4, 0.8, 0.6), (-0.4, 0.7, -0.6))
-    return draw_views(hair, groom.head, cameras, material=groom.material, lights=lights)
+    return draw_views(hair, groom.head, cameras, material=groom.material, lights=_lights())
+
+
+def _lights() -> Lights:
+    """Return lights from front and back alike, bright as a window: the photos go around."""
+    lights = Lights.studio((0.4, 0.8, 0.6), (-0.4, 0.7, -0.6), EXPOSURE)
+    return replace(lights, rim_colour=lights.key_colour)
 
 
 def _arranged(

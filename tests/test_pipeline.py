@@ -13,7 +13,7 @@ import pytest
 from ball import RECIPE
 
 from hairkit import Capture, Groom, Mask, hookimpl
-from hairkit.errors import InputError, PluginError
+from hairkit.errors import InputError, PluginError, RenderError
 from hairkit.groom_file import read_groom
 from hairkit.manager import Manager
 from hairkit.pipeline import export_paths, reconstruct
@@ -34,7 +34,7 @@ def run(out: Path, *settings: str, extra: dict[str, object] | None = None, **cho
         manager.register(plugin, name)
     recipe = parse_recipe(RECIPE.encode(), "ball", "test").with_set(settings)
     capture = choices.pop("capture", None) or turn_capture()
-    choices = {"guides": 40, "head": ball_head()} | choices
+    choices = {"guides": 40, "head": ball_head(), "sheet": False} | choices
     return reconstruct(capture, out, recipe, manager, **choices)
 
 
@@ -64,9 +64,25 @@ def test_photos_become_a_groom_and_its_files(tmp_path: Path) -> None:
 
 def test_two_runs_give_identical_files(tmp_path: Path) -> None:
     """Nothing of time, folder or threads is in the results."""
-    run(tmp_path / "a")
-    run(tmp_path / "b")
+    run(tmp_path / "a", sheet=True)
+    run(tmp_path / "b", sheet=True)
+    assert "contact_sheet.png" in files(tmp_path / "a")
     assert files(tmp_path / "a") == files(tmp_path / "b")
+
+
+def test_without_opengl_only_the_sheet_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The rest is made, one line says why, and no sheet of another groom is left."""
+    run(tmp_path, sheet=True)
+
+    def refuse(*_: object) -> None:
+        raise RenderError("no OpenGL 4.3 context")
+
+    monkeypatch.setattr("hairkit.contact_sheet.write_contact_sheet", refuse)
+    run(tmp_path, sheet=True, seed=1)
+    assert set(files(tmp_path)) == {"groom.npz", "scene.json", "groom.ball"}
+    assert "no contact sheet: no OpenGL 4.3 context" in (tmp_path / "hairkit.log").read_text()
 
 
 def test_cameras_are_for_the_photos_on_disk(tmp_path: Path) -> None:
@@ -118,7 +134,7 @@ def test_the_plugins_own_file_is_part_of_the_digest(tmp_path: Path) -> None:
         recipe = parse_recipe(RECIPE.encode(), "ball", "test")
         reconstruct(
             turn_capture(), tmp_path / "out", recipe, manager,
-            head=ball_head(), guides=40, progress=record,
+            head=ball_head(), guides=40, progress=record, sheet=False,
         )  # fmt: skip
         assert [stage["reused"] for stage in record.stages] == [False] * 8
 

@@ -56,20 +56,22 @@ def test_results_on_stdout_progress_on_stderr(
     assert main(words) == 0
     printed = capsys.readouterr()
     assert printed.out.startswith("30 guides of 30 roots, mean length 3.0 cm")
-    assert str(tmp_path / "out" / "groom.ball") in printed.out
-    assert [line.split()[0] for line in printed.err.splitlines()][-2:] == ["track", "ball_plugin"]
+    for name in ("groom.ball", "contact_sheet.png"):
+        assert str(tmp_path / "out" / name) in printed.out
+    assert [line.split()[0] for line in printed.err.splitlines()][-2:] == ["ball_plugin", "sheet"]
     assert main([*words, "--quiet"]) == 0
     assert capsys.readouterr().err == ""
 
 
 def test_json_is_for_machines(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     """With --json stdout is one JSON document, and a second run says what it has kept."""
+    made_again = ("ball_plugin", "sheet")
     for reused in (False, True):
         assert main([*words, "--json"]) == 0
         document = json.loads(capsys.readouterr().out)
         assert document["strands"] == document["roots"] == 30
         assert Path(document["groom"]).is_file()
-        kept = {s["stage"]: s["reused"] for s in document["stages"] if s["stage"] != "ball_plugin"}
+        kept = {s["stage"]: s["reused"] for s in document["stages"] if s["stage"] not in made_again}
         assert set(kept.values()) == {reused}
     assert main([*words, "--json", "--no-cache"]) == 0
     assert not any(s["reused"] for s in json.loads(capsys.readouterr().out)["stages"])
