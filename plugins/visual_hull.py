@@ -155,8 +155,8 @@ def _bounding_box(
     scene: Scene, views: _Views, options: Options
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return the corners of the box that holds the hair, found on cells four times as large."""
-    low = scene.head.vertices.min(axis=0).astype(np.float64) - [0.3, 0.5, 0.3]
-    high = [*scene.head.vertices.max(axis=0).astype(np.float64), 0.3, 0.3, 0.3]
+    low = scene.head.vertices.min(axis=0).astype(np.float64) - np.array([0.3, 0.5, 0.3])
+    high = scene.head.vertices.max(axis=0).astype(np.float64) + np.array([0.3, 0.3, 0.3])
     coarse = VoxelGrid.around(low, high, 4 * options.voxel_size)
     everywhere = np.ones(coarse.shape, bool)
     occupied = _carve(
