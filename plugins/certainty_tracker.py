@@ -1,5 +1,4 @@
-"""Strand tracking through the orientation field with certain and uncertain states (thesis 6.1 and
-6.2).
+"""Strand tracking through the field with certain and uncertain states (thesis 6.1 and 6.2).
 
 From each root a strand follows the field in small steps, its sign kept along the growth. A step is
 uncertain when it lies outside the hair or the field turns too sharply; a strand then goes straight
@@ -221,7 +220,7 @@ def _track_one(volumes, rules, start, direction, points):  # type: ignore[no-unt
             keep = rules.inertia if i > ROOT_STEPS else max(rules.inertia, ROOT_INERTIA)
             for axis in range(3):
                 d[axis] = keep * d[axis] + (1 - keep) * found[axis]
-        if i * rules.step < rules.slide_length:
+        if rules.slide_sine > 0 and i * rules.step < rules.slide_length:
             _slide(volumes, rules, p, d)
         if not make_unit(d):
             break
