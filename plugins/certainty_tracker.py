@@ -166,7 +166,8 @@ def _grow(
         options.slide_share * hair_length(hull, scalp_way(scene.head, hull)),
         options.clearance,
     )
-    points = np.zeros((len(roots), int(np.ceil(options.max_length / step)) + 2, 3), np.float32)
+    steps = max(int(options.max_length / step + 1e-6), 1)
+    points = np.zeros((len(roots), steps + 1, 3), np.float32)
     counts = np.zeros(len(roots), np.int64)
     _track_all(volumes, rules, roots.positions.astype(np.float64), directions, points, counts)
     return points[:, : max(int(counts.max()), 2)], counts
