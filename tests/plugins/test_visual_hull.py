@@ -171,7 +171,7 @@ def test_wisps_are_loose_and_not_dense() -> None:
     lock = [[0.02, y, 0.0] for y in (0.145, 0.15)]
     assert held(hull, hull.loose, np.array(lock)).all()
     assert not held(hull, hull.dense, np.array(lock)).any()
-    assert hull.dense[true_cells(hull, cap, 3 * PIXEL)].mean() > 0.99
+    assert hull.dense[true_cells(hull, cap, 3 * PIXEL)].mean() > 0.97
 
 
 def test_roots_lie_in_the_hull() -> None:
