@@ -1,5 +1,4 @@
-"""3D orientation field: planes of all views fused by confidence, the rest of the hair filled by
-tensor diffusion.
+"""3D orientation field: planes of all views fused by confidence, the rest filled by diffusion.
 
 A 2D orientation and the ray through its pixel span a plane that holds the strand; with plane
 normals N_i the direction D minimises `sum w_i (N_i . D)^2` (Wei et al. 2005; thesis 5.3 with the

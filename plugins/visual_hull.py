@@ -1,5 +1,4 @@
-"""Visual hull of the hair: votes of silhouettes, or the three-label carve that also cuts out head
-and body.
+"""Visual hull of the hair: votes of silhouettes, or a carve that cuts out head and body too.
 
 `votes` is the thesis's hull (5.2, after Laurentini 1994): a cell is hair when at least `min_views`
 views see hair there, then erosions and dilations. `labels` uses all that a mask says: a view

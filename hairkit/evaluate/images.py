@@ -15,6 +15,7 @@ from hairkit.camera import Camera
 from hairkit.errors import InputError
 from hairkit.evaluate.scores import Samples
 from hairkit.evaluate.surface import Surface, first_surface, point_depth
+from hairkit.filtering import coherent_truth
 from hairkit.head import Head
 from hairkit.orientation import OrientationMap, angle_between
 from hairkit.projection import head_depth, pack_cameras, project_row
@@ -30,9 +31,6 @@ HAIR_WIDTH = 0.0015
 """Width at which hair is drawn into silhouettes, metres."""
 EDGE_PX = 4
 """The mask is eroded by this many pixels before orientation errors are taken."""
-COHERENT = 0.9
-"""Least length of the mean double-angle vector where the truth counts as running one way."""
-_COHERENCE_PX = 4.0
 
 HIDDEN, RIGHT, WRONG = 0, 1, 2
 """Verdicts on a drawn sample; hidden also where the truth has no hair."""
@@ -43,7 +41,7 @@ class OrientationError:
     """Error of a 2D orientation map over the true hair, its edge left out."""
 
     mean_deg: float
-    """Where the truth is coherent: strands run one way within a few pixels."""
+    """Where the truth is coherent, see `hairkit.filtering.coherent_truth`."""
     median_deg: float
     mean_everywhere_deg: float
     """Coherent or not."""
@@ -87,7 +85,7 @@ def orientation_error(
         raise InputError(f"true orientation has shape {truth.shape}, the hair mask {hair.shape}")
     edge = np.ones((2 * EDGE_PX + 1, 2 * EDGE_PX + 1), np.uint8)
     inner = (cv2.erode(hair.astype(np.uint8), edge) > 0) & (truth > 0)
-    coherent = inner & (coherence(truth) > COHERENT)
+    coherent = inner & coherent_truth(truth_angle(truth).astype(np.float32), truth > 0)
     if not coherent.any():
         raise InputError("no pixel of true hair is left to take the orientation error over")
     error = orientation_gap(orientation, truth)
@@ -111,17 +109,6 @@ def orientation_gap(
 def truth_angle(truth: npt.NDArray[np.uint8]) -> Float64Array:
     """Return (H, W) radians in [0, pi): the middle of the bin that each value 1..255 stands for."""
     return (truth.astype(np.float64) - 0.5) / 255 * np.pi
-
-
-def coherence(truth: npt.NDArray[np.uint8]) -> Float32Array:
-    """Return (H, W) in [0, 1]: how far the truth runs one way around each pixel of hair."""
-    hair = (truth > 0).astype(np.float32)
-    double = 2 * truth_angle(truth).astype(np.float32)
-    weight, east, south = (
-        cv2.GaussianBlur(channel, (0, 0), _COHERENCE_PX)
-        for channel in (hair, hair * np.cos(double), hair * np.sin(double))
-    )
-    return np.asarray(np.hypot(east, south) / np.maximum(weight, 1e-6), np.float32)
 
 
 def mask_iou(first: npt.NDArray[np.bool_], second: npt.NDArray[np.bool_]) -> float:
