@@ -117,7 +117,11 @@ def _hull_pictures(hull: Hull, cameras: Sequence[Camera]) -> list[UInt8Array]:
     """Return the dense cells from each camera, as clay."""
     vertices, faces, normals = volume_surface(hull.grid, hull.dense)
     clay = Solid(
-        vertices, faces, normals, np.tile(np.float32(CLAY), (len(vertices), 1)), scatter=0.0
+        vertices,
+        faces,
+        normals,
+        np.tile(np.array(CLAY, np.float32), (len(vertices), 1)),
+        scatter=0.0,
     )
     nothing = Strands(np.empty((0, 3), np.float32), np.zeros(1, np.int64))
     return draw_views(nothing, None, cameras, solids=[clay], lights=_lights())
