@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
 
 import numba
 import numpy as np
 import pytest
-from hairkit_plugins import certainty_tracker
+from hairkit_plugins import certainty_tracker, tensor_diffusion, visual_hull
 from hairkit_plugins.certainty_tracker import Options, _smoothed, _trimmed, track
 
 from hairkit.head import Roots
+from hairkit.options import describe
 from hairkit.stored import BoolArray, Float32Array, Float64Array
 from hairkit.strands import Strands
 from hairkit.testing import scalp_roots, turn_scene
@@ -405,3 +408,12 @@ def test_waves_are_wound_unless_the_option_says_no(monkeypatch: pytest.MonkeyPat
     helix = np.hypot(1, 2 * np.pi * waves.radius / waves.pitch)
     ratio = (wound.lengths() / plain.lengths()).mean()
     assert 1 + 0.75 * (helix - 1) < ratio < helix
+
+
+@pytest.mark.parametrize("plugin", [visual_hull, tensor_diffusion, certainty_tracker])
+def test_the_page_has_every_option_with_its_default(project: Path, plugin: ModuleType) -> None:
+    """The tables of docs/reconstruction.md are those of the code."""
+    page = (project / "docs" / "reconstruction.md").read_text()
+    for info in describe(plugin.Options):
+        default = str(info.default).lower() if info.type is bool else info.default
+        assert f"| `{info.name}` | {default} |" in page, info.name
