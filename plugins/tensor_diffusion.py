@@ -25,7 +25,7 @@ from hairkit.options import option
 from hairkit.projection import pack_cameras, project_row, splat_depth
 from hairkit.stored import Float32Array, Float64Array
 from hairkit.volume import outer_products, symmetric_matrices
-from hairkit.waves import measure_waves, without_slant
+from hairkit.waves import Waves, measure_waves, without_slant
 
 DEPTH_SHRINK = 3
 """Depth maps of the hull are this much smaller than the pictures: cells are larger than pixels."""
@@ -91,7 +91,8 @@ def solve_field(
 ) -> OrientationField:
     """Fuse, add the scalp prior, diffuse over the loose hull, and measure the way from the
     scalp."""
-    waves = measure_waves(orientations, masks, scene.cameras)
+    wavy = options.unslant or options.pool > 0
+    waves = measure_waves(orientations, masks, scene.cameras) if wavy else Waves()
     if options.unslant:
         orientations = tuple(without_slant(found, waves) for found in orientations)
     growth = growth_potential(scene.head, hull, options.tip_share)

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import hypothesis
+import numpy as np
 import pytest
 
 from hairkit.manager import Manager
@@ -37,3 +38,9 @@ def project() -> Path:
 def manager() -> Manager:
     """The plugins that ship with hairkit; not for tests that register others."""
     return Manager.loaded(autoload=False)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """Return a generator with a fixed seed."""
+    return np.random.default_rng(7)
