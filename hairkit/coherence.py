@@ -1,8 +1,10 @@
-"""Silhouette coherence: how well the viewing rays of one view's outline touch all other views' silhouettes.
+"""Silhouette coherence: how well the viewing rays of one view's outline touch all other views'
+silhouettes.
 
-A point of an outline is the picture of a point on the subject, and that point lies inside every other silhouette. So
-somewhere along the ray the smallest signed distance to the other silhouettes must reach 0 (Hernandez, Schmitt and
-Cipolla, "Silhouette coherence for camera calibration under circular motion", 2007).
+A point of an outline is the picture of a point on the subject, and that point lies inside every
+other silhouette. So somewhere along the ray the smallest signed distance to the other silhouettes
+must reach 0 (Hernandez, Schmitt and Cipolla, "Silhouette coherence for camera calibration under
+circular motion", 2007).
 """
 
 from __future__ import annotations
@@ -15,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
-from hairkit.errors import InputError
 from hairkit.mask import Mask
 from hairkit.stored import Float32Array, Float64Array, Int64Array
 
@@ -23,8 +24,12 @@ FIELD_HEIGHT = 540
 """Signed distances are sampled at about this many rows."""
 EDGE = 4
 """Contour points this near to the picture's edge, in field pixels, are cuts and no outline."""
-REACH, COARSE, FINE = 0.28, 64, 8
-"""Rays are searched this far (metres) before and behind the turn's centre: coarse steps, then halvings."""
+REACH, COARSE, FINE = 0.28, 48, 8
+"""Rays are searched this far (metres) before and behind the turn's centre: coarse steps, then
+halvings."""
+FASTEST = 1.6
+"""A point on a ray moves at most this times (pixels per metre at the turn's centre) in another
+view."""
 CAP = 40.0
 """Signed distances are cut at this many pixels; outside its picture a silhouette says nothing."""
 
@@ -34,7 +39,8 @@ class Outlines:
     """The silhouettes of all views, ready for coherence."""
 
     fields: Float32Array
-    """(V, H, W) signed distance to the silhouette's edge, positive inside, in pixels of the full picture."""
+    """(V, H, W) signed distance to the silhouette's edge, positive inside, in pixels of the full
+    picture."""
     scale: float
     """Field pixels per picture pixel."""
     points: Float64Array
@@ -46,11 +52,9 @@ class Outlines:
 
     @classmethod
     def of(cls, masks: Sequence[Mask], count: int) -> Outlines:
-        """Return fields and about `count` contour points a view; masks must have one size."""
-        sizes = {mask.labels.shape for mask in masks}
-        if len(sizes) != 1:
-            raise InputError(f"masks have sizes {sorted(sizes)}, expected one size for all views")
-        height, width = next(iter(sizes))
+        """Return fields and about `count` contour points a view."""
+        masks = _of_one_size(masks)
+        height, width = masks[0].labels.shape
         scale = min(1.0, FIELD_HEIGHT / height)
         size = (max(1, round(width * scale)), max(1, round(height * scale)))
         fields, points, views, hairy = [], [], [], []
@@ -74,7 +78,8 @@ class Outlines:
         )
 
     def crowns(self, ratio: float) -> tuple[Float64Array, Float64Array, Float64Array]:
-        """Return each silhouette's top row, and its middle column and width `ratio` widths below the top, pixels."""
+        """Return each silhouette's top row, and its middle column and width `ratio` widths below
+        the top, pixels."""
         found = []
         for field in self.fields:
             inside = field > 0
@@ -87,6 +92,17 @@ class Outlines:
             found.append((rows[0], (first[row] + last[row]) / 2, last[row] - first[row]))
         top, middle, width = np.array(found, np.float64).T / self.scale
         return top, middle, width
+
+
+def _of_one_size(masks: Sequence[Mask]) -> Sequence[Mask]:
+    """Return masks continued to the right and below, edge pixels repeated, to the largest size."""
+    height = max(mask.labels.shape[0] for mask in masks)
+    width = max(mask.labels.shape[1] for mask in masks)
+    continued = []
+    for mask in masks:
+        more = ((0, height - mask.labels.shape[0]), (0, width - mask.labels.shape[1]))
+        continued.append(Mask(np.pad(mask.labels, more, mode="edge"), mask.person_known))
+    return continued
 
 
 def _smooth(silhouette: npt.NDArray[np.bool_], size: tuple[int, int]) -> npt.NDArray[np.bool_]:
@@ -137,7 +153,8 @@ def coherence(
     centre: Float64Array,
     middle: float,
 ) -> tuple[Float64Array, Float64Array]:
-    """Return how far each contour ray stays inside all other silhouettes, and how that follows the cameras.
+    """Return how far each contour ray stays inside all other silhouettes, and how that follows the
+    cameras.
 
     Parameters
     ----------
@@ -155,16 +172,20 @@ def coherence(
     """
     value = np.empty(len(outlines.points))
     slope = np.zeros((len(outlines.points), len(rotation), 7))
+    # turns[own, view] and shifts[own, view] bring camera coordinates of one view to another's.
+    turns = np.ascontiguousarray(np.einsum("vij,okj->ovik", rotation, rotation))
+    shifts = translation[None] - np.einsum("ovik,ok->ovi", turns, translation)
     _coherence(
-        outlines.points, outlines.views, outlines.fields, outlines.scale, rotation, translation,
+        outlines.points, outlines.views, outlines.fields, outlines.scale, turns, shifts,
         focal, centre, middle, value, slope,
     )  # fmt: skip
     return value, slope
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _sample(field, scale, u, v, out):  # type: ignore[no-untyped-def]
-    """Write signed distance and its gradient by (u, v) at a picture pixel to `out`; CAP outside the picture."""
+    """Write signed distance and its gradient by (u, v) at a picture pixel to `out`; CAP outside
+    the picture."""
     x, y = u * scale - 0.5, v * scale - 0.5
     height, width = field.shape
     if not (x >= 0.0 and y >= 0.0 and x < width - 1 and y < height - 1):
@@ -182,9 +203,17 @@ def _sample(field, scale, u, v, out):  # type: ignore[no-untyped-def]
     out[2] = ((c - a) * (1 - fx) + (d - b) * fx) * scale
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _smallest(z, ray, own, fields, scale, relative, offset, focal, centre, out):  # type: ignore[no-untyped-def]
-    """Return the smallest signed distance, over all views but `own`, at depth z of a ray of view `own`."""
+@njit(cache=True)
+def _turned(turn, vector, result):  # type: ignore[no-untyped-def]
+    """Write turn @ vector; calls into linear algebra libraries cost more than they do."""
+    for i in range(3):
+        result[i] = turn[i, 0] * vector[0] + turn[i, 1] * vector[1] + turn[i, 2] * vector[2]
+
+
+@njit(cache=True)
+def _smallest(z, ray, own, fields, scale, relative, offset, focal, centre, bar, out):  # type: ignore[no-untyped-def]
+    """Return the smallest signed distance over all views but `own` at depth z of a ray; below
+    `bar`, any such."""
     best = CAP
     for view in range(len(fields)):
         if view == own:
@@ -199,14 +228,16 @@ def _smallest(z, ray, own, fields, scale, relative, offset, focal, centre, out):
         _sample(fields[view], scale, u, v, out)
         if out[0] < best:
             best = out[0]
+            if best < bar:
+                return best
     return best
 
 
-@njit(cache=True, parallel=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, parallel=True)
 def _coherence(  # type: ignore[no-untyped-def]
-    points, views, fields, scale, rotation, translation, focal, centre, middle, value, slope
+    points, views, fields, scale, turns, shifts, focal, centre, middle, value, slope
 ):
-    count = len(rotation)
+    count = len(turns)
     for n in prange(len(points)):
         own = views[n]
         out = np.empty(3)
@@ -215,42 +246,47 @@ def _coherence(  # type: ignore[no-untyped-def]
         ray[1] = (points[n, 1] - centre[own, 1]) / focal[own]
         ray[2] = 1.0
         relative = np.empty((count, 3))
-        offset = np.empty((count, 3))
         for view in range(count):
-            turn = rotation[view] @ rotation[own].T
-            relative[view] = turn @ ray
-            offset[view] = translation[view] - turn @ translation[own]
+            _turned(turns[own, view], ray, relative[view])
+        offset = shifts[own]
         step = 2 * REACH / (COARSE - 1)
+        fastest = FASTEST * focal[own] / middle
         z = middle
         best = -1e30
-        for k in range(COARSE):
-            at = middle - REACH + k * step
-            here = _smallest(at, ray, own, fields, scale, relative, offset, focal, centre, out)
+        at = middle - REACH
+        while at <= middle + REACH:
+            here = _smallest(
+                at, ray, own, fields, scale, relative, offset, focal, centre, best, out
+            )
             if here > best:
                 best, z = here, at
+            # A silhouette this far off cannot be reached sooner.
+            at += max(step, (best - here) / fastest)
         for _ in range(FINE):
             step *= 0.5
             for side in (-1.0, 1.0):
                 at = z + side * step
-                here = _smallest(at, ray, own, fields, scale, relative, offset, focal, centre, out)
+                here = _smallest(
+                    at, ray, own, fields, scale, relative, offset, focal, centre, best, out
+                )
                 if here > best:
                     best, z = here, at
         value[n] = best
-        _slopes(
-            n, z, ray, own, fields, scale, relative, offset, rotation, focal, centre, out, slope
-        )
+        _slopes(n, z, ray, own, fields, scale, relative, offset, turns, focal, centre, out, slope)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _slopes(  # type: ignore[no-untyped-def]
-    n, z, ray, own, fields, scale, relative, offset, rotation, focal, centre, out, slope
+    n, z, ray, own, fields, scale, relative, offset, turns, focal, centre, out, slope
 ):
-    """Write the derivative of the best value: of the one or two silhouettes that bound it at depth z."""
+    """Write the derivative of the best value: of the one or two silhouettes that bound it at depth
+    z."""
     count = len(fields)
     distance = np.full(count, CAP)
     along = np.zeros(count)
     gradient = np.zeros((count, 3))
     zoom = np.zeros(count)
+    back = np.empty(3)
     first = -1
     for view in range(count):
         if view == own:
@@ -265,7 +301,8 @@ def _slopes(  # type: ignore[no-untyped-def]
         gradient[view, 1] = out[2] * focal[view] / local[2]
         gradient[view, 2] = -(out[1] * x + out[2] * y) / local[2]
         zoom[view] = out[1] * x + out[2] * y
-        along[view] = gradient[view] @ relative[view]
+        for axis in range(3):
+            along[view] += gradient[view, axis] * relative[view, axis]
         if first < 0 or out[0] < distance[first]:
             first = view
     if first < 0 or distance[first] >= CAP:
@@ -291,7 +328,7 @@ def _slopes(  # type: ignore[no-untyped-def]
         slope[n, view, 2] += weight * (local[0] * g[1] - local[1] * g[0])
         slope[n, view, 3:6] += weight * g
         slope[n, view, 6] += weight * zoom[view]
-        back = rotation[own] @ (rotation[view].T @ g)
+        _turned(turns[view, own], g, back)
         seen = z * ray
         slope[n, own, 0] -= weight * (seen[1] * back[2] - seen[2] * back[1])
         slope[n, own, 1] -= weight * (seen[2] * back[0] - seen[0] * back[2])

@@ -1,7 +1,8 @@
 """Poses from points and a turn of cameras: similarity fit, triangulation, and a turn's parameters.
 
-`Turn` maps a short vector to the cameras of a turn around the head: what all views share (the rig's tilt and place,
-magnification, perspective) and how each one strays from its nominal place. Refinement methods solve for that vector.
+`Turn` maps a short vector to the cameras of a turn around the head: what all views share (the
+rig's tilt and place, magnification, perspective) and how each one strays from its nominal place.
+Refinement methods solve for that vector.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ SHARED, PER_VIEW = 8, 6
 LOG_MAGNIFICATION, PERSPECTIVE = 6, 7
 """Where the shared numbers hold log(pixels per metre at the turn's centre) and 1 / distance."""
 MIN_PERSPECTIVE = 0.01
-"""Cameras are put no farther away than 1 / this, metres: there the picture is orthographic to a tenth of a pixel."""
+"""Cameras are put no farther away than 1 / this, metres: there the picture is orthographic to a
+tenth of a pixel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +56,8 @@ class Similarity:
     def moved_camera(self, camera: Camera) -> Camera:
         """Return the camera that sees `apply(x)` where `camera` sees `x`.
 
-        The world grows by `scale`; so does the distance, while an orthographic camera's pixels per metre shrink.
+        The world grows by `scale`; so does the distance, while an orthographic camera's pixels per
+        metre shrink.
         """
         matrix = np.eye(4)
         matrix[:3, :3] = camera.rotation @ self.rotation.T
@@ -67,10 +70,12 @@ class Similarity:
 def fit_similarity(
     source: npt.ArrayLike, target: npt.ArrayLike, weights: npt.ArrayLike | None = None
 ) -> Similarity:
-    """Return the similarity that brings `source` (N, 3) to `target` (N, 3) with least weighted squares.
+    """Return the similarity that brings `source` (N, 3) to `target` (N, 3) with least weighted
+    squares.
 
-    Umeyama, "Least-squares estimation of transformation parameters between two point patterns" (1991), with weights.
-    Raises `InputError` for fewer than three points, points on one line, or numbers that are not finite.
+    Umeyama, "Least-squares estimation of transformation parameters between two point patterns"
+    (1991), with weights. Raises `InputError` for fewer than three points, points on one line, or
+    numbers that are not finite.
     """
     first = frozen_array(source, np.float64, (None, 3), "points to fit")
     second = frozen_array(target, np.float64, (len(first), 3), "points to fit to")
@@ -103,9 +108,11 @@ def _check_spread(centred: Float64Array) -> None:
 def triangulate(
     cameras: Sequence[Camera], pixels: npt.ArrayLike, weights: npt.ArrayLike | None = None
 ) -> Float64Array:
-    """Return the points (N, 3) nearest to the rays through `pixels` (V, N, 2), least squares over views.
+    """Return the points (N, 3) nearest to the rays through `pixels` (V, N, 2), least squares over
+    views.
 
-    `weights` (V, N) is 0 where a view does not know the point. A point that fewer than two views know is NaN.
+    `weights` (V, N) is 0 where a view does not know the point. A point that fewer than two views
+    know is NaN.
     """
     seen = np.asarray(pixels, np.float64)
     weight = np.ones(seen.shape[:2]) if weights is None else np.asarray(weights, np.float64)
@@ -126,11 +133,13 @@ def triangulate(
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """The family of cameras of a turn around the head, over a vector of `SHARED + PER_VIEW * V` numbers.
+    """The family of cameras of a turn around the head, over a vector of `SHARED + PER_VIEW * V`
+    numbers.
 
-    Shared: rotation vector of the head in the rig (3, radians), the turn's centre in the head frame (3, metres), log of
-    the pixels per metre there, and 1 / distance (0 is orthographic). Per view: azimuth, elevation and roll off the
-    nominal place (radians), log of the distance over the shared one, shift right and down (metres).
+    Shared: rotation vector of the head in the rig (3, radians), the turn's centre in the head
+    frame (3, metres), log of the pixels per metre there, and 1 / distance (0 is orthographic). Per
+    view: azimuth, elevation and roll off the nominal place (radians), log of the distance over the
+    shared one, shift right and down (metres).
     """
 
     azimuths: Float64Array
@@ -142,7 +151,8 @@ class Turn:
 
     @classmethod
     def of(cls, capture: Capture) -> Turn:
-        """Return the turn of a capture: its nominal azimuths and sizes, focal lengths from EXIF or by size."""
+        """Return the turn of a capture: its nominal azimuths and sizes, focal lengths from EXIF or
+        by size."""
         sizes = np.array([(view.width, view.height) for view in capture.views])
         focal = np.hypot(*sizes.T)
         known = [view.focal_px for view in capture.views if view.focal_px is not None]
@@ -169,24 +179,36 @@ class Turn:
     def tangents(self, vector: Float64Array) -> Float64Array:
         """Return (V, 7, size): how camera motions follow the vector's numbers.
 
-        Rows: small rotation w and move t of camera coordinates, `dx = w x x + t`, then log of the focal length.
+        Rows: small rotation w and move t of camera coordinates, `dx = w x x + t`, then log of the
+        focal length.
         """
-        rotation, translation, focal = self.unpack(vector)
         step = 1e-6
-        result = np.zeros((len(rotation), 7, self.size))
-        for column in range(self.size):
+        result = np.zeros((len(self.azimuths), 7, self.size))
+        for column in range(SHARED):
             moved = vector.copy()
             moved[column] += step
-            turned, shifted, zoomed = self.unpack(moved)
-            spin = (turned - rotation) @ rotation.transpose(0, 2, 1) / step
-            w = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
-            result[:, :3, column] = w
-            result[:, 3:6, column] = (shifted - translation) / step - np.cross(w, translation)
-            result[:, 6, column] = np.log(zoomed / focal) / step
+            result[:, :, column] = self._tangent(vector, moved) / step
+        own = np.arange(len(self.azimuths))
+        for column in range(PER_VIEW):
+            moved = vector.copy()
+            moved[SHARED + column :: PER_VIEW] += step
+            places = SHARED + PER_VIEW * own + column
+            result[own, :, places] = self._tangent(vector, moved) / step
         return result
 
+    def _tangent(self, vector: Float64Array, moved: Float64Array) -> Float64Array:
+        """Return (V, 7) the small motions from the cameras of one vector to those of another close
+        by."""
+        rotation, translation, focal = self.unpack(vector)
+        turned, shifted, zoomed = self.unpack(moved)
+        spin = (turned - rotation) @ rotation.transpose(0, 2, 1)
+        w = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        move = shifted - translation - np.cross(w, translation)
+        return np.concatenate([w, move, np.log(zoomed / focal)[:, None]], axis=1)
+
     def nominal(self, magnification: float, perspective: float) -> tuple[Camera, ...]:
-        """Return level cameras on the nominal turn about the origin: pixels per metre there, and 1 / distance."""
+        """Return level cameras on the nominal turn about the origin: pixels per metre there, and 1
+        / distance."""
         vector = np.zeros(self.size)
         vector[LOG_MAGNIFICATION], vector[PERSPECTIVE] = np.log(magnification), perspective
         return self.cameras(vector)
@@ -229,15 +251,14 @@ def _view_rotations(
 ) -> Float64Array:
     """Return (V, 3, 3), as `Camera.on_turn` sets its axes."""
     zero = np.zeros_like(azimuth)
-    back = np.stack(
-        [
-            np.sin(azimuth) * np.cos(elevation),
-            np.sin(elevation),
-            np.cos(azimuth) * np.cos(elevation),
-        ],
-        axis=1,
+    sin_a, cos_a, sin_e, cos_e = (
+        np.sin(azimuth),
+        np.cos(azimuth),
+        np.sin(elevation),
+        np.cos(elevation),
     )
-    right = np.stack([np.cos(azimuth), zero, -np.sin(azimuth)], axis=1)
-    down = -np.cross(back, right)
+    back = np.stack([sin_a * cos_e, sin_e, cos_a * cos_e], axis=1)
+    right = np.stack([cos_a, zero, -sin_a], axis=1)
+    down = np.stack([sin_a * sin_e, -cos_e, cos_a * sin_e], axis=1)
     cosine, sine = np.cos(roll)[:, None], np.sin(roll)[:, None]
     return np.stack([cosine * right - sine * down, sine * right + cosine * down, -back], axis=1)

@@ -1,8 +1,9 @@
-"""Cameras from landmarks alone, as in the thesis: the turn is taken at its word, only the head is placed in it.
+"""Cameras from landmarks alone, as in the thesis: the turn is taken at its word, only the head is
+placed in it.
 
-Landmarks of two or more views are intersected in space by least squares, with cameras exactly on the nominal turn
-(orthographic as in the thesis, or perspective); a weighted similarity (Umeyama 1991) brings the head's landmarks to
-them; the cameras are then expressed in the head's frame.
+Landmarks of two or more views are intersected in space by least squares, with cameras exactly on
+the nominal turn (orthographic as in the thesis, or perspective); a weighted similarity (Umeyama
+1991) brings the head's landmarks to them; the cameras are then expressed in the head's frame.
 """
 
 from __future__ import annotations
@@ -29,12 +30,18 @@ class Options:
         "orthographic", choices=("orthographic", "perspective"), doc="Kind of the nominal cameras."
     )
     focal_equivalent: float = option(
-        42.0, low=10, high=1000, doc="Focal length for perspective without EXIF, full frame.", unit="mm"
+        42.0,
+        low=10,
+        high=1000,
+        doc="Focal length for perspective without EXIF, full frame.",
+        unit="mm",
     )
     distance: float = option(
         0.7, low=0.1, high=20, doc="Usual distance of perspective cameras.", unit="m"
     )
-    jaw_weight: float = option(0.25, low=0, high=1, doc="Weight of the 17 jaw points; others have 1.")
+    jaw_weight: float = option(
+        0.25, low=0, high=1, doc="Weight of the 17 jaw points; others have 1."
+    )
 
 
 @hookimpl
@@ -62,8 +69,8 @@ def _seen(capture: Capture) -> tuple[Float64Array, Float64Array]:
     known = np.array([float(view.landmarks is not None) for view in capture.views])
     if known.sum() < 2:
         raise InputError(
-            f"landmarks are known in {int(known.sum())} views, the plugin 'landmarks' needs 2 or more;"
-            " add landmarks.json or use the plugin 'silhouette'"
+            f"landmarks are known in {int(known.sum())} views, the plugin 'landmarks' needs 2"
+            " or more; add landmarks.json or use the plugin 'silhouette'"
         )
     pixels = np.zeros((len(known), 68, 2))
     for index, view in enumerate(capture.views):

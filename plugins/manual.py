@@ -14,13 +14,18 @@ from hairkit.pose import Similarity, Turn
 
 @dataclass(frozen=True)
 class Options:
-    """Settings of the nominal cameras; EXIF or capture.toml's focal length goes before `focal_equivalent`."""
+    """Settings of the nominal cameras; EXIF or capture.toml's focal length goes before
+    `focal_equivalent`."""
 
     model: str = option(
         "perspective", choices=("orthographic", "perspective"), doc="Kind of the nominal cameras."
     )
     focal_equivalent: float = option(
-        42.0, low=10, high=1000, doc="Focal length where the photos do not tell, full frame.", unit="mm"
+        42.0,
+        low=10,
+        high=1000,
+        doc="Focal length where the photos do not tell, full frame.",
+        unit="mm",
     )
     distance: float = option(
         0.7, low=0.1, high=20, doc="From the cameras to the turn's centre.", unit="m"

@@ -1,42 +1,62 @@
-"""Cameras refined from the nominal turn by landmarks and by the mutual consistency of the silhouettes.
+"""Cameras refined from the nominal turn by landmarks and by the consistency of the silhouettes.
 
-Unknown are the turn's shared place, tilt, magnification and perspective, and six numbers a view (`hairkit.pose.Turn`).
-Gauss-Newton with soft-L1 weights on four kinds of rows: landmarks, marginalised over the unknown shape of the head (a
-Gaussian process around the given head's landmarks); midline landmarks that lie on the outline of profile views; the
-viewing rays of silhouette contour points, each of which must touch all other silhouettes somewhere (silhouette
-coherence: Hernandez, Schmitt and Cipolla, "Silhouette coherence for camera calibration under circular motion", 2007);
-and a prior that keeps to the nominal turn.
+Unknown are the turn's shared place, tilt, magnification and perspective, and six numbers a view
+(`hairkit.pose.Turn`). Levenberg-Marquardt with soft-L1 weights on
+
+* landmarks, marginalised over the unknown shape of the head (`hairkit.landmark_fit`), those that
+  patches of skin carry to the neighbours (`hairkit.carrying`), and the face's midline on the
+  outline of views from the side;
+* silhouette coherence (`hairkit.coherence`; Hernandez, Schmitt and Cipolla 2007): the viewing ray
+  of every contour point touches all other silhouettes;
+* a prior that keeps to the nominal turn.
+
+Perspective and orthographic cameras are both tried unless the capture or the options say which.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hairkit import Capture, Head, Mask, Scene, hookimpl
+from hairkit.carrying import PatchSettings, carry_landmarks
 from hairkit.coherence import Outlines, coherence
 from hairkit.errors import InputError
+from hairkit.landmark_fit import (
+    COUNT,
+    CameraArrays,
+    LandmarkEquations,
+    LandmarkFit,
+    Sights,
+    shape_precision,
+    soft_l1_weight,
+)
 from hairkit.options import option
 from hairkit.pose import LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, SHARED, Turn
-from hairkit.mask import HAIR
-from hairkit.stored import Float64Array, Int64Array
+from hairkit.stored import Float64Array
 
-JAW = 17
-"""The first landmarks trace the jaw, which detectors place less surely."""
-MIDLINE = (27, 28, 29, 30, 33, 51, 57, 8)
-"""Nose, lips and chin: on the outline of a view from the side."""
-USUAL_FOCAL_EQUIVALENT = 42.0
-"""Focal length of head portraits, mm for a 36 x 24 mm frame, when nothing else is known."""
-USUAL_DISTANCE = 0.7
-WIDEST, HAIR_THICKNESS = 0.6, 0.012
-"""Without landmarks: depth below the crown over the width there, and how far hair stands off the head, metres."""
 REFERENCE_HEIGHT = 1080
-SETTLED = 1e-4
-"""Stop when no angle (radians) or length (metres) moves more than this."""
-AFFINE_SPREAD, SMOOTH_SPREAD, SMOOTH_LENGTH = 0.004, 0.004, 0.04
-PLACE_SPREAD, LOOSE_SPREAD = 0.004, 0.0015
-"""How heads differ, metres: stretch (per 0.1 m), smooth bends and their reach, place of the face, single points."""
+USUAL_DISTANCE = 0.7
+"""Distance of head portraits, metres."""
+SHARED_SPREAD = (0.05, 0.01, 0.01, 0.1, 0.2, 0.1, 0.5, 0.5)
+"""Prior of what views share: tilt of the head in the turn (radians), the turn's centre (metres),
+log of the magnification, 1 / distance."""
+WIDEST, HAIR_THICKNESS = 0.6, 0.012
+"""Without landmarks: depth below the crown over the width there, and how far hair stands off the
+head, metres."""
+SETTLED, WORSE = 1e-3, 1e-9
+"""Stop when the cost falls by less than this share; a step that costs more by the second share
+is taken back."""
+TRIAL = 8
+"""Rounds that orthographic cameras get to show that they fit better."""
+SOFT = 0.3
+"""A contour ray counts as missing gradually, over this many times the outline's noise."""
+FROM_THE_SIDE = 0.35
+"""Views this near (radians) to 90 degrees show the face's midline on the outline."""
+PROFILE_PX = 3.0
+MIN_SIGHTS = 6
+"""Fewer landmarks than this place no head."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +74,16 @@ class Options:
     silhouette_px: float = option(
         3.0, low=0.1, high=50, doc="Noise of outlines, pictures 1080 high.", unit="px"
     )
-    contour_points: int = option(140, low=20, high=1000, doc="Contour points used in each view.")
-    iterations: int = option(15, low=1, high=100, doc="Most rounds of Gauss-Newton.")
+    contour_points: int = option(100, low=20, high=1000, doc="Contour points used in each view.")
+    model: str = option(
+        "auto",
+        choices=("auto", "perspective", "orthographic"),
+        doc="Kind of cameras; auto takes what fits better.",
+    )
+    carries: int = option(
+        2, low=0, high=9, doc="Rounds that carry landmarks to neighbours by patches of skin."
+    )
+    iterations: int = option(20, low=1, high=100, doc="Most rounds of Gauss-Newton.")
 
 
 @hookimpl
@@ -63,259 +91,218 @@ def estimate_scene(
     capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
 ) -> Scene:
     """Solve for all cameras; the head keeps its shape and gives the world its frame and scale."""
-    problem = _Problem(capture, Outlines.of(masks, options.contour_points), masks, head, options)
-    vector = problem.start()
-    offset = np.zeros((68, 3))
-    for _ in range(options.iterations):
-        moved, offset = problem.step(vector, offset)
-        change, vector = np.abs(moved - vector).max(), moved
-        if change < SETTLED:
-            break
+    problem = _Problem.of(capture, masks, head, options)
+    wanted = "orthographic" if capture.orthographic else "perspective"
+    if options.model != "auto":
+        wanted = options.model
+    fits = [_solve(problem, problem.start(wanted == "orthographic"), options.iterations)]
+    if options.model == "auto" and not capture.orthographic:
+        fits.append(_solve(problem, problem.start(True), min(options.iterations, TRIAL)))
+    best = min(fits, key=lambda fit: fit.cost)
+    for _ in range(options.carries if problem.landmarks is not None else 0):
+        best = _solve(problem.with_carried(capture, best), best, options.iterations)
     names = tuple(view.name for view in capture.views)
-    cameras = problem.turn.cameras(vector)
-    return Scene(names, cameras, head, problem.residual_px(vector, offset))
+    return Scene(names, problem.turn.cameras(best.vector), head, problem.residual_px(best))
 
 
 @dataclass(frozen=True, eq=False)
-class _Sight:
-    """Landmarks seen in the views, one row each, with how far to trust them."""
+class _Fit:
+    """Where the solution stands."""
 
-    view: Int64Array
-    point: Int64Array
-    pixel: Float64Array
-    noise: Float64Array
-    """(N,) standard deviation in pixels."""
+    vector: Float64Array
+    """Numbers of the turn."""
+    offset: Float64Array
+    """(68, 3) landmarks off the given head's, metres."""
+    flat: bool
+    """True for orthographic cameras: the perspective is held."""
+    cost: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """The problem made linear at one place."""
+
+    cost: float
+    normal: Float64Array
+    right: Float64Array
+    landmarks: LandmarkEquations | None
+
+    def move(self, damping: float, flat: bool) -> Float64Array:
+        """Return the damped step; the perspective stays when `flat`."""
+        normal = self.normal + damping * np.diag(np.diag(self.normal))
+        free = np.arange(len(self.right))
+        if flat:
+            free = np.delete(free, PERSPECTIVE)
+        result = np.zeros(len(self.right))
+        result[free] = np.linalg.solve(normal[np.ix_(free, free)], self.right[free])
+        return result
+
+
+def _solve(problem: _Problem, start: _Fit, iterations: int) -> _Fit:
+    """Return the best place reached from `start` (Levenberg-Marquardt)."""
+    fit, damping = start, 1e-3
+    here = problem.linearised(fit)
+    for _ in range(iterations):
+        move = here.move(damping, fit.flat)
+        vector = fit.vector + move
+        vector[PERSPECTIVE] = max(vector[PERSPECTIVE], MIN_PERSPECTIVE)
+        offset = fit.offset if here.landmarks is None else here.landmarks.offsets(move)
+        trial = replace(fit, vector=vector, offset=offset)
+        there = problem.linearised(trial)
+        if there.cost > here.cost * (1 + WORSE):
+            damping *= 10
+            if damping > 1e3:
+                break
+            continue
+        settled = here.cost - there.cost < SETTLED * here.cost
+        fit, here, damping = trial, there, damping / 5
+        if settled:
+            break
+    return replace(fit, cost=here.cost)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """All evidence about the cameras, and the prior."""
+
+    turn: Turn
+    outlines: Outlines
+    head: Head
+    landmarks: LandmarkFit | None
+    noise: float
+    """Of outlines, pixels."""
+    prior_spread: Float64Array
 
     @classmethod
-    def of(cls, capture: Capture, masks: tuple[Mask, ...], noise: float) -> _Sight:
-        """Collect the landmarks; those of the jaw, or under hair, are only guesses of the detector."""
-        rows = []
-        for index, (view, mask) in enumerate(zip(capture.views, masks, strict=True)):
-            if view.landmarks is None:
-                continue
-            for point, (x, y) in enumerate(view.landmarks):
-                inside = 0 <= x < view.width and 0 <= y < view.height
-                covered = inside and mask.labels[int(y), int(x)] == HAIR
-                trust = (2.0 if point < JAW else 1.0) * (3.0 if covered else 1.0)
-                rows.append((index, point, x, y, noise * trust))
-        table = np.array(rows, np.float64).reshape(-1, 5)
-        return cls(
-            table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2:4], table[:, 4]
-        )
-
-
-class _Problem:
-    """The least-squares problem: rows of residuals and their slopes at a vector of the turn."""
-
-    def __init__(
-        self,
-        capture: Capture,
-        outlines: Outlines,
-        masks: tuple[Mask, ...],
-        head: Head,
-        options: Options,
-    ) -> None:
-        self.turn = _turn(capture)
-        self.outlines = outlines
-        self.head = head
-        self.pixel = capture.views[0].height / REFERENCE_HEIGHT
-        self.sight = _Sight.of(capture, masks, options.landmark_px * self.pixel)
-        self.noise = options.silhouette_px * self.pixel
-        self.knows_landmarks = head.landmark_vertices is not None and len(self.sight.view) >= 6
-        self.landmarks, self.covariance = np.zeros((68, 3)), np.zeros((204, 204))
-        if head.landmark_vertices is not None:
-            self.landmarks = head.vertices[head.landmark_vertices].astype(np.float64)
-            self.covariance = _shape_covariance(self.landmarks)
-        self.centre = self.turn.sizes / 2.0
-        self.prior_mean, self.prior_spread = self._prior(capture, options)
-
-    def _prior(self, capture: Capture, options: Options) -> tuple[Float64Array, Float64Array]:
-        mean = np.zeros(self.turn.size)
-        spread = np.empty(self.turn.size)
-        spread[:SHARED] = [0.15, 0.05, 0.05, 0.1, 0.2, 0.1, 0.5, 0.6]
-        mean[PERSPECTIVE] = 1 / USUAL_DISTANCE
+    def of(
+        cls, capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
+    ) -> _Problem:
+        pixel = capture.views[0].height / REFERENCE_HEIGHT
+        turn = Turn.of(capture)
+        outlines = Outlines.of(masks, options.contour_points)
         angles = np.radians([options.azimuth, options.elevation, options.roll])
-        spread[SHARED:] = np.tile(
-            [*angles, options.distance, options.shift, options.shift], len(capture.views)
-        )
-        return mean, spread
+        each = [*angles, options.distance, options.shift, options.shift]
+        sights = Sights.of(capture, masks, options.landmark_px * pixel)
+        landmarks = None
+        if head.landmark_vertices is not None and len(sights) >= MIN_SIGHTS:
+            places = head.vertices[head.landmark_vertices].astype(np.float64)
+            side = np.nonzero(np.abs(np.cos(turn.azimuths)) < np.sin(FROM_THE_SIDE))[0]
+            fields, scale = outlines.fields, outlines.scale
+            if not all(mask.person_known for mask in masks):
+                side = side[:0]
+            landmarks = LandmarkFit(
+                places, shape_precision(places), sights, fields, scale, side, PROFILE_PX * pixel
+            )
+        spread = np.concatenate([SHARED_SPREAD, np.tile(each, len(capture.views))])
+        noise = options.silhouette_px * pixel
+        return cls(turn, outlines, head, landmarks, noise, spread)
 
-    def start(self) -> Float64Array:
-        """Return the nominal turn with the shared place and magnification that suit landmarks or masks."""
-        vector = self.prior_mean.copy()
-        vector[[LOG_MAGNIFICATION, 3, 4, 5]] = (
-            self._place_by_landmarks(vector)
-            if self.knows_landmarks
-            else self._place_by_masks(vector)
-        )
-        self.prior_mean = vector.copy()
-        return vector
+    def with_carried(self, capture: Capture, fit: _Fit) -> _Problem:
+        """Return the problem with the landmarks that patches carry to other views, given a
+        solution."""
+        assert self.landmarks is not None
+        places = self.landmarks.landmarks + fit.offset
+        cameras = self.turn.cameras(fit.vector)
+        more = carry_landmarks(capture, cameras, self.head, places, PatchSettings())
+        sights = self.landmarks.sights.joined(more)
+        return replace(self, landmarks=replace(self.landmarks, sights=sights))
 
-    def _place_by_landmarks(self, vector: Float64Array) -> Float64Array:
-        """Return log magnification and the turn's centre: exact for cameras far away, so linear."""
-        rotation, _, _ = self.turn.unpack(vector)
-        sight = self.sight
-        axes = rotation[sight.view, :2]
-        seen = sight.pixel - self.centre[sight.view]
-        weight = np.repeat(1 / sight.noise, 2)
+    def start(self, flat: bool) -> _Fit:
+        """Return the nominal turn, its place and magnification as landmarks or masks suggest."""
+        vector = np.zeros(self.turn.size)
+        vector[PERSPECTIVE] = 1 / USUAL_DISTANCE
+        magnification, place = (
+            self._place_by_landmarks(self.landmarks)
+            if self.landmarks is not None
+            else self._place_by_masks()
+        )
+        vector[LOG_MAGNIFICATION], vector[3:6] = np.log(magnification), place
+        if flat:
+            vector[PERSPECTIVE] = MIN_PERSPECTIVE
+        return _Fit(vector, np.zeros((COUNT, 3)), flat)
+
+    def cameras(self, vector: Float64Array) -> CameraArrays:
+        """Return the cameras as arrays."""
+        return (*self.turn.unpack(vector), self.turn.sizes / 2.0)
+
+    def _place_by_landmarks(self, landmarks: LandmarkFit) -> tuple[float, Float64Array]:
+        """Return magnification and the turn's centre: exact for cameras far away, so linear."""
+        sights = landmarks.sights
+        axes = self.turn.unpack(np.zeros(self.turn.size))[0][sights.view, :2]
+        seen = sights.pixel - self.turn.sizes[sights.view] / 2.0
+        weight = np.repeat(1 / sights.noise, 2)
         left = np.concatenate([seen.reshape(-1, 1), axes.reshape(-1, 3)], axis=1)
-        right = np.einsum("nij,nj->ni", axes, self.landmarks[sight.point]).ravel()
+        right = np.einsum("nij,nj->ni", axes, landmarks.landmarks[sights.point]).ravel()
         solution = np.linalg.lstsq(left * weight[:, None], right * weight, rcond=None)[0]
         if not solution[0] > 0:
             raise InputError(
                 "the landmarks do not fit a head seen from the views' azimuths; check their order"
             )
-        return np.array([-np.log(solution[0]), *solution[1:]])
+        return 1 / float(solution[0]), solution[1:]
 
-    def _place_by_masks(self, vector: Float64Array) -> Float64Array:
-        """Return log magnification and the turn's centre from the silhouettes' tops and widths.
+    def _place_by_masks(self) -> tuple[float, Float64Array]:
+        """Return magnification and the turn's centre from the silhouettes' tops and widths.
 
-        A silhouette is as wide as the head, with a little hair, where it lies `WIDEST` of its width below its top.
+        A silhouette is as wide as the head with a little hair where it lies `WIDEST` of its width
+        below its top.
         """
-        rotation, _, _ = self.turn.unpack(vector)
         top, middle, width = self.outlines.crowns(WIDEST)
-        scalp = self.head.vertices[self.head.scalp > 0.5]
+        scalp = self.head.vertices[self.head.scalp > 0.5].astype(np.float64)
         breadth = np.ptp(scalp[:, [0, 2]], axis=0).mean() + 2 * HAIR_THICKNESS
         magnification = float(np.median(width)) / breadth
-        crown = np.array(
-            [
-                0.0,
-                self.head.vertices[:, 1].max() + HAIR_THICKNESS,
-                (scalp[:, 2].max() + scalp[:, 2].min()) / 2,
-            ]
-        )
-        seen = (np.stack([middle, top], axis=1) - self.centre) / magnification
-        axes = rotation[:, :2].reshape(-1, 3)
+        depth = (scalp[:, 2].max() + scalp[:, 2].min()) / 2
+        crown = np.array([0.0, scalp[:, 1].max() + HAIR_THICKNESS, depth])
+        seen = (np.stack([middle, top], axis=1) - self.turn.sizes / 2.0) / magnification
+        axes = self.turn.unpack(np.zeros(self.turn.size))[0][:, :2].reshape(-1, 3)
         place = np.linalg.lstsq(axes, axes @ crown - seen.ravel(), rcond=None)[0]
-        return np.array([np.log(magnification), *place])
+        return magnification, place
 
-    def step(self, vector: Float64Array, offset: Float64Array) -> tuple[Float64Array, Float64Array]:
-        """Return the vector and the landmarks' offsets (68, 3) after one round of Gauss-Newton."""
-        tangents = self.turn.tangents(vector)
-        normal = np.diag(self.prior_spread**-2)
-        right = (self.prior_mean - vector) / self.prior_spread**2
-        rows, residual = self._silhouette_rows(vector, tangents)
-        normal += rows.T @ rows
-        right += rows.T @ residual
-        if not self.knows_landmarks:
-            return vector + np.linalg.solve(normal, right), offset
-        rows, residual, gain = self._landmark_rows(vector, offset, tangents)
-        normal += rows.T @ rows
-        right += rows.T @ residual
-        move = np.linalg.solve(normal, right)
-        if vector[PERSPECTIVE] + move[PERSPECTIVE] < MIN_PERSPECTIVE:
-            move = _solve_held(normal, right, PERSPECTIVE, MIN_PERSPECTIVE - vector[PERSPECTIVE])
-        return vector + move, (gain @ (residual - rows @ move)).reshape(68, 3)
+    def linearised(self, fit: _Fit) -> _Round:
+        """Return the normal equations, and the cost, at a place."""
+        vector = fit.vector
+        cameras, tangents = self.cameras(vector), self.turn.tangents(vector)
+        prior = (self._prior_mean(fit) - vector) / self.prior_spread
+        normal, right = np.diag(self.prior_spread**-2.0), prior / self.prior_spread
+        cost = float(prior @ prior)
+        rows, residual = self._coherence_rows(vector, cameras, tangents)
+        normal, right = normal + rows.T @ rows, right + rows.T @ residual
+        cost += float(residual @ residual)
+        if self.landmarks is None:
+            return _Round(cost, normal, right, None)
+        seen = self.landmarks.equations(fit.offset, cameras, tangents)
+        return _Round(cost + seen.cost, normal + seen.normal, right + seen.right, seen)
 
-    def _silhouette_rows(
-        self, vector: Float64Array, tangents: Float64Array
+    def _prior_mean(self, fit: _Fit) -> Float64Array:
+        """Return the nominal turn; place and magnification are free around where they are."""
+        mean = np.zeros(self.turn.size)
+        mean[3:SHARED] = fit.vector[3:SHARED]
+        mean[PERSPECTIVE] = fit.vector[PERSPECTIVE] if fit.flat else 1 / USUAL_DISTANCE
+        return mean
+
+    def _coherence_rows(
+        self, vector: Float64Array, cameras: CameraArrays, tangents: Float64Array
     ) -> tuple[Float64Array, Float64Array]:
-        """Return rows that bring contour rays into the silhouettes they miss."""
-        rotation, translation, focal = self.turn.unpack(vector)
+        """Return rows that bring contour rays into the silhouettes they miss, or nearly miss."""
+        value, slope = self._coherence(vector, cameras)
+        near = np.nonzero(value < 6 * self.noise)[0]
+        soft = SOFT * self.noise
+        missed = np.logaddexp(0, -value[near] / soft) * soft / self.noise
+        share = 1 / (1 + np.exp(value[near] / soft))
+        weight = np.sqrt(soft_l1_weight(missed))
+        rows = np.einsum("nvk,vkp->np", slope[near], tangents)
+        return rows * (share * weight / self.noise)[:, None], missed * weight
+
+    def _coherence(
+        self, vector: Float64Array, cameras: CameraArrays
+    ) -> tuple[Float64Array, Float64Array]:
         middle = 1 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE)
-        value, slope = coherence(self.outlines, rotation, translation, focal, self.centre, middle)
-        missed = np.nonzero(value < 0)[0]
-        residual = -value[missed] / self.noise
-        weight = np.sqrt(_robust(residual)) / self.noise
-        rows = np.einsum("nvk,vkp->np", slope[missed], tangents) * weight[:, None]
-        return rows, residual * weight * self.noise
+        return coherence(self.outlines, *cameras, middle)
 
-    def _landmark_rows(
-        self, vector: Float64Array, offset: Float64Array, tangents: Float64Array
-    ) -> tuple[Float64Array, Float64Array, Float64Array]:
-        """Return whitened rows, residuals, and the gain that turns residuals into landmark offsets.
-
-        The offsets are a Gaussian process; they are marginalised, so the covariance of the residuals is the noise plus
-        the shape's covariance seen by the cameras.
-        """
-        sight = self.sight
-        pixels, by_camera, by_point = self._project(vector, self.landmarks + offset)
-        residual = sight.pixel - pixels
-        weight = _robust(np.linalg.norm(residual, axis=1) / sight.noise)
-        count = len(sight.view)
-        shape = np.zeros((count, 2, 68, 3))
-        shape[np.arange(count), :, sight.point] = by_point
-        shape = shape.reshape(2 * count, 204)
-        seen = shape @ self.covariance
-        covariance = seen @ shape.T
-        covariance[np.diag_indices(2 * count)] += np.repeat(sight.noise**2 / weight, 2)
-        root = np.linalg.cholesky(covariance)
-        rows = np.einsum("nik,nkp->nip", by_camera, tangents[sight.view]).reshape(2 * count, -1)
-        total = residual.ravel() + shape @ offset.ravel()
-        white = np.linalg.solve(root, np.column_stack([rows, total, seen]))
-        split = rows.shape[1]
-        return white[:, :split], white[:, split], white[:, split + 1 :].T
-
-    def _project(
-        self, vector: Float64Array, points: Float64Array
-    ) -> tuple[Float64Array, Float64Array, Float64Array]:
-        """Return pixels (N, 2) and their slopes by camera motion (N, 2, 7) and by the point (N, 2, 3)."""
-        view = self.sight.view
-        rotation, translation, focal = self.turn.unpack(vector)
-        local = np.einsum("nij,nj->ni", rotation[view], points[self.sight.point])
-        local += translation[view]
-        x, y, z = local.T
-        f = focal[view]
-        zero = np.zeros_like(x)
-        by_local = np.stack(
-            [
-                np.stack([f / z, zero, -f * x / z**2], axis=1),
-                np.stack([zero, f / z, -f * y / z**2], axis=1),
-            ],
-            axis=1,
-        )
-        spin = np.cross(local[:, None, :], by_local)
-        zoom = np.stack([f * x / z, f * y / z], axis=1)
-        by_camera = np.concatenate([spin, by_local, zoom[:, :, None]], axis=2)
-        pixels = zoom + self.centre[view]
-        return pixels, by_camera, by_local @ rotation[view]
-
-    def residual_px(self, vector: Float64Array, offset: Float64Array) -> float:
+    def residual_px(self, fit: _Fit) -> float:
         """Return the root mean square misfit of landmarks and missed contour rays, pixels."""
-        rotation, translation, focal = self.turn.unpack(vector)
-        middle = 1 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE)
-        value, _ = coherence(self.outlines, rotation, translation, focal, self.centre, middle)
+        cameras = self.cameras(fit.vector)
+        value, _ = self._coherence(fit.vector, cameras)
         misfit = value[value < 0]
-        if self.knows_landmarks:
-            pixels, _, _ = self._project(vector, self.landmarks + offset)
-            misfit = np.append(misfit, np.linalg.norm(self.sight.pixel - pixels, axis=1))
+        if self.landmarks is not None:
+            misfit = np.append(misfit, self.landmarks.misfit(fit.offset, cameras))
         return float(np.sqrt(np.mean(misfit**2))) if len(misfit) else 0.0
-
-
-def _solve_held(
-    normal: Float64Array, right: Float64Array, index: int, value: float
-) -> Float64Array:
-    """Return the solution of the normal equations whose number `index` is held at `value`."""
-    free = np.delete(np.arange(len(right)), index)
-    result = np.full(len(right), value)
-    result[free] = np.linalg.solve(
-        normal[np.ix_(free, free)], right[free] - normal[free, index] * value
-    )
-    return result
-
-
-def _robust(scaled: Float64Array) -> Float64Array:
-    """Return the weights of soft-L1 for residuals over their noise, with the bend at 2."""
-    weights: Float64Array = 1 / np.sqrt(1 + (scaled / 2) ** 2)
-    return weights
-
-
-def _shape_covariance(points: Float64Array) -> Float64Array:
-    """Return (204, 204): how landmarks of other heads differ from these, metres squared."""
-    squared = ((points[:, None] - points[None]) ** 2).sum(2)
-    kernel = AFFINE_SPREAD**2 * (points @ points.T) / 0.1**2
-    kernel += SMOOTH_SPREAD**2 * np.exp(-squared / (2 * SMOOTH_LENGTH**2))
-    kernel += PLACE_SPREAD**2 + LOOSE_SPREAD**2 * np.eye(len(points))
-    covariance: Float64Array = np.kron(kernel, np.eye(3))
-    return covariance
-
-
-def _turn(capture: Capture) -> Turn:
-    sizes = np.array([(view.width, view.height) for view in capture.views])
-    diagonal = np.hypot(*sizes.T)
-    known = [view.focal_px for view in capture.views]
-    ratios = diagonal / diagonal[0]
-    if all(focal is not None for focal in known):
-        ratios = np.array(known, np.float64) / float(known[0] or 1)
-    azimuths = np.radians([view.azimuth_deg for view in capture.views])
-    return Turn(azimuths, sizes, ratios)

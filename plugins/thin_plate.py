@@ -1,9 +1,10 @@
-"""The head bent to the photos by a thin plate spline (Bookstein 1989; in 3D its kernel is the distance).
+"""The head bent to the photos by a thin plate spline (Bookstein 1989; in 3D its kernel is the
+distance).
 
-Landmarks are intersected with the refined cameras and pull the head's landmarks; points on the cranium, which no
-landmark tells about, hold still softly. Then the scalp is pushed inside every silhouette, for hair always lies outside
-the head, and skin outlines are brought on to the silhouette's edge. Each push is a smooth spline again, so the scalp
-stays smooth.
+Landmarks are intersected with the refined cameras and pull the head's landmarks; points on the
+cranium, which no landmark tells about, hold still softly. Then the scalp is pushed inside every
+silhouette, for hair always lies outside the head, and skin outlines are brought on to the
+silhouette's edge. Each push is a smooth spline again, so the scalp stays smooth.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from hairkit.coherence import Outlines
 from hairkit.mask import PERSON
 from hairkit.options import option
 from hairkit.pose import triangulate
-from hairkit.stored import Float32Array, Float64Array, Int64Array
+from hairkit.stored import BoolArray, Float32Array, Float64Array, Int64Array
 
 JAW = 17
 """The first landmarks trace the jaw, which detectors place less surely."""
@@ -43,13 +44,13 @@ class Options:
     outline_gate: float = option(
         0.008, low=0, high=0.1, doc="Skin outlines farther off than this are left alone.", unit="m"
     )
-    rounds: int = option(2, low=0, high=10, doc="Rounds of silhouette pushes; 0 for landmarks only.")
+    rounds: int = option(
+        2, low=0, high=10, doc="Rounds of silhouette pushes; 0 for landmarks only."
+    )
 
 
 @hookimpl
-def fit_head(
-    capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: Options
-) -> Scene:
+def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: Options) -> Scene:
     """Bend the scene's head to the landmarks and into the silhouettes."""
     head = _bend_to_landmarks(capture, scene, options)
     if options.rounds and all(mask.person_known for mask in masks):
@@ -79,7 +80,9 @@ def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head
 
 def _cranium(head: Head) -> Int64Array:
     """Return scalp vertices behind the ears' plane: what the landmarks know nothing about."""
-    return np.nonzero((head.scalp > 0.5) & (head.vertices[:, 2] < np.median(head.vertices[:, 2])))[0]
+    return np.nonzero((head.scalp > 0.5) & (head.vertices[:, 2] < np.median(head.vertices[:, 2])))[
+        0
+    ]
 
 
 def _spread(head: Head, count: int) -> Int64Array:
@@ -132,7 +135,8 @@ def _bend_to_outlines(
 def _inside_by(
     field: Float32Array, scale: float, camera: Camera, places: Float64Array, normals: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
-    """Return how far places lie inside the silhouette (metres, infinity off the picture), and its slope along normals."""
+    """Return how far places lie inside the silhouette (metres, infinity off the picture), and its
+    slope along normals."""
     step = 0.002
     metres = camera.focal if camera.model == "orthographic" else camera.focal / camera.depth(places)
     values = []
@@ -140,7 +144,9 @@ def _inside_by(
         column, row = np.nan_to_num(camera.project(moved) * scale - 0.5, nan=-1).T
         values.append(_bilinear(field, column, row) / metres)
     slope = np.where(np.isfinite(values[0]) & np.isfinite(values[1]), values[1], 0.0)
-    slope = (slope - np.where(np.isfinite(values[0]) & np.isfinite(values[1]), values[0], 0.0)) / step
+    slope = (
+        slope - np.where(np.isfinite(values[0]) & np.isfinite(values[1]), values[0], 0.0)
+    ) / step
     return values[0], slope
 
 
@@ -155,8 +161,9 @@ def _bilinear(field: Float32Array, column: Float64Array, row: Float64Array) -> F
     return np.where(inside, upper * (1 - y) + lower * y, np.inf)
 
 
-def _skin_nearby(mask: Mask, camera: Camera, places: Float64Array) -> np.ndarray:
-    """Return True where the person but no hair is seen within a few pixels of the projected places."""
+def _skin_nearby(mask: Mask, camera: Camera, places: Float64Array) -> BoolArray:
+    """Return True where the person but no hair is seen within a few pixels of the projected
+    places."""
     height, width = mask.labels.shape
     column, row = np.nan_to_num(camera.project(places), nan=-1).astype(int).T
     skin = np.zeros(len(places), bool)
@@ -171,7 +178,8 @@ def _skin_nearby(mask: Mask, camera: Camera, places: Float64Array) -> np.ndarray
 
 
 def _moved(head: Head, places: Float64Array, moves: Float64Array, smoothing: Float64Array) -> Head:
-    """Return the head, its joints and capsules carried along by the spline through `moves` at `places`."""
+    """Return the head, its joints and capsules carried along by the spline through `moves` at
+    `places`."""
     spline = RBFInterpolator(places, moves, smoothing=smoothing, kernel="linear", degree=1)
 
     def carry(points: Float32Array) -> Float32Array:
