@@ -16,6 +16,7 @@ SOURCES = sorted((PROJECT / "hairkit").rglob("*.py"))
 PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins" / "__init__.py"})
 
 FLOORS = {
+    "__main__": 4,
     "cli": 4,
     "viewer": 4,
     "studio": 4,
