@@ -51,6 +51,11 @@ class VoxelGrid(Stored):
         axes = [self.origin[i] + (np.arange(self.shape[i]) + 0.5) * self.spacing for i in range(3)]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).astype(np.float32)
 
+    def centres_of(self, cells: BoolArray) -> Float32Array:
+        """Return the centres (N, 3) of the cells that a mask (X, Y, Z) marks, in C order."""
+        index = np.stack(np.nonzero(cells), axis=1)
+        return (self.origin + (index + 0.5) * self.spacing).astype(np.float32)
+
     def index_from_head(self, points: npt.ArrayLike) -> Float64Array:
         """Return continuous indices (..., 3) of points: whole numbers fall on cell centres."""
         result: Float64Array = (np.asarray(points, np.float64) - self.origin) / self.spacing - 0.5

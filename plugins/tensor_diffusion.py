@@ -21,10 +21,11 @@ from scipy import ndimage
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
 from hairkit.combing import combing_direction, gradient, growth_potential
 from hairkit.diffusion import solve_screened
+from hairkit.eigen import smallest_eigenvectors
 from hairkit.options import option
 from hairkit.projection import pack_cameras, project_row, splat_depth
 from hairkit.stored import Float32Array, Float64Array
-from hairkit.volume import outer_products, symmetric_matrices
+from hairkit.volume import outer_products
 from hairkit.waves import Waves, measure_waves, without_slant
 
 DEPTH_SHRINK = 3
@@ -120,9 +121,9 @@ def _fuse(
     options: Options,
 ) -> tuple[Float64Array, npt.NDArray[np.int64]]:
     """Return `sum w N N^T` (N, 6) of every loose cell and the number of views that spoke (N,)."""
-    points = hull.grid.centres()[hull.loose]
+    points = hull.grid.centres_of(hull.loose)
     inner = hull.dense[hull.loose]
-    surface = hull.grid.centres()[hull.dense & ~ndimage.binary_erosion(hull.dense)]
+    surface = hull.grid.centres_of(hull.dense & ~ndimage.binary_erosion(hull.dense))
     planes = np.zeros((len(points), 6))
     count = np.zeros(len(points), np.int64)
     for row, mask, found in zip(pack_cameras(scene.cameras), masks, orientations, strict=True):
@@ -216,9 +217,9 @@ def _directions(
     tensor = np.zeros(planes.shape, np.float32)
     certainty = np.zeros(len(planes), np.float32)
     rows = np.flatnonzero(views >= options.min_views)
-    values, vectors = np.linalg.eigh(symmetric_matrices(planes[rows]))
-    tensor[rows] = outer_products(vectors[:, :, 0])
-    certainty[rows] = values[:, 1] - values[:, 0]
+    direction, gap = smallest_eigenvectors(planes[rows])
+    tensor[rows] = outer_products(direction)
+    certainty[rows] = gap
     return tensor, certainty
 
 
@@ -235,7 +236,7 @@ def _with_prior(
     near = distance < options.scalp_reach
     if not options.scalp_weight or not near.any():
         return tensor, certainty
-    points = hull.grid.centres()[hull.loose][near]
+    points = hull.grid.centres_of(hull.loose)[near]
     if options.scalp == "normal":
         comb = gradient(hull.grid, hull.head_distance, points)
     else:

@@ -220,7 +220,7 @@ def _clothes_depth(grid: VoxelGrid, views: _Views, options: Options) -> _Views:
     person = np.where(views.loose == EMPTY, EMPTY, np.where(views.loose == UNSEEN, UNSEEN, HAIR))
     everything = np.ones(grid.shape, bool)
     hull = _carve(grid, everything, views, person.astype(np.uint8), options, 0)
-    points = grid.centres()[hull & ~ndimage.binary_erosion(hull)]
+    points = grid.centres_of(hull & ~ndimage.binary_erosion(hull))
     surface = views.surface.copy()
     for i, row in enumerate(views.cameras):
         height, width = surface[i].shape
