@@ -115,7 +115,7 @@ def _orientation_picture(map_: OrientationMap, size: tuple[int, int]) -> UInt8Ar
 
 def _hull_pictures(hull: Hull, cameras: Sequence[Camera]) -> list[UInt8Array]:
     """Return the dense cells from each camera, as clay."""
-    vertices, faces, normals = volume_surface(hull.grid, hull.dense)
+    vertices, faces, normals = volume_surface(hull.grid, hull.dense, step=2)  # a pixel is two cells
     clay = Solid(
         vertices,
         faces,

@@ -30,16 +30,21 @@ _EDGES = [
 
 
 def volume_surface(
-    grid: VoxelGrid, occupied: BoolArray
+    grid: VoxelGrid, occupied: BoolArray, step: int = 1
 ) -> tuple[Float32Array, Int32Array, Float32Array]:
-    """Return vertices (V, 3) in metres, triangles (F, 3) seen counter-clockwise, normals (V, 3)."""
+    """Return vertices (V, 3) in metres, triangles (F, 3) seen counter-clockwise, normals (V, 3).
+
+    With a `step` above 1 the smoothed volume is taken at every so many cells: a coarser mesh.
+    """
     low, high = _bounds(occupied)
     cells = occupied[tuple(slice(a, b) for a, b in zip(low, high, strict=True))]
-    values = gaussian_filter(np.pad(cells, 4).astype(np.float32), BLUR, truncate=3.0)
+    margin = 4 * step
+    smooth = gaussian_filter(np.pad(cells, margin).astype(np.float32), BLUR, truncate=3.0)
+    values = np.ascontiguousarray(smooth[::step, ::step, ::step])
     blocks, places = _vertices(values)
     faces = _faces(values > LEVEL, blocks)
     normals = _normals(values, places)
-    positions = grid.origin + (places + low - 4 + 0.5) * grid.spacing
+    positions = grid.origin + (step * places + low - margin + 0.5) * grid.spacing
     return positions.astype(np.float32), faces, normals
 
 

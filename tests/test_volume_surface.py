@@ -16,10 +16,10 @@ def ball(radius: float) -> np.ndarray:
     return np.asarray(np.linalg.norm(GRID.centres(), axis=-1) < radius)
 
 
-@pytest.mark.parametrize("radius", [0.03, 0.06])
-def test_the_surface_of_a_ball_is_a_sphere(radius: float) -> None:
+@pytest.mark.parametrize(("radius", "step"), [(0.03, 1), (0.06, 1), (0.06, 2)])
+def test_the_surface_of_a_ball_is_a_sphere(radius: float, step: int) -> None:
     """Vertices lie on the sphere to a cell; normals point along the radius."""
-    vertices, _, normals = volume_surface(GRID, ball(radius))
+    vertices, _, normals = volume_surface(GRID, ball(radius), step)
     distance = np.linalg.norm(vertices, axis=1)
     assert distance == pytest.approx(radius, abs=GRID.spacing)
     assert (np.einsum("vc,vc->v", vertices, normals) / distance).min() > 0.9
