@@ -15,7 +15,7 @@ test: $(VENV)/.tests
 
 demo: $(VENV)/.hairkit
 	$(BIN)/hairkit reconstruct hairkit/sample -o $(DEMO)
-	@echo "Your hair is in $(DEMO)/: open the contact sheet there to see it, load the .apx in a"
+	@echo "Your hair is in $(DEMO)/: look at $(DEMO)/contact_sheet.png, load the .apx in a"
 	@echo "HairWorks viewer, or go on with: $(BIN)/hairkit info $(DEMO)/groom.npz"
 
 lint: $(VENV)/.lint
