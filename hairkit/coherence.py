@@ -30,6 +30,8 @@ halvings."""
 FASTEST = 1.6
 """A point on a ray moves at most this times (pixels per metre at the turn's centre) in another
 view."""
+FAR = 1e5
+"""Signed distance, in field pixels, where a picture shows no outline at all."""
 CAP = 40.0
 """Signed distances are cut at this many pixels; outside its picture a silhouette says nothing."""
 
@@ -47,8 +49,6 @@ class Outlines:
     """(N, 2) contour points in picture pixels."""
     views: Int64Array
     """(N,) their views."""
-    hairy: npt.NDArray[np.bool_]
-    """(N,) true where the outline is of hair."""
 
     @classmethod
     def of(cls, masks: Sequence[Mask], count: int) -> Outlines:
@@ -57,24 +57,19 @@ class Outlines:
         height, width = masks[0].labels.shape
         scale = min(1.0, FIELD_HEIGHT / height)
         size = (max(1, round(width * scale)), max(1, round(height * scale)))
-        fields, points, views, hairy = [], [], [], []
+        fields, points, views = [], [], []
         whole = all(mask.person_known for mask in masks)
         for view, mask in enumerate(masks):
             silhouette = _smooth(mask.person if whole else mask.hair, size)
             fields.append(_signed_distance(silhouette) / scale)
             contour = _contour(fields[-1] * scale, count)
-            hair = cv2.blur(mask.hair.astype(np.float32), (31, 31))
-            pixels = contour / scale
-            column, row = pixels.astype(int).T
-            hairy.append(hair[row.clip(0, height - 1), column.clip(0, width - 1)] > 0.2)
-            points.append(pixels)
-            views.append(np.full(len(pixels), view))
+            points.append(contour / scale)
+            views.append(np.full(len(contour), view))
         return cls(
             np.stack(fields).astype(np.float32),
             scale,
             np.concatenate(points),
             np.concatenate(views).astype(np.int64),
-            np.concatenate(hairy),
         )
 
     def crowns(self, ratio: float) -> tuple[Float64Array, Float64Array, Float64Array]:
@@ -115,8 +110,8 @@ def _smooth(silhouette: npt.NDArray[np.bool_], size: tuple[int, int]) -> npt.NDA
 def _signed_distance(silhouette: npt.NDArray[np.bool_]) -> Float32Array:
     inside = cv2.distanceTransform(silhouette.astype(np.uint8), cv2.DIST_L2, 5)
     outside = cv2.distanceTransform((~silhouette).astype(np.uint8), cv2.DIST_L2, 5)
-    distance: Float32Array = np.where(silhouette, inside - 0.5, 0.5 - outside)
-    return distance
+    distance = np.where(silhouette, inside - 0.5, 0.5 - outside)
+    return np.asarray(np.clip(distance, -FAR, FAR), np.float32)
 
 
 def _contour(field: Float32Array, count: int) -> Float64Array:
@@ -130,6 +125,8 @@ def _contour(field: Float32Array, count: int) -> Float64Array:
     height, width = field.shape
     kept = (longest >= EDGE).all(1) & (longest < [width - EDGE, height - EDGE]).all(1)
     longest = longest[kept]
+    if not len(longest):
+        return np.zeros((0, 2))
     chosen = longest[np.linspace(0, len(longest), count, endpoint=False).astype(int)]
     return _to_edge(field, chosen) + 0.5
 

@@ -33,7 +33,7 @@ from hairkit.landmark_fit import (
     soft_l1_weight,
 )
 from hairkit.options import option
-from hairkit.pose import LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, SHARED, Turn
+from hairkit.pose import LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, Turn
 from hairkit.stored import Float64Array
 
 REFERENCE_HEIGHT = 1080
@@ -42,6 +42,8 @@ USUAL_DISTANCE = 0.7
 SHARED_SPREAD = (0.05, 0.01, 0.01, 0.1, 0.2, 0.1, 0.5, 0.5)
 """Prior of what views share: tilt of the head in the turn (radians), the turn's centre (metres),
 log of the magnification, 1 / distance."""
+SHARED_SPREAD_BY_MASKS = (0.05, 0.01, 0.01, 0.01, 0.01, 0.01, 0.05, 0.5)
+"""The same where no landmark ties the turn to the head: silhouettes fit any place and size."""
 WIDEST, HAIR_THICKNESS = 0.6, 0.012
 """Without landmarks: depth below the crown over the width there, and how far hair stands off the
 head, metres."""
@@ -115,6 +117,8 @@ class _Fit:
     """(68, 3) landmarks off the given head's, metres."""
     flat: bool
     """True for orthographic cameras: the perspective is held."""
+    prior_mean: Float64Array
+    """The vector of the nominal turn, from which the solution started."""
     cost: float = np.inf
 
 
@@ -193,7 +197,8 @@ class _Problem:
             landmarks = LandmarkFit(
                 places, shape_precision(places), sights, fields, scale, side, PROFILE_PX * pixel
             )
-        spread = np.concatenate([SHARED_SPREAD, np.tile(each, len(capture.views))])
+        shared = SHARED_SPREAD if landmarks is not None else SHARED_SPREAD_BY_MASKS
+        spread = np.concatenate([shared, np.tile(each, len(capture.views))])
         noise = options.silhouette_px * pixel
         return cls(turn, outlines, head, landmarks, noise, spread)
 
@@ -219,7 +224,7 @@ class _Problem:
         vector[LOG_MAGNIFICATION], vector[3:6] = np.log(magnification), place
         if flat:
             vector[PERSPECTIVE] = MIN_PERSPECTIVE
-        return _Fit(vector, np.zeros((COUNT, 3)), flat)
+        return _Fit(vector, np.zeros((COUNT, 3)), flat, vector)
 
     def cameras(self, vector: Float64Array) -> CameraArrays:
         """Return the cameras as arrays."""
@@ -261,7 +266,7 @@ class _Problem:
         """Return the normal equations, and the cost, at a place."""
         vector = fit.vector
         cameras, tangents = self.cameras(vector), self.turn.tangents(vector)
-        prior = (self._prior_mean(fit) - vector) / self.prior_spread
+        prior = (fit.prior_mean - vector) / self.prior_spread
         normal, right = np.diag(self.prior_spread**-2.0), prior / self.prior_spread
         cost = float(prior @ prior)
         rows, residual = self._coherence_rows(vector, cameras, tangents)
@@ -271,13 +276,6 @@ class _Problem:
             return _Round(cost, normal, right, None)
         seen = self.landmarks.equations(fit.offset, cameras, tangents)
         return _Round(cost + seen.cost, normal + seen.normal, right + seen.right, seen)
-
-    def _prior_mean(self, fit: _Fit) -> Float64Array:
-        """Return the nominal turn; place and magnification are free around where they are."""
-        mean = np.zeros(self.turn.size)
-        mean[3:SHARED] = fit.vector[3:SHARED]
-        mean[PERSPECTIVE] = fit.vector[PERSPECTIVE] if fit.flat else 1 / USUAL_DISTANCE
-        return mean
 
     def _coherence_rows(
         self, vector: Float64Array, cameras: CameraArrays, tangents: Float64Array

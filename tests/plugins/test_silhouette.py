@@ -1,0 +1,92 @@
+"""Laws of the refined cameras."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hairkit_plugins.silhouette import Options, estimate_scene
+from turntable import Turntable, azimuth_errors, turntable
+
+from hairkit import Camera, Capture, Mask, View
+
+
+@pytest.fixture(scope="module")
+def bust() -> Turntable:
+    """A head seen by perspective cameras off the turn."""
+    return turntable(np.random.default_rng(11))
+
+
+def _without_landmarks(capture: Capture) -> Capture:
+    views = [View(view.name, view.azimuth_deg, view.image, view.focal_px) for view in capture.views]
+    return replace(capture, views=tuple(views))
+
+
+def _pixels_off(found: tuple[Camera, ...], table: Turntable) -> float:
+    points = table.head.vertices[::50]
+    off = [f.project(points) - t.project(points) for f, t in zip(found, table.cameras, strict=True)]
+    return float(np.mean(np.linalg.norm(off, axis=-1)))
+
+
+def test_cameras_come_nearer_to_the_truth(bust: Turntable) -> None:
+    """Landmarks and outlines lessen the nominal azimuth error, and the head is where it is seen."""
+    scene = estimate_scene(bust.capture, bust.masks, bust.head, Options())
+    nominal = [Camera.on_turn(45.0 * i, focal=560, width=300, height=400) for i in range(8)]
+    start = azimuth_errors(tuple(nominal), bust.cameras).mean()
+    assert azimuth_errors(scene.cameras, bust.cameras).mean() < 0.75 * start
+    assert _pixels_off(scene.cameras, bust) < 4
+    assert scene.cameras[0].model == "perspective"
+    assert scene.residual_px is not None
+    assert scene.residual_px < 1.5
+
+
+def test_the_views_with_landmarks_are_sharp(bust: Turntable) -> None:
+    """Views that show landmarks are found to half a degree relative to each other."""
+    scene = estimate_scene(bust.capture, bust.masks, bust.head, Options())
+    seen = [0, 1, 7]
+    found = tuple(scene.cameras[i] for i in seen)
+    assert azimuth_errors(found, tuple(bust.cameras[i] for i in seen)).max() < 0.5
+
+
+def test_orthographic_pictures_are_recognised() -> None:
+    """Pictures of orthographic cameras on the exact turn give orthographic cameras there."""
+    table = turntable(np.random.default_rng(2), stray=0.0, model="orthographic")
+    scene = estimate_scene(table.capture, table.masks, table.head, Options())
+    assert {camera.model for camera in scene.cameras} == {"orthographic"}
+    assert azimuth_errors(scene.cameras, table.cameras).max() < 0.5
+    assert scene.cameras[0].focal == pytest.approx(800, rel=0.03)
+
+
+def test_the_model_can_be_named() -> None:
+    """An option and the capture's flag decide on the camera model."""
+    table = turntable(np.random.default_rng(2), stray=0.0)
+    options = Options(model="orthographic", iterations=2, carries=0)
+    scene = estimate_scene(table.capture, table.masks, table.head, options)
+    assert scene.cameras[0].model == "orthographic"
+    flagged = replace(table.capture, orthographic=True)
+    scene = estimate_scene(flagged, table.masks, table.head, Options(iterations=2, carries=0))
+    assert scene.cameras[0].model == "orthographic"
+
+
+@pytest.mark.parametrize("person_known", [True, False])
+def test_without_landmarks_the_head_stands_under_its_hair(
+    bust: Turntable, person_known: bool
+) -> None:
+    """Masks alone, even of hair only, put the head's crown near the top of the silhouettes."""
+    masks = bust.masks
+    if not person_known:
+        masks = tuple(Mask(np.where(mask.hair, 255, 0), False) for mask in masks)
+    scene = estimate_scene(_without_landmarks(bust.capture), masks, bust.head, Options())
+    for camera, mask in zip(scene.cameras, masks, strict=True):
+        top = np.nonzero(mask.hair.any(1))[0][0]
+        crown = camera.project(scene.head.vertices)[:, 1].min()
+        assert abs(crown - top) < (30 if person_known else 60)
+
+
+def test_equal_input_gives_equal_cameras(bust: Turntable) -> None:
+    """Two runs give the same bytes."""
+    options = Options(iterations=3, carries=1)
+    one, two = (estimate_scene(bust.capture, bust.masks, bust.head, options) for _ in range(2))
+    for first, second in zip(one.cameras, two.cameras, strict=True):
+        assert first.camera_from_head.tobytes() == second.camera_from_head.tobytes()

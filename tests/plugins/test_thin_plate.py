@@ -1,0 +1,62 @@
+"""Laws of the bent head."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hairkit_plugins.thin_plate import Options, fit_head
+from turntable import NAMES, Turntable, turntable
+
+from hairkit import Head, Scene
+
+
+@pytest.fixture(scope="module")
+def bust() -> Turntable:
+    """A head and its pictures, cameras known."""
+    return turntable(np.random.default_rng(6), noise=0.0)
+
+
+def _scene(bust: Turntable, head: Head) -> Scene:
+    return Scene(NAMES, bust.cameras, head)
+
+
+def _stretched(head: Head, factor: tuple[float, float, float]) -> Head:
+    return replace(head, vertices=head.vertices * np.array(factor, np.float32))
+
+
+def _error(head: Head, bust: Turntable) -> np.ndarray:
+    return np.linalg.norm(head.vertices - bust.head.vertices, axis=1)
+
+
+def test_the_true_head_stays(bust: Turntable) -> None:
+    """A head that fits already is not moved by more than a fraction of a millimetre."""
+    fitted = fit_head(bust.capture, bust.masks, _scene(bust, bust.head), Options(margin=0.0)).head
+    assert np.percentile(_error(fitted, bust), 95) < 0.0012
+
+
+def test_a_face_is_pulled_to_its_landmarks(bust: Turntable) -> None:
+    """A head 6 % too narrow and flat comes to the landmarks within half of its error."""
+    wrong = _stretched(bust.head, (0.94, 1.0, 0.94))
+    fitted = fit_head(bust.capture, bust.masks, _scene(bust, wrong), Options()).head
+    marks = bust.head.landmark_vertices
+    assert _error(fitted, bust)[marks].mean() < 0.5 * _error(wrong, bust)[marks].mean()
+
+
+def test_a_head_too_big_is_pushed_into_the_silhouettes(bust: Turntable) -> None:
+    """A cranium that sticks out of the silhouettes ends up closer to the true one."""
+    wrong = _stretched(bust.head, (1.08, 1.08, 1.08))
+    without = fit_head(bust.capture, bust.masks, _scene(bust, wrong), Options(rounds=0)).head
+    fitted = fit_head(bust.capture, bust.masks, _scene(bust, wrong), Options()).head
+    scalp = bust.head.scalp > 0.5
+    assert _error(fitted, bust)[scalp].mean() < 0.8 * _error(without, bust)[scalp].mean()
+
+
+def test_joints_and_capsules_move_along(bust: Turntable) -> None:
+    """The skeleton is carried by the same bend; topology and scalp stay."""
+    wrong = _stretched(bust.head, (1.08, 1.08, 1.08))
+    fitted = fit_head(bust.capture, bust.masks, _scene(bust, wrong), Options()).head
+    assert np.array_equal(fitted.faces, wrong.faces)
+    assert np.array_equal(fitted.scalp, wrong.scalp)
+    assert not np.allclose(fitted.joints, wrong.joints, atol=1e-4)
