@@ -57,6 +57,8 @@ SOFT = 0.3
 FROM_THE_SIDE = 0.35
 """Views this near (radians) to 90 degrees show the face's midline on the outline."""
 PROFILE_PX = 3.0
+FOCAL_SPREAD = 0.03
+"""Of the logarithm of a known focal length: lenses breathe and cameras crop."""
 MIN_SIGHTS = 6
 """Fewer landmarks than this place no head."""
 
@@ -176,6 +178,8 @@ class _Problem:
     noise: float
     """Of outlines, pixels."""
     prior_spread: Float64Array
+    focal: float | None
+    """Focal length of the first view in pixels, where all views tell theirs."""
 
     @classmethod
     def of(
@@ -200,7 +204,9 @@ class _Problem:
         shared = SHARED_SPREAD if landmarks is not None else SHARED_SPREAD_BY_MASKS
         spread = np.concatenate([shared, np.tile(each, len(capture.views))])
         noise = options.silhouette_px * pixel
-        return cls(turn, outlines, head, landmarks, noise, spread)
+        focals = [view.focal_px for view in capture.views]
+        focal = None if None in focals else focals[0]
+        return cls(turn, outlines, head, landmarks, noise, spread, focal)
 
     def with_carried(self, capture: Capture, fit: _Fit) -> _Problem:
         """Return the problem with the landmarks that patches carry to other views, given a
@@ -222,6 +228,8 @@ class _Problem:
             else self._place_by_masks()
         )
         vector[LOG_MAGNIFICATION], vector[3:6] = np.log(magnification), place
+        if self.focal is not None:
+            vector[PERSPECTIVE] = max(magnification / self.focal, MIN_PERSPECTIVE)
         if flat:
             vector[PERSPECTIVE] = MIN_PERSPECTIVE
         return _Fit(vector, np.zeros((COUNT, 3)), flat, vector)
@@ -272,10 +280,22 @@ class _Problem:
         rows, residual = self._coherence_rows(vector, cameras, tangents)
         normal, right = normal + rows.T @ rows, right + rows.T @ residual
         cost += float(residual @ residual)
+        if self.focal is not None and not fit.flat:
+            row, off = self._focal_row(vector, self.focal)
+            normal, right = normal + np.outer(row, row), right + row * off
+            cost += off**2
         if self.landmarks is None:
             return _Round(cost, normal, right, None)
         seen = self.landmarks.equations(fit.offset, cameras, tangents)
         return _Round(cost + seen.cost, normal + seen.normal, right + seen.right, seen)
+
+    def _focal_row(self, vector: Float64Array, focal: float) -> tuple[Float64Array, float]:
+        """Return the row that keeps magnification over perspective near the known focal length."""
+        perspective = float(vector[PERSPECTIVE])
+        row = np.zeros(len(vector))
+        row[LOG_MAGNIFICATION], row[PERSPECTIVE] = 1, -1 / perspective
+        found = vector[LOG_MAGNIFICATION] - np.log(perspective)
+        return row / FOCAL_SPREAD, float(np.log(focal) - found) / FOCAL_SPREAD
 
     def _coherence_rows(
         self, vector: Float64Array, cameras: CameraArrays, tangents: Float64Array

@@ -69,6 +69,14 @@ def test_the_model_can_be_named() -> None:
     assert scene.cameras[0].model == "orthographic"
 
 
+def test_a_known_focal_length_is_kept(bust: Turntable) -> None:
+    """Photos that tell their focal length get cameras with it, to a few per cent."""
+    views = tuple(replace(view, focal_px=560.0) for view in bust.capture.views)
+    capture = replace(bust.capture, views=views)
+    scene = estimate_scene(capture, bust.masks, bust.head, Options())
+    assert scene.cameras[0].focal == pytest.approx(560, rel=0.06)
+
+
 @pytest.mark.parametrize("person_known", [True, False])
 def test_without_landmarks_the_head_stands_under_its_hair(
     bust: Turntable, person_known: bool
