@@ -7,6 +7,8 @@ faces appear by themselves.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 from numba import njit
@@ -102,6 +104,7 @@ def hair_length(hull: Hull, way: Float32Array) -> float:
     return float(np.percentile(way[hull.dense], 98))
 
 
+@lru_cache(maxsize=1)
 def scalp_way(head: Head, hull: Hull) -> Float32Array:
     """Return (X, Y, Z) the shortest way from the scalp through loose cells, metres; 0 where
     there is none."""

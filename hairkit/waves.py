@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -66,7 +67,19 @@ class Waves:
 def measure_waves(
     orientations: Sequence[OrientationMap], masks: Sequence[Mask], cameras: Sequence[Camera]
 ) -> Waves:
-    """Measure pitch, radius and slant of the waves in all views together."""
+    """Measure pitch, radius and slant of the waves in all views together.
+
+    The field, the tracker and the groom's material ask the same; the last answer is kept.
+    """
+    return _measured(tuple(orientations), tuple(masks), tuple(cameras))
+
+
+@lru_cache(maxsize=1)
+def _measured(
+    orientations: tuple[OrientationMap, ...],
+    masks: tuple[Mask, ...],
+    cameras: tuple[Camera, ...],
+) -> Waves:
     correlation = np.zeros(LONGEST_LAG)
     squares, slants, metres = [], [], []
     for found, mask, camera in zip(orientations, masks, cameras, strict=True):

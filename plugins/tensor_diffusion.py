@@ -11,6 +11,7 @@ scalp settles later which end of a strand is the tip.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -155,12 +156,16 @@ def _pooled(planes: Float64Array, hull: Hull, sigma: float) -> Float64Array:
     """
     if sigma <= 0:
         return planes
-    volume = np.zeros(hull.grid.shape, np.float32)
     result = np.empty_like(planes)
-    for component in range(6):
+
+    def pool(component: int) -> None:
+        volume = np.zeros(hull.grid.shape, np.float32)
         volume[hull.loose] = planes[:, component]
         smooth = ndimage.gaussian_filter(volume, sigma / hull.grid.spacing, truncate=2.5)
         result[:, component] = smooth[hull.loose]
+
+    with ThreadPoolExecutor() as threads:  # the filter lets go of the interpreter's lock
+        list(threads.map(pool, range(6)))
     return result
 
 

@@ -1,5 +1,4 @@
-"""The head bent to the photos by a thin plate spline (Bookstein 1989; in 3D its kernel is the
-distance).
+"""The head bent to the photos by a thin plate spline (Bookstein 1989), the distance its kernel.
 
 Landmarks are intersected with the refined cameras and pull the head's landmarks; points on the
 cranium, which no landmark tells about, hold still softly. Then what sticks out of a silhouette is
