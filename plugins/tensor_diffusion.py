@@ -11,7 +11,6 @@ scalp settles later which end of a strand is the tip.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +31,8 @@ from hairkit.waves import Waves, measure_waves, without_slant
 DEPTH_SHRINK = 3
 """Depth maps of the hull are this much smaller than the pictures: cells are larger than pixels."""
 
+POOL_CELLS = 2
+"""Planes are pooled on cells this many times as large."""
 HARD_WEIGHT = 1e3
 """Weight against `smoothness` that keeps a cell as it is."""
 
@@ -156,16 +157,14 @@ def _pooled(planes: Float64Array, hull: Hull, sigma: float) -> Float64Array:
     """
     if sigma <= 0:
         return planes
+    shape = tuple(-(-n // POOL_CELLS) for n in hull.grid.shape)
+    block = tuple(index // POOL_CELLS for index in np.nonzero(hull.loose))
+    flat = np.ravel_multi_index(block, shape)
     result = np.empty_like(planes)
-
-    def pool(component: int) -> None:
-        volume = np.zeros(hull.grid.shape, np.float32)
-        volume[hull.loose] = planes[:, component]
-        smooth = ndimage.gaussian_filter(volume, sigma / hull.grid.spacing, truncate=2.5)
-        result[:, component] = smooth[hull.loose]
-
-    with ThreadPoolExecutor() as threads:  # the filter lets go of the interpreter's lock
-        list(threads.map(pool, range(6)))
+    for component in range(6):
+        total = np.bincount(flat, planes[:, component], int(np.prod(shape))).reshape(shape)
+        smooth = ndimage.gaussian_filter(total, sigma / (POOL_CELLS * hull.grid.spacing))
+        result[:, component] = smooth.ravel()[flat] / POOL_CELLS**3
     return result
 
 
