@@ -1,6 +1,6 @@
 """Print how far fitted cameras and heads are from the truth, and the time it takes.
 
-python benchmarks/cameras.py ../shared/captures --plugin silhouette
+python benchmarks/cameras.py captures/ --plugin silhouette
 
 The masks are the captures' own. Cameras and head are brought into the truth's frame as `evaluate`
 does it. Each plugin runs twice and the second run is timed, so kernels are compiled already.

@@ -1,6 +1,6 @@
 """How faithful reconstructions are: runs recipes on captures with truth and prints one table.
 
-python benchmarks/fidelity.py --captures ../shared/captures --recipes default thesis
+python benchmarks/fidelity.py --captures captures/ --recipes default thesis
 
 Each capture is reconstructed by the command line in a process of its own, whose wall time and peak
 memory are measured, with as many guides as there are strands to compare; then it is evaluated.

@@ -1,6 +1,6 @@
 """Print how far 2D orientations are from the truth, how well confidence ranks them, and the time.
 
-python benchmarks/orientation.py ../shared/captures --pictures /tmp/orientation
+python benchmarks/orientation.py captures/ --pictures /tmp/orientation
 
 Errors are mean degrees over true hair, the mask eroded by 4 pixels, where the truth is coherent
 (`hairkit.filtering.coherent_truth`); guessing gives 45. `sure half`: the pixels with confidence

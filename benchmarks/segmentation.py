@@ -1,6 +1,6 @@
 """Print how well hair and person are found in captures with true masks, and the time it takes.
 
-python benchmarks/segmentation.py ../shared/captures --plugin grabcut
+python benchmarks/segmentation.py captures/ --plugin grabcut
 """
 
 from __future__ import annotations
