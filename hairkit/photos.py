@@ -219,6 +219,8 @@ def _scan_png(data: bytes) -> tuple[int, int, bytes]:
 
 
 def _decode(data: bytes, mode: int, path: Path) -> UInt8Array:
+    if _kind(data) == "PNG" and _unpacks_to_more(data):
+        raise FormatError(f"{path}: damaged PNG file: it unpacks to more than its picture holds")
     try:
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), mode | _AS_STORED)
     except cv2.error:
@@ -226,6 +228,26 @@ def _decode(data: bytes, mode: int, path: Path) -> UInt8Array:
     if pixels is None:
         raise FormatError(f"{path}: damaged picture, it cannot be decoded; save it again")
     return pixels  # type: ignore[return-value]  # uint8, or uint16 for IMREAD_UNCHANGED
+
+
+def _unpacks_to_more(data: bytes) -> bool:
+    """Tell whether a whole PNG file's packed data is larger than any picture of its size."""
+    width, height = struct.unpack_from(">II", data, 16)
+    left = height * (1 + 8 * width) + 8 * (height + 8)  # 16 bit RGBA, a filter byte a row and pass
+    inflate, position = zlib.decompressobj(), 8
+    while data[position + 4 : position + 8] != b"IEND":
+        (length,) = struct.unpack_from(">I", data, position)
+        if data[position + 4 : position + 8] == b"IDAT":
+            try:
+                left -= len(
+                    inflate.decompress(data[position + 8 : position + 8 + length], left + 1)
+                )
+            except zlib.error:
+                return False  # the decoder says what is wrong
+            if left < 0:
+                return True
+        position += 12 + length
+    return False
 
 
 _AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION

@@ -198,3 +198,18 @@ def test_a_drawing_keeps_its_values(tmp_path: Path) -> None:
     (tmp_path / "d.png").write_bytes(jpeg(scene_picture()))
     with pytest.raises(InputError, match="must be PNG"):
         read_drawing(tmp_path / "d.png")
+
+
+def test_data_beyond_the_pictures_size_is_refused(tmp_path: Path) -> None:
+    """A small header before gigabytes of packed zeros is a bomb: refused while it is unpacked."""
+    data = cv2.imencode(".png", np.zeros((8, 8, 3), np.uint8))[1].tobytes()
+    start = data.index(b"IDAT") - 4
+    (length,) = struct.unpack_from(">I", data, start)
+    packed = zlib.compress(bytes(10**7), 9)
+    chunk = b"IDAT" + packed
+    bomb = data[:start] + struct.pack(">I", len(packed)) + chunk
+    bomb += struct.pack(">I", zlib.crc32(chunk)) + data[start + 12 + length :]
+    path = tmp_path / "bomb.png"
+    path.write_bytes(bomb)
+    with pytest.raises(InputError, match="unpacks to more"):
+        read_photo(path)
