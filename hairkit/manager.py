@@ -23,6 +23,7 @@ import pluggy
 
 from hairkit import hookspecs
 from hairkit.errors import HairkitError, OptionError, PluginError
+from hairkit.file_format import FileFormat
 from hairkit.groom import Groom
 from hairkit.mask import Mask
 from hairkit.options import OptionInfo, describe, make_options, unknown_name
@@ -72,7 +73,9 @@ class PluginInfo:
     source: Path | None = None
     """The plugin's Python file, where there is one."""
     suffixes: tuple[str, ...] = ()
-    """File name endings that it reads or writes, from the module's `SUFFIXES`: `(".apx",)`."""
+    """File name endings that it reads or writes, from the module's `FORMAT`: `(".apx",)`."""
+    format: FileFormat | None = None
+    """What its file format carries, from the module's `FORMAT`."""
     broken: str | None = None
     """Why the plugin cannot be used, or None."""
 
@@ -327,6 +330,9 @@ def _inspect(plugin: object, name: str, distribution: str, version: str) -> Plug
         options = describe(kind)
     summary = (inspect.getdoc(plugin) or "").partition("\n")[0]
     file = getattr(plugin, "__file__", None)
+    form = getattr(plugin, "FORMAT", None)
+    if form is not None and not isinstance(form, FileFormat):
+        raise PluginError("its FORMAT is not a hairkit.file_format.FileFormat")
     return PluginInfo(
         name,
         distribution,
@@ -334,7 +340,8 @@ def _inspect(plugin: object, name: str, distribution: str, version: str) -> Plug
         summary,
         options=options,
         source=Path(file) if file else None,
-        suffixes=tuple(getattr(plugin, "SUFFIXES", ())),
+        suffixes=form.suffixes if form else tuple(getattr(plugin, "SUFFIXES", ())),
+        format=form,
     )
 
 

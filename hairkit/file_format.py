@@ -1,0 +1,53 @@
+"""What a file format carries, as its plugin declares it: the format matrix is made from this."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+
+
+class Feature(StrEnum):
+    """What a groom holds, as far as files may carry it; the value is the matrix's heading."""
+
+    POINTS = "points"
+    COUNTS = "points differ per strand"
+    WIDTHS = "width per point"
+    ROOT_UV = "root uv"
+    GROUP = "groups"
+    GUIDE = "guide flag"
+    GUIDE_WEIGHTS = "guide weights"
+    HEAD = "head mesh"
+    SKIN = "skeleton and skin"
+    CAPSULES = "capsules"
+    COLOUR = "colour"
+    CURL = "curl"
+    PHYSICS = "physics"
+    ANIMATION = "animation"
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """One format: the plugin module's `FORMAT`.
+
+    Every feature stands in at most one of `exact`, `partial` and `written`; what stands in none is
+    lost. Tests write a groom with everything and hold each format to its declaration.
+    """
+
+    title: str
+    """Name in the matrix: `Alembic`."""
+    suffixes: tuple[str, ...]
+    """Endings in lower case, dot first: `(".abc",)`."""
+    exact: frozenset[Feature] = frozenset()
+    """Export then import gives this back within float32."""
+    partial: Mapping[Feature, str] = field(default_factory=lambda: MappingProxyType({}))
+    """Comes back changed; the text says how: `mean of each strand`."""
+    written: frozenset[Feature] = frozenset()
+    """Written for other programs, not read back here (formats without importer: everything)."""
+
+    def state(self, feature: Feature) -> str:
+        """Return the matrix's cell: `yes`, `written`, the text of `partial`, or empty for lost."""
+        if feature in self.exact:
+            return "yes"
+        return "written" if feature in self.written else self.partial.get(feature, "")
