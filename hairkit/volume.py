@@ -131,9 +131,22 @@ class OrientationField(Stored):
     """(X, Y, Z) in [0, 1]; 0 where nothing is known."""
     growth: Float32Array
     """(X, Y, Z) potential, growing with the distance from the scalp through the hair: the sign."""
+    direction: Float32Array | None = None
+    """(X, Y, Z, 3) root to tip, where the method finds signs of its own; lengths mean nothing."""
+    internal_distance: Float32Array | None = None
+    """(X, Y, Z) 0 in the head, 1 at the hair's surface, beyond it 1 more than metres away over
+    the cell's edge; None where the method has none."""
 
     def __post_init__(self) -> None:
         shape = self.grid.shape
+        if self.direction is not None:
+            direction = frozen_array(self.direction, np.float32, (*shape, 3), "field direction")
+            object.__setattr__(self, "direction", direction)
+        if self.internal_distance is not None:
+            inner = frozen_array(
+                self.internal_distance, np.float32, shape, "field internal_distance"
+            )
+            object.__setattr__(self, "internal_distance", inner)
         object.__setattr__(
             self, "tensor", frozen_array(self.tensor, np.float32, (*shape, 6), "field tensor")
         )

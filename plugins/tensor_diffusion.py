@@ -14,25 +14,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
-from numba import njit, prange
-from scipy import ndimage
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
 from hairkit.combing import combing_direction, gradient, growth_potential
 from hairkit.diffusion import solve_screened
-from hairkit.eigen import smallest_eigenvectors
 from hairkit.options import option
-from hairkit.projection import pack_cameras, project_row, splat_depth
-from hairkit.stored import Float32Array, Float64Array
+from hairkit.plane_fusion import fuse_planes, plane_directions, pooled_planes
+from hairkit.stored import Float32Array
 from hairkit.volume import outer_products
 from hairkit.waves import Waves, measure_waves, without_slant
 
-DEPTH_SHRINK = 3
-"""Depth maps of the hull are this much smaller than the pictures: cells are larger than pixels."""
-
-POOL_CELLS = 2
-"""Planes are pooled on cells this many times as large."""
 HARD_WEIGHT = 1e3
 """Weight against `smoothness` that keeps a cell as it is."""
 
@@ -99,9 +90,11 @@ def solve_field(
     if options.unslant:
         orientations = tuple(without_slant(found, waves) for found in orientations)
     growth = growth_potential(scene.head, hull, options.tip_share)
-    planes, views = _fuse(scene, masks, orientations, hull, options)
-    planes = _pooled(planes, hull, options.pool * waves.pitch)
-    tensor, certainty = _directions(planes, views, options)
+    planes, views = fuse_planes(
+        scene.cameras, masks, orientations, hull, options.see_through, options.free_depth
+    )
+    planes = pooled_planes(planes, hull, options.pool * waves.pitch)
+    tensor, certainty = plane_directions(planes, views, options.min_views)
     data, weight = _with_prior(scene, hull, growth, tensor, certainty, options)
     if options.hard:
         weight = np.where(weight > 0, HARD_WEIGHT, 0).astype(np.float32)
@@ -113,118 +106,6 @@ def solve_field(
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
     return OrientationField(hull.grid, field, confidence, growth)
-
-
-def _fuse(
-    scene: Scene,
-    masks: tuple[Mask, ...],
-    orientations: tuple[OrientationMap, ...],
-    hull: Hull,
-    options: Options,
-) -> tuple[Float64Array, npt.NDArray[np.int64]]:
-    """Return `sum w N N^T` (N, 6) of every loose cell and the number of views that spoke (N,)."""
-    points = hull.grid.centres_of(hull.loose)
-    inner = hull.dense[hull.loose]
-    surface = hull.grid.centres_of(hull.dense & ~ndimage.binary_erosion(hull.dense))
-    planes = np.zeros((len(points), 6))
-    count = np.zeros(len(points), np.int64)
-    for row, mask, found in zip(pack_cameras(scene.cameras), masks, orientations, strict=True):
-        height, width = found.angle.shape
-        front = np.full((height // DEPTH_SHRINK, width // DEPTH_SHRINK), np.inf, np.float32)
-        splat_depth(row, surface, 0.75 * hull.grid.spacing, front)
-        certainty = found.confidence * mask.hair
-        _add_planes(
-            row,
-            points,
-            inner,
-            found.angle,
-            certainty,
-            front,
-            options.see_through,
-            options.free_depth,
-            planes,
-            count,
-        )
-    return planes, count
-
-
-def _pooled(planes: Float64Array, hull: Hull, sigma: float) -> Float64Array:
-    """Return the planes (N, 6) averaged over a Gaussian neighbourhood of `sigma` metres.
-
-    Planes of two views 45 degrees apart amplify disagreement into depth, and strands that wave out
-    of step disagree. Pooled before they are intersected, their angles average; afterwards the
-    amplified error would.
-    """
-    if sigma <= 0:
-        return planes
-    shape = tuple(-(-n // POOL_CELLS) for n in hull.grid.shape)
-    block = tuple(index // POOL_CELLS for index in np.nonzero(hull.loose))
-    flat = np.ravel_multi_index(block, shape)
-    result = np.empty_like(planes)
-    for component in range(6):
-        total = np.bincount(flat, planes[:, component], int(np.prod(shape))).reshape(shape)
-        smooth = ndimage.gaussian_filter(total, sigma / (POOL_CELLS * hull.grid.spacing))
-        result[:, component] = smooth.ravel()[flat] / POOL_CELLS**3
-    return result
-
-
-@njit(cache=True, parallel=True)
-def _add_planes(  # type: ignore[no-untyped-def]
-    row, points, inner, angle, certainty, front, see_through, free_depth, planes, count
-):
-    height, width = angle.shape
-    scale = front.shape[0] / row[19]
-    for i in prange(len(points)):
-        if not inner[i]:
-            continue
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        u, v, depth = project_row(row, x, y, z)
-        if u < 0 or v < 0 or u >= width or v >= height:
-            continue
-        weight = certainty[int(v), int(u)]
-        if weight <= 0:
-            continue
-        line = min(int(v * scale), front.shape[0] - 1)
-        column = min(int(u * scale), front.shape[1] - 1)
-        behind = depth - front[line, column] - free_depth
-        if behind > 0:
-            if see_through <= 0:
-                continue
-            weight *= np.exp(-behind / see_through)
-            if weight < 1e-4:
-                continue
-        # the strand's direction in the picture, turned into the head frame, and the ray to the cell
-        c, s = np.cos(angle[int(v), int(u)]), np.sin(angle[int(v), int(u)])
-        dx, dy, dz = c * row[0] + s * row[3], c * row[1] + s * row[4], c * row[2] + s * row[5]
-        if row[15] > 0.5:
-            rx, ry, rz = row[6], row[7], row[8]
-        else:
-            rx, ry, rz = x - row[16], y - row[17], z - row[18]
-        nx, ny, nz = ry * dz - rz * dy, rz * dx - rx * dz, rx * dy - ry * dx
-        norm = nx * nx + ny * ny + nz * nz
-        planes[i, 0] += weight * nx * nx / norm
-        planes[i, 1] += weight * ny * ny / norm
-        planes[i, 2] += weight * nz * nz / norm
-        planes[i, 3] += weight * nx * ny / norm
-        planes[i, 4] += weight * nx * nz / norm
-        planes[i, 5] += weight * ny * nz / norm
-        count[i] += 1
-
-
-def _directions(
-    planes: Float64Array, views: npt.NDArray[np.int64], options: Options
-) -> tuple[Float32Array, Float32Array]:
-    """Return D D^T (N, 6) of the smallest eigenvector and its certainty (N,).
-
-    Certainty is the gap between the two smallest eigenvalues: 0 when all views share one plane.
-    """
-    tensor = np.zeros(planes.shape, np.float32)
-    certainty = np.zeros(len(planes), np.float32)
-    rows = np.flatnonzero(views >= options.min_views)
-    direction, gap = smallest_eigenvectors(planes[rows])
-    tensor[rows] = outer_products(direction)
-    certainty[rows] = gap
-    return tensor, certainty
 
 
 def _with_prior(

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins import tensor_diffusion
-from hairkit_plugins.tensor_diffusion import Options, _add_planes, solve_field
+from hairkit_plugins.tensor_diffusion import Options, solve_field
 
 from hairkit.camera import Camera, CameraModel
 from hairkit.mask import HAIR, Mask
 from hairkit.orientation import OrientationMap, wrap_angle
+from hairkit.plane_fusion import _add_planes
 from hairkit.projection import pack_cameras
 from hairkit.scene import Scene
 from hairkit.stored import BoolArray, Float32Array, Float64Array
