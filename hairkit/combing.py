@@ -7,6 +7,7 @@ faces appear by themselves.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +17,7 @@ from scipy import ndimage
 
 from hairkit.head import Head
 from hairkit.stored import BoolArray, Float32Array, Float64Array
-from hairkit.volume import Hull, VoxelGrid
+from hairkit.volume import Hull, VoxelGrid, outer_products
 
 WHORL_BEHIND = 0.03
 """Metres behind the highest point of the head where the vertical axis of the crown's whorl
@@ -51,6 +52,45 @@ def combing_direction(
         np.linalg.norm(direction, axis=1, keepdims=True), 1e-9
     )
     return result
+
+
+@dataclass(frozen=True)
+class ScalpPrior:
+    """How strongly, and how far from the scalp, combing speaks for photos that say little."""
+
+    weight: float
+    """Against the certainty of fused cells, which is at most 1 for each view."""
+    reach: float
+    """Metres from the head."""
+    lift: float
+    """Outward part against the tangential one."""
+    normal: bool = False
+    """True: hair stands along the head's normal instead of being combed."""
+
+
+def with_scalp_prior(
+    head: Head,
+    hull: Hull,
+    growth: Float32Array,
+    tensor: Float32Array,
+    certainty: Float32Array,
+    prior: ScalpPrior,
+) -> tuple[Float32Array, Float32Array]:
+    """Return wanted tensors (N, 6) and weights (N,) of the loose cells with the prior added."""
+    distance = hull.head_distance[hull.loose]
+    near = distance < prior.reach
+    if not prior.weight or not near.any():
+        return tensor, certainty
+    points = hull.grid.centres_of(hull.loose)[near]
+    if prior.normal:
+        comb = gradient(hull.grid, hull.head_distance, points)
+    else:
+        comb = combing_direction(head, hull, growth, points, prior.lift)
+    data, weight = tensor.copy(), certainty.copy()
+    weight[near] += prior.weight
+    share = (prior.weight / weight[near])[:, None]
+    data[near] = (1 - share) * tensor[near] + share * outer_products(comb)
+    return data, weight
 
 
 def _from_crown(head: Head, at: Float64Array, outward: Float64Array) -> Float64Array:

@@ -16,12 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
-from hairkit.combing import combing_direction, gradient, growth_potential
+from hairkit.combing import ScalpPrior, growth_potential, with_scalp_prior
 from hairkit.diffusion import solve_screened
 from hairkit.options import option
 from hairkit.plane_fusion import fuse_planes, plane_directions, pooled_planes
-from hairkit.stored import Float32Array
-from hairkit.volume import outer_products
 from hairkit.waves import Waves, measure_waves, without_slant
 
 HARD_WEIGHT = 1e3
@@ -95,7 +93,10 @@ def solve_field(
     )
     planes = pooled_planes(planes, hull, options.pool * waves.pitch)
     tensor, certainty = plane_directions(planes, views, options.min_views)
-    data, weight = _with_prior(scene, hull, growth, tensor, certainty, options)
+    prior = ScalpPrior(
+        options.scalp_weight, options.scalp_reach, options.scalp_lift, options.scalp == "normal"
+    )
+    data, weight = with_scalp_prior(scene.head, hull, growth, tensor, certainty, prior)
     if options.hard:
         weight = np.where(weight > 0, HARD_WEIGHT, 0).astype(np.float32)
     solved = solve_screened(
@@ -106,28 +107,3 @@ def solve_field(
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
     return OrientationField(hull.grid, field, confidence, growth)
-
-
-def _with_prior(
-    scene: Scene,
-    hull: Hull,
-    growth: Float32Array,
-    tensor: Float32Array,
-    certainty: Float32Array,
-    options: Options,
-) -> tuple[Float32Array, Float32Array]:
-    """Return wanted tensors and weights after adding the combing prior near the scalp."""
-    distance = hull.head_distance[hull.loose]
-    near = distance < options.scalp_reach
-    if not options.scalp_weight or not near.any():
-        return tensor, certainty
-    points = hull.grid.centres_of(hull.loose)[near]
-    if options.scalp == "normal":
-        comb = gradient(hull.grid, hull.head_distance, points)
-    else:
-        comb = combing_direction(scene.head, hull, growth, points, options.scalp_lift)
-    data, weight = tensor.copy(), certainty.copy()
-    weight[near] += options.scalp_weight
-    share = (options.scalp_weight / weight[near])[:, None]
-    data[near] = (1 - share) * tensor[near] + share * outer_products(comb)
-    return data, weight
