@@ -15,31 +15,43 @@ from scipy.spatial import cKDTree
 
 from hairkit.default_head import default_head
 from hairkit.errors import FormatError, InputError
+from hairkit.file_space import SpaceOptions
 from hairkit.groom import Groom, HairMaterial
 from hairkit.groom_file import read_groom
-from hairkit.head import Capsules, Head
+from hairkit.head import Head
 from hairkit.head_files import read_head
+from hairkit.head_placing import find_place, placed
 from hairkit.options import option
 from hairkit.scalp import bind, roots_at
-from hairkit.stored import Float32Array, Float64Array, Int64Array
+from hairkit.stored import Float32Array, Int64Array
 from hairkit.strands import Strands
 
-SMALLEST, LARGEST = 0.03, 0.6
+__all__ = ["ImportOptions", "adopt", "packed", "placed", "reversed_strands"]
+
+SMALLEST, LARGEST = 0.015, 0.6
 """Roots of a head of hair spread over between these many metres."""
-_ROUNDS = 30
-_INNERMOST = 0.9
+NO_LENGTH = 1e-5
+"""Strands shorter than this share of the longest have no direction."""
+FARTHEST = 0.03
+"""Roots of a head's hair lie within this many metres of it, in the mean."""
+_OUTER = (1.0, 99.0)
+_TYPICAL_SPREAD = 0.2
+_TIP_FIRST = 0.5
 
 _log = logging.getLogger("hairkit")
 
 
 @dataclass(frozen=True)
 class ImportOptions:
-    """Option of every importer of files without a head."""
+    """Options of every importer of files without a head."""
 
     head: Path | None = option(
         None,
         doc="Head under the strands: .obj, .ply, .glb or a groom's .npz; else the default head,"
         " moved and scaled to the roots.",
+    )
+    reverse: bool = option(
+        False, doc="Turn every strand over: for files that draw hair from tip to root."
     )
 
 
@@ -72,12 +84,14 @@ def adopt(
 ) -> Groom:
     """Return strands in the head frame as a groom, bound to a head.
 
+    Strands without length are dropped and counted in a warning.
+
     Parameters
     ----------
     strands
         Metres; with the widths and root uv that the file had, else None.
     options
-        Names the head, if any.
+        Names the head, if any, and says whether to turn the strands over.
     source
         The file, for messages.
     material
@@ -89,80 +103,122 @@ def adopt(
     ------
     InputError
         The roots spread over what cannot be a head, so the unit must be given.
+    FormatError
+        No strand has any length.
     """
-    spread = float(np.ptp(strands.roots, axis=0).max())
-    if not SMALLEST <= spread <= LARGEST and len(strands) > 1:
-        raise InputError(
-            f"{source}: the roots spread over {spread:.4g} m, a head of hair's over about 0.2 m;"
-            f" give metres per unit: scale={_guess(spread, strands):.2g}"
-        )
-    if options.head is not None:
-        head = _read(options.head)
-    elif head is None:
-        head = _fitted(strands.roots.astype(np.float64), source)
+    strands = _with_length(strands, source)
+    if options.reverse:
+        strands = reversed_strands(strands)
+        if material is not None:
+            material = replace(
+                material, root_colour=material.tip_colour, tip_colour=material.root_colour
+            )
+    _check_spread(strands, options, source)
+    head = _head(strands, options, head, source)
+    if not options.reverse:
+        _warn_of_tips(strands, head, source)
     if material is None:
-        material = HairMaterial()
-        if strands.widths is not None and (strands.widths > 0).any():
-            width = float(strands.widths[strands.widths > 0].mean())
-            material = replace(material, width=width)
+        material = _with_mean_width(strands)
     if strands.widths is None:
         _log.warning("%s: no widths; strands are %g mm wide", source, 1000 * material.width)
     triangle, barycentric = bind(strands.roots, head)
     if strands.root_uv is None:
         _log.warning("%s: no root uv; that of the head is taken", source)
-        uv = roots_at(head, triangle, barycentric).uv
-        strands = replace(strands, root_uv=uv)
+        strands = replace(strands, root_uv=roots_at(head, triangle, barycentric).uv)
     return Groom(strands, head, triangle, barycentric, material)
 
 
-def _guess(spread: float, strands: Strands) -> float:
-    """Return metres per unit of the file, were its metres units and the hair on a head."""
-    return 0.2 / max(spread, float(strands.lengths().max()) / 4, 1e-12)
+def reversed_strands(strands: Strands) -> Strands:
+    """Return the strands with their points, and widths, from tip to root."""
+    owner = strands.strand_of_point
+    rows = (strands.offsets[:-1] + strands.offsets[1:] - 1)[owner] - np.arange(len(owner))
+    widths = None if strands.widths is None else strands.widths[rows]
+    return replace(strands, points=strands.points[rows], widths=widths)
+
+
+def _with_length(strands: Strands, source: object) -> Strands:
+    lengths = strands.lengths()
+    keep = lengths > NO_LENGTH * lengths.max(initial=0.0)
+    if not keep.any():
+        raise FormatError(f"{source}: none of its {len(keep)} strands has any length")
+    if keep.all():
+        return strands
+    _log.warning("%s: %d strands without length dropped", source, np.count_nonzero(~keep))
+    return strands.select(keep)
+
+
+def _check_spread(strands: Strands, options: ImportOptions, source: object) -> None:
+    """Refuse strands of another unit; a few roots far off do not count."""
+    low, high = np.percentile(strands.roots, _OUTER, axis=0)
+    spread = float((high - low).max())
+    lone = len(strands) == 1  # roots tell nothing, the length does
+    size = float(strands.lengths()[0]) if lone else spread
+    smallest, largest = (0.001, 2.0) if lone else (SMALLEST, LARGEST)
+    if smallest <= size <= largest:
+        return
+    unit = options.space.metres if isinstance(options, SpaceOptions) else 1.0
+    longest = float(np.percentile(strands.lengths(), 90))
+    guess = unit * _TYPICAL_SPREAD / max(spread, longest / 4, 1e-30)
+    raise InputError(
+        f"{source}: the roots spread over {spread:.4g} m, a head of hair's over about"
+        f" {_TYPICAL_SPREAD} m; give metres per unit of the file: scale={guess:.2g}"
+    )
+
+
+def _head(strands: Strands, options: ImportOptions, own: Head | None, source: object) -> Head:
+    """Return the head of the option, else the file's own, else the default one, in its place."""
+    if options.head is None and own is not None:
+        return own
+    if options.head is None:
+        head = default_head()
+        place = find_place(head, strands)
+        _log.warning(
+            "%s: no head; the default head, scaled by %.2f and moved by %s m, is put under the"
+            " roots, %.1f mm off",
+            source,
+            place.scale,
+            np.array2string(place.shift, precision=3, suppress_small=True, separator=", "),
+            1000 * place.distance,
+        )
+        return placed(head, place.scale, place.shift)
+    head = _read(options.head)
+    if _away(strands.roots, head) <= FARTHEST:
+        return head
+    place = find_place(head, strands, scaled=False)  # a head file is read about its own middle
+    _log.warning(
+        "%s: the head of %s is moved by %s m to the roots, %.1f mm off",
+        source,
+        options.head,
+        np.array2string(place.shift, precision=3, suppress_small=True, separator=", "),
+        1000 * place.distance,
+    )
+    return placed(head, 1.0, place.shift)
 
 
 def _read(path: Path) -> Head:
     return read_groom(path).head if path.suffix == ".npz" else read_head(path)
 
 
-def _fitted(roots: Float64Array, source: object) -> Head:
-    """Return the default head, scaled and moved so that its scalp lies at the roots.
-
-    Iterated closest points with a similarity without turning (Zinsser et al. 2005), the farthest
-    tenth of the roots left out in each round.
-    """
-    head = default_head()
-    scalp = head.vertices[head.scalp > 0.5].astype(np.float64)
-    scale = float(np.clip(np.ptp(roots, axis=0).max() / np.ptp(scalp, axis=0).max(), 0.5, 2.0))
-    shift = roots.mean(axis=0) - scale * scalp.mean(axis=0)
-    for _ in range(_ROUNDS):
-        tree = cKDTree(scale * scalp + shift)
-        distance, near = tree.query(roots)
-        inner = distance <= np.quantile(distance, _INNERMOST)
-        wanted, have = roots[inner], scalp[near[inner]]
-        offset = have - have.mean(axis=0)
-        spread = float((offset**2).sum())
-        if spread > 1e-9:
-            fit = float((offset * (wanted - wanted.mean(axis=0))).sum()) / spread
-            scale = float(np.clip(fit, 0.7, 1.4))
-        shift = wanted.mean(axis=0) - scale * have.mean(axis=0)
-    distance = cKDTree(scale * scalp + shift).query(roots)[0]
-    _log.warning(
-        "%s: no head; the default head, scaled by %.2f, is put under the roots, %.1f mm off",
-        source,
-        scale,
-        1000 * distance.mean(),
-    )
-    return placed(head, scale, shift)
+def _away(points: Float32Array, head: Head) -> float:
+    """Return the mean distance of points (N, 3) from the head's vertices, metres."""
+    return float(cKDTree(head.vertices).query(points)[0].mean())
 
 
-def placed(head: Head, scale: float, shift: Float64Array) -> Head:
-    """Return the head scaled about the origin, then moved by `shift` (3,), metres."""
-    shapes, shift32 = head.capsules, shift.astype(np.float32)
-    return replace(
-        head,
-        vertices=scale * head.vertices + shift32,
-        joints=scale * head.joints + shift32,
-        capsules=Capsules(
-            scale * shapes.first + shift32, scale * shapes.second + shift32, scale * shapes.radius
-        ),
-    )
+def _warn_of_tips(strands: Strands, head: Head, source: object) -> None:
+    """Say so where the tips lie on the head and the roots do not."""
+    roots, tips = _away(strands.roots, head), _away(strands.tips, head)
+    if tips < _TIP_FIRST * roots:
+        _log.warning(
+            "%s: tips lie nearer to the head (%.1f mm) than roots (%.1f mm); if it draws hair from"
+            " tip to root, set reverse=true",
+            source,
+            1000 * tips,
+            1000 * roots,
+        )
+
+
+def _with_mean_width(strands: Strands) -> HairMaterial:
+    widths = strands.widths
+    if widths is None or not (widths > 0).any():
+        return HairMaterial()
+    return HairMaterial(width=float(widths[widths > 0].mean(dtype=np.float64)))
