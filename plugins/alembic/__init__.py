@@ -1,0 +1,60 @@
+"""Alembic .abc (Ogawa): curves with Unreal's groom schema 1.5, still or animated, written and read.
+
+All strands are one curves object, in the groom's order, and say strand by strand whether they are
+guides: Blender then makes one hair object, Unity merges nothing, and Unreal reads `groom_guide` of
+every curve. There is no mesh in the file, because Unreal refuses grooms with one; the head goes
+into an FBX file.
+Written through the Alembic library (alembic3d), whose arrays are filled from NumPy's memory. Read
+by the plugin itself, because that library's reader ends the process at some damaged files.
+Sources: Alembic 1.8 AbcGeom and Ogawa; Epic's "Alembic for Grooms Specification", version 1.5.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import MappingProxyType
+
+from hairkit.exporting import prepared
+from hairkit.file_format import Feature, FileFormat
+from hairkit.groom import Groom
+from hairkit.hookspecs import hookimpl
+
+from .options import Options
+
+__all__ = ["FORMAT", "Options", "export_groom", "import_groom"]
+
+FORMAT = FileFormat(
+    title="Alembic",
+    suffixes=(".abc",),
+    exact=frozenset(
+        {
+            Feature.POINTS,
+            Feature.COUNTS,
+            Feature.WIDTHS,
+            Feature.ROOT_UV,
+            Feature.GROUP,
+            Feature.GUIDE,
+            Feature.COLOUR,
+        }
+    ),
+    partial=MappingProxyType({Feature.ANIMATION: "written; the first frame is read"}),
+    written=frozenset({Feature.GUIDE_WEIGHTS}),
+)
+
+
+@hookimpl
+def export_groom(groom: Groom, path: Path, options: Options) -> bool:
+    """Write the groom as .abc, animated where options name a cache."""
+    from .curves import groom_curves
+    from .writer import write_curves
+
+    write_curves(groom_curves(prepared(groom, options), options), path)
+    return True
+
+
+@hookimpl
+def import_groom(path: Path, options: Options) -> Groom:
+    """Read the curves of an .abc file, of any program, at the first frame."""
+    from .to_groom import read_groom
+
+    return read_groom(path, options)

@@ -1,0 +1,201 @@
+"""The curves objects of an Alembic file: points in the world, widths and groom attributes."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import FormatError
+from hairkit.stored import Float32Array, Float64Array, Int64Array
+
+from .archive import Archive, Object, Property
+from .transforms import transformed
+
+_LINEAR, _NON_PERIODIC = 1, 0
+_MOST_LEVELS = 100
+
+_log = logging.getLogger("hairkit")
+
+
+@dataclass(frozen=True, eq=False)
+class CurveSet:
+    """One curves object at its first frame; None where the file says nothing."""
+
+    points: Float32Array
+    """(P, 3) in the world, in the file's axes and unit."""
+    counts: Int64Array
+    """(S,) points of each curve."""
+    widths: Float32Array | None
+    """(P,) diameters in the file's unit."""
+    root_uv: Float32Array | None
+    """(S, 2)."""
+    colour: Float32Array | None
+    """(P, 3)."""
+    group: Int64Array | None
+    """(S,)."""
+    guide: Int64Array | None
+    """(S,)."""
+    frames: int
+    """Samples of the points in time."""
+    polyline: bool
+    """False where the points are control points of splines, or the curves are closed."""
+
+
+def read_curve_sets(path: Path) -> list[CurveSet]:
+    """Return every curves object with curves in it, in the file's order.
+
+    Raises
+    ------
+    FormatError
+        The file is damaged, or has no curves.
+    InputError
+        The file is missing, or of the HDF5 kind.
+    """
+    archive = Archive.open(path)
+    sets = [
+        found
+        for node, world in _walk(archive)
+        if node.metadata.startswith("schema=AbcGeom_Curve")
+        and (found := _curve_set(node, world)) is not None
+    ]
+    if not sets:
+        raise FormatError(f"{path}: an Alembic file without curves")
+    return sets
+
+
+def _walk(archive: Archive) -> Iterator[tuple[Object, Float64Array]]:
+    """Yield every object and its transform to the world, parents first, in the file's order."""
+    waiting: list[tuple[Object, Float64Array, int]] = [(archive.top(), np.eye(4), 0)]
+    while waiting:
+        node, above, level = waiting.pop()
+        if level > _MOST_LEVELS:
+            raise archive.file.reader.error(f"objects lie more than {_MOST_LEVELS} levels deep")
+        world = transformed(above, node)
+        yield node, world
+        below = [(child, world, level + 1) for child in node.objects()]
+        waiting += below[::-1]
+
+
+def _curve_set(node: Object, world: Float64Array) -> CurveSet | None:
+    geometry = node.properties().get(".geom")
+    found = geometry.properties() if geometry else {}
+    points = found["P"].float32() if "P" in found else None
+    if points is None:
+        return None
+    counts = _counts(found, points, node)
+    values = _Values(node, counts)
+    attributes = found[".arbGeomParams"].properties() if ".arbGeomParams" in found else {}
+    widths = values.per_point(attributes.get("groom_width"), 1)
+    if widths is None:
+        widths = values.per_point(found.get("width"), 1)
+    uv = values.per_strand(attributes.get("groom_root_uv"), 2, "f")
+    if uv is None:
+        uv = values.per_strand(found.get("uv"), 2, "f")
+    group = values.per_strand(attributes.get("groom_group_id"), 1, "i")
+    guide = values.per_strand(attributes.get("groom_guide"), 1, "i")
+    scale = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
+    return CurveSet(
+        points=_moved(points, world),
+        counts=counts,
+        widths=None if widths is None else widths[:, 0] * np.float32(scale),
+        root_uv=uv,
+        colour=values.per_point(attributes.get("groom_color"), 3),
+        group=None if group is None else group[:, 0],
+        guide=None if guide is None else guide[:, 0],
+        frames=found["P"].samples,
+        polyline=_polyline(found.get("curveBasisAndType")),
+    )
+
+
+def _counts(found: dict[str, Property], points: Float32Array, node: Object) -> Int64Array:
+    counts = found["nVertices"].integers() if "nVertices" in found else None
+    if points.shape[1] != 3 or counts is None or counts.min() < 0:
+        raise node.archive.file.reader.error(f"{node.name} has no points or counts of points")
+    # each count is at most the number of points, so that their sum cannot overflow
+    if counts.max() > len(points) or counts.sum() != len(points):
+        raise node.archive.file.reader.error(
+            f"{node.name} has {len(points)} points, its curves ask for another number"
+        )
+    result: Int64Array = counts[:, 0]
+    return result
+
+
+def _polyline(kind: Property | None) -> bool:
+    numbers = None if kind is None else kind.integers()
+    if numbers is None or numbers.size < 2:
+        return True
+    return bool(numbers.ravel()[0] == _LINEAR and numbers.ravel()[1] == _NON_PERIODIC)
+
+
+def _moved(points: Float32Array, world: Float64Array) -> Float32Array:
+    if np.array_equal(world, np.eye(4)):
+        return points
+    with np.errstate(over="ignore", invalid="ignore"):
+        moved: Float32Array = (points @ world[:3, :3] + world[3, :3]).astype(np.float32)
+    return moved
+
+
+class _Values:
+    """Values of geometry parameters, spread to points or strands by their scope."""
+
+    def __init__(self, node: Object, counts: Int64Array) -> None:
+        self.node, self.counts = node, counts
+
+    def per_point(self, header: Property | None, extent: int) -> Any:
+        """Return (P, extent) float32 or None."""
+        values = self._values(header, extent, "f")
+        if values is None:
+            return None
+        scope = self._scope(header, len(values))
+        if scope == "con":
+            return np.repeat(values[:1], self.counts.sum(), axis=0)
+        return np.repeat(values, self.counts, axis=0) if scope == "uni" else values
+
+    def per_strand(self, header: Property | None, extent: int, kind: str) -> Any:
+        """Return (S, extent) float32 or int64, of values at points the root's, or None."""
+        values = self._values(header, extent, kind)
+        if values is None:
+            return None
+        scope = self._scope(header, len(values))
+        if scope == "con":
+            return np.repeat(values[:1], len(self.counts), axis=0)
+        if scope == "uni":
+            return values
+        roots = np.minimum(np.cumsum(self.counts) - self.counts, len(values) - 1)
+        return values[roots]
+
+    def _values(self, header: Property | None, extent: int, kind: str) -> npt.NDArray[Any] | None:
+        """Return (N, extent) the values, of an indexed parameter those that it names."""
+        if header is None:
+            return None
+        parts = header.properties()
+        header = parts.get(".vals", header)
+        values: npt.NDArray[Any] | None = header.integers() if kind == "i" else header.float32()
+        index = parts[".indices"].integers() if ".indices" in parts else None
+        if values is not None and index is not None:
+            if index.min() < 0 or index.max() >= len(values):
+                raise self.node.archive.file.reader.error(f"{header.name} has bad indices")
+            values = values[index[:, 0]]
+        if values is None or values.shape[1] != extent:
+            if header.samples:
+                _log.warning("%s of %s is of another type; left out", header.name, self.node.name)
+            return None
+        return values
+
+    def _scope(self, header: Property | None, have: int) -> str:
+        """Return the scope by the number of values, which the metadata only breaks ties of."""
+        sizes = {"con": 1, "uni": len(self.counts), "vtx": int(self.counts.sum())}
+        fitting = [scope for scope, size in sizes.items() if size == have]
+        said = "" if header is None else header.tag("geoScope")
+        if not fitting:
+            raise self.node.archive.file.reader.error(
+                f"{self.node.name} has {have} values of {header.name if header else ''} for"
+                f" {sizes['uni']} curves of {sizes['vtx']} points"
+            )
+        return said if said in fitting else fitting[-1]

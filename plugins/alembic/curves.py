@@ -1,0 +1,150 @@
+"""What an Alembic groom file holds, made of a groom: in the file's space, within Unreal's limits."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.exporting import PreparedGroom, point_colours
+from hairkit.file_space import FileSpace
+from hairkit.guide_weights import GuideWeights, closest_guides, guide_mask
+from hairkit.point_cache import PointCache
+from hairkit.stored import BoolArray, Float32Array, Int32Array, Int64Array
+from hairkit.strands import Strands
+
+from .options import Options
+
+UNREAL_GROUP_CURVES, UNREAL_GROUP_POINTS = 4_194_303, 16_777_215
+"""The most curves and points of one group that Unreal reads."""
+_IRREGULAR = 0.01
+
+_log = logging.getLogger("hairkit")
+
+
+@dataclass(frozen=True, eq=False)
+class GroomCurves:
+    """One curves object and its groom attributes, in the file's axes and unit."""
+
+    points: Float32Array
+    """(P, 3) at rest."""
+    counts: Int32Array
+    """(S,) points of each curve."""
+    widths: Float32Array
+    """(P,) diameters."""
+    root_uv: Float32Array
+    """(S, 2)."""
+    colour: Float32Array
+    """(P, 3) linear RGB."""
+    group: Int32Array
+    """(S,)."""
+    guide: BoolArray | None
+    """(S,) or None where guides and hair are not told apart."""
+    closest: GuideWeights | None
+    """Guides of each curve; None where there are none to follow."""
+    cache: PointCache | None
+    """Frames (T, P, 3) in the head frame, or None for a still groom."""
+    space: FileSpace
+    """The file's space, for the frames."""
+
+    def frame(self, number: int) -> Float32Array:
+        """Return (P, 3) the points at a frame, in the file's space."""
+        if self.cache is None:
+            return self.points
+        return self.space.points_to_file(self.cache.points[number])
+
+
+def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
+    """Return what is written of a prepared groom.
+
+    Where the strands are guides and nothing else they are not marked: Unreal draws unmarked
+    strands and picks its guides among them, and a reader takes them as guides again.
+
+    Raises
+    ------
+    InputError
+        A group has more curves or points than Unreal takes, and `axis` is Unreal's.
+    """
+    strands, space = ready.groom.strands, options.space
+    fitted, cache = _limited(strands, ready.cache, options.max_points)
+    _check_groups(fitted, strict=options.axis == "unreal")
+    guide = guide_mask(strands)
+    marked = options.mark_guides or not guide.all()
+    look = replace(ready.groom, strands=fitted)
+    assert fitted.widths is not None and fitted.root_uv is not None and fitted.group is not None
+    return GroomCurves(
+        points=space.points_to_file(fitted.points),
+        counts=fitted.counts.astype(np.int32),
+        widths=fitted.widths / np.float32(space.metres),
+        root_uv=fitted.root_uv,
+        colour=point_colours(look),
+        group=fitted.group,
+        guide=guide if marked else None,
+        closest=closest_guides(strands) if marked and guide.any() else None,
+        cache=cache,
+        space=space,
+    )
+
+
+def _limited(
+    strands: Strands, cache: PointCache | None, most: int
+) -> tuple[Strands, PointCache | None]:
+    """Return strands, and their frames, of at most so many points; longer ones are resampled."""
+    if cache is not None:
+        _check_times(cache)
+    long = strands.counts > most
+    if not long.any():
+        return strands, cache
+    _log.warning("%d strands of more than %d points are resampled to these", long.sum(), most)
+    fitted = _shortened(strands, long, most)
+    if cache is not None:
+        moving = (replace(strands, points=points) for points in cache.points)
+        frames = np.stack([_shortened(frame, long, most).points for frame in moving])
+        cache = PointCache(frames, cache.times, cache.head_from_rest)
+    return fitted, cache
+
+
+def _shortened(strands: Strands, long: BoolArray, most: int) -> Strands:
+    """Return the strands, those that the mask (S,) names resampled to `most` points."""
+    resampled = strands.select(long).resampled(most)
+    counts: Int64Array = np.minimum(strands.counts, most)
+    new, old = np.repeat(long, counts), ~np.repeat(long, strands.counts)
+    points = np.empty((counts.sum(), 3), np.float32)
+    points[new], points[~new] = resampled.points, strands.points[old]
+    widths = None
+    if strands.widths is not None and resampled.widths is not None:
+        widths = np.empty(len(points), np.float32)
+        widths[new], widths[~new] = resampled.widths, strands.widths[old]
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    return replace(strands, points=points, offsets=offsets, widths=widths)
+
+
+def _check_groups(strands: Strands, strict: bool) -> None:
+    numbers, place = np.unique(strands.group, return_inverse=True)
+    curves = np.bincount(place)
+    points = np.bincount(place, strands.counts)
+    for name, most, have in (
+        ("curves", UNREAL_GROUP_CURVES, curves),
+        ("points", UNREAL_GROUP_POINTS, points),
+    ):
+        worst = int(have.argmax())
+        if have[worst] > most:
+            text = (
+                f"group {numbers[worst]} has {int(have[worst])} {name}, Unreal takes {most};"
+                " write fewer hairs or points, or more groups"
+            )
+            if strict:
+                raise InputError(text)
+            _log.warning("%s", text)
+
+
+def _check_times(cache: PointCache) -> None:
+    """Alembic's uniform sampling is what Unreal and Blender expect, so it is always written."""
+    step = np.diff(cache.times) * cache.frames_per_second
+    if len(step) and np.abs(step - 1).max() > _IRREGULAR:
+        _log.warning(
+            "the cache's frames are not evenly spaced; they are written as %g frames per second",
+            cache.frames_per_second,
+        )

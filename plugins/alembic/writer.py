@@ -1,0 +1,135 @@
+"""Write groom curves with the Alembic library, from NumPy's memory, as one file or none."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import traceback
+from pathlib import Path
+from typing import Any
+
+import imath
+import numpy as np
+from alembic3d import Abc, AbcCoreAbstract, AbcGeom
+
+import hairkit
+from hairkit.errors import InputError
+
+from .curves import GroomCurves
+from .ogawa import is_complete
+
+GROOM_VERSION = (1, 5)
+"""Major and minor version of Unreal's groom schema."""
+_UNIFORM, _VERTEX = AbcGeom.GeometryScope.kUniformScope, AbcGeom.GeometryScope.kVertexScope
+
+
+def write_curves(curves: GroomCurves, path: Path) -> None:
+    """Write the curves to `path`: afterwards it is the old file or the whole new one.
+
+    The library writes into a folder of its own beside the file, so that nothing is left behind.
+
+    Raises
+    ------
+    InputError
+        The disk is full or the folder cannot be written.
+    """
+    with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
+        part = Path(folder, "groom.abc")
+        try:
+            _write(curves, part)
+        except BaseException as error:
+            # the library closes its file when the last of its objects goes, which frames hold
+            traceback.clear_frames(error.__traceback__)
+            if isinstance(error, RuntimeError):
+                raise InputError(f"{path}: not written: {_first_line(error)}") from error
+            raise
+        _put_on_disk(part)
+        if not is_complete(part):
+            raise InputError(f"{path}: not written whole; is the disk full?")
+        os.replace(part, path)
+
+
+def _write(curves: GroomCurves, part: Path) -> None:
+    # Abc.OArchive writes no date, unlike CreateArchiveWithInfo: equal grooms are equal files
+    archive = Abc.OArchive(str(part))
+    groom = AbcGeom.OXform(archive.getTop(), "groom")
+    _write_groom_properties(groom)
+    sampling = 0
+    if curves.cache is not None:
+        step, start = 1.0 / curves.cache.frames_per_second, float(curves.cache.times[0])
+        sampling = archive.addTimeSampling(AbcCoreAbstract.TimeSampling(step, start))
+    schema = AbcGeom.OCurves(groom, "strands", sampling).getSchema()
+    for number in range(1 if curves.cache is None else len(curves.cache)):
+        schema.set(_sample(curves, number))
+    _write_attributes(schema.getArbGeomParams(), curves)
+
+
+def _write_groom_properties(groom: Any) -> None:
+    """Write what Unreal looks for on the first transform under the top object."""
+    transform = AbcGeom.XformSample()
+    transform.setInheritsXforms(True)
+    groom.getSchema().set(transform)
+    properties = groom.getSchema().getUserProperties()
+    major, minor = GROOM_VERSION
+    Abc.OInt16Property(properties, "groom_version_major").setValue(major)
+    Abc.OInt16Property(properties, "groom_version_minor").setValue(minor)
+    tool = f"hairkit {hairkit.__version__}"
+    Abc.OStringProperty(properties, "groom_tool").setValue(tool)
+
+
+def _sample(curves: GroomCurves, number: int) -> Any:
+    """Return a frame's sample; what does not change is in the first, and repeated by reference.
+
+    Setters leave weights, orders and knots out; the constructor would write empty ones, which a
+    reader could take for a NURBS curve without knots.
+    """
+    sample = AbcGeom.OCurvesSchemaSample()
+    sample.setType(AbcGeom.CurveType.kLinear)
+    sample.setWrap(AbcGeom.CurvePeriodicity.kNonPeriodic)
+    sample.setBasis(AbcGeom.BasisType.kNoBasis)
+    sample.setPositions(_imath(curves.frame(number)))
+    if number == 0:
+        widths, uv = _imath(curves.widths), _imath(curves.root_uv)
+        sample.setCurvesNumVertices(_imath(curves.counts))
+        sample.setWidths(AbcGeom.OFloatGeomParamSample(widths, _VERTEX))
+        sample.setUVs(AbcGeom.OV2fGeomParamSample(uv, _UNIFORM))
+    return sample
+
+
+def _write_attributes(attributes: Any, curves: GroomCurves) -> None:
+    """Write the curves' groom attributes, of the types and scopes of Epic's table."""
+    number = np.arange(len(curves.counts), dtype=np.int32)
+    _write_attribute(attributes, "groom_id", "Int32", _UNIFORM, number)
+    _write_attribute(attributes, "groom_group_id", "Int32", _UNIFORM, curves.group)
+    _write_attribute(attributes, "groom_root_uv", "V2f", _UNIFORM, curves.root_uv)
+    _write_attribute(attributes, "groom_color", "V3f", _VERTEX, curves.colour)
+    if curves.guide is not None:
+        guide = curves.guide.astype(np.int32)
+        _write_attribute(attributes, "groom_guide", "Int32", _UNIFORM, guide)
+    if curves.closest is not None:
+        guides, weights = curves.closest.guides, curves.closest.weights
+        _write_attribute(attributes, "groom_closest_guides", "V3i", _UNIFORM, guides)
+        _write_attribute(attributes, "groom_guide_weights", "V3f", _UNIFORM, weights)
+
+
+def _write_attribute(attributes: Any, name: str, kind: str, scope: Any, values: Any) -> None:
+    sample = getattr(AbcGeom, f"O{kind}GeomParamSample")(_imath(values), scope)
+    getattr(AbcGeom, f"O{kind}GeomParam")(attributes, name, False, scope, 1).set(sample)
+
+
+def _imath(values: np.ndarray[Any, Any]) -> Any:
+    """Return (N,) or (N, 2 or 3) numbers as the library's array, copied by the buffer protocol."""
+    name = {"f": "Float", "i": "Int"}[values.dtype.kind]
+    if values.ndim == 2:
+        name = f"V{values.shape[1]}{name[0].lower()}"
+    return getattr(imath, f"{name}ArrayFromBuffer")(np.ascontiguousarray(values))
+
+
+def _put_on_disk(part: Path) -> None:
+    with part.open("rb+") as file:
+        os.fsync(file.fileno())
+
+
+def _first_line(error: BaseException) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return lines[-1] if lines else type(error).__name__
