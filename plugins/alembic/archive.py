@@ -147,7 +147,7 @@ class Archive:
         if not children:
             return {}
         headers = self.file.headers(children[-1], "property headers")
-        found = []
+        found: list[Property] = []
         while headers.left:
             if len(found) >= len(children) - 1:
                 raise headers.error("there are fewer properties than headers")

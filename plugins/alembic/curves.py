@@ -1,4 +1,4 @@
-"""What an Alembic groom file holds, made of a groom: in the file's space, within Unreal's limits."""
+"""What an Alembic file holds of a groom: in the file's space, within Unreal's limits."""
 
 from __future__ import annotations
 
@@ -69,11 +69,13 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
     """
     strands, space = ready.groom.strands, options.space
     fitted, cache = _limited(strands, ready.cache, options.max_points)
-    _check_groups(fitted, strict=options.axis == "unreal")
     guide = guide_mask(strands)
     marked = options.mark_guides or not guide.all()
     look = replace(ready.groom, strands=fitted)
-    assert fitted.widths is not None and fitted.root_uv is not None and fitted.group is not None
+    assert fitted.widths is not None  # `prepared` has filled in all three
+    assert fitted.root_uv is not None
+    assert fitted.group is not None
+    _check_groups(fitted.group, fitted.counts, strict=options.axis == "unreal")
     return GroomCurves(
         points=space.points_to_file(fitted.points),
         counts=fitted.counts.astype(np.int32),
@@ -121,10 +123,9 @@ def _shortened(strands: Strands, long: BoolArray, most: int) -> Strands:
     return replace(strands, points=points, offsets=offsets, widths=widths)
 
 
-def _check_groups(strands: Strands, strict: bool) -> None:
-    numbers, place = np.unique(strands.group, return_inverse=True)
-    curves = np.bincount(place)
-    points = np.bincount(place, strands.counts)
+def _check_groups(group: Int32Array, counts: Int64Array, strict: bool) -> None:
+    numbers, place = np.unique(group, return_inverse=True)
+    curves, points = np.bincount(place), np.bincount(place, counts)
     for name, most, have in (
         ("curves", UNREAL_GROUP_CURVES, curves),
         ("points", UNREAL_GROUP_POINTS, points),

@@ -13,7 +13,6 @@ UNREAL_POINTS = 255
 """Unreal drops the points of a curve beyond these."""
 
 
-
 @dataclass(frozen=True)
 class Options(SpaceOptions, ImportOptions, AnimationOptions, ExportOptions):
     """Settings of the Alembic exporter and importer."""
@@ -28,5 +27,3 @@ class Options(SpaceOptions, ImportOptions, AnimationOptions, ExportOptions):
         False,
         doc="Mark guides in a file of guides alone, which Unreal then does not draw.",
     )
-
-
