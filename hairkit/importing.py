@@ -23,10 +23,10 @@ from hairkit.head_files import read_head
 from hairkit.head_placing import find_place, placed
 from hairkit.options import option
 from hairkit.scalp import bind, roots_at
-from hairkit.stored import Float32Array, Int64Array
+from hairkit.stored import BoolArray, Float32Array, Int64Array
 from hairkit.strands import Strands
 
-__all__ = ["ImportOptions", "adopt", "packed", "placed", "reversed_strands"]
+__all__ = ["ImportOptions", "adopt", "packed", "placed", "reversed_strands", "rows_kept", "with_mean_width"]
 
 SMALLEST, LARGEST = 0.015, 0.6
 """Roots of a head of hair spread over between these many metres."""
@@ -75,6 +75,15 @@ def packed(points: Float32Array, counts: Int64Array, source: object) -> tuple[St
     return Strands(points, offsets), np.flatnonzero(keep)
 
 
+def rows_kept(counts: Int64Array, kept: Int64Array) -> BoolArray | slice:
+    """Return which of the file's points (P,) belong to the strands that `packed` kept."""
+    if len(kept) == len(counts):
+        return slice(None)
+    keep = np.zeros(len(counts), bool)
+    keep[kept] = True
+    return np.repeat(keep, counts)
+
+
 def adopt(
     strands: Strands,
     options: ImportOptions,
@@ -118,7 +127,7 @@ def adopt(
     if not options.reverse:
         _warn_of_tips(strands, head, source)
     if material is None:
-        material = _with_mean_width(strands)
+        material = with_mean_width(strands)
     if strands.widths is None:
         _log.warning("%s: no widths; strands are %g mm wide", source, 1000 * material.width)
     triangle, barycentric = bind(strands.roots, head)
@@ -134,6 +143,14 @@ def reversed_strands(strands: Strands) -> Strands:
     rows = (strands.offsets[:-1] + strands.offsets[1:] - 1)[owner] - np.arange(len(owner))
     widths = None if strands.widths is None else strands.widths[rows]
     return replace(strands, points=strands.points[rows], widths=widths)
+
+
+def with_mean_width(strands: Strands) -> HairMaterial:
+    """Return the default look, as wide as the strands are in the mean."""
+    widths = strands.widths
+    if widths is None or not (widths > 0).any():
+        return HairMaterial()
+    return HairMaterial(width=float(widths[widths > 0].mean(dtype=np.float64)))
 
 
 def _with_length(strands: Strands, source: object) -> Strands:
@@ -215,10 +232,3 @@ def _warn_of_tips(strands: Strands, head: Head, source: object) -> None:
             1000 * tips,
             1000 * roots,
         )
-
-
-def _with_mean_width(strands: Strands) -> HairMaterial:
-    widths = strands.widths
-    if widths is None or not (widths > 0).any():
-        return HairMaterial()
-    return HairMaterial(width=float(widths[widths > 0].mean(dtype=np.float64)))

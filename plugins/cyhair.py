@@ -1,0 +1,168 @@
+"""cyHair .hair: points, thickness and colour per point, for any number of strands.
+
+Cem Yuksel's hair model format (cyHairFile.h): a header of 128 bytes, then segments a strand (u16),
+points (3 f32), thickness (f32), transparency (f32) and colours (3 f32) a point, each where a bit of
+the header says so, little-endian. Files of the wild also spell the signature in lower case.
+Thickness is taken as the strand's diameter in the file's unit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.byte_reader import ByteReader, finite, read_file
+from hairkit.byte_writer import joined
+from hairkit.errors import InputError
+from hairkit.exporting import ExportOptions, point_colours, prepared
+from hairkit.file_format import Feature, FileFormat
+from hairkit.file_space import FileSpace, SpaceOptions
+from hairkit.groom import Groom, HairMaterial
+from hairkit.hookspecs import hookimpl
+from hairkit.importing import ImportOptions, adopt, packed, rows_kept
+from hairkit.options import option
+from hairkit.stored import Float32Array, Int64Array, write_bytes
+from hairkit.strands import Strands
+
+FORMAT = FileFormat(
+    "cyHair",
+    (".hair",),
+    exact=frozenset({Feature.POINTS, Feature.COUNTS, Feature.WIDTHS, Feature.COLOUR}),
+)
+
+SIGNATURES = (b"HAIR", b"hair")
+SEGMENTS, POINTS, THICKNESS, TRANSPARENCY, COLOURS = 1, 2, 4, 8, 16
+HEADER = np.dtype(
+    [
+        ("signature", "S4"),
+        ("strands", "<u4"),
+        ("points", "<u4"),
+        ("arrays", "<u4"),
+        ("segments", "<u4"),
+        ("thickness", "<f4"),
+        ("transparency", "<f4"),
+        ("colour", "<f4", 3),
+        ("info", "S88"),
+    ]
+)
+"""The 128 bytes at the start; the numbers after `arrays` hold where an array is left out."""
+
+_MOST_SEGMENTS = 2**16 - 1
+_WIDEST = 2e-3
+_INFO = b"written by hairkit"
+
+
+@dataclass(frozen=True)
+class Options(ExportOptions, ImportOptions, SpaceOptions):
+    """Settings of .hair files."""
+
+    colours: bool = option(True, doc="Write a colour at every point, not one for all.")
+
+
+@hookimpl
+def export_groom(groom: Groom, path: Path, options: Options) -> bool:
+    """Write the strands with their thickness, and their colours if asked for."""
+    ready = prepared(groom, options).groom
+    write_bytes(path, _file_bytes(ready, options))
+    return True
+
+
+@hookimpl
+def import_groom(path: Path, options: Options) -> Groom:
+    """Read the strands; a head is put under them."""
+    reader = ByteReader(read_file(path), path)
+    header = _header(reader)
+    counts = _counts(reader, header)
+    total, arrays = int(header["points"]), int(header["arrays"])
+    space = options.space
+    points = finite(reader.array("<f4", (total, 3), "points"), path, "points")
+    widths = reader.array("<f4", total, "thickness") if arrays & THICKNESS else None
+    if arrays & TRANSPARENCY:
+        reader.array("<f4", total, "transparency")
+    colours = reader.array("<f4", (total, 3), "colours") if arrays & COLOURS else None
+    strands, kept = packed(space.points_to_head(points), counts, path)
+    rows = rows_kept(counts, kept)
+    if widths is not None:
+        widths = _plain(finite(widths, path, "thicknesses"), space)[rows]
+        strands = Strands(strands.points, strands.offsets, widths)
+    if colours is not None:
+        colours = finite(colours, path, "colours")[rows]
+    return adopt(strands, options, path, _material(header, strands, colours, space))
+
+
+def _file_bytes(groom: Groom, options: Options) -> memoryview:
+    """Return the whole file; every array is written in its place, once."""
+    strands, space = groom.strands, options.space
+    segments = strands.counts - 1
+    if segments.max() > _MOST_SEGMENTS:
+        raise InputError(
+            f"a strand has {segments.max() + 1} points, .hair holds {_MOST_SEGMENTS + 1} at most"
+        )
+    header = np.zeros((), HEADER)
+    header["signature"], header["info"] = SIGNATURES[0], _INFO
+    header["strands"], header["points"] = len(strands), len(strands.points)
+    header["arrays"] = SEGMENTS | POINTS | THICKNESS | (COLOURS if options.colours else 0)
+    header["thickness"] = groom.material.width / space.metres
+    look = groom.material
+    header["colour"] = (look.root_colour.astype(np.float64) + look.tip_colour) / 2
+    parts: list[tuple[npt.DTypeLike, npt.ArrayLike]] = [
+        (HEADER, header),
+        ("<u2", segments),
+        ("<f4", space.points_to_file(strands.points)),
+        ("<f4", np.asarray(strands.widths) / np.float32(space.metres)),
+    ]
+    if options.colours:
+        parts.append(("<f4", point_colours(groom)))
+    return joined(parts)
+
+
+def _header(reader: ByteReader) -> Any:
+    header = reader.array(HEADER, 1, "the header")[0]
+    if header["signature"] not in SIGNATURES:
+        raise reader.error("the signature is not HAIR")
+    if not header["arrays"] & POINTS:
+        raise reader.error("the points are left out")
+    return header
+
+
+def _counts(reader: ByteReader, header: Any) -> Int64Array:
+    """Return the points (S,) of each strand, which are as many as the file says in all."""
+    strands, total = int(header["strands"]), int(header["points"])
+    if header["arrays"] & SEGMENTS:
+        counts = reader.array("<u2", strands, "segments").astype(np.int64) + 1
+    elif strands * (int(header["segments"]) + 1) == total:
+        counts = np.full(strands, int(header["segments"]) + 1, np.int64)
+    else:
+        counts = np.zeros(0, np.int64)
+    if counts.sum() != total:
+        raise reader.error(f"{strands} strands have {counts.sum()} points, the header says {total}")
+    return counts
+
+
+def _plain(thickness: Float32Array, space: FileSpace) -> Float32Array:
+    """Return widths in metres, none below 0."""
+    widths: Float32Array = np.maximum(thickness, 0) * np.float32(space.metres)
+    return widths
+
+
+def _material(
+    header: Any, strands: Strands, colours: Float32Array | None, space: FileSpace
+) -> HairMaterial:
+    """Return the look; the header's thickness of 1 and white colour mean that nobody set them."""
+    width = float(header["thickness"]) * space.metres
+    if not 0 < width <= _WIDEST:
+        known = strands.widths[strands.widths > 0] if strands.widths is not None else ()
+        width = float(np.mean(known, dtype=np.float64)) if len(known) else HairMaterial.width
+    if colours is not None:
+        ends = strands.offsets
+        root = colours[ends[:-1]].mean(axis=0, dtype=np.float64)
+        tip = colours[ends[1:] - 1].mean(axis=0, dtype=np.float64)
+        return HairMaterial(root, tip, width)
+    colour = np.asarray(header["colour"], np.float32)
+    if np.isfinite(colour).all() and (colour >= 0).all() and (colour < 1).any():
+        return HairMaterial(colour, colour, width)
+    return HairMaterial(width=width)

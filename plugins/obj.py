@@ -1,0 +1,115 @@
+"""Wavefront OBJ lines: the strands' points, for any modelling program.
+
+Each strand is one `l` element over its vertices. Files whose lines are single edges, as Blender
+writes them, are read too: edges that share vertices are put together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hairkit.byte_reader import read_file
+from hairkit.errors import FormatError
+from hairkit.exporting import ExportOptions, prepared
+from hairkit.file_format import Feature, FileFormat
+from hairkit.file_space import SpaceOptions
+from hairkit.groom import Groom
+from hairkit.hookspecs import hookimpl
+from hairkit.importing import ImportOptions, adopt, packed
+from hairkit.number_text import read_numbers, written_rows
+from hairkit.polylines import chains
+from hairkit.stored import Float64Array, Int64Array, write_bytes
+from hairkit.strands import Strands
+
+FORMAT = FileFormat("OBJ lines", (".obj",), exact=frozenset({Feature.POINTS, Feature.COUNTS}))
+
+_STRANDS_AT_ONCE = 4096
+
+
+@dataclass(frozen=True)
+class Options(ExportOptions, ImportOptions, SpaceOptions):
+    """Settings of .obj files."""
+
+
+@hookimpl
+def export_groom(groom: Groom, path: Path, options: Options) -> bool:
+    """Write the strands as lines."""
+    strands = prepared(groom, options).groom.strands
+    points = options.space.points_to_file(strands.points)
+    parts = ["# hair strands, written by hairkit\n", *written_rows("v %.9g %.9g %.9g\n", points)]
+    write_bytes(path, "".join([*parts, *_lines(strands)]).encode("ascii"))
+    return True
+
+
+@hookimpl
+def import_groom(path: Path, options: Options) -> Groom:
+    """Read all lines as strands; faces are passed over, and a head is put under the strands."""
+    vertices, lines, before = _elements(read_file(path).decode("latin-1"))
+    if not lines:
+        raise FormatError(f"{path}: holds no lines ('l' elements), so no strands")
+    points = _points(vertices, path)
+    index, counts = _line_indices(lines, before, len(points), path)
+    if (counts == 2).all():
+        try:
+            index, counts = chains(index.reshape(-1, 2), len(points))
+        except FormatError as error:
+            raise FormatError(f"{path}: {error}") from error
+    strands, _ = packed(options.space.points_to_head(points[index]), counts, path)
+    return adopt(strands, options, path)
+
+
+def _lines(strands: Strands) -> Iterator[str]:
+    """Yield the `l` elements, one a strand, vertices counted from 1."""
+    counts = strands.counts
+    pattern = {int(count): "l" + " %d" * int(count) + "\n" for count in np.unique(counts)}
+    for start in range(0, len(counts), _STRANDS_AT_ONCE):
+        stop = min(start + _STRANDS_AT_ONCE, len(counts))
+        numbers = range(int(strands.offsets[start]) + 1, int(strands.offsets[stop]) + 1)
+        text = "".join(map(pattern.__getitem__, counts[start:stop].tolist()))
+        yield text % tuple(numbers)
+
+
+def _elements(text: str) -> tuple[list[str], list[str], list[int]]:
+    """Return what follows `v` and `l`, and how many vertices stand before each `l`."""
+    vertices: list[str] = []
+    lines: list[str] = []
+    before: list[int] = []
+    for line in text.replace("\\\n", " ").split("\n"):
+        if line.startswith("v "):
+            vertices.append(line[2:])
+        elif line.startswith("l "):
+            lines.append(line[2:])
+            before.append(len(vertices))
+    return vertices, lines, before
+
+
+def _points(vertices: list[str], path: Path) -> Float64Array:
+    """Return (P, 3) the vertices' places; a weight or colour behind them is passed over."""
+    numbers = read_numbers("\n".join(vertices), path, "vertices")
+    if not vertices or len(numbers) % len(vertices) or len(numbers) < 3 * len(vertices):
+        raise FormatError(f"{path}: {len(vertices)} vertices have {len(numbers)} coordinates")
+    return numbers.reshape(len(vertices), -1)[:, :3]
+
+
+def _line_indices(
+    lines: list[str], before: list[int], vertices: int, path: Path
+) -> tuple[Int64Array, Int64Array]:
+    """Return vertex numbers from 0 of all lines, and how many each line has.
+
+    Negative numbers count back from the line; what follows a slash is a texture coordinate.
+    """
+    if any("/" in line for line in lines):
+        lines = [" ".join(word.partition("/")[0] for word in line.split()) for line in lines]
+    counts = np.array([len(line.split()) for line in lines], np.int64)
+    numbers = read_numbers("\n".join(lines), path, "lines")
+    if len(numbers) != counts.sum() or (numbers != np.round(numbers)).any():
+        raise FormatError(f"{path}: lines hold something that is no vertex number")
+    last = np.repeat(np.array(before), counts)
+    index = np.where(numbers < 0, last + numbers, numbers - 1)
+    if (index < 0).any() or (index >= vertices).any() or (numbers == 0).any():
+        raise FormatError(f"{path}: lines name vertices outside 1 to {vertices}")
+    return index.astype(np.int64), counts

@@ -1,0 +1,178 @@
+"""PLY: vertices with thickness and colour, edges between them, and where each strand ends.
+
+Binary little-endian. `element vertex` has x, y, z, thickness (the diameter) and an 8-bit sRGB
+colour; `element edge` lets mesh programs show the strands; `element strand` with `nsegs` (hairutil's
+convention) parts them, with root uv, group and guide flag. Read: ascii and both binary orders, with
+strands or with edges alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.byte_reader import finite, read_file
+from hairkit.byte_writer import joined
+from hairkit.errors import FormatError, InputError
+from hairkit.exporting import ExportOptions, point_colours, prepared
+from hairkit.file_format import Feature, FileFormat
+from hairkit.file_space import SpaceOptions
+from hairkit.groom import Groom, HairMaterial
+from hairkit.hookspecs import hookimpl
+from hairkit.importing import ImportOptions, adopt, packed, rows_kept, with_mean_width
+from hairkit.polylines import chains
+from hairkit.stored import Float32Array, Int64Array, write_bytes
+from hairkit.strands import Strands
+
+from .elements import Elements, read_elements
+
+FORMAT = FileFormat(
+    "PLY",
+    (".ply",),
+    exact=frozenset(
+        {
+            Feature.POINTS,
+            Feature.COUNTS,
+            Feature.WIDTHS,
+            Feature.ROOT_UV,
+            Feature.GROUP,
+            Feature.GUIDE,
+        }
+    ),
+    partial=MappingProxyType({Feature.COLOUR: "8-bit sRGB"}),
+)
+
+_MOST_SEGMENTS = 2**16 - 1
+_VERTEX = [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("thickness", "<f4")]
+_COLOUR = [("red", "u1"), ("green", "u1"), ("blue", "u1")]
+_EDGE = [("vertex1", "<i4"), ("vertex2", "<i4")]
+_STRAND = [("nsegs", "<u2"), ("u", "<f4"), ("v", "<f4"), ("group", "<i4"), ("guide", "u1")]
+_LEVEL = np.arange(256) / 255.0
+_LINEAR = np.where(_LEVEL <= 0.04045, _LEVEL / 12.92, ((_LEVEL + 0.055) / 1.055) ** 2.4)
+"""Linear intensities of the sRGB levels (IEC 61966-2-1)."""
+_NAMES = {"<f4": "float", "u1": "uchar", "<i4": "int", "<u2": "ushort"}
+
+
+@dataclass(frozen=True)
+class Options(ExportOptions, ImportOptions, SpaceOptions):
+    """Settings of .ply files."""
+
+
+@hookimpl
+def export_groom(groom: Groom, path: Path, options: Options) -> bool:
+    """Write vertices, edges and strands."""
+    ready = prepared(groom, options).groom
+    strands, space = ready.strands, options.space
+    segments = strands.counts - 1
+    if segments.max() > _MOST_SEGMENTS:
+        raise InputError(
+            f"a strand has {segments.max() + 1} points, .ply holds {_MOST_SEGMENTS + 1} at most"
+        )
+    vertex = np.empty(len(strands.points), np.dtype(_VERTEX + _COLOUR))
+    place = space.points_to_file(strands.points)
+    for column, name in enumerate("xyz"):
+        vertex[name] = place[:, column]
+    vertex["thickness"] = np.asarray(strands.widths) / np.float32(space.metres)
+    colours = _to_bytes(point_colours(ready))
+    for column, (name, _) in enumerate(_COLOUR):
+        vertex[name] = colours[:, column]
+    strand = np.empty(len(strands), np.dtype(_STRAND))
+    strand["nsegs"], strand["group"], strand["guide"] = segments, strands.group, strands.guide
+    strand["u"], strand["v"] = np.asarray(strands.root_uv).T
+    edge = np.empty((len(vertex) - len(strand), 2), "<i4")
+    edge[:, 0] = np.delete(np.arange(len(vertex)), strands.offsets[1:] - 1)
+    edge[:, 1] = edge[:, 0] + 1
+    header = _header({"vertex": vertex, "strand": strand, "edge": edge})
+    start = np.frombuffer(header.encode("ascii"), np.uint8)
+    write_bytes(
+        path,
+        joined([("u1", start), (vertex.dtype, vertex), (strand.dtype, strand), ("<i4", edge)]),
+    )
+    return True
+
+
+@hookimpl
+def import_groom(path: Path, options: Options) -> Groom:
+    """Read the strands, or put edges together to strands; a head is put under them."""
+    elements = read_elements(read_file(path), path)
+    vertex = elements.get("vertex")
+    if vertex is None or not {"x", "y", "z"} <= set(vertex):
+        raise FormatError(f"{path}: has no element vertex with x, y and z")
+    points = np.stack([vertex[name] for name in "xyz"], axis=1).astype(np.float32)
+    finite(points, path, "vertices")
+    order, counts = _strand_order(elements, len(points), path)
+    strands, kept = packed(options.space.points_to_head(points[order]), counts, path)
+    rows = rows_kept(counts, kept)
+    widths = None
+    if "thickness" in vertex:
+        thickness = finite(vertex["thickness"], path, "thicknesses").astype(np.float32)
+        widths = (np.maximum(thickness, 0) * np.float32(options.space.metres))[order][rows]
+    strands = Strands(strands.points, strands.offsets, widths)
+    strands = _with_strand_values(strands, elements.get("strand", {}), kept, path)
+    colours = None
+    if {name for name, _ in _COLOUR} <= set(vertex):
+        colours = np.stack([vertex[name] for name, _ in _COLOUR], axis=1)[order][rows]
+    return adopt(strands, options, path, _look(colours, strands))
+
+
+def _header(elements: dict[str, npt.NDArray[np.generic]]) -> str:
+    lines = ["ply", "format binary_little_endian 1.0", "comment hair strands, written by hairkit"]
+    fields = {"vertex": _VERTEX + _COLOUR, "edge": _EDGE, "strand": _STRAND}
+    for name, rows in elements.items():
+        lines.append(f"element {name} {len(rows)}")
+        lines += [f"property {_NAMES[kind]} {field}" for field, kind in fields[name]]
+    return "\n".join([*lines, "end_header", ""])
+
+
+def _strand_order(elements: Elements, vertices: int, path: Path) -> tuple[Int64Array, Int64Array]:
+    """Return the vertices (P,) strand after strand, and the points (S,) of each."""
+    segments = elements.get("strand", {}).get("nsegs")
+    if segments is not None:
+        counts = segments.astype(np.int64) + 1
+        if (counts < 1).any() or counts.sum() != vertices:
+            raise FormatError(f"{path}: nsegs part {counts.sum()} points, {vertices} vertices")
+        return np.arange(vertices), counts
+    edge = elements.get("edge", {})
+    if not {"vertex1", "vertex2"} <= set(edge) or not len(edge["vertex1"]):
+        raise FormatError(f"{path}: has no strands: neither an element strand nor edges")
+    try:
+        pairs = np.stack([edge["vertex1"], edge["vertex2"]], axis=1).astype(np.int64)
+        return chains(pairs, vertices)
+    except FormatError as error:
+        raise FormatError(f"{path}: {error}") from error
+
+
+def _with_strand_values(
+    strands: Strands, values: dict[str, npt.NDArray[np.generic]], kept: Int64Array, path: Path
+) -> Strands:
+    """Return the strands with the root uv, groups and guide flags that the file has."""
+    uv, group, guide = None, None, None
+    if {"u", "v"} <= set(values):
+        uv = np.stack([values["u"], values["v"]], axis=1).astype(np.float32)[kept]
+        finite(uv, path, "root uv")
+    if "group" in values:
+        group = finite(values["group"], path, "groups")[kept].astype(np.int32)
+    if "guide" in values:
+        guide = values["guide"][kept] != 0
+    return replace(strands, root_uv=uv, group=group, guide=guide)
+
+
+def _to_bytes(colours: Float32Array) -> npt.NDArray[np.uint8]:
+    """Return linear RGB as sRGB from 0 to 255 (IEC 61966-2-1)."""
+    linear = np.clip(colours, 0, 1)
+    bent = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.round(255 * bent).astype(np.uint8)
+
+
+def _look(colours: npt.NDArray[np.generic] | None, strands: Strands) -> HairMaterial | None:
+    """Return the mean colours of roots and tips; None where the file has none."""
+    if colours is None or colours.dtype != np.uint8:
+        return None
+    linear = _LINEAR[colours]
+    root = linear[strands.offsets[:-1]].mean(axis=0)
+    tip = linear[strands.offsets[1:] - 1].mean(axis=0)
+    return replace(with_mean_width(strands), root_colour=root, tip_colour=tip)

@@ -1,0 +1,123 @@
+"""TressFX .tfx: strands of 4 to 64 points for AMD's simulation, with a .tfxbone beside it.
+
+Version 4 (TressFXFileFormat.h): a header of 160 bytes, then a position and inverse mass (4 f32) for
+every point, a texture coordinate and a thickness for every strand and a colour (4 f32) for every
+point. The first two points of a strand are fixed to the head. The .tfxbone binds each strand to
+the joints. The text files of version 1 and 2 are read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from hairkit.byte_reader import ByteReader, read_file
+from hairkit.exporting import ExportOptions, point_colours, prepared
+from hairkit.file_format import Feature, FileFormat
+from hairkit.file_space import SpaceOptions
+from hairkit.groom import Groom, HairMaterial
+from hairkit.hookspecs import hookimpl
+from hairkit.importing import ImportOptions, adopt, packed, rows_kept, with_mean_width
+from hairkit.options import option
+from hairkit.stored import Float32Array, write_bytes
+from hairkit.strands import Strands
+
+from .binary import TfxHair, read_binary, tfx_bytes
+from .bones import bone_bytes
+from .text import is_text, read_text
+
+__all__ = ["FORMAT", "Options", "TfxHair", "bone_bytes", "read_binary", "read_text", "tfx_bytes"]
+
+POINTS = (4, 8, 16, 32, 64)
+"""Points of every strand that TressFX's threads can share out."""
+
+FORMAT = FileFormat(
+    "TressFX",
+    (".tfx",),
+    exact=frozenset({Feature.ROOT_UV, Feature.COLOUR}),
+    partial=MappingProxyType(
+        {
+            Feature.POINTS: "resampled to `points_per_strand`, ends kept",
+            Feature.WIDTHS: "mean of each strand",
+        }
+    ),
+    written=frozenset({Feature.SKIN}),
+)
+
+
+@dataclass(frozen=True)
+class Options(ExportOptions, ImportOptions, SpaceOptions):
+    """Settings of .tfx files."""
+
+    points_per_strand: int = option(
+        32, choices=POINTS, doc="Points of every strand; strands of another number are resampled."
+    )
+    colours: bool = option(True, doc="Write a colour at every point.")
+    flip_v: bool = option(True, doc="Texture coordinates run down in the file, as in DirectX.")
+    bones: bool = option(True, doc="Write the .tfxbone that binds the strands to the head's joint.")
+
+
+@hookimpl
+def export_groom(groom: Groom, path: Path, options: Options) -> bool:
+    """Write the strands, and the .tfxbone beside the file."""
+    ready = _resampled(prepared(groom, options).groom, options.points_per_strand)
+    write_bytes(path, tfx_bytes(_hair(ready, options)))
+    if options.bones:
+        write_bytes(path.with_suffix(".tfxbone"), bone_bytes(len(ready.strands)))
+    return True
+
+
+@hookimpl
+def import_groom(path: Path, options: Options) -> Groom:
+    """Read a .tfx of version 4, or a text file of version 1 or 2; a head is put under it."""
+    data = read_file(path)
+    hair, counts = read_text(data, path) if is_text(data) else read_binary(ByteReader(data, path))
+    points = options.space.points_to_head(hair.points.reshape(-1, 3))
+    strands, kept = packed(points, counts, path)
+    widths, uv, colours = None, None, None
+    if hair.thickness is not None:
+        each = np.maximum(hair.thickness[kept], 0) * np.float32(options.space.metres)
+        widths = np.repeat(each, strands.counts)
+    if hair.uv is not None:
+        uv = _flipped(hair.uv[kept], options)
+    if hair.colours is not None:
+        colours = hair.colours.reshape(-1, 3)[rows_kept(counts, kept)]
+    strands = Strands(strands.points, strands.offsets, widths, uv)
+    return adopt(strands, options, path, _look(colours, strands))
+
+
+def _resampled(groom: Groom, count: int) -> Groom:
+    if (groom.strands.counts == count).all():
+        return groom
+    return replace(groom, strands=groom.strands.resampled(count))
+
+
+def _hair(groom: Groom, options: Options) -> TfxHair:
+    """Return what goes into the file, in its unit and axes."""
+    strands, space, count = groom.strands, options.space, options.points_per_strand
+    widths = np.asarray(strands.widths, np.float64).reshape(-1, count).mean(axis=1)
+    return TfxHair(
+        space.points_to_file(strands.points).reshape(-1, count, 3),
+        _flipped(np.asarray(strands.root_uv), options),
+        (widths / space.metres).astype(np.float32),
+        point_colours(groom).reshape(-1, count, 3) if options.colours else None,
+    )
+
+
+def _flipped(uv: Float32Array, options: Options) -> Float32Array:
+    turned = uv.copy()
+    if options.flip_v:
+        turned[:, 1] = 1 - turned[:, 1]
+    return turned
+
+
+def _look(colours: Float32Array | None, strands: Strands) -> HairMaterial | None:
+    """Return the mean colours of roots and tips; None where the file has none."""
+    if colours is None:
+        return None
+    root = colours[strands.offsets[:-1]].mean(axis=0, dtype=np.float64)
+    tip = colours[strands.offsets[1:] - 1].mean(axis=0, dtype=np.float64)
+    return replace(with_mean_width(strands), root_colour=root, tip_colour=tip)

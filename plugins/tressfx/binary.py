@@ -1,0 +1,107 @@
+"""The binary .tfx of TressFX 4: a header with the place of each array."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.byte_reader import ByteReader, finite
+from hairkit.byte_writer import joined
+from hairkit.stored import Float32Array, Int64Array
+
+HEADER = np.dtype(
+    [
+        ("version", "<f4"),
+        ("strands", "<u4"),
+        ("points", "<u4"),
+        ("position", "<u4"),
+        ("strand_uv", "<u4"),
+        ("point_uv", "<u4"),
+        ("thickness", "<u4"),
+        ("colour", "<u4"),
+        ("reserved", "<u4", 32),
+    ]
+)
+"""160 bytes; `points` is of each strand, what follows it is where arrays begin, 0 for none."""
+
+VERSION = 4.0
+FIXED = 2
+"""Points at the root that do not move."""
+
+
+@dataclass(frozen=True, eq=False)
+class TfxHair:
+    """What a .tfx file holds, in its own unit and axes."""
+
+    points: Float32Array
+    """(S, N, 3), or (P, 3) where strands differ."""
+    uv: Float32Array | None
+    """(S, 2) texture coordinates of the roots."""
+    thickness: Float32Array | None
+    """(S,) one width a strand."""
+    colours: Float32Array | None
+    """(S, N, 3) linear RGB."""
+
+
+def tfx_bytes(hair: TfxHair) -> memoryview:
+    """Return the whole file; arrays stand in the header's order, at multiples of eight bytes."""
+    strands, count = hair.points.shape[:2]
+    moving = np.ones((strands, count, 1), np.float32)
+    moving[:, :FIXED] = 0.0
+    header = np.zeros((), HEADER)
+    header["version"], header["strands"], header["points"] = VERSION, strands, count
+    parts: list[tuple[npt.DTypeLike, npt.ArrayLike]] = [(HEADER, header)]
+    arrays = {
+        "position": np.concatenate([hair.points, moving], axis=2),
+        "strand_uv": hair.uv,
+        "thickness": hair.thickness,
+        "colour": None
+        if hair.colours is None
+        else np.concatenate([hair.colours, np.ones_like(moving)], axis=2),
+    }
+    at = HEADER.itemsize
+    for name, array in arrays.items():
+        if array is not None:
+            header[name] = at
+            padding = -array.size % 2
+            parts += [("<f4", array), ("<f4", np.zeros(padding))]
+            at += 4 * (array.size + padding)
+    return joined(parts)
+
+
+def read_binary(reader: ByteReader) -> tuple[TfxHair, Int64Array]:
+    """Return what the file holds, and the points (S,) of each strand.
+
+    Raises
+    ------
+    FormatError
+        It is no .tfx of version 4, an array goes beyond its end, or a number is not finite.
+    """
+    header = reader.array(HEADER, 1, "the header")[0]
+    if header["version"] != VERSION:
+        raise reader.error(f"the version is {header['version']:g}, expected {VERSION:g}")
+    size = int(header["strands"]), int(header["points"])
+    if min(size) < 1:
+        raise reader.error(f"{size[0]} strands of {size[1]} points")
+    points = _array(reader, header, "position", (*size, 4))
+    if points is None:
+        raise reader.error("the positions are left out")
+    colours = _array(reader, header, "colour", (*size, 4))
+    hair = TfxHair(
+        points[..., :3],
+        _array(reader, header, "strand_uv", (size[0], 2)),
+        _array(reader, header, "thickness", (size[0],)),
+        None if colours is None else colours[..., :3],
+    )
+    return hair, np.full(size[0], size[1], np.int64)
+
+
+def _array(reader: ByteReader, header: Any, name: str, shape: tuple[int, ...]) -> Any:
+    """Return the array that starts where the header says, None where it says 0."""
+    if header[name] == 0:
+        return None
+    reader.seek(int(header[name]), name)
+    return finite(reader.array("<f4", shape, name), reader.source, name)

@@ -1,0 +1,106 @@
+"""USC-HairSalon .data: bare strands of any number of points, and CT2Hair's .bin.
+
+Hair datasets (USC-HairSalon, Hair Photobooth): the number of strands (i32), then for each strand
+its number of points (i32) and the points (3 f32), little-endian. A .bin of CT2Hair has seven f32 a
+point, of which the first three are the place; the rest is written as zeros.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.byte_reader import ByteReader, finite, read_file
+from hairkit.exporting import ExportOptions, prepared
+from hairkit.file_format import Feature, FileFormat
+from hairkit.file_space import SpaceOptions
+from hairkit.groom import Groom
+from hairkit.hookspecs import hookimpl
+from hairkit.importing import ImportOptions, adopt, packed
+from hairkit.stored import BoolArray, Float32Array, Int64Array, write_bytes
+
+FORMAT = FileFormat(
+    "USC-HairSalon, CT2Hair",
+    (".data", ".bin"),
+    exact=frozenset({Feature.POINTS, Feature.COUNTS}),
+)
+
+
+@dataclass(frozen=True)
+class Options(ExportOptions, ImportOptions, SpaceOptions):
+    """Settings of .data and .bin files."""
+
+
+@hookimpl
+def export_groom(groom: Groom, path: Path, options: Options) -> bool:
+    """Write the strands' points."""
+    strands = prepared(groom, options).groom.strands
+    points = options.space.points_to_file(strands.points)
+    write_bytes(path, _file_bytes(points, strands.counts, _numbers_a_point(path)))
+    return True
+
+
+@hookimpl
+def import_groom(path: Path, options: Options) -> Groom:
+    """Read the strands; a head is put under them."""
+    reader = ByteReader(read_file(path), path)
+    width = _numbers_a_point(path)
+    words = reader.array("<i4", reader.left // 4, "the file")
+    if len(words) * 4 != len(reader.data) or not len(words):
+        raise reader.error("the file does not consist of numbers of four bytes")
+    counts = _counts(words, width, reader)
+    numbers = words[~_is_count(counts, width)].view("<f4").reshape(-1, width)
+    points = finite(numbers[:, :3], path, "points")
+    strands, _ = packed(options.space.points_to_head(points), counts, path)
+    return adopt(strands, options, path)
+
+
+def _numbers_a_point(path: Path) -> int:
+    return 7 if path.suffix.lower() == ".bin" else 3
+
+
+def _file_bytes(points: Float32Array, counts: Int64Array, width: int) -> memoryview:
+    """Return the file; counts stand between the points, so both fill one buffer of words."""
+    is_count = _is_count(counts, width)
+    words = np.empty(len(is_count), "<i4")
+    words[is_count] = np.concatenate([[len(counts)], counts])
+    row = np.zeros((len(points), width), "<f4")
+    row[:, :3] = points
+    words[~is_count] = row.reshape(-1).view("<i4")
+    return memoryview(words.view(np.uint8))
+
+
+def _is_count(counts: Int64Array, width: int) -> BoolArray:
+    """Return which words of the file are counts: the first, and the one before each strand."""
+    sizes = 1 + width * counts
+    mask = np.zeros(1 + int(sizes.sum()), bool)
+    mask[0] = True
+    mask[1 + np.cumsum(sizes) - sizes] = True
+    return mask
+
+
+def _counts(words: npt.NDArray[np.int32], width: int, reader: ByteReader) -> Int64Array:
+    """Return the points (S,) of each strand.
+
+    Each count says where the next one stands, so this is a walk, if not all strands are equal.
+    """
+    strands = int(words[0])
+    if not 0 < strands < len(words):
+        raise reader.error(f"{strands} strands in a file of {len(reader.data)} bytes")
+    each = 1 + width * int(words[1])
+    if len(words) == 1 + strands * each and (words[1::each] == words[1]).all():
+        return np.full(strands, int(words[1]), np.int64)
+    counts, at = np.empty(strands, np.int64), 1
+    plain = memoryview(np.ascontiguousarray(words))
+    for strand in range(strands):
+        count = plain[at] if at < len(words) else -1
+        if not 0 <= count <= (len(words) - at - 1) // width:
+            raise reader.error(f"strand {strand} has {count} points, which the file has no room for")
+        counts[strand] = count
+        at += 1 + width * count
+    if at != len(words):
+        raise reader.error(f"{len(words) - at} numbers follow the last strand")
+    return counts
