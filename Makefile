@@ -1,17 +1,25 @@
 # `make test` and `make demo` need Python 3.11 or newer and make; what else they need they fetch:
 # into .venv by pip and, as root on Debian or Ubuntu, the OpenGL libraries by apt.
+# `make test-clients` adds what Blender 4.5 makes of the files; it needs Python 3.11 for that.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+CLIENTS := .clients
+BPY_PYTHON ?= python3.11
 DEMO := demo-out
 EXAMPLE := examples/hairkit-sobel
 LIBRARIES := libegl1 libgl1 libgl1-mesa-dri libosmesa6
 
-.PHONY: test demo lint bench clean
+.PHONY: test test-clients demo lint bench clean
 
 test: $(VENV)/.tests
-	$(BIN)/python -m pytest
+	@sh .ci/validator $(CLIENTS)
+	$(BIN)/python -m pytest --ignore tests/clients
+
+test-clients: $(VENV)/.tests $(CLIENTS)/.blender
+	@sh .ci/validator $(CLIENTS)
+	$(BIN)/python -m pytest tests/clients tests/plugins
 
 demo: $(VENV)/.hairkit
 	$(BIN)/hairkit reconstruct hairkit/sample -o $(DEMO)
@@ -27,7 +35,7 @@ bench: $(VENV)/.tests
 	@for program in benchmarks/*.py; do echo "== $$program"; $(BIN)/python $$program || exit 1; done
 
 clean:
-	rm -rf $(VENV) $(DEMO) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(CLIENTS) $(DEMO) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -o -name '*.egg-info' | xargs rm -rf
 
 $(VENV)/.python:
@@ -45,6 +53,11 @@ $(VENV)/.hairkit: $(VENV)/.python pyproject.toml
 $(VENV)/.tests: $(VENV)/.hairkit $(wildcard $(EXAMPLE)/*.*)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps ./$(EXAMPLE)
+	@touch $@
+
+$(CLIENTS)/.blender: .ci/blender
+	@mkdir -p $(CLIENTS)
+	@sh .ci/blender $(CLIENTS)/bpy $(BPY_PYTHON) python3.11 $(PYTHON)
 	@touch $@
 
 $(VENV)/.lint: $(VENV)/.hairkit

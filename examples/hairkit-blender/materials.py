@@ -1,0 +1,47 @@
+"""Materials in the captured colour."""
+
+import bpy
+
+ROUGHNESS = 0.3
+HEAD_COLOUR = (0.45, 0.27, 0.2, 1.0)
+
+
+def hair_material(root_colour, tip_colour):
+    """Return a hair material (Chiang et al. 2016) whose colour runs from root to tip."""
+    material = bpy.data.materials.new("hair")
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    info = tree.nodes.new("ShaderNodeHairInfo")
+    mix = tree.nodes.new("ShaderNodeMix")
+    fibre = tree.nodes.new("ShaderNodeBsdfHairPrincipled")
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    for index, node in enumerate((info, mix, fibre, output)):
+        node.location.x = 250 * index
+    mix.data_type = "RGBA"
+    ends = [socket for socket in mix.inputs if socket.type == "RGBA" and socket.enabled]
+    for socket, colour in zip(ends, (root_colour, tip_colour), strict=True):
+        socket.default_value = (*map(float, colour), 1.0)
+    fibre.parametrization = "COLOR"
+    fibre.inputs["Roughness"].default_value = ROUGHNESS
+    share = next(socket for socket in mix.inputs if socket.enabled and socket.type == "VALUE")
+    mixed = next(socket for socket in mix.outputs if socket.enabled and socket.type == "RGBA")
+    tree.links.new(info.outputs["Intercept"], share)
+    tree.links.new(mixed, fibre.inputs["Color"])
+    tree.links.new(fibre.outputs[0], output.inputs["Surface"])
+    material.diffuse_color = (*map(float, root_colour), 1.0)  # of the solid view
+    return material
+
+
+def head_material():
+    """Return a plain skin, shared by all heads."""
+    name = "hairkit head"
+    material = bpy.data.materials.get(name)
+    if material is None:
+        material = bpy.data.materials.new(name)
+        material.use_nodes = True
+        skin = material.node_tree.nodes["Principled BSDF"]
+        skin.inputs["Base Color"].default_value = HEAD_COLOUR
+        skin.inputs["Roughness"].default_value = 0.6
+        material.diffuse_color = HEAD_COLOUR
+    return material

@@ -1,0 +1,157 @@
+"""The Blender add-on, installed in Blender as a user installs it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from blender_session import BlenderSession, blender_python
+
+from hairkit.capture_reader import sample_folder
+from hairkit.groom import Groom
+from hairkit.groom_file import read_groom, write_groom
+
+ADDON = Path(__file__).parents[2] / "examples" / "hairkit-blender"
+FIND_TOOL = "import bpy; print(bpy.utils.resource_path('LOCAL'))"
+TOOL = "scripts/addons_core/bl_pkg/cli/blender_ext.py"
+
+
+def z_up(points: npt.ArrayLike) -> npt.NDArray[np.float32]:
+    """Return points of the head frame as Blender has them: x, -z, y."""
+    turned: npt.NDArray[np.float32] = np.asarray(points, np.float32)[..., [0, 2, 1]] * [1, -1, 1]
+    return turned
+
+
+def of_type(things: list[dict[str, Any]], kind: str) -> dict[str, Any]:
+    """Return the only object of a type."""
+    (thing,) = (thing for thing in things if thing["type"] == kind)
+    return thing
+
+
+@pytest.fixture(scope="module")
+def addon(blender: BlenderSession, tmp_path_factory: pytest.TempPathFactory) -> BlenderSession:
+    """Blender with the add-on: built and validated by Blender's own tool, installed, enabled."""
+    python = str(blender_python())
+    found = subprocess.run([python, "-c", FIND_TOOL], capture_output=True, text=True, check=True)
+    tool = Path(found.stdout.strip().splitlines()[-1]) / TOOL
+    package = tmp_path_factory.mktemp("addon") / "hairkit.zip"
+    words = ["build", "--source-dir", str(ADDON), "--output-filepath", str(package)]
+    subprocess.run([python, str(tool), *words], capture_output=True, check=True)
+    subprocess.run([python, str(tool), "validate", str(package)], capture_output=True, check=True)
+    state = blender.call("addon.installed", package=package)
+    assert state == {"enabled": True, "operators": ["import_groom", "reconstruct"], "menu": True}
+    return blender
+
+
+@pytest.fixture(scope="module")
+def stored(groom: Groom, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small groom as hairkit's own file."""
+    path = tmp_path_factory.mktemp("groom") / "anna.npz"
+    write_groom(path, groom)
+    return path
+
+
+def test_hair_arrives_point_by_point(addon: BlenderSession, stored: Path, groom: Groom) -> None:
+    """Positions, half the widths, groups, guide flags and root uv are those of the groom."""
+    hair = of_type(addon.call("addon.imported", path=stored), "CURVES")
+    strands, attributes = groom.strands, hair["attributes"]
+    assert strands.widths is not None
+    np.testing.assert_array_equal(hair["offsets"], strands.offsets)
+    np.testing.assert_allclose(hair["positions"], z_up(strands.points), atol=1e-7)
+    np.testing.assert_allclose(attributes["radius"], strands.widths / 2, rtol=1e-6)
+    for name in ("group", "guide", "root_uv"):
+        np.testing.assert_array_equal(attributes[name], getattr(strands, name))
+
+
+def test_hair_is_in_the_captured_colour(addon: BlenderSession, stored: Path, groom: Groom) -> None:
+    """The material's two colours are those of root and tip."""
+    hair = of_type(addon.call("addon.imported", path=stored), "CURVES")
+    wanted = [groom.material.root_colour, groom.material.tip_colour]
+    np.testing.assert_allclose(hair["ends"][0], wanted, atol=1e-6)
+
+
+def test_the_head_comes_along(addon: BlenderSession, stored: Path, groom: Groom) -> None:
+    """The hair's parent is the head: same vertices, faces, uv and scalp."""
+    things = addon.call("addon.imported", path=stored)
+    hair, head = of_type(things, "CURVES"), of_type(things, "MESH")
+    assert hair["parent"] == hair["surface"] == head["name"]
+    np.testing.assert_allclose(head["positions"], z_up(groom.head.vertices), atol=1e-7)
+    np.testing.assert_array_equal(head["corners"].reshape(-1, 3), groom.head.faces)
+    np.testing.assert_array_equal(head["uv"][0], groom.head.uv[head["corners"]])
+    assert head["groups"] == ["scalp"]
+    np.testing.assert_allclose(head["weights"][:, 0], groom.head.scalp, atol=1e-6)
+
+
+def test_hair_follows_the_skin(addon: BlenderSession, stored: Path) -> None:
+    """When a shape key moves the head's surface, every strand moves with it."""
+    shift = [0.1, 0.0, 0.05]
+    seen = addon.call("addon.followed", path=stored, shift=shift)
+    moved = seen["after"] - seen["before"]
+    np.testing.assert_allclose(moved, np.broadcast_to(shift, moved.shape), atol=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("python", "says"),
+    [
+        ("", "hairkit's Python is not known; set it in"),
+        ("/nowhere/at/all", "hairkit's Python is not at /nowhere/at/all; set it in"),
+        ("BLENDER", "hairkit is not installed in the chosen Python; set another in"),
+    ],
+)
+def test_without_hairkit_one_line_says_what_to_do(
+    addon: BlenderSession, tmp_path: Path, python: str, says: str
+) -> None:
+    """A Python that is not set, not there or without hairkit is one line with the cure."""
+    chosen = str(blender_python()) if python == "BLENDER" else python
+    for words in (
+        {"operator": "import_groom", "filepath": tmp_path / "x.apx"},
+        {"operator": "reconstruct", "directory": tmp_path},
+    ):
+        line = addon.call("addon.refusal", python=chosen, **words)
+        assert "\n" not in line
+        assert line.startswith(f"Error: {says}")
+
+
+def test_a_file_that_is_no_groom_is_one_line(addon: BlenderSession, tmp_path: Path) -> None:
+    """Missing and foreign files are named, and nothing is added."""
+    (tmp_path / "noise.npz").write_bytes(b"noise")
+    for path in (tmp_path / "noise.npz", tmp_path / "missing.npz"):
+        line = addon.call("addon.refusal", operator="import_groom", filepath=path)
+        assert line.startswith(f"Error: {path}: not a groom of hairkit")
+        assert "\n" not in line
+        assert addon.call("contents.objects") == []
+
+
+def test_what_hairkit_refuses_is_passed_on(addon: BlenderSession, tmp_path: Path) -> None:
+    """The one line of a failing command is the one line that Blender shows."""
+    line = addon.call(
+        "addon.refusal", operator="reconstruct", python=sys.executable, directory=tmp_path / "no"
+    )
+    assert line.startswith("Error: hairkit: ")
+    assert "\n" not in line
+
+
+def test_a_folder_of_photos_becomes_hair(addon: BlenderSession, tmp_path: Path) -> None:
+    """The command reconstructs the sample capture, and what arrives is the groom it wrote."""
+    things = addon.call(
+        "addon.reconstructed",
+        folder=sample_folder(),
+        out=tmp_path / "out",
+        python=sys.executable,
+        guides=60,
+    )
+    hair, made = of_type(things, "CURVES"), read_groom(tmp_path / "out" / "groom.npz")
+    np.testing.assert_allclose(hair["positions"], z_up(made.strands.points), atol=1e-7)
+
+
+def test_it_leaves_nothing_behind(addon: BlenderSession) -> None:
+    """Disabled, its commands and menus are gone; enabled again, they are back."""
+    before = addon.call("addon.menus")
+    assert before == {"bar": ["_in_menu_bar"], "file": ["_in_file_menu"]}
+    assert addon.call("addon.disabled") == {"operators": [], "menu": False}
+    assert addon.call("addon.menus") == before
