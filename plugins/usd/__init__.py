@@ -1,0 +1,63 @@
+"""USD .usda, .usdc, .usd: curves on a skinned head, still or animated, written and read.
+
+Written is one component: a SkelRoot with the skeleton (root, neck, head), the head mesh, all
+strands as one BasisCurves and their materials. The strands carry Unreal's `groom_*` primvars, and
+what only hairkit knows (binding, scalp, capsules, curl, physics) is in primvars and custom data
+named `hairkit`, so that the file gives the whole groom back.
+Animated strands are baked: their points are where they are in the world, and they are not bound to
+the skeleton, which would move them twice; the head mesh is skinned to the moving skeleton.
+Read are the BasisCurves of any program, cubic ones as the polylines of their control points. The
+USD library (usd-core) reads in a process of its own, because damaged crate files crash it; files
+that refer to other files are refused.
+Source: OpenUSD, UsdGeomBasisCurves and UsdSkel schemas; Epic's groom attributes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from hairkit.exporting import AnimationOptions, ExportOptions, prepared
+from hairkit.file_format import Feature, FileFormat
+from hairkit.file_space import SpaceOptions
+from hairkit.groom import Groom
+from hairkit.hookspecs import hookimpl
+from hairkit.importing import ImportOptions
+from hairkit.options import option
+
+FORMAT = FileFormat(
+    title="USD",
+    suffixes=(".usdc", ".usda", ".usd"),
+    exact=frozenset(Feature) - {Feature.GUIDE_WEIGHTS, Feature.ANIMATION},
+    partial=MappingProxyType({Feature.ANIMATION: "written; the rest pose is read"}),
+    written=frozenset({Feature.GUIDE_WEIGHTS}),
+)
+
+
+@dataclass(frozen=True)
+class Options(SpaceOptions, ImportOptions, AnimationOptions, ExportOptions):
+    """Settings of the USD exporter and importer.
+
+    USD files say their axes and unit themselves: `axis` is for writing, and reading takes `scale`
+    only to overrule the file.
+    """
+
+    head_mesh: bool = option(True, doc="Write the head's mesh.")
+
+
+@hookimpl
+def export_groom(groom: Groom, path: Path, options: Options) -> bool:
+    """Write the groom as .usda (text), .usdc or .usd (crate), animated where options say so."""
+    from .stage import write_stage
+
+    write_stage(prepared(groom, options), path, options)
+    return True
+
+
+@hookimpl
+def import_groom(path: Path, options: Options) -> Groom:
+    """Read all curves of a USD file, and the head and settings where hairkit wrote them."""
+    from .to_groom import read_groom
+
+    return read_groom(path, options)

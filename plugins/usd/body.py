@@ -1,0 +1,108 @@
+"""The skeleton, its motion, and the head mesh that is skinned to it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hairkit.exporting import PreparedGroom
+from hairkit.file_space import FileSpace
+from hairkit.head import Head
+from hairkit.head_skin import JOINT_NAMES, head_weights
+from hairkit.point_cache import PointCache
+from hairkit.stored import Float64Array
+
+JOINTS = tuple("/".join(JOINT_NAMES[: count + 1]) for count in range(len(JOINT_NAMES)))
+"""USD names joints by their paths: root, root/neck, root/neck/head."""
+
+
+def add_skeleton(stage: Any, ready: PreparedGroom, space: FileSpace, codes: list[float]) -> Any:
+    """Add the skeleton at rest, and its motion where the groom is animated; return it.
+
+    A simulated head moves as one rigid piece, so only the root joint is animated.
+    """
+    from pxr import UsdSkel, Vt
+
+    joints = space.points_to_file(ready.groom.head.joints).astype(np.float64)
+    skeleton = UsdSkel.Skeleton.Define(stage, "/Groom/Skeleton")
+    skeleton.CreateJointsAttr(Vt.TokenArray(JOINTS))
+    skeleton.CreateBindTransformsAttr(_moves(joints))
+    skeleton.CreateRestTransformsAttr(_moves(np.diff(joints, axis=0, prepend=np.zeros((1, 3)))))
+    if ready.cache is not None:
+        motion = _add_motion(stage, ready.cache, space, joints[0], codes)
+        binding = UsdSkel.BindingAPI.Apply(skeleton.GetPrim())
+        binding.CreateAnimationSourceRel().SetTargets([motion.GetPath()])
+    return skeleton
+
+
+def _moves(offsets: Float64Array) -> Any:
+    """Return translations by offsets (N, 3) as USD's matrices, which act on row vectors."""
+    from pxr import Gf, Vt
+
+    return Vt.Matrix4dArray(
+        [Gf.Matrix4d(1.0).SetTranslate(Gf.Vec3d(*map(float, offset))) for offset in offsets]
+    )
+
+
+def _add_motion(
+    stage: Any, cache: PointCache, space: FileSpace, root: Float64Array, codes: list[float]
+) -> Any:
+    """Add the root joint's translation and rotation at every frame."""
+    from pxr import Gf, UsdSkel, Vt
+
+    motion = UsdSkel.Animation.Define(stage, "/Groom/Skeleton/Motion")
+    motion.CreateJointsAttr(Vt.TokenArray(JOINTS[:1]))
+    translations, rotations = motion.CreateTranslationsAttr(), motion.CreateRotationsAttr()
+    motion.CreateScalesAttr(Vt.Vec3hArray([Gf.Vec3h(1.0, 1.0, 1.0)]))
+    previous = Gf.Quatd(1.0)
+    for code, moved in zip(codes, space.transform_to_file(cache.head_from_rest), strict=True):
+        place = moved[:3, :3] @ root + moved[:3, 3]
+        turn = Gf.Matrix3d(*moved[:3, :3].T.ravel().tolist()).ExtractRotation().GetQuat()
+        if Gf.Dot(turn, previous) < 0:
+            turn = -turn  # the same turn, without a jump between frames
+        previous = turn
+        translations.Set(Vt.Vec3fArray([Gf.Vec3f(*map(float, place))]), code)
+        rotations.Set(Vt.QuatfArray([Gf.Quatf(turn)]), code)
+    return motion
+
+
+def add_head(stage: Any, head: Head, space: FileSpace, skeleton: Any, material: Any) -> None:
+    """Add the head mesh with normals, uv, skin, and what hairkit reads back."""
+    from pxr import UsdGeom, UsdShade, Vt
+
+    mesh = UsdGeom.Mesh.Define(stage, "/Groom/Head")
+    points = Vt.Vec3fArray.FromNumpy(space.points_to_file(head.vertices))
+    mesh.CreatePointsAttr(points)
+    mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(head.faces), 3))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(head.faces.ravel()))
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(space.directions_to_file(head.normals())))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    _add_vertex_data(mesh.GetPrim(), head)
+    _add_skin(mesh.GetPrim(), head, skeleton)
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def _add_vertex_data(prim: Any, head: Head) -> None:
+    from pxr import Sdf, UsdGeom, Vt
+
+    primvars, types, vertex = UsdGeom.PrimvarsAPI(prim), Sdf.ValueTypeNames, UsdGeom.Tokens.vertex
+    uv = primvars.CreatePrimvar("st", types.TexCoord2fArray, vertex)
+    uv.Set(Vt.Vec2fArray.FromNumpy(head.uv))
+    scalp = primvars.CreatePrimvar("hairkit:scalp", types.FloatArray, vertex)
+    scalp.Set(Vt.FloatArray.FromNumpy(head.scalp))
+
+
+def _add_skin(prim: Any, head: Head, skeleton: Any) -> None:
+    from pxr import Gf, UsdSkel, Vt
+
+    weights = head_weights(head)
+    vertices, joints = weights.shape
+    indices = np.tile(np.arange(joints, dtype=np.int32), vertices)
+    binding = UsdSkel.BindingAPI.Apply(prim)
+    binding.CreateSkeletonRel().SetTargets([skeleton.GetPath()])
+    binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
+    binding.CreateJointIndicesPrimvar(False, joints).Set(Vt.IntArray.FromNumpy(indices))
+    binding.CreateJointWeightsPrimvar(False, joints).Set(Vt.FloatArray.FromNumpy(weights.ravel()))

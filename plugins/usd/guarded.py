@@ -1,0 +1,88 @@
+"""Runs the reading program apart, so that a crash of the USD library is one error."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
+
+from hairkit.errors import FormatError, InputError, MissingExtraError
+from hairkit.stored import read_npz
+
+from .stage import MISSING
+
+MAX_BYTES = 2 * 2**30
+"""Files larger than this are refused."""
+SECONDS = 60.0
+"""Time for reading, and one second on top for every megabyte."""
+_PROGRAM = Path(__file__).with_name("reading_child.py")
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """What the reading program found."""
+
+    arrays: Mapping[str, npt.NDArray[Any]]
+    description: Mapping[str, Any]
+
+
+def contents(path: Path) -> Contents:
+    """Return the curves, meshes and settings of a USD file.
+
+    Raises
+    ------
+    InputError
+        The file is missing, too large, or refers to other files.
+    FormatError
+        It is damaged or no USD file.
+    MissingExtraError
+        usd-core is not installed.
+    """
+    if importlib.util.find_spec("pxr") is None:
+        raise MissingExtraError(MISSING)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    size = path.stat().st_size
+    if size > MAX_BYTES:
+        raise InputError(f"{path}: {size} bytes, hairkit reads up to {MAX_BYTES}")
+    with tempfile.TemporaryDirectory(prefix="hairkit-usd-") as folder:
+        archive = Path(folder) / "contents.npz"
+        answer = _run(path, archive, SECONDS + size / 1e6)
+        if "error" in answer:
+            kind = InputError if answer.get("kind") == "refused" else FormatError
+            start = f"{path}: " if kind is InputError else f"{path}: not a readable USD file: "
+            raise kind(start + str(answer["error"]))
+        arrays = read_npz(archive)
+    description = json.loads(arrays["description"].tobytes())
+    return Contents(arrays, description)
+
+
+def _run(path: Path, archive: Path, seconds: float) -> dict[str, Any]:
+    """Return the program's answer; raises `FormatError` when it crashed or took too long."""
+    command = [sys.executable, "-P", str(_PROGRAM), str(path.resolve()), str(archive)]
+    try:
+        done = subprocess.run(
+            command, capture_output=True, stdin=subprocess.DEVNULL, timeout=seconds, check=False
+        )
+    except subprocess.TimeoutExpired as error:
+        raise FormatError(f"{path}: not read within {seconds:.0f} s: damaged or hostile") from error
+    lines = done.stdout.decode("utf-8", "replace").splitlines()
+    if done.returncode or not lines:
+        raise FormatError(f"{path}: damaged: {_ending(done.returncode, done.stderr)}")
+    answer: dict[str, Any] = json.loads(lines[-1])
+    return answer
+
+
+def _ending(code: int, stderr: bytes) -> str:
+    if code < 0:
+        return f"the USD library crashed while reading it (signal {-code})"
+    last = [*stderr.decode("utf-8", "replace").split("\n"), ""][-2:]
+    return f"the USD library ended while reading it ({' '.join(last).strip()[:160]})"

@@ -1,0 +1,92 @@
+"""What only hairkit knows of a groom, as the component's custom data, in SI units."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import FormatError, InputError
+from hairkit.groom import Groom, HairMaterial, HairPhysics
+from hairkit.head import Capsules
+
+_T = TypeVar("_T", HairMaterial, HairPhysics)
+
+
+def settings_of(groom: Groom) -> dict[str, Any]:
+    """Return nested dictionaries of numbers and arrays: material, physics, capsules, landmarks."""
+    from pxr import Vt
+
+    shapes, landmarks = groom.head.capsules, groom.head.landmark_vertices
+    settings: dict[str, Any] = {
+        "material": _numbers(groom.material),
+        "physics": _numbers(groom.physics),
+        "capsules": {
+            "first": Vt.Vec3fArray.FromNumpy(shapes.first),
+            "second": Vt.Vec3fArray.FromNumpy(shapes.second),
+            "radius": Vt.Vec2fArray.FromNumpy(shapes.radius),
+        },
+    }
+    if landmarks is not None:
+        settings["landmarks"] = Vt.IntArray.FromNumpy(landmarks)
+    return settings
+
+
+def _numbers(value: HairMaterial | HairPhysics) -> dict[str, Any]:
+    from pxr import Gf
+
+    return {
+        field.name: Gf.Vec3f(*map(float, number)) if np.ndim(number) else float(number)
+        for field in dataclasses.fields(value)
+        for number in (getattr(value, field.name),)
+    }
+
+
+def material_from(settings: Mapping[str, Any], source: object) -> HairMaterial | None:
+    """Return the look that the settings (as plain numbers and lists) hold, or None."""
+    return _made(HairMaterial, settings.get("material"), source)
+
+
+def physics_from(settings: Mapping[str, Any], source: object) -> HairPhysics | None:
+    """Return the physics that the settings hold, or None."""
+    return _made(HairPhysics, settings.get("physics"), source)
+
+
+def capsules_from(settings: Mapping[str, Any], source: object) -> Capsules:
+    """Return the head's collision capsules; none where the settings have none."""
+    found = settings.get("capsules")
+    held = found if isinstance(found, Mapping) else {}
+    return Capsules(
+        numbers(held.get("first", ()), (-1, 3), source, "capsules"),
+        numbers(held.get("second", ()), (-1, 3), source, "capsules"),
+        numbers(held.get("radius", ()), (-1, 2), source, "capsules"),
+    )
+
+
+def numbers(value: Any, shape: tuple[int, ...], source: object, name: str) -> npt.NDArray[Any]:
+    """Return lists of finite numbers as an array of `shape`; raises `FormatError`."""
+    try:
+        array = np.asarray(value, np.float64).reshape(shape)
+    except (TypeError, ValueError) as error:
+        raise FormatError(f"{source}: hairkit's {name} are not numbers of shape {shape}") from error
+    if not np.isfinite(array).all():
+        raise FormatError(f"{source}: hairkit's {name} are not finite")
+    return array
+
+
+def _made(kind: type[_T], found: Any, source: object) -> _T | None:
+    """Return the dataclass with the fields found, the others at their defaults."""
+    if not isinstance(found, Mapping):
+        return None
+    values: dict[str, Any] = {}
+    for field in dataclasses.fields(kind):
+        if field.name in found:
+            array = numbers(found[field.name], np.shape(found[field.name]), source, field.name)
+            values[field.name] = array if array.ndim else float(array)
+    try:
+        return kind(**values)
+    except (InputError, TypeError) as error:
+        raise FormatError(f"{source}: {error}") from error

@@ -1,0 +1,116 @@
+"""The stage as a whole: metadata, the component's parts, and the file."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Any, Protocol
+
+from hairkit.errors import InputError, MissingExtraError
+from hairkit.exporting import PreparedGroom
+from hairkit.file_space import FileSpace
+
+MISSING = "USD files need usd-core, which is not installed: pip install 'hairkit[usd]'"
+DIGITS = 6
+"""Time codes are rounded to so many decimals, so that frame 3 is at 3."""
+
+
+class StageOptions(Protocol):
+    """What `write_stage` asks of the plugin's options."""
+
+    @property
+    def axis(self) -> str: ...
+    @property
+    def space(self) -> FileSpace: ...
+    @property
+    def head_mesh(self) -> bool: ...
+
+
+def write_stage(ready: PreparedGroom, path: Path, options: StageOptions) -> None:
+    """Write the groom to `path`, whose ending says whether as text or as crate.
+
+    Raises
+    ------
+    InputError
+        The axes are left-handed.
+    MissingExtraError
+        usd-core is not installed.
+    """
+    space = options.space
+    if space.mirrored:
+        raise InputError(
+            f"axis is {options.axis!r}, but USD is right-handed; take z_up_centimetres, programs"
+            " turn USD files themselves as upAxis and metersPerUnit say"
+        )
+    try:
+        from pxr import Usd
+    except ImportError as error:
+        raise MissingExtraError(MISSING) from error
+    stage = Usd.Stage.CreateInMemory(f"groom{path.suffix}")
+    _describe(stage, ready, space)
+    _fill(stage, ready, space, options.head_mesh)
+    _export(stage, path)
+
+
+def _describe(stage: Any, ready: PreparedGroom, space: FileSpace) -> None:
+    """Write the stage's axes, unit and times."""
+    from pxr import UsdGeom
+
+    up = UsdGeom.Tokens.y if space.axes == "y_up" else UsdGeom.Tokens.z
+    UsdGeom.SetStageUpAxis(stage, up)
+    UsdGeom.SetStageMetersPerUnit(stage, space.metres)
+    if ready.cache is not None:
+        rate = ready.cache.frames_per_second
+        stage.SetTimeCodesPerSecond(rate)
+        stage.SetFramesPerSecond(rate)
+        stage.SetStartTimeCode(time_codes(ready)[0])
+        stage.SetEndTimeCode(time_codes(ready)[-1])
+
+
+def time_codes(ready: PreparedGroom) -> list[float]:
+    """Return the time code of each cached frame; code / timeCodesPerSecond is its second."""
+    if ready.cache is None:
+        return []
+    rate = ready.cache.frames_per_second
+    return [round(float(time) * rate, DIGITS) for time in ready.cache.times]
+
+
+def _fill(stage: Any, ready: PreparedGroom, space: FileSpace, head_mesh: bool) -> None:
+    from pxr import Kind, Usd, UsdSkel
+
+    from .body import add_head, add_skeleton
+    from .curves import add_hair
+    from .look import add_materials
+    from .settings import settings_of
+
+    root = UsdSkel.Root.Define(stage, "/Groom").GetPrim()
+    stage.SetDefaultPrim(root)
+    Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
+    root.SetCustomData({"hairkit": settings_of(ready.groom)})
+    materials = add_materials(stage, ready.groom)
+    skeleton = add_skeleton(stage, ready, space, time_codes(ready))
+    if head_mesh:
+        add_head(stage, ready.groom.head, space, skeleton, materials.skin)
+    add_hair(stage, ready, space, skeleton, materials.hair, time_codes(ready))
+
+
+def _export(stage: Any, path: Path) -> None:
+    """Write the stage beside its place and move it there, so that no half file is ever seen."""
+    handle, temporary = tempfile.mkstemp(
+        dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix.lower()
+    )
+    os.close(handle)
+    try:
+        stage.GetRootLayer().Export(temporary)
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,249 @@
+"""A groom from what a USD file holds."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import FormatError, InputError
+from hairkit.file_space import FileSpace
+from hairkit.groom import Groom, HairMaterial
+from hairkit.head import Head
+from hairkit.importing import ImportOptions, adopt, packed, rows_kept
+from hairkit.stored import Float32Array, Int32Array, Int64Array
+from hairkit.strands import Strands
+
+from .body_reading import read_head
+from .guarded import Contents, contents
+from .settings import material_from, physics_from
+
+_log = logging.getLogger("hairkit")
+
+
+class ReadOptions(Protocol):
+    """What `read_groom` asks of the plugin's options, beside those of `adopt`."""
+
+    @property
+    def scale(self) -> float: ...
+
+
+@dataclass(frozen=True, eq=False)
+class _Curves:
+    """The curves of one prim, in the head frame; None for what the file does not say."""
+
+    points: Float32Array
+    counts: Int64Array
+    widths: Float32Array | None
+    root_uv: Float32Array | None
+    group: Int32Array | None
+    guide: Int32Array | None
+    colour: Float32Array | None
+    triangle: Int32Array | None
+    barycentric: Float32Array | None
+
+
+def read_groom(path: Path, options: Any) -> Groom:
+    """Return all curves of the file as one groom; options are `ImportOptions` with `scale`."""
+    found = contents(path)
+    space = _space(found, options, path)
+    every = [_curves(found, curves, space, path) for curves in found.description["curves"]]
+    every = [curves for curves in every if len(curves.counts)]
+    if not every:
+        raise FormatError(f"{path}: holds no BasisCurves with points")
+    joined = _joined(every)
+    strands, kept = packed(joined.points, joined.counts, path)
+    strands = _complete(strands, joined, kept)
+    head = read_head(found, space, path)
+    settings = found.description["settings"]
+    material = material_from(settings, path) or _look(joined, strands, kept)
+    groom = adopt(strands, options, path, material, head)
+    groom = replace(groom, physics=physics_from(settings, path) or groom.physics)
+    return _bound(groom, joined, kept, options) if head is not None else groom
+
+
+def _space(found: Contents, options: ReadOptions, path: Path) -> FileSpace:
+    axes = {"Y": "y_up", "Z": "z_up"}.get(found.description["up"])
+    if axes is None:
+        raise FormatError(f"{path}: upAxis is {found.description['up']!r}, expected Y or Z")
+    if options.scale > 0:
+        return FileSpace(axes, options.scale)
+    metres = float(found.description["metres"])
+    if not (np.isfinite(metres) and metres > 0):
+        raise FormatError(f"{path}: metersPerUnit is {metres}, expected a number above 0")
+    if not found.description["metres_known"]:
+        _log.warning("%s: no metersPerUnit; USD's default of %g is taken", path, metres)
+    return FileSpace(axes, metres)
+
+
+def _curves(found: Contents, told: dict[str, Any], space: FileSpace, path: Path) -> _Curves:
+    where, name = f"{path}: {told['path']}", told["name"]
+    counts = found.arrays.get(name + "curveVertexCounts", np.zeros(0)).astype(np.int64)
+    points = found.arrays.get(name + "points", np.zeros((0, 3), np.float32))
+    if (counts < 0).any() or counts.sum() != len(points):
+        raise FormatError(f"{where} has {len(points)} points, its curves {counts.sum()}")
+    _say_what_changes(told, where)
+    matrix = np.array(told["to_stage"], np.float64)
+    if not (np.isfinite(points).all() and np.isfinite(matrix).all()):
+        raise FormatError(f"{where} has points or transforms that are not finite numbers")
+    if not np.array_equal(matrix, np.eye(4)):
+        points = points @ matrix[:3, :3] + matrix[3, :3]
+    placed = space.points_to_head(points)
+    if not np.isfinite(placed).all():
+        raise FormatError(f"{where} has points too far away")
+    values = _Values(found, told, counts, where)
+    growth = float(np.cbrt(abs(np.linalg.det(matrix[:3, :3])))) * space.metres
+    widths = values.of_points("widths")
+    colour = values.of_points("groom_color", 3)
+    triangle = values.of_strands("hairkit:root_triangle")
+    group = values.of_strands("groom_group_id")
+    guide = values.of_strands("groom_guide")
+    uv = values.of_strands("groom_root_uv", 2)
+    return _Curves(
+        placed,
+        counts,
+        None if widths is None else np.maximum(widths * np.float32(growth), 0),
+        values.of_strands("st", 2) if uv is None else uv,
+        None if group is None else group.astype(np.int32),
+        None if guide is None else guide.astype(np.int32),
+        values.of_points("displayColor", 3) if colour is None else colour,
+        None if triangle is None else triangle.astype(np.int32),
+        values.of_strands("hairkit:root_barycentric", 3),
+    )
+
+
+def _say_what_changes(told: dict[str, Any], where: str) -> None:
+    if told["shape"] != "linear":
+        _log.warning(
+            "%s: cubic (%s) curves are read as lines between control points", where, told["shape"]
+        )
+    if told["frames"] > 1:
+        _log.warning("%s: animated, %d frames; only one is read", where, told["frames"])
+
+
+class _Values:
+    """Widths and primvars of one prim, brought to one value a point or a strand."""
+
+    def __init__(
+        self, found: Contents, told: dict[str, Any], counts: Int64Array, where: str
+    ) -> None:
+        self.found, self.told, self.counts, self.where = found, told, counts, where
+
+    def of_points(self, name: str, columns: int = 1) -> Float32Array | None:
+        """Return (P,) or (P, columns) float32, or None where there is no such value."""
+        array, interpolation = self._array(name, columns)
+        points, strands = int(self.counts.sum()), len(self.counts)
+        if array is None:
+            return None
+        if interpolation in ("vertex", "varying") and len(array) == points:
+            return array
+        if interpolation == "uniform" and len(array) == strands:
+            return np.repeat(array, self.counts, axis=0)
+        if len(array) == 1:
+            return np.repeat(array, points, axis=0)
+        self._ignore(name)
+        return None
+
+    def of_strands(self, name: str, columns: int = 1) -> Any:
+        """Return (S,) or (S, columns), the root's value where there is one a point; or None."""
+        array, interpolation = self._array(name, columns)
+        points, strands = int(self.counts.sum()), len(self.counts)
+        if array is None:
+            return None
+        if interpolation == "uniform" and len(array) == strands:
+            return array
+        if interpolation in ("vertex", "varying") and len(array) == points > 0:
+            first = np.cumsum(self.counts) - self.counts
+            return array[np.minimum(first, points - 1)]
+        if len(array) == 1:
+            return np.repeat(array, strands, axis=0)
+        self._ignore(name)
+        return None
+
+    def _array(self, name: str, columns: int) -> tuple[Any, str]:
+        array = self.found.arrays.get(self.told["name"] + name)
+        interpolation = self.told["interpolation"].get(name, "")
+        if array is None or array.ndim < 1:
+            return None, interpolation
+        shape = (len(array),) if columns == 1 else (len(array), columns)
+        if array.shape != shape or not np.isfinite(array).all():
+            self._ignore(name)
+            return None, interpolation
+        if array.dtype.kind == "f":
+            array = array.astype(np.float32)
+        return array, interpolation
+
+    def _ignore(self, name: str) -> None:
+        _log.warning("%s: %s does not match its curves and is ignored", self.where, name)
+
+
+def _joined(every: list[_Curves]) -> _Curves:
+    """Return one set of curves; values that only some have are left out, groups number the sets."""
+
+    def column(name: str) -> Any:
+        parts = [getattr(curves, name) for curves in every]
+        return None if any(part is None for part in parts) else np.concatenate(parts)
+
+    group = column("group")
+    if group is None and len(every) > 1:
+        sizes = [len(curves.counts) for curves in every]
+        group = np.repeat(np.arange(len(every), dtype=np.int32), sizes)
+    return replace(
+        every[0],
+        group=group,
+        **{
+            name: column(name)
+            for name in (
+                "points",
+                "counts",
+                "widths",
+                "root_uv",
+                "guide",
+                "colour",
+                "triangle",
+                "barycentric",
+            )
+        },
+    )
+
+
+def _complete(strands: Strands, joined: _Curves, kept: Int64Array) -> Strands:
+    rows = rows_kept(joined.counts, kept)
+    return replace(
+        strands,
+        widths=None if joined.widths is None else joined.widths[rows],
+        root_uv=None if joined.root_uv is None else joined.root_uv[kept],
+        group=None if joined.group is None else joined.group[kept],
+        guide=None if joined.guide is None else joined.guide[kept] != 0,
+    )
+
+
+def _look(joined: _Curves, strands: Strands, kept: Int64Array) -> HairMaterial | None:
+    """Return the mean colours of roots and tips, where the file has colours."""
+    if joined.colour is None:
+        return None
+    colour = joined.colour[rows_kept(joined.counts, kept)]
+    ends = strands.offsets
+    root = colour[ends[:-1]].mean(axis=0, dtype=np.float64)
+    tip = colour[ends[1:] - 1].mean(axis=0, dtype=np.float64)
+    wide = strands.widths[strands.widths > 0] if strands.widths is not None else np.zeros(0)
+    width = float(wide.mean(dtype=np.float64)) if len(wide) else HairMaterial.width
+    return HairMaterial(root, tip, width)
+
+
+def _bound(groom: Groom, joined: _Curves, kept: Int64Array, options: ImportOptions) -> Groom:
+    """Return the groom bound as the file says, where hairkit wrote it and its head is used."""
+    triangle, barycentric = joined.triangle, joined.barycentric
+    if triangle is None or barycentric is None or options.head is not None or options.reverse:
+        return groom
+    if len(kept) != len(groom.strands):
+        return groom
+    try:
+        return replace(groom, root_triangle=triangle[kept], root_barycentric=barycentric[kept])
+    except InputError:
+        _log.warning("the file's root binding does not match its head; the nearest faces are taken")
+        return groom
