@@ -1,0 +1,107 @@
+"""glTF 2.0 .glb: guides as lines, hair as ribbons or cards, head, skeleton and animation.
+
+Khronos glTF 2.0, written so that the Khronos validator has nothing to say. glTF has no curves:
+strands stand in the file twice, as one LINES primitive with custom attributes, which is read back,
+and as triangles for viewers, which is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from hairkit.exporting import AnimationOptions, ExportOptions, prepared
+from hairkit.file_format import Feature, FileFormat
+from hairkit.groom import Groom
+from hairkit.hookspecs import hookimpl
+from hairkit.importing import ImportOptions
+from hairkit.options import option
+
+FORMAT = FileFormat(
+    "glTF",
+    (".glb", ".gltf"),
+    exact=frozenset(
+        {
+            Feature.POINTS,
+            Feature.COUNTS,
+            Feature.WIDTHS,
+            Feature.ROOT_UV,
+            Feature.GROUP,
+            Feature.GUIDE,
+            Feature.HEAD,
+            Feature.CAPSULES,
+            Feature.COLOUR,
+            Feature.CURL,
+            Feature.PHYSICS,
+            Feature.SKIN,
+        }
+    ),
+    written=frozenset({Feature.ANIMATION}),
+)
+
+
+@dataclass(frozen=True)
+class Options(ExportOptions, AnimationOptions, ImportOptions):
+    """Settings of the .glb exporter and importer."""
+
+    lines: str = option(
+        "all",
+        choices=("all", "guides", "none"),
+        doc="Strands written as lines, the only form that is read back.",
+    )
+    hair: str = option(
+        "ribbons",
+        choices=("ribbons", "cards", "none"),
+        doc="Triangles: a ribbon for each of some strands, cards for locks of them, or none.",
+    )
+    strips: int = option(
+        0, low=0, high=500_000, doc="Ribbons or cards; 0 makes 4000 ribbons or 800 cards."
+    )
+    strip_points: int = option(12, low=2, high=128, doc="Points along each ribbon or card.")
+    strip_width: float = option(
+        0.0, low=0.0, high=0.05, doc="Width of a strip; 0 covers what 100,000 hairs do.", unit="m"
+    )
+    lods: int = option(
+        1,
+        low=1,
+        high=6,
+        doc="Levels of detail, each with half the strips, twice as wide: one scene of the file"
+        " each.",
+    )
+    alpha: str = option(
+        "MASK", choices=("OPAQUE", "MASK", "BLEND"), doc="How the strips' texture is cut out."
+    )
+    head_mesh: bool = option(True, doc="Write the head.")
+    animation: str = option(
+        "morph",
+        choices=("morph", "skin", "none"),
+        doc="From the cache: the hair's shapes and the head's motion, the head's motion with hair"
+        " rigid on it, or nothing.",
+    )
+    frame_step: int = option(1, low=1, high=1000, doc="Every how manieth frame of the cache.")
+    morphs: int = option(
+        32,
+        low=1,
+        high=1000,
+        doc="Shapes that the animation is mixed from at most; as many as frames make it exact.",
+    )
+    metres: float = option(
+        1.0, low=1e-6, high=1e3, doc="Metres in one unit of a file that is read.", unit="m"
+    )
+
+
+@hookimpl
+def export_groom(groom: Groom, path: Path, options: Options) -> bool:
+    """Write the groom as .glb."""
+    from .scene import groom_document
+
+    groom_document(prepared(groom, options), options).write(path)
+    return True
+
+
+@hookimpl
+def import_groom(path: Path, options: Options) -> Groom:
+    """Read the lines of a .glb or .gltf file as strands; files of hairkit give all back."""
+    from .reader import read_gltf_groom
+
+    return read_gltf_groom(path, options)

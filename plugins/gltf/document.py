@@ -1,0 +1,121 @@
+"""A glTF document under construction: its JSON objects, and arrays laid out in one buffer."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import hairkit
+from hairkit.glb_file import BINARY_CHUNK, JSON_CHUNK
+from hairkit.stored import write_bytes
+
+_COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
+_SHAPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
+VERTICES, INDICES = 34962, 34963
+"""Targets of buffer views: the OpenGL names of both kinds of buffers."""
+
+
+class Document:
+    """Objects are added in any order and named by the number that `add` returns."""
+
+    def __init__(self) -> None:
+        self.json: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": f"hairkit {hairkit.__version__}"}
+        }
+        self._arrays: list[npt.NDArray[Any]] = []
+        self._pictures: dict[bytes, int] = {}
+        self._end = 0
+
+    def add(self, kind: str, **item: Any) -> int:
+        """Append an object to the list `kind`, fields of None left out; return its number."""
+        items = self.json.setdefault(kind, [])
+        items.append({name: value for name, value in item.items() if value is not None})
+        return len(items) - 1
+
+    def accessor(
+        self,
+        array: npt.NDArray[Any],
+        target: int | None = VERTICES,
+        *,
+        bounds: bool = False,
+        normalised: bool = False,
+    ) -> int:
+        """Store an array (count, ...) and return its accessor.
+
+        Parameters
+        ----------
+        array
+            Elements of a glTF type: scalars, vectors, or matrices that are column-major already.
+        target
+            What the GPU uses it for, or None.
+        bounds
+            Say the smallest and largest elements, as glTF wants of positions and times.
+        normalised
+            Whole numbers stand for 0 to 1.
+        """
+        low = high = None
+        if bounds:
+            low = np.atleast_1d(array.min(axis=0)).tolist()
+            high = np.atleast_1d(array.max(axis=0)).tolist()
+        return self.add(
+            "accessors",
+            bufferView=self.view(array, target),
+            componentType=_COMPONENTS[array.dtype.str[1:]],
+            normalized=True if normalised else None,
+            count=len(array),
+            type=_SHAPES[array.shape[1:]],
+            min=low,
+            max=high,
+        )
+
+    def indices(self, array: npt.NDArray[Any], vertices: int) -> int:
+        """Store vertex numbers, in two bytes each where they fit."""
+        kind = np.uint16 if vertices < 2**16 - 1 else np.uint32
+        return self.accessor(array.reshape(-1).astype(kind, copy=False), INDICES)
+
+    def view(self, array: npt.NDArray[Any], target: int | None = None) -> int:
+        """Store bytes in the buffer, at a multiple of four, and return their buffer view."""
+        start = self._end
+        self._arrays.append(array)
+        self._end += -(-array.nbytes // 4) * 4
+        return self.add(
+            "bufferViews", buffer=0, byteOffset=start, byteLength=array.nbytes, target=target
+        )
+
+    def image(self, png: bytes, name: str) -> int:
+        """Store a picture, if it is new, and return its texture."""
+        if png in self._pictures:
+            return self._pictures[png]
+        view = self.view(np.frombuffer(png, np.uint8))
+        source = self.add("images", bufferView=view, mimeType="image/png", name=name)
+        if "samplers" not in self.json:
+            # linear with mipmaps; across and along a strip the picture does not repeat
+            clamp = 33071
+            self.add("samplers", magFilter=9729, minFilter=9987, wrapS=clamp, wrapT=clamp)
+        self._pictures[png] = self.add("textures", source=source, sampler=0)
+        return self._pictures[png]
+
+    def write(self, path: Path) -> None:
+        """Write the .glb file, atomically; equal documents are equal files."""
+        if self._end:
+            self.json["buffers"] = [{"byteLength": self._end}]
+        text = json.dumps(self.json, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        head = 12 + 8 + len(text)
+        data = np.empty(head + 8 + self._end, np.uint8)
+        start = struct.pack("<4sIIII", b"glTF", 2, len(data), len(text), JSON_CHUNK) + text
+        data[: head + 8] = np.frombuffer(
+            start + struct.pack("<II", self._end, BINARY_CHUNK), np.uint8
+        )
+        at = head + 8
+        for array in self._arrays:
+            end = at + array.nbytes
+            data[at:end].view(array.dtype).reshape(array.shape)[...] = array
+            at += -(-array.nbytes // 4) * 4
+            data[end:at] = 0
+        write_bytes(path, data.data)

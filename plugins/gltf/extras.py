@@ -1,0 +1,78 @@
+"""What glTF has no place for, as JSON under `extras.hairkit` of the document."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hairkit.groom import Groom, HairMaterial, HairPhysics
+from hairkit.head import Capsules, Head
+
+VERSION = 1
+_PHYSICS = ("stiffness", "bend_stiffness", "damping", "friction", "gravity")
+
+
+def groom_extras(groom: Groom) -> dict[str, Any]:
+    """Return material, physics, capsules and landmarks of a groom: SI units, linear colours."""
+    look, head = groom.material, groom.head
+    landmarks = head.landmark_vertices
+    return {
+        "version": VERSION,
+        "unit": "metre",
+        "material": {
+            "root_colour": look.root_colour.tolist(),
+            "tip_colour": look.tip_colour.tolist(),
+            "width": float(look.width),
+            "curl_radius": float(look.curl_radius),
+            "curl_pitch": float(look.curl_pitch),
+        },
+        "physics": {name: float(getattr(groom.physics, name)) for name in _PHYSICS},
+        "capsules": {
+            "first": head.capsules.first.tolist(),
+            "second": head.capsules.second.tolist(),
+            "radius": head.capsules.radius.tolist(),
+        },
+        "landmark_vertices": None if landmarks is None else landmarks.tolist(),
+    }
+
+
+def material_of(extras: dict[str, Any]) -> HairMaterial:
+    """Return the material; raises what malformed values raise."""
+    values = extras["material"]
+    return HairMaterial(
+        np.array(values["root_colour"], np.float32),
+        np.array(values["tip_colour"], np.float32),
+        *(_number(values[name]) for name in ("width", "curl_radius", "curl_pitch")),
+    )
+
+
+def physics_of(extras: dict[str, Any]) -> HairPhysics:
+    """Return the physics."""
+    return HairPhysics(*(_number(extras["physics"][name]) for name in _PHYSICS))
+
+
+def capsules_of(extras: dict[str, Any]) -> Capsules:
+    """Return the collision capsules."""
+    values = extras["capsules"]
+    first = np.array(values["first"], np.float32).reshape(-1, 3)
+    second = np.array(values["second"], np.float32).reshape(-1, 3)
+    return Capsules(first, second, np.array(values["radius"], np.float32).reshape(-1, 2))
+
+
+def with_landmarks(head: Head, extras: dict[str, Any]) -> Head:
+    """Return the head with the file's landmarks, checked."""
+    numbers = extras.get("landmark_vertices")
+    if numbers is None:
+        return head
+    index = np.array(numbers, np.int32)
+    if index.shape != (68,) or index.min() < 0 or index.max() >= len(head.vertices):
+        raise ValueError("landmark_vertices are not 68 vertices of the head")
+    return Head(head.vertices, head.faces, head.uv, head.scalp, index, head.joints, head.capsules)
+
+
+def _number(value: Any) -> float:
+    number = float(value)
+    if not np.isfinite(number):
+        raise ValueError(f"{value} where a number is expected")
+    return number

@@ -1,0 +1,181 @@
+"""Meshes of a groom in a glTF document: head, lines and strips, tied to the head joint."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import InputError
+from hairkit.exporting import selected
+from hairkit.groom import Groom
+from hairkit.guide_weights import guide_mask
+from hairkit.stored import Float32Array, Float64Array, Int64Array, UInt8Array
+
+from .document import Document
+from .strips import HairMesh
+from .texture import white_picture
+
+JOINTS = ("root", "neck", "head")
+HEAD_JOINT = JOINTS.index("head")
+LINES = 1
+ROUGHNESS = {"head": 0.7, "hair": 0.45, "guides": 0.6}
+_SKIN_COLOUR = np.array([0.58, 0.4, 0.32])
+
+
+class Meshes:
+    """Adds meshes to a document, all skinned to the head joint."""
+
+    def __init__(self, document: Document, groom: Groom) -> None:
+        self.document, self.groom = document, groom
+
+    def head(self) -> int:
+        """Add the head and return its mesh; the scalp is tinted like the hair's roots."""
+        head, add = self.groom.head, self.document.accessor
+        tint = head.scalp[:, None] * (0.6 * self.groom.material.root_colour / _SKIN_COLOUR)
+        colour = np.clip(tint + 1 - head.scalp[:, None], 0, 1)
+        # a picture of the face may take its place; without one, validators call the uv unused
+        white = self.document.image(white_picture(), "white")
+        attributes = {
+            "POSITION": add(head.vertices, bounds=True),
+            "NORMAL": add(_unit_normals(head.normals())),
+            "TEXCOORD_0": add(_upside_down(head.uv)),
+            "COLOR_0": add(_bytes(colour), normalised=True),
+            "_SCALP": add(head.scalp),
+            **self._skin(len(head.vertices)),
+        }
+        primitive = {
+            "attributes": attributes,
+            "indices": self.document.indices(head.faces, len(head.vertices)),
+            "material": _plain(self.document, "head", _SKIN_COLOUR, white),
+        }
+        return self.document.add("meshes", name="head_mesh", primitives=[primitive])
+
+    def hair(self, mesh: HairMesh, material: int, level: int) -> int:
+        """Add strips and return their mesh."""
+        add, ribbons = self.document.accessor, mesh.ribbons
+        look, v = self.groom.material, ribbons.uv[:, 1:]
+        mixed = (look.root_colour * (1 - v) + look.tip_colour * v) * mesh.shade[:, None]
+        attributes = {
+            "POSITION": add(ribbons.vertices, bounds=True),
+            "NORMAL": add(ribbons.normals),
+            "TANGENT": add(ribbons.tangents),
+            "TEXCOORD_0": add(ribbons.uv),
+            "TEXCOORD_1": add(_upside_down(mesh.root_uv)),
+            "COLOR_0": add(
+                _bytes(mixed / np.maximum(brightest(self.groom), 1e-6)), normalised=True
+            ),
+            **self._skin(len(ribbons.vertices)),
+        }
+        primitive = {
+            "attributes": attributes,
+            "indices": self.document.indices(ribbons.faces, len(ribbons.vertices)),
+            "material": material,
+        }
+        return self._with_shapes(f"hair_LOD{level}", primitive, mesh.shapes)
+
+    def lines(self, groom: Groom, shapes: Float32Array, which: str) -> int:
+        """Add one indexed LINES primitive of strands and return its mesh."""
+        if which == "guides":
+            keep = guide_mask(groom.strands)
+            if not keep.any():
+                raise InputError("the groom has no guides; choose lines=all or lines=none")
+            shapes = shapes[:, keep[groom.strands.strand_of_point]]
+            groom = selected(groom, keep)
+        strands, add = groom.strands, self.document.accessor
+        owner, counts = strands.strand_of_point, strands.counts
+        attributes = {
+            "POSITION": add(strands.points, bounds=True),
+            "_STRAND_ID": add(owner.astype(np.float32)),
+            "_STRAND_T": add(_shares(counts)),
+            **self._skin(len(strands.points)),
+        }
+        described: dict[str, Any] = {"strands": len(strands)}
+        if (counts == counts[0]).all():
+            described["points_per_strand"] = int(counts[0])
+        else:
+            described["offsets"] = strands.offsets.tolist()
+        if strands.widths is not None:
+            attributes["_RADIUS"] = add(strands.widths / 2)
+        if strands.root_uv is not None:
+            attributes["_ROOT_UV"] = add(_upside_down(np.repeat(strands.root_uv, counts, axis=0)))
+        for name, values in (("group", strands.group), ("guide", strands.guide)):
+            if values is not None and (values == values[0]).all():
+                described[name] = values[0].item()
+            elif values is not None:
+                attributes[f"_{name.upper()}"] = add(np.repeat(values, counts).astype(np.float32))
+        first = np.delete(np.arange(len(strands.points), dtype=np.uint32), strands.offsets[1:] - 1)
+        segments = np.stack([first, first + 1], axis=1)
+        primitive = {
+            "attributes": attributes,
+            "indices": self.document.indices(segments, len(strands.points)),
+            "material": _plain(self.document, "guides", brightest(groom)),
+            "mode": LINES,
+            "extras": {"hairkit": described},
+        }
+        return self._with_shapes("guides", primitive, shapes)
+
+    def _with_shapes(self, name: str, primitive: dict[str, Any], shapes: Float32Array) -> int:
+        extras = weights = None
+        if len(shapes):
+            primitive["targets"] = [
+                {"POSITION": self.document.accessor(shape, bounds=True)} for shape in shapes
+            ]
+            weights = [0.0] * len(shapes)
+            extras = {"targetNames": [f"motion_{number}" for number in range(len(shapes))]}
+        return self.document.add(
+            "meshes", name=name, primitives=[primitive], weights=weights, extras=extras
+        )
+
+    def _skin(self, count: int) -> dict[str, int]:
+        """Return the attributes that tie vertices to the head joint alone."""
+        joints, weights = np.zeros((2, count, 4), np.uint8)
+        joints[:, 0], weights[:, 0] = HEAD_JOINT, 255
+        add = self.document.accessor
+        return {"JOINTS_0": add(joints), "WEIGHTS_0": add(weights, normalised=True)}
+
+
+def _shares(counts: Int64Array) -> Float32Array:
+    """Return (P,) 0 at the root of each strand to 1 at its tip."""
+    first = np.cumsum(counts) - counts
+    rank = np.arange(counts.sum()) - np.repeat(first, counts)
+    result: Float32Array = (rank / np.repeat(counts - 1, counts)).astype(np.float32)
+    return result
+
+
+def _upside_down(uv: Float32Array) -> Float32Array:
+    """Return texture coordinates with v from the picture's top, as glTF has it, or back."""
+    turned = uv.astype(np.float32, copy=True)
+    turned[:, 1] = 1 - turned[:, 1]
+    return turned
+
+
+def _unit_normals(normals: Float64Array) -> Float32Array:
+    """Return normals that are unit also at vertices without faces."""
+    lost = np.linalg.norm(normals, axis=1) < 0.5
+    return np.where(lost[:, None], [0.0, 1.0, 0.0], normals).astype(np.float32)
+
+
+def _bytes(colour: npt.NDArray[Any]) -> UInt8Array:
+    """Return RGBA bytes of linear colours (V, 3) in [0, 1]."""
+    bytes_ = np.full((len(colour), 4), 255, np.uint8)
+    bytes_[:, :3] = np.rint(255 * np.clip(colour, 0, 1))
+    return bytes_
+
+
+def brightest(groom: Groom) -> Float64Array:
+    """Return (3,) the brighter of root and tip in each channel, which vertex colours darken."""
+    look = groom.material
+    return np.clip(np.maximum(look.root_colour, look.tip_colour).astype(np.float64), 0, 1)
+
+
+def _plain(document: Document, name: str, colour: Float64Array, texture: int | None = None) -> int:
+    look: dict[str, Any] = {
+        "baseColorFactor": [*np.clip(colour, 0, 1).tolist(), 1.0],
+        "metallicFactor": 0.0,
+        "roughnessFactor": ROUGHNESS[name],
+    }
+    if texture is not None:
+        look["baseColorTexture"] = {"index": texture}
+    return document.add("materials", name=name, pbrMetallicRoughness=look)

@@ -1,0 +1,2 @@
+def read_gltf_groom(path, options):
+    raise NotImplementedError

@@ -1,0 +1,177 @@
+"""Make a glTF document of a groom: skeleton, head, lines, strips, materials and animation."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Protocol
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.exporting import PreparedGroom
+from hairkit.groom import Groom
+from hairkit.stored import Float32Array, Float64Array
+
+from .baking import Baked, bake
+from .document import Document
+from .extras import groom_extras
+from .meshes import HEAD_JOINT, JOINTS, ROUGHNESS, Meshes, brightest
+from .strips import StripOptions, hair_meshes
+from .texture import strand_pictures, white_picture
+
+_CUTOFF = 0.4
+_STRANDS_ON = {"ribbons": 6, "cards": 22}
+"""Strands in the picture of each strip."""
+
+
+class SceneOptions(StripOptions, Protocol):
+    """What `groom_document` asks of the plugin's options."""
+
+    @property
+    def lines(self) -> str: ...
+    @property
+    def alpha(self) -> str: ...
+    @property
+    def head_mesh(self) -> bool: ...
+    @property
+    def animation(self) -> str: ...
+    @property
+    def frame_step(self) -> int: ...
+    @property
+    def morphs(self) -> int: ...
+
+
+def groom_document(ready: PreparedGroom, options: SceneOptions) -> Document:
+    """Return the document of a groom; each level of detail is a scene, the first holds the lines.
+
+    Raises
+    ------
+    InputError
+        The options leave nothing to write.
+    """
+    document = Document()
+    groom = ready.groom
+    document.json["extras"] = {"hairkit": groom_extras(groom)}
+    baked = _baked(ready, options)
+    shapes = (
+        np.zeros((0, len(groom.strands.points), 3), np.float32) if baked is None else baked.shapes
+    )
+    meshes = Meshes(document, groom)
+    shared = [("head_mesh", meshes.head())] if options.head_mesh else []
+    levels = []
+    if options.hair != "none":
+        material = _hair_material(document, groom, options)
+        for level, mesh in enumerate(hair_meshes(groom, shapes, options)):
+            levels.append([(f"hair_LOD{level}", meshes.hair(mesh, material, level))])
+    first = levels[0] if levels else []
+    if options.lines != "none":
+        first = [("guides", meshes.lines(groom, shapes, options.lines)), *first]
+    if not (first or shared):
+        raise InputError("lines=none, hair=none and head_mesh=false leave nothing to write")
+    scenes = [[*shared, *first], *([*shared, *level] for level in levels[1:])]
+    animated = [
+        _scene(document, groom, parts, level, len(shapes)) for level, parts in enumerate(scenes)
+    ]
+    document.json["scene"] = 0
+    if baked is not None:
+        _animate(document, groom, baked, animated)
+    return document
+
+
+def _baked(ready: PreparedGroom, options: SceneOptions) -> Baked | None:
+    if ready.cache is None or options.animation == "none":
+        return None
+    rest = ready.groom.strands.points
+    deform = options.animation == "morph"
+    return bake(ready.cache, rest, options.frame_step, options.morphs, deform)
+
+
+def _scene(
+    document: Document, groom: Groom, parts: list[tuple[str, int]], level: int, morphs: int
+) -> tuple[int, list[int]]:
+    """Add a scene with a skeleton of its own; return its head joint and the nodes that morph.
+
+    Scenes share no node: a node has one place in three.js, and skins must lie in their scene.
+    """
+    joints = groom.head.joints.astype(np.float64)
+    offsets = np.diff(joints, axis=0, prepend=np.zeros((1, 3)))
+    numbers: list[int] = []
+    for name, offset in zip(JOINTS, offsets, strict=True):
+        numbers.append(document.add("nodes", name=name, translation=offset.tolist()))
+    for above, below in itertools.pairwise(numbers):
+        document.json["nodes"][above]["children"] = [below]
+    skin = document.add(
+        "skins",
+        name="skeleton",
+        joints=numbers,
+        skeleton=numbers[0],
+        inverseBindMatrices=_inverse_bind(document, joints),
+    )
+    nodes = [document.add("nodes", name=name, mesh=mesh, skin=skin) for name, mesh in parts]
+    document.add("scenes", name=f"LOD{level}", nodes=[numbers[0], *nodes])
+    moving = [node for node, (name, _) in zip(nodes, parts, strict=True) if name != "head_mesh"]
+    return numbers[HEAD_JOINT], moving if morphs else []
+
+
+def _inverse_bind(document: Document, joints: Float64Array) -> int:
+    if "skins" in document.json:
+        number: int = document.json["skins"][0]["inverseBindMatrices"]
+        return number
+    matrices = np.tile(np.eye(4, dtype=np.float32), (len(joints), 1, 1))
+    matrices[:, 3, :3] = -joints  # column-major: the place is in the last row of the array
+    return document.accessor(matrices, None)
+
+
+def _animate(
+    document: Document, groom: Groom, baked: Baked, animated: list[tuple[int, list[int]]]
+) -> None:
+    """Add one animation that moves all scenes alike."""
+    times = document.accessor(baked.times, None, bounds=True)
+    place, turn = _head_track(groom, baked.head_from_rest)
+    tracks: list[tuple[str, Float32Array]] = [("translation", place), ("rotation", turn)]
+    if len(baked.shapes):
+        tracks.append(("weights", baked.weights.reshape(-1)))
+    samplers = [
+        {"input": times, "interpolation": "LINEAR", "output": document.accessor(values, None)}
+        for _, values in tracks
+    ]
+    channels = [
+        {"sampler": sampler, "target": {"node": node, "path": path}}
+        for head, moving in animated
+        for sampler, (path, _) in enumerate(tracks)
+        for node in (moving if path == "weights" else [head])
+    ]
+    document.add("animations", name="simulation", samplers=samplers, channels=channels)
+
+
+def _head_track(groom: Groom, motion: Float64Array) -> tuple[Float32Array, Float32Array]:
+    """Return translations (T, 3) and rotations (T, 4) of the head joint on a still neck."""
+    from scipy.spatial.transform import Rotation
+
+    _, neck, head = groom.head.joints.astype(np.float64)
+    place = motion[:, :3, :3] @ head + motion[:, :3, 3] - neck
+    turn = Rotation.from_matrix(motion[:, :3, :3]).as_quat()
+    # the shorter way from key to key: q and -q are the same rotation
+    jump = (turn[1:] * turn[:-1]).sum(axis=1) < 0
+    turn[1:] *= np.where(np.cumsum(jump) % 2, -1.0, 1.0)[:, None]
+    return place.astype(np.float32), turn.astype(np.float32)
+
+
+def _hair_material(document: Document, groom: Groom, options: SceneOptions) -> int:
+    colour, normal = strand_pictures(_STRANDS_ON[options.hair], options.alpha == "OPAQUE")
+    return document.add(
+        "materials",
+        name="hair",
+        pbrMetallicRoughness={
+            "baseColorFactor": [*brightest(groom).tolist(), 1.0],
+            "baseColorTexture": {"index": document.image(colour, "strands")},
+            "metallicFactor": 0.0,
+            "roughnessFactor": ROUGHNESS["hair"],
+        },
+        normalTexture={"index": document.image(normal, "relief")},
+        # white: it gives the roots' texture coordinates a use, and a studio's scalp map a place
+        occlusionTexture={"index": document.image(white_picture(), "white"), "texCoord": 1},
+        alphaMode=options.alpha,
+        alphaCutoff=_CUTOFF if options.alpha == "MASK" else None,
+        doubleSided=True,
+    )

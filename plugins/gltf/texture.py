@@ -1,0 +1,78 @@
+"""Pictures for strips: strands side by side that end at different places, and their relief."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from hairkit.stored import Float64Array, UInt8Array
+
+_SHORTEST = 0.72
+"""Share of the strip's length that the shortest strand reaches."""
+_DARKEST = 0.62
+
+
+def strand_pictures(strands: int, opaque: bool, seed: int = 0) -> tuple[bytes, bytes]:
+    """Return PNGs of colour with alpha (sRGB, to be multiplied with the hair's) and of normals.
+
+    Parameters
+    ----------
+    strands
+        How many lie side by side, root at the upper edge.
+    opaque
+        Without holes.
+    seed
+        Of places, lengths and shades.
+    """
+    width, height = (64, 256) if strands <= 8 else (256, 256)
+    relief, shade = _strands_side_by_side(strands, width, height, seed)
+    lit = shade * (0.75 + 0.25 * np.maximum(relief, 0))
+    colour = np.repeat(255 * _to_srgb(lit)[..., None], 4, axis=-1)
+    edge = 0.25  # of the relief: alpha goes from 0 to 1 there, so that the cut is smooth
+    colour[..., 3] = 255 if opaque else 255 * np.clip(0.5 + relief / edge, 0, 1)
+    return _png(colour), _png(_normals(np.maximum(relief, 0) * width / strands * 0.3))
+
+
+def white_picture() -> bytes:
+    """Return a PNG of four white pixels: the place of a map that is not there yet."""
+    return _png(np.full((2, 2, 3), 255.0))
+
+
+def _strands_side_by_side(
+    strands: int, width: int, height: int, seed: int
+) -> tuple[Float64Array, Float64Array]:
+    """Return the strands' height over the strip (H, W), below 0 between them, and shades."""
+    random = np.random.default_rng(seed)
+    u = (np.arange(width) + 0.5)[:, None] / width
+    v = (np.arange(height) + 0.5)[:, None, None] / height
+    slot = (np.arange(strands) + 0.5) / strands
+    phase, end = random.uniform(0, 2 * np.pi, strands), random.uniform(_SHORTEST, 1.02, strands)
+    end[strands // 2] = 1.02
+    centre = slot + 0.25 / strands * np.sin(phase + 2 * np.pi * v * random.uniform(0.5, 1, strands))
+    half = 0.62 / strands * np.sqrt(np.clip((end - v) / 0.3, 0, 1))
+    # a quadratic bump for every strand; the highest is seen
+    bumps = 1 - ((u - centre) / np.maximum(half, 1e-4)) ** 2
+    nearest = bumps.argmax(axis=-1)
+    shade = random.uniform(_DARKEST, 1.0, strands)[nearest]
+    return np.maximum(bumps.max(axis=-1), -1.0), shade
+
+
+def _normals(relief: Float64Array) -> Float64Array:
+    """Return the normal map (H, W, 3) of a relief in pixels: +X to the right, +Y up."""
+    down, right = np.gradient(relief)
+    normal = np.stack([-right, down, np.ones_like(relief)], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    result: Float64Array = 127.5 * (normal + 1)
+    return result
+
+
+def _to_srgb(linear: Float64Array) -> Float64Array:
+    """Return sRGB-encoded values of [0, 1] (IEC 61966-2-1)."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def _png(picture: Float64Array) -> bytes:
+    pixels: UInt8Array = np.rint(picture).astype(np.uint8)
+    order = [2, 1, 0, 3][: pixels.shape[-1]]
+    encoded = cv2.imencode(".png", np.ascontiguousarray(pixels[..., order]))[1]
+    return bytes(encoded)
