@@ -22,4 +22,4 @@ def joined(parts: Sequence[tuple[npt.DTypeLike, npt.ArrayLike]]) -> memoryview:
         place = buffer[at : at + size].view(kind)
         place.reshape(values.shape)[...] = values
         at += size
-    return memoryview(buffer)
+    return buffer.data

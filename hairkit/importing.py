@@ -26,7 +26,15 @@ from hairkit.scalp import bind, roots_at
 from hairkit.stored import BoolArray, Float32Array, Int64Array
 from hairkit.strands import Strands
 
-__all__ = ["ImportOptions", "adopt", "packed", "placed", "reversed_strands", "rows_kept", "with_mean_width"]
+__all__ = [
+    "ImportOptions",
+    "adopt",
+    "packed",
+    "placed",
+    "reversed_strands",
+    "rows_kept",
+    "with_mean_width",
+]
 
 SMALLEST, LARGEST = 0.015, 0.6
 """Roots of a head of hair spread over between these many metres."""

@@ -132,13 +132,12 @@ def _header(reader: ByteReader) -> Any:
 def _counts(reader: ByteReader, header: Any) -> Int64Array:
     """Return the points (S,) of each strand, which are as many as the file says in all."""
     strands, total = int(header["strands"]), int(header["points"])
+    counts: Int64Array = np.zeros(0, np.int64)
     if header["arrays"] & SEGMENTS:
         counts = reader.array("<u2", strands, "segments").astype(np.int64) + 1
     elif strands * (int(header["segments"]) + 1) == total:
         counts = np.full(strands, int(header["segments"]) + 1, np.int64)
-    else:
-        counts = np.zeros(0, np.int64)
-    if counts.sum() != total:
+    if int(counts.sum()) != total:
         raise reader.error(f"{strands} strands have {counts.sum()} points, the header says {total}")
     return counts
 

@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import MappingProxyType
 
-from hairkit import Groom, hookimpl
+from hairkit.exporting import ExportOptions, prepared
+from hairkit.file_format import Feature, FileFormat
+from hairkit.groom import Groom
 from hairkit.groom_file import read_groom, write_groom
+from hairkit.hookspecs import hookimpl
 
-SUFFIXES = (".npz",)
+FORMAT = FileFormat(
+    "hairkit",
+    (".npz",),
+    exact=frozenset(Feature) - {Feature.GUIDE_WEIGHTS, Feature.ANIMATION},
+    partial=MappingProxyType({Feature.GUIDE_WEIGHTS: "made again from the guides"}),
+)
+
+Options = ExportOptions
 
 
 @hookimpl
-def export_groom(groom: Groom, path: Path) -> bool:
-    """Write everything that is on the groom."""
-    write_groom(path, groom)
+def export_groom(groom: Groom, path: Path, options: ExportOptions) -> bool:
+    """Write everything that is on the groom, or the strands that the options choose."""
+    whole = options == ExportOptions()
+    write_groom(path, groom if whole else prepared(groom, options).groom)
     return True
 
 

@@ -70,7 +70,7 @@ def _file_bytes(points: Float32Array, counts: Int64Array, width: int) -> memoryv
     row = np.zeros((len(points), width), "<f4")
     row[:, :3] = points
     words[~is_count] = row.reshape(-1).view("<i4")
-    return memoryview(words.view(np.uint8))
+    return words.view(np.uint8).data
 
 
 def _is_count(counts: Int64Array, width: int) -> BoolArray:
@@ -94,11 +94,13 @@ def _counts(words: npt.NDArray[np.int32], width: int, reader: ByteReader) -> Int
     if len(words) == 1 + strands * each and (words[1::each] == words[1]).all():
         return np.full(strands, int(words[1]), np.int64)
     counts, at = np.empty(strands, np.int64), 1
-    plain = memoryview(np.ascontiguousarray(words))
+    plain = np.ascontiguousarray(words).data
     for strand in range(strands):
         count = plain[at] if at < len(words) else -1
         if not 0 <= count <= (len(words) - at - 1) // width:
-            raise reader.error(f"strand {strand} has {count} points, which the file has no room for")
+            raise reader.error(
+                f"strand {strand} has {count} points, which the file has no room for"
+            )
         counts[strand] = count
         at += 1 + width * count
     if at != len(words):

@@ -31,6 +31,7 @@ VERBS = {
     "synth": "make a procedural groom and photos of it, with their truth",
     "render": "draw a groom on its head",
     "export": "write a groom in an engine's format",
+    "convert": "read hair of one format, write another",
     "info": "say what a file holds",
     "plugins": "list the plugins, or tell about one",
     "new-plugin": "start a plugin of your own",

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from hairkit.errors import InputError, OptionError
+from hairkit.groom import Groom
+from hairkit.groom_file import read_groom
+from hairkit.manager import Manager
 
 _DESCRIPTION = """\
 Example: hairkit export out/groom.npz -o hair.apx
 
-Write a groom in the format that the file's ending names. `hairkit plugins export_groom` lists the
-formats."""
+Write a groom in the format that the file's ending names. `hairkit plugins --formats` says what each
+format carries; `hairkit convert` has more to say about the file that is read."""
 
 
 def register(subparsers: Any) -> None:
@@ -30,24 +34,51 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Export, and print the file's name."""
-    from hairkit.groom_file import read_groom
-    from hairkit.manager import Manager
-
     manager = Manager.loaded(args.plugin)
     source, target = Path(args.groom), Path(args.out)
     exporter = args.using or plugin_for(manager, "export_groom", target)
-    options = manager.options(exporter, _settings(exporter, args.set))
-    if not target.parent.is_dir():
-        raise InputError(f"{target.parent}: no such folder; make it first")
-    if source.suffix == ".npz" or not source.exists():
-        groom = read_groom(source)
-    else:
-        groom = manager.call(
-            "import_groom", plugin_for(manager, "import_groom", source), path=source
-        )
+    settings = assigned(args.set, exporter)
+    options = manager.options(exporter, settings)
+    check_target(target)
+    groom = load_groom(manager, source, {})
     manager.call("export_groom", exporter, options, groom=groom, path=target)
     print(target)
     return 0
+
+
+def load_groom(
+    manager: Manager, path: Path, settings: Mapping[str, object], plugin: str | None = None
+) -> Groom:
+    """Return the groom in a file.
+
+    Parameters
+    ----------
+    manager
+        The plugins.
+    path
+        A groom.npz, or a file of any format that a plugin imports.
+    settings
+        Options of the import plugin by name.
+    plugin
+        The import plugin; by default the one of the file's ending.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if plugin is None and path.suffix == ".npz" and not settings:
+        return read_groom(path)
+    name = plugin or plugin_for(manager, "import_groom", path)
+    groom = manager.call("import_groom", name, manager.options(name, settings), path=path)
+    if not isinstance(groom, Groom):  # the manager has checked it; this tells the type
+        raise InputError(f"{path}: {name} made no groom of it")
+    return groom
+
+
+def check_target(path: Path) -> None:
+    """Raise `InputError` when a file cannot be put there, before any work is done."""
+    if not path.parent.is_dir():
+        raise InputError(f"{path.parent}: no such folder; make it first")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file")
 
 
 def plugin_for(manager: Any, stage: str, path: Path) -> str:
@@ -64,13 +95,13 @@ def plugin_for(manager: Any, stage: str, path: Path) -> str:
     return str(max(fitting)[1])
 
 
-def _settings(exporter: str, assignments: list[str]) -> dict[str, object]:
+def assigned(assignments: Iterable[str], plugin: str) -> dict[str, object]:
     """Take `option=value` and `plugin.option=value` texts apart."""
     values: dict[str, object] = {}
     for text in assignments:
         target, equals, value = (part.strip() for part in text.partition("="))
-        name = target.removeprefix(f"{exporter}.")
+        name = target.removeprefix(f"{plugin}.")
         if not equals or not name:
-            raise OptionError(f"--set {text}: expected option=value of {exporter}")
+            raise OptionError(f"--set {text}: expected option=value of {plugin}")
         values[name] = value
     return values

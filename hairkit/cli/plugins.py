@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import Any
 
+from hairkit.format_table import format_table
 from hairkit.manager import STAGES, Manager, PluginInfo
 from hairkit.options import OptionInfo
 
@@ -13,7 +14,8 @@ _DESCRIPTION = """\
 Example: hairkit plugins gabor
 
 List the installed plugins by stage, or tell about one: where it comes from, what it does, and
-its options with their defaults and bounds."""
+its options with their defaults and bounds. --formats prints what each file format carries, as a
+Markdown table."""
 
 
 def register(subparsers: Any) -> None:
@@ -23,12 +25,16 @@ def register(subparsers: Any) -> None:
     parser.add_argument(
         "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
     )
+    parser.add_argument("--formats", action="store_true", help="print the table of file formats")
     parser.add_argument("--json", action="store_true", help="print for machines")
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the list, or one plugin; a broken plugin asked for by name gives exit code 2."""
     manager = Manager.loaded(args.plugin)
+    if args.formats:
+        print(format_table(manager))
+        return 0
     if args.name is None or args.name in STAGES:
         wanted = [i for i in manager.plugins() if args.name is None or args.name in i.stages]
         print(_as_json(wanted) if args.json else _listing(wanted))

@@ -8,12 +8,16 @@ of a groom read back), groups, widths along the strand, and points beyond `point
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 
 from hairkit.errors import FormatError, InputError
+from hairkit.exporting import ExportOptions, prepared
+from hairkit.file_format import Feature, FileFormat
 from hairkit.groom import Groom
 from hairkit.hookspecs import hookimpl
+from hairkit.importing import ImportOptions, adopt
 from hairkit.options import option
 from hairkit.stored import write_text
 
@@ -23,14 +27,39 @@ from .reader import read_apx
 from .to_groom import asset_to_groom
 from .writer import asset_text
 
-__all__ = ["ApxAsset", "Options", "asset_text", "asset_to_groom", "groom_to_asset", "read_apx"]
+__all__ = [
+    "FORMAT",
+    "ApxAsset",
+    "Options",
+    "asset_text",
+    "asset_to_groom",
+    "groom_to_asset",
+    "read_apx",
+]
 
-SUFFIXES = (".apx",)
+FORMAT = FileFormat(
+    "HairWorks",
+    (".apx",),
+    exact=frozenset(
+        {Feature.ROOT_UV, Feature.SKIN, Feature.CAPSULES, Feature.COLOUR, Feature.PHYSICS}
+    ),
+    partial=MappingProxyType(
+        {
+            Feature.POINTS: "guides only, resampled to `points_per_strand`",
+            Feature.HEAD: "growth mesh of the roots",
+            Feature.CURL: "as waves, where points are too far apart to show it",
+        }
+    ),
+)
 
 
 @dataclass(frozen=True)
 class Options:
-    """Settings of the .apx exporter."""
+    """Settings of .apx files."""
+
+    strands: str = option(
+        "guides", choices=("guides", "all"), doc="Strands of the groom that become guides."
+    )
 
     points_per_strand: int = option(
         16, low=2, high=64, doc="Points of every guide; HairWorks wants one number for all."
@@ -45,20 +74,28 @@ class Options:
         "2000-01-01 00:00:00 UTC",
         doc="Date in the file; fixed, so that equal grooms are equal files.",
     )
+    head: Path | None = option(
+        None, doc="Head to bind the guides to when a file is read; else its own growth mesh."
+    )
 
 
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the groom's guides as .apx."""
-    write_text(path, asset_text(groom_to_asset(groom, options)))
+    chosen = prepared(groom, ExportOptions(strands=options.strands)).groom
+    write_text(path, asset_text(groom_to_asset(chosen, options)))
     return True
 
 
 @hookimpl
-def import_groom(path: Path) -> Groom:
-    """Read an .apx file; the growth mesh becomes the head."""
+def import_groom(path: Path, options: Options) -> Groom:
+    """Read an .apx file; the growth mesh becomes the head, if no other is named."""
     asset = read_apx(path)
     try:
-        return asset_to_groom(asset)
+        groom = asset_to_groom(asset)
     except InputError as error:
         raise FormatError(f"{path}: {error}") from error
+    if options.head is None:
+        return groom
+    bound = adopt(groom.strands, ImportOptions(options.head), path, groom.material)
+    return replace(bound, physics=groom.physics)

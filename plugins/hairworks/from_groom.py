@@ -52,14 +52,13 @@ class ApxOptions(Protocol):
 
 
 def groom_to_asset(groom: Groom, options: ApxOptions) -> ApxAsset:
-    """Return the asset of a groom's guides, in the unit and axes of `options`.
+    """Return the asset of a groom, all its strands guides, in the unit and axes of `options`.
 
     Raises
     ------
     InputError
         There are fewer than three guides, or they stand on one line.
     """
-    groom = _guides_only(groom)
     head = groom.head
     turn = FILE_FROM_HEAD[options.axis] * (100.0 / CENTIMETRES[options.unit])
     strands = groom.strands.resampled(options.points_per_strand)
@@ -87,21 +86,6 @@ def groom_to_asset(groom: Groom, options: ApxOptions) -> ApxAsset:
         handedness=RIGHT_HANDED,
         materials=_materials(groom, strands, len(faces), len(capsules) > 0, options),
         info=("1.1", f"hairkit {hairkit.__version__}", "", options.author, options.last_modified),
-    )
-
-
-def _guides_only(groom: Groom) -> Groom:
-    """Return the groom without its interpolated hair, which HairWorks makes itself."""
-    guide = groom.strands.guide
-    if guide is None or guide.all():
-        return groom
-    return Groom(
-        groom.strands.select(guide),
-        groom.head,
-        groom.root_triangle[guide],
-        groom.root_barycentric[guide],
-        groom.material,
-        groom.physics,
     )
 
 

@@ -13,6 +13,7 @@ from xml.parsers import expat
 import numpy as np
 
 from hairkit.errors import FormatError
+from hairkit.number_text import read_numbers
 from hairkit.stored import Float64Array, Int64Array
 
 from . import schema
@@ -224,14 +225,10 @@ def _integers(fields: dict[str, _Element], name: str, kind: str, size: int) -> I
 def _floats(text: str, name: str, count: int) -> Float64Array:
     if not _NUMBERS.fullmatch(text):
         raise FormatError(f"{name} holds something that is no number")
-    words = text.replace(",", " ").split()
-    if len(words) != count:
-        raise FormatError(f"{name} holds {len(words)} numbers, expected {count}")
-    try:
-        values = np.array(words, np.float64)
-    except ValueError as error:
-        raise FormatError(f"{name} holds something that is no number") from error
-    if not np.isfinite(values).all() or (np.abs(values) > np.finfo(np.float32).max).any():
+    values = read_numbers(text.replace(",", " "), schema.DOCTYPE, name)
+    if len(values) != count:
+        raise FormatError(f"{name} holds {len(values)} numbers, expected {count}")
+    if (np.abs(values) > np.finfo(np.float32).max).any():
         raise FormatError(f"{name} holds numbers beyond what a float can hold")
     return values
 

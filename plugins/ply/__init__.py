@@ -1,9 +1,9 @@
 """PLY: vertices with thickness and colour, edges between them, and where each strand ends.
 
 Binary little-endian. `element vertex` has x, y, z, thickness (the diameter) and an 8-bit sRGB
-colour; `element edge` lets mesh programs show the strands; `element strand` with `nsegs` (hairutil's
-convention) parts them, with root uv, group and guide flag. Read: ascii and both binary orders, with
-strands or with edges alone.
+colour; `element edge` lets mesh programs show the strands; `element strand` with `nsegs`, as
+hairutil writes it, parts them, with root uv, group and guide flag. Read: ascii and both binary
+orders, with strands or with edges alone.
 """
 
 from __future__ import annotations

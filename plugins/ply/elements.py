@@ -64,15 +64,14 @@ def read_elements(data: bytes, source: str | os.PathLike[str]) -> Elements:
     return found
 
 
-def _header(
-    data: bytes, source: str | os.PathLike[str]
-) -> tuple[str, list[_Element], int]:
+def _header(data: bytes, source: str | os.PathLike[str]) -> tuple[str, list[_Element], int]:
     """Return the byte order, what elements there are, and where the rows begin."""
     head = data[:_LONGEST_HEADER]
     end = re.search(rb"end_header\r?\n", head)
     if not re.match(rb"ply\r?\n", head) or end is None:
         raise FormatError(f"{source}: no PLY file: it lacks 'ply' or a near 'end_header'")
-    order, elements = None, []
+    order: str | None = None
+    elements: list[_Element] = []
     for line in head[: end.start()].decode("latin-1").splitlines()[1:]:
         words = line.split()
         if not words or words[0] in ("comment", "obj_info"):
@@ -98,9 +97,7 @@ def _rows(text: str, source: str | os.PathLike[str]) -> int:
     return int(text)
 
 
-def _with_property(
-    element: _Element, words: list[str], source: str | os.PathLike[str]
-) -> _Element:
+def _with_property(element: _Element, words: list[str], source: str | os.PathLike[str]) -> _Element:
     """Return the element with the property of a header line: `property float x`."""
     listed = len(words) == 5 and words[1] == "list"
     kind = "list" if listed else _KINDS.get(words[1]) if len(words) == 3 else None

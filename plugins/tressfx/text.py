@@ -1,10 +1,10 @@
 """The text .tfx of TressFX 1 and 2: a few settings, then each strand with its points, one a line.
 
-    version 2.0
-    scale 1.0
-    numStrands 93
-    strand 0 numVerts 16 texcoord 0.000000 000000
-    -2.28788 107.007 23.5948
+version 2.0
+scale 1.0
+numStrands 93
+strand 0 numVerts 16 texcoord 0.000000 000000
+-2.28788 107.007 23.5948
 """
 
 from __future__ import annotations
@@ -63,9 +63,7 @@ def read_text(data: bytes, source: str | os.PathLike[str]) -> tuple[TfxHair, Int
     return TfxHair(placed, uv.astype(np.float32), None, None), counts
 
 
-def _settings(
-    lines: list[str], source: str | os.PathLike[str]
-) -> dict[str, Float64Array]:
+def _settings(lines: list[str], source: str | os.PathLike[str]) -> dict[str, Float64Array]:
     """Return the numbers of each setting before the first strand."""
     settings = {}
     for line in lines:
@@ -101,4 +99,5 @@ def _placed(
         raise FormatError(f"{source}: scale is not one number above 0, or translation not three")
     if settings.get("rotation", np.zeros(3)).any():
         _log.warning("%s: its rotation is not applied", source)
-    return points * scale[0] + move
+    moved: Float64Array = points * scale[0] + move
+    return moved

@@ -227,7 +227,7 @@ def test_export_then_import_gives_the_same_groom(tmp_path: Path, axis: str, unit
     """Points, material, physics, skeleton and collision shapes come back to float precision."""
     groom, path = cap_groom(), tmp_path / "hair.apx"
     hairworks.export_groom(groom, path, hairworks.Options(axis=axis, unit=unit))
-    back = hairworks.import_groom(path)
+    back = hairworks.import_groom(path, hairworks.Options())
     wanted = groom.strands.resampled(16)
     assert np.allclose(back.strands.points, wanted.points, rtol=2e-7, atol=1e-8)
     assert np.array_equal(back.strands.offsets, wanted.offsets)
@@ -258,7 +258,7 @@ def test_only_guides_are_written(tmp_path: Path) -> None:
     guide = np.arange(len(groom.strands)) % 3 != 1
     mixed = replace(groom, strands=replace(groom.strands, guide=guide))
     hairworks.export_groom(mixed, tmp_path / "hair.apx", hairworks.Options())
-    back = hairworks.import_groom(tmp_path / "hair.apx")
+    back = hairworks.import_groom(tmp_path / "hair.apx", hairworks.Options())
     assert np.allclose(back.strands.roots, groom.strands.roots[guide], atol=1e-7)
 
 
@@ -267,11 +267,11 @@ def test_waves_are_written_where_the_points_cannot_show_them(tmp_path: Path) -> 
     groom = cap_groom()
     fine = replace(groom, material=replace(groom.material, curl_radius=0.004, curl_pitch=0.01))
     hairworks.export_groom(fine, tmp_path / "f", hairworks.Options(points_per_strand=6))
-    back = hairworks.import_groom(tmp_path / "f").material
+    back = hairworks.import_groom(tmp_path / "f", hairworks.Options()).material
     assert back.curl_radius == pytest.approx(0.004)
     assert back.curl_pitch == pytest.approx(0.01, rel=0.05)
     hairworks.export_groom(fine, tmp_path / "c", hairworks.Options(points_per_strand=64))
-    assert hairworks.import_groom(tmp_path / "c").material.curl_radius == 0
+    assert hairworks.import_groom(tmp_path / "c", hairworks.Options()).material.curl_radius == 0
 
 
 def test_too_few_guides_are_refused(tmp_path: Path) -> None:
@@ -295,7 +295,7 @@ def test_roots_that_share_a_place_all_get_a_face(tmp_path: Path) -> None:
         groom.root_barycentric[index],
     )
     hairworks.export_groom(doubled, tmp_path / "hair.apx", hairworks.Options())
-    back = hairworks.import_groom(tmp_path / "hair.apx")
+    back = hairworks.import_groom(tmp_path / "hair.apx", hairworks.Options())
     assert np.allclose(back.strands.roots[0], back.strands.roots[1], atol=1e-7)
 
 
@@ -330,6 +330,6 @@ def test_nvidias_own_file_has_our_structure(tmp_path: Path) -> None:
         ]
 
     assert structure(ours) == structure(theirs)
-    groom = hairworks.import_groom(REFERENCE)
+    groom = hairworks.import_groom(REFERENCE, hairworks.Options())
     assert len(groom.strands) == 451
     assert set(groom.strands.counts) == {5}

@@ -61,7 +61,7 @@ def test_damage_is_told_in_one_line(tmp_path: Path, name: str) -> None:
     assert EDITS[name][0] in text
     path.write_text(text.replace(*EDITS[name]))
     with pytest.raises(FormatError) as caught:
-        hairworks.import_groom(path)
+        hairworks.import_groom(path, hairworks.Options())
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -115,4 +115,4 @@ def test_damaged_bytes_give_a_groom_or_a_format_error(
     path = tmp_path_factory.getbasetemp() / "hair.apx"
     path.write_bytes(raw)
     with contextlib.suppress(FormatError):
-        hairworks.import_groom(path)
+        hairworks.import_groom(path, hairworks.Options())

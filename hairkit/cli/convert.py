@@ -1,0 +1,124 @@
+"""`hairkit convert IN OUT`: read hair of any format and write it in any other."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairkit.cli.export import assigned, check_target, load_groom, plugin_for
+from hairkit.errors import InputError, OptionError
+from hairkit.groom import Groom
+from hairkit.guide_weights import guide_mask
+from hairkit.manager import Manager
+
+_DESCRIPTION = """\
+Example: hairkit convert a.tfx b.abc --scale 0.0023 --up y
+
+Read a file of one format and write it in another; the names' endings say which. What the file lacks
+(head, widths, root uv) is made by stated defaults, and said. `hairkit plugins --formats` says what
+each format carries."""
+
+UP = {"y": "y_up_metres", "z": "z_up_metres"}
+"""Axis option of the reader for each way up."""
+READER, WRITER = "reader", "writer"
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "convert", help="read hair of one format, write another", description=_DESCRIPTION
+    )
+    add = parser.add_argument
+    add("source", metavar="IN", type=Path, help="file of any format that a plugin imports")
+    add("target", metavar="OUT", type=Path, help="file of any format that a plugin exports")
+    add_reader_arguments(parser)
+    add("--to", metavar="PLUGIN", help="export plugin; by default the one of the ending")
+    add(
+        "--set",
+        action="append",
+        default=[],
+        metavar="P.X=V",
+        help="option X of plugin P; P may also be reader or writer",
+    )
+
+
+def add_reader_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what may be said about a file that is read."""
+    add = parser.add_argument
+    add("--scale", metavar="M", help="metres in one unit of the file that is read")
+    add("--up", choices=tuple(UP), help="axis that points up in the file that is read")
+    add("--head", metavar="FILE", help="head to put under the strands")
+    add("--from", dest="reader", metavar="PLUGIN", help="import plugin; else that of the ending")
+    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Convert, and print one line about what was written."""
+    start = time.perf_counter()
+    manager, source, target = Manager.loaded(args.plugin), args.source, args.target
+    if not source.exists():
+        raise InputError(f"{source}: no such file")
+    reader = args.reader or plugin_for(manager, "import_groom", source)
+    writer = args.to or plugin_for(manager, "export_groom", target)
+    manager.implementer("import_groom", reader)
+    manager.implementer("export_groom", writer)
+    reading, writing = _parted(args.set, reader, writer)
+    reading = reader_settings(manager, reader, args) | reading
+    options = manager.options(writer, writing)
+    check_target(target)
+    if target.exists() and target.samefile(source):
+        raise InputError(f"{target}: is the file that is read; name another to write")
+    groom = load_groom(manager, source, reading, reader)
+    manager.call("export_groom", writer, options, groom=groom, path=target)
+    print(_summary(groom, target, time.perf_counter() - start))
+    return 0
+
+
+def reader_settings(manager: Manager, reader: str, args: argparse.Namespace) -> dict[str, object]:
+    """Return the reader's options that --scale, --up and --head stand for."""
+    known = {option.name for option in manager.info(reader).options}
+    wanted = {
+        "scale": ("--scale", args.scale),
+        "axis": ("--up", None if args.up is None else UP[args.up]),
+        "head": ("--head", args.head),
+    }
+    given = {name: word for name, (word, value) in wanted.items() if value is not None}
+    missing = [word for name, word in given.items() if name not in known]
+    if missing:
+        raise OptionError(
+            f"{missing[0]}: files of plugin {reader!r} say that themselves; leave it out"
+        )
+    return {name: wanted[name][1] for name in given}
+
+
+def _parted(
+    assignments: list[str], reader: str, writer: str
+) -> tuple[dict[str, object], dict[str, object]]:
+    """Return the options of reader and writer out of `plugin.option=value` texts."""
+    reading: list[str] = []
+    writing: list[str] = []
+    for text in assignments:
+        plugin, dot, rest = text.strip().partition(".")
+        if not dot or "=" in plugin or plugin not in (reader, writer, READER, WRITER):
+            raise OptionError(
+                f"--set {text}: expected {reader}.option=value or {writer}.option=value"
+            )
+        if plugin in (reader, READER):
+            reading.append(rest)
+        if plugin in (writer, WRITER):
+            writing.append(rest)
+    return assigned(reading, reader), assigned(writing, writer)
+
+
+def _summary(groom: Groom, target: Path, seconds: float) -> str:
+    strands = groom.strands
+    size = np.ptp(strands.points, axis=0)
+    return (
+        f"{target}: {len(strands)} strands, {len(strands.points)} points,"
+        f" {np.count_nonzero(guide_mask(strands))} guides,"
+        f" {' x '.join(f'{length:.3f}' for length in size)} m, in {seconds:.2f} s"
+    )
