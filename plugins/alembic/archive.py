@@ -63,7 +63,8 @@ class Property:
         numbers = self._first_sample("f")
         if numbers is None or numbers.dtype != np.float32:
             wide = self.floats()
-            return None if wide is None else wide.astype(np.float32)
+            with np.errstate(over="ignore"):
+                return None if wide is None else wide.astype(np.float32)
         return finite(numbers, self.archive.file.reader.source, self.name)
 
     def integers(self) -> Int64Array | None:

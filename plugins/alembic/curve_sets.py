@@ -99,11 +99,10 @@ def _curve_set(node: Object, world: Float64Array) -> CurveSet | None:
         uv = values.per_strand(found.get("uv"), 2, "f")
     group = values.per_strand(attributes.get("groom_group_id"), 1, "i")
     guide = values.per_strand(attributes.get("groom_guide"), 1, "i")
-    scale = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
     return CurveSet(
         points=_moved(points, world),
         counts=counts,
-        widths=None if widths is None else widths[:, 0] * np.float32(scale),
+        widths=None if widths is None else _scaled(widths[:, 0], world),
         root_uv=uv,
         colour=values.per_point(attributes.get("groom_color"), 3),
         group=None if group is None else group[:, 0],
@@ -139,6 +138,14 @@ def _moved(points: Float32Array, world: Float64Array) -> Float32Array:
     with np.errstate(over="ignore", invalid="ignore"):
         moved: Float32Array = (points @ world[:3, :3] + world[3, :3]).astype(np.float32)
     return moved
+
+
+def _scaled(widths: Float32Array, world: Float64Array) -> Float32Array:
+    """Return widths times the mean scale of the transform."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        scale = np.cbrt(np.abs(np.linalg.det(world[:3, :3])))
+        scaled: Float32Array = (widths * scale).astype(np.float32)
+    return scaled
 
 
 class _Values:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import shutil
 import tempfile
 import traceback
 from pathlib import Path
@@ -20,6 +22,8 @@ from .ogawa import is_complete
 
 GROOM_VERSION = (1, 5)
 """Major and minor version of Unreal's groom schema."""
+_HEADER_BYTES, _ATTRIBUTES = 512, 32
+"""More than the header of a property or frame takes, and more than there are properties."""
 _UNIFORM, _VERTEX = AbcGeom.GeometryScope.kUniformScope, AbcGeom.GeometryScope.kVertexScope
 
 
@@ -31,22 +35,43 @@ def write_curves(curves: GroomCurves, path: Path) -> None:
     Raises
     ------
     InputError
-        The disk is full or the folder cannot be written.
+        There is no room for the file.
     """
     with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
         part = Path(folder, "groom.abc")
         try:
+            _make_room(part, _size(curves))
             _write(curves, part)
+        except OSError as error:
+            raise InputError(
+                f"{path}: no room for {_size(curves)} bytes: {error.strerror}"
+            ) from error
         except BaseException as error:
             # the library closes its file when the last of its objects goes, which frames hold
             traceback.clear_frames(error.__traceback__)
-            if isinstance(error, RuntimeError):
-                raise InputError(f"{path}: not written: {_first_line(error)}") from error
             raise
         _put_on_disk(part)
         if not is_complete(part):
-            raise InputError(f"{path}: not written whole; is the disk full?")
+            raise InputError(f"{path}: the Alembic library did not write the whole file")
         os.replace(part, path)
+
+
+def _make_room(part: Path, size: int) -> None:
+    """Raise `OSError` now where the disk is full: the library would end the process later."""
+    with part.open("wb") as file:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, size)
+    if shutil.disk_usage(part.parent).free < size - part.stat().st_size:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _size(curves: GroomCurves) -> int:
+    """Return at least the bytes of the file: its numbers, each sample's key, and headers."""
+    frames = 1 if curves.cache is None else len(curves.cache)
+    arrays = [curves.counts, curves.widths, curves.root_uv, curves.colour, curves.group]
+    size = sum(array.nbytes for array in arrays) + frames * curves.points.nbytes
+    # also each curve's number, guide flag, and three guides with weights
+    return size + 32 * len(curves.counts) + _HEADER_BYTES * (frames + _ATTRIBUTES)
 
 
 def _write(curves: GroomCurves, part: Path) -> None:
@@ -128,8 +153,3 @@ def _imath(values: np.ndarray[Any, Any]) -> Any:
 def _put_on_disk(part: Path) -> None:
     with part.open("rb+") as file:
         os.fsync(file.fileno())
-
-
-def _first_line(error: BaseException) -> str:
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    return lines[-1] if lines else type(error).__name__
