@@ -63,8 +63,8 @@ class GlbFile:
         """Read a file of at most `limit` bytes; side files must lie in its own folder."""
         self.path = Path(path)
         data = read_file(path, limit)
-        self.size = len(data)
-        """Bytes of the file itself."""
+        self.bytes_read = len(data)
+        """Bytes of the file and of what it brought in so far: a measure for what may come of it."""
         self._binary: memoryview | None = None
         self._buffers: dict[int, memoryview] = {}
         text: bytes | memoryview = data
@@ -157,6 +157,8 @@ class GlbFile:
             if length > len(data):
                 raise ValueError(f"buffer {number} has {len(data)} bytes, it claims {length}")
             self._buffers[number] = data[:length]
+            if data is not self._binary:
+                self.bytes_read += len(data)
         return self._buffers[number]
 
     def _buffer_data(self, buffer: dict[str, Any], number: int) -> memoryview:

@@ -1,2 +1,270 @@
-def read_gltf_groom(path, options):
-    raise NotImplementedError
+"""Read the lines of a glTF file as strands; what hairkit wrote comes back as it was."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import FormatError
+from hairkit.glb_file import GlbFile, readable
+from hairkit.groom import Groom
+from hairkit.head import Head
+from hairkit.importing import ImportOptions, adopt, packed
+from hairkit.scalp import bind
+from hairkit.stored import Float32Array, Float64Array, Int64Array
+from hairkit.strands import Strands
+
+from .extras import VERSION, capsules_of, material_of, physics_of, with_landmarks
+from .joining import joined
+from .meshes import JOINTS
+
+_LINES, _LOOP, _STRIP, _TRIANGLES = 1, 2, 3, 4
+_MAX_GROUP = 2**31 - 1
+
+
+class ReaderOptions(Protocol):
+    """What `read_gltf_groom` asks of the plugin's options."""
+
+    @property
+    def head(self) -> Path | None: ...
+    @property
+    def metres(self) -> float: ...
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """The strands of one primitive, points in order."""
+
+    points: Float32Array
+    counts: Int64Array
+    radius: Float32Array | None
+    root_uv: Float32Array | None
+    group: Int64Array | None
+    guide: npt.NDArray[np.bool_] | None
+
+
+def read_gltf_groom(path: str | os.PathLike[str], options: ReaderOptions) -> Groom:
+    """Return the strands in a file's LINES, LINE_STRIP and LINE_LOOP primitives as a groom.
+
+    The transforms of nodes are applied; a skinned mesh is taken in its bind pose. A file of
+    hairkit's brings head, skeleton, capsules, material and physics along, others get what
+    `hairkit.importing.adopt` says.
+
+    Raises
+    ------
+    FormatError
+        The file is damaged, or holds no lines.
+    """
+    with readable(path, "glTF groom"):
+        file = GlbFile(path)
+        own = _own_extras(file)
+        metres = 1.0 if own else options.metres
+        parts = _parts(file, metres)
+        if not parts:
+            raise FormatError(
+                f"{path}: holds no lines; ribbons and cards cannot be turned back into strands:"
+                " export the hair as lines or curves"
+            )
+        strands = _strands(parts, path)
+        head = _own_head(file, own) if own else None
+        material = material_of(own) if own else None
+        physics = physics_of(own) if own else None
+    if head is not None and options.head is None and material is not None:
+        triangle, barycentric = bind(strands.roots, head)
+        groom = Groom(strands, head, triangle, barycentric, material)
+    else:
+        groom = adopt(strands, ImportOptions(options.head), path, material, head)
+    return groom if physics is None else replace(groom, physics=physics)
+
+
+def _own_extras(file: GlbFile) -> dict[str, Any] | None:
+    """Return what hairkit noted in its file, or None in files of others."""
+    extras = file.document.get("extras")
+    own = extras.get("hairkit") if isinstance(extras, dict) else None
+    if own is not None and own["version"] != VERSION:
+        raise ValueError(f"it is of hairkit's form {own['version']}, this hairkit reads {VERSION}")
+    return own
+
+
+def _parts(file: GlbFile, metres: float) -> list[_Part]:
+    parts: list[_Part] = []
+    read = 0
+    for node, placed in file.nodes_in_place():
+        if "mesh" not in node:
+            continue
+        # glTF 2.0, 3.7.3.3: the transform of a skinned mesh's own node is ignored
+        matrix = np.eye(4) if "skin" in node else placed
+        for primitive in file.document["meshes"][node["mesh"]]["primitives"]:
+            if primitive.get("mode", _TRIANGLES) not in (_LINES, _LOOP, _STRIP):
+                continue
+            part = _part(file, primitive, matrix, metres)
+            parts.append(part)
+            read += len(part.points)
+            if read > file.bytes_read:
+                raise ValueError("its meshes use the same data over and over")
+    return parts
+
+
+def _part(file: GlbFile, primitive: dict[str, Any], matrix: Float64Array, metres: float) -> _Part:
+    attributes = primitive["attributes"]
+    points = file.accessor(attributes["POSITION"])
+    if points.shape[1] != 3 or points.dtype != np.float32:
+        raise ValueError("positions are not three 32-bit floats each")
+    if not np.isfinite(points).all():
+        raise ValueError("positions are not finite numbers")
+    segments = _segments(file, primitive, len(points))
+    if "_STRAND_ID" not in attributes:
+        segments = _welded(segments, points)
+    order, counts = joined(segments, len(points))
+    if not np.array_equal(matrix, np.eye(4)) or metres != 1:
+        points = metres * (points @ matrix[:3, :3].T + matrix[:3, 3])
+    custom = _Custom(file, primitive, order, np.cumsum(counts) - counts)
+    radius, uv = custom.of_points("_RADIUS", 1), custom.of_points("_ROOT_UV", 2)
+    if uv is not None:
+        uv = uv[custom.first]
+        uv[:, 1] = 1 - uv[:, 1]  # glTF counts v from the top of the picture, this project upwards
+    guide = custom.of_strands("guide")
+    return _Part(
+        points[order].astype(np.float32),
+        counts,
+        None if radius is None else radius[:, 0].astype(np.float32),
+        None if uv is None else uv.astype(np.float32),
+        custom.of_strands("group"),
+        None if guide is None else guide > 0,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Custom:
+    """The attributes that hairkit adds to lines."""
+
+    file: GlbFile
+    primitive: dict[str, Any]
+    order: Int64Array
+    """(P,) vertices in the order of the strands."""
+    first: Int64Array
+    """(S,) where in that order each strand starts."""
+
+    def of_points(self, name: str, width: int) -> Float64Array | None:
+        """Return (P, width) values, None where the attribute is missing."""
+        attributes = self.primitive["attributes"]
+        if name not in attributes:
+            return None
+        values = self.file.numbers(attributes[name])
+        count = self.file.document["accessors"][attributes["POSITION"]]["count"]
+        if values.shape != (count, width) or not np.isfinite(values).all():
+            raise ValueError(f"{name} is not {width} finite numbers a point")
+        return values[self.order]
+
+    def of_strands(self, name: str) -> Int64Array | None:
+        """Return (S,) whole numbers: of the attribute, or one for all strands in the extras."""
+        values = self.of_points(f"_{name.upper()}", 1)
+        constant = _described(self.primitive).get(name)
+        if values is None and constant is None:
+            return None
+        column = np.full(len(self.first), constant, np.float64)
+        if values is not None:
+            column = values[self.first, 0]
+        if not (np.abs(column) <= _MAX_GROUP).all():
+            raise ValueError(f"_{name.upper()} is beyond what 32 bits hold")
+        return np.rint(column).astype(np.int64)
+
+
+def _described(primitive: dict[str, Any]) -> dict[str, Any]:
+    extras = primitive.get("extras")
+    own = extras.get("hairkit") if isinstance(extras, dict) else None
+    return own if isinstance(own, dict) else {}
+
+
+def _segments(file: GlbFile, primitive: dict[str, Any], vertices: int) -> Int64Array:
+    """Return (M, 2) vertex numbers of a primitive's segments."""
+    if "indices" in primitive:
+        stored = file.accessor(primitive["indices"])
+        if stored.shape[1] != 1 or stored.dtype.kind != "u":
+            raise ValueError("indices are not whole numbers")
+        index = stored[:, 0].astype(np.int64)
+        # the largest number starts a new strip (EXT_mesh_primitive_restart)
+        restart = np.iinfo(stored.dtype).max if primitive["mode"] != _LINES else -1
+    else:
+        index, restart = np.arange(vertices), -1
+    if ((index >= vertices) & (index != restart)).any():
+        raise ValueError(f"an index is {index.max()}, the mesh has {vertices} vertices")
+    if primitive["mode"] == _LINES:
+        if len(index) % 2:
+            raise ValueError(f"{len(index)} indices do not make pairs")
+        return index.reshape(-1, 2)
+    pairs = np.stack([index[:-1], index[1:]], axis=1)
+    if primitive["mode"] == _LOOP and len(index) > 2:
+        pairs = np.concatenate([pairs, [[index[-1], index[0]]]])
+    kept: Int64Array = pairs[(pairs != restart).all(axis=1)]
+    return kept
+
+
+def _welded(segments: Int64Array, points: npt.NDArray[Any]) -> Int64Array:
+    """Join segments that have their own vertices each, where one starts as the last one ended."""
+    if len(segments) < 2 or np.bincount(segments.ravel(), minlength=len(points)).max() > 1:
+        return segments
+    meets = (points[segments[1:, 0]] == points[segments[:-1, 1]]).all(axis=1)
+    segments = segments.copy()
+    segments[1:, 0][meets] = segments[:-1, 1][meets]
+    return segments
+
+
+def _strands(parts: list[_Part], path: object) -> Strands:
+    """Return all parts' strands; what only some parts have is left out."""
+    points = np.concatenate([part.points for part in parts])
+    counts = np.concatenate([part.counts for part in parts])
+    strands, kept = packed(points, counts, path)
+    radius, uv, group, guide = (
+        None if any(values is None for values in column) else np.concatenate(column)
+        for column in zip(
+            *((part.radius, part.root_uv, part.group, part.guide) for part in parts), strict=True
+        )
+    )
+    if radius is not None and (radius < 0).any():
+        raise ValueError("a radius is below 0")
+    return replace(
+        strands,
+        widths=None if radius is None else 2 * radius[np.repeat(counts >= 2, counts)],
+        root_uv=None if uv is None else uv[kept],
+        group=None if group is None else group[kept],
+        guide=None if guide is None else guide[kept],
+    )
+
+
+def _own_head(file: GlbFile, own: dict[str, Any]) -> Head | None:
+    """Return the head of a file of hairkit's, or None where it was left out."""
+    joints = np.zeros((3, 3))
+    primitive = None
+    for node, placed in file.nodes_in_place():
+        if node.get("name") in JOINTS:
+            joints[JOINTS.index(node["name"])] = placed[:3, 3]
+        if "mesh" in node:
+            for candidate in file.document["meshes"][node["mesh"]]["primitives"]:
+                if "_SCALP" in candidate["attributes"]:
+                    primitive = candidate
+    if primitive is None:
+        return None
+    attributes = primitive["attributes"]
+    uv = file.numbers(attributes["TEXCOORD_0"])
+    uv[:, 1] = 1 - uv[:, 1]
+    vertices = file.numbers(attributes["POSITION"])
+    faces = file.accessor(primitive["indices"]).reshape(-1, 3).astype(np.int64)
+    if faces.max() >= len(vertices):
+        raise ValueError("a face of the head names a vertex that does not exist")
+    scalp = file.numbers(attributes["_SCALP"])[:, 0]
+    head = Head(
+        vertices.astype(np.float32),
+        faces.astype(np.int32),
+        uv.astype(np.float32),
+        scalp.astype(np.float32),
+        None,
+        joints.astype(np.float32),
+        capsules_of(own),
+    )
+    return with_landmarks(head, own)
