@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+import numpy.typing as npt
 
 PROJECT = Path(__file__).parents[1]
 INSIDE = Path(__file__).parent / "clients" / "inside"
@@ -101,6 +102,19 @@ class BlenderSession:
     def _last_words(self) -> str:
         self._said.seek(0)
         return self._said.read()[-2000:]
+
+
+def z_up(points: npt.ArrayLike) -> npt.NDArray[np.float32]:
+    """Return points (..., 3) of the head frame as Blender has them: x, -z, y."""
+    turned: npt.NDArray[np.float32] = np.asarray(points, np.float32)[..., [0, 2, 1]]
+    return turned * np.array([1, -1, 1], np.float32)
+
+
+def only(things: list[dict[str, Any]], kind: str, name: str = "") -> dict[str, Any]:
+    """Return the only object of a type whose name begins with `name`."""
+    found = [t for t in things if t["type"] == kind and t["name"].startswith(name)]
+    assert len(found) == 1, [(t["type"], t["name"]) for t in things]
+    return found[0]
 
 
 def _with_arrays(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:

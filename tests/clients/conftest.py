@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
-from blender_session import VARIABLE, BlenderSession, blender_python
+from blender_session import VARIABLE, BlenderSession, blender_python, z_up
+from client_groom import rich_groom, wandering
 
-from hairkit.groom import Groom, HairMaterial
+from hairkit.groom import Groom
+from hairkit.guide_weights import follow
 from hairkit.point_cache import PointCache
-from hairkit.strands import Strands
-from hairkit.testing import bristle_groom
 
 
 @pytest.fixture(scope="session")
@@ -33,41 +34,19 @@ def groom() -> Groom:
 
 @pytest.fixture(scope="session")
 def cache(groom: Groom) -> PointCache:
-    """Three frames at 24 a second in which every point takes a way of its own."""
-    rng = np.random.default_rng(11)
-    away = np.cumsum(rng.normal(0, 0.004, (3, *groom.strands.points.shape)), axis=0)
-    away -= away[0]
-    times = np.arange(3) / 24
-    return PointCache(groom.strands.points + away, times, np.tile(np.eye(4), (3, 1, 1)))
+    """Frames in which every point takes a way of its own."""
+    return wandering(groom)
 
 
-def rich_groom() -> Groom:
-    """Return bent strands of 3 to 9 points, each width another, two groups, guides and hair."""
-    rng = np.random.default_rng(5)
-    bristles = bristle_groom()
-    count = 40
-    counts = rng.integers(3, 10, count)
-    roots = bristles.strands.roots[:count]
-    way = bristles.strands.points.reshape(-1, 5, 3)[:count, 4] - roots
-    offsets = np.concatenate([[0], np.cumsum(counts)])
-    owner = np.repeat(np.arange(count), counts)
-    rank = np.arange(offsets[-1]) - offsets[:-1][owner]
-    bend = rng.normal(0, 0.004, (len(owner), 3)) * (rank > 0)[:, None]
-    points = roots[owner] + way[owner] * (rank / 4)[:, None] + bend
-    strands = Strands(
-        points,
-        offsets,
-        widths=rng.uniform(4e-5, 2e-4, len(owner)),
-        root_uv=rng.uniform(0.05, 0.95, (count, 2)),
-        group=np.arange(count) % 2,
-        guide=np.arange(count) % 4 != 3,
-    )
-    return replace(
-        bristles,
-        strands=strands,
-        root_triangle=bristles.root_triangle[:count],
-        root_barycentric=bristles.root_barycentric[:count],
-        material=HairMaterial(
-            np.array([0.3, 0.12, 0.05]), np.array([0.6, 0.35, 0.2]), 1e-4, 0.004, 0.03
-        ),
-    )
+@pytest.fixture(scope="session")
+def stored_cache(cache: PointCache, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The frames as a file, for the option `cache`."""
+    path = tmp_path_factory.mktemp("cache") / "cache.npz"
+    cache.save(path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def frames(groom: Groom, cache: PointCache) -> npt.NDArray[np.float32]:
+    """(3, P, 3) where all strands are at frames 0, 1 and 2, in Blender's axes."""
+    return z_up(follow(groom.strands, cache.points))

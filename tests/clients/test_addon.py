@@ -5,12 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
-from blender_session import BlenderSession, blender_python
+from blender_session import BlenderSession, blender_python, only, z_up
 
 from hairkit.capture_reader import sample_folder
 from hairkit.groom import Groom
@@ -19,18 +17,6 @@ from hairkit.groom_file import read_groom, write_groom
 ADDON = Path(__file__).parents[2] / "examples" / "hairkit-blender"
 FIND_TOOL = "import bpy; print(bpy.utils.resource_path('LOCAL'))"
 TOOL = "scripts/addons_core/bl_pkg/cli/blender_ext.py"
-
-
-def z_up(points: npt.ArrayLike) -> npt.NDArray[np.float32]:
-    """Return points of the head frame as Blender has them: x, -z, y."""
-    turned: npt.NDArray[np.float32] = np.asarray(points, np.float32)[..., [0, 2, 1]] * [1, -1, 1]
-    return turned
-
-
-def of_type(things: list[dict[str, Any]], kind: str) -> dict[str, Any]:
-    """Return the only object of a type."""
-    (thing,) = (thing for thing in things if thing["type"] == kind)
-    return thing
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +44,7 @@ def stored(groom: Groom, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_hair_arrives_point_by_point(addon: BlenderSession, stored: Path, groom: Groom) -> None:
     """Positions, half the widths, groups, guide flags and root uv are those of the groom."""
-    hair = of_type(addon.call("addon.imported", path=stored), "CURVES")
+    hair = only(addon.call("addon.imported", path=stored), "CURVES")
     strands, attributes = groom.strands, hair["attributes"]
     assert strands.widths is not None
     np.testing.assert_array_equal(hair["offsets"], strands.offsets)
@@ -70,7 +56,7 @@ def test_hair_arrives_point_by_point(addon: BlenderSession, stored: Path, groom:
 
 def test_hair_is_in_the_captured_colour(addon: BlenderSession, stored: Path, groom: Groom) -> None:
     """The material's two colours are those of root and tip."""
-    hair = of_type(addon.call("addon.imported", path=stored), "CURVES")
+    hair = only(addon.call("addon.imported", path=stored), "CURVES")
     wanted = [groom.material.root_colour, groom.material.tip_colour]
     np.testing.assert_allclose(hair["ends"][0], wanted, atol=1e-6)
 
@@ -78,7 +64,7 @@ def test_hair_is_in_the_captured_colour(addon: BlenderSession, stored: Path, gro
 def test_the_head_comes_along(addon: BlenderSession, stored: Path, groom: Groom) -> None:
     """The hair's parent is the head: same vertices, faces, uv and scalp."""
     things = addon.call("addon.imported", path=stored)
-    hair, head = of_type(things, "CURVES"), of_type(things, "MESH")
+    hair, head = only(things, "CURVES"), only(things, "MESH")
     assert hair["parent"] == hair["surface"] == head["name"]
     np.testing.assert_allclose(head["positions"], z_up(groom.head.vertices), atol=1e-7)
     np.testing.assert_array_equal(head["corners"].reshape(-1, 3), groom.head.faces)
@@ -145,7 +131,7 @@ def test_a_folder_of_photos_becomes_hair(addon: BlenderSession, tmp_path: Path) 
         python=sys.executable,
         guides=60,
     )
-    hair, made = of_type(things, "CURVES"), read_groom(tmp_path / "out" / "groom.npz")
+    hair, made = only(things, "CURVES"), read_groom(tmp_path / "out" / "groom.npz")
     np.testing.assert_allclose(hair["positions"], z_up(made.strands.points), atol=1e-7)
 
 

@@ -1,0 +1,121 @@
+"""glTF in Blender: lines, ribbons and head, skinned, and a simulation that plays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from blender_session import BlenderSession, only, z_up
+from client_groom import written
+
+from hairkit.groom import Groom
+from hairkit.head_skin import HEAD_JOINT, JOINT_NAMES
+from hairkit.manager import Manager
+from hairkit.strands import Strands
+
+STRIPS, POINTS = 30, 12
+RIBBONS = {"lines": "none", "strips": STRIPS, "strip_points": POINTS}
+IMPORT = "import_scene.gltf"
+
+
+def seen(blender: BlenderSession, path: Path, frames: Any = ()) -> list[dict[str, Any]]:
+    """Return what Blender imports, without the shape that it makes to show bones."""
+    things = blender.call("contents.imported", path=path, operator=IMPORT, frames=frames)
+    return [thing for thing in things if thing["name"] != "Icosphere"]
+
+
+def off_strands(points: npt.NDArray[Any], strands: npt.NDArray[Any], layout: Strands) -> float:
+    """Return the largest distance of points (N, 3) from the polylines of points (P, 3)."""
+    first = layout.segments()[1]
+    start, way = strands[first].astype(float), (strands[first + 1] - strands[first]).astype(float)
+    share = np.einsum("nsc,sc->ns", points[:, None] - start, way) / (way**2).sum(axis=1)
+    foot = start + share.clip(0, 1)[..., None] * way
+    return float(np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1).max())
+
+
+def test_ribbons_lie_on_strands(
+    blender: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path
+) -> None:
+    """The middle of every ribbon runs along a strand, v runs from root to tip, u across."""
+    things = seen(blender, written(manager, groom, tmp_path / "hair.glb", **RIBBONS))
+    mesh = only(things, "MESH", "hair")
+    assert len(mesh["positions"]) == STRIPS * POINTS * 2
+    middle = mesh["positions"].reshape(-1, 2, 3).mean(axis=1)
+    assert off_strands(middle, z_up(groom.strands.points), groom.strands) < 1e-6
+    corner = mesh["corners"]
+    share = (corner // 2 % POINTS) / (POINTS - 1)
+    np.testing.assert_allclose(mesh["uv"][0][:, 0], corner % 2, atol=1e-6)
+    np.testing.assert_allclose(1 - mesh["uv"][0][:, 1], share, atol=1e-6)
+
+
+@pytest.mark.parametrize("hair", ["ribbons", "cards"])
+def test_hair_is_bound_to_the_head_joint(
+    blender: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path, hair: str
+) -> None:
+    """Bones stand at the joints; the hair follows the armature's head with its whole weight."""
+    things = seen(blender, written(manager, groom, tmp_path / "hair.glb", lines="none", hair=hair))
+    bones, mesh = only(things, "ARMATURE"), only(things, "MESH", "hair")
+    assert tuple(bones["bones"]) == tuple(mesh["groups"]) == JOINT_NAMES
+    assert bones["parents"] == [None, "root", "neck"]
+    np.testing.assert_allclose(bones["heads"], z_up(groom.head.joints), atol=1e-6)
+    assert mesh["modifiers"] == ["ARMATURE"]
+    assert (mesh["weights"][:, HEAD_JOINT] == 1).all()
+    assert (mesh["weights"].sum(axis=1) == 1).all()
+
+
+def test_the_head_arrives(
+    blender: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path
+) -> None:
+    """Vertices, faces, uv and scalp are the head's; what grows hair follows the head joint."""
+    things = seen(blender, written(manager, groom, tmp_path / "hair.glb", **RIBBONS))
+    mesh, head = only(things, "MESH", "head"), groom.head
+    np.testing.assert_allclose(mesh["positions"], z_up(head.vertices), atol=1e-7)
+    np.testing.assert_array_equal(mesh["corners"].reshape(-1, 3), head.faces)
+    np.testing.assert_allclose(mesh["uv"][0], head.uv[mesh["corners"]], atol=1e-6)
+    np.testing.assert_allclose(mesh["attributes"]["_SCALP"], head.scalp, atol=1e-6)
+    np.testing.assert_allclose(mesh["weights"].sum(axis=1), 1, atol=1e-6)
+    assert (mesh["weights"][head.scalp > 0.5, HEAD_JOINT] == 1).all()
+
+
+def test_lines_are_the_strands(
+    blender: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path
+) -> None:
+    """Edges along every strand, with its number, group, guide flag, root uv and radius."""
+    things = seen(blender, written(manager, groom, tmp_path / "hair.glb", hair="none"))
+    mesh, strands = only(things, "MESH", "guides"), groom.strands
+    have, owner = mesh["attributes"], strands.strand_of_point
+    assert strands.widths is not None
+    assert strands.root_uv is not None
+    assert strands.group is not None
+    assert strands.guide is not None
+    first = strands.segments()[1]
+    np.testing.assert_allclose(mesh["positions"], z_up(strands.points), atol=1e-7)
+    np.testing.assert_array_equal(
+        np.sort(np.sort(mesh["edges"], axis=1), axis=0), np.stack([first, first + 1], axis=1)
+    )
+    np.testing.assert_array_equal(have["_STRAND_ID"], owner)
+    np.testing.assert_array_equal(have["_GROUP"], strands.group[owner])
+    np.testing.assert_array_equal(have["_GUIDE"], strands.guide[owner])
+    np.testing.assert_allclose(have["_RADIUS"], strands.widths / 2, rtol=1e-6)
+    for index, name in enumerate(("_ROOT_U", "_ROOT_V")):
+        np.testing.assert_allclose(have[name], strands.root_uv[owner, index], atol=1e-6)
+    assert (mesh["weights"][:, HEAD_JOINT] == 1).all()
+
+
+def test_a_simulation_plays(
+    blender: BlenderSession,
+    manager: Manager,
+    groom: Groom,
+    frames: npt.NDArray[np.float32],
+    stored_cache: Path,
+    tmp_path: Path,
+) -> None:
+    """At frame k the ribbons lie on the strands as the cache has them at frame k."""
+    path = written(manager, groom, tmp_path / "hair.glb", cache=stored_cache, **RIBBONS)
+    mesh = only(seen(blender, path, [0, 1, 2]), "MESH", "hair")
+    for wanted, places in zip(frames, mesh["frames"], strict=True):
+        middle = places.reshape(-1, 2, 3).mean(axis=1)
+        assert off_strands(middle, wanted, groom.strands) < 1e-6
