@@ -1,0 +1,68 @@
+"""Keeps drawing within a frame's time by drawing less: softness first, then pixels, then hairs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SMOOTHING = 0.3
+"""Weight of the newest time in the running one."""
+PATIENCE = 6
+"""Pictures between two changes."""
+HEADROOM = 0.55
+"""More is drawn only when less than this share of the budget is used."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How much is drawn."""
+
+    smooth: bool
+    """Strokes have soft edges."""
+    scale: float
+    """Pixels drawn over pixels shown, along an edge."""
+    share: float
+    """Of the hairs asked for."""
+
+
+LEVELS = (
+    Quality(True, 1.0, 1.0),
+    Quality(False, 1.0, 1.0),
+    Quality(False, 0.8, 1.0),
+    Quality(False, 0.65, 1.0),
+    Quality(False, 0.65, 0.6),
+    Quality(False, 0.5, 0.4),
+    Quality(False, 0.5, 0.2),
+)
+"""From the best to the fastest."""
+
+
+@dataclass
+class Budget:
+    """Chooses a level by the time that pictures take."""
+
+    seconds: float = 1 / 20
+    """A picture may take so long, simulation included; 0 always draws the best."""
+    level: int = 1
+    taken: float = 0.0
+    """Running time of a picture, seconds."""
+    _wait: int = PATIENCE
+
+    @property
+    def quality(self) -> Quality:
+        """What to draw now."""
+        return LEVELS[0] if self.seconds <= 0 else LEVELS[self.level]
+
+    def spent(self, seconds: float) -> None:
+        """Take note of how long a picture took."""
+        self.taken += SMOOTHING * (seconds - self.taken) if self.taken else seconds
+        self._wait -= 1
+        if self._wait > 0 or self.seconds <= 0:
+            return
+        if self.taken > self.seconds and self.level < len(LEVELS) - 1:
+            self._change(1)
+        elif self.taken < HEADROOM * self.seconds and self.level > 0:
+            self._change(-1)
+
+    def _change(self, step: int) -> None:
+        self.level += step
+        self._wait = PATIENCE if step > 0 else 4 * PATIENCE  # slow to rise: no flicker

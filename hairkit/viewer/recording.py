@@ -1,0 +1,64 @@
+"""Keeps pictures: single PNG files, numbered PNG files, MP4."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.stored import UInt8Array, write_bytes
+
+FRAMES_PER_SECOND = 30
+
+
+def write_png(path: Path, picture: UInt8Array) -> None:
+    """Write a picture (H, W, 3) RGB, atomically."""
+    done, data = cv2.imencode(".png", np.ascontiguousarray(picture[..., ::-1]))
+    if not done:
+        raise InputError(f"{path}: the picture of {picture.shape[:2]} cannot be encoded")
+    write_bytes(path, data.tobytes(), durable=False)
+
+
+class Recorder:
+    """Takes one picture after the other; `close` ends the recording."""
+
+    def __init__(self, path: Path) -> None:
+        """Record into `path`: an .mp4 file, or a folder for `0000.png`, `0001.png`, ..."""
+        self.path = path
+        self.count = 0
+        self._video: cv2.VideoWriter | None = None
+        self._size = (0, 0)
+        if path.suffix and path.suffix.lower() != ".mp4":
+            raise InputError(f"{path}: recordings are .mp4 files or folders of PNG files")
+        self._is_video = path.suffix.lower() == ".mp4"
+        if not self._is_video:
+            path.mkdir(parents=True, exist_ok=True)
+
+    def add(self, picture: UInt8Array) -> None:
+        """Take a picture (H, W, 3) RGB; all must have the size of the first one."""
+        if self._is_video:
+            self._add_to_video(picture)
+        else:
+            write_png(self.path / f"{self.count:04d}.png", picture)
+        self.count += 1
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._video is not None:
+            self._video.release()
+            self._video = None
+
+    def _add_to_video(self, picture: UInt8Array) -> None:
+        even = picture[: picture.shape[0] // 2 * 2, : picture.shape[1] // 2 * 2]
+        size = (even.shape[1], even.shape[0])
+        if self._video is None:
+            code = cv2.VideoWriter.fourcc(*"mp4v")
+            self._video = cv2.VideoWriter(str(self.path), code, FRAMES_PER_SECOND, size)
+            self._size = size
+            if not self._video.isOpened():
+                raise InputError(f"{self.path}: OpenCV cannot write MP4 here; record into a folder")
+        if size != self._size:
+            even = np.asarray(cv2.resize(even, self._size, interpolation=cv2.INTER_AREA), np.uint8)
+        self._video.write(np.ascontiguousarray(even[..., ::-1]))

@@ -1,0 +1,47 @@
+"""Meshes that stay on the GPU: the head with its skin, the hull as clay."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from hairkit.camera import Camera
+from hairkit.render.context import Renderer
+from hairkit.render.head import Solid
+from hairkit.render.projection import DepthRange, set_camera, set_uniforms
+
+
+class SolidPass:
+    """One shaded mesh on the GPU."""
+
+    def __init__(self, gl: Renderer, solid: Solid) -> None:
+        self._gl = gl
+        self.solid = solid
+        self._program = gl.program("skin")
+        values = np.concatenate([solid.vertices, solid.normals, solid.colours], axis=1)
+        self._vertices = gl.context.buffer(np.ascontiguousarray(values, np.float32))
+        self._faces = gl.context.buffer(np.ascontiguousarray(solid.faces, np.uint32))
+        self._array = gl.context.vertex_array(
+            self._program,
+            [(self._vertices, "3f 3f 3f", "in_position", "in_normal", "in_colour")],
+            index_buffer=self._faces,
+        )
+
+    def draw(self, camera: Camera, depth: DepthRange, push: float, lighting: dict[str, Any]) -> None:
+        """Draw the mesh, its depth `push` metres behind its surface."""
+        set_camera(self._program, camera, depth)
+        set_uniforms(
+            self._program,
+            u_push_m=push,
+            u_eye=tuple(camera.position.tolist()),
+            u_scatter=self.solid.scatter,
+            **lighting,
+        )
+        self._array.render(moderngl.TRIANGLES)
+
+    def release(self) -> None:
+        """Free the buffers."""
+        for part in (self._array, self._vertices, self._faces):
+            part.release()

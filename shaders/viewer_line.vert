@@ -1,0 +1,14 @@
+#version 430
+
+uniform mat4 u_clip_from_head;
+uniform float u_pull;       // moves lines this share of the depth range towards the camera
+
+in vec3 in_position;
+in vec4 in_colour;
+out vec4 v_colour;
+
+void main() {
+    gl_Position = u_clip_from_head * vec4(in_position, 1.0);
+    gl_Position.z -= u_pull * gl_Position.w;
+    v_colour = in_colour;
+}
