@@ -6,6 +6,7 @@ import subprocess
 import tempfile
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 VARIABLE = "HAIRKIT_PYTHON"
 """Environment variable that names hairkit's Python where the preferences do not."""
@@ -13,6 +14,14 @@ VARIABLE = "HAIRKIT_PYTHON"
 
 class ChildError(Exception):
     """hairkit is not there or has failed; the text is one line for the user."""
+
+
+class Answer(NamedTuple):
+    """What a run of hairkit that went well has said."""
+
+    output: str
+    warnings: list
+    """One line each."""
 
 
 class Child:
@@ -43,13 +52,15 @@ class Child:
         return self._process.poll() is not None
 
     def result(self):
-        """Wait for the end and return what it printed; `ChildError` when it failed."""
+        """Wait for the end and return its `Answer`; `ChildError` when it failed."""
         code = self._process.wait()
-        output, said = _text(self._output), self.last_line()
+        output, said, last = _text(self._output), _text(self._said), self.last_line()
         self.close()
         if code:
-            raise ChildError(_reason(said, code))
-        return output
+            raise ChildError(_reason(last, code))
+        mark = "hairkit: WARNING: "
+        warnings = [line.partition(mark)[2] for line in said.splitlines() if mark in line]
+        return Answer(output, warnings)
 
     def last_line(self):
         """Return the last line of what it has said so far about its progress."""
@@ -69,7 +80,7 @@ class Child:
 
 
 def run(command, limit=600.0):
-    """Return what a command prints; `ChildError` when it fails or takes more than `limit` s."""
+    """Return the `Answer` of a command; `ChildError` when it fails or takes more than `limit` s."""
     child, end = Child(command), time.monotonic() + limit
     while not child.over():
         if time.monotonic() > end:

@@ -22,9 +22,24 @@ class ImportGroom(bpy.types.Operator, ImportHelper):
     bl_label = "Import groom"
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
-    settings: bpy.props.StringProperty(
-        name="Settings",
-        description="Options of the format's importer, as: axis=z_up_metres scale=0.01",
+    hairs: bpy.props.IntProperty(
+        name="Hairs",
+        description="Strands in all, interpolated between the guides; 0: those of the file",
+        default=0,
+        min=0,
+        max=2_000_000,
+    )
+    up: bpy.props.EnumProperty(
+        name="Up",
+        description="Axis that points up in a file that does not say so",
+        items=[("FILE", "As the format has it", ""), ("y", "Y", ""), ("z", "Z", "")],
+    )
+    scale: bpy.props.FloatProperty(
+        name="Metres per unit",
+        description="Of a file that does not say so; 0: as the format has it",
+        default=0.0,
+        min=0.0,
+        precision=5,
     )
     filter_glob: bpy.props.StringProperty(
         default="*.npz;*.apx;*.abc;*.usd;*.usda;*.usdc;*.glb;*.hair;*.tfx;*.data;*.ply;*.obj",
@@ -35,13 +50,30 @@ class ImportGroom(bpy.types.Operator, ImportHelper):
         """Add head and hair to the scene."""
         source = Path(bpy.path.abspath(self.filepath))
         try:
-            groom = _read(source, self.settings.split())
+            groom = self._read(source)
         except (child.ChildError, GroomError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         add_groom(context, groom, source.stem)
         self.report({"INFO"}, f"{len(groom.offsets) - 1} strands")
         return {"FINISHED"}
+
+    def _read(self, source):
+        """Return the groom in a file; hairkit's own file needs no hairkit."""
+        words = self._words()
+        if source.suffix.lower() == ".npz" and not words:
+            return read_groom(source)
+        with tempfile.TemporaryDirectory() as folder:
+            target = str(Path(folder) / "groom.npz")
+            command = [*child.hairkit(chosen_python()), "convert", str(source), target, *words]
+            for warning in child.run(command).warnings:
+                self.report({"WARNING"}, warning)
+            return read_groom(target)
+
+    def _words(self):
+        words = ["--up", self.up] if self.up != "FILE" else []
+        words += ["--scale", f"{self.scale:.9g}"] if self.scale > 0 else []
+        return words + (["--set", f"writer.hairs={self.hairs}"] if self.hairs else [])
 
 
 class Reconstruct(bpy.types.Operator):
@@ -107,7 +139,7 @@ class Reconstruct(bpy.types.Operator):
 
     def _finish(self, context):
         try:
-            made = json.loads(self._run.result())
+            made = json.loads(self._run.result().output)
             groom = read_groom(made["groom"])
         except (child.ChildError, GroomError, ValueError, KeyError) as error:
             self.report({"ERROR"}, str(error))
@@ -125,15 +157,3 @@ def _beside(photos):
     """Return the work folder of a folder of photos: `anna` gets `anna-hairkit`."""
     photos = Path(os.path.normpath(photos))
     return photos.parent / f"{photos.name}-hairkit"
-
-
-def _read(source, settings):
-    """Return the groom in a file of any format that hairkit reads."""
-    if source.suffix.lower() == ".npz":
-        return read_groom(source)
-    with tempfile.TemporaryDirectory() as folder:
-        target = Path(folder) / "groom.npz"
-        words = [word for text in settings for word in ("--set", text)]
-        command = child.hairkit(chosen_python())
-        child.run([*command, "convert", str(source), str(target), *words])
-        return read_groom(target)

@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from blender_session import BlenderSession, blender_python, only, z_up
+from client_groom import read_back, written
 
 from hairkit.capture_reader import sample_folder
 from hairkit.groom import Groom
 from hairkit.groom_file import read_groom, write_groom
+from hairkit.manager import Manager
 
 ADDON = Path(__file__).parents[2] / "examples" / "hairkit-blender"
 FIND_TOOL = "import bpy; print(bpy.utils.resource_path('LOCAL'))"
@@ -120,6 +122,36 @@ def test_what_hairkit_refuses_is_passed_on(addon: BlenderSession, tmp_path: Path
     )
     assert line.startswith("Error: hairkit: ")
     assert "\n" not in line
+
+
+@pytest.mark.parametrize("ending", [".abc", ".apx", ".usdc"])
+def test_any_file_that_hairkit_reads_is_imported(
+    addon: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path, ending: str
+) -> None:
+    """What arrives from another format is what hairkit reads from it, at the same places."""
+    path = written(manager, groom, tmp_path / f"hair{ending}")
+    things = addon.call("addon.imported", path=path, python=sys.executable)
+    wanted = read_back(manager, path).strands.points
+    np.testing.assert_allclose(only(things, "CURVES")["positions"], z_up(wanted), atol=1e-7)
+
+
+def test_a_file_that_says_no_unit_is_told_it(
+    addon: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path
+) -> None:
+    """Axis and unit that the user gives bring a bare file to its place."""
+    path = written(manager, groom, tmp_path / "hair.obj", axis="z_up_centimetres")
+    told = {"up": "z", "scale": 0.01}
+    things = addon.call("addon.imported", path=path, python=sys.executable, **told)
+    found = only(things, "CURVES")["positions"]
+    np.testing.assert_allclose(found, z_up(groom.strands.points), atol=1e-6)
+
+
+def test_hair_is_interpolated_on_demand(addon: BlenderSession, stored: Path) -> None:
+    """With a number of hairs there are so many, and all of them have a radius."""
+    things = addon.call("addon.imported", path=stored, python=sys.executable, hairs=300)
+    hair = only(things, "CURVES")
+    assert len(hair["offsets"]) == 301
+    assert (hair["attributes"]["radius"] > 0).all()
 
 
 def test_a_folder_of_photos_becomes_hair(addon: BlenderSession, tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """Hair curves made in Blender and written by its own exporters."""
 
-import time
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -13,22 +11,6 @@ def hair(path: str, points: Any, counts: list, radius: Any) -> None:
     """Write hair curves, Catmull-Rom as Blender's hair is, with the exporter of the ending."""
     _add_hair(np.asarray(points, np.float32), counts, np.asarray(radius, np.float32))
     _export(path)
-
-
-def seconds(path: str, arrays: str, rounds: int) -> list:
-    """Return how long each export of the strands in an npz file took; only the export counts.
-
-    The file holds `points` (P, 3), Z up, `counts` (S,) and `radius` (P,).
-    """
-    with np.load(arrays) as stored:
-        _add_hair(stored["points"], stored["counts"].tolist(), stored["radius"])
-    took = []
-    for _ in range(rounds):
-        Path(path).unlink(missing_ok=True)
-        began = time.perf_counter()
-        _export(path)
-        took.append(time.perf_counter() - began)
-    return took
 
 
 def _add_hair(points: np.ndarray, counts: list, radius: np.ndarray) -> None:
