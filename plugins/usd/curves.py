@@ -51,7 +51,9 @@ def _add_primvars(primvars: Any, groom: Groom) -> None:
     from pxr import Sdf, UsdGeom, Vt
 
     strands, types = groom.strands, Sdf.ValueTypeNames
-    assert strands.root_uv is not None and strands.group is not None and strands.guide is not None
+    assert strands.root_uv is not None
+    assert strands.group is not None
+    assert strands.guide is not None
     colours = Vt.Vec3fArray.FromNumpy(point_colours(groom))
     uv = Vt.Vec2fArray.FromNumpy(strands.root_uv)
     uniform, vertex = UsdGeom.Tokens.uniform, UsdGeom.Tokens.vertex

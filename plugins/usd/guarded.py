@@ -21,7 +21,7 @@ from .stage import MISSING
 
 MAX_BYTES = 2 * 2**30
 """Files larger than this are refused."""
-SECONDS = 60.0
+SECONDS = 30.0
 """Time for reading, and one second on top for every megabyte."""
 _PROGRAM = Path(__file__).with_name("reading_child.py")
 
@@ -55,7 +55,7 @@ def contents(path: Path) -> Contents:
         raise InputError(f"{path}: {size} bytes, hairkit reads up to {MAX_BYTES}")
     with tempfile.TemporaryDirectory(prefix="hairkit-usd-") as folder:
         archive = Path(folder) / "contents.npz"
-        answer = _run(path, archive, SECONDS + size / 1e6)
+        answer = run(path, archive, SECONDS + size / 1e6)
         if "error" in answer:
             kind = InputError if answer.get("kind") == "refused" else FormatError
             start = f"{path}: " if kind is InputError else f"{path}: not a readable USD file: "
@@ -65,7 +65,7 @@ def contents(path: Path) -> Contents:
     return Contents(arrays, description)
 
 
-def _run(path: Path, archive: Path, seconds: float) -> dict[str, Any]:
+def run(path: Path, archive: Path, seconds: float) -> dict[str, Any]:
     """Return the program's answer; raises `FormatError` when it crashed or took too long."""
     command = [sys.executable, "-P", str(_PROGRAM), str(path.resolve()), str(archive)]
     try:

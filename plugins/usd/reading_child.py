@@ -35,7 +35,7 @@ CURVE_PRIMVARS = (
 _INTERPOLATIONS = ("constant", "uniform", "varying", "vertex", "faceVarying")
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """The file is whole, but not read."""
 
 
@@ -43,21 +43,26 @@ def main() -> None:
     """Read the file named first and write the archive named second."""
     source, target = sys.argv[1:]
     _limit_memory(os.path.getsize(source))
-    answer: dict[str, str] = {}
+    print(json.dumps(answered(source, target)), flush=True)
+    os._exit(0)  # nothing of the library's is needed any more, least of all its destructors
+
+
+def answered(source: str, target: str) -> dict[str, str]:
+    """Write the archive; return nothing, or the `error` and its `kind`."""
     from pxr import Tf
 
+    save: Any = np.savez  # whose stubs take names of arrays for options
     try:
-        np.savez(target, **extracted(source))
-    except Refused as error:
-        answer = {"kind": "refused", "error": str(error)}
+        save(target, **extracted(source))
+    except RefusedError as error:
+        return {"kind": "refused", "error": str(error)}
     except Tf.ErrorException as error:
-        answer = {"kind": "damaged", "error": _first_reason(str(error))}
+        return {"kind": "damaged", "error": _first_reason(error)}
     except MemoryError:
-        answer = {"kind": "damaged", "error": "it unpacks to more memory than is allowed"}
+        return {"kind": "damaged", "error": "it unpacks to more memory than is allowed"}
     except (ValueError, TypeError, OverflowError, RuntimeError, RecursionError) as error:
-        answer = {"kind": "damaged", "error": " ".join(str(error).split())[:200]}
-    print(json.dumps(answer), flush=True)
-    os._exit(0)  # nothing of the library's is needed any more, least of all its destructors
+        return {"kind": "damaged", "error": " ".join(str(error).split())[:200]}
+    return {}
 
 
 def extracted(source: str) -> dict[str, npt.NDArray[Any]]:
@@ -73,7 +78,7 @@ def extracted(source: str) -> dict[str, npt.NDArray[Any]]:
     prims = Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())
     for number, prim in enumerate(prims):
         if number >= MAX_PRIMS:
-            raise Refused(f"it has more than {MAX_PRIMS} prims")
+            raise RefusedError(f"it has more than {MAX_PRIMS} prims")
         if prim.IsA(UsdGeom.BasisCurves):
             taken.curves.append(taken.points(prim, "c", CURVE_PRIMVARS))
         elif prim.IsA(UsdGeom.Mesh) and prim.HasAttribute("primvars:hairkit:scalp"):
@@ -140,7 +145,7 @@ class _Taken:
             return
         self.total += len(array) if array.ndim else 1
         if self.total > MAX_POINTS * 8:
-            raise Refused(f"it has more than {MAX_POINTS} points")
+            raise RefusedError(f"it has more than {MAX_POINTS} points")
         self.arrays[name] = array
 
     def take_joints(self, prim: Any) -> None:
@@ -159,7 +164,9 @@ def _refuse_other_files(layer: Any) -> None:
 
     others = sorted(filter(None, layer.GetCompositionAssetDependencies()))
     if others:
-        raise Refused(f"it refers to another file ({others[0]}); flatten it first: usdcat --flatten")
+        raise RefusedError(
+            f"it refers to another file ({others[0]}); flatten it first: usdcat --flatten"
+        )
     clips: list[str] = []
 
     def look(path: Any) -> None:
@@ -169,7 +176,7 @@ def _refuse_other_files(layer: Any) -> None:
 
     layer.Traverse(Sdf.Path.absoluteRootPath, look)
     if clips:
-        raise Refused(f"it has value clips in other files (at {clips[0]}); flatten it first")
+        raise RefusedError(f"it has value clips in other files (at {clips[0]}); flatten it first")
 
 
 def _time_of(attribute: Any) -> tuple[Any, int]:
@@ -217,10 +224,15 @@ def _plain(value: Any, depth: int) -> Any:
     return array.tolist() if array.dtype.kind in "iuf" else None
 
 
-def _first_reason(text: str) -> str:
+def _first_reason(error: Exception) -> str:
     """Return what the library says, without its functions and files."""
+    try:
+        text = str(error)
+    except UnicodeDecodeError as broken:  # the library quotes the damaged bytes
+        text = broken.object.decode("utf-8", "replace")
     found = re.search(r": '(.*?)'?\s*(?:\n|$)", text)
-    return " ".join((found.group(1) if found else text).split())[:200]
+    words = re.sub(r"pxrInternal\w*::", "", found.group(1) if found else text)
+    return " ".join(words.split())[:200]
 
 
 def _limit_memory(size: int) -> None:

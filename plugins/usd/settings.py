@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.errors import FormatError, InputError
+from hairkit.errors import FormatError
 from hairkit.groom import Groom, HairMaterial, HairPhysics
 from hairkit.head import Capsules
 
@@ -88,5 +88,5 @@ def _made(kind: type[_T], found: Any, source: object) -> _T | None:
             values[field.name] = array if array.ndim else float(array)
     try:
         return kind(**values)
-    except (InputError, TypeError) as error:
+    except (ValueError, TypeError) as error:
         raise FormatError(f"{source}: {error}") from error

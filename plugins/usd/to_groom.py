@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.errors import FormatError, InputError
 from hairkit.file_space import FileSpace
 from hairkit.groom import Groom, HairMaterial
-from hairkit.head import Head
 from hairkit.importing import ImportOptions, adopt, packed, rows_kept
 from hairkit.stored import Float32Array, Int32Array, Int64Array
 from hairkit.strands import Strands
@@ -133,7 +131,7 @@ class _Values:
     ) -> None:
         self.found, self.told, self.counts, self.where = found, told, counts, where
 
-    def of_points(self, name: str, columns: int = 1) -> Float32Array | None:
+    def of_points(self, name: str, columns: int = 1) -> Any:
         """Return (P,) or (P, columns) float32, or None where there is no such value."""
         array, interpolation = self._array(name, columns)
         points, strands = int(self.counts.sum()), len(self.counts)
