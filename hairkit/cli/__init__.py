@@ -32,6 +32,7 @@ VERBS = {
     "render": "draw a groom on its head",
     "export": "write a groom in an engine's format",
     "convert": "read hair of one format, write another",
+    "simulate": "simulate a groom, its head shaken and in wind",
     "info": "say what a file holds",
     "plugins": "list the plugins, or tell about one",
     "new-plugin": "start a plugin of your own",

@@ -6,5 +6,19 @@ The methods are plugins: `manager.call("make_simulator", "pbd", groom=groom)` re
 from __future__ import annotations
 
 from hairkit.simulate.contract import Grab, Measures, Simulator, Surroundings
+from hairkit.simulate.motion import HeadMotion, Shake, read_motion, shaken, still
+from hairkit.simulate.running import Weather, run
 
-__all__ = ["Grab", "Measures", "Simulator", "Surroundings"]
+__all__ = [
+    "Grab",
+    "HeadMotion",
+    "Measures",
+    "Shake",
+    "Simulator",
+    "Surroundings",
+    "Weather",
+    "read_motion",
+    "run",
+    "shaken",
+    "still",
+]

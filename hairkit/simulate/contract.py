@@ -70,6 +70,11 @@ class Simulator(Protocol):
         ...
 
     @property
+    def options(self) -> Any:
+        """The plugin's options in force: those that were None are resolved by the groom."""
+        ...
+
+    @property
     def time(self) -> float:
         """Seconds since the start or the last reset."""
         ...

@@ -1,0 +1,162 @@
+"""`hairkit simulate GROOM -o cache.npz`: shake and blow the guides, without a window."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairkit.errors import InputError, OptionError
+from hairkit.stored import Float64Array
+
+_DESCRIPTION = """\
+Example: hairkit simulate out/groom.npz -o cache.npz --shake yaw:20:1.5 --wind 3,0,1
+
+Simulate a groom's guides and write a point cache (.npz), or with --using's exporter a file of
+another ending with the animation in it: -o hair.abc. The captured hair is at rest at the start.
+Shakes are AXIS:DEGREES:HERTZ[:SECONDS] with yaw, pitch or roll; several go together."""
+
+SIMULATOR = "pbd"
+MOST_FRAMES = 100_000
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "simulate", help="simulate a groom's guides", description=_DESCRIPTION
+    )
+    add = parser.add_argument
+    add("groom", metavar="GROOM", type=Path, help="groom.npz, or a file that a plugin imports")
+    add("-o", "--out", required=True, type=Path, metavar="FILE", help="cache.npz, or hair.abc, ...")
+    add("--frames", type=int, default=120, metavar="N", help="frames to write (120)")
+    add("--fps", type=float, default=60.0, metavar="N", help="frames per second (60)")
+    add("--warm-up", type=float, default=0.0, metavar="S", help="seconds before the first frame")
+    add("--shake", action="append", default=[], metavar="A:D:H", help="as yaw:20:1.5")
+    add("--motion", type=Path, metavar="FILE", help="head motion: .json, or an animated .glb")
+    add("--wind", default="0,0,0", metavar="X,Y,Z", help="metres per second (0,0,0)")
+    add("--turbulence", type=float, default=0.0, metavar="T", help="gusts over the wind (0)")
+    add("--gravity", type=float, metavar="G", help="m/s^2 downwards; the groom's by default")
+    add("--set", action="append", default=[], metavar="X=V", help="option=V of the simulator")
+    add("--using", default=SIMULATOR, metavar="NAME", help=f"simulator plugin ({SIMULATOR})")
+    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+    add("--quiet", action="store_true", help="no progress")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate, write the cache or the animated file, and print its name."""
+    from hairkit.cli.export import plugin_for
+    from hairkit.manager import Manager
+    from hairkit.progress import progress_for
+    from hairkit.simulate import Weather, read_motion, shaken, still
+    from hairkit.simulate import run as simulated
+
+    _check(args)
+    manager = Manager.loaded(args.plugin)
+    options, others = _settings(manager, args.using, args.set)
+    exporter = None
+    if args.out.suffix.lower() != ".npz":
+        exporter = plugin_for(manager, "export_groom", args.out)
+    _refuse_unknown(others, exporter)
+    weather = Weather(_vector("--wind", args.wind), args.turbulence, _gravity(args.gravity))
+    groom = _read(manager, args.groom)
+    motion = still() if args.motion is None else read_motion(args.motion)
+    motion = shaken(args.shake, groom.head, motion)
+    simulator = manager.call("make_simulator", args.using, options, groom=groom)
+    with progress_for(sys.stderr, quiet=args.quiet) as progress:
+        cache = simulated(
+            simulator, motion, args.frames, args.fps,
+            weather=weather, warm_up=args.warm_up, progress=progress,
+        )  # fmt: skip
+    if exporter is None:
+        cache.save(args.out)
+    else:
+        _export(manager, exporter, others.get(exporter, {}), groom, cache, args.out)
+    stretch = simulator.measure().stretch
+    print(
+        f"{args.out.name}: {len(cache)} frames of {len(simulator.strands)} guides,"
+        f" stretch {100 * stretch:.2f} % at the end",
+        file=sys.stderr,
+    )
+    print(args.out)
+    return 0
+
+
+def _check(args: argparse.Namespace) -> None:
+    if not 1 <= args.frames <= MOST_FRAMES:
+        raise InputError(f"--frames is {args.frames}, expected 1 to {MOST_FRAMES}")
+    if not (math.isfinite(args.fps) and 0.1 <= args.fps <= 10_000):
+        raise InputError(f"--fps is {args.fps}, expected 0.1 to 10000 frames per second")
+    if not 0 <= args.warm_up <= 3600:
+        raise InputError(f"--warm-up is {args.warm_up}, expected 0 to 3600 seconds")
+    if not 0 <= args.turbulence <= 10:
+        raise InputError(f"--turbulence is {args.turbulence}, expected 0 to 10 times the wind")
+    if not args.out.parent.is_dir():
+        raise InputError(f"{args.out.parent}: no such folder; make it first")
+
+
+def _vector(name: str, text: str) -> Float64Array:
+    try:
+        vector = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        vector = np.zeros(0)
+    if vector.shape != (3,) or not np.isfinite(vector).all() or np.abs(vector).max() > 200:
+        raise InputError(f"{name} is {text!r}, expected X,Y,Z up to 200, as 3,0,1")
+    return vector
+
+
+def _gravity(down: float | None) -> Float64Array | None:
+    if down is None:
+        return None
+    if not (math.isfinite(down) and abs(down) <= 1000):
+        raise InputError(f"--gravity is {down}, expected metres per second squared")
+    return np.array([0.0, -down, 0.0])
+
+
+def _read(manager: Any, source: Path) -> Any:
+    from hairkit.cli.export import plugin_for
+    from hairkit.groom_file import read_groom
+
+    if source.suffix == ".npz" or not source.exists():
+        return read_groom(source)
+    return manager.call("import_groom", plugin_for(manager, "import_groom", source), path=source)
+
+
+def _settings(
+    manager: Any, simulator: str, assignments: list[str]
+) -> tuple[Any, dict[str, dict[str, object]]]:
+    """Take `option=value` and `plugin.option=value` apart: the simulator's, and other plugins'."""
+    values: dict[str, dict[str, object]] = {simulator: {}}
+    for text in assignments:
+        target, equals, value = (part.strip() for part in text.partition("="))
+        plugin, dot, name = target.rpartition(".")
+        if not equals or not name or (dot and not plugin):
+            raise OptionError(f"--set {text}: expected option=value or plugin.option=value")
+        values.setdefault(plugin or simulator, {})[name] = value
+    manager.implementer("make_simulator", simulator)
+    return manager.options(simulator, values.pop(simulator)), values
+
+
+def _refuse_unknown(others: dict[str, dict[str, object]], exporter: str | None) -> None:
+    for plugin in others:
+        if plugin != exporter:
+            known = "the simulator's options" if exporter is None else f"those or {exporter}'s"
+            raise OptionError(f"--set {plugin}.{next(iter(others[plugin]))}: expected {known}")
+
+
+def _export(
+    manager: Any, exporter: str, values: dict[str, object], groom: Any, cache: Any, path: Path
+) -> None:
+    """Write the animated file; its exporter reads the frames from a cache that goes away again."""
+    known = {info.name for info in manager.info(exporter).options}
+    if "cache" not in known:
+        raise InputError(f"{path}: {exporter} writes no animation; write a cache .npz or .abc")
+    with tempfile.TemporaryDirectory(prefix="hairkit-") as folder:
+        frames = Path(folder) / "cache.npz"
+        cache.save(frames)
+        options = manager.options(exporter, values | {"cache": frames})
+        manager.call("export_groom", exporter, options, groom=groom, path=path)

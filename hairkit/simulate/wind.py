@@ -1,0 +1,66 @@
+"""Wind with gusts: a mean, and turbulence as a function of place and time."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from hairkit.stored import Float64Array
+
+MODES = 16
+"""Waves that the gusts are made of."""
+LONGEST, SHORTEST = 0.8, 0.08
+"""Wavelengths of the gusts, metres: from a head's height to a lock's."""
+LIFETIME = 0.5
+"""How fast a gust changes while it is carried along: turns of phase per second, of the longest."""
+
+
+def air_velocity(
+    points: Float64Array, time: float, wind: Float64Array, turbulence: float, seed: int = 0
+) -> Float64Array:
+    """Return the velocity of the air (N, 3) at points (N, 3) in the world, metres per second.
+
+    The gusts are a sum of plane waves whose amplitudes are square to their wave vectors, so that
+    they are free of divergence (Kraichnan 1970), with an energy that falls as Kolmogorov's spectrum
+    does; they are carried along by the mean wind (Taylor's hypothesis) and change slowly. The root
+    mean square of a component is `turbulence` times the mean wind over the square root of three.
+
+    Parameters
+    ----------
+    points
+        Where, world, metres.
+    time
+        When, seconds.
+    wind
+        (3,) mean velocity.
+    turbulence
+        Root mean square of the gusts as a share of the mean wind's speed.
+    seed
+        Of the gusts; equal seeds give equal gusts.
+    """
+    speed = float(np.linalg.norm(wind))
+    mean = np.broadcast_to(wind, points.shape)
+    if turbulence == 0.0 or speed == 0.0:
+        return mean.astype(np.float64)
+    waves, amplitudes, rates, phases = _modes(seed)
+    angle = points @ waves.T + (phases - (waves @ wind + rates) * time)
+    result: Float64Array = mean + turbulence * speed * (np.cos(angle) @ amplitudes)
+    return result
+
+
+@lru_cache(maxsize=8)
+def _modes(seed: int) -> tuple[Float64Array, Float64Array, Float64Array, Float64Array]:
+    """Wave vectors (M, 3), amplitudes (M, 3) of mean square 1, rates (M,) and phases (M,)."""
+    rng = np.random.default_rng(seed)
+    length = LONGEST * (SHORTEST / LONGEST) ** (np.arange(MODES) / (MODES - 1))
+    direction = rng.normal(size=(MODES, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    waves = direction * (2 * np.pi / length)[:, None]
+    across = np.cross(direction, rng.normal(size=(MODES, 3)))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    # energy k^(-5/3) over wave numbers evenly spaced in log k: amplitude k^(-1/3)
+    size = length ** (1.0 / 3.0)
+    size *= np.sqrt(2.0 / (size**2).sum())
+    rates = 2 * np.pi * LIFETIME * (LONGEST / length) ** (2.0 / 3.0) * rng.uniform(0.5, 1.0, MODES)
+    return waves, across * size[:, None], rates, rng.uniform(0, 2 * np.pi, MODES)

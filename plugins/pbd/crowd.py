@@ -1,0 +1,95 @@
+"""Hair among hair: density and velocity of all nodes on a grid around the head.
+
+Nodes are spread to a grid in the head frame and read back (Petrovic, Henne and Anderson 2005;
+particle-in-cell): velocities are drawn to those of the neighbours, which is friction between hairs,
+and where hair is denser than it was when captured, nodes are pushed to thinner places. At rest the
+grid has no say: nothing moves, and nothing is denser than captured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit.stored import Float64Array, Int64Array
+
+SPACING = 0.015
+"""Metres between the grid's values: some distances between guides."""
+ROOM = 0.15
+"""How far the grid goes beyond the captured hair, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crowd:
+    """The grid and what it held at rest."""
+
+    origin: Float64Array
+    """(3,) place of the first value, head frame."""
+    shape: tuple[int, int, int]
+    density: Float64Array
+    """(C,) kilograms a value at rest."""
+
+    def velocities(
+        self,
+        position: Float64Array,
+        velocity: Float64Array,
+        mass: Float64Array,
+        cohesion: float,
+        pressure: float,
+        seconds: float,
+    ) -> Float64Array:
+        """Return velocities (N, 3) after `seconds` among each other.
+
+        Parameters
+        ----------
+        position, velocity, mass
+            (N, 3), (N, 3) relative to the head, and (N,) of the nodes.
+        cohesion
+            1/s, at which a node takes on its neighbours' velocity.
+        pressure
+            m/s^2 of push at twice the captured density, over one cell's distance.
+        seconds
+            How long.
+        """
+        corner, weight = self._corners(position)
+        share = weight * mass[:, None]
+        filled = self._summed(corner, share)
+        result = velocity
+        if cohesion > 0:
+            cells = np.stack(
+                [self._summed(corner, share * velocity[:, k, None]) for k in range(3)], axis=-1
+            ) / np.maximum(filled, 1e-30)[:, None]
+            mean = np.einsum("nc,nck->nk", weight, cells[corner])
+            result = velocity + (1 - np.exp(-cohesion * seconds)) * (mean - velocity)
+        if pressure > 0:
+            usual = np.maximum(self.density, 0.25 * self.density.max())
+            crowded = np.maximum(filled - usual, 0.0) / usual
+            slope = np.stack(np.gradient(np.minimum(crowded, 4.0).reshape(self.shape)), axis=-1)
+            push = np.einsum("nc,nck->nk", weight, slope.reshape(-1, 3)[corner])
+            result = result - pressure * seconds * push
+        return result
+
+    def _corners(self, position: Float64Array) -> tuple[Int64Array, Float64Array]:
+        """Numbers (N, 8) of the cells about each node and their weights (N, 8)."""
+        at = (position - self.origin) / SPACING
+        at = np.clip(at, 0.0, np.array(self.shape) - 1.001)
+        low = at.astype(np.int64)
+        t = at - low
+        bits = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)])
+        weight = np.where(bits, t[:, None], 1 - t[:, None]).prod(axis=-1)
+        stride = np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
+        return (low[:, None] + bits) @ stride, weight
+
+    def _summed(self, corner: Int64Array, value: Float64Array) -> Float64Array:
+        return np.bincount(corner.ravel(), value.ravel(), int(np.prod(self.shape)))
+
+
+def crowd_of(position: Float64Array, mass: Float64Array) -> Crowd:
+    """Return the grid of nodes (N, 3) at rest."""
+    origin = position.min(axis=0) - ROOM
+    size = np.ceil((position.max(axis=0) + ROOM - origin) / SPACING).astype(int) + 1
+    shape = (int(size[0]), int(size[1]), int(size[2]))
+    empty = Crowd(origin, shape, np.zeros(int(np.prod(size))))
+    corner, weight = empty._corners(position)
+    return Crowd(origin, shape, empty._summed(corner, weight * mass[:, None]))

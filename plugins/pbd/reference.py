@@ -1,0 +1,239 @@
+"""The reference backend: one substep in plain NumPy float64, in the order of the method.
+
+Everything is in the axes of the moving head, velocities are those in the world: the head's surface,
+the roots and the captured places then stand still, and float32 keeps its digits wherever the head
+goes. The faster backends do the same steps and are held to this one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hairkit.simulate import rotation
+from hairkit.simulate.obstacles import Obstacles
+from hairkit.stored import Float64Array
+
+from .rods import Rods, half_binormal, half_way, shares, shifted, twist_between
+from .system import System
+
+LARGEST_SPIN = 0.3
+"""Radians that torsion may turn a segment in a substep; Newton's step is no good beyond."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Where rods are; head axes."""
+
+    position: Float64Array
+    """(S, n, 3) metres."""
+    velocity: Float64Array
+    """(S, n, 3) m/s in the world."""
+    frames: Float64Array
+    """(S, n - 1, 4) of the segments."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """How nodes meet the obstacles."""
+
+    obstacles: Obstacles
+    clearance: Float64Array
+    """(S, n) metres that a node keeps from them; less where the captured hair is nearer."""
+    friction: float
+    """Coulomb's coefficient."""
+    fastest: float
+    """m/s, at which a node deep inside is brought out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What acts in one substep; head axes at its end."""
+
+    ride: Float64Array
+    """(4, 4) from the head axes before the substep to those after it."""
+    gravity: Float64Array
+    """(3,) m/s^2."""
+    air: Float64Array
+    """(S, n, 3) or (3,) velocity of the air, m/s."""
+    force: Float64Array | None = None
+    """(S, n, 3) further force, newtons."""
+
+
+def at_rest(rods: Rods) -> State:
+    """Return the captured state, without velocity."""
+    return State(rods.points.copy(), np.zeros_like(rods.points), rods.frames.copy())
+
+
+def substep(
+    rods: Rods,
+    system: System,
+    state: State,
+    load: Load,
+    contact: Contact | None = None,
+    iterations: int = 1,
+) -> State:
+    """Return the state one substep later.
+
+    `iterations` linearise the lengths anew about the last solution; the default is enough at the
+    default substeps, since positions and directions are predicted to second order.
+    """
+    h, rates = system.step, system.rates
+    old = carried(state, load.ride, rods, h)
+    predicted = old.position + h * old.velocity
+    edge = np.diff(predicted, axis=1)
+    direction = rotation.unit(edge)
+    frames = swung(old.frames, direction)
+    frames = untwisted(rods, frames)
+    force = elastic_force(rods, edge, frames)
+    # Velocity of a point that rides on the head, in the world: where it is less where it was.
+    riding = (predicted - moved(load.ride, predicted)) / h
+    force += rods.mass[..., None] * (
+        load.gravity
+        + rates.drag[..., None] * (load.air - old.velocity)
+        + rates.damping * (riding - old.velocity)
+        + rates.shape[..., None] * (rods.points - predicted)
+    )
+    if load.force is not None:
+        force += load.force
+    free = system.inverse @ force[:, 1:]
+    change = free
+    for _ in range(iterations):
+        change = free - system.inverse @ _edges_transposed(
+            tension(system, edge + _edges(free), direction, rods.length)[..., None] * direction
+        )
+        direction = rotation.unit(edge + _edges(change))
+    position, velocity = predicted.copy(), old.velocity.copy()
+    position[:, 1:] += change
+    velocity[:, 1:] += change / h
+    new = State(position, velocity, frames)
+    return new if contact is None else collided(new, contact, load.ride, h)
+
+
+def moved(motion: Float64Array, points: Float64Array) -> Float64Array:
+    """Return points (..., 3) under a rigid motion (4, 4)."""
+    result: Float64Array = points @ motion[:3, :3].T + motion[:3, 3]
+    return result
+
+
+def carried(state: State, ride: Float64Array, rods: Rods, step: float) -> State:
+    """Return the same state in the head axes at the substep's end; roots go with the head."""
+    position = moved(ride, state.position)
+    velocity = state.velocity @ ride[:3, :3].T
+    frames = rotation.product(rotation.from_matrix(ride[:3, :3]), state.frames)
+    velocity[:, 0] = (rods.points[:, 0] - position[:, 0]) / step
+    return State(position, velocity, frames)
+
+
+def swung(frames: Float64Array, direction: Float64Array) -> Float64Array:
+    """Return frames transported in time on to new directions, without spin about them."""
+    turn = rotation.swing(rotation.third_axis(frames), direction)
+    return rotation.unit(rotation.product(turn, frames))
+
+
+def untwisted(rods: Rods, frames: Float64Array) -> Float64Array:
+    """Return frames spun about their segments so that torques balance (one Newton step).
+
+    Torsion is far faster than the hair's motion, so that it is always in equilibrium (Bergou et al.
+    2008); the system is tridiagonal.
+    """
+    before = rods.before(frames)
+    torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
+    natural = rotation.rotated(half_way(before, frames), rods.curvature)
+    direction = rotation.third_axis(frames)
+    turn = direction - rotation.third_axis(before)
+    spun = rods.bend[..., None] * np.cross(natural, turn)
+    first, second = shares(before, frames, spun)
+    gradient = torque - shifted(torque) - (direction * (second + shifted(first))).sum(axis=-1)
+    firm = 0.25 * rods.bend * np.maximum((natural * turn).sum(axis=-1), 0.0)
+    diagonal = rods.twist + shifted(rods.twist) + firm + shifted(firm)
+    beside = firm[:, 1:] - rods.twist[:, 1:]
+    angle = _tridiagonal(np.where(diagonal > 0, diagonal, 1.0), beside, -gradient)
+    angle = np.clip(angle, -LARGEST_SPIN, LARGEST_SPIN)
+    # half angles by a rational cosine and sine: exact turns, the angle right to third order
+    turn_by = rotation.unit(
+        np.concatenate([np.ones_like(angle)[..., None], 0.5 * angle[..., None] * direction], -1)
+    )
+    return rotation.product(turn_by, frames)
+
+
+def elastic_force(rods: Rods, edge: Float64Array, frames: Float64Array) -> Float64Array:
+    """Return the force (S, n, 3) of bending and twist on the nodes, minus the energy's slope."""
+    before = rods.before(frames)
+    reach = edge / rods.length[..., None]
+    held = rotation.third_axis(rods.root_frame)[:, None]
+    turn = reach - np.concatenate([held, reach[:, :-1]], axis=1)
+    natural = rotation.rotated(half_way(before, frames), rods.curvature)
+    moment = rods.bend[..., None] * (natural - turn)
+    spun = rods.bend[..., None] * np.cross(natural, turn)
+    torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
+    twisting = torque[..., None] * half_binormal(before, frames)
+    first, second = shares(before, frames, spun)
+    direction = rotation.third_axis(frames)
+    pull = moment - twisting - shifted(moment + twisting)
+    pull += np.cross(second + shifted(first), direction)
+    pull /= rods.length[..., None]
+    force = np.zeros((*edge.shape[:1], edge.shape[1] + 1, 3))
+    force[:, 1:] += pull
+    force[:, :-1] -= pull
+    return force
+
+
+def tension(
+    system: System, edge: Float64Array, direction: Float64Array, length: Float64Array
+) -> Float64Array:
+    """Return the pull (S, n - 1) along the segments that brings them to their lengths, newtons."""
+    excess = (edge * direction).sum(axis=-1) - length
+    matrix = system.metric * (direction @ direction.transpose(0, 2, 1))
+    result: Float64Array = np.linalg.solve(matrix, excess[..., None])[..., 0]
+    return result
+
+
+def collided(state: State, contact: Contact, ride: Float64Array, step: float) -> State:
+    """Return the state with nodes brought out of the obstacles, with Coulomb friction."""
+    shape = state.position.shape
+    distance, normal = contact.obstacles.at(state.position.reshape(-1, 3))
+    distance, normal = distance.reshape(shape[:2]), normal.reshape(shape)
+    depth = contact.clearance - distance
+    depth[:, 0] = 0.0
+    riding = (state.position - moved(ride, state.position)) / step
+    relative = state.velocity - riding
+    inward = np.maximum(-(relative * normal).sum(axis=-1), 0.0)
+    # What came in during this substep goes out again; older depth leaves at a limited speed.
+    out = np.clip(depth, 0.0, (inward + contact.fastest) * step)
+    touching = (depth > 0)[..., None]
+    along = relative - (relative * normal).sum(axis=-1, keepdims=True) * normal
+    speed = np.linalg.norm(along, axis=-1)
+    # Coulomb: the change along is at most the coefficient times the change across.
+    slowed = np.minimum(contact.friction * inward, speed) / np.maximum(speed, 1e-12)
+    brake = -slowed[..., None] * along
+    velocity = state.velocity + touching * (inward[..., None] * normal + brake)
+    position = state.position + touching * (out[..., None] * normal + step * brake)
+    return replace(state, position=position, velocity=velocity)
+
+
+def _edges(change: Float64Array) -> Float64Array:
+    """Change of the segments for a change of the free nodes."""
+    return np.diff(change, axis=1, prepend=np.zeros_like(change[:, :1]))
+
+
+def _edges_transposed(pull: Float64Array) -> Float64Array:
+    """Force on the free nodes of forces on the segments."""
+    return pull - shifted(pull)
+
+
+def _tridiagonal(
+    diagonal: Float64Array, beside: Float64Array, right: Float64Array
+) -> Float64Array:
+    """Solve symmetric tridiagonal systems (S, m) by elimination along the rods (Thomas)."""
+    count = diagonal.shape[1]
+    pivot, value = diagonal.copy(), right.copy()
+    for j in range(1, count):
+        factor = beside[:, j - 1] / pivot[:, j - 1]
+        pivot[:, j] -= factor * beside[:, j - 1]
+        value[:, j] -= factor * value[:, j - 1]
+    value[:, -1] /= pivot[:, -1]
+    for j in range(count - 2, -1, -1):
+        value[:, j] = (value[:, j] - beside[:, j] * value[:, j + 1]) / pivot[:, j]
+    return value

@@ -1,0 +1,217 @@
+"""Rods that carry orientations: the discrete model, its rest state, and inverse statics.
+
+A rod has n nodes and n - 1 segments; each segment carries a frame (a quaternion) whose third axis
+is its direction (Cosserat rods after Kugelstadt and Schoemer 2016; transport in time after Bergou
+et al. 2010). Element i joins segments i - 1 and i; element 0 joins the root frame, which the head
+holds at half a segment's distance, to segment 0. With unit directions d, rest directions c and
+twists t, the energy is
+
+    sum_i bend_i / 2 |(d_i - d_{i-1}) - c_i|^2 + twist_i / 2 (t_i - rest_i)^2,
+
+bend = EI / l and twist = GJ / l in N m: quadratic in the node positions, since segments keep their
+length, so that one banded matrix serves all three coordinates at all times.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import InputError
+from hairkit.simulate import rotation
+from hairkit.stored import Float64Array
+
+SHARPEST = 0.3
+"""1 + the cosine of a turn is not taken as less: beyond 134 degrees twist no longer follows."""
+_ROUNDS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Rods:
+    """S rods of n nodes each, at rest; metres, kilograms, newtons, head frame."""
+
+    points: Float64Array
+    """(S, n, 3) where the nodes are at rest."""
+    mass: Float64Array
+    """(S, n) of the nodes."""
+    length: Float64Array
+    """(S, n - 1) of the segments."""
+    bend: Float64Array
+    """(S, n - 1) bending stiffness of the elements, EI / l; element 0 at 0 is a hinge."""
+    twist: Float64Array
+    """(S, n - 1) torsional stiffness of the elements, GJ / l."""
+    root_frame: Float64Array
+    """(S, 4) what the head holds."""
+    frames: Float64Array
+    """(S, n - 1, 4) of the segments at rest."""
+    curvature: Float64Array
+    """(S, n - 1, 3) natural turn c of each element, in the frame half way."""
+    natural_twist: Float64Array
+    """(S, n - 1) natural twist of each element, radians."""
+
+    @property
+    def nodes(self) -> int:
+        """Nodes of every rod."""
+        return self.points.shape[1]
+
+    def before(self, frames: Float64Array) -> Float64Array:
+        """Return (S, n - 1, 4) the frame before each element: the root's, then the segments'."""
+        return np.concatenate([self.root_frame[:, None], frames[:, :-1]], axis=1)
+
+
+def make_rods(
+    points: npt.ArrayLike,
+    density: npt.ArrayLike,
+    bending: npt.ArrayLike,
+    torsion: npt.ArrayLike | None = None,
+    *,
+    root_direction: npt.ArrayLike | None = None,
+    straight: bool = False,
+) -> Rods:
+    """Return rods whose nodes are at `points`, without load.
+
+    Parameters
+    ----------
+    points
+        (S, n, 3) metres, root first.
+    density
+        Mass per length, kg/m: a number or (S, n - 1) of the segments.
+    bending, torsion
+        EI and GJ, N m^2: numbers or (S, n - 1) of the elements; GJ is EI / 1.3 where None (a round
+        fibre of Poisson's ratio 0.3).
+    root_direction
+        (3,) or (S, 3) direction that the root holds; the first segment's where None.
+    straight
+        True makes the natural shape straight; else it is the shape given.
+    """
+    nodes = np.array(points, np.float64)
+    edge = np.diff(nodes, axis=1)
+    length = np.linalg.norm(edge, axis=-1)
+    if nodes.ndim != 3 or nodes.shape[1] < 3 or not (length > 0).all():
+        raise InputError(f"rods need (S, n, 3) points, n >= 3, none alike; got {nodes.shape}")
+    segments = np.broadcast_to(np.asarray(density, np.float64), length.shape) * length
+    mass = np.zeros(nodes.shape[:2])
+    mass[:, :-1] += segments / 2
+    mass[:, 1:] += segments / 2
+    # an element's length: from middle to middle, the first from the root to its middle
+    span = length / 2
+    span[:, 1:] += length[:, :-1] / 2
+    ei = np.broadcast_to(np.asarray(bending, np.float64), length.shape)
+    gj = ei / 1.3 if torsion is None else np.broadcast_to(torsion, length.shape)
+    direction = edge / length[..., None]
+    held = direction[:, 0] if root_direction is None else np.asarray(root_direction, np.float64)
+    frames = transported(np.broadcast_to(rotation.unit(held), direction[:, 0].shape), direction)
+    rods = Rods(
+        nodes, mass, length, ei / span, gj / span, frames[:, 0], frames[:, 1:],
+        np.zeros_like(nodes[:, 1:]), np.zeros_like(length),
+    )  # fmt: skip
+    return rods if straight else _with_moments(rods, np.zeros_like(direction), 0 * length)
+
+
+def transported(held: Float64Array, direction: Float64Array) -> Float64Array:
+    """Return frames (S, n, 4) without twist: of the root, then of the segments (Bishop 1975)."""
+    first = np.broadcast_to([0.0, 0.0, 1.0], held.shape)
+    frames = [rotation.swing(first, held)]
+    before = held
+    for j in range(direction.shape[1]):
+        turn = rotation.swing(before, direction[:, j])
+        frames.append(rotation.unit(rotation.product(turn, frames[-1])))
+        before = direction[:, j]
+    return np.stack(frames, axis=1)
+
+
+def loaded(rods: Rods, force: npt.ArrayLike) -> Rods:
+    """Return rods that stay where they are under a force (S, n, 3) on their nodes, newtons.
+
+    Inverse statics: from the tip inwards, the moment in each element that balances the load beyond
+    it; the natural shape is what gives this moment at the present shape. Tension carries the part
+    along the rod, so that moments are square to it.
+    """
+    weight = np.broadcast_to(np.asarray(force, np.float64), rods.points.shape)
+    beyond = np.cumsum(weight[:, ::-1], axis=1)[:, ::-1][:, 1:]
+    load = rods.length[..., None] * beyond
+    before = rods.before(rods.frames)
+    direction = rotation.third_axis(rods.frames)
+    turn = direction - rotation.third_axis(before)
+    middle = rotation.third_axis(before) + direction
+    along = (direction * middle).sum(axis=-1, keepdims=True)
+    along = np.where(along > 1e-9, along, np.inf)  # a fold straight back has no middle
+    binormal = half_binormal(before, rods.frames)
+    moment, torque = np.zeros_like(direction), np.zeros_like(rods.length)
+    for _ in range(_ROUNDS * rods.nodes):
+        first, second = shares(before, rods.frames, np.cross(turn, moment))
+        turning = second + shifted(first)
+        twisting = torque[..., None] * binormal
+        total = load + np.cross(turning, direction) - twisting - shifted(twisting)
+        new = total
+        for j in range(direction.shape[1] - 1, -1, -1):
+            if j + 1 < direction.shape[1]:
+                new[:, j] += new[:, j + 1]
+            pull = (new[:, j] * middle[:, j]).sum(axis=-1, keepdims=True) / along[:, j]
+            new[:, j] -= pull * direction[:, j]
+        torsion = np.cumsum((direction * turning).sum(axis=-1)[:, ::-1], axis=1)[:, ::-1]
+        change = np.abs(new - moment).max(initial=0.0) + np.abs(torsion - torque).max(initial=0.0)
+        moment, torque = new, torsion
+        if change <= 1e-15 * np.abs(moment).max(initial=0.0):
+            break
+    return _with_moments(rods, moment, torque)
+
+
+def _with_moments(rods: Rods, moment: Float64Array, torque: Float64Array) -> Rods:
+    """Choose the natural shape so that the elements carry these moments at the present shape."""
+    direction = rotation.third_axis(rods.frames)
+    before = rods.before(rods.frames)
+    turn = direction - rotation.third_axis(before)
+    soft = np.where(rods.bend > 0, rods.bend, np.inf)[..., None]
+    natural = turn - moment / soft
+    middle = half_way(before, rods.frames)
+    twisting = np.where(rods.twist > 0, rods.twist, np.inf)
+    return replace(
+        rods,
+        curvature=rotation.rotated(rotation.inverse(middle), natural),
+        natural_twist=twist_between(before, rods.frames) - torque / twisting,
+    )
+
+
+def half_way(before: Float64Array, after: Float64Array) -> Float64Array:
+    """Return the frames half way between neighbours."""
+    sign = np.where((before * after).sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    return rotation.unit(before + sign * after)
+
+
+def twist_between(before: Float64Array, after: Float64Array) -> Float64Array:
+    """Return the twist about their direction between neighbouring frames, radians."""
+    step = rotation.product(rotation.inverse(before), after)
+    sign = np.where(step[..., 0] < 0, -1.0, 1.0)
+    result: Float64Array = 2.0 * np.arctan2(sign * step[..., 3], sign * step[..., 0])
+    return result
+
+
+def half_binormal(before: Float64Array, after: Float64Array) -> Float64Array:
+    """Return a x b / (1 + a.b) of directions a, b: how twist follows a change of either."""
+    first, second = rotation.third_axis(before), rotation.third_axis(after)
+    cosine = (first * second).sum(axis=-1, keepdims=True)
+    result: Float64Array = np.cross(first, second) / np.maximum(1.0 + cosine, SHARPEST)
+    return result
+
+
+def shares(
+    before: Float64Array, after: Float64Array, torque: Float64Array
+) -> tuple[Float64Array, Float64Array]:
+    """Split a torque on the frames half way into torques on the frames before and after.
+
+    The frame half way turns by half the sum of both turns, and by the tangent of a quarter of the
+    angle between them for their difference.
+    """
+    step = rotation.product(after, rotation.inverse(before))
+    sign = np.where(step[..., :1] < 0, -1.0, 1.0)
+    quarter = sign * step[..., 1:] / (1.0 + sign * step[..., :1])
+    aside = np.cross(quarter, torque)
+    return 0.5 * (torque - aside), 0.5 * (torque + aside)
+
+
+def shifted(values: Float64Array) -> Float64Array:
+    """Return the values of the next element; 0 beyond the tip."""
+    return np.concatenate([values[:, 1:], np.zeros_like(values[:, :1])], axis=1)

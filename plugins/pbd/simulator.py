@@ -1,0 +1,294 @@
+"""The simulator: a groom's guides as rods, options as physics, time in substeps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.exporting import selected
+from hairkit.groom import Groom
+from hairkit.guide_weights import guide_mask
+from hairkit.simulate import Grab, Measures, Surroundings, rotation
+from hairkit.simulate.obstacles import Obstacles, head_obstacles
+from hairkit.simulate.wind import air_velocity
+from hairkit.stored import Float32Array, Float64Array
+from hairkit.strands import Strands
+
+from .crowd import Crowd, crowd_of
+from .energies import elastic_energy, largest_stretch
+from .guides import node_points, riders
+from .reference import Contact, Load, State, at_rest, moved, substep
+from .rods import Rods, loaded, make_rods
+from .system import Rates, System, assemble
+
+if TYPE_CHECKING:
+    from . import Options
+
+FRAME = 1 / 60
+"""Seconds that the option `substeps` counts for; air and other hair are looked at this often."""
+HAIR_DENSITY = 1300.0
+"""kg/m^3 of keratin."""
+SINGLE_HAIR = 1.2e-3
+"""m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""
+_KEPT_SYSTEMS = 4
+
+
+class Backend(Protocol):
+    """Does substeps; the reference is the function of that name."""
+
+    def __call__(
+        self,
+        rods: Rods,
+        system: System,
+        state: State,
+        load: Load,
+        contact: Contact | None = None,
+        iterations: int = 1,
+    ) -> State:
+        """Return the state one substep later."""
+        ...
+
+
+class PbdSimulator:
+    """Simulated guides of a groom (see `hairkit.simulate.Simulator`)."""
+
+    def __init__(self, groom: Groom, options: Options) -> None:
+        guides = selected(groom, guide_mask(groom.strands))
+        self._groom = guides
+        self._obstacles: Obstacles = head_obstacles(guides.head)
+        self._tune(options)
+        self.reset()
+
+    @property
+    def strands(self) -> Strands:
+        """The guides at rest, head frame."""
+        return self._groom.strands
+
+    @property
+    def options(self) -> Options:
+        """The options in force; those that were None are the groom's."""
+        return self._options
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start or the last reset."""
+        return self._time
+
+    @property
+    def rods(self) -> Rods:
+        """The rods that stand for the guides, at rest."""
+        return self._rods
+
+    @property
+    def points(self) -> Float32Array:
+        """(P, 3) present positions in the world, metres, in the order of `strands`."""
+        if self._points is None:
+            local = self._riders.points(self._state.position, self._state.frames)
+            world = moved(self._head, local.astype(np.float64))
+            self._points = world.astype(np.float32)
+            self._points.setflags(write=False)
+        return self._points
+
+    def advance(self, seconds: float, surroundings: Surroundings) -> None:
+        """Go on by `seconds`, in pieces of at most a sixtieth of a second, each in substeps."""
+        if not seconds > 0:
+            return
+        start, end = self._head, surroundings.head_from_rest
+        pieces = max(1, math.ceil(seconds / FRAME - 1e-6))
+        for piece in range(pieces):
+            self._piece(
+                seconds / pieces,
+                surroundings,
+                between(start, end, piece / pieces),
+                between(start, end, (piece + 1) / pieces),
+            )
+        self._head = end
+        self._points = None
+
+    def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
+        """Put the guides at rest on a head at `head_from_rest` (4, 4), without velocity."""
+        self._head = np.eye(4) if head_from_rest is None else np.asarray(head_from_rest, np.float64)
+        self._state = at_rest(self._rods)
+        self._time = 0.0
+        self._points: Float32Array | None = None
+
+    def retune(self, options: Options) -> None:
+        """Take other options from now on; positions and velocities stay."""
+        before, nodes = self._state, self._rods.nodes
+        self._tune(options)
+        if self._rods.nodes != nodes:
+            self.reset(self._head)
+        else:
+            self._state = before
+        self._points = None
+
+    def measure(self) -> Measures:
+        """Return the present stretch and energies; potential energy is 0 at rest."""
+        state, rods = self._state, self._rods
+        kinetic = 0.5 * float((rods.mass[..., None] * state.velocity**2).sum())
+        down = self._head[:3, :3].T @ self._gravity(None)
+        fallen = ((state.position - rods.points) * down).sum(axis=-1)
+        weight = -float((rods.mass * fallen).sum())
+        elastic = elastic_energy(rods, state, self._rates.shape)
+        rest = elastic_energy(rods, at_rest(rods), self._rates.shape)
+        return Measures(largest_stretch(rods, state), kinetic, weight + elastic - rest)
+
+    def _tune(self, options: Options) -> None:
+        physics, strands = self._groom.physics, self._groom.strands
+        resolved = options.resolved(physics)
+        nodes = resolved.nodes
+        points = node_points(strands, nodes)
+        width = strands.widths
+        width_of = np.full(len(strands), self._groom.material.width)
+        if width is not None:
+            width_of = np.add.reduceat(width, strands.offsets[:-1]) / strands.counts
+            width_of = np.maximum(width_of, 1e-6)
+        density = HAIR_DENSITY * np.pi / 4 * width_of[:, None] ** 2
+        bending = density * SINGLE_HAIR * resolved.firmness()
+        rods = make_rods(points, density, bending, bending * resolved.twist)
+        down = np.array([0.0, -physics.gravity, 0.0])
+        self._rods = loaded(rods, rods.mass[..., None] * down)
+        self._riders = riders(strands, points, self._rods.frames)
+        self._options = resolved
+        self._rates = _rates(resolved, rods, width_of)
+        self._systems: dict[float, System] = {}
+        self._contact = _contact(resolved, self._obstacles, points)
+        self._crowd: Crowd = crowd_of(points.reshape(-1, 3), self._rods.mass.reshape(-1))
+        self._backend: Backend = substep
+
+    def _system(self, step: float) -> System:
+        key = round(step, 9)
+        if key not in self._systems:
+            if len(self._systems) >= _KEPT_SYSTEMS:
+                self._systems.pop(next(iter(self._systems)))
+            self._systems[key] = assemble(self._rods, self._rates, step)
+        return self._systems[key]
+
+    def _piece(
+        self, seconds: float, around: Surroundings, start: Float64Array, end: Float64Array
+    ) -> None:
+        """Advance by up to a sixtieth of a second: look at air and neighbours once, then step."""
+        count = max(1, math.ceil(self._options.substeps * seconds / FRAME - 1e-6))
+        step = seconds / count
+        system = self._system(step)
+        air_world = self._air(around, start)
+        self._state = self._among(self._state, start, end, seconds)
+        head = start
+        for k in range(count):
+            after = between(start, end, (k + 1) / count)
+            turn = after[:3, :3].T
+            load = Load(
+                inverse_motion(after) @ head if (after != head).any() else np.eye(4),
+                turn @ self._gravity(around),
+                air_world @ turn.T,
+                self._grabbed(around.grabs, system, head, after),
+            )
+            self._state = self._backend(
+                self._rods, system, self._state, load, self._contact, self._options.iterations
+            )
+            head = after
+        self._time += seconds
+
+    def _gravity(self, around: Surroundings | None) -> Float64Array:
+        if around is None or around.gravity is None:
+            return np.array([0.0, -self._groom.physics.gravity, 0.0])
+        return around.gravity
+
+    def _air(self, around: Surroundings, head: Float64Array) -> Float64Array:
+        """Velocity of the air at the nodes, world; gusts are mixed between every fourth node."""
+        if around.turbulence == 0.0 or not around.wind.any():
+            return np.asarray(around.wind, np.float64)
+        nodes = self._rods.nodes
+        some = np.unique(np.append(np.arange(0, nodes, 4), nodes - 1))
+        where = moved(head, self._state.position[:, some])
+        found = air_velocity(
+            where.reshape(-1, 3), self._time, around.wind, around.turbulence, self._options.seed
+        ).reshape(where.shape)
+        at = np.arange(nodes)
+        after = np.clip(np.searchsorted(some, at), 1, len(some) - 1)
+        share = ((at - some[after - 1]) / (some[after] - some[after - 1]))[:, None]
+        result: Float64Array = found[:, after - 1] * (1 - share) + found[:, after] * share
+        return result
+
+    def _among(
+        self, state: State, start: Float64Array, end: Float64Array, seconds: float
+    ) -> State:
+        """Let hair rub on hair and keep its room, once a piece."""
+        options, rods = self._options, self._rods
+        if options.cohesion == 0.0 and options.pressure == 0.0:
+            return state
+        ride = inverse_motion(end) @ start
+        riding = (state.position - moved(ride, state.position)) / seconds
+        relative = (state.velocity - riding).reshape(-1, 3)
+        new = self._crowd.velocities(
+            state.position.reshape(-1, 3), relative, rods.mass.reshape(-1),
+            options.cohesion, options.pressure, seconds,
+        ).reshape(state.velocity.shape)  # fmt: skip
+        new[:, 0] = state.velocity[:, 0] - riding[:, 0]
+        return replace(state, velocity=new + riding)
+
+    def _grabbed(
+        self, grabs: tuple[Grab, ...], system: System, head: Float64Array, after: Float64Array
+    ) -> Float64Array | None:
+        """Force on the nodes nearest to grabbed points that brings them to their targets."""
+        if not grabs:
+            return None
+        force = np.zeros_like(self._rods.points)
+        back = inverse_motion(after)
+        for grab in grabs:
+            rod = int(self._riders.rod[grab.point])
+            node = int(self._riders.segment[grab.point] + (self._riders.share[grab.point] >= 0.5))
+            node = max(node, 1)
+            target = moved(back, np.asarray(grab.target, np.float64))
+            here = moved(back @ head, self._state.position[rod, node])
+            velocity = back[:3, :3] @ head[:3, :3] @ self._state.velocity[rod, node]
+            wanted = target - (here + system.step * velocity)
+            far = float(np.linalg.norm(wanted))
+            limit = self._options.grab_speed * system.step
+            wanted *= min(1.0, limit / max(far, 1e-12))
+            force[rod, node] += wanted / system.inverse[rod, node - 1, node - 1]
+        return force
+
+
+def between(start: Float64Array, end: Float64Array, share: float) -> Float64Array:
+    """Return the rigid motion a share of the way from `start` to `end`."""
+    if share <= 0.0 or (start == end).all():
+        return start
+    if share >= 1.0:
+        return end
+    turns = rotation.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
+    result = np.eye(4)
+    result[:3, :3] = rotation.to_matrix(rotation.slerp(turns[0], turns[1], share))
+    result[:3, 3] = (1 - share) * start[:3, 3] + share * end[:3, 3]
+    return result
+
+
+def inverse_motion(motion: Float64Array) -> Float64Array:
+    """Return the inverse of a rigid motion (4, 4)."""
+    result = np.eye(4)
+    result[:3, :3] = motion[:3, :3].T
+    result[:3, 3] = -motion[:3, :3].T @ motion[:3, 3]
+    return result
+
+
+def _rates(options: Options, rods: Rods, width: Float64Array) -> Rates:
+    """Turn options into rates; air takes thin hair along faster: area over mass goes as 1/width."""
+    share = np.linspace(0.0, 1.0, rods.nodes)
+    drag = options.drag * width.mean() / width
+    shape = options.pull() * (1 - share) ** 2
+    return Rates(
+        np.repeat(drag[:, None], rods.nodes, axis=1),
+        -math.log(1 - options.damping_share()) / FRAME,
+        np.broadcast_to(shape, rods.mass.shape).copy(),
+    )
+
+
+def _contact(options: Options, obstacles: Obstacles, points: Float64Array) -> Contact:
+    """Captured hair that is nearer than the clearance keeps its own distance."""
+    distance = obstacles.at(points.reshape(-1, 3))[0].reshape(points.shape[:2])
+    clearance = np.minimum(options.clearance, distance)
+    return Contact(obstacles, clearance, options.rubbing(), options.depenetration)
