@@ -57,7 +57,7 @@ class Options(ExportOptions, AnimationOptions, ImportOptions):
     strips: int = option(
         0, low=0, high=500_000, doc="Ribbons or cards; 0 makes 4000 ribbons or 800 cards."
     )
-    strip_points: int = option(12, low=2, high=128, doc="Points along each ribbon or card.")
+    strip_points: int = option(16, low=2, high=128, doc="Points along each ribbon or card.")
     strip_width: float = option(
         0.0, low=0.0, high=0.05, doc="Width of a strip; 0 covers what 100,000 hairs do.", unit="m"
     )

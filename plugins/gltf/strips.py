@@ -18,6 +18,7 @@ RIBBONS, CARDS = 4000, 800
 """Strips where the options say 0."""
 _HAIRS_OF_A_HEAD = 100_000
 _NARROWEST, _WIDEST = 2e-4, 0.02
+_STRANDS_PER_CARD = 8
 _CARD_SPREAD = 3.0
 """Widths of a card in root mean square distances of its strands from the middle."""
 _FEWEST_POINTS = 4
@@ -66,8 +67,9 @@ def hair_meshes(groom: Groom, shapes: Float32Array, options: StripOptions) -> It
         Where more strips are wanted than there are strands, hair is interpolated between guides.
     """
     wanted = options.strips or (CARDS if options.hair == "cards" else RIBBONS)
-    if options.hair == "ribbons" and len(groom.strands) < wanted:
-        groom, shapes = _denser(groom, shapes, wanted, options)
+    needed = wanted if options.hair == "ribbons" else wanted * _STRANDS_PER_CARD
+    if len(groom.strands) < needed:
+        groom, shapes = _denser(groom, shapes, needed, options)
     for level in range(options.lods):
         count = max(wanted >> level, 1)
         points = max(
