@@ -6,9 +6,11 @@ import dataclasses
 import io
 import os
 import tempfile
+import tokenize
 import types
 import typing
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any, Self
 
@@ -27,6 +29,20 @@ BoolArray = npt.NDArray[np.bool_]
 MAX_UNPACKED_BYTES = 4 * 2**30
 """Refuse archives that claim to unpack to more than this many bytes."""
 
+_UNREADABLE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    ValueError,
+    OSError,
+    EOFError,
+    MemoryError,
+    NotImplementedError,
+    RuntimeError,
+    SyntaxError,
+    KeyError,
+    tokenize.TokenError,
+)
+"""What zipfile and NumPy raise on damaged archives, encrypted members and wild headers included."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -131,10 +147,11 @@ def read_npz(path: str | os.PathLike[str]) -> dict[str, npt.NDArray[Any]]:
             return {name: data[name] for name in data.files}
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such file") from error
-    except (zipfile.BadZipFile, ValueError, OSError, EOFError, MemoryError, zipfile.error) as error:
+    except _UNREADABLE as error:
         if isinstance(error, FormatError):
             raise
-        raise FormatError(f"{path}: not a readable .npz file ({error})") from error
+        reason = str(error).partition("\n")[0][:120]  # zipfile quotes the damaged bytes in full
+        raise FormatError(f"{path}: not a readable .npz file ({reason})") from error
 
 
 def write_bytes(

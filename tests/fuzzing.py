@@ -27,8 +27,10 @@ _NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 _MOST_EDITS = 4
 _LONGEST = 64
 
-long_run = settings(max_examples=CASES, database=None, derandomize=True)
-"""Settings of a test over damaged files: the same files every time."""
+
+def long_run(cases: int) -> settings:
+    """Return the settings of a test over so many damaged files, the same ones every time."""
+    return settings(max_examples=cases, database=None, derandomize=True)
 
 
 @st.composite
