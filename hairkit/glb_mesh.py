@@ -16,7 +16,8 @@ def read_glb(path: str | os.PathLike[str]) -> FileMesh:
     """Return the triangles of the default scene in its frame, with TEXCOORD_0 and COLOR_0.
 
     Each node, mesh and material name becomes a group, and so does each custom scalar attribute
-    (`_SCALP` is the group `scalp`). Raises `FormatError` for damaged, compressed or sparse files.
+    (`_SCALP` is the group `scalp`). Where some meshes have `_SCALP`, only those are the head.
+    Raises `FormatError` for damaged, compressed or sparse files.
     """
     with readable(path, "GLB mesh"):
         parts = _parts(GlbFile(path, MAX_FILE_BYTES))
@@ -27,9 +28,9 @@ def read_glb(path: str | os.PathLike[str]) -> FileMesh:
 
 def _parts(file: GlbFile) -> list[FileMesh]:
     parts: list[FileMesh] = []
-    for node, placed in file.nodes_in_place():
-        if "mesh" not in node:
-            continue
+    nodes = [(node, placed) for node, placed in file.nodes_in_place() if "mesh" in node]
+    marked = [(node, placed) for node, placed in nodes if _has_scalp(file, node)]
+    for node, placed in marked or nodes:
         mesh = file.document["meshes"][node["mesh"]]
         names = [node.get("name", ""), mesh.get("name", "")]
         for primitive in mesh["primitives"]:
@@ -38,6 +39,11 @@ def _parts(file: GlbFile) -> list[FileMesh]:
         if sum(len(part.vertices) for part in parts) > MAX_VERTICES:
             raise ValueError(f"it has more than {MAX_VERTICES} vertices")
     return parts
+
+
+def _has_scalp(file: GlbFile, node: dict[str, Any]) -> bool:
+    primitives = file.document["meshes"][node["mesh"]]["primitives"]
+    return any("_SCALP" in primitive["attributes"] for primitive in primitives)
 
 
 def _primitive(
