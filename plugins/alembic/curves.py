@@ -76,6 +76,7 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
     assert fitted.root_uv is not None
     assert fitted.group is not None
     _check_groups(fitted.group, fitted.counts, strict=options.axis == "unreal")
+    _check_roots(fitted.widths[fitted.offsets[:-1]])
     return GroomCurves(
         points=space.points_to_file(fitted.points),
         counts=fitted.counts.astype(np.int32),
@@ -139,6 +140,12 @@ def _check_groups(group: Int32Array, counts: Int64Array, strict: bool) -> None:
             if strict:
                 raise InputError(text)
             _log.warning("%s", text)
+
+
+def _check_roots(widths: Float32Array) -> None:
+    bare = np.count_nonzero(widths <= 0)
+    if bare:
+        _log.warning("%d strands are 0 wide at the root; Unity then ignores all widths", bare)
 
 
 def _check_times(cache: PointCache) -> None:
