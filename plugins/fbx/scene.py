@@ -1,0 +1,177 @@
+"""The whole document: header, settings, objects and how they are connected."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from hairkit.file_space import FileSpace
+from hairkit.head import Head
+from hairkit.strands import Strands
+
+from .records import (
+    CREATION_TIME,
+    FILE_ID,
+    VERSION,
+    Record,
+    file_bytes,
+    number,
+    object_name,
+    raw,
+    record,
+    text,
+)
+
+CREATOR = "hairkit"
+SCENE = 0
+"""The id of the scene's root, which is no object."""
+_FIRST_ID = 1_000_000
+_AXES = {"y_up": (1, 1, 2, 1, 0, 1), "z_up": (2, 1, 1, -1, 0, 1)}
+_AXIS_NAMES = ("UpAxis", "UpAxisSign", "FrontAxis", "FrontAxisSign", "CoordAxis", "CoordAxisSign")
+_VALUES = {"int": "I", "enum": "I", "double": "D"}
+
+
+@dataclass
+class Scene:
+    """Objects and connections while they are put together."""
+
+    space: FileSpace
+    objects: list[Record] = field(default_factory=list)
+    connections: list[tuple[int, int]] = field(default_factory=list)
+
+    def add(self, kind: str, name: str, subkind: str, *children: Record, label: str = "") -> int:
+        """Add an object and return its id; `label` is the class in its name, if not `kind`."""
+        number_ = _FIRST_ID + len(self.objects)
+        values = (number("L", number_), object_name(name, label or kind), text(subkind))
+        self.objects.append(record(kind, *values, children=children))
+        return number_
+
+    def add_model(self, name: str, subkind: str, parent: int, *properties: Record) -> int:
+        """Add a node of the hierarchy below `parent` and return its id."""
+        always = (
+            one("DefaultAttributeIndex", "int", "Integer", "", 0),
+            one("InheritType", "enum", "", "", 1),
+        )
+        model = self.add(
+            "Model",
+            name,
+            subkind,
+            record("Version", number("I", 232)),
+            properties70(*properties, *always),
+            record("Shading", number("C", True)),
+            record("Culling", text("CullingOff")),
+        )
+        self.connect(model, parent)
+        return model
+
+    def connect(self, child: int, parent: int) -> None:
+        """Say that an object belongs to another."""
+        self.connections.append((child, parent))
+
+
+def scene_bytes(head: Head, strands: Strands | None, space: FileSpace) -> bytes:
+    """Return the file of a head, and of strands where there are some."""
+    from .body import add_body
+    from .curves import add_curves
+
+    scene = Scene(space)
+    add_body(scene, head)
+    if strands is not None:
+        add_curves(scene, strands)
+    return file_bytes(_document(scene))
+
+
+def properties70(*properties: Record) -> Record:
+    """Return an object's block of properties."""
+    return record("Properties70", children=properties)
+
+
+def one(name: str, kind: str, label: str, flags: str, *values: float) -> Record:
+    """Return one property; its values are doubles unless its kind is a whole number."""
+    code = _VALUES.get(kind, "D")
+    numbers = [number(code, value) for value in values]
+    return record("P", text(name), text(kind), text(label), text(flags), *numbers)
+
+
+def _document(scene: Scene) -> list[Record]:
+    connections = [
+        record("C", text("OO"), number("L", child), number("L", parent))
+        for child, parent in scene.connections
+    ]
+    return [
+        _header(),
+        record("FileId", raw(FILE_ID)),
+        record("CreationTime", text(CREATION_TIME)),
+        record("Creator", text(CREATOR)),
+        _settings(scene.space),
+        _documents(),
+        record("References"),
+        _definitions(scene.objects),
+        record("Objects", children=scene.objects),
+        record("Connections", children=connections),
+        record("Takes", children=[record("Current", text(""))]),
+    ]
+
+
+def _header() -> Record:
+    stamp = ("Year", 1970), ("Month", 1), ("Day", 1), ("Hour", 10), ("Minute", 0), ("Second", 0)
+    times = [("Version", 1000), *stamp, ("Millisecond", 0)]
+    return record(
+        "FBXHeaderExtension",
+        children=[
+            record("FBXHeaderVersion", number("I", 1003)),
+            record("FBXVersion", number("I", VERSION)),
+            record("EncryptionType", number("I", 0)),
+            record(
+                "CreationTimeStamp",
+                children=[record(name, number("I", value)) for name, value in times],
+            ),
+            record("Creator", text(CREATOR)),
+        ],
+    )
+
+
+def _settings(space: FileSpace) -> Record:
+    """Return axes and unit; UnitScaleFactor is in centimetres."""
+    axes = [
+        one(name, "int", "Integer", "", value)
+        for name, value in zip(_AXIS_NAMES, _AXES[space.axes], strict=True)
+    ]
+    centimetres = round(100 * space.metres, 12)
+    return record(
+        "GlobalSettings",
+        children=[
+            record("Version", number("I", 1000)),
+            properties70(
+                *axes,
+                one("OriginalUpAxis", "int", "Integer", "", -1),
+                one("OriginalUpAxisSign", "int", "Integer", "", 1),
+                one("UnitScaleFactor", "double", "Number", "", centimetres),
+                one("OriginalUnitScaleFactor", "double", "Number", "", centimetres),
+            ),
+        ],
+    )
+
+
+def _documents() -> Record:
+    document = record(
+        "Document",
+        number("L", 1),
+        text("Scene"),
+        text("Scene"),
+        children=[record("RootNode", number("L", SCENE))],
+    )
+    return record("Documents", children=[record("Count", number("I", 1)), document])
+
+
+def _definitions(objects: Sequence[Record]) -> Record:
+    """Return how many objects there are of each kind."""
+    counts = Counter({"GlobalSettings": 1})
+    counts.update(entry.name.decode() for entry in objects)
+    kinds = [
+        record("ObjectType", text(kind), children=[record("Count", number("I", count))])
+        for kind, count in counts.items()
+    ]
+    total = record("Count", number("I", len(objects) + 1))
+    return record("Definitions", children=[record("Version", number("I", 100)), total, *kinds])
