@@ -18,6 +18,8 @@ from hairkit.stored import Float64Array
 from .rods import Rods, half_binormal, half_way, shares, shifted, twist_between
 from .system import System
 
+SOFTEST = 1e-3
+"""Compliance of lengths between nodes that an obstacle holds, as a share of the free one's."""
 LARGEST_SPIN = 0.3
 """Radians that torsion may turn a segment in a substep; Newton's step is no good beyond."""
 
@@ -108,7 +110,7 @@ def substep(
     position[:, 1:] += change
     velocity[:, 1:] += change / h
     new = State(position, velocity, frames)
-    return new if contact is None else collided(new, contact, load.ride, h)
+    return new if contact is None else collided(rods, new, contact, load.ride, h)
 
 
 def moved(motion: Float64Array, points: Float64Array) -> Float64Array:
@@ -190,7 +192,9 @@ def tension(
     return result
 
 
-def collided(state: State, contact: Contact, ride: Float64Array, step: float) -> State:
+def collided(
+    rods: Rods, state: State, contact: Contact, ride: Float64Array, step: float
+) -> State:
     """Return the state with nodes brought out of the obstacles, with Coulomb friction."""
     shape = state.position.shape
     distance, normal = contact.obstacles.at(state.position.reshape(-1, 3))
@@ -210,7 +214,36 @@ def collided(state: State, contact: Contact, ride: Float64Array, step: float) ->
     brake = -slowed[..., None] * along
     velocity = state.velocity + touching * (inward[..., None] * normal + brake)
     position = state.position + touching * (out[..., None] * normal + step * brake)
-    return replace(state, position=position, velocity=velocity)
+    fixed = relengthened(rods, position, touching * normal)
+    return replace(state, position=fixed, velocity=velocity + (fixed - position) / step)
+
+
+def relengthened(rods: Rods, position: Float64Array, normal: Float64Array) -> Float64Array:
+    """Return positions with the lengths restored that contacts have changed.
+
+    One tridiagonal solve (Han and Harada 2013) in which a node at an obstacle moves only along it,
+    square to `normal` (S, n, 3), which is 0 where a node is free; the root does not move.
+    """
+    ease = 1.0 / rods.mass
+    ease[:, 0] = 0.0
+    edge = np.diff(position, axis=1)
+    reach = np.linalg.norm(edge, axis=-1)
+    direction = edge / reach[..., None]
+
+    def eased(nodes: slice) -> Float64Array:
+        """What each segment's pull does to the node at its start or its end."""
+        across = (normal[:, nodes] * direction).sum(axis=-1, keepdims=True) * normal[:, nodes]
+        return ease[:, nodes, None] * (direction - across)
+
+    start, end = eased(slice(None, -1)), eased(slice(1, None))
+    diagonal = (direction * (start + end)).sum(axis=-1)
+    diagonal += SOFTEST * (ease[:, :-1] + ease[:, 1:])
+    beside = -(end[:, :-1] * direction[:, 1:]).sum(axis=-1)
+    pull = _tridiagonal(diagonal, beside, reach - rods.length)[..., None]
+    fixed = position.copy()
+    fixed[:, :-1] += pull * start
+    fixed[:, 1:] -= pull * end
+    return fixed
 
 
 def _edges(change: Float64Array) -> Float64Array:
