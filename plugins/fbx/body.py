@@ -6,7 +6,7 @@ import numpy as np
 
 from hairkit.head import Head
 from hairkit.head_skin import JOINT_NAMES, head_weights
-from hairkit.stored import Float64Array, Int32Array
+from hairkit.stored import Float32Array, Float64Array, Int32Array
 
 from .records import Record, array, number, record, text
 from .scene import SCENE, Scene, one, properties70
@@ -59,7 +59,7 @@ def _held(name: str, head: Head, scene: Scene) -> Record:
 
 
 def _indexed(
-    kind: str, name: str, values: str, index: str, rows: Float64Array, faces: Int32Array
+    kind: str, name: str, values: str, index: str, rows: Float32Array, faces: Int32Array
 ) -> Record:
     """Return a layer with a value a vertex, named again at every corner of every face."""
     content = record(values, array("d", rows)), record(index, array("i", faces))
@@ -154,7 +154,7 @@ def _add_bind_pose(scene: Scene, mesh: int, bones: list[int], joints: Float64Arr
 
 
 def _add_skin(
-    scene: Scene, geometry: int, bones: list[int], joints: Float64Array, weights: Float64Array
+    scene: Scene, geometry: int, bones: list[int], joints: Float64Array, weights: Float32Array
 ) -> None:
     """Add the skin with one cluster a joint: which vertices follow it, and how much."""
     skin = scene.add(
