@@ -30,6 +30,7 @@ VERBS = {
     "evaluate": "score a groom against the truth",
     "synth": "make a procedural groom and photos of it, with their truth",
     "render": "draw a groom on its head",
+    "view": "show a groom in motion, in a window or by a script",
     "export": "write a groom in an engine's format",
     "convert": "read hair of one format, write another",
     "simulate": "simulate a groom, its head shaken and in wind",

@@ -59,6 +59,12 @@ class Renderer:
             )
         return self._programs[key]
 
+    def forget_programs(self) -> None:
+        """Compile every shader anew when it is next asked for, as its file then is."""
+        for program in (*self._programs.values(), *self._computes.values()):
+            program.release()
+        self._programs, self._computes = {}, {}
+
     def compute(self, name: str) -> moderngl.ComputeShader:
         """Return the compute shader `name.comp`."""
         if name not in self._computes:
@@ -83,6 +89,19 @@ def renderer() -> Iterator[Renderer]:
             error = _renderer.context.error
         if error != "GL_NO_ERROR":
             raise RenderError(f"drawing failed: OpenGL reports {error} ({_renderer.backend})")
+
+
+def install(context: moderngl.Context, backend: str) -> Renderer:
+    """Make a context, such as a window's, the one that this process draws with.
+
+    Raises `RenderError` when the process draws with another one already.
+    """
+    global _renderer, _owner
+    with _lock:
+        if _renderer is not None and _owner == os.getpid():
+            raise RenderError(f"this process draws by {_renderer.backend} already; open a new one")
+        _renderer, _owner = Renderer(context, backend), os.getpid()
+        return _renderer
 
 
 def shader_source(name: str) -> str:

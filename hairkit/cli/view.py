@@ -1,0 +1,103 @@
+"""`hairkit view GROOM`: a window in which captured hair moves like hair, or a script without one."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from hairkit.cli.render import parse_size
+from hairkit.errors import InputError
+
+_DESCRIPTION = """\
+Example: hairkit view out/groom.npz
+
+Show a groom in motion. GROOM is a groom.npz, any file that an import plugin reads, or the folder
+that `hairkit reconstruct` wrote. Press H for the keys. With --headless a script does what a user
+would do: hairkit view out/ --headless --script steps.toml --out pictures/"""
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser(
+        "view", help="show a groom in motion", description=_DESCRIPTION
+    )
+    add = parser.add_argument
+    add("groom", metavar="GROOM", type=Path, help="groom.npz, importable file or folder of results")
+    add("--capture", type=Path, metavar="FOLDER", help="the photos, to show them in space")
+    add("--simulator", metavar="NAME", help="simulator plugin (pbd), or none")
+    add("--set", action="append", default=[], metavar="X=V", help="option=V of the simulator")
+    add("--hairs", type=int, metavar="N", help="strands drawn (10000)")
+    add("--size", metavar="WxH", help="pixels (1280x720)")
+    add("--budget", type=float, metavar="MS", help="milliseconds a picture may take (50)")
+    add("--headless", action="store_true", help="no window: run --script")
+    add("--script", type=Path, metavar="FILE", help="actions to do (TOML)")
+    add("--out", type=Path, metavar="FOLDER", help="where a script's pictures go (.)")
+    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Show the groom until the window is closed, or play the script."""
+    if args.headless:
+        return _headless(args)
+    from hairkit.viewer.window import show
+
+    if args.out is not None:
+        raise InputError("--out is for --headless; in the window pictures go to this folder")
+    show(lambda size: _session(args, size), _size(args), script=args.script, budget=_budget(args))
+    return 0
+
+
+def _headless(args: argparse.Namespace) -> int:
+    from hairkit.render.context import renderer
+    from hairkit.viewer.preview import Preview
+    from hairkit.viewer.script import play, read_script
+
+    if args.script is None:
+        raise InputError("--headless needs --script steps.toml; docs/viewer.md shows one")
+    script = read_script(args.script)
+    if args.hairs is None:
+        args.hairs = script.setup.hairs
+    size = _size(args) if args.size else script.setup.size
+    with renderer() as gl:
+        print(gl.description, file=sys.stderr)
+        preview = Preview(gl, _session(args, size, script.setup.seed))
+        play(preview, script, args.out or Path())
+        preview.release()
+    for path in preview.written:
+        print(path)
+    return 0
+
+
+def _session(args: argparse.Namespace, size: tuple[int, int], seed: int = 0) -> Any:
+    from hairkit.manager import Manager
+    from hairkit.viewer.session import HAIRS, Session
+
+    session = Session(
+        Manager.loaded(args.plugin),
+        args.groom,
+        size=size,
+        simulator=args.simulator,
+        hairs=HAIRS if args.hairs is None else args.hairs,
+        capture=args.capture,
+        seed=seed,
+    )
+    for text in args.set:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise InputError(f"--set {text}: expected option=value")
+        session.tuned.set(name.removeprefix(f"{session.tuned.plugin}."), value)
+    return session
+
+
+def _size(args: argparse.Namespace) -> tuple[int, int]:
+    return parse_size(args.size) if args.size else (1280, 720)
+
+
+def _budget(args: argparse.Namespace) -> float:
+    if args.budget is None:
+        return 1 / 20
+    if not args.budget > 0:
+        raise InputError(f"--budget is {args.budget}, expected milliseconds above 0")
+    return float(args.budget) / 1e3

@@ -1,0 +1,180 @@
+"""What the stages found, as things to show: photos in space, masks, orientation, hull, field lines.
+
+All is read from the work folder of `hairkit reconstruct` when it is first shown.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import TypeVar
+
+import cv2
+import numpy as np
+
+from hairkit.camera import Camera
+from hairkit.capture_reader import read_capture
+from hairkit.errors import HairkitError, InputError
+from hairkit.mask import HAIR, PERSON, Mask
+from hairkit.orientation import OrientationMap
+from hairkit.render.head import Solid
+from hairkit.scene import Scene
+from hairkit.stored import Float32Array, Stored, UInt8Array, from_arrays, read_npz
+from hairkit.viewer.line_pass import Board, LineSet
+from hairkit.volume import Hull, OrientationField
+from hairkit.volume_surface import volume_surface
+
+BOARDS = ("photos", "masks", "orientation")
+"""Layers of pictures in space, one a camera."""
+NAMES = ("head", *BOARDS, "cameras", "hull", "field")
+FRUSTUM = 0.35
+"""Metres from a camera to its picture."""
+CLAY = (0.30, 0.28, 0.26)
+FIELD_LINES = 4000
+_Found = TypeVar("_Found", bound=Stored)
+
+
+class Layers:
+    """The layers that a folder of results offers."""
+
+    def __init__(self, results: Path | None, capture: Path | None = None) -> None:
+        self._work = None if results is None else results / "work"
+        self._capture = capture
+
+    @property
+    def available(self) -> tuple[str, ...]:
+        """Names of the layers that can be shown."""
+        have = {"head": True, "photos": self._capture is not None and bool(self.cameras)}
+        files = {"masks": "segment-*", "orientation": "orient-*", "cameras": "scene"}
+        files |= {"hull": "hull", "field": "field"}
+        for name, pattern in files.items():
+            have[name] = self._work is not None and any(self._work.glob(f"{pattern}.npz"))
+        return tuple(name for name in NAMES if have[name])
+
+    def check(self, name: str) -> None:
+        """Raise `InputError` when there is no such layer here."""
+        if name not in NAMES:
+            raise InputError(f"no layer {name!r}; there are {', '.join(NAMES)}")
+        if name not in self.available:
+            cure = "name the photos' folder by --capture" if name == "photos" else (
+                "open the folder that hairkit reconstruct wrote"
+            )
+            raise InputError(f"the layer {name!r} is not here; {cure}")
+
+    @cached_property
+    def cameras(self) -> dict[str, Camera]:
+        """Cameras of the photos by view name, at working size, head frame; empty without a scene."""
+        scene = self._read(Scene, "head") or self._read(Scene, "scene")
+        return {} if scene is None else dict(zip(scene.names, scene.cameras, strict=True))
+
+    def boards(self, layer: str) -> dict[str, Board]:
+        """Return the pictures of a layer, by view name, in front of their cameras."""
+        pictures = {"photos": self._photos, "masks": self._masks, "orientation": self._angles}
+        found = pictures[layer]()
+        return {
+            name: Board(_picture_corners(self.cameras[name]), image)
+            for name, image in found.items()
+            if name in self.cameras
+        }
+
+    def frusta(self) -> LineSet:
+        """Return the cameras as pyramids."""
+        corners = [_picture_corners(camera) for camera in self.cameras.values()]
+        eyes = [camera.position for camera in self.cameras.values()]
+        paths = []
+        for (a, b, c, d), eye in zip(corners, eyes, strict=True):
+            paths += [np.array([a, b, d, c, a]), np.array([a, eye, b]), np.array([c, eye, d])]
+        return _line_set(paths, (0.15, 0.35, 0.75, 0.8))
+
+    def hull(self) -> Solid | None:
+        """Return the dense hair as clay."""
+        hull = self._read(Hull, "hull")
+        if hull is None:
+            return None
+        vertices, faces, normals = volume_surface(hull.grid, hull.dense)
+        colours = np.tile(np.array(CLAY, np.float32), (len(vertices), 1))
+        return Solid(vertices, faces, normals, colours, scatter=0.0)
+
+    def field_lines(self) -> LineSet | None:
+        """Return short strokes along the field, coloured by their direction."""
+        field, hull = self._read(OrientationField, "field"), self._read(Hull, "hull")
+        if field is None or hull is None:
+            return None
+        cells = np.argwhere(hull.dense & (field.confidence > 0))
+        chosen = cells[np.linspace(0, len(cells) - 1, min(FIELD_LINES, len(cells))).astype(int)]
+        tensor = field.tensor[tuple(chosen.T)].astype(np.float64)
+        full = tensor[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
+        way = np.linalg.eigh(full)[1][:, :, 2]
+        middle = field.grid.origin + (chosen + 0.5) * field.grid.spacing
+        half = 1.6 * field.grid.spacing * way
+        points = np.stack([middle - half, middle + half], axis=1).reshape(-1, 3)
+        colours = np.ones((len(points), 4), np.float32)
+        colours[:, :3] = np.repeat(np.abs(way[:, [0, 2, 1]]), 2, axis=0)
+        offsets = np.arange(len(chosen) + 1) * 2
+        return LineSet(points.astype(np.float32), offsets, colours)
+
+    def confidence(self, rows: Float32Array) -> Float32Array | None:
+        """Return (G, m) the field's confidence along guides (G, m, 3) at rest, None without one."""
+        field = self._read(OrientationField, "field")
+        if field is None:
+            return None
+        values = field.grid.sample(field.confidence, rows.reshape(-1, 3))
+        return values.reshape(rows.shape[:2])
+
+    def _photos(self) -> dict[str, UInt8Array]:
+        if self._capture is None:
+            return {}
+        return {view.name: _opaque(view.image) for view in read_capture(self._capture, 640).views}
+
+    def _masks(self) -> dict[str, UInt8Array]:
+        pictures = {}
+        for name, mask in self._every(Mask, "segment").items():
+            image = np.zeros((*mask.labels.shape, 4), np.uint8)
+            image[mask.labels == HAIR] = (232, 60, 132, 230)
+            image[mask.labels == PERSON] = (70, 130, 235, 150)
+            pictures[name] = image
+        return pictures
+
+    def _angles(self) -> dict[str, UInt8Array]:
+        return {name: _hue(found) for name, found in self._every(OrientationMap, "orient").items()}
+
+    def _every(self, kind: type[_Found], stage: str) -> dict[str, _Found]:
+        found = {name: self._read(kind, f"{stage}-{name}") for name in self.cameras}
+        return {name: value for name, value in found.items() if value is not None}
+
+    def _read(self, kind: type[_Found], stem: str) -> _Found | None:
+        """Return what a stage left, None when it is not there or of another version."""
+        if self._work is None or not (path := self._work / f"{stem}.npz").is_file():
+            return None
+        try:
+            arrays = read_npz(path)
+            arrays.pop("work_digest", None)
+            return from_arrays(kind, arrays, str(path))
+        except HairkitError:
+            return None
+
+
+def _hue(found: OrientationMap) -> UInt8Array:
+    """Return (H, W, 4): hue for the angle, opacity for the confidence."""
+    half = np.full(found.angle.shape, 220, np.uint8)
+    hue = (found.angle * (180 / np.pi)).astype(np.uint8)
+    rgb = cv2.cvtColor(np.stack([hue, half, half], axis=-1), cv2.COLOR_HSV2RGB)
+    alpha = (np.sqrt(found.confidence) * 255).astype(np.uint8)
+    return np.asarray(np.dstack([rgb, alpha]), np.uint8)
+
+
+def _opaque(image: UInt8Array) -> UInt8Array:
+    return np.asarray(np.dstack([image, np.full(image.shape[:2], 255, np.uint8)]), np.uint8)
+
+
+def _picture_corners(camera: Camera) -> Float32Array:
+    width, height = camera.width, camera.height
+    pixels = np.array([[0, 0], [width, 0], [0, height], [width, height]], np.float64)
+    depth = FRUSTUM if camera.model == "perspective" else 0.0
+    return camera.unproject(pixels, np.full(4, depth)).astype(np.float32)
+
+
+def _line_set(paths: list[np.ndarray], colour: tuple[float, ...]) -> LineSet:  # type: ignore[type-arg]
+    offsets = np.concatenate([[0], np.cumsum([len(path) for path in paths])])
+    points = np.concatenate([*paths, np.zeros((0, 3))]).astype(np.float32)
+    return LineSet(points, offsets, np.tile(np.array(colour, np.float32), (len(points), 1)))

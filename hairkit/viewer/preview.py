@@ -1,0 +1,236 @@
+"""A session and the stage that draws it: one picture after the other, in a window or without."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairkit.render.context import Renderer
+from hairkit.render.head import head_solid
+from hairkit.stored import UInt8Array
+from hairkit.viewer.budget import LEVELS, Budget
+from hairkit.viewer.colouring import point_values, ramp
+from hairkit.viewer.hair_pass import HairLook
+from hairkit.viewer.hud import Readings
+from hairkit.viewer.layers import BOARDS
+from hairkit.viewer.line_pass import LineSet
+from hairkit.viewer.recording import write_png
+from hairkit.viewer.session import Session
+from hairkit.viewer.stage import Shot, Stage
+
+GUIDE_WIDER = 7.0
+"""Guides shown alone are drawn this many times wider than hair."""
+MEASURE_EVERY = 12
+"""Pictures between two looks at the simulator's read-outs."""
+PICKED = (1.0, 0.85, 0.1, 1.0)
+
+
+class Preview:
+    """Draws a session; used inside `renderer()` only."""
+
+    def __init__(self, gl: Renderer, session: Session, budget: Budget | None = None) -> None:
+        self.gl = gl
+        self.session = session
+        self.budget = budget or Budget(0.0)
+        self.readings = Readings(renderer=gl.description)
+        self.written: list[Path] = []
+        """Screenshots so far."""
+        self._stage: Stage | None = None
+        self._drawn: tuple[object, object] = (None, None)
+        self._kept: dict[str, list[str]] = {}
+        self._lines: dict[str, LineSet | None] = {}
+        self._pictures = 0
+        self._times: dict[str, float] = {}
+
+    @property
+    def stage(self) -> Stage:
+        """The stage, up to date with the session's groom."""
+        session = self.session
+        now = (session.opened, session.body)
+        if self._stage is None or self._drawn[0] is not now[0]:
+            self.release()
+            groom = session.opened.groom
+            self._stage = Stage(self.gl, head_solid(groom.head, groom.material), session.body)
+        elif self._drawn[1] is not now[1]:
+            self._stage.replace_body(session.body)
+        self._drawn = now
+        return self._stage
+
+    def release(self) -> None:
+        """Free what is on the GPU."""
+        if self._stage is not None:
+            self._stage.release()
+        self._stage, self._kept, self._lines = None, {}, {}
+
+    def restart(self) -> None:
+        """Compile all shaders anew; the old ones stay when one does not compile."""
+        self.release()
+        self.gl.forget_programs()
+
+    def frame(self, seconds: float, *, still: bool = False) -> None:
+        """Let time pass, draw, and keep the picture where it is asked for.
+
+        `still` draws at the best quality, whatever the budget.
+        """
+        began = time.perf_counter()
+        self.session.advance(seconds)
+        simulated = time.perf_counter()
+        self.draw(still=still)
+        self._keep_picture()
+        drawn = time.perf_counter()
+        self.budget.spent(drawn - began)
+        self._read_out(simulated - began, drawn - simulated)
+
+    def draw(self, *, still: bool = False) -> None:
+        """Draw the session as it is."""
+        stage, session = self.stage, self.session
+        quality = LEVELS[0] if still else self.budget.quality
+        width, height = (max(round(n * quality.scale), 16) for n in session.size)
+        rows = session.guide_rows()
+        look = self._look(quality.smooth, quality.share)
+        overlays = self._overlays(rows)
+        boards, solids = self._shown_boards(stage), self._shown_solids(stage)
+        stage.draw(
+            Shot(
+                session.camera((width, height)),
+                session.world_from_head,
+                rows,
+                look,
+                show_head="head" in session.shown.layers,
+                floor=session.floor,
+                exposure=session.shown.exposure,
+                whole_light=still,
+                lines=overlays,
+                boards=boards,
+                board_opacity=session.shown.opacity,
+                solids=solids,
+            )
+        )
+        self._hairs = 0 if look is None else look.hairs
+
+    def picture(self) -> UInt8Array:
+        """Return the last picture (H, W, 3) RGB, as large as it was drawn."""
+        return self.stage.read()
+
+    def _look(self, smooth: bool, share: float) -> HairLook | None:
+        session, material = self.session, self.session.opened.groom.material
+        shown = session.shown
+        guides = len(session.body.guides)
+        if shown.colours not in ("hair", "direction"):
+            return None
+        count = guides if shown.guides_only else min(shown.hairs, len(session.body))
+        count = max(round(count * (1.0 if shown.guides_only else share)), 1)
+        return HairLook(
+            count,
+            smooth,
+            _triple(material.root_colour),
+            _triple(material.tip_colour),
+            by_direction=shown.colours == "direction",
+            wider=GUIDE_WIDER if shown.guides_only else None,
+        )
+
+    def _overlays(self, rows: Any) -> tuple[tuple[LineSet, bool], ...]:
+        """Return lines, and whether they move with the head."""
+        session = self.session
+        lines: list[tuple[LineSet, bool]] = []
+        if session.shown.colours not in ("hair", "direction"):
+            rest = session.body.guide_rest
+            confidence = session.layers.confidence(rest)
+            values = point_values(session.shown.colours, rows, rest, confidence)
+            lines.append((_guide_lines(rows, ramp(values)), True))
+        if session.picked is not None:
+            one = rows[session.picked : session.picked + 1]
+            colour = np.broadcast_to(np.float32(PICKED[:3]), one.shape)
+            lines.append((_guide_lines(one, colour), True))
+        for name, find in (("cameras", session.layers.frusta), ("field", session.layers.field_lines)):
+            if name in session.shown.layers:
+                if name not in self._lines:
+                    self._lines[name] = find()
+                found = self._lines[name]
+                if found is not None:
+                    lines.append((found, name == "field"))
+        return tuple(lines)
+
+    def _shown_boards(self, stage: Stage) -> tuple[str, ...]:
+        session, names = self.session, []
+        for layer in BOARDS:
+            if layer not in session.shown.layers:
+                continue
+            if layer not in self._kept:
+                boards = session.layers.boards(layer)
+                for name, board in boards.items():
+                    stage.keep_board(f"{layer}/{name}", board)
+                self._kept[layer] = list(boards)
+            only = session.shown.through
+            names += [f"{layer}/{n}" for n in self._kept[layer] if only is None or n == only]
+        return tuple(names)
+
+    def _shown_solids(self, stage: Stage) -> tuple[str, ...]:
+        if "hull" not in self.session.shown.layers:
+            return ()
+        if "hull" not in self._kept:
+            solid = self.session.layers.hull()
+            self._kept["hull"] = [] if solid is None else ["hull"]
+            if solid is not None:
+                stage.keep_solid("hull", solid)
+        return tuple(self._kept["hull"])
+
+    def _keep_picture(self) -> None:
+        session = self.session
+        if session.recorder is None and not session.screenshots:
+            return
+        picture = self.picture()
+        if session.recorder is not None:
+            session.recorder.add(picture)
+        for path in session.screenshots:
+            free = path if session.overwrite else free_name(path)
+            write_png(free, picture)
+            self.written.append(free)
+            session.message = f"written: {free}"
+        session.screenshots = []
+
+    def _read_out(self, simulated: float, drawn: float) -> None:
+        self._pictures += 1
+        for name, value in (("simulate", simulated), ("draw", drawn)):
+            before = self._times.get(name, value)
+            self._times[name] = before + 0.2 * (value - before)
+        readings = self.readings
+        stretch, energy = readings.stretch, readings.energy
+        if self._pictures % MEASURE_EVERY == 1:
+            measures = self.session.measures()
+            stretch = measures.stretch
+            energy = measures.kinetic_energy + measures.potential_energy
+        self.readings = Readings(
+            1 / max(self._times["simulate"] + self._times["draw"], 1e-6),
+            1e3 * self._times["simulate"],
+            1e3 * self._times["draw"],
+            stretch,
+            energy,
+            self._hairs,
+            self.stage.framebuffer.width / self.session.size[0],
+            readings.renderer,
+        )
+
+
+def free_name(path: Path) -> Path:
+    """Return the path, or the first of `name_1`, `name_2` ... that is not taken."""
+    number, free = 0, path
+    while free.exists():
+        number += 1
+        free = path.with_stem(f"{path.stem}_{number}")
+    return free
+
+
+def _guide_lines(rows: Any, colours: Any) -> LineSet:
+    count, points = rows.shape[:2]
+    rgba = np.ones((count * points, 4), np.float32)
+    rgba[:, :3] = np.asarray(colours, np.float32).reshape(-1, 3)
+    return LineSet(rows.reshape(-1, 3), np.arange(count + 1) * points, rgba)
+
+
+def _triple(colour: Any) -> tuple[float, float, float]:
+    red, green, blue = (float(value) for value in colour)
+    return red, green, blue

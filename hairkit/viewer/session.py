@@ -1,0 +1,205 @@
+"""What the user sees and changes: a groom in motion, the view of it, and what is shown with it.
+
+A session knows nothing of OpenGL or windows; `actions` change it, `preview` draws it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hairkit.camera import Camera
+from hairkit.manager import Manager
+from hairkit.simulate.contract import Measures, Surroundings
+from hairkit.stored import Float32Array, Float64Array
+from hairkit.viewer.hair_body import GuideSampler, HairBody, split_guides
+from hairkit.viewer.layers import Layers
+from hairkit.viewer.motion import HeadMotion
+from hairkit.viewer.opening import Opened, open_path
+from hairkit.viewer.picking import Hold
+from hairkit.viewer.recording import Recorder
+from hairkit.viewer.simulation import Tuned
+from hairkit.viewer.view import OrbitView
+
+STEP = 1 / 60
+"""Seconds of one step of the simulator as the session asks for it."""
+MOST_STEPS = 3
+"""Steps a picture at most: on slow machines hair moves slower instead of not at all."""
+HAIRS = 10_000
+
+
+@dataclass
+class Wind:
+    """The air around the head."""
+
+    blowing: bool = False
+    speed: float = 4.0
+    """Metres per second."""
+    azimuth: float = 90.0
+    """Degrees, where it comes from: 0 in front, 90 from the subject's left."""
+    turbulence: float = 0.4
+
+    def velocity(self) -> Float64Array:
+        """Return (3,) metres per second, world."""
+        if not self.blowing:
+            return np.zeros(3)
+        angle = np.radians(self.azimuth)
+        return -self.speed * np.array([np.sin(angle), 0.0, np.cos(angle)])
+
+
+@dataclass
+class Shown:
+    """What is drawn, and how."""
+
+    hairs: int = HAIRS
+    guides_only: bool = False
+    colours: str = "hair"
+    layers: set[str] = field(default_factory=lambda: {"head"})
+    opacity: float = 0.8
+    """Of the photos in space."""
+    exposure: float = 0.75
+    help: bool = False
+    panel: bool = True
+    numbers: bool = True
+    option: int = 0
+    """The option that the keyboard changes."""
+    through: str | None = None
+    """Name of the photo whose camera the user looks through."""
+
+
+class Session:
+    """One groom in the viewer."""
+
+    def __init__(
+        self,
+        manager: Manager,
+        path: Path,
+        *,
+        size: tuple[int, int] = (1280, 720),
+        simulator: str | None = None,
+        hairs: int = HAIRS,
+        capture: Path | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.manager = manager
+        self.size = size
+        self._simulator = simulator
+        self._capture = capture
+        self.seed = seed
+        self.wind, self.shown = Wind(), Shown(hairs=hairs)
+        self.paused = False
+        self.hold: Hold | None = None
+        self.picked: int | None = None
+        self.message = ""
+        self.pending = 0.0
+        """Seconds that a script still wants to see."""
+        self.screenshots: list[Path] = []
+        """Files that the next picture is written to."""
+        self.recorder: Recorder | None = None
+        self.overwrite = False
+        """True lets screenshots take the place of older ones of the same name."""
+        self.finished = False
+        self.open(path)
+
+    def open(self, path: Path) -> None:
+        """Show another groom, from its best side."""
+        self._take(open_path(path, self.manager))
+        self.frame()
+
+    def reload(self) -> None:
+        """Read the file again; view, wind and options stay."""
+        values = dict(self.tuned.values)
+        self._take(open_path(self.opened.path, self.manager))
+        if self.tuned.infos:
+            self.tuned.replace(values)
+
+    def frame(self) -> None:
+        """Look at all of it, from the front and a little to the side."""
+        groom = self.opened.groom
+        points = np.concatenate([groom.strands.points, groom.head.vertices])
+        self.view = OrbitView.around(points, self.size[0] / self.size[1])
+        self.floor = float(points[:, 1].min()) - 0.03
+        self.shown.through = None
+
+    @property
+    def world_from_head(self) -> Float64Array:
+        """(4, 4) where the head is."""
+        return self.motion.matrix()
+
+    def camera(self, size: tuple[int, int] | None = None) -> Camera:
+        """Return the camera of the picture, world."""
+        width, height = size or self.size
+        through = self.shown.through
+        if through is not None and through in self.layers.cameras:
+            return fitted(self.layers.cameras[through], width, height)
+        return self.view.camera(width, height)
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass, unless paused; what is too much for one picture is lost."""
+        if self.paused:
+            return
+        self._behind = min(self._behind + seconds, MOST_STEPS * STEP)
+        while self._behind >= STEP * (1 - 1e-6):
+            self._behind -= STEP
+            self.step()
+
+    def step(self) -> None:
+        """Let one step of time pass."""
+        self.motion.advance(STEP)
+        surroundings = Surroundings(
+            head_from_rest=self.world_from_head,
+            wind=self.wind.velocity(),
+            turbulence=self.wind.turbulence,
+            grabs=() if self.hold is None else self.hold.grabs(),
+        )
+        self.tuned.simulator.advance(STEP, surroundings)
+        self.steps += 1
+
+    def reset(self) -> None:
+        """Put head and hair back to rest."""
+        self.motion.stop()
+        self.hold = None
+        self._behind = 0.0
+        self.tuned.simulator.reset(np.eye(4))
+
+    def guide_rows(self) -> Float32Array:
+        """Return (G, m, 3) the present guides in the head frame."""
+        matrix = self.world_from_head
+        points = (self.tuned.simulator.points - matrix[:3, 3]) @ matrix[:3, :3]
+        return self._sampler(points.astype(np.float32))
+
+    def measures(self) -> Measures:
+        """Return the simulator's read-outs."""
+        return self.tuned.simulator.measure()
+
+    def set_hairs(self, count: int) -> None:
+        """Draw so many strands, the guides among them."""
+        self.shown.hairs = count
+        if count > len(self.body) and self._own is None:
+            self._make_body()
+
+    def _take(self, opened: Opened) -> None:
+        guides, self._own = split_guides(opened.groom)
+        self.opened = opened
+        self.tuned = Tuned(self.manager, guides, self._simulator)
+        self.motion = HeadMotion(opened.groom.head.joints[1].astype(np.float64))
+        self.layers = Layers(opened.results, self._capture)
+        self.hold = self.picked = None
+        self.steps, self._behind = 0, 0.0
+        self._make_body()
+
+    def _make_body(self) -> None:
+        groom, strands = self.opened.groom, self.tuned.simulator.strands
+        hairs = max(self.shown.hairs, len(strands))
+        self.body = HairBody.of(strands, groom.head, groom.material, hairs, self._own, self.seed)
+        self._sampler = GuideSampler(strands, self.body.points_each)
+
+
+def fitted(camera: Camera, width: int, height: int) -> Camera:
+    """Return a photo's camera for a picture of another shape: all of the photo is in it."""
+    scale = min(width / camera.width, height / camera.height)
+    focal, centre = camera.focal * scale, camera.centre * scale
+    spare = np.array([width - camera.width * scale, height - camera.height * scale]) / 2
+    return Camera(camera.camera_from_head, focal, centre + spare, width, height, camera.model)
