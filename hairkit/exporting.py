@@ -75,7 +75,8 @@ def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
     cache = None if path is None else read_cache(path, _guides_of(groom))
     if options.hairs > len(groom.strands):
         groom = dense_groom(groom, options.hairs, options.seed)
-    strands = completed(groom).strands
+    groom = completed(groom)
+    strands = groom.strands
     frames = None if cache is None else follow(strands, cache.points)
     keep = _chosen(strands, options.strands) & ~_degenerate(strands)
     if not keep.any():
@@ -83,7 +84,7 @@ def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
     if frames is not None and cache is not None:
         frames = frames[:, keep[strands.strand_of_point]]
         cache = PointCache(frames, cache.times, cache.head_from_rest)
-    return PreparedGroom(selected(completed(groom), keep), cache)
+    return PreparedGroom(selected(groom, keep), cache)
 
 
 def dense_groom(groom: Groom, count: int, seed: int = 0) -> Groom:
@@ -110,6 +111,8 @@ def completed(groom: Groom) -> Groom:
     Defaults: the material's width at every point, the bound root's uv, group 0, all guides.
     """
     strands = groom.strands
+    if not any(value is None for value in _made_up(strands)):
+        return groom
     uv = strands.root_uv
     if uv is None:
         uv = bound_roots(groom).uv
@@ -121,6 +124,10 @@ def completed(groom: Groom) -> Groom:
         strands, widths=widths, root_uv=uv, group=group, guide=guide_mask(strands).copy()
     )
     return replace(groom, strands=full)
+
+
+def _made_up(strands: Strands) -> tuple[object, ...]:
+    return strands.widths, strands.root_uv, strands.group, strands.guide
 
 
 def selected(groom: Groom, keep: BoolArray) -> Groom:
@@ -143,11 +150,27 @@ def bound_roots(groom: Groom) -> Roots:
 def point_colours(groom: Groom) -> Float32Array:
     """Return (P, 3) linear RGB, from the root's colour to the tip's along each strand."""
     strands, look = groom.strands, groom.material
-    owner = strands.strand_of_point
-    rank = np.arange(len(strands.points)) - strands.offsets[:-1][owner]
-    share = (rank / (strands.counts[owner] - 1)).astype(np.float32)[:, None]
-    mixed: Float32Array = look.root_colour * (1 - share) + look.tip_colour * share
-    return mixed
+    counts = strands.counts
+    rank = np.arange(len(strands.points)) - np.repeat(strands.offsets[:-1], counts)
+    share = rank.astype(np.float32) / np.repeat((counts - 1).astype(np.float32), counts)
+    rest = 1 - share
+    colours = np.empty((len(share), 3), np.float32)
+    for channel in range(3):
+        root, tip = look.root_colour[channel], look.tip_colour[channel]
+        np.multiply(rest, root, out=colours[:, channel])
+        colours[:, channel] += tip * share
+    return colours
+
+
+def shorter_than(strands: Strands, length: float) -> BoolArray:
+    """Return (S,) which strands are shorter, metres; most are known by their first segment."""
+    first = strands.offsets[:-1]
+    step = np.linalg.norm(strands.points[first + 1] - strands.points[first], axis=1)
+    doubtful = np.flatnonzero(step < length)
+    short = np.zeros(len(strands), bool)
+    if len(doubtful):
+        short[doubtful] = strands.select(doubtful).lengths() < length
+    return short
 
 
 def _guides_of(groom: Groom) -> Groom:
@@ -162,7 +185,7 @@ def _chosen(strands: Strands, wanted: str) -> BoolArray:
 
 
 def _degenerate(strands: Strands) -> BoolArray:
-    short: BoolArray = strands.lengths() < SHORTEST
+    short = shorter_than(strands, SHORTEST)
     if short.any():
         _log.warning("%d strands without length are not written", np.count_nonzero(short))
     return short

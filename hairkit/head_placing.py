@@ -14,7 +14,7 @@ from hairkit.strands import Strands
 
 _ROUNDS, _STILL = 40, 1e-6
 _INNERMOST = 0.9
-_SAMPLES = 1500
+_SAMPLES = 600
 _PATCH = 0.6
 """Roots that spread over less than this share of the scalp tell nothing about the head's size."""
 _SMALLEST, _LARGEST = 0.7, 1.4

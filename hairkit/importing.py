@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from hairkit.default_head import default_head
 from hairkit.errors import FormatError, InputError
+from hairkit.exporting import shorter_than
 from hairkit.file_space import SpaceOptions
 from hairkit.groom import Groom, HairMaterial
 from hairkit.groom_file import read_groom
@@ -38,13 +39,14 @@ __all__ = [
 
 SMALLEST, LARGEST = 0.015, 0.6
 """Roots of a head of hair spread over between these many metres."""
-NO_LENGTH = 1e-5
-"""Strands shorter than this share of the longest have no direction."""
+NO_LENGTH = 1e-6
+"""Strands shorter than this share of the whole hair's extent have no direction."""
 FARTHEST = 0.03
 """Roots of a head's hair lie within this many metres of it, in the mean."""
 _OUTER = (1.0, 99.0)
 _TYPICAL_SPREAD = 0.2
 _TIP_FIRST = 0.5
+_SAMPLES = 1000
 
 _log = logging.getLogger("hairkit")
 
@@ -162,8 +164,8 @@ def with_mean_width(strands: Strands) -> HairMaterial:
 
 
 def _with_length(strands: Strands, source: object) -> Strands:
-    lengths = strands.lengths()
-    keep = lengths > NO_LENGTH * lengths.max(initial=0.0)
+    extent = float(np.ptp(strands.points, axis=0).max())
+    keep = ~shorter_than(strands, max(NO_LENGTH * extent, float(np.finfo(np.float32).tiny)))
     if not keep.any():
         raise FormatError(f"{source}: none of its {len(keep)} strands has any length")
     if keep.all():
@@ -226,7 +228,8 @@ def _read(path: Path) -> Head:
 
 def _away(points: Float32Array, head: Head) -> float:
     """Return the mean distance of points (N, 3) from the head's vertices, metres."""
-    return float(cKDTree(head.vertices).query(points)[0].mean())
+    sample = points[:: -(-len(points) // _SAMPLES)]
+    return float(cKDTree(head.vertices).query(sample)[0].mean())
 
 
 def _warn_of_tips(strands: Strands, head: Head, source: object) -> None:
