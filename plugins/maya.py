@@ -1,0 +1,133 @@
+"""Maya ASCII .ma: every strand as a NURBS curve of degree 1, which XGen takes as guides.
+
+The scene needs no plugin: transforms `guides` and `hair` (one for each group of the groom, where it
+has several) below `groom`, with one curve a strand. Written only; widths, root uv, colour and the
+head go by Alembic, USD or FBX.
+Source: Autodesk's description of Maya ASCII files and of `setAttr -type nurbsCurve`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.exporting import ExportOptions, prepared
+from hairkit.file_format import Feature, FileFormat
+from hairkit.file_space import SPACES, FileSpace, SpaceOptions
+from hairkit.groom import Groom
+from hairkit.hookspecs import hookimpl
+from hairkit.options import option
+from hairkit.stored import BoolArray, Float32Array, write_bytes
+from hairkit.strands import Strands
+
+FORMAT = FileFormat(
+    title="Maya ASCII",
+    suffixes=(".ma",),
+    written=frozenset({Feature.POINTS, Feature.COUNTS, Feature.GUIDE, Feature.GROUP}),
+)
+
+UNITS = {0.001: "millimeter", 0.01: "centimeter", 1.0: "meter", 0.0254: "inch", 0.3048: "foot"}
+"""Maya's names of units, by their metres."""
+_TOP = "groom"
+_HEADER = """//Maya ASCII 2018 scene
+//hairkit: strands as curves of degree 1
+requires maya "2018";
+currentUnit -l {unit} -a degree -t film;
+createNode transform -n "{top}";
+"""
+
+
+@dataclass(frozen=True)
+class Options(SpaceOptions, ExportOptions):
+    """Settings of the Maya exporter."""
+
+    axis: str = option(
+        "y_up_centimetres",
+        choices=tuple(name for name in SPACES if name != "unreal"),
+        doc="Axes and unit of the scene; Z up is for a Maya whose up axis is set to Z.",
+    )
+
+
+@hookimpl
+def export_groom(groom: Groom, path: Path, options: Options) -> bool:
+    """Write the strands as a Maya scene of curves."""
+    space = options.space
+    unit = _unit(space)
+    strands = prepared(groom, options).groom.strands
+    parts = [_HEADER.format(unit=unit, top=_TOP), *_scene(strands, space)]
+    write_bytes(path, "".join(parts).encode("ascii"))
+    return True
+
+
+def _unit(space: FileSpace) -> str:
+    """Return Maya's name of the file's unit."""
+    for metres, name in UNITS.items():
+        if abs(space.metres - metres) < 1e-6 * metres:
+            return name
+    raise InputError(
+        f"a unit of {space.metres:g} m has no name in Maya; scale must be one of"
+        f" {', '.join(f'{metres:g} ({name})' for metres, name in UNITS.items())}"
+    )
+
+
+def _scene(strands: Strands, space: FileSpace) -> Iterator[str]:
+    """Yield the groups, each with its curves."""
+    points = space.points_to_file(strands.points)
+    for kind, chosen in _kinds(strands):
+        assert strands.group is not None
+        groups = np.unique(strands.group[chosen])
+        for group in groups.tolist():
+            name = kind.group if len(groups) == 1 else _numbered(kind.group, group)
+            yield f'createNode transform -n "{name}" -p "|{_TOP}";\n'
+            index = np.flatnonzero(chosen & (strands.group == group))
+            yield from _curves(strands, points, index.tolist(), name, kind.curve)
+
+
+@dataclass(frozen=True)
+class _Kind:
+    group: str
+    curve: str
+
+
+def _kinds(strands: Strands) -> list[tuple[_Kind, BoolArray]]:
+    assert strands.guide is not None
+    return [(_Kind("guides", "guide"), strands.guide), (_Kind("hair", "hair"), ~strands.guide)]
+
+
+def _numbered(name: str, number: int) -> str:
+    """Return a name of letters, digits and underscores, as Maya's are."""
+    return f"{name}_{number}" if number >= 0 else f"{name}_minus{-number}"
+
+
+def _curves(
+    strands: Strands, points: Float32Array, index: list[int], parent: str, kind: str
+) -> Iterator[str]:
+    """Yield the text of the curves; strand numbers are in the names, all with as many digits."""
+    digits = len(str(len(strands) - 1))
+    offsets = strands.offsets.tolist()
+    for strand in index:
+        rows = points[offsets[strand] : offsets[strand + 1]]
+        name = f"{kind}_{strand:0{digits}}"
+        yield _template(len(rows)) % (name, parent, name, parent, name, *rows.ravel().tolist())
+
+
+@cache
+def _template(count: int) -> str:
+    """Return the text of a curve of `count` points, with places for names and coordinates.
+
+    Degree, spans, form (0 open), rational, dimensions; as many knots as points, 0, 1, 2 ...
+    """
+    return (
+        f'createNode transform -n "%s" -p "|{_TOP}|%s";\n'
+        f'createNode nurbsCurve -n "%sShape" -p "|{_TOP}|%s|%s";\n'
+        '\tsetAttr -k off ".v";\n'
+        '\tsetAttr ".cc" -type "nurbsCurve"\n'
+        f"\t\t1 {count - 1} 0 no 3\n"
+        f"\t\t{count} {' '.join(map(str, range(count)))}\n"
+        f"\t\t{count}\n" + "\t\t%.9g %.9g %.9g\n" * count + "\t\t;\n"
+    )
