@@ -9,14 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.errors import InputError
+from hairkit.cli.convert import add_reader_arguments, reader_settings
+from hairkit.cli.export import assigned, load_groom, plugin_for
+from hairkit.errors import FormatError, InputError
+from hairkit.guide_weights import guide_mask
+from hairkit.manager import Manager
 from hairkit.stored import Float32Array
 
 _DESCRIPTION = """\
 Example: hairkit info out/groom.npz
 
-Say what a file holds: a groom (.npz or what an import plugin reads), a scene.json, a head (.obj,
-.ply, .glb), or a capture's folder. Lengths are in metres."""
+Say what a file holds: a groom (.npz or what an import plugin reads; --scale, --up and --set say
+what bare strands leave open), a scene.json, a head (.obj, .ply, .glb), or a capture's folder.
+Lengths are in metres."""
 
 _HEADS = (".obj", ".ply", ".glb")
 
@@ -28,8 +33,9 @@ def register(subparsers: Any) -> None:
     parser.add_argument(
         "--head-units", default="m", metavar="U", help="units of a head file (default m)"
     )
+    add_reader_arguments(parser)
     parser.add_argument(
-        "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
+        "--set", action="append", default=[], metavar="X=V", help="option=V of the import plugin"
     )
     parser.add_argument("--json", action="store_true", help="print for machines")
 
@@ -48,33 +54,37 @@ def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
         raise InputError(f"{path}: no such file")
     if path.suffix == ".json":
         return _scene(path)
-    if path.suffix.lower() in _HEADS:
+    if path.suffix.lower() not in _HEADS:
+        return _groom(path, args)
+    try:
+        return _groom(path, args)
+    except FormatError:  # no strands in it, so it is a head
         return _head_file(path, args.head_units)
-    return _groom(path, args.plugin)
 
 
-def _groom(path: Path, plugin_files: list[str]) -> dict[str, Any]:
-    from hairkit.groom_file import read_groom
-
-    if path.suffix == ".npz":
-        groom = read_groom(path)
-    else:
-        from hairkit.cli.export import plugin_for
-        from hairkit.manager import Manager
-
-        manager = Manager.loaded(plugin_files)
-        groom = manager.call("import_groom", plugin_for(manager, "import_groom", path), path=path)
-    lengths, counts = groom.strands.lengths(), groom.strands.counts
+def _groom(path: Path, args: argparse.Namespace) -> dict[str, Any]:
+    manager = Manager.loaded(args.plugin)
+    reader = args.reader or plugin_for(manager, "import_groom", path)
+    settings = reader_settings(manager, reader, args) | assigned(args.set, reader)
+    groom = load_groom(manager, path, settings, reader)
+    strands = groom.strands
+    lengths, counts = strands.lengths(), strands.counts
     look = groom.material
     return {
         "kind": "groom",
-        "strands": len(groom.strands),
-        "points": len(groom.strands.points),
+        "strands": len(strands),
+        "guides": int(np.count_nonzero(guide_mask(strands))),
+        "points": len(strands.points),
         "points_per_strand": _range(counts),
         "length_m": _range(lengths),
         "mean_length_m": round(float(lengths.mean()), 4) if len(lengths) else None,
-        "bounds_m": _bounds(groom.strands.points),
+        "bounds_m": _bounds(strands.points),
         "width_m": look.width,
+        "has": [
+            name
+            for name in ("widths", "root_uv", "group", "guide")
+            if getattr(strands, name) is not None
+        ],
         "root_colour": [round(float(c), 4) for c in look.root_colour],
         "tip_colour": [round(float(c), 4) for c in look.tip_colour],
         "head": _head(groom.head),
