@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.byte_reader import ByteReader, finite
+from hairkit.byte_reader import finite
 from hairkit.stored import Float32Array, Float64Array, Int64Array
 
-from .ogawa import Ogawa
+from .ogawa import Headers, Ogawa
 
 _PODS = "?,u1,i1,u2,i2,u4,i4,u8,i8,f2,f4,f8".replace(",", " <").split()
 """NumPy's name of each plain type, by Alembic's number; strings (12, 13) are not read."""
@@ -54,7 +54,7 @@ class Property:
         numbers = self._first_sample("f")
         if numbers is None:
             return None
-        source = self.archive.file.reader.source
+        source = self.archive.file.source
         result: Float64Array = finite(numbers, source, self.name).astype(np.float64)
         return result
 
@@ -65,7 +65,7 @@ class Property:
             wide = self.floats()
             with np.errstate(over="ignore"):
                 return None if wide is None else wide.astype(np.float32)
-        return finite(numbers, self.archive.file.reader.source, self.name)
+        return finite(numbers, self.archive.file.source, self.name)
 
     def integers(self) -> Int64Array | None:
         """Return (N, extent) the first sample; None where there is none."""
@@ -84,8 +84,8 @@ class Property:
         if len(raw) < _KEY_BYTES + size:
             return None
         if (len(raw) - _KEY_BYTES) % size:
-            raise file.reader.error(f"{self.name} is cut within a number")
-        return np.frombuffer(raw[_KEY_BYTES:].data, dtype).reshape(-1, self.extent)
+            raise file.error(f"{self.name} is cut within a number")
+        return np.frombuffer(raw[_KEY_BYTES:], dtype).reshape(-1, self.extent)
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Object:
     archive: Archive
     name: str
     metadata: str
-    children: list[int]
+    children: tuple[int, ...]
     """Its group: properties, child objects, data of their headers."""
 
     def properties(self) -> dict[str, Property]:
@@ -111,10 +111,10 @@ class Object:
         child = 0
         while headers.left > _HASH_BYTES:
             child += 1
-            name = headers.text(headers.number("<u4", "length of a name"), "name of an object")
-            metadata = self.archive.metadata_text(headers, headers.number("u1", name), 4)
+            name = headers.text(headers.number(4, "length of a name"), "name of an object")
+            metadata = self.archive.metadata_text(headers, headers.number(1, name), 4)
             if child >= len(self.children) - 1:
-                raise headers.error(f"{self.name} has fewer objects than headers")
+                raise headers.file.error(f"{self.name} has fewer objects than headers")
             group = file.group(self.children[child], name)
             yield Object(self.archive, name, metadata, group)
 
@@ -126,11 +126,11 @@ class Archive:
         self.file = file
         self.children = file.group(file.root, "root group")
         if len(self.children) < _ROOT_CHILDREN:
-            raise file.reader.error(f"the root group has {len(self.children)} parts, expected 6")
+            raise file.error(f"the root group has {len(self.children)} parts, expected 6")
         self.metadata = [""]
         reader = file.headers(self.children[5], "metadata")
         while reader.left:
-            length = reader.number("u1", "length of metadata")
+            length = reader.number(1, "length of metadata")
             self.metadata.append(reader.text(length, "metadata"))
 
     @classmethod
@@ -151,35 +151,35 @@ class Archive:
         found: list[Property] = []
         while headers.left:
             if len(found) >= len(children) - 1:
-                raise headers.error("there are fewer properties than headers")
+                raise headers.file.error("there are fewer properties than headers")
             found.append(self._header(headers, children[len(found)]))
         return {header.name: header for header in found}
 
-    def metadata_text(self, reader: ByteReader, index: int, size: int) -> str:
+    def metadata_text(self, reader: Headers, index: int, size: int) -> str:
         """Return metadata by its number in the file's table, or from here in `size` bytes."""
         if index == _LONG_METADATA:
-            length = reader.number(f"<u{size}", "length of metadata")
+            length = reader.number(size, "length of metadata")
             return reader.text(length, "metadata")
         if index >= len(self.metadata):
-            raise reader.error(f"metadata {index} of {len(self.metadata)}")
+            raise reader.file.error(f"metadata {index} of {len(self.metadata)}")
         return self.metadata[index]
 
-    def _header(self, reader: ByteReader, child: int) -> Property:
+    def _header(self, reader: Headers, child: int) -> Property:
         """Read one property header; the numbers in it are 1, 2 or 4 bytes wide, as it says."""
-        info = reader.number("<u4", "property header")
+        info = reader.number(4, "property header")
         kind, hint = info & 3, info >> 2 & 3
         if hint > 2:
-            raise reader.error("property header has numbers of an unknown size")
-        number = f"<u{1 << hint}"
+            raise reader.file.error("property header has numbers of an unknown size")
+        width = 1 << hint
         samples = 0
         if kind:
-            samples = reader.number(number, "number of samples")
+            samples = reader.number(width, "number of samples")
             # first and last changed sample, and the time sampling, where the flags say so
             for flag, name in ((0x200, "changed"), (0x200, "changed"), (0x100, "sampling")):
                 if info & flag:
-                    reader.number(number, name)
-        name = reader.text(reader.number(number, "length of a name"), "name of a property")
-        metadata = self.metadata_text(reader, info >> 20 & 0xFF, 1 << hint)
+                    reader.number(width, name)
+        name = reader.text(reader.number(width, "length of a name"), "name of a property")
+        metadata = self.metadata_text(reader, info >> 20 & 0xFF, width)
         return Property(
             self, name, metadata, kind, info >> 4 & 15, info >> 12 & 0xFF, samples, child
         )

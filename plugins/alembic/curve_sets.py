@@ -19,6 +19,7 @@ from .transforms import transformed
 
 _LINEAR, _NON_PERIODIC = 1, 0
 _MOST_LEVELS = 100
+_IDENTITY = np.eye(4)
 
 _log = logging.getLogger("hairkit")
 
@@ -71,11 +72,11 @@ def read_curve_sets(path: Path) -> list[CurveSet]:
 
 def _walk(archive: Archive) -> Iterator[tuple[Object, Float64Array]]:
     """Yield every object and its transform to the world, parents first, in the file's order."""
-    waiting: list[tuple[Object, Float64Array, int]] = [(archive.top(), np.eye(4), 0)]
+    waiting: list[tuple[Object, Float64Array, int]] = [(archive.top(), _IDENTITY, 0)]
     while waiting:
         node, above, level = waiting.pop()
         if level > _MOST_LEVELS:
-            raise archive.file.reader.error(f"objects lie more than {_MOST_LEVELS} levels deep")
+            raise archive.file.error(f"objects lie more than {_MOST_LEVELS} levels deep")
         world = transformed(above, node)
         yield node, world
         below = [(child, world, level + 1) for child in node.objects()]
@@ -115,10 +116,10 @@ def _curve_set(node: Object, world: Float64Array) -> CurveSet | None:
 def _counts(found: dict[str, Property], points: Float32Array, node: Object) -> Int64Array:
     counts = found["nVertices"].integers() if "nVertices" in found else None
     if points.shape[1] != 3 or counts is None or counts.min() < 0:
-        raise node.archive.file.reader.error(f"{node.name} has no points or counts of points")
+        raise node.archive.file.error(f"{node.name} has no points or counts of points")
     # each count is at most the number of points, so that their sum cannot overflow
     if counts.max() > len(points) or counts.sum() != len(points):
-        raise node.archive.file.reader.error(
+        raise node.archive.file.error(
             f"{node.name} has {len(points)} points, its curves ask for another number"
         )
     result: Int64Array = counts[:, 0]
@@ -133,7 +134,7 @@ def _polyline(kind: Property | None) -> bool:
 
 
 def _moved(points: Float32Array, world: Float64Array) -> Float32Array:
-    if np.array_equal(world, np.eye(4)):
+    if np.array_equal(world, _IDENTITY):
         return points
     with np.errstate(over="ignore", invalid="ignore"):
         moved: Float32Array = (points @ world[:3, :3] + world[3, :3]).astype(np.float32)
@@ -142,6 +143,8 @@ def _moved(points: Float32Array, world: Float64Array) -> Float32Array:
 
 def _scaled(widths: Float32Array, world: Float64Array) -> Float32Array:
     """Return widths times the mean scale of the transform."""
+    if np.array_equal(world, _IDENTITY):
+        return widths
     with np.errstate(over="ignore", invalid="ignore"):
         scale = np.cbrt(np.abs(np.linalg.det(world[:3, :3])))
         scaled: Float32Array = (widths * scale).astype(np.float32)
@@ -187,7 +190,7 @@ class _Values:
         index = parts[".indices"].integers() if ".indices" in parts else None
         if values is not None and index is not None:
             if index.min() < 0 or index.max() >= len(values):
-                raise self.node.archive.file.reader.error(f"{header.name} has bad indices")
+                raise self.node.archive.file.error(f"{header.name} has bad indices")
             values = values[index[:, 0]]
         if values is None or values.shape[1] != extent:
             if header.samples:
@@ -201,7 +204,7 @@ class _Values:
         fitting = [scope for scope, size in sizes.items() if size == have]
         said = "" if header is None else header.tag("geoScope")
         if not fitting:
-            raise self.node.archive.file.reader.error(
+            raise self.node.archive.file.error(
                 f"{self.node.name} has {have} values of {header.name if header else ''} for"
                 f" {sizes['uni']} curves of {sizes['vtx']} points"
             )

@@ -8,13 +8,11 @@ Source: Ogawa of Alembic 1.8. Little-endian throughout.
 from __future__ import annotations
 
 import os
+import struct
 from pathlib import Path
 
-import numpy as np
-
-from hairkit.byte_reader import ByteReader, read_file
+from hairkit.byte_reader import read_file
 from hairkit.errors import FormatError, InputError
-from hairkit.stored import UInt8Array
 
 _MAGIC, _HDF5, _FROZEN = b"Ogawa", b"\x89HDF", 0xFF
 _HEADER_BYTES = 16
@@ -27,7 +25,7 @@ class Ogawa:
     """A file in memory; a child is a position, with the top bit set where it is data."""
 
     def __init__(self, data: bytes, source: str | os.PathLike[str]) -> None:
-        self.reader = ByteReader(data, source)
+        self.bytes, self.source = data, source
         self.structure_left = _STRUCTURE[0] * len(data) + _STRUCTURE[1]
         self.samples_left = _SAMPLES[0] * len(data) + _SAMPLES[1]
         head = data[:_HEADER_BYTES]
@@ -47,46 +45,83 @@ class Ogawa:
         """Read a file; raises `InputError` when it is missing, `FormatError` when not Ogawa."""
         return cls(read_file(path), path)
 
-    def group(self, child: int, name: str) -> list[int]:
+    def group(self, child: int, name: str) -> tuple[int, ...]:
         """Return the children of a group; 0 is an empty group."""
         if is_data(child):
-            raise self.reader.error(f"{name} is data, expected a group")
+            raise self.error(f"{name} is data, expected a group")
         if child == 0:
-            return []
-        self.reader.seek(child, name)
-        count = int(self.reader.number("<u8", name))
-        children = self.reader.array("<u8", count, name)
+            return ()
+        count = self._size(child, 8, name)
         self._spend_structure(8 * count + 8, name)
-        return [int(child) for child in children]
+        return struct.unpack_from(f"<{count}Q", self.bytes, child + 8)
 
-    def headers(self, child: int, name: str) -> ByteReader:
+    def headers(self, child: int, name: str) -> Headers:
         """Return a reader of a block of headers."""
-        raw = self._block(child, name).tobytes()
-        self._spend_structure(len(raw) + 8, name)
-        return ByteReader(raw, self.reader.source)
+        start, size = self._block(child, name)
+        self._spend_structure(size + 8, name)
+        return Headers(self.bytes[start : start + size], self)
 
-    def sample(self, child: int, name: str) -> UInt8Array:
-        """Return a block of numbers as bytes, without a copy; position 0 is an empty block."""
-        raw = self._block(child, name)
-        self.samples_left -= len(raw)
+    def sample(self, child: int, name: str) -> memoryview:
+        """Return a block of numbers as bytes, without a copy."""
+        start, size = self._block(child, name)
+        self.samples_left -= size
         if self.samples_left < 0:
-            raise self.reader.error(f"{name} and others share their numbers again and again")
-        return raw
+            raise self.error(f"{name} and others share their numbers again and again")
+        return memoryview(self.bytes)[start : start + size]
 
-    def _block(self, child: int, name: str) -> UInt8Array:
+    def error(self, reason: str) -> FormatError:
+        """Return the error to raise: it names the file."""
+        return FormatError(f"{self.source}: damaged, or of an unknown Alembic version: {reason}")
+
+    def _block(self, child: int, name: str) -> tuple[int, int]:
+        """Return where a block of data begins, and its bytes; position 0 is an empty block."""
         if not is_data(child):
-            raise self.reader.error(f"{name} is a group, expected data")
+            raise self.error(f"{name} is a group, expected data")
         if child == _IS_DATA:
-            return np.zeros(0, np.uint8)
-        self.reader.seek(child ^ _IS_DATA, name)
-        size = int(self.reader.number("<u8", name))
-        result: UInt8Array = self.reader.array(np.uint8, size, name)
-        return result
+            return 0, 0
+        at = child ^ _IS_DATA
+        return at + 8, self._size(at, 1, name)
+
+    def _size(self, at: int, item: int, name: str) -> int:
+        """Return the number of items of so many bytes that a group or block says it has."""
+        left = len(self.bytes) - at - 8
+        if left < 0:
+            raise self.error(f"{name} would be at byte {at} of {len(self.bytes)}")
+        size = int.from_bytes(self.bytes[at : at + 8], "little")
+        if size * item > left:
+            raise self.error(f"{name} would be {size} x {item} bytes, but {left} are left")
+        return size
 
     def _spend_structure(self, size: int, name: str) -> None:
         self.structure_left -= size
         if self.structure_left < 0:
-            raise self.reader.error(f"{name} and others are pointed at again and again")
+            raise self.error(f"{name} and others are pointed at again and again")
+
+
+class Headers:
+    """A place in a block of headers, which moves on as they are read."""
+
+    def __init__(self, data: bytes, file: Ogawa) -> None:
+        self.bytes, self.file, self.at = data, file, 0
+
+    @property
+    def left(self) -> int:
+        """Bytes from here to the block's end."""
+        return len(self.bytes) - self.at
+
+    def number(self, size: int, name: str) -> int:
+        """Return the whole number in the next `size` bytes."""
+        return int.from_bytes(self._next(size, name), "little")
+
+    def text(self, size: int, name: str) -> str:
+        """Return the text in the next `size` bytes."""
+        return self._next(size, name).decode("utf-8", "replace")
+
+    def _next(self, size: int, name: str) -> bytes:
+        if size > self.left:
+            raise self.file.error(f"{name} has {size} bytes, but {self.left} are left")
+        self.at += size
+        return self.bytes[self.at - size : self.at]
 
 
 def is_data(child: int) -> bool:

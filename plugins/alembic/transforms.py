@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.byte_reader import ByteReader
 from hairkit.stored import Float64Array, Int64Array
 
 from .archive import Object
+from .ogawa import Ogawa
 
 _SCALE, _TRANSLATE, _ROTATE, _MATRIX, _ROTATE_X, _ROTATE_Y, _ROTATE_Z = range(7)
 _SIZES = {_SCALE: 3, _TRANSLATE: 3, _ROTATE: 4, _MATRIX: 16}
@@ -44,12 +44,12 @@ def transformed(world: Float64Array, node: Object) -> Float64Array:
     own = np.eye(4)
     if operations is not None:
         numbers = np.zeros(0) if numbers is None else numbers.ravel()
-        own = _stack(operations.ravel() >> 4, numbers, node.archive.file.reader)
+        own = _stack(operations.ravel() >> 4, numbers, node.archive.file)
     with np.errstate(over="ignore", invalid="ignore"):
         return own @ world if inherits is None or inherits[0, 0] else own
 
 
-def _stack(operations: Int64Array, numbers: Float64Array, file: ByteReader) -> Float64Array:
+def _stack(operations: Int64Array, numbers: Float64Array, file: Ogawa) -> Float64Array:
     result, at = np.eye(4), 0
     for operation in operations.tolist():
         size = _SIZES.get(operation, 0)
