@@ -1,4 +1,4 @@
-"""`hairkit view GROOM`: a window in which captured hair moves like hair, or a script without one."""
+"""`hairkit view GROOM`: a window in which captured hair moves, or a script without one."""
 
 from __future__ import annotations
 
@@ -20,9 +20,7 @@ would do: hairkit view out/ --headless --script steps.toml --out pictures/"""
 
 def register(subparsers: Any) -> None:
     """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "view", help="show a groom in motion", description=_DESCRIPTION
-    )
+    parser = subparsers.add_parser("view", help="show a groom in motion", description=_DESCRIPTION)
     add = parser.add_argument
     add("groom", metavar="GROOM", type=Path, help="groom.npz, importable file or folder of results")
     add("--capture", type=Path, metavar="FOLDER", help="the photos, to show them in space")

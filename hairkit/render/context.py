@@ -61,8 +61,10 @@ class Renderer:
 
     def forget_programs(self) -> None:
         """Compile every shader anew when it is next asked for, as its file then is."""
-        for program in (*self._programs.values(), *self._computes.values()):
+        for program in self._programs.values():
             program.release()
+        for compute in self._computes.values():
+            compute.release()
         self._programs, self._computes = {}, {}
 
     def compute(self, name: str) -> moderngl.ComputeShader:

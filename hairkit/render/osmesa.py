@@ -25,6 +25,7 @@ class OSMesaContext:
         if not self._context:
             raise RenderError("OSMesa offers no OpenGL 4.3 core context")
         self._pixel = (ctypes.c_ubyte * 4)()
+        self._depth = 0
         self._make_current()
 
     def load(self, name: str) -> int:
@@ -38,10 +39,14 @@ class OSMesaContext:
             self._context = None
 
     def __enter__(self) -> OSMesaContext:
+        self._depth += 1
         self._make_current()
         return self
 
     def __exit__(self, *exception: object) -> None:
+        self._depth -= 1
+        if self._depth:  # an outer block goes on drawing
+            return
         self._library.OSMesaMakeCurrent(None, None, 0, 0, 0)
 
     def _make_current(self) -> None:

@@ -7,17 +7,13 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
-import typing
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hairkit.errors import InputError
-from hairkit.options import make_options, unknown_name
+from hairkit.options import unknown_name
+from hairkit.viewer.action_table import ACTIONS, action, bindings, perform
 from hairkit.viewer.colouring import COLOURINGS
 from hairkit.viewer.hair_body import MAX_HAIRS
 from hairkit.viewer.motion import AXES, Shake
@@ -26,104 +22,37 @@ from hairkit.viewer.presets import presets_path, read_preset, write_preset
 from hairkit.viewer.recording import Recorder
 from hairkit.viewer.session import Session
 
+__all__ = ["ACTIONS", "LOOKS", "bindings", "perform"]
+
 LOOKS = {"front": (0.0, 0.0), "side": (90.0, 0.0), "back": (180.0, 0.0), "top": (0.0, 89.0)}
 """Named views: azimuth and elevation, degrees."""
 MAX_SECONDS = 3600.0
 
-_Do = Callable[..., None]
 
-
-@dataclass(frozen=True)
-class Action:
-    """One thing the user can do."""
-
-    name: str
-    do: _Do
-    """Takes the session, then the values."""
-    doc: str
-    """One line for help sheet and manual."""
-    values: type[Any]
-    """Dataclass of the values that it takes."""
-    keys: Mapping[str, Mapping[str, object]]
-    """Keys that do it, and the values that they give."""
-
-
-ACTIONS: dict[str, Action] = {}
-"""All actions by name."""
-
-
-def perform(session: Session, name: str, values: Mapping[str, object] | None = None) -> None:
-    """Do one action.
-
-    Raises
-    ------
-    InputError, OptionError
-        There is no such action, a value is unknown, missing or refused, or it cannot be done here.
-    """
-    if name not in ACTIONS:
-        raise InputError(unknown_name("action", name, sorted(ACTIONS)))
-    action = ACTIONS[name]
-    given = dict(values or {})
-    checked = make_options(action.values, given, name)
-    wanted = {f.name: getattr(checked, f.name) for f in dataclasses.fields(action.values)}
-    missing = [key for key, value in wanted.items() if value is _MISSING]
-    if missing:
-        raise InputError(f"{name}: no value for {', '.join(missing)}")
-    action.do(session, **wanted)
-
-
-def bindings() -> dict[str, tuple[str, Mapping[str, object]]]:
-    """Return what each key does: action and values."""
-    return {
-        key: (action.name, values)
-        for action in ACTIONS.values()
-        for key, values in action.keys.items()
-    }
-
-
-_MISSING: Any = inspect.Parameter.empty
-
-
-def _action(**keys: Mapping[str, object]) -> Callable[[_Do], _Do]:
-    """Put a function into the table under its name; keys are written as in `keyboard.KEYS`."""
-
-    def add(do: _Do) -> _Do:
-        hints = typing.get_type_hints(do)
-        fields = []
-        for name, parameter in list(inspect.signature(do).parameters.items())[1:]:
-            fields.append((name, hints[name], dataclasses.field(default=parameter.default)))
-        kind = dataclasses.make_dataclass(do.__name__, fields, frozen=True)
-        doc = (inspect.getdoc(do) or "").partition("\n")[0]
-        ACTIONS[do.__name__] = Action(do.__name__, do, doc, kind, keys)
-        return do
-
-    return add
-
-
-@_action()
+@action()
 def orbit(session: Session, right: float = 0.0, up: float = 0.0) -> None:
-    """Turn the camera around the hair, degrees to its right and up."""
+    """Turn the camera around the hair, by degrees to its right and up."""
     session.shown.through = None
     session.view = session.view.orbited(right, up)
 
 
-@_action()
+@action()
 def pan(session: Session, right: float = 0.0, down: float = 0.0) -> None:
     """Slide the picture, in shares of its height."""
     session.shown.through = None
     session.view = session.view.panned(right, down)
 
 
-@_action(PAGE_UP={"factor": 1.15}, PAGE_DOWN={"factor": 1 / 1.15})
+@action(PAGE_UP={"factor": 1.15}, PAGE_DOWN={"factor": 1 / 1.15})
 def zoom(session: Session, factor: float) -> None:
-    """Go `factor` times nearer."""
+    """Go nearer, or away."""
     if not factor > 0:
         raise InputError(f"zoom: factor is {factor}, expected a number above 0")
     session.shown.through = None
     session.view = session.view.zoomed(factor)
 
 
-@_action()
+@action()
 def recentre(session: Session, x: float, y: float) -> None:
     """Look at what is under a pixel."""
     camera = session.camera()
@@ -137,9 +66,7 @@ def recentre(session: Session, x: float, y: float) -> None:
         session.view = session.view.centred(point)
 
 
-@_action(
-    N1={"name": "front"}, N3={"name": "side"}, N7={"name": "top"}, N9={"name": "back"}
-)
+@action(N1={"name": "front"}, N3={"name": "side"}, N7={"name": "top"}, N9={"name": "back"})
 def look(session: Session, name: str) -> None:
     """Look from the front, side, top or back."""
     if name not in LOOKS:
@@ -149,15 +76,15 @@ def look(session: Session, name: str) -> None:
     session.view = dataclasses.replace(session.view, azimuth=azimuth, elevation=elevation)
 
 
-@_action(HOME={})
+@action(HOME={})
 def frame(session: Session) -> None:
     """Show all of the hair again."""
     session.frame()
 
 
-@_action(N={"step": 1}, B={"step": -1})
+@action(N={"step": 1}, B={"step": -1})
 def through(session: Session, name: str = "", step: int = 0) -> None:
-    """Look through the camera of a photo, by name or the next one; without both, leave it."""
+    """Look through the camera of a photo: the next one, or by name; without either, leave it."""
     names = list(session.layers.cameras)
     if not names:
         raise InputError("there are no photos' cameras here; open the folder of a reconstruction")
@@ -169,26 +96,26 @@ def through(session: Session, name: str = "", step: int = 0) -> None:
     session.shown.through = name or None
 
 
-@_action(SPACE={})
+@action(SPACE={})
 def pause(session: Session, on: bool | None = None) -> None:
     """Stop time, or let it go on."""
     session.paused = not session.paused if on is None else on
 
 
-@_action(PERIOD={})
+@action(PERIOD={})
 def step(session: Session) -> None:
     """Stop time and let one sixtieth of a second pass."""
     session.paused = True
     session.step()
 
 
-@_action(R={})
+@action(R={})
 def reset(session: Session) -> None:
     """Put head and hair back to rest."""
     session.reset()
 
 
-@_action()
+@action()
 def run(session: Session, seconds: float) -> None:
     """Let a script wait while time passes and pictures are recorded."""
     if not 0 <= seconds <= MAX_SECONDS:
@@ -196,7 +123,7 @@ def run(session: Session, seconds: float) -> None:
     session.pending += seconds
 
 
-@_action(W={})
+@action(W={})
 def wind(
     session: Session,
     on: bool | None = None,
@@ -204,7 +131,7 @@ def wind(
     azimuth: float | None = None,
     turbulence: float | None = None,
 ) -> None:
-    """Let the wind blow or not: metres per second, degrees it comes from, share of gusts."""
+    """Let the wind blow or not."""
     air = session.wind
     air.blowing = not air.blowing if on is None else on
     air.speed = air.speed if speed is None else float(np.clip(speed, 0, 60))
@@ -212,20 +139,20 @@ def wind(
     air.turbulence = air.turbulence if turbulence is None else float(np.clip(turbulence, 0, 5))
 
 
-@_action(
+@action(
     LEFT={"degrees": -15.0},
     RIGHT={"degrees": 15.0},
     UP={"faster": 1.0},
     DOWN={"faster": -1.0},
 )
 def wind_change(session: Session, degrees: float = 0.0, faster: float = 0.0) -> None:
-    """Turn the wind by degrees, make it faster by metres per second; it blows then."""
+    """Turn the wind by degrees, make it faster by metres per second."""
     air = session.wind
     azimuth = (air.azimuth + degrees + 180.0) % 360.0 - 180.0
     wind(session, on=True, speed=air.speed + faster, azimuth=azimuth)
 
 
-@_action(S={})
+@action(S={})
 def shake(
     session: Session,
     axis: str = "yaw",
@@ -239,7 +166,7 @@ def shake(
     session.motion.shakes.append(Shake(axis, float(np.radians(degrees)), hertz, seconds))
 
 
-@_action(
+@action(
     J={"yaw": -20.0}, L={"yaw": 20.0}, I={"pitch": -10.0}, K={"pitch": 10.0}, Y={"straight": True}
 )
 def turn(
@@ -255,7 +182,7 @@ def turn(
         session.motion.turn[axis] = float(np.clip(now + np.radians(degrees), -2.0, 2.0))
 
 
-@_action()
+@action()
 def grab(session: Session, x: float, y: float) -> None:
     """Take the lock under a pixel into the hand."""
     simulator = session.tuned.simulator
@@ -265,20 +192,20 @@ def grab(session: Session, x: float, y: float) -> None:
         session.message = "no hair there to grab"
 
 
-@_action()
+@action()
 def drag(session: Session, x: float, y: float) -> None:
     """Move the hand that holds hair to a pixel."""
     if session.hold is not None:
         session.hold = session.hold.moved(session.camera(), (x, y))
 
 
-@_action()
+@action()
 def release(session: Session) -> None:
     """Let go of the hair."""
     session.hold = None
 
 
-@_action()
+@action()
 def pick(session: Session, x: float, y: float) -> None:
     """Tell the numbers of the guide under a pixel; beside hair: of none."""
     simulator = session.tuned.simulator
@@ -286,7 +213,7 @@ def pick(session: Session, x: float, y: float) -> None:
     session.picked = None if picked is None else int(simulator.strands.strand_of_point[picked])
 
 
-@_action(LEFT_BRACKET={"times": 0.8}, RIGHT_BRACKET={"times": 1.25})
+@action(LEFT_BRACKET={"times": 0.8}, RIGHT_BRACKET={"times": 1.25})
 def hairs(session: Session, count: int = 0, times: float = 1.0) -> None:
     """Draw so many hairs, or so many times more."""
     wanted = count or round(session.shown.hairs * times)
@@ -294,15 +221,15 @@ def hairs(session: Session, count: int = 0, times: float = 1.0) -> None:
     session.message = f"{session.shown.hairs} hairs"
 
 
-@_action(G={})
+@action(G={})
 def guides(session: Session, only: bool | None = None) -> None:
     """Show the guides alone."""
     session.shown.guides_only = not session.shown.guides_only if only is None else only
 
 
-@_action(D={})
+@action(D={})
 def colours(session: Session, by: str = "") -> None:
-    """Colour by hair, direction, length, stretch, curvature or confidence; the next without one."""
+    """Colour by hair, direction, length, stretch, curvature, confidence."""
     if by and by not in COLOURINGS:
         raise InputError(unknown_name("colouring", by, COLOURINGS))
     after = COLOURINGS[(COLOURINGS.index(session.shown.colours) + 1) % len(COLOURINGS)]
@@ -310,7 +237,7 @@ def colours(session: Session, by: str = "") -> None:
     session.message = f"coloured by {session.shown.colours}"
 
 
-@_action(
+@action(
     F2={"name": "photos"},
     F3={"name": "masks"},
     F4={"name": "orientation"},
@@ -320,32 +247,32 @@ def colours(session: Session, by: str = "") -> None:
     F9={"name": "head"},
 )
 def layer(session: Session, name: str, on: bool | None = None) -> None:
-    """Show a layer or hide it: head, photos, masks, orientation, cameras, hull, field."""
+    """Show or hide photos, masks, orientation, cameras, hull, field, head."""
     session.layers.check(name)
     layers = session.shown.layers
     shown = name not in layers if on is None else on
     layers.add(name) if shown else layers.discard(name)
 
 
-@_action()
+@action()
 def exposure(session: Session, value: float) -> None:
     """Make the light brighter or darker; 0.75 at first."""
     session.shown.exposure = float(np.clip(value, 0.05, 8.0))
 
 
-@_action()
+@action()
 def opacity(session: Session, value: float) -> None:
     """Make photos in space more or less opaque, 0 to 1."""
     session.shown.opacity = float(np.clip(value, 0.0, 1.0))
 
 
-@_action()
+@action()
 def option(session: Session, name: str, value: object) -> None:
     """Change an option of the simulator."""
     session.tuned.set(name, value)
 
 
-@_action(TAB={"by": 1}, SHIFT_TAB={"by": -1})
+@action(TAB={"by": 1}, SHIFT_TAB={"by": -1})
 def option_next(session: Session, by: int = 1) -> None:
     """Choose the option that + and - change."""
     infos = session.tuned.infos
@@ -355,7 +282,7 @@ def option_next(session: Session, by: int = 1) -> None:
     _tell_option(session)
 
 
-@_action(EQUAL={"steps": 1}, MINUS={"steps": -1}, KP_ADD={"steps": 1}, KP_SUBTRACT={"steps": -1})
+@action(EQUAL={"steps": 1}, MINUS={"steps": -1}, KP_ADD={"steps": 1}, KP_SUBTRACT={"steps": -1})
 def option_change(session: Session, steps: int = 1) -> None:
     """Change the chosen option by steps."""
     infos = session.tuned.infos
@@ -366,7 +293,7 @@ def option_change(session: Session, steps: int = 1) -> None:
     _tell_option(session)
 
 
-@_action(CTRL_S={})
+@action(CTRL_S={})
 def preset_save(session: Session, name: str = "preset") -> None:
     """Keep the simulator's options under a name, beside the groom."""
     path = presets_path(session.opened.path)
@@ -375,7 +302,7 @@ def preset_save(session: Session, name: str = "preset") -> None:
     session.message = f"kept in {path}"
 
 
-@_action(CTRL_L={})
+@action(CTRL_L={})
 def preset_load(session: Session, name: str = "preset") -> None:
     """Take the options that were kept under a name."""
     preset = read_preset(presets_path(session.opened.path), name)
@@ -386,15 +313,15 @@ def preset_load(session: Session, name: str = "preset") -> None:
     session.message = f"preset {name}"
 
 
-@_action(P={})
+@action(P={})
 def screenshot(session: Session, file: str = "hairkit.png") -> None:
-    """Write the next picture to a PNG file; a name that is taken gets a number."""
+    """Write the picture to hairkit.png, or the next free number."""
     session.screenshots.append(Path(file))
 
 
-@_action(V={})
+@action(V={})
 def record(session: Session, on: bool | None = None, file: str = "hairkit.mp4") -> None:
-    """Record pictures from now on, into an .mp4 file or a folder of PNG files; or stop."""
+    """Record into an .mp4 file (or a folder of PNG files), or stop."""
     wanted = session.recorder is None if on is None else on
     if session.recorder is not None:
         session.recorder.close()
@@ -404,37 +331,37 @@ def record(session: Session, on: bool | None = None, file: str = "hairkit.mp4") 
         session.recorder = Recorder(Path(file))
 
 
-@_action(H={})
+@action(H={})
 def help_sheet(session: Session, on: bool | None = None) -> None:
     """Show the keys."""
     session.shown.help = not session.shown.help if on is None else on
 
 
-@_action(F1={})
+@action(F1={})
 def panel(session: Session, on: bool | None = None) -> None:
     """Show the panel of options."""
     session.shown.panel = not session.shown.panel if on is None else on
 
 
-@_action(T={})
+@action(T={})
 def numbers(session: Session, on: bool | None = None) -> None:
     """Show the read-outs."""
     session.shown.numbers = not session.shown.numbers if on is None else on
 
 
-@_action()
+@action()
 def open_file(session: Session, file: str) -> None:
     """Show another groom, also when its file is dropped on the window."""
     session.open(Path(file))
 
 
-@_action(F5={})
+@action(F5={})
 def reload(session: Session) -> None:
     """Read the groom again."""
     session.reload()
 
 
-@_action(ESCAPE={})
+@action(ESCAPE={})
 def leave(session: Session) -> None:
     """Close the viewer."""
     session.finished = True

@@ -41,10 +41,10 @@ class Budget:
     """Chooses a level by the time that pictures take."""
 
     seconds: float = 1 / 20
-    """A picture may take so long, simulation included; 0 always draws the best."""
+    """A picture may take so long, simulation included (half of it at most); 0 draws the best."""
     level: int = 1
     taken: float = 0.0
-    """Running time of a picture, seconds."""
+    """Running time of drawing a picture, seconds."""
     _wait: int = PATIENCE
 
     @property
@@ -52,15 +52,16 @@ class Budget:
         """What to draw now."""
         return LEVELS[0] if self.seconds <= 0 else LEVELS[self.level]
 
-    def spent(self, seconds: float) -> None:
-        """Take note of how long a picture took."""
+    def spent(self, seconds: float, simulated: float = 0.0) -> None:
+        """Take note of how long a picture took to draw and, before that, to simulate."""
+        allowed = max(self.seconds - simulated, 0.5 * self.seconds)
         self.taken += SMOOTHING * (seconds - self.taken) if self.taken else seconds
         self._wait -= 1
         if self._wait > 0 or self.seconds <= 0:
             return
-        if self.taken > self.seconds and self.level < len(LEVELS) - 1:
+        if self.taken > allowed and self.level < len(LEVELS) - 1:
             self._change(1)
-        elif self.taken < HEADROOM * self.seconds and self.level > 0:
+        elif self.taken < HEADROOM * allowed and self.level > 0:
             self._change(-1)
 
     def _change(self, step: int) -> None:

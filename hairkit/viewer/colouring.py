@@ -12,7 +12,13 @@ COLOURINGS = ("hair", "direction", "length", "stretch", "curvature", "confidence
 FULL_STRETCH = 0.02
 """Relative change of length that is drawn as red (longer) or blue (shorter)."""
 _RAMP = np.array(
-    [[0.16, 0.22, 0.60], [0.10, 0.58, 0.72], [0.36, 0.76, 0.36], [0.95, 0.80, 0.20], [0.85, 0.15, 0.12]],
+    [
+        [0.16, 0.22, 0.60],
+        [0.10, 0.58, 0.72],
+        [0.36, 0.76, 0.36],
+        [0.95, 0.80, 0.20],
+        [0.85, 0.15, 0.12],
+    ],
     np.float32,
 )
 

@@ -1,4 +1,4 @@
-"""What the viewer's shaders need to know of the hair at rest: guides, and hair that follows them."""
+"""What the viewer's shaders need to know of hair at rest: guides, and hair that follows them."""
 
 from __future__ import annotations
 

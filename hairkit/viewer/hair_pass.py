@@ -28,6 +28,7 @@ FULL_LOOK = 50_000
 """Fewer hairs are drawn wider, so that they cover the head as this many would."""
 WIDEST = 5.0
 
+
 @dataclass(frozen=True)
 class HairLook:
     """How the hair is drawn in one picture."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hairkit.stored import UInt8Array
+from hairkit.stored import Float32Array, UInt8Array
 from hairkit.viewer.actions import ACTIONS
 from hairkit.viewer.session import Session
 
@@ -16,8 +16,10 @@ FONT = cv2.FONT_HERSHEY_SIMPLEX
 LINE = 18
 """Pixels from line to line."""
 SIZE = 0.43
-PAPER = 150
-"""Opacity of the box behind the text, of 255."""
+PAPER = (20, 22, 26)
+"""sRGB of the box behind the text."""
+OPACITY = 150
+"""Of the box, of 255."""
 MOUSE = (
     ("left drag", "orbit"),
     ("middle or shift+left drag", "pan"),
@@ -27,6 +29,19 @@ MOUSE = (
     ("click", "numbers of a guide"),
     ("drop a file", "open it"),
 )
+
+_LABELS = {
+    "PERIOD": ".",
+    "LEFT_BRACKET": "[",
+    "RIGHT_BRACKET": "]",
+    "EQUAL": "+",
+    "MINUS": "-",
+    "KP_ADD": "num+",
+    "KP_SUBTRACT": "num-",
+    "SHIFT_TAB": "shift+tab",
+}
+KEY_COLUMN = 170
+"""Pixels of the help sheet's first column."""
 
 
 @dataclass(frozen=True)
@@ -63,24 +78,21 @@ def status_lines(session: Session, readings: Readings) -> list[str]:
 
 
 def help_lines() -> list[str]:
-    """Return the help sheet: mouse, then every action that has keys."""
-    lines = [f"{what:<28}{does}" for what, does in MOUSE]
+    """Return the help sheet, `what<TAB>does`: mouse, then every action that has keys."""
+    lines = [f"{what}\t{does}" for what, does in MOUSE]
     for action in ACTIONS.values():
         if action.keys:
-            lines.append(f"{' '.join(map(key_label, action.keys)):<28}{action.doc}")
+            lines.append(f"{' '.join(map(key_label, action.keys))}\t{action.doc}")
     return lines
 
 
 def key_label(key: str) -> str:
     """Return how a key is called on the keyboard: `N1` is `1`, `PERIOD` is `.`."""
-    labels = {
-        "PERIOD": ".", "LEFT_BRACKET": "[", "RIGHT_BRACKET": "]", "EQUAL": "+", "MINUS": "-",
-        "KP_ADD": "num+", "KP_SUBTRACT": "num-", "SHIFT_TAB": "shift+tab",
-    }  # fmt: skip
     if key.startswith("N") and key[1:].isdigit():
         return key[1:]
-    return labels.get(key, key.replace("CTRL_", "ctrl+").replace("_", " ").lower()
-                      if len(key) > 1 else key)  # fmt: skip
+    if len(key) == 1:
+        return key
+    return _LABELS.get(key, key.replace("CTRL_", "ctrl+").replace("_", " ").lower())
 
 
 def overlay(size: tuple[int, int], session: Session, readings: Readings) -> UInt8Array | None:
@@ -88,33 +100,37 @@ def overlay(size: tuple[int, int], session: Session, readings: Readings) -> UInt
     width, height = size
     image = np.zeros((height, width, 4), np.uint8)
     drawn = False
-    if session.shown.numbers:
+    if session.shown.numbers and not session.shown.help:
         _write(image, status_lines(session, readings), (10, 10))
         drawn = True
     if session.message:
         _write(image, [session.message], (10, height - LINE - 14))
         drawn = True
     if session.shown.help:
-        lines = help_lines()
-        half = -(-len(lines) // 2) if LINE * (len(lines) + 3) > height else len(lines)
-        _write(image, lines[:half], (max(width // 2 - 560, 10), 60))
-        _write(image, lines[half:], (width // 2 + 5, 60))
+        _write(image, help_lines(), (14, 60))
         drawn = True
     return image if drawn else None
 
 
 def _write(image: UInt8Array, lines: Sequence[str], corner: tuple[int, int]) -> None:
-    """Write lines in a box with its top left corner there."""
+    """Write lines in a box with its top left corner there; what follows a tab is a column."""
     if not lines:
         return
     x, y = corner
-    widest = max(cv2.getTextSize(line, FONT, SIZE, 1)[0][0] for line in lines)
-    cv2.rectangle(
-        image, (x - 6, y - 4), (x + widest + 6, y + LINE * len(lines) + 4), (20, 22, 26, PAPER), -1
-    )
+    ink = np.zeros(image.shape[:2], np.uint8)
+    widest = 0
     for index, line in enumerate(lines):
-        place = (x, y + LINE * index + LINE - 5)
-        cv2.putText(image, line, place, FONT, SIZE, (240, 240, 240, 255), 1, cv2.LINE_AA)
+        for column, part in enumerate(line.split("\t")):
+            left = x + KEY_COLUMN * column
+            place = (left, y + LINE * index + LINE - 5)
+            cv2.putText(ink, part, place, FONT, SIZE, 255, 1, cv2.LINE_AA)
+            widest = max(widest, left - x + cv2.getTextSize(part, FONT, SIZE, 1)[0][0])
+    low, high = (x - 6, y - 4), (x + widest + 6, y + LINE * len(lines) + 4)
+    cv2.rectangle(image, low, high, (*PAPER, OPACITY), -1)
+    # mixed here: drawing soft edges into the opacity would make them holes
+    share = (ink / 255.0)[..., None]
+    mixed = image * (1 - share) + np.array([240, 240, 240, 255]) * share
+    image[:] = np.where(share > 0, mixed, image).astype(np.uint8)
 
 
 def _guide_lines(session: Session) -> list[str]:
@@ -133,5 +149,5 @@ def _guide_lines(session: Session) -> list[str]:
     ]
 
 
-def _vector(point: np.ndarray) -> str:  # type: ignore[type-arg]
+def _vector(point: Float32Array) -> str:
     return "(" + ", ".join(f"{1e3 * value:.0f}" for value in point) + ")"

@@ -19,7 +19,7 @@ from hairkit.mask import HAIR, PERSON, Mask
 from hairkit.orientation import OrientationMap
 from hairkit.render.head import Solid
 from hairkit.scene import Scene
-from hairkit.stored import Float32Array, Stored, UInt8Array, from_arrays, read_npz
+from hairkit.stored import Float32Array, Float64Array, Stored, UInt8Array, from_arrays, read_npz
 from hairkit.viewer.line_pass import Board, LineSet
 from hairkit.volume import Hull, OrientationField
 from hairkit.volume_surface import volume_surface
@@ -56,14 +56,16 @@ class Layers:
         if name not in NAMES:
             raise InputError(f"no layer {name!r}; there are {', '.join(NAMES)}")
         if name not in self.available:
-            cure = "name the photos' folder by --capture" if name == "photos" else (
-                "open the folder that hairkit reconstruct wrote"
+            cure = (
+                "name the photos' folder by --capture"
+                if name == "photos"
+                else ("open the folder that hairkit reconstruct wrote")
             )
             raise InputError(f"the layer {name!r} is not here; {cure}")
 
     @cached_property
     def cameras(self) -> dict[str, Camera]:
-        """Cameras of the photos by view name, at working size, head frame; empty without a scene."""
+        """Cameras of the photos by view name, working size, head frame; empty without a scene."""
         scene = self._read(Scene, "head") or self._read(Scene, "scene")
         return {} if scene is None else dict(zip(scene.names, scene.cameras, strict=True))
 
@@ -174,7 +176,7 @@ def _picture_corners(camera: Camera) -> Float32Array:
     return camera.unproject(pixels, np.full(4, depth)).astype(np.float32)
 
 
-def _line_set(paths: list[np.ndarray], colour: tuple[float, ...]) -> LineSet:  # type: ignore[type-arg]
+def _line_set(paths: list[Float64Array], colour: tuple[float, ...]) -> LineSet:
     offsets = np.concatenate([[0], np.cumsum([len(path) for path in paths])])
     points = np.concatenate([*paths, np.zeros((0, 3))]).astype(np.float32)
     return LineSet(points, offsets, np.tile(np.array(colour, np.float32), (len(points), 1)))

@@ -1,4 +1,4 @@
-"""How the user moves the head: shakes that fade out, and turns that glide to where they are asked."""
+"""How the user moves the head: shakes that fade out, turns that glide to where they are asked."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from hairkit.stored import Float64Array
 
 AXES = {"yaw": (0.0, 1.0, 0.0), "pitch": (1.0, 0.0, 0.0), "roll": (0.0, 0.0, 1.0)}
-"""Head frame: yaw turns to the subject's left, pitch nods down, roll tilts to the right shoulder."""
+"""Yaw turns to the subject's left, pitch nods down, roll tilts to the right shoulder."""
 GLIDE = 0.18
 """Seconds in which a turn goes most of its way."""
 FADE = 0.25

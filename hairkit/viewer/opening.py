@@ -1,4 +1,4 @@
-"""Opens what the user names: a groom, a file that an import plugin reads, or a folder of results."""
+"""Opens what the user names: a groom, a file that an import plugin reads, a folder of results."""
 
 from __future__ import annotations
 

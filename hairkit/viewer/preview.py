@@ -25,7 +25,8 @@ GUIDE_WIDER = 7.0
 """Guides shown alone are drawn this many times wider than hair."""
 MEASURE_EVERY = 12
 """Pictures between two looks at the simulator's read-outs."""
-PICKED = (1.0, 0.85, 0.1, 1.0)
+PICKED = (1.0, 0.85, 0.1)
+"""sRGB of the guide whose numbers are told."""
 
 
 class Preview:
@@ -81,7 +82,7 @@ class Preview:
         self.draw(still=still)
         self._keep_picture()
         drawn = time.perf_counter()
-        self.budget.spent(drawn - began)
+        self.budget.spent(drawn - simulated, simulated - began)
         self._read_out(simulated - began, drawn - simulated)
 
     def draw(self, *, still: bool = False) -> None:
@@ -143,9 +144,10 @@ class Preview:
             lines.append((_guide_lines(rows, ramp(values)), True))
         if session.picked is not None:
             one = rows[session.picked : session.picked + 1]
-            colour = np.broadcast_to(np.float32(PICKED[:3]), one.shape)
+            colour = np.broadcast_to(np.array(PICKED, np.float32), one.shape)
             lines.append((_guide_lines(one, colour), True))
-        for name, find in (("cameras", session.layers.frusta), ("field", session.layers.field_lines)):
+        finders = {"cameras": session.layers.frusta, "field": session.layers.field_lines}
+        for name, find in finders.items():
             if name in session.shown.layers:
                 if name not in self._lines:
                     self._lines[name] = find()

@@ -1,17 +1,17 @@
 """Scripts of actions, run without a window: `[[steps]]` tables of a TOML file.
 
-    size = [640, 360]          # pixels
-    hairs = 5000
-    [[steps]]
-    do = "wind"                # an action of `hairkit.viewer.actions`, the rest are its values
-    on = true
-    speed = 5
-    [[steps]]
-    do = "run"
-    seconds = 1.5
-    [[steps]]
-    do = "screenshot"
-    file = "windy.png"         # in the folder of --out
+size = [640, 360]          # pixels
+hairs = 5000
+[[steps]]
+do = "wind"                # an action of `hairkit.viewer.actions`, the rest are its values
+on = true
+speed = 5
+[[steps]]
+do = "run"
+seconds = 1.5
+[[steps]]
+do = "screenshot"
+file = "windy.png"         # in the folder of --out
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ A session knows nothing of OpenGL or windows; `actions` change it, `preview` dra
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -25,8 +26,6 @@ from hairkit.viewer.view import OrbitView
 
 STEP = 1 / 60
 """Seconds of one step of the simulator as the session asks for it."""
-MOST_STEPS = 3
-"""Steps a picture at most: on slow machines hair moves slower instead of not at all."""
 HAIRS = 10_000
 
 
@@ -98,6 +97,12 @@ class Session:
         self.screenshots: list[Path] = []
         """Files that the next picture is written to."""
         self.recorder: Recorder | None = None
+        self.most_seconds: float | None = None
+        """A picture's simulation ends after the step that takes it beyond this: on slow machines
+        hair moves slower instead of stopping. None simulates all, which scripts want."""
+        self.steps = 0
+        """Steps since the groom was opened."""
+        self._behind = 0.0
         self.overwrite = False
         """True lets screenshots take the place of older ones of the same name."""
         self.finished = False
@@ -137,13 +142,16 @@ class Session:
         return self.view.camera(width, height)
 
     def advance(self, seconds: float) -> None:
-        """Let time pass, unless paused; what is too much for one picture is lost."""
+        """Let time pass, unless paused."""
         if self.paused:
             return
-        self._behind = min(self._behind + seconds, MOST_STEPS * STEP)
+        self._behind += seconds
+        began = time.perf_counter()
         while self._behind >= STEP * (1 - 1e-6):
             self._behind -= STEP
             self.step()
+            if self.most_seconds is not None and time.perf_counter() - began > self.most_seconds:
+                self._behind = 0.0
 
     def step(self) -> None:
         """Let one step of time pass."""

@@ -1,4 +1,4 @@
-"""The simulator behind the preview: found by plugin name, tuned by its own options, or none at all."""
+"""The simulator behind the preview: a plugin by name, tuned by its own options, or none at all."""
 
 from __future__ import annotations
 

@@ -29,7 +29,9 @@ class SolidPass:
             index_buffer=self._faces,
         )
 
-    def draw(self, camera: Camera, depth: DepthRange, push: float, lighting: dict[str, Any]) -> None:
+    def draw(
+        self, camera: Camera, depth: DepthRange, push: float, lighting: dict[str, Any]
+    ) -> None:
         """Draw the mesh, its depth `push` metres behind its surface."""
         set_camera(self._program, camera, depth)
         set_uniforms(

@@ -61,7 +61,8 @@ class OrbitView:
         """Return the view whose picture slid by shares of its height."""
         rotation = self.camera(1, 1).rotation
         whole = 2 * self.distance * np.tan(VERTICAL_ANGLE / 2)
-        x, y, z = (np.array(self.target) - whole * (right * rotation[0] + down * rotation[1])).tolist()
+        slid = np.array(self.target) - whole * (right * rotation[0] + down * rotation[1])
+        x, y, z = slid.tolist()
         return replace(self, target=(x, y, z))
 
     def zoomed(self, factor: float) -> OrbitView:

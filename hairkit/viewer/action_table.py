@@ -1,0 +1,83 @@
+"""The one table of actions: name, function, values and keys; how they are added and done."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from hairkit.errors import InputError
+from hairkit.options import make_options, unknown_name
+from hairkit.viewer.session import Session
+
+_Do = Callable[..., None]
+
+
+@dataclass(frozen=True)
+class Action:
+    """One thing the user can do."""
+
+    name: str
+    do: _Do
+    """Takes the session, then the values."""
+    doc: str
+    """One line for help sheet and manual."""
+    values: type[Any]
+    """Dataclass of the values that it takes."""
+    keys: Mapping[str, Mapping[str, object]]
+    """Keys that do it, and the values that they give."""
+
+
+ACTIONS: dict[str, Action] = {}
+"""All actions by name."""
+
+
+def perform(session: Session, name: str, values: Mapping[str, object] | None = None) -> None:
+    """Do one action.
+
+    Raises
+    ------
+    InputError, OptionError
+        There is no such action, a value is unknown, missing or refused, or it cannot be done here.
+    """
+    if name not in ACTIONS:
+        raise InputError(unknown_name("action", name, sorted(ACTIONS)))
+    action = ACTIONS[name]
+    given = dict(values or {})
+    checked = make_options(action.values, given, name)
+    wanted = {f.name: getattr(checked, f.name) for f in dataclasses.fields(action.values)}
+    missing = [key for key, value in wanted.items() if value is _MISSING]
+    if missing:
+        raise InputError(f"{name}: no value for {', '.join(missing)}")
+    action.do(session, **wanted)
+
+
+def bindings() -> dict[str, tuple[str, Mapping[str, object]]]:
+    """Return what each key does: action and values."""
+    return {
+        key: (action.name, values)
+        for action in ACTIONS.values()
+        for key, values in action.keys.items()
+    }
+
+
+_MISSING: Any = inspect.Parameter.empty
+
+
+def action(**keys: Mapping[str, object]) -> Callable[[_Do], _Do]:
+    """Put a function into the table under its name; keys are written as in `keyboard.KEYS`."""
+
+    def add(do: _Do) -> _Do:
+        hints = typing.get_type_hints(do)
+        fields = []
+        for name, parameter in list(inspect.signature(do).parameters.items())[1:]:
+            fields.append((name, hints[name], dataclasses.field(default=parameter.default)))
+        kind = dataclasses.make_dataclass(do.__name__, fields, frozen=True)
+        doc = (inspect.getdoc(do) or "").partition("\n")[0]
+        ACTIONS[do.__name__] = Action(do.__name__, do, doc, kind, keys)
+        return do
+
+    return add

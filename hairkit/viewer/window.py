@@ -1,0 +1,276 @@
+"""The window: passes events on to the actions and shows what the preview draws. Nothing else.
+
+The window's OpenGL context becomes the one that all of hairkit draws with in this process.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from hairkit.errors import HairkitError, RenderError
+from hairkit.render.context import REQUIRED_VERSION, install, renderer
+from hairkit.render.projection import set_uniforms
+from hairkit.viewer.actions import bindings, perform
+from hairkit.viewer.budget import Budget
+from hairkit.viewer.hud import overlay
+from hairkit.viewer.keyboard import key_name
+from hairkit.viewer.mouse import Mouse
+from hairkit.viewer.panel import Panel, load_windowing
+from hairkit.viewer.preview import Preview
+from hairkit.viewer.script import play, read_script
+from hairkit.viewer.session import Session
+from hairkit.viewer.watching import Watch, shader_files
+
+TITLE = "hairkit"
+TEXT_EVERY = 6
+"""Pictures between two redraws of the text."""
+LONGEST_PAUSE = 0.1
+"""Seconds that pass at most between two pictures, as far as the hair is told."""
+_CURE = (
+    "install an OpenGL driver and a display (apt-get install libgl1 libgl1-mesa-dri; xvfb-run"
+    " without a screen), or use --headless"
+)
+
+
+def show(
+    make_session: Callable[[tuple[int, int]], Session],
+    size: tuple[int, int],
+    *,
+    script: Path | None = None,
+    budget: float = 1 / 20,
+) -> None:
+    """Open the window and stay until it is closed.
+
+    Parameters
+    ----------
+    make_session
+        Makes the session for a picture size; called when OpenGL is there, which simulators use.
+    size
+        Pixels.
+    script
+        Actions to do first.
+    budget
+        Seconds that a picture may take before less is drawn.
+
+    Raises
+    ------
+    RenderError
+        No window can be opened, or it has no OpenGL 4.3; the text says what to install.
+    """
+    context = _Context(size)
+    try:
+        settings: Any = {"context": context}
+        install(moderngl.create_context(REQUIRED_VERSION, **settings), "window")
+        with renderer():
+            session = make_session(size)
+        window = Window(context, session, budget)
+        if script is not None:
+            with renderer():
+                play(window.preview, read_script(script), Path())
+        window.loop()
+    finally:
+        context.close()
+
+
+class _Context:
+    """A GLFW window as the context that moderngl takes."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self.glfw = load_windowing()
+        failures: list[str] = []
+        self.glfw.set_error_callback(lambda code, text: failures.append(_text(text)))
+        if not self.glfw.init():
+            raise RenderError(f"no window: {'; '.join(failures) or 'GLFW fails'}; {_CURE}")
+        self.window = self._create(size)
+        if not self.window:
+            raise RenderError(f"no window with OpenGL 4.3: {'; '.join(failures)}; {_CURE}")
+        self.glfw.make_context_current(self.window)
+        self.glfw.swap_interval(0)
+        self._depth = 0
+
+    def _create(self, size: tuple[int, int]) -> Any:
+        glfw = self.glfw
+        for api in (glfw.NATIVE_CONTEXT_API, glfw.EGL_CONTEXT_API):
+            glfw.default_window_hints()
+            glfw.window_hint(glfw.CONTEXT_CREATION_API, api)
+            glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 4)
+            glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
+            glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
+            window = glfw.create_window(*size, TITLE, None, None)
+            if window:
+                return window
+        return None
+
+    def load(self, name: str) -> int:
+        """Return the address of an OpenGL function, 0 when there is none."""
+        return self.glfw.get_proc_address(name) or 0
+
+    def release(self) -> None:
+        """The window stays until it is closed."""
+
+    def close(self) -> None:
+        """Close the window."""
+        self.glfw.terminate()
+
+    def __enter__(self) -> _Context:
+        self._depth += 1
+        self.glfw.make_context_current(self.window)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._depth -= 1
+        if not self._depth:  # no outer block goes on drawing
+            self.glfw.make_context_current(None)
+
+
+class Window:
+    """Events in, pictures out."""
+
+    def __init__(self, context: _Context, session: Session, budget: float) -> None:
+        self._glfw, self._window = context.glfw, context.window
+        self.session = session
+        session.most_seconds = 0.4 * budget
+        self._keys = bindings()
+        self.mouse = Mouse(self.perform, session.size[1])
+        self._watch_groom = Watch([session.opened.path])
+        self._watch_shaders = Watch(shader_files())
+        self._count = 0
+        with renderer() as gl:
+            self._gl = gl
+            self.preview = Preview(gl, session, Budget(budget))
+            program = gl.program("viewer_screen", "viewer_blit")
+            self._blit = gl.context.vertex_array(program, [])
+            self._text = gl.context.texture((1, 1), 4, b"\0\0\0\0")
+            self._screen = gl.context.detect_framebuffer(0)
+            self._panel = Panel(self._window)
+        self._listen()
+
+    def perform(self, name: str, values: Mapping[str, object]) -> None:
+        """Do an action; what goes wrong is told in the picture."""
+        self.session.message = ""
+        try:
+            with renderer():
+                perform(self.session, name, values)
+        except (HairkitError, OSError) as error:
+            self.session.message = " ".join(str(error).split())
+
+    def loop(self) -> None:
+        """Draw until the window is closed."""
+        before = time.perf_counter()
+        while not (self.session.finished or self._glfw.window_should_close(self._window)):
+            self._glfw.poll_events()
+            now = time.perf_counter()
+            self.picture(min(now - before, LONGEST_PAUSE))
+            before = now
+        if self.session.recorder is not None:
+            self.session.recorder.close()
+
+    def picture(self, seconds: float) -> None:
+        """Let time pass and show a picture."""
+        self._fit()
+        self._reload_changed()
+        with renderer() as gl:
+            self.preview.frame(seconds, still=bool(self.session.screenshots))
+            self._show(gl)
+            self._panel.draw(self.session, self.preview, self.perform)
+            self._glfw.swap_buffers(self._window)
+            gl.home.use()
+
+    def _show(self, gl: Any) -> None:
+        """Bring the picture and the text onto the screen."""
+        self._count += 1
+        if self._count % TEXT_EVERY == 1 or self.session.message:
+            self._write_text()
+        size = self._glfw.get_framebuffer_size(self._window)
+        self._screen.use()
+        gl.context.viewport = (0, 0, *size)
+        gl.context.enable_only(moderngl.NOTHING)
+        self.preview.stage.texture.use(5)
+        self._text.use(6)
+        program = gl.program("viewer_screen", "viewer_blit")
+        set_uniforms(program, u_picture=5, u_text=6, u_size=size)
+        self._blit.render(moderngl.TRIANGLES, vertices=3)
+
+    def _write_text(self) -> None:
+        image = overlay(self.session.size, self.session, self.preview.readings)
+        if image is None:
+            image = np.zeros((1, 1, 4), np.uint8)
+        size = (image.shape[1], image.shape[0])
+        if self._text.size != size:
+            self._text.release()
+            self._text = self._gl.context.texture(size, 4)
+        self._text.write(image.tobytes())
+
+    def _fit(self) -> None:
+        width, height = self._glfw.get_framebuffer_size(self._window)
+        if width > 0 and height > 0:
+            self.session.size = (width, height)
+            self.mouse.height = height
+
+    def _reload_changed(self) -> None:
+        now = time.monotonic()
+        if self._watch_groom.changed(now):
+            self.perform("reload", {})
+        if self._watch_shaders.changed(now):
+            try:
+                with renderer() as gl:
+                    self.preview.restart()
+                    program = gl.program("viewer_screen", "viewer_blit")
+                    self._blit = gl.context.vertex_array(program, [])
+                    self.preview.draw()
+            except RenderError as error:  # a shader that is being written: wait for the next save
+                self.session.message = " ".join(str(error).split())
+
+    def _listen(self) -> None:
+        glfw, window = self._glfw, self._window
+        glfw.set_key_callback(window, self.on_key)
+        glfw.set_mouse_button_callback(window, self.on_button)
+        glfw.set_cursor_pos_callback(window, self.on_move)
+        glfw.set_scroll_callback(window, self.on_scroll)
+        glfw.set_drop_callback(window, self.on_drop)
+        self._panel.listen()
+
+    def on_key(self, window: Any, key: int, scancode: int, event: int, mods: int) -> None:
+        """A key was pressed, released or repeated."""
+        self._panel.on_key(key, event, mods)
+        name = key_name(self._glfw, key, mods)
+        if event == self._glfw.RELEASE or name not in self._keys or self._panel.wants_keys:
+            return
+        self.perform(*self._keys[name])
+
+    def on_button(self, window: Any, button: int, event: int, mods: int) -> None:
+        """A button of the mouse was pressed or released."""
+        self._panel.on_button(button, event)
+        if event == self._glfw.RELEASE:
+            self.mouse.release(time.monotonic())
+        elif not self._panel.wants_mouse:
+            self.mouse.press(button, mods)
+
+    def on_move(self, window: Any, x: float, y: float) -> None:
+        """The mouse moved; `x`, `y` in screen units."""
+        width, height = self._glfw.get_window_size(self._window)
+        self._panel.on_move(x, y)
+        scale = self.session.size[0] / max(width, 1), self.session.size[1] / max(height, 1)
+        self.mouse.move(x * scale[0], y * scale[1])
+
+    def on_scroll(self, window: Any, right: float, up: float) -> None:
+        """The wheel turned."""
+        self._panel.on_scroll(right, up)
+        if not self._panel.wants_mouse:
+            self.mouse.scroll(up)
+
+    def on_drop(self, window: Any, paths: list[str]) -> None:
+        """Files were dropped; the first one is opened."""
+        if paths:
+            self.perform("open_file", {"file": str(paths[0])})
+            self._watch_groom = Watch([self.session.opened.path])
+
+
+def _text(text: bytes | str) -> str:
+    return text.decode(errors="replace") if isinstance(text, bytes) else text
