@@ -25,6 +25,12 @@ _LONG_METADATA = 255
 _ROOT_CHILDREN = 6
 
 
+def tag(metadata: str, key: str) -> str:
+    """Return a value of metadata, `key=value` joined by semicolons; empty where there is none."""
+    pairs = (part.partition("=") for part in metadata.split(";"))
+    return next((value for name, _, value in pairs if name == key), "")
+
+
 @dataclass(frozen=True)
 class Property:
     """A header; values are read when they are asked for."""
@@ -32,18 +38,12 @@ class Property:
     archive: Archive
     name: str
     metadata: str
-    """`key=value` joined by semicolons."""
     kind: int
     """0 compound, 1 scalar, 2 array, 3 array of one element."""
     pod: int
     extent: int
     samples: int
     child: int
-
-    def tag(self, key: str) -> str:
-        """Return a value of the metadata, empty where there is none."""
-        pairs = (part.partition("=") for part in self.metadata.split(";"))
-        return next((value for name, _, value in pairs if name == key), "")
 
     def properties(self) -> dict[str, Property]:
         """Return the properties of a compound by name, empty for any other kind."""
@@ -101,6 +101,10 @@ class Object:
     def properties(self) -> dict[str, Property]:
         """Return the object's properties by name."""
         return self.archive.properties(self.children[0]) if self.children else {}
+
+    def is_a(self, schema: str) -> bool:
+        """Return whether the object has a schema of any version: `AbcGeom_Curve`."""
+        return tag(self.metadata, "schema").startswith(f"{schema}_v")
 
     def objects(self) -> Iterator[Object]:
         """Yield the objects under this one."""

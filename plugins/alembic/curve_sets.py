@@ -14,7 +14,7 @@ import numpy.typing as npt
 from hairkit.errors import FormatError
 from hairkit.stored import Float32Array, Float64Array, Int64Array
 
-from .archive import Archive, Object, Property
+from .archive import Archive, Object, Property, tag
 from .transforms import transformed
 
 _LINEAR, _NON_PERIODIC = 1, 0
@@ -62,8 +62,7 @@ def read_curve_sets(path: Path) -> list[CurveSet]:
     sets = [
         found
         for node, world in _walk(archive)
-        if node.metadata.startswith("schema=AbcGeom_Curve")
-        and (found := _curve_set(node, world)) is not None
+        if node.is_a("AbcGeom_Curve") and (found := _curve_set(node, world)) is not None
     ]
     if not sets:
         raise FormatError(f"{path}: an Alembic file without curves")
@@ -202,7 +201,7 @@ class _Values:
         """Return the scope by the number of values, which the metadata only breaks ties of."""
         sizes = {"con": 1, "uni": len(self.counts), "vtx": int(self.counts.sum())}
         fitting = [scope for scope, size in sizes.items() if size == have]
-        said = "" if header is None else header.tag("geoScope")
+        said = "" if header is None else tag(header.metadata, "geoScope")
         if not fitting:
             raise self.node.archive.file.error(
                 f"{self.node.name} has {have} values of {header.name if header else ''} for"

@@ -34,7 +34,7 @@ def transformed(world: Float64Array, node: Object) -> Float64Array:
     FormatError
         An operation is unknown, or there are fewer numbers than operations ask for.
     """
-    if not node.metadata.startswith("schema=AbcGeom_Xform"):
+    if not node.is_a("AbcGeom_Xform"):
         return world
     transform = node.properties().get(".xform")
     found = transform.properties() if transform else {}
