@@ -39,8 +39,9 @@ def patent_counts(strands: Strands) -> Int64Array:
     cosine = (tangents[first] * tangents[first + 1]).sum(-1)
     change = (cosine <= SPLIT).astype(np.int64) - (cosine > MERGED)
     between = (path.lengths > SHORT) & (path.lengths < LONG)
-    changed: Int64Array = counts + between * np.add.reduceat(change, offsets[:-1])
-    return np.clip(changed, FEWEST, MOST)
+    changed = counts + between * np.add.reduceat(change, offsets[:-1])
+    result: Int64Array = np.clip(changed, FEWEST, MOST)
+    return result
 
 
 def adaptive_counts(

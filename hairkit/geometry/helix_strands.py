@@ -65,12 +65,7 @@ class HelixStrands(Stored):
     @classmethod
     def from_arcs(cls, arcs: Arcs) -> HelixStrands:
         """Take the arcs' Darboux vectors into frames that travel along the strands."""
-        root = first_frames(arcs.tangents[arcs.offsets[:-1]])
-        turns = rotation(arcs.darboux * arcs.lengths[:, None])
-        frames = np.empty((len(arcs.lengths), 3, 3))
-        for here, before, strand in _ranks(arcs.offsets):
-            frames[here] = root[strand] if before is None else turns[before] @ frames[before]
-        local = np.einsum("aji,aj->ai", frames, arcs.darboux)
+        root, local = travelling(arcs)
         return cls(
             arcs.points[arcs.offsets[:-1]].astype(np.float32),
             root.astype(np.float32),
@@ -128,6 +123,19 @@ def smoothed(strands: Strands, tolerance: float) -> Strands:
     points, _ = arcs.at(arcs.offsets[:-1][strand] + rank, place - rank)
     points[strands.offsets[:-1]] = strands.roots
     return replace(strands, points=points.astype(np.float32))
+
+
+def travelling(arcs: Arcs) -> tuple[Float64Array, Float64Array]:
+    """Return frames (S, 3, 3) at the roots and Darboux vectors (A, 3) in frames that travel along.
+
+    Columns of the frames: tangent and two normals; so the vectors are torsion and two curvatures.
+    """
+    root = first_frames(arcs.tangents[arcs.offsets[:-1]])
+    turns = rotation(arcs.darboux * arcs.lengths[:, None])
+    frames = np.empty((len(arcs.lengths), 3, 3))
+    for here, before, strand in _ranks(arcs.offsets):
+        frames[here] = root[strand] if before is None else turns[before] @ frames[before]
+    return root, np.einsum("aji,aj->ai", frames, arcs.darboux)
 
 
 def first_frames(tangents: Float64Array) -> Float64Array:

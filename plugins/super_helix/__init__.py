@@ -1,0 +1,72 @@
+"""Super-helices: guides as inextensible rods of elements with constant curvatures and twist.
+
+Bertails et al., "Super-helices for predicting the dynamics of natural hair", 2006, with the shape
+taken from the groom by floating tangents and inverse statics, so that it rests as captured, and
+each implicit step solved in linear time (Bertails, "Linear time super-helices", 2009) or densely by
+conjugate gradients as in the patent. Contact with the head has Coulomb friction; hair around a
+point drags and pushes it. Nothing stretches.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from hairkit.groom import Groom
+from hairkit.hookspecs import hookimpl
+from hairkit.options import option
+
+if TYPE_CHECKING:
+    from .simulator import SuperHelices
+
+__all__ = ["Options"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of the super-helix simulator."""
+
+    elements: int = option(
+        10, low=0, high=64, doc="Elements a guide; 0 takes as many as its shape needs."
+    )
+    stiffness: float = option(
+        4.0, low=0.0001, high=1000.0, doc="Times stiffer than one hair: guides stand for locks."
+    )
+    young: float = option(4.0, low=0.01, high=50.0, doc="Young's modulus of hair.", unit="GPa")
+    diameter: float | None = option(
+        None, low=10.0, high=500.0, doc="Of a hair; none takes the groom's width.", unit="um"
+    )
+    internal_friction: float = option(
+        0.02, low=0.0, high=1.0, doc="Damping of changes of shape, as a time.", unit="s"
+    )
+    air_drag: float = option(
+        1.0, low=0.0, high=100.0, doc="Rate at which hair takes on the air's speed.", unit="1/s"
+    )
+    friction: float | None = option(
+        None, low=0.0, high=2.0, doc="Coulomb friction on the head; none takes the groom's."
+    )
+    hair_friction: float = option(
+        4.0, low=0.0, high=200.0, doc="Rate of taking on the speed of hair around.", unit="1/s"
+    )
+    hair_push: float = option(
+        4.0, low=0.0, high=100.0, doc="Push out of hair twice as dense as at rest.", unit="m/s2"
+    )
+    contact: bool = option(True, doc="Whether the head keeps hair out.")
+    substeps: int = option(2, low=1, high=64, doc="Steps in a sixtieth of a second.")
+    iterations: int = option(1, low=1, high=20, doc="Newton iterations a step.")
+    second_order: bool = option(
+        True, doc="BDF2, which keeps swings; false is Euler's step, which damps them."
+    )
+    solver: str = option(
+        "recursion",
+        choices=("recursion", "conjugate_gradients"),
+        doc="How a step is solved: in linear time, or densely as in the patent (slow).",
+    )
+
+
+@hookimpl
+def make_simulator(groom: Groom, options: Options) -> SuperHelices:
+    """Return a simulator of the guides as super-helices."""
+    from .simulator import SuperHelices
+
+    return SuperHelices(groom, options)

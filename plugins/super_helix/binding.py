@@ -1,0 +1,117 @@
+"""Between the groom's points and super-helices: rods made from guides, guides drawn on rods."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.geometry import adaptive_counts, fit_arcs
+from hairkit.geometry.helix_strands import travelling
+from hairkit.geometry.path import Path
+from hairkit.stored import Float64Array, Int64Array
+from hairkit.strands import Strands
+
+from .nodes import carried, compiled, node, onward, times, turns
+from .rods import Rods
+
+SHORTEST = 1e-4
+"""Guides shorter than this, metres, are refused."""
+
+
+class Binding(NamedTuple):
+    """How the guides' points ride on the elements."""
+
+    element: Int64Array
+    """(P,) element of each point, counted over all strands."""
+    arc: Float64Array
+    """(P,) where on it, metres from its start."""
+    offset: Float64Array
+    """(P, 3) from there to the point, in the frame there."""
+    bounds: Int64Array
+    """(S + 1,) of the points, as the strands'."""
+
+
+def rods_of(strands: Strands, elements: int) -> tuple[Rods, Binding]:
+    """Return rods of unit stiffness and density through guides, and how the guides ride on them.
+
+    Parameters
+    ----------
+    strands
+        The guides.
+    elements
+        Elements a strand; 0 takes as many as each strand's shape needs.
+    """
+    short = np.flatnonzero(strands.lengths() < SHORTEST)
+    if len(short):
+        raise InputError(
+            f"{len(short)} guides are shorter than {SHORTEST * 1e3} mm (the first is {short[0]}); "
+            "remove them"
+        )
+    counts = np.full(len(strands), elements) if elements else adaptive_counts(strands)
+    path = Path.of(strands)
+    arcs = fit_arcs(path, counts)
+    frames, q = travelling(arcs)
+    ones = np.ones((len(q), 3))
+    rods = Rods(
+        arcs.offsets,
+        np.ascontiguousarray(strands.roots, np.float64),
+        np.ascontiguousarray(frames),
+        arcs.lengths,
+        q,
+        q,
+        ones,
+        ones[:, 0].copy(),
+    )
+    strand = strands.strand_of_point
+    place = path.arc / path.lengths[strand] * counts[strand]
+    rank = np.minimum(place.astype(np.int64), counts[strand] - 1)
+    element = arcs.offsets[:-1][strand] + rank
+    arc = (place - rank) * arcs.lengths[element]
+    binding = Binding(element, arc, np.zeros((len(arc), 3)), strands.offsets)
+    return rods, binding._replace(offset=_offsets(rods, binding, path.points))
+
+
+def _offsets(rods: Rods, binding: Binding, wanted: Float64Array) -> Float64Array:
+    bare, frames = np.empty_like(wanted), np.empty((len(wanted), 3, 3))
+    draw(rods, rods.captured, np.eye(4), binding, bare, frames, 0, len(rods.offsets) - 1)
+    return np.ascontiguousarray(np.einsum("pji,pj->pi", frames, wanted - bare))
+
+
+@compiled
+def draw(
+    rods: Rods,
+    q: Float64Array,
+    head: Float64Array,
+    binding: Binding,
+    points: Float64Array,
+    frames: Float64Array,
+    begin: int,
+    stop: int,
+) -> None:
+    """Write the points (P, 3) and frames (P, 3, 3) of strands `begin` to `stop`, world."""
+    local, slope, arm = np.empty(3), np.empty((3, 3)), np.empty(3)
+    turn, mean = np.empty((3, 3)), np.empty((3, 3))
+    frame, root = np.empty((3, 3)), np.empty(3)
+    next_frame, next_root = np.empty((3, 3)), np.empty(3)
+    for strand in range(begin, stop):
+        carried(head, rods.roots[strand], rods.frames[strand], root, frame)
+        e = rods.offsets[strand]
+        for p in range(binding.bounds[strand], binding.bounds[strand + 1]):
+            while e < binding.element[p]:
+                onward(q[e], rods.lengths[e], frame, root, next_frame, next_root)
+                frame[:], root[:] = next_frame, next_root
+                e += 1
+            node(q[e], binding.arc[p], local, slope)
+            turns(q[e], binding.arc[p], turn, mean)
+            for i in range(3):
+                for j in range(3):
+                    local[i] += turn[i, j] * binding.offset[p, j]
+            times(frame, local, arm)
+            for i in range(3):
+                points[p, i] = root[i] + arm[i]
+                for j in range(3):
+                    frames[p, i, j] = (
+                        frame[i, 0] * turn[0, j] + frame[i, 1] * turn[1, j] + frame[i, 2] * turn[2, j]
+                    )

@@ -1,0 +1,141 @@
+"""The same step formed densely and solved by conjugate gradients, as in the patent.
+
+Readable twin of `recursion.py`, one strand at a time, and the energies and generalised forces that
+tests hold against each other. Mass matrix and forces are those of Bertails et al. 2006, section 4:
+M = J' m J, K = diag(l GJ, l EI, l EI). The step is implicit (Euler or BDF2) in place of the text's
+semi-implicit one: its Coriolis forces arise from the Gauss points' own velocities.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, cg
+
+from hairkit.stored import Float64Array
+
+from .kinematics import Placed, place
+from .recursion import Loads, Motion, Step
+from .rods import NODES, Rods
+from .touch import touch
+
+
+def mass_matrix(rod: Rods, placed: Placed) -> Float64Array:
+    """Return M (3n, 3n), kilograms square metres: 1/2 q' M q' is the kinetic energy."""
+    flat = placed.jacobian.reshape(-1, 3 * len(rod.lengths))
+    return (flat.T * np.repeat(rod.masses.ravel(), 3)) @ flat
+
+
+def stiffness_matrix(rod: Rods) -> Float64Array:
+    """Return K (3n, 3n), diagonal."""
+    return np.diag((rod.lengths[:, None] * rod.stiffness).ravel())
+
+
+def potential(rod: Rods, q: Float64Array, placed: Placed, gravity: Float64Array) -> float:
+    """Return the elastic energy and that of gravity, joules."""
+    elastic = 0.5 * (rod.lengths[:, None] * rod.stiffness * (q - rod.natural) ** 2).sum()
+    return float(elastic - (rod.masses[..., None] * placed.points * gravity).sum())
+
+
+def forces(rod: Rods, q: Float64Array, placed: Placed, gravity: Float64Array) -> Float64Array:
+    """Return the generalised forces -dV/dq (n, 3) of elasticity and gravity."""
+    elastic = rod.lengths[:, None] * rod.stiffness * (rod.natural - q)
+    weight = np.einsum("eg,i,egikj->kj", rod.masses, gravity, placed.jacobian)
+    return np.asarray(elastic + weight)
+
+
+def system(
+    rod: Rods,
+    motion: Motion,
+    loads: Loads,
+    step: Step,
+    q: Float64Array,
+    root: Float64Array,
+    frame: Float64Array,
+) -> tuple[Float64Array, Float64Array]:
+    """Return matrix A (3n, 3n) and gradient (3n,) of a Newton iteration at q: A dq = -gradient.
+
+    `motion` holds the strand's state before the step; `root` and `frame` are its clamped end after
+    it.
+    """
+    placed = place(rod, q, root, frame)
+    h, back_q, back, rate = _history(motion, step)
+    weight, pull = _point_loads(rod, loads, step, h, placed.points, back, rate)
+    flat = placed.jacobian.reshape(-1, 3, 3 * len(q))
+    matrix = np.einsum("pia,pij,pjb->ab", flat, weight.reshape(-1, 3, 3), flat)
+    gradient = np.einsum("pia,pi->a", flat, pull.reshape(-1, 3))
+    stiff = stiffness_matrix(rod)
+    matrix += h * (h + step.friction) * stiff
+    elastic = h * (q - rod.natural) + step.friction * (q - back_q)
+    return matrix, gradient + h * stiff @ elastic.ravel()
+
+
+def change(matrix: Float64Array, gradient: Float64Array) -> Float64Array:
+    """Return dq (3n,) by conjugate gradients, preconditioned by the diagonal."""
+    scale = 1 / np.diag(matrix)
+    precondition = LinearOperator(matrix.shape, lambda v: scale * v)
+    found, _ = cg(matrix, -gradient, rtol=1e-12, maxiter=40 * len(gradient), M=precondition)
+    return np.asarray(found)
+
+
+def step_densely(rods: Rods, motion: Motion, loads: Loads, step: Step) -> None:
+    """Advance all strands by one step as `recursion.step_strands` does, slowly."""
+    for strand in range(len(rods.offsets) - 1):
+        own = slice(rods.offsets[strand], rods.offsets[strand + 1])
+        rod = rods.one(strand)
+        before = Motion(*(array[own].copy() for array in motion))
+        acting = Loads(*(array[own] for array in loads))
+        root = step.head[:3, :3] @ rod.roots[0] + step.head[:3, 3]
+        frame = step.head[:3, :3] @ rod.frames[0]
+        q = 2 * before.q - before.q_before
+        for _ in range(step.iterations):
+            dq = change(*system(rod, before, acting, step, q, root, frame)).reshape(q.shape)
+            size = rod.lengths * np.linalg.norm(dq, axis=1)
+            q = q + dq / np.maximum(size, 1.0)[:, None]
+        h, _, back, _ = _history(before, step)
+        points = place(rod, q, root, frame).points
+        new = (q, before.q, points, before.points, (points - back) / h, before.velocity)
+        for array, values in zip(motion, new, strict=True):
+            array[own] = values
+
+
+def _history(motion: Motion, step: Step) -> tuple[float, Float64Array, Float64Array, Float64Array]:
+    """Return the effective step, and the q, points and velocities that it starts from."""
+    if not step.two_step:
+        return step.seconds, motion.q, motion.points, motion.velocity
+    pairs = (
+        (motion.q, motion.q_before),
+        (motion.points, motion.points_before),
+        (motion.velocity, motion.velocity_before),
+    )
+    q, points, velocity = ((4 * now - before) / 3 for now, before in pairs)
+    return step.seconds * 2 / 3, q, points, velocity
+
+
+def _point_loads(
+    rod: Rods,
+    loads: Loads,
+    step: Step,
+    h: float,
+    points: Float64Array,
+    back: Float64Array,
+    rate: Float64Array,
+) -> tuple[Float64Array, Float64Array]:
+    """Return weights (n, NODES, 3, 3) and gradients (n, NODES, 3) of the Gauss points."""
+    mass = rod.masses[..., None]
+    drag, spring = h * loads.drag[..., None], h * h * loads.spring[..., None]
+    pull = mass * (points - back - h * rate - h * h * step.gravity)
+    pull += drag * (points - back - h * loads.air) + spring * (points - loads.anchor)
+    weight = (mass + drag + spring)[..., None] * np.eye(3)
+    if len(step.distance):
+        for e, g in np.ndindex(len(points), NODES):
+            touch(
+                step,
+                float(mass[e, g, 0]),
+                h,
+                loads.gap[e, g],
+                points[e, g],
+                back[e, g],
+                weight[e, g],
+                pull[e, g],
+            )
+    return weight, pull

@@ -1,0 +1,218 @@
+"""The simulator of the contract: guides as super-helices on a moving head."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import InputError
+from hairkit.groom import Groom
+from hairkit.simulate import Measures, Surroundings, rotation
+from hairkit.simulate.obstacles import Obstacles, head_obstacles
+from hairkit.simulate.wind import air_velocity
+from hairkit.stored import Float32Array, Float64Array
+from hairkit.strands import Strands
+
+from .binding import draw, rods_of
+from .neighbours import Neighbours
+from .recursion import Loads, Motion, Step, place_points, step_strands
+from .reference import step_densely
+from .rods import NODES, Rods
+from .statics import at_rest
+from .threads import over_strands
+
+if TYPE_CHECKING:
+    from . import Options
+
+FRAME = 1 / 60
+"""Seconds that the option `substeps` divides."""
+SKIN = 0.0015
+"""Hair is kept this far off the head, metres, where it was not nearer at rest."""
+PUSH_RATE, GRAB_RATE = 600.0, 150.0
+"""Rates, per second, at which contact and a user's hand act on a point's or a strand's mass."""
+POISSON = 0.38
+KERATIN = 1300.0
+"""Kilograms per cubic metre."""
+MIDDLE = 0.6
+"""`bend_stiffness` of a groom that leaves the stiffness of hair as it is."""
+
+
+class SuperHelices:
+    """Guides whose elements keep their length: two curvatures and a twist each."""
+
+    def __init__(
+        self, groom: Groom, options: Options, obstacles: Obstacles | None = None
+    ) -> None:
+        self._groom = groom
+        self._shape, self._binding = rods_of(groom.strands, options.elements)
+        self._rest_gravity = np.array([0.0, -groom.physics.gravity, 0.0])
+        if obstacles is None and options.contact and len(groom.strands):
+            obstacles = head_obstacles(groom.head)
+        self._obstacles = obstacles
+        self.retune(options)
+        self.reset()
+
+    @property
+    def strands(self) -> Strands:
+        """The guides at rest, head frame."""
+        return self._groom.strands
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start or the last reset."""
+        return self._time
+
+    @property
+    def points(self) -> Float32Array:
+        """(P, 3) present positions in the world, metres."""
+        return self._drawn().astype(np.float32)
+
+    def retune(self, options: Options) -> None:
+        """Take other options from now on; positions and the number of elements stay."""
+        self._options = options
+        self._rods = at_rest(self._with_material(options), self._rest_gravity)
+
+    def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
+        """Put the guides at rest on a head at `head_from_rest` (4, 4), without velocity."""
+        head = np.eye(4) if head_from_rest is None else np.array(head_from_rest, np.float64)
+        if head.shape != (4, 4):
+            raise InputError(f"head_from_rest has shape {head.shape}, expected (4, 4)")
+        self._head, self._time, self._before = head, 0.0, 0.0
+        shape = (len(self._rods.lengths), NODES)
+        rest = np.empty((*shape, 3))
+        over_strands(place_points, self._rods.offsets, self._rods, self._rods.captured, head, rest)
+        q, still = self._rods.captured, np.zeros((*shape, 3))
+        self._motion = Motion(q.copy(), q.copy(), rest, rest.copy(), still, still.copy())
+        own = (rest - head[:3, 3]) @ head[:3, :3]
+        self._gap = np.full(shape, SKIN)
+        if self._obstacles is not None:
+            away = self._obstacles.at(own.reshape(-1, 3))[0].reshape(shape)
+            self._gap = np.minimum(self._gap, away)
+        self._neighbours = Neighbours(own, self._rods.masses)
+        self._rest_energy = self._potential(own, q, self._rest_gravity)
+
+    def advance(self, seconds: float, surroundings: Surroundings) -> None:
+        """Go on by `seconds` in substeps; the head moves evenly from where it was."""
+        if not seconds > 0:
+            raise InputError(f"cannot advance by {seconds} s, expected seconds above 0")
+        count = max(1, int(np.ceil(seconds / FRAME * self._options.substeps - 1e-6)))
+        start, end = self._head, surroundings.head_from_rest
+        turns = rotation.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
+        for substep in range(1, count + 1):
+            share = substep / count
+            head = end.copy()
+            if substep < count:
+                head[:3, :3] = rotation.to_matrix(rotation.slerp(turns[0], turns[1], share))
+                head[:3, 3] = (1 - share) * start[:3, 3] + share * end[:3, 3]
+            self._substep(seconds / count, head, surroundings)
+
+    def measure(self) -> Measures:
+        """Return the present read-outs."""
+        speed = (self._motion.velocity**2).sum(-1)
+        own = (self._motion.points - self._head[:3, 3]) @ self._head[:3, :3]
+        gravity = self._rest_gravity @ self._head[:3, :3]
+        return Measures(
+            self._stretch(),
+            float(0.5 * (self._rods.masses * speed).sum()),
+            self._potential(own, self._motion.q, gravity) - self._rest_energy,
+        )
+
+    def _substep(self, seconds: float, head: Float64Array, around: Surroundings) -> None:
+        options = self._options
+        gravity = self._rest_gravity if around.gravity is None else around.gravity
+        two_step = options.second_order and abs(self._before - seconds) < 1e-9
+        grid = self._obstacles
+        step = Step(
+            seconds,
+            two_step,
+            options.internal_friction,
+            options.iterations,
+            np.array(gravity, np.float64),
+            np.array(head, np.float64),
+            np.array(self._head, np.float64),
+            PUSH_RATE**2,
+            self._groom.physics.friction if options.friction is None else options.friction,
+            np.zeros(3) if grid is None else np.array(grid.grid.origin, np.float64),
+            1.0 if grid is None else float(grid.grid.spacing),
+            np.zeros((0, 0, 0), np.float32) if grid is None else np.array(grid.distance),
+        )
+        loads = self._loads(around, head)
+        if options.solver == "recursion":
+            over_strands(
+                step_strands, self._rods.offsets, self._rods, self._motion, loads, step
+            )
+        else:
+            step_densely(self._rods, self._motion, loads, step)
+        self._head, self._before = step.head, seconds
+        self._time += seconds
+
+    def _loads(self, around: Surroundings, head: Float64Array) -> Loads:
+        motion, masses = self._motion, self._rods.masses
+        shape = masses.shape
+        flat = motion.points.reshape(-1, 3)
+        air = air_velocity(flat, self._time, around.wind, around.turbulence)
+        air, drag = air.reshape(motion.points.shape), self._options.air_drag * masses
+        if self._options.hair_friction > 0 or self._options.hair_push > 0:
+            drag, air = self._neighbours.act(
+                motion,
+                head,
+                drag,
+                air,
+                masses,
+                self._options.hair_friction,
+                self._options.hair_push,
+            )
+        spring, anchor = np.zeros(shape), np.zeros_like(motion.points)
+        drawn = self._drawn() if around.grabs else None
+        for grab in around.grabs:
+            if drawn is None or not 0 <= grab.point < len(drawn):
+                raise InputError(f"grab of point {grab.point}, expected 0 to {len(flat) - 1}")
+            element = self._binding.element[grab.point]
+            node = int(np.argmin(np.linalg.norm(motion.points[element] - drawn[grab.point], axis=1)))
+            strand = np.searchsorted(self._rods.offsets, element, side="right") - 1
+            own = slice(self._rods.offsets[strand], self._rods.offsets[strand + 1])
+            spring[element, node] = GRAB_RATE**2 * masses[own].sum()
+            lever = motion.points[element, node] - drawn[grab.point]
+            anchor[element, node] = np.array(grab.target) + lever
+        return Loads(drag, np.ascontiguousarray(air), spring, anchor, self._gap)
+
+    def _with_material(self, options: Options) -> Rods:
+        """Return the captured rods with the stiffness and mass of hair."""
+        width = self._groom.material.width if options.diameter is None else options.diameter * 1e-6
+        second = np.pi * (width / 2) ** 4 / 4
+        bend = options.young * 1e9 * second * options.stiffness
+        bend *= self._groom.physics.bend_stiffness / MIDDLE
+        one = np.array([bend / (1 + POISSON), bend, bend])
+        shape = self._shape
+        density = np.full(len(shape.lengths), KERATIN * np.pi * width**2 / 4)
+        return shape._replace(stiffness=np.tile(one, (len(density), 1)), density=density)
+
+    def _drawn(self) -> Float64Array:
+        total = len(self._binding.arc)
+        points, frames = np.empty((total, 3)), np.empty((total, 3, 3))
+        over_strands(
+            draw,
+            self._rods.offsets,
+            self._rods,
+            self._motion.q,
+            self._head,
+            self._binding,
+            points,
+            frames,
+        )
+        return points
+
+    def _potential(self, points: Float64Array, q: Float64Array, gravity: Float64Array) -> float:
+        rods = self._rods
+        elastic = 0.5 * (rods.lengths[:, None] * rods.stiffness * (q - rods.natural) ** 2).sum()
+        return float(elastic - (rods.masses[..., None] * points * gravity).sum())
+
+    def _stretch(self) -> float:
+        rest, first = self.strands.segments()
+        now = self._drawn()
+        before = np.linalg.norm(rest.astype(np.float64), axis=1)
+        after = np.linalg.norm(now[first + 1] - now[first], axis=1)
+        change: Any = np.abs(after - before) / np.maximum(before, 1e-9)
+        return float(change.max(initial=0.0))
