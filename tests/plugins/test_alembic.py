@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import errno
 import logging
-import runpy
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -379,23 +376,3 @@ def test_the_room_made_is_enough(tmp_path: Path, caplog: pytest.LogCaptureFixtur
         size = writer._size(curves.groom_curves(ready, alembic.Options(**options)))
         have = written(groom, tmp_path, **options).stat().st_size
         assert have <= size < 2 * have + 50_000
-
-
-def test_the_script_for_unreal_imports_without_turning(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Against a stand-in for Unreal: one task, its own factory, no rotation, scale 1."""
-    script = Path(__file__).parents[2] / "examples/unreal/import_groom.py"
-    unreal = MagicMock()
-    unreal.GroomAsset = unreal.load_asset.return_value.__class__
-    unreal.AssetImportTask.return_value.get_editor_property.return_value = ["/Game/Hair/hair"]
-    monkeypatch.setitem(sys.modules, "unreal", unreal)
-    monkeypatch.setattr(sys, "argv", [str(script), str(tmp_path / "hair.abc"), "/Game/Hair"])
-    runpy.run_path(str(script), run_name="__main__")
-    assert [call.args for call in unreal.Vector.call_args_list] == [(0, 0, 0), (1, 1, 1)]
-    task = dict(
-        call.args for call in unreal.AssetImportTask.return_value.set_editor_property.call_args_list
-    )
-    assert task["factory"] is unreal.HairStrandsFactory.return_value
-    assert task["options"] is unreal.GroomImportOptions.return_value
-    assert task["filename"] == str(tmp_path / "hair.abc")
