@@ -25,6 +25,10 @@ from .meshes import JOINTS
 
 _LINES, _LOOP, _STRIP, _TRIANGLES = 1, 2, 3, 4
 _MAX_GROUP = 2**31 - 1
+_LEAST_BYTES = 4
+"""Of a file for each point that is made of it: positions alone take twelve."""
+_FARTHEST = 1e5
+"""Positions of a head and its hair, in any unit; beyond, 32-bit floats have no millimetres."""
 
 
 class ReaderOptions(Protocol):
@@ -105,7 +109,7 @@ def _parts(file: GlbFile, metres: float) -> list[_Part]:
             part = _part(file, primitive, matrix, metres)
             parts.append(part)
             read += len(part.points)
-            if read > file.bytes_read:
+            if _LEAST_BYTES * read > file.bytes_read:
                 raise ValueError("its meshes use the same data over and over")
     return parts
 
@@ -123,6 +127,8 @@ def _part(file: GlbFile, primitive: dict[str, Any], matrix: Float64Array, metres
     order, counts = joined(segments, len(points))
     if not np.array_equal(matrix, np.eye(4)) or metres != 1:
         points = metres * (points @ matrix[:3, :3].T + matrix[:3, 3])
+    if not (np.abs(points) <= _FARTHEST).all():
+        raise ValueError(f"positions lie beyond {_FARTHEST:g} m")
     custom = _Custom(file, primitive, order, np.cumsum(counts) - counts)
     radius, uv = custom.of_points("_RADIUS", 1), custom.of_points("_ROOT_UV", 2)
     if uv is not None:
@@ -192,6 +198,8 @@ def _segments(file: GlbFile, primitive: dict[str, Any], vertices: int) -> Int64A
         restart = np.iinfo(stored.dtype).max if primitive["mode"] != _LINES else -1
     else:
         index, restart = np.arange(vertices), -1
+    if len(index) > _LEAST_BYTES * (vertices + _LEAST_BYTES):
+        raise ValueError(f"{len(index)} indices use {vertices} vertices over and over")
     if ((index >= vertices) & (index != restart)).any():
         raise ValueError(f"an index is {index.max()}, the mesh has {vertices} vertices")
     if primitive["mode"] == _LINES:
@@ -255,6 +263,8 @@ def _own_head(file: GlbFile, own: dict[str, Any]) -> Head | None:
     uv[:, 1] = 1 - uv[:, 1]
     vertices = file.numbers(attributes["POSITION"])
     faces = file.accessor(primitive["indices"]).reshape(-1, 3).astype(np.int64)
+    if not (np.abs(vertices) <= _FARTHEST).all() or not (np.abs(joints) <= _FARTHEST).all():
+        raise ValueError(f"the head lies beyond {_FARTHEST:g} m")
     if faces.max() >= len(vertices):
         raise ValueError("a face of the head names a vertex that does not exist")
     scalp = file.numbers(attributes["_SCALP"])[:, 0]
