@@ -83,7 +83,8 @@ def _turned(vectors: npt.ArrayLike, turn: Float64Array, factor: float) -> Float3
     for row in range(3):
         column = int(np.abs(turn[row]).argmax())
         scale = np.float32(factor * turn[row, column])
-        np.multiply(source[..., column], scale, out=result[..., row])
+        with np.errstate(over="ignore"):  # readers refuse what is not finite, in their own words
+            np.multiply(source[..., column], scale, out=result[..., row])
     return result
 
 

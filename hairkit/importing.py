@@ -9,8 +9,10 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from hairkit.default_head import default_head
@@ -32,6 +34,7 @@ __all__ = [
     "adopt",
     "packed",
     "placed",
+    "plain_widths",
     "reversed_strands",
     "rows_kept",
     "with_mean_width",
@@ -41,6 +44,8 @@ SMALLEST, LARGEST = 0.015, 0.6
 """Roots of a head of hair spread over between these many metres."""
 NO_LENGTH = 1e-6
 """Strands shorter than this share of the whole hair's extent have no direction."""
+REACH = 1e6
+"""Metres; beyond them, squares of lengths leave what a float32 can hold."""
 FARTHEST = 0.03
 """Roots of a head's hair lie within this many metres of it, in the mean."""
 _OUTER = (1.0, 99.0)
@@ -73,8 +78,11 @@ def packed(points: Float32Array, counts: Int64Array, source: object) -> tuple[St
     Raises
     ------
     FormatError
-        No strand is left.
+        No strand is left, or a point lies where no hair can.
     """
+    farthest = float(np.abs(points).max(initial=0.0))
+    if not farthest <= REACH:
+        raise FormatError(f"{source}: a point lies {farthest:.3g} m away, expected hair on a head")
     keep = counts >= 2
     if not keep.any():
         raise FormatError(f"{source}: holds no strand of two or more points")
@@ -92,6 +100,18 @@ def rows_kept(counts: Int64Array, kept: Int64Array) -> BoolArray | slice:
     keep = np.zeros(len(counts), bool)
     keep[kept] = True
     return np.repeat(keep, counts)
+
+
+def plain_widths(thickness: npt.NDArray[Any], metres: float, source: object) -> Float32Array:
+    """Return diameters in metres of a file's, of `metres` a unit; what is below 0 becomes 0.
+
+    Raises `FormatError` when one is not finite or beyond all reason.
+    """
+    limit = REACH / metres
+    if not (thickness <= limit).all():  # so NaN is refused too
+        raise FormatError(f"{source}: a thickness is no number, or wider than {REACH:g} m")
+    widths: Float32Array = np.maximum(thickness, 0).astype(np.float32) * np.float32(metres)
+    return widths
 
 
 def adopt(

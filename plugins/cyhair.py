@@ -23,7 +23,7 @@ from hairkit.file_format import Feature, FileFormat
 from hairkit.file_space import FileSpace, SpaceOptions
 from hairkit.groom import Groom, HairMaterial
 from hairkit.hookspecs import hookimpl
-from hairkit.importing import ImportOptions, adopt, packed, rows_kept
+from hairkit.importing import ImportOptions, adopt, packed, plain_widths, rows_kept
 from hairkit.options import option
 from hairkit.stored import Float32Array, Int64Array, write_bytes
 from hairkit.strands import Strands
@@ -87,7 +87,7 @@ def import_groom(path: Path, options: Options) -> Groom:
     strands, kept = packed(space.points_to_head(points), counts, path)
     rows = rows_kept(counts, kept)
     if widths is not None:
-        widths = _plain(finite(widths, path, "thicknesses"), space)[rows]
+        widths = plain_widths(widths, space.metres, path)[rows]
         strands = Strands(strands.points, strands.offsets, widths)
     if colours is not None:
         colours = finite(colours, path, "colours")[rows]
@@ -140,12 +140,6 @@ def _counts(reader: ByteReader, header: Any) -> Int64Array:
     if int(counts.sum()) != total:
         raise reader.error(f"{strands} strands have {counts.sum()} points, the header says {total}")
     return counts
-
-
-def _plain(thickness: Float32Array, space: FileSpace) -> Float32Array:
-    """Return widths in metres, none below 0."""
-    widths: Float32Array = np.maximum(thickness, 0) * np.float32(space.metres)
-    return widths
 
 
 def _material(

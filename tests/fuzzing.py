@@ -7,6 +7,7 @@ import os
 import re
 import struct
 from collections.abc import Callable
+from random import Random
 
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -33,61 +34,64 @@ def long_run(cases: int) -> settings:
     return settings(max_examples=cases, database=None, derandomize=True)
 
 
-@st.composite
-def damaged(draw: st.DrawFn, whole: bytes) -> bytes:
-    """Return a valid file with one to four injuries.
+def damaged(whole: bytes) -> st.SearchStrategy[bytes]:
+    """Return a strategy of injured copies of a valid file; see `injured`."""
+    return st.integers(0, 2**40).map(lambda seed: injured(whole, seed))
+
+
+def injured(whole: bytes, seed: int) -> bytes:
+    """Return a valid file with one to four injuries, the same ones for equal seeds.
 
     Flipped bits, words overwritten by extreme numbers, numbers of a text replaced by extreme ones,
-    parts cut out, doubled or moved, and truncation.
+    parts cut out or doubled elsewhere, and truncation.
     """
-    data = whole
-    for _ in range(draw(st.integers(1, _MOST_EDITS))):
+    chance, data = Random(seed), whole
+    for _ in range(chance.randint(1, _MOST_EDITS)):
         if data:
-            data = draw(st.sampled_from(_EDITS))(draw, data)
+            data = chance.choice(_EDITS)(chance, data)
     return data
 
 
-def _place(draw: st.DrawFn, data: bytes) -> int:
+def _place(chance: Random, data: bytes) -> int:
     """Half of the places are near the start, where headers are."""
-    head = min(len(data), 256)
-    return draw(st.one_of(st.integers(0, head - 1), st.integers(0, len(data) - 1)))
+    return chance.randrange(min(len(data), chance.choice((256, 2**40))))
 
 
-def _flip(draw: st.DrawFn, data: bytes) -> bytes:
-    at = _place(draw, data)
-    return data[:at] + bytes([data[at] ^ (1 << draw(st.integers(0, 7)))]) + data[at + 1 :]
+def _flip(chance: Random, data: bytes) -> bytes:
+    at = _place(chance, data)
+    return data[:at] + bytes([data[at] ^ (1 << chance.randrange(8))]) + data[at + 1 :]
 
 
-def _truncate(draw: st.DrawFn, data: bytes) -> bytes:
-    return data[: _place(draw, data)]
+def _truncate(chance: Random, data: bytes) -> bytes:
+    return data[: _place(chance, data)]
 
 
-def _overwrite(draw: st.DrawFn, data: bytes) -> bytes:
-    at = _place(draw, data)
-    at -= draw(st.sampled_from((at % 4, 0)))
-    word = draw(st.sampled_from(_WORDS))
+def _overwrite(chance: Random, data: bytes) -> bytes:
+    at = _place(chance, data)
+    at -= chance.choice((at % 4, 0))
+    word = chance.choice(_WORDS)
     return data[:at] + word + data[at + len(word) :]
 
 
-def _renumber(draw: st.DrawFn, data: bytes) -> bytes:
-    start = _place(draw, data)
+def _renumber(chance: Random, data: bytes) -> bytes:
+    start = _place(chance, data)
     found = _NUMBER.search(data, start, start + 4096)
     if found is None:
         return data
-    return data[: found.start()] + draw(st.sampled_from(_TEXTS)) + data[found.end() :]
+    return data[: found.start()] + chance.choice(_TEXTS) + data[found.end() :]
 
 
-def _cut(draw: st.DrawFn, data: bytes) -> bytes:
-    at = _place(draw, data)
-    return data[:at] + data[at + draw(st.integers(1, _LONGEST)) :]
+def _cut(chance: Random, data: bytes) -> bytes:
+    at = _place(chance, data)
+    return data[:at] + data[at + chance.randint(1, _LONGEST) :]
 
 
-def _splice(draw: st.DrawFn, data: bytes) -> bytes:
-    at, other = _place(draw, data), _place(draw, data)
-    return data[:at] + data[other : other + draw(st.integers(1, _LONGEST))] + data[at:]
+def _splice(chance: Random, data: bytes) -> bytes:
+    at, other = _place(chance, data), _place(chance, data)
+    return data[:at] + data[other : other + chance.randint(1, _LONGEST)] + data[at:]
 
 
-_EDITS: tuple[Callable[[st.DrawFn, bytes], bytes], ...] = (
+_EDITS: tuple[Callable[[Random, bytes], bytes], ...] = (
     _flip,
     _truncate,
     _overwrite,

@@ -23,7 +23,7 @@ from hairkit.file_format import Feature, FileFormat
 from hairkit.file_space import SpaceOptions
 from hairkit.groom import Groom, HairMaterial
 from hairkit.hookspecs import hookimpl
-from hairkit.importing import ImportOptions, adopt, packed, rows_kept, with_mean_width
+from hairkit.importing import ImportOptions, adopt, packed, plain_widths, rows_kept, with_mean_width
 from hairkit.polylines import chains
 from hairkit.stored import Float32Array, Int64Array, write_bytes
 from hairkit.strands import Strands
@@ -109,8 +109,7 @@ def import_groom(path: Path, options: Options) -> Groom:
     rows = rows_kept(counts, kept)
     widths = None
     if "thickness" in vertex:
-        thickness = finite(vertex["thickness"], path, "thicknesses").astype(np.float32)
-        widths = (np.maximum(thickness, 0) * np.float32(options.space.metres))[order][rows]
+        widths = plain_widths(vertex["thickness"], options.space.metres, path)[order][rows]
     strands = Strands(strands.points, strands.offsets, widths)
     strands = _with_strand_values(strands, elements.get("strand", {}), kept, path)
     colours = None

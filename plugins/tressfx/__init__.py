@@ -20,7 +20,7 @@ from hairkit.file_format import Feature, FileFormat
 from hairkit.file_space import SpaceOptions
 from hairkit.groom import Groom, HairMaterial
 from hairkit.hookspecs import hookimpl
-from hairkit.importing import ImportOptions, adopt, packed, rows_kept, with_mean_width
+from hairkit.importing import ImportOptions, adopt, packed, plain_widths, rows_kept, with_mean_width
 from hairkit.options import option
 from hairkit.stored import Float32Array, write_bytes
 from hairkit.strands import Strands
@@ -79,8 +79,8 @@ def import_groom(path: Path, options: Options) -> Groom:
     strands, kept = packed(points, counts, path)
     widths, uv, colours = None, None, None
     if hair.thickness is not None:
-        each = np.maximum(hair.thickness[kept], 0) * np.float32(options.space.metres)
-        widths = np.repeat(each, strands.counts)
+        each = plain_widths(hair.thickness, options.space.metres, path)
+        widths = np.repeat(each[kept], strands.counts)
     if hair.uv is not None:
         uv = _flipped(hair.uv[kept], options)
     if hair.colours is not None:
