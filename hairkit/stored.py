@@ -11,6 +11,7 @@ import types
 import typing
 import zipfile
 import zlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Self
 
@@ -158,13 +159,21 @@ def write_bytes(
     path: str | os.PathLike[str], data: bytes | memoryview, *, durable: bool = True
 ) -> None:
     """Write `data` to `path` so that the file is either the old one or the whole new one."""
+    write_pieces(path, (data,), durable=durable)
+
+
+def write_pieces(
+    path: str | os.PathLike[str], pieces: Iterable[bytes | memoryview], *, durable: bool = True
+) -> None:
+    """Write pieces one after the other as `write_bytes` does, without joining them in memory."""
     target = Path(path)
     handle, temporary = tempfile.mkstemp(
         prefix=f".{target.name}.", suffix=".part", dir=target.parent
     )
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
+            for piece in pieces:
+                file.write(piece)
             file.flush()
             if durable:
                 os.fsync(file.fileno())

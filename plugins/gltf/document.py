@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +14,13 @@ import numpy.typing as npt
 
 import hairkit
 from hairkit.glb_file import BINARY_CHUNK, JSON_CHUNK
-from hairkit.stored import write_bytes
+from hairkit.stored import write_pieces
 
 _COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 _SHAPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
 VERTICES, INDICES = 34962, 34963
 """Targets of buffer views: the OpenGL names of both kinds of buffers."""
+_ROW = 1024
 
 
 class Document:
@@ -60,8 +63,7 @@ class Document:
         """
         low = high = None
         if bounds:
-            low = np.atleast_1d(array.min(axis=0)).tolist()
-            high = np.atleast_1d(array.max(axis=0)).tolist()
+            low, high = _bounds(array)
         return self.add(
             "accessors",
             bufferView=self.view(array, target),
@@ -106,16 +108,27 @@ class Document:
             self.json["buffers"] = [{"byteLength": self._end}]
         text = json.dumps(self.json, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
-        head = 12 + 8 + len(text)
-        data = np.empty(head + 8 + self._end, np.uint8)
-        start = struct.pack("<4sIIII", b"glTF", 2, len(data), len(text), JSON_CHUNK) + text
-        data[: head + 8] = np.frombuffer(
-            start + struct.pack("<II", self._end, BINARY_CHUNK), np.uint8
-        )
-        at = head + 8
+        total = 12 + 8 + len(text) + 8 + self._end
+        start = struct.pack("<4sIIII", b"glTF", 2, total, len(text), JSON_CHUNK) + text
+        start += struct.pack("<II", self._end, BINARY_CHUNK)
+        write_pieces(path, itertools.chain([start], self._pieces()))
+
+    def _pieces(self) -> Iterator[bytes | memoryview]:
         for array in self._arrays:
-            end = at + array.nbytes
-            data[at:end].view(array.dtype).reshape(array.shape)[...] = array
-            at += -(-array.nbytes // 4) * 4
-            data[end:at] = 0
-        write_bytes(path, data.data)
+            yield np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
+            yield bytes(-array.nbytes % 4)
+
+
+def _bounds(array: npt.NDArray[Any]) -> tuple[list[float], list[float]]:
+    """Return the smallest and the largest of each column.
+
+    Taken over long rows of many elements each, which is ten times as fast as over short ones.
+    """
+    columns = array.reshape(len(array), -1)
+    whole = len(columns) // _ROW * _ROW
+    found = []
+    for least in (np.min, np.max):
+        rows = least(columns[:whole].reshape(-1, _ROW * columns.shape[1]), axis=0) if whole else []
+        rest = np.concatenate([np.reshape(rows, (-1, columns.shape[1])), columns[whole:]])
+        found.append(least(rest, axis=0).astype(array.dtype).tolist())
+    return found[0], found[1]
