@@ -49,7 +49,7 @@ def contents(path: Path) -> Contents:
     if importlib.util.find_spec("pxr") is None:
         raise MissingExtraError(MISSING)
     if not path.is_file():
-        raise InputError(f"{path}: no such file")
+        raise InputError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise InputError(f"{path}: {size} bytes, hairkit reads up to {MAX_BYTES}")

@@ -47,7 +47,7 @@ def write_stage(ready: PreparedGroom, path: Path, options: StageOptions) -> None
         from pxr import Usd
     except ImportError as error:
         raise MissingExtraError(MISSING) from error
-    stage = Usd.Stage.CreateInMemory(f"groom{path.suffix}")
+    stage = Usd.Stage.CreateInMemory(f"groom{path.suffix.lower()}")
     _describe(stage, ready, space)
     _fill(stage, ready, space, options.head_mesh)
     _export(stage, path)
