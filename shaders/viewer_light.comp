@@ -38,7 +38,10 @@ void main() {
     float near = taken(at) + taken(at + vec3(1, 1, 0)) + taken(at - vec3(1, 1, 0))
                + taken(at + vec3(1, -1, 1)) + taken(at - vec3(1, -1, 1))
                + taken(at + vec3(0, 1, -1)) + taken(at - vec3(0, 1, -1));
-    if (near <= 0.0) return;
+    if (near <= 0.0) {
+        imageStore(u_reached, cell, vec4(1.0));
+        return;
+    }
     float sky = 2.0 * towards(at, vec3(0, 1, 0), SKY_GROWTH, SKY_STEPS)
               + towards(at, vec3(1, 0, 0), SKY_GROWTH, SKY_STEPS)
               + towards(at, vec3(-1, 0, 0), SKY_GROWTH, SKY_STEPS)

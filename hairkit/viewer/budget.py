@@ -66,4 +66,5 @@ class Budget:
 
     def _change(self, step: int) -> None:
         self.level += step
+        self.taken = 0.0
         self._wait = PATIENCE if step > 0 else 4 * PATIENCE  # slow to rise: no flicker

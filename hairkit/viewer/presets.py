@@ -59,6 +59,9 @@ def write_preset(path: Path, name: str, preset: Mapping[str, Any]) -> None:
 def _toml(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(_toml(item) for item in value)}]"
+    if isinstance(value, Mapping):
+        pairs = ", ".join(f"{json.dumps(key)} = {_toml(item)}" for key, item in value.items())
+        return f"{{{pairs}}}"
     if isinstance(value, float):
         return repr(value)
     return json.dumps(value if isinstance(value, (bool, int)) else str(value))

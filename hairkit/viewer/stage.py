@@ -123,8 +123,9 @@ class Stage:
         depth = self._depth(shot, own)
         if shot.hair is not None:
             self.hair.place(own, _hair_depth(own, self._rows), depth, shot.hair)
-            points, whole = self.body.points_each, shot.whole_light or self._fresh
-            self._light.update(self.hair.places, points, shot.hair.hairs, lights, whole=whole)
+        hairs = 0 if shot.hair is None else shot.hair.hairs
+        whole = shot.whole_light or self._fresh
+        self._light.update(self.hair.places, self.body.points_each, hairs, lights, whole=whole)
         self._fresh = False
         self._light.texture.use(0)
         self._draw_set(shot, own, depth, lighting)

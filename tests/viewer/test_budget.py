@@ -1,0 +1,56 @@
+"""Laws of the frame budget."""
+
+from __future__ import annotations
+
+from hairkit.viewer.budget import LEVELS, Budget
+
+
+def settle(budget: Budget, times: list[float], pictures: int = 400) -> None:
+    """Draw pictures that take, at each level, so long."""
+    for _ in range(pictures):
+        budget.spent(times[budget.level])
+
+
+def test_slow_drawing_draws_less_until_it_fits() -> None:
+    """The level ends where pictures fit, and does not swing."""
+    budget = Budget(0.05)
+    times = [0.4, 0.2, 0.1, 0.045, 0.03, 0.02, 0.01]
+    settle(budget, times)
+    assert budget.level == 3
+    settle(budget, times)
+    assert budget.level == 3
+
+
+def test_fast_drawing_draws_the_best() -> None:
+    """With time to spare every level is climbed."""
+    budget = Budget(0.05, level=len(LEVELS) - 1)
+    settle(budget, [0.005] * len(LEVELS))
+    assert budget.quality == LEVELS[0]
+
+
+def test_hopeless_drawing_stays_at_the_fastest() -> None:
+    """Too slow at every level is no reason to stop."""
+    budget = Budget(0.05)
+    settle(budget, [1.0] * len(LEVELS))
+    assert budget.quality == LEVELS[-1]
+
+
+def test_no_budget_draws_the_best() -> None:
+    """Scripts have all the time in the world."""
+    budget = Budget(0.0)
+    settle(budget, [9.0] * len(LEVELS))
+    assert budget.quality == LEVELS[0]
+
+
+def test_levels_draw_less_and_less() -> None:
+    """From level to level nothing gets finer."""
+    for better, worse in zip(LEVELS, LEVELS[1:], strict=False):
+        assert (better.smooth, better.scale, better.share) > (worse.smooth, worse.scale, worse.share)
+
+
+def test_a_slow_simulator_does_not_take_all_the_time_from_drawing() -> None:
+    """Drawing keeps half of the budget, however long the simulation takes."""
+    budget = Budget(0.05)
+    for _ in range(300):
+        budget.spent(0.02, simulated=1.0)
+    assert budget.quality == LEVELS[1]

@@ -1,0 +1,146 @@
+"""Laws of the layers: what the stages found is shown where the photos saw it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hairkit.errors import InputError
+from hairkit.groom_file import write_groom
+from hairkit.manager import Manager
+from hairkit.render.context import renderer
+from hairkit.stored import Stored, to_arrays, write_npz
+from hairkit.testing import (
+    ball_mask,
+    bristle_groom,
+    combed_field,
+    combed_orientation,
+    shell_hull,
+    turn_scene,
+)
+from hairkit.viewer.actions import perform
+from hairkit.viewer.layers import BOARDS, Layers
+from hairkit.viewer.preview import Preview
+from hairkit.viewer.session import Session
+
+SCENE = turn_scene()
+
+
+def keep(folder: Path, name: str, value: Stored) -> None:
+    """Write a stage's result as the work folder does."""
+    write_npz(folder / f"{name}.npz", to_arrays(value) | {"work_digest": np.asarray("x")})
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    """A folder of results, as `reconstruct` leaves it."""
+    work = tmp_path / "work"
+    work.mkdir()
+    keep(work, "scene", SCENE)
+    keep(work, "hull", shell_hull())
+    keep(work, "field", combed_field())
+    for name, camera in zip(SCENE.names, SCENE.cameras, strict=True):
+        keep(work, f"segment-{name}", ball_mask(camera))
+        keep(work, f"orient-{name}", combed_orientation(ball_mask(camera)))
+    write_groom(tmp_path / "groom.npz", bristle_groom())
+    return tmp_path
+
+
+def test_a_picture_in_space_covers_what_its_camera_sees(results: Path) -> None:
+    """Its corners project onto the corners of the photo."""
+    layers = Layers(results)
+    for layer in ("masks", "orientation"):
+        boards = layers.boards(layer)
+        assert sorted(boards) == sorted(SCENE.names)
+        for name, camera in zip(SCENE.names, SCENE.cameras, strict=True):
+            corners = camera.project(boards[name].corners)
+            size = np.array([camera.width, camera.height])
+            np.testing.assert_allclose(corners, [[0, 0], [1, 0], [0, 1], [1, 1]] * size, atol=1e-3)
+
+
+def test_masks_show_hair_and_orientation_shows_upright_strands_in_one_hue(results: Path) -> None:
+    """Opaque where hair is, clear in the background."""
+    layers = Layers(results)
+    mask = ball_mask(SCENE.cameras[0])
+    image = layers.boards("masks")["front"].image
+    assert (image[mask.hair][:, 3] > 200).all()
+    assert (image[mask.labels == 0][:, 3] == 0).all()
+    angles = layers.boards("orientation")["front"].image
+    assert len(np.unique(angles[mask.hair], axis=0)) == 1
+
+
+def test_field_lines_run_along_the_field(results: Path) -> None:
+    """Each stroke of a field combed down the ball lies square to the ball's radius."""
+    lines = Layers(results).field_lines()
+    assert lines is not None
+    ends = lines.points.reshape(-1, 2, 3)
+    way, middle = ends[:, 1] - ends[:, 0], ends.mean(axis=1)
+    cosine = (way * middle).sum(axis=1) / (
+        np.linalg.norm(way, axis=1) * np.linalg.norm(middle, axis=1)
+    )
+    assert np.abs(cosine).max() < 0.05
+
+
+def test_confidence_is_the_fields_at_the_guides(results: Path) -> None:
+    """Guides inside the certain shell are certain, far away they are not."""
+    inside = np.array([[[0.0, 0.112, 0.0], [0.0, 0.115, 0.0]]], np.float32)
+    confidence = Layers(results).confidence(inside)
+    assert confidence is not None
+    assert (confidence > 0.4).all()
+    far = Layers(results).confidence(inside * 0)
+    assert far is not None
+    assert (far < 0.1).all()
+
+
+def test_a_groom_alone_has_the_head_alone(tmp_path: Path) -> None:
+    """Layers that are not there are refused with what to do."""
+    layers = Layers(None)
+    assert layers.available == ("head",)
+    with pytest.raises(InputError, match="open the folder that hairkit reconstruct wrote"):
+        layers.check("hull")
+    with pytest.raises(InputError, match="no layer 'hat'"):
+        layers.check("hat")
+    assert layers.field_lines() is None
+    assert layers.hull() is None
+
+
+def test_a_damaged_stage_is_left_out(results: Path) -> None:
+    """A file that cannot be read shows nothing, and nothing else suffers."""
+    (results / "work" / "field.npz").write_bytes(b"PK broken")
+    assert Layers(results).field_lines() is None
+    assert Layers(results).hull() is not None
+
+
+def test_every_layer_changes_the_picture(results: Path, swaying_manager: Manager) -> None:
+    """Shown on opening the folder itself; hidden again, the picture is as before."""
+    session = Session(swaying_manager, results, size=(160, 120), hairs=200)
+    perform(session, "zoom", {"factor": 0.5})
+    with renderer() as gl:
+        preview = Preview(gl, session)
+        preview.frame(0.0, still=True)
+        plain = preview.picture().copy()
+        for layer in (*BOARDS[1:], "cameras", "hull", "field", "head"):
+            perform(session, "layer", {"name": layer})
+            preview.frame(0.0, still=True)
+            assert (preview.picture() != plain).any(), layer
+            perform(session, "layer", {"name": layer})
+            preview.frame(0.0, still=True)
+            assert (preview.picture() == plain).all(), layer
+        preview.release()
+
+
+def test_looking_through_a_photos_camera_sees_what_the_photo_saw(
+    results: Path, swaying_manager: Manager
+) -> None:
+    """The camera of the picture projects points where the photo's does, scaled to fit."""
+    session = Session(swaying_manager, results, size=(160, 120), hairs=200)
+    perform(session, "through", {"name": "left"})
+    camera, photo = session.camera(), session.layers.cameras["left"]
+    points = np.array([[0.02, 0.05, 0.01], [0.0, -0.03, 0.06]])
+    scale = min(160 / photo.width, 120 / photo.height)
+    expected = (photo.project(points) - photo.centre) * scale + [80, 60]
+    np.testing.assert_allclose(camera.project(points), expected, atol=1e-6)
+    perform(session, "orbit", {"right": 5.0})
+    assert session.shown.through is None
