@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 
 from hairkit.errors import FormatError, HairkitError, InputError
 from hairkit.exporting import selected
+from hairkit.groom_file import write_groom
 from hairkit.testing import bristle_groom
 
 REFERENCE = Path(__file__).parents[3] / "shared/reference/abc"
@@ -313,7 +314,7 @@ def test_damaged_bytes_give_a_groom_or_one_error(
     folder = tmp_path_factory.getbasetemp()
     groom, good = folder / "groom.npz", folder / "small.abc"
     if not good.exists():
-        bristle_groom().save(groom)
+        write_groom(groom, bristle_groom())
         small_file(folder)
     path = folder / "damaged.abc"
     path.write_bytes(data.draw(damaged(good.read_bytes())))
