@@ -78,12 +78,12 @@ class FileSpace:
 
 def _turned(vectors: npt.ArrayLike, turn: Float64Array, factor: float) -> Float32Array:
     """Signed permutations are written out: no rounding but that of the unit, and fast."""
-    source = np.asarray(vectors, np.float32)
-    result = np.empty_like(source)
-    for row in range(3):
-        column = int(np.abs(turn[row]).argmax())
-        scale = np.float32(factor * turn[row, column])
-        with np.errstate(over="ignore"):  # readers refuse what is not finite, in their own words
+    with np.errstate(over="ignore"):  # readers refuse what is not finite, in their own words
+        source = np.asarray(vectors, np.float32)
+        result = np.empty_like(source)
+        for row in range(3):
+            column = int(np.abs(turn[row]).argmax())
+            scale = np.float32(factor * turn[row, column])
             np.multiply(source[..., column], scale, out=result[..., row])
     return result
 
