@@ -3,7 +3,7 @@
 import bpy
 
 ROUGHNESS = 0.3
-DARKENING = 2.4
+DARKENING = 1.8
 """Exponent of the captured colour on its way into the fibre. The captured colour is what the hair
 looks like in photos; the model's colour is that of very dense hair and comes out much paler. Found
 by eye, so that dark hair looks as in hairkit's own picture."""
