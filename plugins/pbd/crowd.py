@@ -8,11 +8,13 @@ grid has no say: nothing moves, and nothing is denser than captured.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hairkit.stored import Float64Array, Int64Array
+
+from .reference import State, moved
 
 SPACING = 0.015
 """Metres between the grid's values: some distances between guides."""
@@ -29,6 +31,29 @@ class Crowd:
     shape: tuple[int, int, int]
     density: Float64Array
     """(C,) kilograms a value at rest."""
+
+    @property
+    def usual(self) -> Float64Array:
+        """(X, Y, Z) what counts as not crowded: as captured, or a quarter of the densest."""
+        least = max(0.25 * float(self.density.max(initial=0.0)), 1e-30)
+        return np.maximum(self.density, least).reshape(self.shape)
+
+    def rubbed(
+        self, state: State, mass: Float64Array, ride: Float64Array, rates: tuple[float, float, float]
+    ) -> State:
+        """Return the state with velocities after hair has acted on hair; roots keep theirs.
+
+        `ride` (4, 4) is how the head moves in the meantime, `rates` are cohesion, pressure, seconds.
+        """
+        cohesion, pressure, seconds = rates
+        riding = (state.position - moved(ride, state.position)) / seconds
+        relative = state.velocity - riding
+        new = self.velocities(
+            state.position.reshape(-1, 3), relative.reshape(-1, 3), mass.reshape(-1),
+            cohesion, pressure, seconds,
+        ).reshape(relative.shape)  # fmt: skip
+        new[:, 0] = relative[:, 0]
+        return replace(state, velocity=new + riding)
 
     def velocities(
         self,
@@ -63,7 +88,7 @@ class Crowd:
             mean = np.einsum("nc,nck->nk", weight, cells[corner])
             result = velocity + (1 - np.exp(-cohesion * seconds)) * (mean - velocity)
         if pressure > 0:
-            usual = np.maximum(self.density, 0.25 * self.density.max())
+            usual = self.usual.reshape(-1)
             crowded = np.maximum(filled - usual, 0.0) / usual
             slope = np.stack(np.gradient(np.minimum(crowded, 4.0).reshape(self.shape)), axis=-1)
             push = np.einsum("nc,nck->nk", weight, slope.reshape(-1, 3)[corner])

@@ -71,6 +71,15 @@ class Riders:
     """(P,) how far along the segment."""
     offset: Float64Array
     """(P, 3) from the place on the rod, in the frame there."""
+    _cast: tuple[Int64Array, Int64Array, Float32Array, Float32Array] | None = None
+
+    def packed(self) -> tuple[Int64Array, Int64Array, Float32Array, Float32Array]:
+        """Return rod, segment, share and offset for the kernels, cast once."""
+        if self._cast is None:
+            cast = (self.rod, self.segment, self.share.astype("f4"), self.offset.astype("f4"))
+            object.__setattr__(self, "_cast", cast)
+        assert self._cast is not None
+        return self._cast
 
     def points(self, position: Float64Array, frames: Float64Array) -> Float32Array:
         """Return (P, 3) where the points are, of rods at `position` (S, n, 3)."""

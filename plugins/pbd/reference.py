@@ -51,16 +51,18 @@ class Contact:
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """What acts in one substep; head axes at its end."""
+    """What acts in one substep."""
 
     ride: Float64Array
     """(4, 4) from the head axes before the substep to those after it."""
+    turn: Float64Array
+    """(3, 3) from the world's axes to the head's after it."""
     gravity: Float64Array
-    """(3,) m/s^2."""
+    """(3,) m/s^2, world."""
     air: Float64Array
-    """(S, n, 3) or (3,) velocity of the air, m/s."""
+    """(S, n, 3) or (3,) velocity of the air, m/s, world."""
     force: Float64Array | None = None
-    """(S, n, 3) further force, newtons."""
+    """(S, n, 3) further force, newtons, head axes after the substep."""
 
 
 def at_rest(rods: Rods) -> State:
@@ -92,8 +94,8 @@ def substep(
     # Velocity of a point that rides on the head, in the world: where it is less where it was.
     riding = (predicted - moved(load.ride, predicted)) / h
     force += rods.mass[..., None] * (
-        load.gravity
-        + rates.drag[..., None] * (load.air - old.velocity)
+        load.turn @ load.gravity
+        + rates.drag[..., None] * (load.air @ load.turn.T - old.velocity)
         + rates.damping * (riding - old.velocity)
         + rates.shape[..., None] * (rods.points - predicted)
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,8 @@ from hairkit.strands import Strands
 from .crowd import Crowd, crowd_of
 from .energies import elastic_energy, largest_stretch
 from .guides import node_points, riders
-from .reference import Contact, Load, State, at_rest, moved, substep
+from .engine import Engine, ReferenceEngine
+from .reference import Contact, Load, at_rest, moved
 from .rods import Rods, loaded, make_rods
 from .system import Rates, System, assemble
 
@@ -35,22 +36,6 @@ HAIR_DENSITY = 1300.0
 SINGLE_HAIR = 1.2e-3
 """m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""
 _KEPT_SYSTEMS = 4
-
-
-class Backend(Protocol):
-    """Does substeps; the reference is the function of that name."""
-
-    def __call__(
-        self,
-        rods: Rods,
-        system: System,
-        state: State,
-        load: Load,
-        contact: Contact | None = None,
-        iterations: int = 1,
-    ) -> State:
-        """Return the state one substep later."""
-        ...
 
 
 class PbdSimulator:
@@ -87,9 +72,7 @@ class PbdSimulator:
     def points(self) -> Float32Array:
         """(P, 3) present positions in the world, metres, in the order of `strands`."""
         if self._points is None:
-            local = self._riders.points(self._state.position, self._state.frames)
-            world = moved(self._head, local.astype(np.float64))
-            self._points = world.astype(np.float32)
+            self._points = self._engine.points(self._riders, self._head)
             self._points.setflags(write=False)
         return self._points
 
@@ -112,23 +95,21 @@ class PbdSimulator:
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
         """Put the guides at rest on a head at `head_from_rest` (4, 4), without velocity."""
         self._head = np.eye(4) if head_from_rest is None else np.asarray(head_from_rest, np.float64)
-        self._state = at_rest(self._rods)
+        self._engine.state = at_rest(self._rods)
         self._time = 0.0
         self._points: Float32Array | None = None
 
     def retune(self, options: Options) -> None:
         """Take other options from now on; positions and velocities stay."""
-        before, nodes = self._state, self._rods.nodes
+        before, nodes = self._engine.state, self._rods.nodes
         self._tune(options)
-        if self._rods.nodes != nodes:
-            self.reset(self._head)
-        else:
-            self._state = before
+        if self._rods.nodes == nodes:
+            self._engine.state = before
         self._points = None
 
     def measure(self) -> Measures:
         """Return the present stretch and energies; potential energy is 0 at rest."""
-        state, rods = self._state, self._rods
+        state, rods = self._engine.state, self._rods
         kinetic = 0.5 * float((rods.mass[..., None] * state.velocity**2).sum())
         down = self._head[:3, :3].T @ self._gravity(None)
         fallen = ((state.position - rods.points) * down).sum(axis=-1)
@@ -158,7 +139,7 @@ class PbdSimulator:
         self._systems: dict[float, System] = {}
         self._contact = _contact(resolved, self._obstacles, points)
         self._crowd: Crowd = crowd_of(points.reshape(-1, 3), self._rods.mass.reshape(-1))
-        self._backend: Backend = substep
+        self._engine = _engine(resolved.backend, self._rods, self._contact)
 
     def _system(self, step: float) -> System:
         key = round(step, 9)
@@ -175,22 +156,23 @@ class PbdSimulator:
         count = max(1, math.ceil(self._options.substeps * seconds / FRAME - 1e-6))
         step = seconds / count
         system = self._system(step)
-        air_world = self._air(around, start)
-        self._state = self._among(self._state, start, end, seconds)
-        head = start
+        gravity, air = self._gravity(around), self._air(around, start)
+        if self._options.cohesion > 0 or self._options.pressure > 0:
+            rates = (self._options.cohesion, self._options.pressure, seconds)
+            self._engine.rub(self._crowd, inverse_motion(end) @ start, rates)
+        loads, head = [], start
         for k in range(count):
             after = between(start, end, (k + 1) / count)
-            turn = after[:3, :3].T
-            load = Load(
-                inverse_motion(after) @ head if (after != head).any() else np.eye(4),
-                turn @ self._gravity(around),
-                air_world @ turn.T,
-                self._grabbed(around.grabs, system, head, after),
-            )
-            self._state = self._backend(
-                self._rods, system, self._state, load, self._contact, self._options.iterations
-            )
+            ride = inverse_motion(after) @ head if (after != head).any() else np.eye(4)
+            load = Load(ride, after[:3, :3].T, gravity, air)
+            if around.grabs:  # a pull depends on where the node is
+                force = self._grabbed(around.grabs, system, load, after)
+                self._engine.run(system, [replace(load, force=force)], self._options.iterations)
+            else:
+                loads.append(load)
             head = after
+        if loads:
+            self._engine.run(system, loads, self._options.iterations)
         self._time += seconds
 
     def _gravity(self, around: Surroundings | None) -> Float64Array:
@@ -204,7 +186,7 @@ class PbdSimulator:
             return np.asarray(around.wind, np.float64)
         nodes = self._rods.nodes
         some = np.unique(np.append(np.arange(0, nodes, 4), nodes - 1))
-        where = moved(head, self._state.position[:, some])
+        where = moved(head, self._engine.state.position[:, some])
         found = air_velocity(
             where.reshape(-1, 3), self._time, around.wind, around.turbulence, self._options.seed
         ).reshape(where.shape)
@@ -214,42 +196,21 @@ class PbdSimulator:
         result: Float64Array = found[:, after - 1] * (1 - share) + found[:, after] * share
         return result
 
-    def _among(
-        self, state: State, start: Float64Array, end: Float64Array, seconds: float
-    ) -> State:
-        """Let hair rub on hair and keep its room, once a piece."""
-        options, rods = self._options, self._rods
-        if options.cohesion == 0.0 and options.pressure == 0.0:
-            return state
-        ride = inverse_motion(end) @ start
-        riding = (state.position - moved(ride, state.position)) / seconds
-        relative = (state.velocity - riding).reshape(-1, 3)
-        new = self._crowd.velocities(
-            state.position.reshape(-1, 3), relative, rods.mass.reshape(-1),
-            options.cohesion, options.pressure, seconds,
-        ).reshape(state.velocity.shape)  # fmt: skip
-        new[:, 0] = state.velocity[:, 0] - riding[:, 0]
-        return replace(state, velocity=new + riding)
-
     def _grabbed(
-        self, grabs: tuple[Grab, ...], system: System, head: Float64Array, after: Float64Array
-    ) -> Float64Array | None:
+        self, grabs: tuple[Grab, ...], system: System, load: Load, after: Float64Array
+    ) -> Float64Array:
         """Force on the nodes nearest to grabbed points that brings them to their targets."""
-        if not grabs:
-            return None
         force = np.zeros_like(self._rods.points)
         back = inverse_motion(after)
         for grab in grabs:
             rod = int(self._riders.rod[grab.point])
             node = int(self._riders.segment[grab.point] + (self._riders.share[grab.point] >= 0.5))
             node = max(node, 1)
-            target = moved(back, np.asarray(grab.target, np.float64))
-            here = moved(back @ head, self._state.position[rod, node])
-            velocity = back[:3, :3] @ head[:3, :3] @ self._state.velocity[rod, node]
-            wanted = target - (here + system.step * velocity)
+            place, velocity = self._engine.node(rod, node)
+            expected = moved(load.ride, place) + system.step * load.ride[:3, :3] @ velocity
+            wanted = moved(back, np.asarray(grab.target, np.float64)) - expected
             far = float(np.linalg.norm(wanted))
-            limit = self._options.grab_speed * system.step
-            wanted *= min(1.0, limit / max(far, 1e-12))
+            wanted *= min(1.0, self._options.grab_speed * system.step / max(far, 1e-12))
             force[rod, node] += wanted / system.inverse[rod, node - 1, node - 1]
         return force
 
@@ -273,6 +234,14 @@ def inverse_motion(motion: Float64Array) -> Float64Array:
     result[:3, :3] = motion[:3, :3].T
     result[:3, 3] = -motion[:3, :3].T @ motion[:3, 3]
     return result
+
+
+def _engine(name: str, rods: Rods, contact: Contact) -> Engine:
+    if name == "reference":
+        return ReferenceEngine(rods, contact)
+    from .fast import FastEngine  # Numba loads where it is used
+
+    return FastEngine(rods, contact)
 
 
 def _rates(options: Options, rods: Rods, width: Float64Array) -> Rates:

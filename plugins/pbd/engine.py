@@ -1,0 +1,62 @@
+"""What runs substeps: the contract of the backends, and the reference behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from hairkit.stored import Float32Array, Float64Array
+
+from .crowd import Crowd
+from .guides import Riders
+from .reference import Contact, Load, State, at_rest, moved, substep
+from .rods import Rods
+from .system import System
+
+
+class Engine(Protocol):
+    """Rods in motion, in whatever form suits the backend."""
+
+    state: State
+    """The present state; setting it moves the rods."""
+
+    def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
+        """Do one substep for each load."""
+        ...
+
+    def rub(self, crowd: Crowd, ride: Float64Array, rates: tuple[float, float, float]) -> None:
+        """Let hair act on hair: cohesion, pressure, seconds."""
+        ...
+
+    def node(self, rod: int, node: int) -> tuple[Float64Array, Float64Array]:
+        """Return place and velocity (3,) of one node, head axes."""
+        ...
+
+    def points(self, riders: Riders, head: Float64Array) -> Float32Array:
+        """Return the guides' points (P, 3) in the world."""
+        ...
+
+
+class ReferenceEngine:
+    """The plain one: float64 throughout."""
+
+    def __init__(self, rods: Rods, contact: Contact | None) -> None:
+        self._rods, self._contact = rods, contact
+        self.state = at_rest(rods)
+
+    def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
+        """Do one substep for each load."""
+        for load in loads:
+            self.state = substep(self._rods, system, self.state, load, self._contact, iterations)
+
+    def rub(self, crowd: Crowd, ride: Float64Array, rates: tuple[float, float, float]) -> None:
+        """Let hair act on hair."""
+        self.state = crowd.rubbed(self.state, self._rods.mass, ride, rates)
+
+    def node(self, rod: int, node: int) -> tuple[Float64Array, Float64Array]:
+        """Return place and velocity (3,) of one node, head axes."""
+        return self.state.position[rod, node], self.state.velocity[rod, node]
+
+    def points(self, riders: Riders, head: Float64Array) -> Float32Array:
+        """Return the guides' points (P, 3) in the world."""
+        return moved(head, riders.points(self.state.position, self.state.frames)).astype("f4")

@@ -1,0 +1,145 @@
+"""Kernels around the substeps: the guides' points in the world, and hair among hair."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+
+from .kernel_math import carry, rotate
+
+LANES = 32
+ONE, TWO, HALF, ZERO = np.float32(1), np.float32(2), np.float32(0.5), np.float32(0)
+THREE, FOUR, CELL = np.float32(3), np.float32(4), np.float32(1 / 0.015)
+
+
+@njit(parallel=True, fastmath=True, error_model="numpy", cache=True)
+def ride_points(  # type: ignore[no-untyped-def]
+    x, q, identity, rod, segment, share, offset, head, count
+):  # pragma: no cover - compiled
+    """Return (P, 3) the guides' points in the world (see `guides.Riders`)."""
+    n = x.shape[1]
+    if identity:
+        out = np.empty((count * n, 3), np.float32)
+        for number in prange(count):
+            s = np.int64(number)
+            block, lane = s // LANES, s % LANES
+            for j in range(n):
+                p = carry(head, x[block, j, 0, lane], x[block, j, 1, lane], x[block, j, 2, lane])
+                out[s * n + j, 0], out[s * n + j, 1], out[s * n + j, 2] = p
+        return out
+    out = np.empty((len(rod), 3), np.float32)
+    for number in prange(len(rod)):
+        i = np.int64(number)
+        block, lane = rod[i] // LANES, rod[i] % LANES
+        j, t = segment[i], share[i]
+        one, two = t * t * (THREE - TWO * t), t * (ONE - t)
+        before, after = max(j - 1, 0), min(j + 2, n - 1)
+        place = np.empty(3, np.float32)
+        for c in range(3):
+            a, b = x[block, j, c, lane], x[block, j + 1, c, lane]
+            sa = b - a if j == 0 else (b - x[block, before, c, lane]) * HALF
+            sb = b - a if j == n - 2 else (x[block, after, c, lane] - a) * HALF
+            place[c] = a + (b - a) * one + two * ((ONE - t) * sa - t * sb)
+        k = min(max(j + (-1 if t < HALF else 1), 0), n - 2)
+        part = abs(t - HALF)
+        w = ZERO
+        for c in range(4):
+            w += q[block, j, c, lane] * q[block, k, c, lane]
+        mix = part if w >= ZERO else -part
+        f0 = (ONE - part) * q[block, j, 0, lane] + mix * q[block, k, 0, lane]
+        f1 = (ONE - part) * q[block, j, 1, lane] + mix * q[block, k, 1, lane]
+        f2 = (ONE - part) * q[block, j, 2, lane] + mix * q[block, k, 2, lane]
+        f3 = (ONE - part) * q[block, j, 3, lane] + mix * q[block, k, 3, lane]
+        size = ONE / np.sqrt(f0 * f0 + f1 * f1 + f2 * f2 + f3 * f3)
+        frame = (f0 * size, f1 * size, f2 * size, f3 * size)
+        turned = rotate(frame, offset[i, 0], offset[i, 1], offset[i, 2])
+        p = carry(head, place[0] + turned[0], place[1] + turned[1], place[2] + turned[2])
+        out[i, 0], out[i, 1], out[i, 2] = p
+    return out
+
+
+@njit(fastmath=True, error_model="numpy", cache=True)
+def _corner(p, origin, shape):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the cell and the shares within it of a place along one axis."""
+    at = min(max((p - origin) * CELL, ZERO), np.float32(shape) - np.float32(1.001))
+    low = int(at)
+    return low, at - np.float32(low)
+
+
+@njit(fastmath=True, error_model="numpy", cache=True)
+def rub_nodes(  # type: ignore[no-untyped-def]
+    x, v, mass, count, ride, origin, shape, usual, rates
+) -> None:  # pragma: no cover - compiled
+    """Draw velocities to those of the neighbours, and push out of crowded places, in place."""
+    cohesion, pressure, seconds = rates[0], rates[1], rates[2]
+    taken, over = ONE - np.exp(-cohesion * seconds), ONE / seconds
+    n, s0, s1, s2 = x.shape[1], shape[0], shape[1], shape[2]
+    cells = np.zeros((s0, s1, s2, 4), np.float32)
+    for s in range(count):
+        block, lane = s // LANES, s % LANES
+        for j in range(n):
+            p0, p1, p2 = x[block, j, 0, lane], x[block, j, 1, lane], x[block, j, 2, lane]
+            r0, r1, r2 = carry(ride, p0, p1, p2)
+            m = mass[block, j, lane]
+            u0 = m * (v[block, j, 0, lane] - (p0 - r0) * over)
+            u1 = m * (v[block, j, 1, lane] - (p1 - r1) * over)
+            u2 = m * (v[block, j, 2, lane] - (p2 - r2) * over)
+            a, fa = _corner(p0, origin[0], s0)
+            b, fb = _corner(p1, origin[1], s1)
+            c, fc = _corner(p2, origin[2], s2)
+            for i in range(8):
+                k, l, o = i >> 2 & 1, i >> 1 & 1, i & 1
+                weight = (fa if k else ONE - fa) * (fb if l else ONE - fb) * (fc if o else ONE - fc)
+                cell = cells[a + k, b + l, c + o]
+                cell[0] += weight * m
+                cell[1] += weight * u0
+                cell[2] += weight * u1
+                cell[3] += weight * u2
+    crowded = np.zeros((s0, s1, s2), np.float32)
+    for a in range(s0):
+        for b in range(s1):
+            for c in range(s2):
+                cell, use = cells[a, b, c], usual[a, b, c]
+                crowded[a, b, c] = min(max((cell[0] - use) / use, ZERO), FOUR)
+                scale = ONE / max(cell[0], np.float32(1e-30))
+                cell[1] *= scale
+                cell[2] *= scale
+                cell[3] *= scale
+    for s in range(count):
+        block, lane = s // LANES, s % LANES
+        for j in range(1, n):
+            p0, p1, p2 = x[block, j, 0, lane], x[block, j, 1, lane], x[block, j, 2, lane]
+            r0, r1, r2 = carry(ride, p0, p1, p2)
+            h0, h1, h2 = (p0 - r0) * over, (p1 - r1) * over, (p2 - r2) * over
+            u0, u1 = v[block, j, 0, lane] - h0, v[block, j, 1, lane] - h1
+            u2 = v[block, j, 2, lane] - h2
+            a, fa = _corner(p0, origin[0], s0)
+            b, fb = _corner(p1, origin[1], s1)
+            c, fc = _corner(p2, origin[2], s2)
+            m0, m1, m2, g0, g1, g2 = ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
+            for i in range(8):
+                k, l, o = i >> 2 & 1, i >> 1 & 1, i & 1
+                weight = (fa if k else ONE - fa) * (fb if l else ONE - fb) * (fc if o else ONE - fc)
+                i0, i1, i2 = a + k, b + l, c + o
+                cell = cells[i0, i1, i2]
+                m0 += weight * cell[1]
+                m1 += weight * cell[2]
+                m2 += weight * cell[3]
+                if pressure > ZERO:
+                    g0 += weight * _slope(crowded, i0, i1, i2, 0)
+                    g1 += weight * _slope(crowded, i0, i1, i2, 1)
+                    g2 += weight * _slope(crowded, i0, i1, i2, 2)
+            push = pressure * seconds
+            v[block, j, 0, lane] = h0 + u0 + taken * (m0 - u0) - push * g0
+            v[block, j, 1, lane] = h1 + u1 + taken * (m1 - u1) - push * g1
+            v[block, j, 2, lane] = h2 + u2 + taken * (m2 - u2) - push * g2
+
+
+@njit(fastmath=True, error_model="numpy", cache=True)
+def _slope(values, a, b, c, axis):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Central difference along an axis, one-sided at the ends, in units of a cell."""
+    low, high = [a, b, c], [a, b, c]
+    low[axis] = max(low[axis] - 1, 0)
+    high[axis] = min(high[axis] + 1, values.shape[axis] - 1)
+    rise = values[high[0], high[1], high[2]] - values[low[0], low[1], low[2]]
+    return rise / np.float32(high[axis] - low[axis])
