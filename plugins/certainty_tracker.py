@@ -10,7 +10,7 @@ al. 2013, cut where they turn up into a U, and resampled.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,8 @@ from numba import njit, prange
 from scipy import ndimage
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, Strands, hookimpl
-from hairkit.combing import combing_direction, gradient, hair_length, scalp_way
+from hairkit.clearance import kept_outside
+from hairkit.combing import combing_direction, hair_length, scalp_way
 from hairkit.field_sampling import gradient_at, make_unit, principal_direction, sample_at
 from hairkit.options import option
 from hairkit.stored import BoolArray, Float32Array, Float64Array, Int64Array
@@ -103,19 +104,7 @@ def track(
     result = Strands(smooth.reshape(-1, 3), strands.offsets, root_uv=roots.uv)
     if options.waves:
         result = add_waves(result, measure_waves(orientations, masks, scene.cameras))
-    return _outside_head(result, hull, options.clearance)
-
-
-def _outside_head(strands: Strands, hull: Hull, clearance: float) -> Strands:
-    """Return strands whose points, but for the roots, keep `clearance` metres from the head."""
-    points = strands.points.astype(np.float64)
-    free = np.ones(len(points), bool)
-    free[strands.offsets[:-1]] = False
-    for _ in range(3):
-        lack = clearance - hull.grid.sample(hull.head_distance, points)
-        near = np.flatnonzero((lack > 0) & free)
-        points[near] += lack[near, None] * gradient(hull.grid, hull.head_distance, points[near])
-    return replace(strands, points=points.astype(np.float32))
+    return kept_outside(result, hull, options.clearance)
 
 
 def _start_directions(

@@ -128,7 +128,7 @@ def test_a_file_is_read_like_a_shipped_recipe(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(NEEDED + '[orient]\nplugin = "gabor"\n')
     assert load_recipe(path).name == "mine"
-    with pytest.raises(InputError, match=r"did you mean 'thesis'.*default, thesis"):
+    with pytest.raises(InputError, match=r"did you mean 'thesis'.*default, patent, thesis"):
         load_recipe("thesiss")
     with pytest.raises(InputError, match="cannot be read"):
         load_recipe(tmp_path / "none.toml")

@@ -1,0 +1,138 @@
+"""Hybrid field: surface structure, internal direction, internal distance and growth direction.
+
+The patent's first stage on a grid of the hull's cells: `H = a_s S + a_v V + a_i grad(I) + a_o O`.
+
+1. Oriented 3D segments: lines followed in each photo and lifted onto the hull, and lines followed
+   through the confident outer cells of the fused field. Segments agree on which end is the root.
+2. S, surface structure: segments as ribbons that reach sideways, spread by heat diffusion.
+3. V, internal direction: the tensor v v^T, kept at strands and roots, elsewhere drawn to what the
+   views say through the hair, diffused; its sign comes from O.
+4. I, internal distance: 0 in the head, 1 on strands, 1 and the distance beyond at the border,
+   harmonic in between; its gradient leads outward.
+5. O, growth direction: the signed course of segments and of the roots, diffused.
+
+Weights differ from cell to cell: S near strands, V where they are far, grad(I) at the scalp.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
+from hairkit.combing import ScalpPrior, growth_potential, with_scalp_prior
+from hairkit.options import option
+from hairkit.plane_fusion import fuse_planes, plane_directions, pooled_planes
+from hairkit.waves import Waves, measure_waves, without_slant
+
+from .fields import (
+    Fields,
+    blended,
+    growth_direction,
+    internal_direction,
+    internal_distance,
+    ribbons,
+    surface_structure,
+)
+from .segments import find_segments
+
+__all__ = ["Options", "blended", "find_segments", "internal_distance", "ribbons"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of segments, fields and their weights."""
+
+    see_through: float = option(
+        0.02,
+        low=0,
+        high=0.2,
+        unit="m",
+        doc="Depth behind the first hair at which a view's weight falls to 1/e.",
+    )
+    free_depth: float = option(
+        0.006, low=0, high=0.05, unit="m", doc="Depth behind the first hair that costs no weight."
+    )
+    unslant: bool = option(
+        True, doc="Take off the slant that the near halves of waves show in every view."
+    )
+    pool: float = option(
+        0.15, low=0, high=1, doc="Pooling of planes of wavy hair, as a share of the waves' pitch."
+    )
+    line_spacing: int = option(
+        6, low=2, high=100, unit="px", doc="Distance between lines followed in a photo."
+    )
+    longest: float = option(
+        0.06, low=0.005, high=0.5, unit="m", doc="Length of the longest segment."
+    )
+    agreement_deg: float = option(
+        35.0,
+        low=1,
+        high=90,
+        unit="deg",
+        doc="A lifted line is dropped where it differs by more from what all views say together.",
+    )
+    ribbon: float = option(
+        0.004, low=0, high=0.05, unit="m", doc="How far a ribbon reaches to either side."
+    )
+    smoothness: float = option(0.4, low=1e-4, high=100, doc="Weight of the diffusion of V.")
+    strand_weight: float = option(
+        0.05, low=0, high=1000, doc="Weight of strand cells in V; large values fix them."
+    )
+    scalp_weight: float = option(
+        0.1, low=0, high=100, doc="Weight of the combing prior at the scalp in V."
+    )
+    scalp_reach: float = option(
+        0.02, low=0, high=0.1, unit="m", doc="Distance from the scalp within which the prior acts."
+    )
+    scalp_lift: float = option(0.6, low=0, high=5, doc="Outward part of the prior.")
+    surface: float = option(0.5, low=0, high=10, doc="Largest weight of S, on strand cells.")
+    surface_reach: float = option(
+        0.004, low=1e-4, high=0.1, unit="m", doc="Distance from strands at which S falls to 1/e."
+    )
+    outward: float = option(0.2, low=0, high=10, doc="Largest weight of grad(I), at the scalp.")
+    signed: float = option(0.1, low=0, high=10, doc="Weight of O.")
+    tip_share: float = option(
+        0.6,
+        low=0.05,
+        high=1,
+        doc="Cells this far along the longest way from the scalp count as tips.",
+    )
+    tolerance: float = option(2e-2, low=1e-8, high=0.1, doc="Relative residual of the solvers.")
+
+
+@hookimpl
+def solve_field(
+    scene: Scene,
+    masks: tuple[Mask, ...],
+    orientations: tuple[OrientationMap, ...],
+    hull: Hull,
+    options: Options,
+) -> OrientationField:
+    """Return the blended field with its signs and the internal distance."""
+    wavy = options.unslant or options.pool > 0
+    waves = measure_waves(orientations, masks, scene.cameras) if wavy else Waves()
+    if options.unslant:
+        orientations = tuple(without_slant(found, waves) for found in orientations)
+    growth = growth_potential(scene.head, hull, options.tip_share)
+    planes, views = fuse_planes(
+        scene.cameras, masks, orientations, hull, options.see_through, options.free_depth
+    )
+    planes = pooled_planes(planes, hull, options.pool * waves.pitch)
+    tensor, certainty = plane_directions(planes, views, 1)
+    segments = find_segments(
+        scene.cameras, masks, orientations, hull, growth, tensor, certainty, options
+    )
+    prior = ScalpPrior(options.scalp_weight, options.scalp_reach, options.scalp_lift)
+    wanted, weight = with_scalp_prior(scene.head, hull, growth, tensor, certainty, prior)
+    band = ribbons(segments, hull, options.ribbon)
+    signs = growth_direction(scene.head, hull, growth, band, options)
+    inner = internal_direction(hull, wanted, weight, band, options)
+    distance = internal_distance(hull, segments, options.tolerance)
+    surface = surface_structure(hull, band, options.tolerance)
+    fields = Fields(surface, inner, distance, signs)
+    direction, outer = blended(hull, band, fields, options)
+    confidence = np.zeros(hull.grid.shape, np.float32)
+    confidence[hull.loose] = np.clip(weight, 0, 1)
+    return OrientationField(hull.grid, outer, confidence, growth, direction, distance)

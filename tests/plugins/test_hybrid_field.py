@@ -1,0 +1,203 @@
+"""Laws of the patent's four fields, of the segments they stand on, and of their blend."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hairkit_plugins import hybrid_field
+from hairkit_plugins.hybrid_field import Options, solve_field
+from hairkit_plugins.hybrid_field.fields import (
+    Band,
+    internal_distance,
+    ribbons,
+    surface_structure,
+)
+from hairkit_plugins.hybrid_field.segments import directed, find_segments
+
+from hairkit.camera import Camera
+from hairkit.combing import growth_potential
+from hairkit.mask import HAIR, Mask
+from hairkit.orientation import OrientationMap, wrap_angle
+from hairkit.plane_fusion import fuse_planes, plane_directions
+from hairkit.scene import Scene
+from hairkit.stored import Float64Array
+from hairkit.strands import Strands
+from hairkit.testing import ball_head
+from hairkit.volume import Hull, VoxelGrid
+from hairkit.waves import Waves
+
+CENTRE = np.array([0.0, 0.16, 0.0])
+ALONG = np.array([0.5, -0.75, 0.433])
+SPACING = 0.006
+PLAIN = Options(scalp_weight=0.0, pool=0.0, unslant=False, outward=0.0)
+
+
+@pytest.fixture(autouse=True)
+def _straight_hair(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measuring waves takes longer than all the rest, and these heads have none."""
+    monkeypatch.setattr(hybrid_field, "measure_waves", lambda *_: Waves())
+
+
+def cameras() -> tuple[Camera, ...]:
+    """Eight cameras around a bun on top of the head, on two levels."""
+    return tuple(
+        Camera.on_turn(
+            45.0 * i,
+            elevation_deg=12.0 * (i % 2),
+            distance=0.6,
+            target=CENTRE,
+            focal=540.0,
+            width=120,
+            height=120,
+        )
+        for i in range(8)
+    )
+
+
+def bun() -> Hull:
+    """A ball of hair of 6 cm radius above the head."""
+    low, high = CENTRE - 0.08, CENTRE + 0.08
+    low[1] -= 0.04
+    grid = VoxelGrid.around(low, high, SPACING)
+    centres = grid.centres().astype(np.float64)
+    distance = np.linalg.norm(centres, axis=-1) - 0.1
+    hair = (np.linalg.norm(centres - CENTRE, axis=-1) < 0.06) & (distance > 0)
+    return Hull(grid, hair, hair, distance.astype(np.float32))
+
+
+def seen(camera: Camera) -> OrientationMap:
+    """The exact image angle of strands along `ALONG`."""
+    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    dx, dy, dz = camera.rotation @ ALONG
+    dx = dx - dz * (x - camera.centre[0]) / camera.focal
+    dy = dy - dz * (y - camera.centre[1]) / camera.focal
+    return OrientationMap(wrap_angle(np.arctan2(dy, dx)), np.ones(x.shape, np.float32))
+
+
+def photos() -> tuple[tuple[Camera, ...], tuple[Mask, ...], tuple[OrientationMap, ...]]:
+    views = cameras()
+    labels = np.full((views[0].height, views[0].width), HAIR, np.uint8)
+    return views, tuple(Mask(labels, True) for _ in views), tuple(map(seen, views))
+
+
+def off_deg(directions: Float64Array) -> Float64Array:
+    """Angles in degrees between directions and `ALONG`, signs ignored."""
+    length = np.linalg.norm(directions, axis=-1) * np.linalg.norm(ALONG)
+    return np.degrees(np.arccos(np.clip(np.abs(directions @ ALONG) / length, 0, 1)))
+
+
+def segments(options: Options = PLAIN) -> tuple[Strands, Hull]:
+    views, masks, maps = photos()
+    hull = bun()
+    growth = growth_potential(ball_head(), hull, 0.6)
+    tensor, certainty = plane_directions(*fuse_planes(views, masks, maps, hull, 0.02, 0.006), 1)
+    return find_segments(views, masks, maps, hull, growth, tensor, certainty, options), hull
+
+
+def test_segments_run_along_the_hair_they_were_seen_on() -> None:
+    """Lines lifted from photos and lines through cells follow the true direction."""
+    found, hull = segments()
+    chords = (found.tips - found.roots).astype(np.float64)
+    assert len(found) > 200
+    assert np.median(off_deg(chords)) < 5
+    assert hull.grid.sample(hull.dense.astype(np.float32), found.points).mean() > 0.4
+
+
+def test_segments_are_no_longer_than_allowed() -> None:
+    """`longest` bounds them, but for half the rounding of both halves."""
+    found, _ = segments(replace(PLAIN, longest=0.02))
+    assert found.lengths().max() < 0.02 + 0.012
+
+
+def test_segments_agree_on_which_end_is_the_root() -> None:
+    """Parallel segments of mixed signs come out with one sign, that of the growth."""
+    hull = bun()
+    rng = np.random.default_rng(1)
+    roots = (CENTRE + rng.uniform(-0.03, 0.03, (60, 3))).astype(np.float32)
+    course = np.linspace(0, 0.02, 8)[:, None] * np.array([0.0, 1.0, 0.0])
+    points = roots[:, None] + course
+    points[::3] = points[::3, ::-1]
+    growth = hull.grid.centres()[..., 1]
+    growth = growth + 0.004 * rng.standard_normal(growth.shape).astype(np.float32)
+    mixed = Strands(points.reshape(-1, 3).astype(np.float32), np.arange(61) * 8)
+    result = directed(mixed, hull, growth.astype(np.float32))
+    assert ((result.tips - result.roots)[:, 1] > 0).all()
+    np.testing.assert_array_equal(np.sort(result.points[:, 1]), np.sort(mixed.points[:, 1]))
+
+
+def test_ribbons_widen_segments_along_the_surface() -> None:
+    """A wider ribbon covers more cells, all directions unit where one segment runs alone."""
+    hull = bun()
+    course = CENTRE + [0, 0, 0.055] + np.linspace(-0.02, 0.02, 21)[:, None] * [0, 1.0, 0]
+    lone = Strands.from_list([course])
+    thin, wide = (ribbons(lone, hull, reach) for reach in (0.0, 0.012))
+    assert wide.cells.sum() > 1.5 * thin.cells.sum()
+    length = np.linalg.norm(thin.direction[thin.cells], axis=1)
+    np.testing.assert_allclose(length, 1, atol=1e-5)
+    assert (thin.direction[thin.cells][:, 1] > 0.99).all()
+
+
+def test_surface_structure_keeps_ribbons_and_spreads_them() -> None:
+    """Dirichlet on ribbons; everywhere else of the bun the one direction there is."""
+    hull = bun()
+    course = CENTRE + [0, 0, 0.05] + np.linspace(-0.02, 0.02, 21)[:, None] * [0, 1.0, 0]
+    band = ribbons(Strands.from_list([course]), hull, 0.0)
+    field = surface_structure(hull, band, 1e-4)
+    on = band.cells[hull.loose]
+    np.testing.assert_allclose(field[on], band.direction[hull.loose][on], atol=0.02)
+    np.testing.assert_allclose(field, np.broadcast_to([0, 1, 0], field.shape), atol=0.03)
+
+
+def test_internal_distance_is_0_in_the_head_1_on_strands_and_grows_outward() -> None:
+    """Harmonic between: within the bounds of its Dirichlet values."""
+    grid = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.005)
+    away = np.linalg.norm(grid.centres(), axis=-1)
+    hair = (away > 0.1) & (away < 0.14)
+    hull = Hull(grid, hair, hair, (away - 0.1).astype(np.float32))
+    rng = np.random.default_rng(0)
+    spots = rng.standard_normal((4000, 3))
+    spots *= 0.135 / np.linalg.norm(spots, axis=1, keepdims=True)
+    strands = Strands(np.repeat(spots, 2, axis=0).astype(np.float32), np.arange(4001) * 2)
+    value = internal_distance(hull, strands, 1e-4)
+    assert abs(float(np.median(value[away < 0.08]))) < 0.02
+    on = grid.sample(value, spots.astype(np.float32))
+    assert abs(float(np.median(on)) - 1) < 0.15
+    assert (value[(away > 0.17) & (away < 0.19)] > 1.2).all()
+    between = (away > 0.108) & (away < 0.122)
+    assert 0.1 < float(np.median(value[between])) < 0.9
+
+
+def test_one_direction_everywhere_comes_back_signed() -> None:
+    """Exact angles: the blend lies along the hair, with one sign over nearly all of the bun."""
+    views, masks, maps = photos()
+    scene = Scene(tuple("abcdefgh"), views, ball_head())
+    hull = bun()
+    field = solve_field(scene, masks, maps, hull, PLAIN)
+    assert field.direction is not None
+    direction = field.direction[hull.dense].astype(np.float64)
+    assert np.median(off_deg(direction)) < 4
+    np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, atol=1e-4)
+    majority = np.abs(np.sign(direction @ ALONG).mean())
+    assert majority > 0.8
+
+
+def test_without_segments_the_inner_field_alone_speaks() -> None:
+    """Photos without any sure pixel still give a field: that of the scalp's combing."""
+    views, masks, maps = photos()
+    blank = tuple(OrientationMap(found.angle, 0 * found.confidence) for found in maps)
+    scene = Scene(tuple("abcdefgh"), views, ball_head())
+    field = solve_field(scene, masks, blank, bun(), Options(pool=0.0, unslant=False))
+    assert field.direction is not None
+    assert np.isfinite(field.direction).all()
+    assert field.internal_distance is not None
+
+
+def test_an_empty_band_has_no_direction() -> None:
+    """No segments, no ribbons."""
+    hull = bun()
+    band = ribbons(Strands(np.zeros((0, 3), np.float32), np.zeros(1, np.int64)), hull, 0.004)
+    assert isinstance(band, Band)
+    assert not band.cells.any()
+    assert not band.direction.any()

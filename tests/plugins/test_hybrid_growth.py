@@ -1,0 +1,122 @@
+"""Laws of growing strands through a signed field."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hairkit_plugins import hybrid_growth
+from hairkit_plugins.hybrid_growth import Options, grown, track
+
+from hairkit.head import Roots
+from hairkit.stored import Float32Array
+from hairkit.strands import Strands
+from hairkit.testing import ball_head, combed_field, scalp_roots, shell_hull, turn_scene
+from hairkit.volume import OrientationField, VoxelGrid
+from hairkit.waves import Waves
+
+FREE = Options(slide_sine=0.0, waves=False, clearance=0.0)
+GRID = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.01)
+
+
+@pytest.fixture(autouse=True)
+def _straight_hair(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hybrid_growth, "measure_waves", lambda *_: Waves())
+
+
+def constant(way: tuple[float, float, float]) -> OrientationField:
+    """A field of one signed direction."""
+    direction = np.broadcast_to(np.array(way, np.float32), (*GRID.shape, 3))
+    zero = np.zeros(GRID.shape, np.float32)
+    return OrientationField(GRID, np.zeros((*GRID.shape, 6)), zero, zero, direction, zero)
+
+
+def run(
+    field: OrientationField, distance: Float32Array, options: Options, way: float = 0.1
+) -> Strands:
+    assert field.direction is not None
+    starts = np.array([[0.0, 0, 0], [0.05, 0.02, -0.03]], np.float32)
+    return grown(field, field.direction, distance, starts, way, options)
+
+
+def test_strands_follow_the_sign_of_the_field() -> None:
+    """A field and its negative grow strands to opposite sides, straight and of full length."""
+    inside = np.full(GRID.shape, 0.5, np.float32)
+    up, down = (run(constant((0, s, 0)), inside, replace(FREE, reach=1.0)) for s in (1.0, -1.0))
+    np.testing.assert_allclose((up.tips - up.roots)[:, 1], 0.1, atol=2e-3)
+    np.testing.assert_allclose(up.tips - up.roots, -(down.tips - down.roots), atol=1e-6)
+
+
+def test_a_strand_ends_where_the_internal_distance_passes_the_bound() -> None:
+    """I grows linearly with x: the end lies where I is `bound`, within one step."""
+    distance = (1 + GRID.centres()[..., 0]).astype(np.float32)
+    options = replace(FREE, reach=5.0, blind=0.0, bound=1.1)
+    found = run(constant((1, 0, 0)), distance, options, way=0.5)
+    np.testing.assert_allclose(found.tips[:, 0], 0.1, atol=1.5e-3)
+
+
+def test_no_strand_ends_on_its_blind_way() -> None:
+    """Roots lie outside what the photos show as hair: the first way is free."""
+    outside = np.full(GRID.shape, 3.0, np.float32)
+    found = run(constant((0, 1, 0)), outside, replace(FREE, blind=0.02))
+    np.testing.assert_allclose(found.lengths(), 0.02, atol=2e-3)
+
+
+def test_strands_slide_along_the_surface_they_meet_at_a_small_angle() -> None:
+    """With sliding they run on along x beyond I = 1; at a large angle they leave and end."""
+    distance = (1 + 10 * GRID.centres()[..., 1]).astype(np.float32)
+    options = replace(FREE, slide_sine=0.35, reach=1.0, inertia=0.0, blind=0.0, bound=1.5)
+    starts = np.array([[-0.1, -0.005, 0.0]], np.float32)
+    flat, steep = (
+        grown(field, field.direction, distance, starts, 0.15, options)
+        for field in (constant((0.97, 0.24, 0)), constant((0.5, 0.87, 0)))
+        if field.direction is not None
+    )
+    assert flat.tips[0, 0] > 0.03
+    assert flat.tips[0, 1] < 0.012
+    assert steep.tips[0, 1] > 0.03
+
+
+def test_a_root_where_nothing_is_known_keeps_its_place() -> None:
+    """One strand a root, whatever the field: a stub of two points."""
+    inside = np.zeros(GRID.shape, np.float32)
+    found = run(constant((0, 0, 0)), inside, FREE)
+    assert len(found) == 2
+    assert found.lengths().max() < 0.01
+
+
+def follow_ball(options: Options, roots: Roots) -> Strands:
+    scene = turn_scene()
+    return track(scene, (), (), shell_hull(), combed_field(), roots, options)
+
+
+def test_a_field_without_signs_is_followed_along_its_growth() -> None:
+    """Hair combed down a ball, tensors only: strands run down close to the ball."""
+    roots = scalp_roots(ball_head())
+    found = follow_ball(replace(FREE, reach=1.0, clearance=0.001), roots)
+    assert len(found) == len(roots)
+    drop = (found.tips - found.roots)[:, 1]
+    assert (drop < 0.01).mean() > 0.95
+    away = np.linalg.norm(found.points, axis=1)
+    assert away.max() < 0.16
+    np.testing.assert_allclose(found.roots, roots.positions, atol=1e-7)
+
+
+def test_blocks_grow_what_one_run_grows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many strands are grown in blocks; the result does not depend on them."""
+    roots = scalp_roots(ball_head())
+    whole = follow_ball(FREE, roots)
+    monkeypatch.setattr(hybrid_growth, "BLOCK", 50)
+    np.testing.assert_array_equal(follow_ball(FREE, roots).points, whole.points)
+
+
+def test_the_step_hardly_matters() -> None:
+    """Half the step with the inertia of the same way: the same strand within a millimetre."""
+    roots = scalp_roots(ball_head())
+    coarse = follow_ball(replace(FREE, inertia=0.0), roots)
+    fine = follow_ball(replace(FREE, inertia=0.0, step=0.0005), roots)
+    both = np.minimum(coarse.lengths(), fine.lengths()) > 0.02
+    assert both.mean() > 0.9
+    apart = np.linalg.norm(coarse.points - fine.points, axis=1).reshape(len(roots), -1)
+    assert np.median(apart[both].max(axis=1)) < 2e-3
