@@ -60,11 +60,12 @@ def _next_half_edge(edges: Int64Array, vertices: int) -> Int64Array:
 def _ends(after: Int64Array) -> tuple[Int64Array, Int64Array]:
     """Return (2E,) the half-edge at the end of each one's way, and the steps there.
 
-    The way is doubled until all have arrived; what has not after log2 of all rounds is closed.
+    The way is doubled log2 of all times, after which only what is closed has not arrived.
     """
-    steps = (after != np.arange(len(after))).astype(np.int64)
+    is_end = after == np.arange(len(after))
+    steps = (~is_end).astype(np.int64)
     for _ in range(int(np.ceil(np.log2(max(len(after), 2)))) + 1):
-        if (after[after] == after).all():
+        if is_end[after].all():
             return after, steps
         steps = steps + steps[after]
         after = after[after]
