@@ -32,6 +32,8 @@ CURVE_PRIMVARS = (
     "hairkit:root_triangle",
     "hairkit:root_barycentric",
 )
+_INSTEAD = {"st": "groom_root_uv", "displayColor": "groom_color"}
+"""What is not needed where something better was found."""
 _INTERPOLATIONS = ("constant", "uniform", "varying", "vertex", "faceVarying")
 
 
@@ -122,6 +124,8 @@ class _Taken:
         every = UsdGeom.PrimvarsAPI(prim)
         for wanted in primvars:
             primvar = every.GetPrimvar(wanted)
+            if _INSTEAD.get(wanted) in found:
+                continue
             if primvar and primvar.HasValue():
                 when, _ = _time_of(primvar.GetAttr())
                 self.put(name + wanted, primvar.ComputeFlattened(when), None)
@@ -140,7 +144,7 @@ class _Taken:
         """Keep a value as an array, checked for its size."""
         if value is None:
             return
-        array = np.array(value)
+        array = np.asarray(value)
         if array.dtype.kind not in "iuf" or (columns == 3 and array.shape[1:] != (3,)):
             return
         self.total += len(array) if array.ndim else 1
