@@ -36,20 +36,18 @@ class LightPass:
         taken = _solid_depth(self.grid, solids)
         self._solids = gl.context.buffer(np.ascontiguousarray(taken.transpose(2, 1, 0)))
         self._dense = gl.context.buffer(reserve=4 * taken.size)
-        empty = np.ones((taken.size, 4), np.float16)
-        self.texture = gl.context.texture3d(self._cells, 4, empty.tobytes(), dtype="f2")
-        self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self.texture.repeat_x = self.texture.repeat_y = self.texture.repeat_z = False
-        self._taken = gl.context.texture3d(self._cells, 1, dtype="f4")
-        self._taken.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self._taken.repeat_x = self._taken.repeat_y = self._taken.repeat_z = False
+        self.texture, self._coming = (_volume(gl, self._cells, 4, "f2") for _ in range(2))
+        """What is seen; what is in the making, in turns, for one state of hair and lights."""
+        self._taken = _volume(gl, self._cells, 1, "f4")
         self._turn = 0
+        self._lights: Lights | None = None
 
     def release(self) -> None:
         """Free buffers and texture."""
         self._solids.release()
         self._dense.release()
         self._taken.release()
+        self._coming.release()
         self.texture.release()
 
     def uniforms(self) -> dict[str, Any]:
@@ -64,27 +62,32 @@ class LightPass:
     def update(
         self, places: moderngl.Buffer, points: int, hairs: int, lights: Lights, *, whole: bool
     ) -> None:
-        """Bring a part of the volume, or the `whole`, up to the placed hair and the lights."""
+        """Make a part of the next volume, or all of it, for the placed hair and the lights."""
         turns = 1 if whole else TURNS
-        self._turn = 0 if whole else (self._turn + 1) % TURNS
-        if self._turn == 0:
+        self._turn = 0 if whole else self._turn % TURNS
+        if self._turn == 0 or self._lights is None:
             self._fill(places, points, hairs)
+            self._lights = lights
         light = self._gl.compute("viewer_light")
         set_uniforms(
             light,
             u_cells=self._cells,
             u_spacing=self.grid.spacing,
             u_taken=3,
-            u_key_direction=lights.key_direction,
-            u_rim_direction=lights.rim_direction,
+            u_key_direction=self._lights.key_direction,
+            u_rim_direction=self._lights.rim_direction,
             u_turn=self._turn,
             u_turns=turns,
         )
         self._taken.use(3)
-        self.texture.bind_to_image(0, read=False, write=True)
+        self._coming.bind_to_image(0, read=False, write=True)
         x, y, z = self._cells
         light.run(-(-x // 8), -(-y // 8), -(-z // turns))
         self._gl.context.memory_barrier()
+        self._turn += 1
+        if self._turn == turns:
+            self.texture, self._coming = self._coming, self.texture
+            self._turn = 0
 
     def _fill(self, places: moderngl.Buffer, points: int, hairs: int) -> None:
         fill = self._gl.compute("viewer_density")
@@ -103,6 +106,17 @@ class LightPass:
         x, y, z = self._cells
         taken.run(-(-x // 8), -(-y // 8), z)
         self._gl.context.memory_barrier()
+
+
+def _volume(
+    gl: Renderer, cells: tuple[int, int, int], components: int, kind: str
+) -> moderngl.Texture3D:
+    """Return a texture of ones."""
+    ones = np.ones(int(np.prod(cells)) * components, f"f{kind[1]}")
+    texture = gl.context.texture3d(cells, components, ones.tobytes(), dtype=kind)
+    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    texture.repeat_x = texture.repeat_y = texture.repeat_z = False
+    return texture
 
 
 def _grid(guides: Strands, solids: list[Mesh]) -> VoxelGrid:

@@ -5,8 +5,9 @@ The window's OpenGL context becomes the one that all of hairkit draws with in th
 
 from __future__ import annotations
 
+import contextlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -63,17 +64,24 @@ def show(
     RenderError
         No window can be opened, or it has no OpenGL 4.3; the text says what to install.
     """
-    context = _Context(size)
-    try:
-        settings: Any = {"context": context}
-        install(moderngl.create_context(REQUIRED_VERSION, **settings), "window")
-        with renderer():
-            session = make_session(size)
-        window = Window(context, session, budget)
+    with opened(make_session, size, budget) as window:
         if script is not None:
             with renderer():
                 play(window.preview, read_script(script), Path())
         window.loop()
+
+
+@contextlib.contextmanager
+def opened(
+    make_session: Callable[[tuple[int, int]], Session], size: tuple[int, int], budget: float
+) -> Iterator[Window]:
+    """Open a window for a block; see `show`."""
+    context = _Context(size)
+    try:
+        install(moderngl.create_context(REQUIRED_VERSION, **context.settings), "window")
+        with renderer():
+            session = make_session(size)
+        yield Window(context, session, budget)
     finally:
         context.close()
 
@@ -107,6 +115,11 @@ class _Context:
                 return window
         return None
 
+    @property
+    def settings(self) -> Any:
+        """What moderngl is to be called with."""
+        return {"context": self}
+
     def load(self, name: str) -> int:
         """Return the address of an OpenGL function, 0 when there is none."""
         return self.glfw.get_proc_address(name) or 0
@@ -135,7 +148,7 @@ class Window:
     def __init__(self, context: _Context, session: Session, budget: float) -> None:
         self._glfw, self._window = context.glfw, context.window
         self.session = session
-        session.most_seconds = 0.4 * budget
+        session.most_seconds = 0.4 * budget if budget > 0 else None
         self._keys = bindings()
         self.mouse = Mouse(self.perform, session.size[1])
         self._watch_groom = Watch([session.opened.path])

@@ -45,7 +45,11 @@ def test_no_budget_draws_the_best() -> None:
 def test_levels_draw_less_and_less() -> None:
     """From level to level nothing gets finer."""
     for better, worse in zip(LEVELS, LEVELS[1:], strict=False):
-        assert (better.smooth, better.scale, better.share) > (worse.smooth, worse.scale, worse.share)
+        assert (better.smooth, better.scale, better.share) > (
+            worse.smooth,
+            worse.scale,
+            worse.share,
+        )
 
 
 def test_a_slow_simulator_does_not_take_all_the_time_from_drawing() -> None:

@@ -62,7 +62,11 @@ def test_a_script_does_what_a_user_would_do(session: Session, tmp_path: Path) ->
     # wind from the subject's left, the picture's right: hair reaches further to the left
     moved = np.abs(rest - wind).max(axis=2) > 30
     assert moved[:, :80].sum() > 0
-    assert sorted(p.name for p in (out / "frames").iterdir()) == ["0000.png", "0001.png", "0002.png"]
+    assert sorted(p.name for p in (out / "frames").iterdir()) == [
+        "0000.png",
+        "0001.png",
+        "0002.png",
+    ]
     assert preview.written == [out / "rest.png", out / "wind.png", out / "side.png"]
 
 

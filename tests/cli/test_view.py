@@ -1,0 +1,103 @@
+"""Laws of `hairkit view`."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import pytest
+
+from hairkit.cli import main
+from hairkit.groom_file import write_groom
+from hairkit.testing import bristle_groom
+
+
+@pytest.fixture
+def groom_path(tmp_path: Path) -> Path:
+    """A groom on disk."""
+    write_groom(tmp_path / "groom.npz", bristle_groom())
+    return tmp_path / "groom.npz"
+
+
+def view(*words: object) -> int:
+    """Run the verb on hair that stands still."""
+    return main(["view", *map(str, words), "--simulator", "none"])
+
+
+def test_a_script_without_a_window_prints_the_pictures_it_wrote(
+    groom_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Names on stdout, the renderer on stderr, pictures of the size asked for."""
+    script = tmp_path / "steps.toml"
+    script.write_text("hairs = 300\n[[steps]]\ndo = 'screenshot'\nfile = 'a.png'\n")
+    out = tmp_path / "out"
+    words = (groom_path, "--headless", "--script", script, "--out", out, "--size", "96x64")
+    assert view(*words) == 0
+    said = capsys.readouterr()
+    assert said.out == f"{out / 'a.png'}\n"
+    assert "OpenGL" in said.err
+    picture = cv2.imread(str(out / "a.png"))
+    assert picture is not None
+    assert picture.shape == (64, 96, 3)
+
+
+def test_a_folder_of_results_is_opened_by_its_name(groom_path: Path, tmp_path: Path) -> None:
+    """The folder stands for the groom in it."""
+    script = tmp_path / "steps.toml"
+    script.write_text(
+        "hairs = 300\nsize = [64, 48]\n[[steps]]\ndo = 'screenshot'\nfile = 'b.png'\n"
+    )
+    assert view(groom_path.parent, "--headless", "--script", script, "--out", tmp_path) == 0
+    assert (tmp_path / "b.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--headless",), "--headless needs --script"),
+        (("--headless", "--script", "nothing.toml"), "nothing.toml: no such file"),
+        (("--out", "x"), "--out is for --headless"),
+        (("--size", "big"), "--size is 'big'"),
+        (("--budget", "-1"), "--budget is -1.0"),
+    ],
+)
+def test_mistakes_give_one_line(
+    groom_path: Path, words: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2 and one line that says what was wanted."""
+    assert view(groom_path, *words) == 2
+    said = capsys.readouterr().err.strip()
+    assert message in said
+    assert "\n" not in said
+
+
+def test_what_is_no_groom_is_refused(
+    tmp_path: Path, groom_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Missing files, folders without a groom and unknown simulators are named."""
+    script = tmp_path / "steps.toml"
+    script.write_text("")
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    common = ("--headless", "--script", script)
+    for path, message in ((tmp_path / "no.npz", "no such file"), (empty, "no groom.npz")):
+        assert view(path, *common) == 2
+        assert message in capsys.readouterr().err
+    assert main(["view", str(groom_path), *map(str, common), "--simulator", "magic"]) == 2
+    assert "no simulator 'magic'" in capsys.readouterr().err
+
+
+def test_without_a_display_one_line_says_what_to_do(groom_path: Path) -> None:
+    """A machine without a screen is told of --headless."""
+    code = (
+        "import os, sys; os.environ.pop('DISPLAY', None); os.environ.pop('WAYLAND_DISPLAY', None);"
+        "from hairkit.cli import main; sys.exit(main(sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", code, "view", str(groom_path)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 2
+    lines = done.stderr.strip().splitlines()
+    assert "no window" in lines[-1]
+    assert "--headless" in lines[-1]
