@@ -9,8 +9,10 @@ import numpy as np
 
 from hairkit.cli.export import plugin_for
 from hairkit.groom import Groom, HairMaterial
+from hairkit.guide_weights import guide_mask
 from hairkit.manager import Manager
 from hairkit.point_cache import PointCache
+from hairkit.stored import Float32Array, Float64Array
 from hairkit.strands import Strands
 from hairkit.testing import bristle_groom
 
@@ -64,10 +66,26 @@ def read_back(manager: Manager, path: Path, **options: object) -> Groom:
 
 def wandering(groom: Groom, frames: int = 3) -> PointCache:
     """Return frames at 24 a second, the first at rest, then every point goes a way of its own."""
-    guides = (
-        groom.strands if groom.strands.guide is None else groom.strands.select(groom.strands.guide)
-    )
+    guides = groom.strands.select(guide_mask(groom.strands))
     away = np.random.default_rng(11).normal(0, 0.004, (frames, *guides.points.shape))
     away[0] = 0
     points = guides.points + np.cumsum(away, axis=0)
     return PointCache(points, np.arange(frames) / 24, np.tile(np.eye(4), (frames, 1, 1)))
+
+
+def nodding(groom: Groom, frames: int = 3) -> PointCache:
+    """Return frames in which the head turns about its joint and hair and skin go along rigidly."""
+    motion = np.tile(np.eye(4), (frames, 1, 1))
+    joint = groom.head.joints[-1].astype(np.float64)
+    for frame, angle in enumerate(np.linspace(0, 0.6, frames)):
+        turn = motion[frame, :3, :3]
+        turn[1:, 1:] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        motion[frame, :3, 3] = joint - turn @ joint
+    guides = groom.strands.select(guide_mask(groom.strands))
+    return PointCache(moved(motion, guides.points), np.arange(frames) / 24, motion)
+
+
+def moved(motion: Float64Array, points: Float32Array) -> Float32Array:
+    """Return points (P, 3) under each of the rigid motions (T, 4, 4): (T, P, 3)."""
+    turned = np.einsum("tij,pj->tpi", motion[:, :3, :3], points) + motion[:, None, :3, 3]
+    return np.asarray(turned, np.float32)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from blender_session import BlenderSession, only, z_up
-from client_groom import read_back, written
+from client_groom import moved, nodding, read_back, written
 
 from hairkit.exporting import point_colours
 from hairkit.groom import Groom
@@ -64,6 +64,34 @@ def test_a_simulation_plays(
         "contents.imported", path=path, operator=OPERATORS[ending], frames=[0, 1, 2]
     )
     np.testing.assert_allclose(only(things, "CURVES")["frames"], frames, atol=1e-7)
+
+
+@pytest.mark.parametrize("axis", ["z_up_metres", "z_up_centimetres"])
+def test_usd_says_its_axes(
+    blender: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path, axis: str
+) -> None:
+    """Hair and head stand where they stood, whatever axes and unit the file has."""
+    path = written(manager, groom, tmp_path / "hair.usdc", axis=axis)
+    things = blender.call("contents.imported", path=path, operator="wm.usd_import")
+    hair, head = only(things, "CURVES"), only(things, "MESH")
+    np.testing.assert_allclose(hair["positions"], z_up(groom.strands.points), atol=1e-6)
+    np.testing.assert_allclose(head["positions"], z_up(groom.head.vertices), atol=1e-6)
+
+
+def test_the_head_nods_with_its_hair(
+    blender: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path
+) -> None:
+    """In USD the skeleton moves the skin of the head as the hair moves."""
+    cache = nodding(groom)
+    cache.save(tmp_path / "cache.npz")
+    path = written(manager, groom, tmp_path / "hair.usdc", cache=tmp_path / "cache.npz")
+    call = {"path": path, "operator": "wm.usd_import", "frames": [0, 1, 2]}
+    things = blender.call("contents.imported", **call)
+    scalp = groom.head.scalp > 0.5
+    skin = z_up(moved(cache.head_from_rest, groom.head.vertices[scalp]))
+    np.testing.assert_allclose(only(things, "MESH")["frames"][:, scalp], skin, atol=2e-6)
+    strands = z_up(moved(cache.head_from_rest, groom.strands.points))
+    np.testing.assert_allclose(only(things, "CURVES")["frames"], strands, atol=2e-6)
 
 
 def test_usd_carries_what_is_said_of_strands(

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from blender_session import BlenderSession, only, z_up
-from client_groom import written
+from client_groom import moved, nodding, written
 
 from hairkit.groom import Groom
 from hairkit.head_skin import HEAD_JOINT, JOINT_NAMES
@@ -119,3 +119,23 @@ def test_a_simulation_plays(
     for wanted, places in zip(frames, mesh["frames"], strict=True):
         middle = places.reshape(-1, 2, 3).mean(axis=1)
         assert off_strands(middle, wanted, groom.strands) < 1e-6
+
+
+@pytest.mark.parametrize("animation", ["morph", "skin"])
+def test_the_head_nods_with_its_hair(
+    blender: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path, animation: str
+) -> None:
+    """Of a head's motion, baked as shapes or as the skeleton's, skin and hair take part alike."""
+    cache = nodding(groom)
+    cache.save(tmp_path / "cache.npz")
+    options = {"cache": tmp_path / "cache.npz", "animation": animation, **RIBBONS}
+    path = written(manager, groom, tmp_path / "hair.glb", **options)
+    things = seen(blender, path, [0, 1, 2])
+    head, hair = only(things, "MESH", "head"), only(things, "MESH", "hair")
+    scalp = groom.head.scalp > 0.5
+    skin = z_up(moved(cache.head_from_rest, groom.head.vertices[scalp]))
+    np.testing.assert_allclose(head["frames"][:, scalp], skin, atol=2e-6)
+    strands = z_up(moved(cache.head_from_rest, groom.strands.points))
+    for wanted, places in zip(strands, hair["frames"], strict=True):
+        middle = places.reshape(-1, 2, 3).mean(axis=1)
+        assert off_strands(middle, wanted, groom.strands) < 2e-6
