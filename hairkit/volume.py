@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -170,3 +171,9 @@ def outer_products(directions: npt.ArrayLike) -> Float64Array:
     """Return the (..., 6) components of d d^T for directions (..., 3)."""
     d = np.asarray(directions, np.float64)
     return np.stack([d[..., i] * d[..., j] for i, j in TENSOR_INDICES], axis=-1)
+
+
+def cell_slopes(values: npt.NDArray[np.float32]) -> Float32Array:
+    """Return (X, Y, Z, 3) central differences of values (X, Y, Z), per cell."""
+    parts: Any = np.gradient(values)
+    return np.stack(list(parts), axis=-1).astype(np.float32)

@@ -19,7 +19,7 @@ from hairkit.combing import hair_length, scalp_way
 from hairkit.field_sampling import gradient_at, make_unit, sample_at
 from hairkit.options import option
 from hairkit.stored import Float32Array
-from hairkit.volume import symmetric_matrices
+from hairkit.volume import cell_slopes, symmetric_matrices
 from hairkit.waves import add_waves, measure_waves
 
 KEPT = 4
@@ -136,7 +136,7 @@ def _signed(field: OrientationField) -> Float32Array:
         return field.direction
     known = np.abs(field.tensor).max(axis=3) > 0
     main = np.linalg.eigh(symmetric_matrices(field.tensor[known]))[1][:, :, 2]
-    slope = np.stack([part[known] for part in np.gradient(field.growth)], axis=1)
+    slope = cell_slopes(field.growth)[known]
     main *= np.where((main * slope).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     direction = np.zeros((*field.grid.shape, 3), np.float32)
     direction[known] = main

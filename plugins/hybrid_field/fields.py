@@ -12,7 +12,7 @@ from hairkit import Head, Hull, Strands
 from hairkit.combing import combing_direction
 from hairkit.diffusion import solve_screened
 from hairkit.stored import BoolArray, Float32Array, Float64Array
-from hairkit.volume import outer_products, symmetric_matrices
+from hairkit.volume import cell_slopes, outer_products, symmetric_matrices
 
 FIXED = 1e3
 """Weight against a smoothness of 1 that keeps a cell as it is (Dirichlet)."""
@@ -85,8 +85,7 @@ def ribbons(segments: Strands, hull: Hull, reach: float) -> Band:
 def _outward(hull: Hull, points: Float32Array) -> Float64Array:
     """Return (N, 3) minus the gradient of the smoothed occupancy."""
     soft = ndimage.gaussian_filter(hull.dense.astype(np.float32), 2.0)
-    slope = np.stack(np.gradient(soft), axis=-1).astype(np.float32)
-    return -hull.grid.sample(slope, points).astype(np.float64)
+    return -hull.grid.sample(cell_slopes(soft), points).astype(np.float64)
 
 
 def surface_structure(hull: Hull, band: Band, tolerance: float) -> Float32Array:
@@ -191,7 +190,7 @@ def blended(
     off = ndimage.distance_transform_edt(~band.cells)[hull.loose] * spacing
     main = np.linalg.eigh(symmetric_matrices(fields.inner))[1][:, :, 2]
     main *= np.where((main * fields.growth).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
-    slope = np.stack([part[hull.loose] for part in np.gradient(fields.distance)], axis=1)
+    slope = cell_slopes(fields.distance)[hull.loose]
     slope /= np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
     near_scalp = np.exp(-np.maximum(hull.head_distance[hull.loose], 0) / (2 * spacing))
     a_s = options.surface * np.exp(-off / options.surface_reach)
