@@ -56,6 +56,8 @@ def read_elements(data: bytes, source: str | os.PathLike[str]) -> Elements:
     reader = ByteReader(data, source, start)
     found: Elements = {}
     for element in plain:
+        if not element.fields:
+            continue  # rows of nothing, however many the header claims
         kinds = [(name, order + kind) for name, kind in element.fields if kind != "list"]
         rows = reader.array(np.dtype(kinds), element.rows, f"element {element.name}")
         found[element.name] = {

@@ -49,18 +49,14 @@ class TfxHair:
 def tfx_bytes(hair: TfxHair) -> memoryview:
     """Return the whole file; arrays stand in the header's order, at multiples of eight bytes."""
     strands, count = hair.points.shape[:2]
-    moving = np.ones((strands, count, 1), np.float32)
-    moving[:, :FIXED] = 0.0
     header = np.zeros((), HEADER)
     header["version"], header["strands"], header["points"] = VERSION, strands, count
     parts: list[tuple[npt.DTypeLike, npt.ArrayLike]] = [(HEADER, header)]
     arrays = {
-        "position": np.concatenate([hair.points, moving], axis=2),
+        "position": _with_fourth(hair.points, 0.0, FIXED),
         "strand_uv": hair.uv,
         "thickness": hair.thickness,
-        "colour": None
-        if hair.colours is None
-        else np.concatenate([hair.colours, np.ones_like(moving)], axis=2),
+        "colour": None if hair.colours is None else _with_fourth(hair.colours, 1.0, 0),
     }
     at = HEADER.itemsize
     for name, array in arrays.items():
@@ -70,6 +66,15 @@ def tfx_bytes(hair: TfxHair) -> memoryview:
             parts += [("<f4", array), ("<f4", np.zeros(padding))]
             at += 4 * (array.size + padding)
     return joined(parts)
+
+
+def _with_fourth(values: Float32Array, first: float, count: int) -> Float32Array:
+    """Return (S, N, 4): the values and a fourth number, `first` for the first points, then 1."""
+    result = np.empty((*values.shape[:2], 4), np.float32)
+    result[..., :3] = values
+    result[..., 3] = 1.0
+    result[:, :count, 3] = first
+    return result
 
 
 def read_binary(reader: ByteReader) -> tuple[TfxHair, Int64Array]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import re
+import tracemalloc
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -116,3 +118,36 @@ def test_damaged_bytes_give_a_groom_or_a_format_error(
     path.write_bytes(raw)
     with contextlib.suppress(FormatError):
         hairworks.import_groom(path, hairworks.Options())
+
+
+def laughs() -> str:
+    """Return entities that would unfold to ten thousand million letters."""
+    names = "abcdefghij"
+    lines = ['<!ENTITY a "ha">']
+    lines += [f'<!ENTITY {y} "{f"&{x};" * 10}">' for x, y in pairwise(names)]
+    return f"<!DOCTYPE NvParameters [{''.join(lines)}]><NvParameters>&j;</NvParameters>"
+
+
+HOSTILE = {
+    "nested": "<!DOCTYPE NvParameters>" + "<value>" * 100_000,
+    "many": "<!DOCTYPE NvParameters><NvParameters>" + "<a/>" * 100_000,
+    "attributes": "<!DOCTYPE NvParameters><a " + " ".join(f'b{i}=""' for i in range(9999)) + "/>",
+    "one word": "<!DOCTYPE NvParameters><" + "a" * 500_000,
+    "laughs": laughs(),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_xml_takes_little_memory(tmp_path: Path, name: str) -> None:
+    """Deep nesting, floods of elements and entities that unfold are refused early and cheaply."""
+    path = tmp_path / "hair.apx"
+    path.write_text(HOSTILE[name])
+    tracemalloc.start()
+    try:
+        with pytest.raises(FormatError) as caught:
+            hairworks.read_apx(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert len(str(caught.value)) < 500
+    assert peak < 16 * 2**20

@@ -43,6 +43,7 @@ def rewritten(path: Path, order: str, edges_only: bool) -> None:
     header = f"ply\nformat {order} 1.0\nelement vertex 5\nproperty double x\nproperty double y\n"
     header += "property double z\n"
     header += "element edge 3\nproperty int vertex1\nproperty int vertex2\n" if edges_only else ""
+    header += "element nothing 4294967295\n" if order != "ascii" else ""
     header += "" if edges_only else "element strand 2\nproperty uchar nsegs\n"
     header += "element face 0\nproperty list uchar int vertex_indices\nend_header\n"
     rows = edge if edges_only else np.array([[2], [1]])
