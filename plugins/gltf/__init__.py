@@ -80,7 +80,7 @@ class Options(ExportOptions, AnimationOptions, ImportOptions):
     )
     frame_step: int = option(1, low=1, high=1000, doc="Every how manieth frame of the cache.")
     morphs: int = option(
-        32,
+        16,
         low=1,
         high=1000,
         doc="Shapes that the animation is mixed from at most; as many as frames make it exact.",
