@@ -11,6 +11,7 @@ from hairkit.file_space import FileSpace
 from hairkit.groom import Groom
 from hairkit.guide_weights import closest_guides
 from hairkit.head_skin import HEAD_JOINT
+from hairkit.stored import Float32Array, Int32Array
 
 
 def add_hair(
@@ -47,51 +48,46 @@ def add_hair(
 
 
 def _add_primvars(primvars: Any, groom: Groom) -> None:
-    """Add primvars of types that Unreal reads: int, float2, float3; so ids of guides are floats."""
+    """Add the colours at every point and what is known of every strand."""
     from pxr import Sdf, UsdGeom, Vt
 
-    strands, types = groom.strands, Sdf.ValueTypeNames
-    assert strands.root_uv is not None
+    types = Sdf.ValueTypeNames
+    colours = Vt.Vec3fArray.FromNumpy(point_colours(groom))
+    for name, kind in (("displayColor", types.Color3fArray), ("groom_color", types.Float3Array)):
+        primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.vertex).Set(colours)
+    assert groom.strands.root_uv is not None
+    uv = Vt.Vec2fArray.FromNumpy(groom.strands.root_uv)
+    for name, kind in (("st", types.TexCoord2fArray), ("groom_root_uv", types.Float2Array)):
+        primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.uniform).Set(uv)
+    for name, values in _numbers(groom).items():
+        array, kind = Vt.IntArray.FromNumpy(values), types.IntArray
+        primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.uniform).Set(array)
+    for name, rows in _triples(groom).items():
+        array, kind = Vt.Vec3fArray.FromNumpy(rows), types.Float3Array
+        primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.uniform).Set(array)
+
+
+def _numbers(groom: Groom) -> dict[str, Int32Array]:
+    """Return the whole numbers (S,) of every strand."""
+    strands = groom.strands
     assert strands.group is not None
     assert strands.guide is not None
-    colours = Vt.Vec3fArray.FromNumpy(point_colours(groom))
-    uv = Vt.Vec2fArray.FromNumpy(strands.root_uv)
-    uniform, vertex = UsdGeom.Tokens.uniform, UsdGeom.Tokens.vertex
-    ids = np.arange(len(strands), dtype=np.int32)
-    values = [
-        ("displayColor", types.Color3fArray, vertex, colours),
-        ("st", types.TexCoord2fArray, uniform, uv),
-        ("groom_color", types.Float3Array, vertex, colours),
-        ("groom_root_uv", types.Float2Array, uniform, uv),
-        ("groom_id", types.IntArray, uniform, Vt.IntArray.FromNumpy(ids)),
-        ("groom_group_id", types.IntArray, uniform, Vt.IntArray.FromNumpy(strands.group)),
-        (
-            "groom_guide",
-            types.IntArray,
-            uniform,
-            Vt.IntArray.FromNumpy(strands.guide.astype(np.int32)),
-        ),
-        (
-            "hairkit:root_triangle",
-            types.IntArray,
-            uniform,
-            Vt.IntArray.FromNumpy(groom.root_triangle),
-        ),
-        (
-            "hairkit:root_barycentric",
-            types.Float3Array,
-            uniform,
-            Vt.Vec3fArray.FromNumpy(groom.root_barycentric),
-        ),
-    ]
-    if strands.guide.any():
-        mix = closest_guides(strands)
-        guides = Vt.Vec3fArray.FromNumpy(mix.guides.astype(np.float32))
-        weights = Vt.Vec3fArray.FromNumpy(mix.weights)
-        values.append(("groom_closest_guides", types.Float3Array, uniform, guides))
-        values.append(("groom_guide_weights", types.Float3Array, uniform, weights))
-    for name, kind, interpolation, value in values:
-        primvars.CreatePrimvar(name, kind, interpolation).Set(value)
+    return {
+        "groom_id": np.arange(len(strands), dtype=np.int32),
+        "groom_group_id": strands.group,
+        "groom_guide": strands.guide.astype(np.int32),
+        "hairkit:root_triangle": groom.root_triangle,
+    }
+
+
+def _triples(groom: Groom) -> dict[str, Float32Array]:
+    """Return three numbers (S, 3) of every strand; ids of guides too, as Unreal reads no int3."""
+    triples = {"hairkit:root_barycentric": groom.root_barycentric}
+    if groom.strands.guide is not None and groom.strands.guide.any():
+        mix = closest_guides(groom.strands)
+        triples["groom_closest_guides"] = mix.guides.astype(np.float32)
+        triples["groom_guide_weights"] = mix.weights
+    return triples
 
 
 def _bind_to_head(prim: Any, skeleton: Any) -> None:

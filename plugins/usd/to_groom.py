@@ -49,14 +49,15 @@ def read_groom(path: Path, options: Any) -> Groom:
     """Return all curves of the file as one groom; options are `ImportOptions` with `scale`."""
     found = contents(path)
     space = _space(found, options, path)
-    every = [_curves(found, curves, space, path) for curves in found.description["curves"]]
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
+        every = [_curves(found, curves, space, path) for curves in found.description["curves"]]
+        head = read_head(found, space, path)
     every = [curves for curves in every if len(curves.counts)]
     if not every:
         raise FormatError(f"{path}: holds no BasisCurves with points")
     joined = _joined(every)
     strands, kept = packed(joined.points, joined.counts, path)
     strands = _complete(strands, joined, kept)
-    head = read_head(found, space, path)
     settings = found.description["settings"]
     material = material_from(settings, path) or _look(joined, strands, kept)
     groom = adopt(strands, options, path, material, head)

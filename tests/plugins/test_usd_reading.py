@@ -145,6 +145,7 @@ def test_other_files_are_never_opened(read: Reader, tmp_path: Path, text: str) -
         (HEADER + curves().replace("(0, 0.2, 0)", "(0, nan, 0)"), "not finite"),
         (HEADER + curves().replace("[3, 3, 3]", "[1, 1, 1, 1, 1, 1, 1, 1, 1]"), "two or more"),
         (HEADER.replace("metersPerUnit = 1", "metersPerUnit = -1") + curves(), "metersPerUnit"),
+        (HEADER.replace("metersPerUnit = 1", "metersPerUnit = 1e300") + curves(), "too far away"),
     ],
 )
 def test_damage_is_one_clear_error(read: Reader, text: str, wanted: str) -> None:
