@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+import os
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 
@@ -78,3 +81,17 @@ class Groom(Stored):
             self.root_barycentric, np.float32, (count, 3), "root_barycentric"
         )
         object.__setattr__(self, "root_barycentric", barycentric)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the groom as hairkit's own file (see `hairkit.groom_file`), atomically."""
+        from hairkit.groom_file import write_groom  # it builds on this module
+
+        write_groom(path, self)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read what `save` and `reconstruct` wrote; raises `FormatError` for anything else."""
+        from hairkit.groom_file import read_groom
+
+        groom = read_groom(path)
+        return cls(**{f.name: getattr(groom, f.name) for f in dataclasses.fields(cls)})

@@ -16,9 +16,10 @@ import numpy.typing as npt
 
 from hairkit.camera import Camera
 from hairkit.capture_reader import TURN
+from hairkit.cli.export import load_groom
 from hairkit.densify import densify
 from hairkit.errors import InputError
-from hairkit.groom import Groom
+from hairkit.manager import Manager
 from hairkit.render import Lights, draw_views
 from hairkit.scene import read_cameras
 from hairkit.stored import UInt8Array, write_bytes
@@ -42,7 +43,9 @@ LARGEST = 8192
 def register(subparsers: Any) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("render", help="draw a groom", description=_DESCRIPTION)
-    parser.add_argument("groom", metavar="GROOM", type=Path, help="a groom (.npz)")
+    parser.add_argument(
+        "groom", metavar="GROOM", type=Path, help="groom.npz, or a file that an import plugin reads"
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="PNG")
     parser.add_argument(
         "--camera", default=None, help="front, left, ... or azimuth,elevation (front)"
@@ -57,7 +60,7 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw and print the names of the pictures."""
-    groom = Groom.load(args.groom)
+    groom = load_groom(Manager.loaded(), args.groom, {})
     if not 1 <= args.hairs <= MOST_HAIRS:
         raise InputError(f"--hairs is {args.hairs}, expected 1 to {MOST_HAIRS}")
     hair = densify(groom, args.hairs, args.seed)
