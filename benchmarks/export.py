@@ -31,6 +31,7 @@ from hairkit.cli.export import plugin_for
 from hairkit.default_head import default_head
 from hairkit.errors import InputError
 from hairkit.groom import Groom
+from hairkit.groom_file import read_groom, write_groom
 from hairkit.head import Roots
 from hairkit.manager import Manager
 from hairkit.scalp import sample_roots
@@ -77,7 +78,7 @@ def main() -> int:
         return 2
     with tempfile.TemporaryDirectory(dir=args.folder) as folder:
         groom = combed(args.strands, args.points)
-        groom.save(Path(folder) / "groom.npz")
+        write_groom(Path(folder) / "groom.npz", groom)
         blender = _blender(args, groom, Path(folder), endings)
         print(_heading(args), flush=True)
         for ending in endings:
@@ -120,7 +121,7 @@ def _measured(ending: str, folder: str, rounds: int) -> Measured:
 def _child(ending: str, folder: Path, rounds: int) -> int:
     """Write the groom in the folder; print what it took."""
     manager = Manager.loaded(autoload=False)
-    groom = Groom.load(folder / "groom.npz")
+    groom = read_groom(folder / "groom.npz")
     path = folder / f"hair{ending}"
     name = plugin_for(manager, "export_groom", path)
     options = manager.options(name, SETTINGS[ending])
