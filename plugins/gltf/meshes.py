@@ -99,7 +99,9 @@ class Meshes:
         if strands.widths is not None:
             attributes["_RADIUS"] = add(strands.widths / 2)
         if strands.root_uv is not None:
-            attributes["_ROOT_UV"] = add(_upside_down(np.repeat(strands.root_uv, counts, axis=0)))
+            # a scalar each: Blender 4.5 mixes up custom attributes of different widths
+            u, v = np.repeat(_upside_down(strands.root_uv), counts, axis=0).T
+            attributes |= {"_ROOT_U": add(u), "_ROOT_V": add(v)}
         for name, values in (("group", strands.group), ("guide", strands.guide)):
             if values is not None and (values == values[0]).all():
                 described[name] = values[0].item()

@@ -130,15 +130,16 @@ def _part(file: GlbFile, primitive: dict[str, Any], matrix: Float64Array, metres
     if not (np.abs(points) <= _FARTHEST).all():
         raise ValueError(f"positions lie beyond {_FARTHEST:g} m")
     custom = _Custom(file, primitive, order, np.cumsum(counts) - counts)
-    radius, uv = custom.of_points("_RADIUS", 1), custom.of_points("_ROOT_UV", 2)
-    if uv is not None:
-        uv = uv[custom.first]
-        uv[:, 1] = 1 - uv[:, 1]  # glTF counts v from the top of the picture, this project upwards
+    radius, u, v = (custom.of_points(name) for name in ("_RADIUS", "_ROOT_U", "_ROOT_V"))
+    uv = None
+    if u is not None and v is not None:
+        # glTF counts v from the top of the picture, this project upwards
+        uv = np.stack([u, 1 - v], axis=1)[custom.first]
     guide = custom.of_strands("guide")
     return _Part(
         points[order].astype(np.float32),
         counts,
-        None if radius is None else radius[:, 0].astype(np.float32),
+        None if radius is None else radius.astype(np.float32),
         None if uv is None else uv.astype(np.float32),
         custom.of_strands("group"),
         None if guide is None else guide > 0,
@@ -156,26 +157,27 @@ class _Custom:
     first: Int64Array
     """(S,) where in that order each strand starts."""
 
-    def of_points(self, name: str, width: int) -> Float64Array | None:
-        """Return (P, width) values, None where the attribute is missing."""
+    def of_points(self, name: str) -> Float64Array | None:
+        """Return (P,) values, None where the attribute is missing."""
         attributes = self.primitive["attributes"]
         if name not in attributes:
             return None
         values = self.file.numbers(attributes[name])
         count = self.file.document["accessors"][attributes["POSITION"]]["count"]
-        if values.shape != (count, width) or not np.isfinite(values).all():
-            raise ValueError(f"{name} is not {width} finite numbers a point")
-        return values[self.order]
+        if values.shape != (count, 1) or not np.isfinite(values).all():
+            raise ValueError(f"{name} is not a finite number for each point")
+        column: Float64Array = values[self.order, 0]
+        return column
 
     def of_strands(self, name: str) -> Int64Array | None:
         """Return (S,) whole numbers: of the attribute, or one for all strands in the extras."""
-        values = self.of_points(f"_{name.upper()}", 1)
+        values = self.of_points(f"_{name.upper()}")
         constant = _described(self.primitive).get(name)
         if values is None and constant is None:
             return None
         column = np.full(len(self.first), constant, np.float64)
         if values is not None:
-            column = values[self.first, 0]
+            column = values[self.first]
         if not (np.abs(column) <= _MAX_GROUP).all():
             raise ValueError(f"_{name.upper()} is beyond what 32 bits hold")
         return np.rint(column).astype(np.int64)

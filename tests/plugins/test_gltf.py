@@ -172,6 +172,19 @@ def test_trimesh_reads_points_and_triangles(tmp_path: Path) -> None:
     assert counts == {len(groom.head.faces), 50 * 3 * 2}
 
 
+def test_custom_attributes_are_scalars(tmp_path: Path) -> None:
+    """Blender 4.5 fails on custom attributes of different widths in one mesh."""
+    file = GlbFile(written(tmp_path, rich_groom(), strips=10))
+    kinds = {
+        (accessor["type"], accessor["componentType"])
+        for mesh in file.document["meshes"]
+        for name, number in mesh["primitives"][0]["attributes"].items()
+        if name.startswith("_")
+        for accessor in [file.document["accessors"][number]]
+    }
+    assert kinds == {("SCALAR", 5126)}
+
+
 def test_a_written_head_is_a_head_again(tmp_path: Path) -> None:
     """`read_head` takes the head out of a file with hair; its scalp is marked."""
     groom = rich_groom()
