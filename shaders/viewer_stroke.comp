@@ -25,7 +25,7 @@ uniform ivec2 u_picture;
 uniform float u_smooth;         // 1: partial coverage across the stroke; 0: whole pixels, faster
 
 const float BOUNCED = 0.1;      // of the sky's light, that comes through hair on all ways
-const float HIDDEN = 0.05;      // a piece of which less arrives is not drawn
+const float HIDDEN = 0.1;       // a piece of which less arrives is not drawn
 const float WIDEST = 64.0;      // pixels
 
 vec3 place_at(int index) { return vec3(places[3 * index], places[3 * index + 1], places[3 * index + 2]); }

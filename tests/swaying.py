@@ -23,7 +23,7 @@ class Options:
 
 
 class Swaying:
-    """Points lean with the wind by their distance from the root; held points are where the hand is."""
+    """Points lean with the wind by their distance from the root; held points are in the hand."""
 
     def __init__(self, groom: Any, options: Options) -> None:
         self.strands = groom.strands

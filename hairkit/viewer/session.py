@@ -202,7 +202,7 @@ class Session:
         groom, strands = self.opened.groom, self.tuned.simulator.strands
         hairs = max(self.shown.hairs, len(strands))
         self.body = HairBody.of(strands, groom.head, groom.material, hairs, self._own, self.seed)
-        self._sampler = GuideSampler(strands, self.body.points_each)
+        self._sampler = GuideSampler(strands, self.body.shares)
 
 
 def fitted(camera: Camera, width: int, height: int) -> Camera:

@@ -26,6 +26,9 @@ KEY = (-0.45, 0.6, 0.75)
 RIM = (0.55, 0.6, -0.55)
 STUDIO_SIZE = (160, 90)
 """Pixels of the studio's picture, which is smooth and spread over the whole."""
+NEAR_HAIR, OFF_GUIDES = 0.05, 0.06
+"""Metres: hair nearer than the first may be anywhere in the picture; hair keeps within the second
+of the guides."""
 PULL = 0.002
 """Overlaid lines are drawn this share of the depth range nearer, so that skin does not cut them."""
 
@@ -132,7 +135,7 @@ class Stage:
         self.gl.context.copy_framebuffer(self.framebuffer, self._set)
         if shot.hair is not None:
             self.hair.draw(own, depth, shot.hair, self._depth_texture, lighting)
-            self._draw_hair()
+            self._draw_hair(_frame_of(own, self._rows))
         self._draw_overlays(shot, own, depth)
         self.gl.home.use()
 
@@ -199,15 +202,18 @@ class Stage:
         )
         self._backdrop.render(moderngl.TRIANGLES, vertices=3)
 
-    def _draw_hair(self) -> None:
+    def _draw_hair(self, frame: tuple[int, int, int, int]) -> None:
+        """Resolve the sums inside a frame, which takes them all."""
         context = self.gl.context
         self.framebuffer.use()
+        self.framebuffer.scissor = frame
         context.enable_only(moderngl.BLEND)
         context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
         set_uniforms(self.gl.program("viewer_screen", "viewer_resolve"), u_picture=self._size)
         if self.hair.sums is not None:
             self.hair.sums.bind_to_storage_buffer(7)
         self._resolve.render(moderngl.TRIANGLES, vertices=3)
+        self.framebuffer.scissor = None
 
     def _draw_overlays(self, shot: Shot, own: Camera, depth: DepthRange) -> None:
         if not shot.lines and not shot.boards:
@@ -263,6 +269,20 @@ def _in_head(camera: Camera, world_from_head: Float64Array) -> Camera:
 def _hair_depth(camera: Camera, rows: Float32Array) -> DepthRange:
     depth = camera.depth(rows.reshape(-1, 3))
     return DepthRange(float(depth.min()) - 0.005, float(depth.max()) + 0.005)
+
+
+def _frame_of(camera: Camera, rows: Float32Array) -> tuple[int, int, int, int]:
+    """Return x, y, width and height in pixels of where hair that follows guides can be."""
+    size = np.array([camera.width, camera.height])
+    depth = camera.depth(rows.reshape(-1, 3))
+    if depth.min() < NEAR_HAIR:
+        return 0, 0, camera.width, camera.height
+    pixels = camera.project(rows.reshape(-1, 3))
+    margin = 8 + OFF_GUIDES * camera.focal / float(depth.min())
+    low = np.clip(np.floor(pixels.min(axis=0) - margin), 0, size)
+    high = np.clip(np.ceil(pixels.max(axis=0) + margin), low + 1, size + 1)
+    x, y, width, height = np.concatenate([low, high - low]).astype(int).tolist()
+    return x, y, width, height
 
 
 def _set_key(shot: Shot, depth: DepthRange) -> tuple[object, ...]:

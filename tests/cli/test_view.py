@@ -46,9 +46,7 @@ def test_a_script_without_a_window_prints_the_pictures_it_wrote(
 def test_a_folder_of_results_is_opened_by_its_name(groom_path: Path, tmp_path: Path) -> None:
     """The folder stands for the groom in it."""
     script = tmp_path / "steps.toml"
-    script.write_text(
-        "hairs = 300\nsize = [64, 48]\n[[steps]]\ndo = 'screenshot'\nfile = 'b.png'\n"
-    )
+    script.write_text("size = [64, 48]\n[[steps]]\ndo = 'screenshot'\nfile = 'b.png'\n")
     assert view(groom_path.parent, "--headless", "--script", script, "--out", tmp_path) == 0
     assert (tmp_path / "b.png").is_file()
 

@@ -43,16 +43,18 @@ def test_every_key_can_be_pressed(session: Session, key: str, tmp_path: Path) ->
     name, values = bindings()[key]
     if name == "record":
         values = {"file": str(tmp_path / "frames")}
-    try:
+    needs_results = name in ("layer", "through", "preset_load") and key != "F9"
+    if needs_results:
+        with pytest.raises(HairkitError) as caught:
+            perform(session, name, values)
+        assert "\n" not in str(caught.value)
+    else:
         perform(session, name, values)
-    except HairkitError as error:
-        assert "\n" not in str(error)
-        assert name in ("layer", "through", "preset_load", "adjust")
 
 
 def test_unknown_actions_and_refused_values_are_named(session: Session) -> None:
     """A mistake in a script gives one line with what was meant."""
-    with pytest.raises(InputError, match="no action 'orbitt'.*did you mean 'orbit'"):
+    with pytest.raises(InputError, match=r"no action 'orbitt'.*did you mean 'orbit'"):
         perform(session, "orbitt")
     with pytest.raises(OptionError, match=r"orbit: .*no option 'left'"):
         perform(session, "orbit", {"left": 3.0})

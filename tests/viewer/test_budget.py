@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import astuple
+
 from hairkit.viewer.budget import LEVELS, Budget
 
 
@@ -44,12 +47,9 @@ def test_no_budget_draws_the_best() -> None:
 
 def test_levels_draw_less_and_less() -> None:
     """From level to level nothing gets finer."""
-    for better, worse in zip(LEVELS, LEVELS[1:], strict=False):
-        assert (better.smooth, better.scale, better.share) > (
-            worse.smooth,
-            worse.scale,
-            worse.share,
-        )
+    for better, worse in itertools.pairwise(astuple(level) for level in LEVELS):
+        assert better > worse
+        assert all(a >= b for a, b in zip(better, worse, strict=True))
 
 
 def test_a_slow_simulator_does_not_take_all_the_time_from_drawing() -> None:

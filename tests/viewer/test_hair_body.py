@@ -10,10 +10,10 @@ from hairkit.groom import Groom
 from hairkit.strands import Strands
 from hairkit.testing import bristle_groom
 from hairkit.viewer.hair_body import (
-    FEWEST_POINTS,
+    COUNTS,
     GuideSampler,
     HairBody,
-    points_needed,
+    shares_needed,
     split_guides,
 )
 
@@ -48,14 +48,14 @@ def test_fewer_hairs_are_a_first_part_of_more_hairs_of_the_same_spread() -> None
     course = np.einsum("sk,skc->sc", body.weights, body.guide_rest[body.followed][:, :, 0])
     roots = (course + body.offsets[:, 0])[len(groom.strands) :]
     some = roots[: len(roots) // 10]
-    np.testing.assert_allclose(some.mean(axis=0), roots.mean(axis=0), atol=0.015)
-    np.testing.assert_allclose(some.std(axis=0), roots.std(axis=0), atol=0.015)
+    np.testing.assert_allclose(some.mean(axis=0), roots.mean(axis=0), atol=0.03)
+    np.testing.assert_allclose(some.std(axis=0), roots.std(axis=0), atol=0.03)
 
 
 def test_sampling_keeps_roots_and_tips() -> None:
     """Whatever the number of points, ends stay."""
     groom = bristle_groom()
-    rows = GuideSampler(groom.strands, 9)(groom.strands.points)
+    rows = GuideSampler(groom.strands, np.linspace(0, 1, 9) ** 1.5)(groom.strands.points)
     np.testing.assert_allclose(rows[:, 0], groom.strands.roots, atol=1e-7)
     np.testing.assert_allclose(rows[:, -1], groom.strands.tips, atol=1e-7)
 
@@ -66,8 +66,8 @@ def test_straight_hair_needs_the_fewest_points_and_curls_more() -> None:
     straight = Strands.from_list([np.stack([0 * t, -0.3 * t, 0 * t], axis=1)])
     angle = 2 * np.pi * 6 * t
     curl = np.stack([0.01 * np.cos(angle), -0.3 * t, 0.01 * np.sin(angle)], axis=1)
-    assert points_needed(straight) == FEWEST_POINTS
-    assert points_needed(Strands.from_list([curl])) > 4 * FEWEST_POINTS
+    assert len(shares_needed(straight)) == COUNTS[0]
+    assert len(shares_needed(Strands.from_list([curl]))) > 4 * COUNTS[0]
 
 
 def test_marked_guides_are_the_guides_and_the_rest_follows() -> None:

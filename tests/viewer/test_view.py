@@ -1,4 +1,4 @@
-"""Laws of the view: what the mouse does can be undone, and all of the hair is seen from anywhere."""
+"""Laws of the view: what the mouse does can be undone, all of the hair is seen from anywhere."""
 
 from __future__ import annotations
 

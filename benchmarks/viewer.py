@@ -1,0 +1,100 @@
+"""How many pictures a second the viewer draws: prints one table.
+
+python benchmarks/viewer.py --guides 600 --hairs 10000 --size 1280x720
+
+Each row is the median picture of a shaken head in wind, as wall time, and as processor time of all
+threads over the number of cores: what the wall time is on a machine that does nothing else.
+`chosen` is what the frame budget settles on by itself.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import tempfile
+import time
+from pathlib import Path
+
+from hairkit.cli.render import parse_size
+from hairkit.default_head import default_head
+from hairkit.groom_file import write_groom
+from hairkit.manager import Manager
+from hairkit.render.context import renderer
+from hairkit.synth import grow
+from hairkit.viewer.actions import perform
+from hairkit.viewer.budget import LEVELS, Budget
+from hairkit.viewer.preview import Preview
+from hairkit.viewer.session import Session
+
+WARM = 12
+"""Pictures before the measured ones."""
+
+
+def main() -> int:
+    """Measure and print."""
+    args = _arguments()
+    with tempfile.TemporaryDirectory() as folder, renderer() as gl:
+        path = Path(folder) / "groom.npz"
+        write_groom(path, grow("straight", default_head(), args.guides))
+        print(f"{gl.description}, {os.cpu_count()} cores\n")
+        print(f"{args.guides} guides, {args.hairs} hairs, {args.size}, {args.pictures} pictures\n")
+        print("| simulation | quality | wall ms | fps | processor ms / cores | fps idle machine |")
+        print("|---|---|---|---|---|---|")
+        for simulator in ("none", None):
+            session = Session(
+                Manager.loaded(),
+                path,
+                size=parse_size(args.size),
+                simulator=simulator,
+                hairs=args.hairs,
+            )
+            for level in (0, 1, 2, 3, None):
+                _row(args, gl, session, level)
+    return 0
+
+
+def _row(args: argparse.Namespace, gl: object, session: Session, level: int | None) -> None:
+    """Print one line: a fixed level of quality, or the budget's choice."""
+    budget = Budget(1 / 20)
+    session.most_seconds = 0.4 * budget.seconds
+    preview = Preview(gl, session, budget)  # type: ignore[arg-type]
+    walls, processors = [], []
+    for picture in range(WARM + args.pictures + (80 if level is None else 0)):
+        if picture % 60 == 0:
+            perform(session, "shake", {"seconds": 3.0})
+            perform(session, "wind", {"on": True})
+        if level is not None:
+            budget.level, budget._wait = level, 99
+        wall, processor = time.perf_counter(), time.process_time()
+        preview.frame(1 / 30)
+        gl.context.finish()  # type: ignore[attr-defined]
+        walls.append(time.perf_counter() - wall)
+        processors.append(time.process_time() - processor)
+    wall = statistics.median(walls[-args.pictures :])
+    processor = statistics.median(processors[-args.pictures :]) / (os.cpu_count() or 1)
+    quality = LEVELS[budget.level]
+    name = (
+        f"{'chosen: ' if level is None else ''}scale {quality.scale}, {quality.share:.0%} of hairs"
+    )
+    print(
+        f"| {session.tuned.plugin} | {name}{', soft' if quality.smooth else ''} | {1e3 * wall:.0f}"
+        f" | {1 / wall:.1f} | {1e3 * processor:.0f} | {1 / processor:.1f} |",
+        flush=True,
+    )
+    preview.release()
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--guides", type=int, default=600)
+    parser.add_argument("--hairs", type=int, default=10_000)
+    parser.add_argument("--size", default="1280x720", metavar="WxH")
+    parser.add_argument("--pictures", type=int, default=40)
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
