@@ -83,7 +83,7 @@ def test_the_head_arrives(
 def test_lines_are_the_strands(
     blender: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path
 ) -> None:
-    """Edges along every strand, with its number, group, guide flag, root uv and radius."""
+    """Edges along every strand, with number, group, guide flag, radius, root uv (v from the top)."""
     things = seen(blender, written(manager, groom, tmp_path / "hair.glb", hair="none"))
     mesh, strands = only(things, "MESH", "guides"), groom.strands
     have, owner = mesh["attributes"], strands.strand_of_point
@@ -100,8 +100,8 @@ def test_lines_are_the_strands(
     np.testing.assert_array_equal(have["_GROUP"], strands.group[owner])
     np.testing.assert_array_equal(have["_GUIDE"], strands.guide[owner])
     np.testing.assert_allclose(have["_RADIUS"], strands.widths / 2, rtol=1e-6)
-    for index, name in enumerate(("_ROOT_U", "_ROOT_V")):
-        np.testing.assert_allclose(have[name], strands.root_uv[owner, index], atol=1e-6)
+    np.testing.assert_allclose(have["_ROOT_U"], strands.root_uv[owner, 0], atol=1e-6)
+    np.testing.assert_allclose(1 - have["_ROOT_V"], strands.root_uv[owner, 1], atol=1e-6)
     assert (mesh["weights"][:, HEAD_JOINT] == 1).all()
 
 
