@@ -1,52 +1,17 @@
-"""A small groom that holds everything files may carry, and an animation of it."""
+"""Grooms through files and back, and animations of them, for checks by other programs."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hairkit.cli.export import plugin_for
-from hairkit.groom import Groom, HairMaterial
+from hairkit.groom import Groom
 from hairkit.guide_weights import guide_mask
 from hairkit.manager import Manager
 from hairkit.point_cache import PointCache
 from hairkit.stored import Float32Array, Float64Array
-from hairkit.strands import Strands
-from hairkit.testing import bristle_groom
-
-
-def rich_groom() -> Groom:
-    """Return bent strands of 3 to 9 points, each width another, two groups, guides and hair."""
-    rng = np.random.default_rng(5)
-    bristles = bristle_groom()
-    count = 40
-    counts = rng.integers(3, 10, count)
-    roots = bristles.strands.roots[:count]
-    way = bristles.strands.points.reshape(-1, 5, 3)[:count, 4] - roots
-    offsets = np.concatenate([[0], np.cumsum(counts)])
-    owner = np.repeat(np.arange(count), counts)
-    rank = np.arange(offsets[-1]) - offsets[:-1][owner]
-    bend = rng.normal(0, 0.004, (len(owner), 3)) * (rank > 0)[:, None]
-    points = roots[owner] + way[owner] * (rank / 4)[:, None] + bend
-    strands = Strands(
-        points,
-        offsets,
-        widths=rng.uniform(4e-5, 2e-4, len(owner)),
-        root_uv=rng.uniform(0.05, 0.95, (count, 2)),
-        group=np.arange(count) % 2,
-        guide=np.arange(count) % 4 != 3,
-    )
-    return replace(
-        bristles,
-        strands=strands,
-        root_triangle=bristles.root_triangle[:count],
-        root_barycentric=bristles.root_barycentric[:count],
-        material=HairMaterial(
-            np.array([0.3, 0.12, 0.05]), np.array([0.6, 0.35, 0.2]), 1e-4, 0.004, 0.03
-        ),
-    )
 
 
 def written(manager: Manager, groom: Groom, path: Path, **options: object) -> Path:

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from blender_session import VARIABLE, BlenderSession, blender_python, z_up
-from client_groom import rich_groom, wandering
+from client_groom import wandering
+from rich_groom import rich_groom
 
 from hairkit.groom import Groom
 from hairkit.guide_weights import follow

@@ -83,7 +83,7 @@ def test_the_head_arrives(
 def test_lines_are_the_strands(
     blender: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path
 ) -> None:
-    """Edges along every strand, with number, group, guide flag, radius, root uv (v from the top)."""
+    """Edges along strands, with number, group, guide flag, radius, root uv (v from the top)."""
     things = seen(blender, written(manager, groom, tmp_path / "hair.glb", hair="none"))
     mesh, strands = only(things, "MESH", "guides"), groom.strands
     have, owner = mesh["attributes"], strands.strand_of_point
