@@ -53,7 +53,9 @@ class Options:
     )
     contact: bool = option(True, doc="Whether the head keeps hair out.")
     substeps: int = option(2, low=1, high=64, doc="Steps in a sixtieth of a second.")
-    iterations: int = option(1, low=1, high=20, doc="Newton iterations a step.")
+    iterations: int = option(
+        4, low=1, high=20, doc="Newton iterations a step at most; calm hair needs one."
+    )
     second_order: bool = option(
         True, doc="BDF2, which keeps swings; false is Euler's step, which damps them."
     )

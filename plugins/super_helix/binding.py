@@ -113,5 +113,7 @@ def draw(
                 points[p, i] = root[i] + arm[i]
                 for j in range(3):
                     frames[p, i, j] = (
-                        frame[i, 0] * turn[0, j] + frame[i, 1] * turn[1, j] + frame[i, 2] * turn[2, j]
+                        frame[i, 0] * turn[0, j]
+                        + frame[i, 1] * turn[1, j]
+                        + frame[i, 2] * turn[2, j]
                     )

@@ -1,8 +1,8 @@
 """Where a super-helix lies and how it moves: the readable NumPy form, one strand at a time.
 
 The frame travels as F' = F [q]x with q = (twist, curvature, curvature) constant on an element, the
-point as r' = F e1 (Bertails et al. 2006, equations 3 to 5). A change dq of an element turns all that
-follows by F_e l A(l q) dq, A the mean rotation, and moves its point at s by F_e D(s) dq.
+point as r' = F e1 (Bertails et al. 2006, equations 3 to 5). A change dq of an element turns all
+that follows by F_e l A(l q) dq, A the mean rotation, and moves its point at s by F_e D(s) dq.
 """
 
 from __future__ import annotations

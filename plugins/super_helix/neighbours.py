@@ -9,15 +9,15 @@ is implicit like air drag, and pushed down the slope of density where it is dens
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import map_coordinates
 
-from hairkit.stored import Float64Array, Int64Array
+from hairkit.stored import Float64Array
 
-from .recursion import Motion
+from .nodes import compiled
 
 CELL = 0.01
 """Metres; a lock's width."""
-_BITS = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+WIDEST = 256
+"""Cells along an edge of the grid at most; hair beyond is taken at its border."""
 
 
 class Neighbours:
@@ -25,81 +25,110 @@ class Neighbours:
 
     def __init__(self, rest: Float64Array, masses: Float64Array) -> None:
         """Keep the density at rest: `rest` (E, NODES, 3) in the head frame."""
-        self._masses = masses.ravel()
-        flat = rest.reshape(-1, 3)
-        low = flat.min(axis=0, initial=0.0)
-        grid = _Grid(flat, low)
-        density, _ = grid.spread(self._masses, np.zeros_like(flat))
-        self._rest = grid.gather(density)
-        self._floor = float(np.median(self._rest)) if len(self._rest) else 1.0
+        self._masses = np.ascontiguousarray(masses.ravel())
+        points = np.ascontiguousarray(rest.reshape(-1, 3))
+        found = _around(points, np.zeros_like(points), self._masses)
+        self._rest = found[:, 0]
+        self._floor = float(np.median(self._rest)) if len(found) else 1.0
 
     def act(
         self,
-        motion: Motion,
-        head: Float64Array,
+        points: Float64Array,
+        velocity: Float64Array,
         drag: Float64Array,
         air: Float64Array,
-        masses: Float64Array,
         friction: float,
         push: float,
     ) -> tuple[Float64Array, Float64Array]:
-        """Return drag (E, NODES) and the velocity it pulls to (E, NODES, 3), with the hair's part.
+        """Return a drag (E, NODES) and the velocity (E, NODES, 3) it pulls to, the hair's included.
 
-        `friction` is the rate, per second, at which a point in hair as dense as the median at rest
-        takes on its neighbours' velocity; `push` the acceleration, metres per second squared, at
-        twice the rest's density.
+        Parameters
+        ----------
+        points, velocity
+            (E, NODES, 3) of the Gauss points now.
+        drag, air
+            (E, NODES) kilograms per second and (E, NODES, 3) metres per second, of the air.
+        friction
+            Rate, per second, at which a point in hair as dense as the median at rest takes on the
+            speed of its neighbours.
+        push
+            Acceleration, metres per second squared, at twice the density of rest.
         """
-        flat = motion.points.reshape(-1, 3)
-        own = (flat - head[:3, 3]) @ head[:3, :3]
-        grid = _Grid(own, own.min(axis=0, initial=0.0))
-        velocity = motion.velocity.reshape(-1, 3)
-        density, momentum = grid.spread(self._masses, velocity)
-        here = grid.gather(density)
-        around = np.stack([grid.gather(momentum[..., i]) for i in range(3)], axis=-1)
-        around /= np.maximum(here, 1e-30)[:, None]
-        share = np.minimum(here / self._floor, 1.0)
-        rate = (friction * share * self._masses).reshape(drag.shape)
-        crowded = np.maximum(here / np.maximum(self._rest, self._floor) - 1.0, 0.0)
-        away = -np.stack([grid.slope(density, i) for i in range(3)], axis=-1)
-        size = np.linalg.norm(away, axis=1, keepdims=True)
-        away = (away / np.maximum(size, 1e-30)) @ head[:3, :3].T
-        force = push * np.minimum(crowded, 1.0)[:, None] * away * self._masses[:, None]
-        total = drag + rate
-        pulled = drag[..., None] * air + rate[..., None] * around.reshape(air.shape)
-        pulled += force.reshape(air.shape)
+        flat = points.reshape(-1, 3)
+        found = _around(flat, velocity.reshape(-1, 3), self._masses)
+        density, around, away = found[:, 0], found[:, 1:4], found[:, 4:]
+        rate = friction * np.minimum(density / self._floor, 1.0) * self._masses
+        crowded = np.clip(density / np.maximum(self._rest, self._floor) - 1.0, 0.0, 1.0)
+        force = (push * crowded * self._masses)[:, None] * away
+        total = drag + rate.reshape(drag.shape)
+        pulled = (rate[:, None] * around + force).reshape(air.shape) + drag[..., None] * air
         return total, pulled / np.maximum(total, 1e-30)[..., None]
 
 
-class _Grid:
-    """Values on cell corners around points, trilinear."""
+def _around(points: Float64Array, velocity: Float64Array, masses: Float64Array) -> Float64Array:
+    """Return (P, 7) density, mean velocity, and unit direction down the slope of density."""
+    if not len(points):
+        return np.zeros((0, 7))
+    low = points.min(axis=0)
+    size = np.minimum((points.max(axis=0) - low) / CELL, WIDEST - 3).astype(np.int64) + 3
+    corners = np.zeros((*size, 4))
+    spread(points, low, velocity, masses, corners)
+    result = np.empty((len(points), 7))
+    gather(points, low, corners, result)
+    return result
 
-    def __init__(self, points: Float64Array, low: Float64Array) -> None:
-        self.at: Float64Array = (points - low) / CELL + 1.0
-        high = self.at.max(axis=0, initial=0.0)
-        self.shape = tuple(np.minimum(high.astype(np.int64) + 3, 400))
-        self.at = np.clip(self.at, 0, np.array(self.shape) - 1.001)
 
-    def spread(
-        self, masses: Float64Array, velocity: Float64Array
-    ) -> tuple[Float64Array, Float64Array]:
-        """Return mass (X, Y, Z) and momentum (X, Y, Z, 3) on the corners."""
-        corner = self.at.astype(np.int64)
-        t = self.at - corner
-        density = np.zeros(int(np.prod(self.shape)))
-        momentum = np.zeros((3, len(density)))
-        for bits in _BITS:
-            index: Int64Array = np.ravel_multi_index((corner + bits).T, self.shape)
-            part = np.where(bits, t, 1 - t).prod(axis=1) * masses
-            density += np.bincount(index, part, len(density))
+@compiled
+def spread(
+    points: Float64Array,
+    low: Float64Array,
+    velocity: Float64Array,
+    masses: Float64Array,
+    corners: Float64Array,
+) -> None:
+    """Add masses and momenta to the corners (X, Y, Z, 4) of the points' cells, trilinear."""
+    for p in range(len(points)):
+        x, y, z = (points[p] - low) / CELL
+        i, j, k = (
+            min(int(x), corners.shape[0] - 2),
+            min(int(y), corners.shape[1] - 2),
+            min(int(z), corners.shape[2] - 2),
+        )
+        u, v, w = min(x - i, 1.0), min(y - j, 1.0), min(z - k, 1.0)
+        for bit in range(8):
+            a, b, c = bit >> 2, bit >> 1 & 1, bit & 1
+            part = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w) * masses[p]
+            corners[i + a, j + b, k + c, 0] += part
             for axis in range(3):
-                momentum[axis] += np.bincount(index, part * velocity[:, axis], len(density))
-        return density.reshape(self.shape), np.moveaxis(momentum.reshape(3, *self.shape), 0, -1)
+                corners[i + a, j + b, k + c, 1 + axis] += part * velocity[p, axis]
 
-    def gather(self, values: Float64Array) -> Float64Array:
-        """Return the values at the points, trilinear."""
-        found: Float64Array = map_coordinates(values, self.at.T, order=1, mode="nearest")
-        return found
 
-    def slope(self, values: Float64Array, axis: int) -> Float64Array:
-        """Return the derivative along an axis at the points, per cell."""
-        return self.gather(np.gradient(values, axis=axis))
+@compiled
+def gather(
+    points: Float64Array, low: Float64Array, corners: Float64Array, result: Float64Array
+) -> None:
+    """Write density, mean velocity and the direction of falling density at the points."""
+    value, slope = np.empty(4), np.empty(3)
+    for p in range(len(points)):
+        x, y, z = (points[p] - low) / CELL
+        i, j, k = (
+            min(int(x), corners.shape[0] - 2),
+            min(int(y), corners.shape[1] - 2),
+            min(int(z), corners.shape[2] - 2),
+        )
+        u, v, w = min(x - i, 1.0), min(y - j, 1.0), min(z - k, 1.0)
+        value[:], slope[:] = 0.0, 0.0
+        for bit in range(8):
+            a, b, c = bit >> 2, bit >> 1 & 1, bit & 1
+            f, g, h = (u if a else 1 - u), (v if b else 1 - v), (w if c else 1 - w)
+            for axis in range(4):
+                value[axis] += f * g * h * corners[i + a, j + b, k + c, axis]
+            density = corners[i + a, j + b, k + c, 0]
+            slope[0] += (2 * a - 1) * g * h * density
+            slope[1] += (2 * b - 1) * f * h * density
+            slope[2] += (2 * c - 1) * f * g * density
+        size = np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
+        result[p, 0] = value[0]
+        for axis in range(3):
+            result[p, 1 + axis] = value[1 + axis] / max(value[0], 1e-30)
+            result[p, 4 + axis] = -slope[axis] / max(size, 1e-30)

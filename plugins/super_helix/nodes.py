@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -26,8 +26,8 @@ _VERSINE_SLOPE, _REST_SLOPE = (
 
 def compiled(function: _Function) -> _Function:
     """Compile a function that runs beside others and divides as NumPy does."""
-    made: _Function = njit(cache=True, nogil=True, error_model="numpy")(function)
-    return made
+    made: Any = njit(cache=True, nogil=True, error_model="numpy")(function)
+    return cast(_Function, made)
 
 
 @compiled
@@ -106,9 +106,7 @@ def turns(q: Float64Array, s: float, turn: Float64Array, mean: Float64Array) -> 
 def times(matrix: Float64Array, vector: Float64Array, result: Float64Array) -> None:
     """Write matrix (3, 3) times vector (3,)."""
     for i in range(3):
-        result[i] = (
-            matrix[i, 0] * vector[0] + matrix[i, 1] * vector[1] + matrix[i, 2] * vector[2]
-        )
+        result[i] = matrix[i, 0] * vector[0] + matrix[i, 1] * vector[1] + matrix[i, 2] * vector[2]
 
 
 @compiled

@@ -11,77 +11,16 @@ super-helices", Eurographics 2009. `reference.py` forms and solves the same syst
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.stored import Float64Array
 
-from .nodes import compiled, carried, node, onward, product, times, turns
+from .elimination import eliminate
+from .nodes import carried, compiled, node, onward, product, times, turns
 from .rods import NODES, SHARES, WEIGHTS, Rods
+from .state import CLOSE, FAR, Loads, Motion, Step
 from .touch import touch
-
-
-class Motion(NamedTuple):
-    """The hair's state, changed in place."""
-
-    q: Float64Array
-    """(E, 3) coordinates now."""
-    q_before: Float64Array
-    """(E, 3) one step ago."""
-    points: Float64Array
-    """(E, NODES, 3) Gauss points now, world."""
-    points_before: Float64Array
-    """(E, NODES, 3) one step ago."""
-    velocity: Float64Array
-    """(E, NODES, 3) metres per second."""
-    velocity_before: Float64Array
-    """(E, NODES, 3) one step ago."""
-
-
-class Loads(NamedTuple):
-    """What acts on the Gauss points during a step."""
-
-    drag: Float64Array
-    """(E, NODES) kilograms per second."""
-    air: Float64Array
-    """(E, NODES, 3) velocity that the drag pulls to, metres per second."""
-    spring: Float64Array
-    """(E, NODES) newton per metre, 0 where nothing holds the point."""
-    anchor: Float64Array
-    """(E, NODES, 3) where springs pull to, world."""
-    gap: Float64Array
-    """(E, NODES) distance from obstacles below which a point is pushed out, metres."""
-
-
-class Step(NamedTuple):
-    """One step, the same for all strands."""
-
-    seconds: float
-    """Its length."""
-    two_step: bool
-    """True for the second-order formula, which looks back two steps (BDF2); else Euler's."""
-    friction: float
-    """Internal friction, seconds: force per stiffness and rate of change of shape."""
-    iterations: int
-    """Newton iterations."""
-    gravity: Float64Array
-    """(3,) metres per second squared."""
-    head: Float64Array
-    """(4, 4) head_from_rest at the step's end."""
-    head_before: Float64Array
-    """(4, 4) at its start."""
-    contact: float
-    """Square of the rate at which obstacles push points out, per square second."""
-    coulomb: float
-    """Coefficient of friction on obstacles."""
-    origin: Float64Array
-    """(3,) of the obstacles' grid."""
-    spacing: float
-    """Of the obstacles' grid, metres."""
-    distance: npt.NDArray[np.float32]
-    """(X, Y, Z) of the obstacles, metres; empty for none."""
 
 
 @compiled
@@ -93,17 +32,47 @@ def step_strands(
         first, last = rods.offsets[strand], rods.offsets[strand + 1]
         root, frame = np.empty(3), np.empty((3, 3))
         carried(step.head, rods.roots[strand], rods.frames[strand], root, frame)
-        start = np.empty((last - first, 3))
-        for e in range(first, last):
-            for k in range(3):
-                now, ahead = motion.q[e, k], 2 * motion.q[e, k] - motion.q_before[e, k]
-                before = (4 * now - motion.q_before[e, k]) / 3 if step.two_step else now
-                start[e - first, k] = before
-                motion.q_before[e, k] = now
-                motion.q[e, k] = ahead
-        for _ in range(step.iterations):
-            newton(rods, motion, loads, step, first, last, root, frame, start)
-        _keep(rods, motion, step, first, last, root, frame)
+        now, two_step = motion.q[first:last].copy(), step.two_step
+        solved = _solved(
+            rods, motion, loads, step, two_step, step.iterations, first, last, root, frame, now
+        )
+        if not solved:
+            # wild hair takes Euler's step, which only takes energy, from where it is
+            two_step = False
+            motion.q_before[first:last] = now
+            more = 2 * step.iterations
+            _solved(rods, motion, loads, step, two_step, more, first, last, root, frame, now)
+        motion.q_before[first:last] = now
+        _keep(rods, motion, step, two_step, first, last, root, frame)
+
+
+@compiled
+def _solved(
+    rods: Rods,
+    motion: Motion,
+    loads: Loads,
+    step: Step,
+    two_step: bool,
+    iterations: int,
+    first: int,
+    last: int,
+    root: Float64Array,
+    frame: Float64Array,
+    now: Float64Array,
+) -> bool:
+    """Extrapolate one strand's coordinates, iterate, and return whether they settled."""
+    start = np.empty((last - first, 3))
+    for k in range(last - first):
+        for j in range(3):
+            before = motion.q_before[first + k, j]
+            start[k, j] = (4 * now[k, j] - before) / 3 if two_step else now[k, j]
+            motion.q[first + k, j] = 2 * now[k, j] - before
+    turned = 0.0
+    for _ in range(iterations):
+        turned = newton(rods, motion, loads, step, two_step, first, last, root, frame, start)
+        if turned < CLOSE:
+            break
+    return turned < FAR
 
 
 @compiled
@@ -112,39 +81,52 @@ def newton(
     motion: Motion,
     loads: Loads,
     step: Step,
+    two_step: bool,
     first: int,
     last: int,
     root: Float64Array,
     frame: Float64Array,
     start: Float64Array,
-) -> None:
-    """Change `motion.q` of one strand by one Newton iteration of the implicit step."""
+) -> float:
+    """Change `motion.q` of one strand by one Newton iteration of the implicit step.
+
+    Return by how many radians it turned an element at most.
+    """
     count = last - first
-    h = step.seconds * 2 / 3 if step.two_step else step.seconds
+    h = step.seconds * 2 / 3 if two_step else step.seconds
     frames, ends = np.empty((count + 1, 3, 3)), np.empty((count + 1, 3))
     spin, shift = np.empty((count, 3, 3)), np.empty((count, 3, 3))
     form, gradient = np.zeros((count, 9, 9)), np.zeros((count, 9))
     frames[0], ends[0] = frame, root
     for k in range(count):
         e = first + k
-        _element(rods, motion, loads, step, h, e, frames[k], ends[k], form[k], gradient[k])
+        _element(
+            rods, motion, loads, step, two_step, h, e, frames[k], ends[k], form[k], gradient[k]
+        )
         _onward(motion.q[e], rods.lengths[e], frames, ends, spin, shift, k)
         for j in range(3):
             stiff = rods.lengths[e] * rods.stiffness[e, j]
             form[k, 6 + j, 6 + j] += h * (h + step.friction) * stiff
-            gradient[k, 6 + j] += h * stiff * (
-                h * (motion.q[e, j] - rods.natural[e, j])
-                + step.friction * (motion.q[e, j] - start[k, j])
+            gradient[k, 6 + j] += (
+                h
+                * stiff
+                * (
+                    h * (motion.q[e, j] - rods.natural[e, j])
+                    + step.friction * (motion.q[e, j] - start[k, j])
+                )
             )
-    _solve(form, gradient, ends, spin, shift)
+    eliminate(form, gradient, ends, spin, shift)
+    most = 0.0
     for k in range(count):
         # no element turns by more than a radian in one iteration
         size = rods.lengths[first + k] * math.sqrt(
             gradient[k, 6] ** 2 + gradient[k, 7] ** 2 + gradient[k, 8] ** 2
         )
+        most = max(most, size)
         damp = 1.0 if size < 1.0 else 1.0 / size
         for j in range(3):
             motion.q[first + k, j] -= damp * gradient[k, 6 + j]
+    return most
 
 
 @compiled
@@ -153,6 +135,7 @@ def _element(
     motion: Motion,
     loads: Loads,
     step: Step,
+    two_step: bool,
     h: float,
     e: int,
     frame: Float64Array,
@@ -172,7 +155,7 @@ def _element(
         for i in range(3):
             point[i] = end[i] + arm[i]
             old, rate = motion.points[e, g, i], motion.velocity[e, g, i]
-            if step.two_step:
+            if two_step:
                 old = (4 * old - motion.points_before[e, g, i]) / 3
                 rate = (4 * rate - motion.velocity_before[e, g, i]) / 3
             before[i] = old
@@ -194,7 +177,9 @@ def _element(
             by_twist[i, 3 + i] = 1.0
             for j in range(3):
                 by_twist[i, 6 + j] = (
-                    frame[i, 0] * slope[0, j] + frame[i, 1] * slope[1, j] + frame[i, 2] * slope[2, j]
+                    frame[i, 0] * slope[0, j]
+                    + frame[i, 1] * slope[1, j]
+                    + frame[i, 2] * slope[2, j]
                 )
         for j in range(9):
             x = y = z = 0.0
@@ -206,123 +191,6 @@ def _element(
                 form[i, j] += by_twist[0, i] * x + by_twist[1, i] * y + by_twist[2, i] * z
             for i in range(3):
                 gradient[j] += by_twist[i, j] * pull[i]
-
-
-@compiled
-def _solve(
-    form: Float64Array,
-    gradient: Float64Array,
-    ends: Float64Array,
-    spin: Float64Array,
-    shift: Float64Array,
-) -> None:
-    """Eliminate from the tip to the root, then go back; leaves -dq in `gradient[:, 6:]`."""
-    count = len(form)
-    tip, pull = np.zeros((6, 6)), np.zeros(6)
-    for k in range(count - 1, -1, -1):
-        a, b = form[k], gradient[k]
-        for i in range(9):
-            for j in range(i):
-                a[i, j] = a[j, i]
-        if k < count - 1:
-            _join(a, b, tip, pull, ends[k + 1] - ends[k], spin[k], shift[k])
-        _invert(a)
-        _eliminate(a, b, tip, pull)
-    twist, turned = np.zeros(6), np.zeros(6)
-    for k in range(count):
-        a, b = form[k], gradient[k]
-        for i in range(3):
-            for j in range(6):
-                b[6 + i] += a[6 + i, j] * twist[j]  # holds A_qq^-1 (A_qV V + gradient) = -dq
-        d = ends[k + 1] - ends[k]
-        turned[:] = twist
-        turned[3] += twist[1] * d[2] - twist[2] * d[1]
-        turned[4] += twist[2] * d[0] - twist[0] * d[2]
-        turned[5] += twist[0] * d[1] - twist[1] * d[0]
-        for i in range(3):
-            for j in range(3):
-                turned[i] -= spin[k, i, j] * b[6 + j]
-                turned[3 + i] -= shift[k, i, j] * b[6 + j]
-        twist[:] = turned
-
-
-@compiled
-def _join(
-    a: Float64Array,
-    b: Float64Array,
-    tip: Float64Array,
-    pull: Float64Array,
-    d: Float64Array,
-    spin: Float64Array,
-    shift: Float64Array,
-) -> None:
-    """Add what hangs on an element's end: its twist is the element's own, moved, and S dq."""
-    to = np.zeros((6, 9))
-    for i in range(6):
-        to[i, i] = 1.0
-    to[3, 1], to[3, 2], to[4, 0] = d[2], -d[1], -d[2]
-    to[4, 2], to[5, 0], to[5, 1] = d[0], d[1], -d[0]
-    for i in range(3):
-        for j in range(3):
-            to[i, 6 + j], to[3 + i, 6 + j] = spin[i, j], shift[i, j]
-    carried = np.zeros(6)
-    for j in range(9):
-        for i in range(6):
-            total = 0.0
-            for k in range(6):
-                total += tip[i, k] * to[k, j]
-            carried[i] = total
-        for i in range(9):
-            total = 0.0
-            for k in range(6):
-                total += to[k, i] * carried[k]
-            a[i, j] += total
-        for i in range(6):
-            b[j] += to[i, j] * pull[i]
-
-
-@compiled
-def _invert(a: Float64Array) -> None:
-    """Put the inverse of the symmetric block [6:, 6:] in its place."""
-    p, q, r = a[6, 6], a[6, 7], a[6, 8]
-    s, t, u = a[7, 7], a[7, 8], a[8, 8]
-    # Cholesky, since the forms of twist and bending differ by many orders of magnitude
-    l0 = math.sqrt(p)
-    l1, l2 = q / l0, r / l0
-    l3 = math.sqrt(s - l1 * l1)
-    l4 = (t - l1 * l2) / l3
-    l5 = math.sqrt(u - l2 * l2 - l4 * l4)
-    i0, i3, i5 = 1 / l0, 1 / l3, 1 / l5
-    i1 = -l1 * i0 * i3
-    i4 = -l4 * i3 * i5
-    i2 = -(l2 * i0 + l4 * i1) * i5
-    a[6, 6] = i0 * i0 + i1 * i1 + i2 * i2
-    a[7, 7] = i3 * i3 + i4 * i4
-    a[8, 8] = i5 * i5
-    a[6, 7] = a[7, 6] = i1 * i3 + i2 * i4
-    a[6, 8] = a[8, 6] = i2 * i5
-    a[7, 8] = a[8, 7] = i4 * i5
-
-
-@compiled
-def _eliminate(a: Float64Array, b: Float64Array, tip: Float64Array, pull: Float64Array) -> None:
-    """Take dq out: the joint's form in `tip`, A_qq^-1 A_qV in a[6:, :6], A_qq^-1 g in b[6:]."""
-    x, y, z = b[6], b[7], b[8]
-    for i in range(3):
-        b[6 + i] = a[6 + i, 6] * x + a[6 + i, 7] * y + a[6 + i, 8] * z
-    for j in range(6):
-        x, y, z = a[j, 6], a[j, 7], a[j, 8]
-        for i in range(3):
-            a[6 + i, j] = a[6 + i, 6] * x + a[6 + i, 7] * y + a[6 + i, 8] * z
-    for i in range(6):
-        pull[i] = b[i]
-        for k in range(3):
-            pull[i] -= a[i, 6 + k] * b[6 + k]
-        for j in range(6):
-            total = a[i, j]
-            for k in range(3):
-                total -= a[i, 6 + k] * a[6 + k, j]
-            tip[i, j] = total
 
 
 @compiled
@@ -352,13 +220,14 @@ def _keep(
     rods: Rods,
     motion: Motion,
     step: Step,
+    two_step: bool,
     first: int,
     last: int,
     root: Float64Array,
     frame: Float64Array,
 ) -> None:
     """Place the Gauss points at the new coordinates and put the old ones one step back."""
-    h = step.seconds * 2 / 3 if step.two_step else step.seconds
+    h = step.seconds * 2 / 3 if two_step else step.seconds
     local, slope, arm = np.empty(3), np.empty((3, 3)), np.empty(3)
     next_frame, next_root = np.empty((3, 3)), np.empty(3)
     for e in range(first, last):
@@ -367,7 +236,7 @@ def _keep(
             times(frame, local, arm)
             for i in range(3):
                 old = now = motion.points[e, g, i]
-                if step.two_step:
+                if two_step:
                     old = (4 * now - motion.points_before[e, g, i]) / 3
                 motion.points_before[e, g, i] = now
                 motion.points[e, g, i] = root[i] + arm[i]

@@ -14,8 +14,8 @@ from scipy.sparse.linalg import LinearOperator, cg
 from hairkit.stored import Float64Array
 
 from .kinematics import Placed, place
-from .recursion import Loads, Motion, Step
 from .rods import NODES, Rods
+from .state import CLOSE, FAR, Loads, Motion, Step
 from .touch import touch
 
 
@@ -86,16 +86,39 @@ def step_densely(rods: Rods, motion: Motion, loads: Loads, step: Step) -> None:
         acting = Loads(*(array[own] for array in loads))
         root = step.head[:3, :3] @ rod.roots[0] + step.head[:3, 3]
         frame = step.head[:3, :3] @ rod.frames[0]
-        q = 2 * before.q - before.q_before
-        for _ in range(step.iterations):
-            dq = change(*system(rod, before, acting, step, q, root, frame)).reshape(q.shape)
-            size = rod.lengths * np.linalg.norm(dq, axis=1)
-            q = q + dq / np.maximum(size, 1.0)[:, None]
-        h, _, back, _ = _history(before, step)
+        q, solved = _iterated(rod, before, acting, step, step.iterations, root, frame)
+        taken = step
+        if not solved:
+            taken = step._replace(two_step=False)
+            calm = before._replace(q_before=before.q)
+            q, _ = _iterated(rod, calm, acting, taken, 2 * step.iterations, root, frame)
+        h, _, back, _ = _history(before, taken)
         points = place(rod, q, root, frame).points
         new = (q, before.q, points, before.points, (points - back) / h, before.velocity)
         for array, values in zip(motion, new, strict=True):
             array[own] = values
+
+
+def _iterated(
+    rod: Rods,
+    before: Motion,
+    loads: Loads,
+    step: Step,
+    iterations: int,
+    root: Float64Array,
+    frame: Float64Array,
+) -> tuple[Float64Array, bool]:
+    """Return coordinates after Newton iterations from the extrapolated ones; whether settled."""
+    q = 2 * before.q - before.q_before
+    most = 0.0
+    for _ in range(iterations):
+        dq = change(*system(rod, before, loads, step, q, root, frame)).reshape(q.shape)
+        size = rod.lengths * np.linalg.norm(dq, axis=1)
+        q = q + dq / np.maximum(size, 1.0)[:, None]
+        most = float(size.max())
+        if most < CLOSE:
+            break
+    return q, most < FAR
 
 
 def _history(motion: Motion, step: Step) -> tuple[float, Float64Array, Float64Array, Float64Array]:
@@ -132,7 +155,7 @@ def _point_loads(
                 step,
                 float(mass[e, g, 0]),
                 h,
-                loads.gap[e, g],
+                float(loads.gap[e, g]),
                 points[e, g],
                 back[e, g],
                 weight[e, g],

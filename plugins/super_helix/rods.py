@@ -10,7 +10,10 @@ from hairkit.stored import Float64Array, Int64Array
 
 NODES = 3
 """Gauss points of an element, at which its mass sits."""
-SHARES, WEIGHTS = (0.5 * (v + shift) for v, shift in zip(np.polynomial.legendre.leggauss(NODES), (1, 0), strict=True))
+SHARES, WEIGHTS = (
+    0.5 * (v + shift)
+    for v, shift in zip(np.polynomial.legendre.leggauss(NODES), (1, 0), strict=True)
+)
 
 
 class Rods(NamedTuple):

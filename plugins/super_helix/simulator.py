@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,9 +18,10 @@ from hairkit.strands import Strands
 
 from .binding import draw, rods_of
 from .neighbours import Neighbours
-from .recursion import Loads, Motion, Step, place_points, step_strands
+from .recursion import place_points, step_strands
 from .reference import step_densely
 from .rods import NODES, Rods
+from .state import Loads, Motion, Step
 from .statics import at_rest
 from .threads import over_strands
 
@@ -42,9 +44,7 @@ MIDDLE = 0.6
 class SuperHelices:
     """Guides whose elements keep their length: two curvatures and a twist each."""
 
-    def __init__(
-        self, groom: Groom, options: Options, obstacles: Obstacles | None = None
-    ) -> None:
+    def __init__(self, groom: Groom, options: Options, obstacles: Obstacles | None = None) -> None:
         self._groom = groom
         self._shape, self._binding = rods_of(groom.strands, options.elements)
         self._rest_gravity = np.array([0.0, -groom.physics.gravity, 0.0])
@@ -60,6 +60,11 @@ class SuperHelices:
         return self._groom.strands
 
     @property
+    def options(self) -> Options:
+        """The options in force: those that were None come from the groom."""
+        return self._options
+
+    @property
     def time(self) -> float:
         """Seconds since the start or the last reset."""
         return self._time
@@ -71,7 +76,10 @@ class SuperHelices:
 
     def retune(self, options: Options) -> None:
         """Take other options from now on; positions and the number of elements stay."""
-        self._options = options
+        groom = self._groom
+        width = groom.material.width * 1e6 if options.diameter is None else options.diameter
+        grip = groom.physics.friction if options.friction is None else options.friction
+        options = self._options = replace(options, diameter=width, friction=grip)
         self._rods = at_rest(self._with_material(options), self._rest_gravity)
 
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
@@ -133,22 +141,20 @@ class SuperHelices:
             np.array(head, np.float64),
             np.array(self._head, np.float64),
             PUSH_RATE**2,
-            self._groom.physics.friction if options.friction is None else options.friction,
+            float(options.friction or 0.0),
             np.zeros(3) if grid is None else np.array(grid.grid.origin, np.float64),
             1.0 if grid is None else float(grid.grid.spacing),
             np.zeros((0, 0, 0), np.float32) if grid is None else np.array(grid.distance),
         )
-        loads = self._loads(around, head)
+        loads = self._loads(around)
         if options.solver == "recursion":
-            over_strands(
-                step_strands, self._rods.offsets, self._rods, self._motion, loads, step
-            )
+            over_strands(step_strands, self._rods.offsets, self._rods, self._motion, loads, step)
         else:
             step_densely(self._rods, self._motion, loads, step)
         self._head, self._before = step.head, seconds
         self._time += seconds
 
-    def _loads(self, around: Surroundings, head: Float64Array) -> Loads:
+    def _loads(self, around: Surroundings) -> Loads:
         motion, masses = self._motion, self._rods.masses
         shape = masses.shape
         flat = motion.points.reshape(-1, 3)
@@ -156,11 +162,10 @@ class SuperHelices:
         air, drag = air.reshape(motion.points.shape), self._options.air_drag * masses
         if self._options.hair_friction > 0 or self._options.hair_push > 0:
             drag, air = self._neighbours.act(
-                motion,
-                head,
+                motion.points,
+                motion.velocity,
                 drag,
                 air,
-                masses,
                 self._options.hair_friction,
                 self._options.hair_push,
             )
@@ -170,7 +175,9 @@ class SuperHelices:
             if drawn is None or not 0 <= grab.point < len(drawn):
                 raise InputError(f"grab of point {grab.point}, expected 0 to {len(flat) - 1}")
             element = self._binding.element[grab.point]
-            node = int(np.argmin(np.linalg.norm(motion.points[element] - drawn[grab.point], axis=1)))
+            node = int(
+                np.argmin(np.linalg.norm(motion.points[element] - drawn[grab.point], axis=1))
+            )
             strand = np.searchsorted(self._rods.offsets, element, side="right") - 1
             own = slice(self._rods.offsets[strand], self._rods.offsets[strand + 1])
             spring[element, node] = GRAB_RATE**2 * masses[own].sum()
@@ -180,7 +187,7 @@ class SuperHelices:
 
     def _with_material(self, options: Options) -> Rods:
         """Return the captured rods with the stiffness and mass of hair."""
-        width = self._groom.material.width if options.diameter is None else options.diameter * 1e-6
+        width = 1e-6 * float(options.diameter or 0.0)
         second = np.pi * (width / 2) ** 4 / 4
         bend = options.young * 1e9 * second * options.stiffness
         bend *= self._groom.physics.bend_stiffness / MIDDLE

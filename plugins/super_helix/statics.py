@@ -149,5 +149,3 @@ def _forces(
 def _in_frame(frame: Float64Array, vector: Float64Array, result: Float64Array) -> None:
     for j in range(3):
         result[j] = frame[0, j] * vector[0] + frame[1, j] * vector[1] + frame[2, j] * vector[2]
-
-

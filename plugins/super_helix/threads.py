@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numba
@@ -32,7 +33,7 @@ def over_strands(function: Callable[..., Any], offsets: Int64Array, *arguments: 
         return
     jobs = [
         _pool(threads).submit(function, *arguments, int(first), int(last))
-        for first, last in zip(bounds[:-1], bounds[1:], strict=True)
+        for first, last in pairwise(bounds)
     ]
     for job in jobs:
         job.result()

@@ -1,0 +1,76 @@
+"""What a step starts from and what acts during it: arrays that compiled code and its twin share."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.stored import Float64Array
+
+CLOSE = 0.01
+"""Radians by which an iteration turns no element more once a strand's step is solved."""
+FAR = 0.1
+"""Radians in the last iteration above which a step is given up for a shorter-sighted one."""
+
+
+class Motion(NamedTuple):
+    """The hair's state, changed in place."""
+
+    q: Float64Array
+    """(E, 3) coordinates now."""
+    q_before: Float64Array
+    """(E, 3) one step ago."""
+    points: Float64Array
+    """(E, NODES, 3) Gauss points now, world."""
+    points_before: Float64Array
+    """(E, NODES, 3) one step ago."""
+    velocity: Float64Array
+    """(E, NODES, 3) metres per second."""
+    velocity_before: Float64Array
+    """(E, NODES, 3) one step ago."""
+
+
+class Loads(NamedTuple):
+    """What acts on the Gauss points during a step."""
+
+    drag: Float64Array
+    """(E, NODES) kilograms per second."""
+    air: Float64Array
+    """(E, NODES, 3) velocity that the drag pulls to, metres per second."""
+    spring: Float64Array
+    """(E, NODES) newton per metre, 0 where nothing holds the point."""
+    anchor: Float64Array
+    """(E, NODES, 3) where springs pull to, world."""
+    gap: Float64Array
+    """(E, NODES) distance from obstacles below which a point is pushed out, metres."""
+
+
+class Step(NamedTuple):
+    """One step, the same for all strands."""
+
+    seconds: float
+    """Its length."""
+    two_step: bool
+    """True for the second-order formula, which looks back two steps (BDF2); else Euler's."""
+    friction: float
+    """Internal friction, seconds: force per stiffness and rate of change of shape."""
+    iterations: int
+    """Newton iterations at most; a strand needs one where it moves as extrapolated."""
+    gravity: Float64Array
+    """(3,) metres per second squared."""
+    head: Float64Array
+    """(4, 4) head_from_rest at the step's end."""
+    head_before: Float64Array
+    """(4, 4) at its start."""
+    contact: float
+    """Square of the rate at which obstacles push points out, per square second."""
+    coulomb: float
+    """Coefficient of friction on obstacles."""
+    origin: Float64Array
+    """(3,) of the obstacles' grid."""
+    spacing: float
+    """Of the obstacles' grid, metres."""
+    distance: npt.NDArray[np.float32]
+    """(X, Y, Z) of the obstacles, metres; empty for none."""
