@@ -30,7 +30,8 @@ class FastEngine:
         self._count = len(rods.points)
         self._unit = rods.mass.mean(axis=1)
         self._contact = contact
-        self._root = kernels.padded(rods.root_frame)
+        held = rotation.third_axis(rods.root_frame)
+        self._root = kernels.padded(np.concatenate([rods.root_frame, held], axis=1))
         self._packed: tuple[System, Float32Array, Float32Array, Float32Array] | None = None
         self._grid = _grid(contact)
         self.state = at_rest(rods)
@@ -38,14 +39,14 @@ class FastEngine:
     @property
     def state(self) -> State:
         """The present state as float64; setting it moves the rods."""
-        return State(
-            self._unpacked(self._x), self._unpacked(self._v), rotation.unit(self._unpacked(self._q))
-        )
+        nodes = self._unpacked(self._x)
+        return State(nodes[..., :3], nodes[..., 3:6], rotation.unit(self._unpacked(self._q)))
 
     @state.setter
     def state(self, value: State) -> None:
-        self._x = kernels.padded(value.position.astype(np.float32))
-        self._v = kernels.padded(value.velocity.astype(np.float32))
+        slack = np.zeros_like(value.position[..., :1])
+        nodes = np.concatenate([value.position, value.velocity, slack], axis=-1)
+        self._x = kernels.padded(nodes.astype(np.float32))
         self._q = kernels.padded(value.frames.astype(np.float32))
 
     def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
@@ -60,7 +61,7 @@ class FastEngine:
             np.float32,
         )
         kernels.run_substeps(
-            self._x, self._v, self._q, self._root, node, element, metric,
+            self._x, self._q, self._root, node, element, metric,
             _rides(loads), np.stack([load.turn for load in loads]).astype(np.float32),
             loads[0].gravity.astype(np.float32), self._air(loads[0].air),
             self._force(loads[0].force), self._grid, settings,
@@ -69,7 +70,7 @@ class FastEngine:
     def rub(self, crowd: Crowd, ride: Float64Array, rates: tuple[float, float, float]) -> None:
         """Let hair act on hair."""
         rub_nodes(
-            self._x, self._v, self._mass_of_nodes(), self._count, ride.astype(np.float32),
+            self._x, self._mass_of_nodes(), self._count, ride.astype(np.float32),
             crowd.origin.astype(np.float32), crowd.shape, crowd.usual.astype(np.float32),
             np.array(rates, np.float32),
         )  # fmt: skip
@@ -78,8 +79,8 @@ class FastEngine:
         """Return place and velocity (3,) of one node, head axes."""
         block, lane = divmod(rod, kernels.LANES)
         return (
-            self._x[block, node, :, lane].astype(np.float64),
-            self._v[block, node, :, lane].astype(np.float64),
+            self._x[block, node, :3, lane].astype(np.float64),
+            self._x[block, node, 3:6, lane].astype(np.float64),
         )
 
     def points(self, riders: Riders, head: Float64Array) -> Float32Array:
@@ -103,12 +104,12 @@ class FastEngine:
 
     def _air(self, air: Float64Array) -> Float32Array:
         if air.ndim == 1:
-            return air.astype(np.float32).reshape(1, 1, 3, 1)
+            return np.repeat(air.astype(np.float32)[None, None, :, None], kernels.LANES, axis=3)
         return kernels.padded(air.astype(np.float32))
 
     def _force(self, force: Float64Array | None) -> Float32Array:
         if force is None:
-            return np.zeros((1, 1, 3, 1), np.float32)
+            return np.zeros((1, 1, 3, kernels.LANES), np.float32)
         return kernels.padded((force / self._unit[:, None, None]).astype(np.float32))
 
 
@@ -163,8 +164,9 @@ def _rides(loads: Sequence[Load]) -> Float32Array:
 
 def _grid(contact: Contact | None) -> tuple[Float32Array, Float32Array]:
     if contact is None:
-        return np.zeros((2, 2, 2), np.float32), np.ones(4, np.float32)
+        return np.zeros((2, 2, 2), np.float32), np.ones(5, np.float32)
     grid = contact.obstacles.grid
     first = grid.origin + 0.5 * grid.spacing
-    place = np.array([*first, 1.0 / grid.spacing], np.float32)
+    # outside the grid nothing is nearer than its room; a node looks again after that way
+    place = np.array([*first, 1.0 / grid.spacing, 0.02], np.float32)
     return contact.obstacles.distance.copy(), place

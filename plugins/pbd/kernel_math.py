@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+LANES = 64
+"""Strands side by side."""
+
 ONE, TWO, TINY = np.float32(1), np.float32(2), np.float32(1e-4)
 _C1, _C3, _C5 = np.float32(0.9998660), np.float32(-0.3302995), np.float32(0.1801410)
 _C7, _C9 = np.float32(-0.0851330), np.float32(0.0208351)
@@ -52,7 +55,8 @@ def swing_frame(q0, q1, q2, q3, d0, d1, d2):  # type: ignore[no-untyped-def] # p
     t0 = TWO * (q1 * q3 + q0 * q2)
     t1 = TWO * (q2 * q3 - q0 * q1)
     t2 = ONE - TWO * (q1 * q1 + q2 * q2)
-    r0 = max(ONE + t0 * d0 + t1 * d1 + t2 * d2, TINY)
+    r0 = ONE + t0 * d0 + t1 * d1 + t2 * d2
+    r0 = r0 if r0 > TINY else TINY
     r1 = t1 * d2 - t2 * d1
     r2 = t2 * d0 - t0 * d2
     r3 = t0 * d1 - t1 * d0
@@ -91,11 +95,12 @@ def twist_angle(a, b):  # type: ignore[no-untyped-def] # pragma: no cover - comp
     sign = ONE if w >= np.float32(0) else -ONE
     w, z = sign * w, sign * z
     size = abs(z)
-    low, high = min(size, w), max(size, w)
-    t = low / max(high, np.float32(1e-20))
+    steep = size > w
+    low, high = (w, size) if steep else (size, w)
+    t = low / high  # one of both is at least the root of a half, or the frames are opposite
     s = t * t
     angle = t * (_C1 + s * (_C3 + s * (_C5 + s * (_C7 + s * _C9))))
     small = t * (ONE - s * (np.float32(1 / 3) - s * (np.float32(0.2) - s * np.float32(1 / 7))))
     angle = small if s < np.float32(0.04) else angle
-    angle = _HALF_PI - angle if size > w else angle
+    angle = _HALF_PI - angle if steep else angle
     return TWO * angle if z >= np.float32(0) else -TWO * angle

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from .kernel_math import carry, rotate
+from .kernel_math import LANES, carry, rotate
 
-LANES = 32
 ONE, TWO, HALF, ZERO = np.float32(1), np.float32(2), np.float32(0.5), np.float32(0)
 THREE, FOUR, CELL = np.float32(3), np.float32(4), np.float32(1 / 0.015)
 
@@ -68,7 +67,7 @@ def _corner(p, origin, shape):  # type: ignore[no-untyped-def] # pragma: no cove
 
 @njit(fastmath=True, error_model="numpy", cache=True)
 def rub_nodes(  # type: ignore[no-untyped-def]
-    x, v, mass, count, ride, origin, shape, usual, rates
+    x, mass, count, ride, origin, shape, usual, rates
 ) -> None:  # pragma: no cover - compiled
     """Draw velocities to those of the neighbours, and push out of crowded places, in place."""
     cohesion, pressure, seconds = rates[0], rates[1], rates[2]
@@ -81,9 +80,9 @@ def rub_nodes(  # type: ignore[no-untyped-def]
             p0, p1, p2 = x[block, j, 0, lane], x[block, j, 1, lane], x[block, j, 2, lane]
             r0, r1, r2 = carry(ride, p0, p1, p2)
             m = mass[block, j, lane]
-            u0 = m * (v[block, j, 0, lane] - (p0 - r0) * over)
-            u1 = m * (v[block, j, 1, lane] - (p1 - r1) * over)
-            u2 = m * (v[block, j, 2, lane] - (p2 - r2) * over)
+            u0 = m * (x[block, j, 3, lane] - (p0 - r0) * over)
+            u1 = m * (x[block, j, 4, lane] - (p1 - r1) * over)
+            u2 = m * (x[block, j, 5, lane] - (p2 - r2) * over)
             a, fa = _corner(p0, origin[0], s0)
             b, fb = _corner(p1, origin[1], s1)
             c, fc = _corner(p2, origin[2], s2)
@@ -105,14 +104,15 @@ def rub_nodes(  # type: ignore[no-untyped-def]
                 cell[1] *= scale
                 cell[2] *= scale
                 cell[3] *= scale
+    slopes = _slopes(crowded)
     for s in range(count):
         block, lane = s // LANES, s % LANES
         for j in range(1, n):
             p0, p1, p2 = x[block, j, 0, lane], x[block, j, 1, lane], x[block, j, 2, lane]
             r0, r1, r2 = carry(ride, p0, p1, p2)
             h0, h1, h2 = (p0 - r0) * over, (p1 - r1) * over, (p2 - r2) * over
-            u0, u1 = v[block, j, 0, lane] - h0, v[block, j, 1, lane] - h1
-            u2 = v[block, j, 2, lane] - h2
+            u0, u1 = x[block, j, 3, lane] - h0, x[block, j, 4, lane] - h1
+            u2 = x[block, j, 5, lane] - h2
             a, fa = _corner(p0, origin[0], s0)
             b, fb = _corner(p1, origin[1], s1)
             c, fc = _corner(p2, origin[2], s2)
@@ -125,21 +125,28 @@ def rub_nodes(  # type: ignore[no-untyped-def]
                 m0 += weight * cell[1]
                 m1 += weight * cell[2]
                 m2 += weight * cell[3]
-                if pressure > ZERO:
-                    g0 += weight * _slope(crowded, i0, i1, i2, 0)
-                    g1 += weight * _slope(crowded, i0, i1, i2, 1)
-                    g2 += weight * _slope(crowded, i0, i1, i2, 2)
+                slope = slopes[i0, i1, i2]
+                g0 += weight * slope[0]
+                g1 += weight * slope[1]
+                g2 += weight * slope[2]
             push = pressure * seconds
-            v[block, j, 0, lane] = h0 + u0 + taken * (m0 - u0) - push * g0
-            v[block, j, 1, lane] = h1 + u1 + taken * (m1 - u1) - push * g1
-            v[block, j, 2, lane] = h2 + u2 + taken * (m2 - u2) - push * g2
+            x[block, j, 3, lane] = h0 + u0 + taken * (m0 - u0) - push * g0
+            x[block, j, 4, lane] = h1 + u1 + taken * (m1 - u1) - push * g1
+            x[block, j, 5, lane] = h2 + u2 + taken * (m2 - u2) - push * g2
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
-def _slope(values, a, b, c, axis):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Central difference along an axis, one-sided at the ends, in units of a cell."""
-    low, high = [a, b, c], [a, b, c]
-    low[axis] = max(low[axis] - 1, 0)
-    high[axis] = min(high[axis] + 1, values.shape[axis] - 1)
-    rise = values[high[0], high[1], high[2]] - values[low[0], low[1], low[2]]
-    return rise / np.float32(high[axis] - low[axis])
+def _slopes(values):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return (X, Y, Z, 3) differences in units of a cell, central, one-sided at the ends."""
+    s0, s1, s2 = values.shape
+    out = np.zeros((s0, s1, s2, 3), np.float32)
+    for a in range(s0):
+        a0, a1 = max(a - 1, 0), min(a + 1, s0 - 1)
+        for b in range(s1):
+            b0, b1 = max(b - 1, 0), min(b + 1, s1 - 1)
+            for c in range(s2):
+                c0, c1 = max(c - 1, 0), min(c + 1, s2 - 1)
+                out[a, b, c, 0] = (values[a1, b, c] - values[a0, b, c]) / np.float32(a1 - a0)
+                out[a, b, c, 1] = (values[a, b1, c] - values[a, b0, c]) / np.float32(b1 - b0)
+                out[a, b, c, 2] = (values[a, b, c1] - values[a, b, c0]) / np.float32(c1 - c0)
+    return out

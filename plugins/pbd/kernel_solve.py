@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-LANES = 32
+from .kernel_math import LANES
+
 LENGTH, FIRST, SECOND, PIVOT = 0, 8, 9, 10
 ONE, ZERO = np.float32(1), np.float32(0)
 
@@ -38,33 +39,30 @@ def banded_solve(element, force, result) -> None:  # type: ignore[no-untyped-def
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
-def excess_of(edge, change, direction, element, excess) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def excess_of(segment, change, element, excess) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write by how much segments are too long along their directions."""
     for j in range(element.shape[0]):
-        ej, dj, a, b, el, out = (
-            edge[j], direction[j], change[j], change[j + 1], element[j], excess[j],
-        )  # fmt: skip
+        s, a, b, el, out = segment[j], change[j], change[j + 1], element[j], excess[j]
         for w in range(LANES):
             out[w] = (
-                (ej[0, w] + b[0, w] - a[0, w]) * dj[0, w]
-                + (ej[1, w] + b[1, w] - a[1, w]) * dj[1, w]
-                + (ej[2, w] + b[2, w] - a[2, w]) * dj[2, w]
+                (s[0, w] + b[0, w] - a[0, w]) * s[3, w]
+                + (s[1, w] + b[1, w] - a[1, w]) * s[4, w]
+                + (s[2, w] + b[2, w] - a[2, w]) * s[5, w]
                 - el[LENGTH, w]
             )
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
-def factorise_lengths(metric, direction, factor, pivot) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def factorise_lengths(metric, segment, factor, pivot, scaled) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write the factor L D L^T of metric * (d d^T), lower rows packed; `pivot` is 1/D."""
-    m = int((np.sqrt(8.0 * metric.shape[0] + 1.0) - 1.0) / 2.0 + 0.5)
-    scaled = np.empty((m, LANES), np.float32)
+    m = segment.shape[0] - 1
     for i in range(m):
-        base, di = i * (i + 1) // 2, direction[i]
+        base, di = i * (i + 1) // 2, segment[i]
         for j in range(i + 1):
-            row, mj, dj = factor[base + j], metric[base + j], direction[j]
+            row, mj, dj = factor[base + j], metric[base + j], segment[j]
             for w in range(LANES):
-                row[w] = mj[w] * (di[0, w] * dj[0, w] + di[1, w] * dj[1, w] + di[2, w] * dj[2, w])
-        # scaled[j] = L_ij D_j, found from left to right
+                row[w] = mj[w] * (di[3, w] * dj[3, w] + di[4, w] * dj[4, w] + di[5, w] * dj[5, w])
+        # scaled[j] (work) = L_ij D_j, found from left to right
         for j in range(i):
             other, here = j * (j + 1) // 2, factor[base + j]
             k = 0
@@ -91,49 +89,61 @@ def factorise_lengths(metric, direction, factor, pivot) -> None:  # type: ignore
                 last[w] -= s0[w] * here[w]
         out, floor = pivot[i], metric[base + i]
         for w in range(LANES):
-            out[w] = ONE / max(last[w], np.float32(1e-6) * floor[w])
+            least = np.float32(1e-6) * floor[w]
+            out[w] = ONE / (last[w] if last[w] > least else least)
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
-def lengths_solve(factor, pivot, value) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Solve with the factor of `factorise_lengths`, in place."""
-    m = int((np.sqrt(8.0 * factor.shape[0] + 1.0) - 1.0) / 2.0 + 0.5)
-    for i in range(m):
+def lengths_solve(factor, pivot, value, m) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Solve with the factor of `factorise_lengths`, in place; columns go in pairs."""
+    for i in range(1, m):
         base, here = i * (i + 1) // 2, value[i]
-        for j in range(i):
-            row, other = factor[base + j], value[j]
+        j = 0
+        while j + 1 < i:
+            a, b, x, y = factor[base + j], factor[base + j + 1], value[j], value[j + 1]
             for w in range(LANES):
-                here[w] -= row[w] * other[w]
+                here[w] -= a[w] * x[w] + b[w] * y[w]
+            j += 2
+        if j < i:
+            a, x = factor[base + j], value[j]
+            for w in range(LANES):
+                here[w] -= a[w] * x[w]
     for i in range(m - 1, -1, -1):
         here, p = value[i], pivot[i]
         for w in range(LANES):
             here[w] *= p[w]
-        for k in range(i + 1, m):
-            row, other = factor[k * (k + 1) // 2 + i], value[k]
+        k = i + 1
+        while k + 1 < m:
+            a, b = factor[k * (k + 1) // 2 + i], factor[(k + 1) * (k + 2) // 2 + i]
+            x, y = value[k], value[k + 1]
             for w in range(LANES):
-                here[w] -= row[w] * other[w]
+                here[w] -= a[w] * x[w] + b[w] * y[w]
+            k += 2
+        if k < m:
+            a, x = factor[k * (k + 1) // 2 + i], value[k]
+            for w in range(LANES):
+                here[w] -= a[w] * x[w]
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
-def pull_back(tension, direction, force) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def pull_back(tension, segment, force) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write the force on the nodes of tensions along the segments."""
     n = force.shape[0]
     for j in range(1, n):
-        fj, dj, tj = force[j], direction[j - 1], tension[j - 1]
+        fj, dj, tj = force[j], segment[j - 1], tension[j - 1]
         for c in range(3):
             for w in range(LANES):
-                fj[c, w] = tj[w] * dj[c, w]
+                fj[c, w] = tj[w] * dj[3 + c, w]
         if j < n - 1:
-            dk, tk = direction[j], tension[j]
+            dk, tk = segment[j], tension[j]
             for c in range(3):
                 for w in range(LANES):
-                    fj[c, w] -= tk[w] * dk[c, w]
+                    fj[c, w] -= tk[w] * dk[3 + c, w]
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
-def tridiagonal_solve(diagonal, beside, value) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def tridiagonal_solve(diagonal, beside, value, m) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Solve a symmetric tridiagonal system in place; `beside[j]` stands between j - 1 and j."""
-    m = diagonal.shape[0]
     for j in range(1, m):
         a, b, s, x, y = diagonal[j - 1], diagonal[j], beside[j], value[j - 1], value[j]
         for w in range(LANES):

@@ -5,50 +5,76 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .kernel_math import carry
+from .kernel_math import LANES, carry
 from .kernel_solve import tridiagonal_solve
 
-LANES = 32
 LENGTH, CLEAR, EASE = 0, 6, 7
 ONE, ZERO, HALF, SOFTEST = np.float32(1), np.float32(0), np.float32(0.5), np.float32(1e-3)
-FAR = np.float32(1.0)
+FAR, FURTHER = np.float32(1.0), np.float32(1.05)
+SLACK = 6
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
-def touch(x, v, node, ride, grid, settings, normals) -> bool:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Bring nodes out of the obstacles; write normals where they touch, tell whether any does."""
-    h, friction, fastest = settings[0], settings[2], settings[3]
-    over = ONE / h
-    normals[:] = ZERO
+def touch(x, node, ride, grid, settings, normals) -> bool:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Bring nodes out of the obstacles; write normals where they touch, tell whether any does.
+
+    A node is looked up again only when it may have gone as far as it was away the last time.
+    """
+    h = settings[0]
     any_touches = False
     for j in range(1, x.shape[0]):
-        xj, vj = x[j], v[j]
+        xj, nj = x[j], normals[j]
+        _worn_row(xj, ride[0], ride[1], ride[2], h)
+        nj[:] = ZERO
         for w in range(LANES):
-            clear = node[j, CLEAR, w]
-            p0, p1, p2 = xj[0, w], xj[1, w], xj[2, w]
-            distance, n0, n1, n2 = _distance(grid, p0, p1, p2, clear)
-            depth = clear - distance
-            if not depth > ZERO:
+            if xj[SLACK, w] > ZERO:
                 continue
-            any_touches = True
-            normals[j, 0, w], normals[j, 1, w], normals[j, 2, w] = n0, n1, n2
-            r0, r1, r2 = carry(ride, p0, p1, p2)
-            u0 = vj[0, w] - (p0 - r0) * over
-            u1 = vj[1, w] - (p1 - r1) * over
-            u2 = vj[2, w] - (p2 - r2) * over
-            across = u0 * n0 + u1 * n1 + u2 * n2
-            inward = max(-across, ZERO)
-            out = min(depth, (inward + fastest) * h)
-            a0, a1, a2 = u0 - across * n0, u1 - across * n1, u2 - across * n2
-            speed = np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
-            slowed = min(friction * inward, speed) / max(speed, np.float32(1e-12))
-            vj[0, w] += inward * n0 - slowed * a0
-            vj[1, w] += inward * n1 - slowed * a1
-            vj[2, w] += inward * n2 - slowed * a2
-            xj[0, w] = p0 + out * n0 - h * slowed * a0
-            xj[1, w] = p1 + out * n1 - h * slowed * a1
-            xj[2, w] = p2 + out * n2 - h * slowed * a2
+            clear = node[j, CLEAR, w]
+            distance, n0, n1, n2 = _distance(grid, xj[0, w], xj[1, w], xj[2, w], clear)
+            xj[SLACK, w] = distance - clear
+            if distance < clear:
+                any_touches = True
+                nj[0, w], nj[1, w], nj[2, w] = n0, n1, n2
+                _out(xj, w, ride, clear - distance, n0, n1, n2, settings)
     return any_touches
+
+
+@njit(fastmath=True, error_model="numpy", cache=True)
+def _worn_row(x, r0, r1, r2, h) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Take the way that nodes have gone over the head off their slack."""
+    a, b, c, s = r0[0], r0[1], r0[2], r0[3]
+    d, e, f, t = r1[0], r1[1], r1[2], r1[3]
+    g, i, k, u = r2[0], r2[1], r2[2], r2[3]
+    for w in range(LANES):
+        p0, p1, p2 = x[0, w], x[1, w], x[2, w]
+        w0 = h * x[3, w] - (p0 - (a * p0 + b * p1 + c * p2 + s))
+        w1 = h * x[4, w] - (p1 - (d * p0 + e * p1 + f * p2 + t))
+        w2 = h * x[5, w] - (p2 - (g * p0 + i * p1 + k * p2 + u))
+        x[SLACK, w] -= FURTHER * np.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
+
+
+@njit(fastmath=True, error_model="numpy", cache=True)
+def _out(xj, w, ride, depth, n0, n1, n2, settings) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Move one node out, with friction."""
+    h, friction, fastest = settings[0], settings[2], settings[3]
+    over = ONE / h
+    p0, p1, p2 = xj[0, w], xj[1, w], xj[2, w]
+    r0, r1, r2 = carry(ride, p0, p1, p2)
+    u0 = xj[3, w] - (p0 - r0) * over
+    u1 = xj[4, w] - (p1 - r1) * over
+    u2 = xj[5, w] - (p2 - r2) * over
+    across = u0 * n0 + u1 * n1 + u2 * n2
+    inward = max(-across, ZERO)
+    out = min(depth, (inward + fastest) * h)
+    a0, a1, a2 = u0 - across * n0, u1 - across * n1, u2 - across * n2
+    speed = np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
+    slowed = min(friction * inward, speed) / max(speed, np.float32(1e-12))
+    xj[3, w] += inward * n0 - slowed * a0
+    xj[4, w] += inward * n1 - slowed * a1
+    xj[5, w] += inward * n2 - slowed * a2
+    xj[0, w] = p0 + out * n0 - h * slowed * a0
+    xj[1, w] = p1 + out * n1 - h * slowed * a1
+    xj[2, w] = p2 + out * n2 - h * slowed * a2
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
@@ -65,11 +91,12 @@ def _distance(grid, p0, p1, p2, clear):  # type: ignore[no-untyped-def] # pragma
         and v <= np.float32(s1 - 1)
         and w <= np.float32(s2 - 1)
     ):
-        return FAR, ZERO, ZERO, ZERO
+        return clear + place[4], ZERO, ZERO, ZERO
     i, j, k = min(int(u), s0 - 2), min(int(v), s1 - 2), min(int(w), s2 - 2)
     # within a cell the distance changes by at most its diagonal
-    if values[i, j, k] > clear + np.float32(1.8) / place[3]:
-        return FAR, ZERO, ZERO, ZERO
+    least = values[i, j, k] - np.float32(1.8) / place[3]
+    if least > clear:
+        return least, ZERO, ZERO, ZERO
     a, b, c = u - np.float32(i), v - np.float32(j), w - np.float32(k)
     d, e, f = ONE - a, ONE - b, ONE - c
     v000, v001 = values[i, j, k], values[i, j, k + 1]
@@ -86,12 +113,11 @@ def _distance(grid, p0, p1, p2, clear):  # type: ignore[no-untyped-def] # pragma
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
-def relengthen(x, v, node, element, scratch, lines, over) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def relengthen(x, node, element, vector, line, over) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Restore the lengths; a touching node moves only along the obstacle."""
     n = x.shape[0]
-    start, end, normals = scratch[0:n], scratch[n : 2 * n], scratch[6 * n : 7 * n]
-    way = scratch[2 * n : 3 * n]
-    diagonal, beside, pull = lines[0 : n - 1], lines[n : 2 * n - 1], lines[2 * n : 3 * n - 1]
+    start, end, way, normals = vector[0], vector[1], vector[2], vector[3]
+    diagonal, beside, pull = line[0], line[1], line[2]
     for j in range(n - 1):
         xa, xb, na, nb = x[j], x[j + 1], normals[j], normals[j + 1]
         ea, eb, el = node[j, EASE], node[j + 1, EASE], element[j]
@@ -121,14 +147,13 @@ def relengthen(x, v, node, element, scratch, lines, over) -> None:  # type: igno
         tj, dj, bs = end[j - 1], way[j], beside[j]
         for w in range(LANES):
             bs[w] = -(tj[0, w] * dj[0, w] + tj[1, w] * dj[1, w] + tj[2, w] * dj[2, w])
-    tridiagonal_solve(diagonal, beside, pull)
+    tridiagonal_solve(diagonal, beside, pull, n - 1)
     for j in range(n - 1):
-        xa, xb, va, vb = x[j], x[j + 1], v[j], v[j + 1]
-        sj, tj, pj = start[j], end[j], pull[j]
+        xa, xb, sj, tj, pj = x[j], x[j + 1], start[j], end[j], pull[j]
         for c in range(3):
             for w in range(LANES):
-                a, b = pj[w] * sj[c, w], pj[w] * tj[c, w]
-                xa[c, w] += a
-                va[c, w] += a * over
-                xb[c, w] -= b
-                vb[c, w] -= b * over
+                xa[c, w] += pj[w] * sj[c, w]
+                xa[3 + c, w] += pj[w] * sj[c, w] * over
+            for w in range(LANES):
+                xb[c, w] -= pj[w] * tj[c, w]
+                xb[3 + c, w] -= pj[w] * tj[c, w] * over
