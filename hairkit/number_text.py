@@ -13,6 +13,8 @@ from hairkit.errors import FormatError
 from hairkit.stored import Float64Array
 
 _ROWS_AT_ONCE = 65_536
+_LARGEST = float(np.finfo(np.float32).max) * (1 + 1e-8)
+"""Nine digits of the largest float32 lie just above it, and are rounded to it."""
 
 
 def read_numbers(text: str, source: str | os.PathLike[str], name: str) -> Float64Array:
@@ -32,8 +34,8 @@ def read_numbers(text: str, source: str | os.PathLike[str], name: str) -> Float6
             numbers = np.fromstring(text, np.float64, sep=" ")
         except (DeprecationWarning, ValueError) as error:
             raise FormatError(f"{source}: {name} hold something that is no number") from error
-    if not np.isfinite(numbers).all():
-        raise FormatError(f"{source}: {name} hold numbers that are not finite")
+    if not (np.abs(numbers) <= _LARGEST).all():
+        raise FormatError(f"{source}: {name} hold numbers that are not finite in 32 bits")
     return numbers
 
 

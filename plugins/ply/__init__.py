@@ -102,7 +102,8 @@ def import_groom(path: Path, options: Options) -> Groom:
     vertex = elements.get("vertex")
     if vertex is None or not {"x", "y", "z"} <= set(vertex):
         raise FormatError(f"{path}: has no element vertex with x, y and z")
-    points = np.stack([vertex[name] for name in "xyz"], axis=1).astype(np.float32)
+    with np.errstate(over="ignore"):  # what is not finite is refused below
+        points = np.stack([vertex[name] for name in "xyz"], axis=1).astype(np.float32)
     finite(points, path, "vertices")
     order, counts = _strand_order(elements, len(points), path)
     strands, kept = packed(options.space.points_to_head(points[order]), counts, path)
@@ -151,7 +152,8 @@ def _with_strand_values(
     """Return the strands with the root uv, groups and guide flags that the file has."""
     uv, group, guide = None, None, None
     if {"u", "v"} <= set(values):
-        uv = np.stack([values["u"], values["v"]], axis=1).astype(np.float32)[kept]
+        with np.errstate(over="ignore"):
+            uv = np.stack([values["u"], values["v"]], axis=1).astype(np.float32)[kept]
         finite(uv, path, "root uv")
     if "group" in values:
         group = finite(values["group"], path, "groups")[kept].astype(np.int32)

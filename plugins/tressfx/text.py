@@ -59,7 +59,8 @@ def read_text(data: bytes, source: str | os.PathLike[str]) -> tuple[TfxHair, Int
             f"{source}: holds {len(points)} coordinates, expected {3 * counts.sum()}, three for"
             " each point that its strands claim"
         )
-    placed = _placed(points.reshape(-1, 3), settings, source).astype(np.float32)
+    with np.errstate(over="ignore"):  # what is not finite is refused with the points
+        placed = _placed(points.reshape(-1, 3), settings, source).astype(np.float32)
     return TfxHair(placed, uv.astype(np.float32), None, None), counts
 
 
