@@ -26,7 +26,7 @@ import numpy as np
 
 from hairkit.errors import InputError
 from hairkit.options import make_options, option, unknown_name
-from hairkit.stored import Float64Array
+from hairkit.stored import Float64Array, write_text
 
 _TABLES = ("head", "views")
 
@@ -107,6 +107,42 @@ def read_capture_file(path: Path) -> CaptureFile:
         _head_pose(document["head"], f"{path}: [head]") if "head" in document else None,
         _views(document.get("views", []), path),
     )
+
+
+def write_head_entry(path: Path, entry: HeadEntry) -> None:
+    """Put the head's pose into a `capture.toml`, made where there is none; all else in it stays."""
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    kept, inside = [], False
+    for line in text.splitlines():
+        if line.strip().startswith("["):
+            inside = line.split("#")[0].strip() == "[head]"
+        if not inside:
+            kept.append(line)
+    x, y, z = entry.rotation_deg
+    right, up, front = entry.translation_m
+    table = [
+        "[head]",
+        f"scale = {entry.scale!r}",
+        f"rotation_deg = [{x!r}, {y!r}, {z!r}]",
+        f"translation_m = [{right!r}, {up!r}, {front!r}]",
+    ]
+    while kept and not kept[-1].strip():
+        kept.pop()
+    write_text(path, "\n".join([*kept, *([""] if kept else []), *table]) + "\n")
+
+
+def head_entry(pose: Float64Array) -> HeadEntry:
+    """Return the `[head]` table of a similarity (4, 4), to a tenth of a micrometre."""
+    scale = float(np.cbrt(np.linalg.det(pose[:3, :3])))
+    turn = pose[:3, :3] / scale
+    angles = (
+        math.atan2(turn[2, 1], turn[2, 2]),
+        -math.asin(min(max(float(turn[2, 0]), -1.0), 1.0)),
+        math.atan2(turn[1, 0], turn[0, 0]),
+    )
+    x, y, z = (round(math.degrees(angle), 6) for angle in angles)
+    right, up, front = (round(float(value), 7) for value in pose[:3, 3])
+    return HeadEntry(round(scale, 7), (x, y, z), (right, up, front))
 
 
 def _views(tables: Any, path: Path) -> tuple[ViewEntry, ...]:

@@ -30,6 +30,8 @@ from hairkit.waves import measure_waves
 from hairkit.workfolder import WorkFolder
 
 MAX_GUIDES = 100_000
+PHOTOS = "photos in "
+"""Begins the line of `hairkit.log` that names their folder."""
 SHEET = "contact_sheet.png"
 """Name of the picture that shows what every stage has found."""
 
@@ -102,6 +104,9 @@ def reconstruct(
         if sheet:
             _draw_sheet(folder / SHEET, capture, made, log)
         manager.notify("groom_ready", groom=made.groom)
+        photo = capture.views[0].photo_path
+        if photo is not None:
+            log.noted(f"{PHOTOS}{photo.resolve().parent}")
         log.write(folder / "hairkit.log", recipe, manager)
     return made.groom
 

@@ -51,6 +51,11 @@ class RunLog:
             self._lines.append(text)
             self._progress.message(text)
 
+    def noted(self, text: str) -> None:
+        """Record one line without telling it."""
+        with self._guard:
+            self._lines.append(text)
+
     def write(self, path: str | os.PathLike[str], recipe: Recipe, manager: Manager) -> None:
         """Write the record."""
         total = time.perf_counter() - self._began

@@ -1,7 +1,7 @@
 """Everything a user can do, in one table: keys, mouse, panel and scripts all go through it.
 
 >>> sorted(ACTIONS)[:3]
-['colours', 'drag', 'exposure']
+['adjust', 'colours', 'drag']
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from hairkit.errors import InputError
 from hairkit.options import unknown_name
+from hairkit.viewer import pose_actions  # adds its own to the table
 from hairkit.viewer.action_table import ACTIONS, action, bindings, perform
 from hairkit.viewer.colouring import COLOURINGS
 from hairkit.viewer.hair_body import MAX_HAIRS
@@ -22,7 +23,7 @@ from hairkit.viewer.presets import presets_path, read_preset, write_preset
 from hairkit.viewer.recording import Recorder
 from hairkit.viewer.session import Session
 
-__all__ = ["ACTIONS", "LOOKS", "bindings", "perform"]
+__all__ = ["ACTIONS", "LOOKS", "bindings", "perform", "pose_actions"]
 
 LOOKS = {"front": (0.0, 0.0), "side": (90.0, 0.0), "back": (180.0, 0.0), "top": (0.0, 89.0)}
 """Named views: azimuth and elevation, degrees."""
@@ -85,7 +86,7 @@ def frame(session: Session) -> None:
 @action(N={"step": 1}, B={"step": -1})
 def through(session: Session, name: str = "", step: int = 0) -> None:
     """Look through the camera of a photo: the next one, or by name; without either, leave it."""
-    names = list(session.layers.cameras)
+    names = list(session.photo_cameras)
     if not names:
         raise InputError("there are no photos' cameras here; open the folder of a reconstruction")
     if name and name not in names:

@@ -17,6 +17,7 @@ from hairkit.capture_reader import read_capture
 from hairkit.errors import HairkitError, InputError
 from hairkit.mask import HAIR, PERSON, Mask
 from hairkit.orientation import OrientationMap
+from hairkit.pipeline import PHOTOS
 from hairkit.render.head import Solid
 from hairkit.scene import Scene
 from hairkit.stored import Float32Array, Float64Array, Stored, UInt8Array, from_arrays, read_npz
@@ -39,12 +40,13 @@ class Layers:
 
     def __init__(self, results: Path | None, capture: Path | None = None) -> None:
         self._work = None if results is None else results / "work"
-        self._capture = capture
+        self.capture = _noted_capture(results) if capture is None else capture
+        """Folder of the photos, None where it is not known."""
 
     @property
     def available(self) -> tuple[str, ...]:
         """Names of the layers that can be shown."""
-        have = {"head": True, "photos": self._capture is not None and bool(self.cameras)}
+        have = {"head": True, "photos": self.capture is not None and bool(self.cameras)}
         files = {"masks": "segment-*", "orientation": "orient-*", "cameras": "scene"}
         files |= {"hull": "hull", "field": "field"}
         for name, pattern in files.items():
@@ -69,14 +71,15 @@ class Layers:
         scene = self._read(Scene, "head") or self._read(Scene, "scene")
         return {} if scene is None else dict(zip(scene.names, scene.cameras, strict=True))
 
-    def boards(self, layer: str) -> dict[str, Board]:
-        """Return the pictures of a layer, by view name, in front of their cameras."""
+    def boards(self, layer: str, cameras: dict[str, Camera] | None = None) -> dict[str, Board]:
+        """Return the pictures of a layer, by view name, in front of their `cameras` (as found)."""
+        cameras = self.cameras if cameras is None else cameras
         pictures = {"photos": self._photos, "masks": self._masks, "orientation": self._angles}
         found = pictures[layer]()
         return {
-            name: Board(_picture_corners(self.cameras[name]), image)
+            name: Board(_picture_corners(cameras[name]), image)
             for name, image in found.items()
-            if name in self.cameras
+            if name in cameras
         }
 
     def frusta(self) -> LineSet:
@@ -124,9 +127,9 @@ class Layers:
         return values.reshape(rows.shape[:2])
 
     def _photos(self) -> dict[str, UInt8Array]:
-        if self._capture is None:
+        if self.capture is None:
             return {}
-        return {view.name: _opaque(view.image) for view in read_capture(self._capture, 640).views}
+        return {view.name: _opaque(view.image) for view in read_capture(self.capture, 640).views}
 
     def _masks(self) -> dict[str, UInt8Array]:
         pictures = {}
@@ -154,6 +157,18 @@ class Layers:
             return from_arrays(kind, arrays, str(path))
         except HairkitError:
             return None
+
+
+def _noted_capture(results: Path | None) -> Path | None:
+    """Return the folder of the photos that the log of a reconstruction names, if it is there."""
+    if results is None or not (results / "hairkit.log").is_file():
+        return None
+    for line in (results / "hairkit.log").read_text(errors="replace").splitlines():
+        if line.startswith(PHOTOS):
+            folder = Path(line.removeprefix(PHOTOS))
+            folder = folder.parent if folder.name == "photos" else folder
+            return folder if folder.is_dir() else None
+    return None
 
 
 def _hue(found: OrientationMap) -> UInt8Array:

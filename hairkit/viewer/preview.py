@@ -43,6 +43,7 @@ class Preview:
         self._drawn: tuple[object, object] = (None, None)
         self._kept: dict[str, list[str]] = {}
         self._lines: dict[str, LineSet | None] = {}
+        self._places: dict[str, object] = {}
         self._pictures = 0
         self._times: dict[str, float] = {}
 
@@ -161,11 +162,11 @@ class Preview:
         for layer in BOARDS:
             if layer not in session.shown.layers:
                 continue
-            if layer not in self._kept:
-                boards = session.layers.boards(layer)
+            if layer not in self._kept or self._places.get(layer) is not session.adjusted:
+                boards = session.layers.boards(layer, session.photo_cameras)
                 for name, board in boards.items():
                     stage.keep_board(f"{layer}/{name}", board)
-                self._kept[layer] = list(boards)
+                self._kept[layer], self._places[layer] = list(boards), session.adjusted
             only = session.shown.through
             names += [f"{layer}/{n}" for n in self._kept[layer] if only is None or n == only]
         return tuple(names)

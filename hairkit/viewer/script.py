@@ -16,6 +16,7 @@ file = "windy.png"         # in the folder of --out
 
 from __future__ import annotations
 
+import time
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ from hairkit.options import make_options, option
 from hairkit.viewer.actions import ACTIONS, perform
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import FRAMES_PER_SECOND
+from hairkit.viewer.session import Session
 
 _WRITES = ("screenshot", "record")
 _READS = ("open_file",)
@@ -77,6 +79,7 @@ def play(preview: Preview, script: Script, out: Path) -> None:
         except HairkitError as error:
             raise InputError(f"{script.path}: step {index}: {error}") from error
         _let_time_pass(preview)
+        _wait_for_rerun(session)
         if session.screenshots:
             preview.frame(0.0, still=True)
         if session.finished:
@@ -94,6 +97,12 @@ def _let_time_pass(preview: Preview) -> None:
             preview.frame(seconds)
         else:
             session.advance(seconds)  # nobody sees it
+
+
+def _wait_for_rerun(session: Session) -> None:
+    while session.rerun is not None:
+        time.sleep(0.05)
+        session.look_after_rerun()
 
 
 def _step(path: Path, index: int, table: dict[str, Any]) -> tuple[str, dict[str, Any]]:

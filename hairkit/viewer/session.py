@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.camera import Camera
+from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.simulate.contract import Measures, Surroundings
 from hairkit.stored import Float32Array, Float64Array
+from hairkit.viewer.adjusting import Adjustment, Rerun
 from hairkit.viewer.hair_body import GuideSampler, HairBody, split_guides
 from hairkit.viewer.layers import Layers
 from hairkit.viewer.motion import HeadMotion
@@ -97,6 +99,11 @@ class Session:
         self.screenshots: list[Path] = []
         """Files that the next picture is written to."""
         self.recorder: Recorder | None = None
+        self.adjustment: Adjustment | None = None
+        self.adjusted: dict[str, Camera] | None = None
+        """The head against the photos, while it is placed by hand."""
+        self.rerun: Rerun | None = None
+        """The reconstruction that goes on."""
         self.most_seconds: float | None = None
         """A picture's simulation ends after the step that takes it beyond this: on slow machines
         hair moves slower instead of stopping. None simulates all, which scripts want."""
@@ -137,9 +144,47 @@ class Session:
         """Return the camera of the picture, world."""
         width, height = size or self.size
         through = self.shown.through
-        if through is not None and through in self.layers.cameras:
-            return fitted(self.layers.cameras[through], width, height)
+        if through is not None and through in self.photo_cameras:
+            return fitted(self.photo_cameras[through], width, height)
         return self.view.camera(width, height)
+
+    @property
+    def photo_cameras(self) -> dict[str, Camera]:
+        """Cameras of the photos by view name: as found, or as the head is being placed."""
+        return self.layers.cameras if self.adjusted is None else self.adjusted
+
+    def adjust(self, on: bool) -> None:
+        """Begin to place the head by hand, or leave it; raises `InputError` without photos."""
+        self.adjustment, self.adjusted = None, None
+        if on:
+            folder = self.layers.capture
+            if folder is None:
+                raise InputError("the photos are not here; name their folder by --capture")
+            self.adjustment = Adjustment.of(
+                self.manager, folder, self.opened.groom.head, self.layers.cameras
+            )
+            self.place_head()
+        elif self.shown.through not in self.layers.cameras:
+            self.shown.through = None
+
+    def place_head(self) -> None:
+        """Take over the pose of the adjustment."""
+        if self.adjustment is not None:
+            self.adjusted = self.adjustment.cameras()
+
+    def look_after_rerun(self) -> None:
+        """Tell how a reconstruction goes on; show what it has made when it ends."""
+        if self.rerun is None:
+            return
+        self.message = f"reconstructing: {self.rerun.progress}"
+        if self.rerun.running:
+            return
+        rerun, self.rerun = self.rerun, None
+        rerun.wait()
+        rerun.check()
+        self.adjust(False)
+        self.reload()
+        self.message = "reconstructed from the head as it was placed"
 
     def advance(self, seconds: float) -> None:
         """Let time pass, unless paused."""
@@ -193,6 +238,7 @@ class Session:
         self.opened = opened
         self.tuned = Tuned(self.manager, guides, self._simulator)
         self.motion = HeadMotion(opened.groom.head.joints[1].astype(np.float64))
+        self.adjustment, self.adjusted = None, None
         self.layers = Layers(opened.results, self._capture)
         self.hold = self.picked = None
         self.steps, self._behind = 0, 0.0

@@ -213,7 +213,7 @@ class Stage:
         if self.hair.sums is not None:
             self.hair.sums.bind_to_storage_buffer(7)
         self._resolve.render(moderngl.TRIANGLES, vertices=3)
-        self.framebuffer.scissor = None
+        self.framebuffer.scissor = (0, 0, *self._size)
 
     def _draw_overlays(self, shot: Shot, own: Camera, depth: DepthRange) -> None:
         if not shot.lines and not shot.boards:

@@ -228,7 +228,13 @@ class Window:
 
     def _reload_changed(self) -> None:
         now = time.monotonic()
-        if self._watch_groom.changed(now):
+        if self.session.rerun is not None:
+            try:
+                with renderer():
+                    self.session.look_after_rerun()
+            except HairkitError as error:
+                self.session.message = str(error)
+        elif self._watch_groom.changed(now):
             self.perform("reload", {})
         if self._watch_shaders.changed(now):
             try:

@@ -13,6 +13,9 @@ from hairkit.viewer.actions import ACTIONS, LOOKS, bindings, perform
 from hairkit.viewer.presets import presets_path
 from hairkit.viewer.session import STEP, Session
 
+NEEDS_RESULTS = ("layer", "through", "preset_load", "adjust", "reconstruct")
+NEEDS_RESULTS += ("head_move", "head_turn", "head_scale", "head_save")
+
 
 def tip_pixel(session: Session, strand: int) -> tuple[float, float]:
     """Return where a guide's point before its tip is seen."""
@@ -43,7 +46,7 @@ def test_every_key_can_be_pressed(session: Session, key: str, tmp_path: Path) ->
     name, values = bindings()[key]
     if name == "record":
         values = {"file": str(tmp_path / "frames")}
-    needs_results = name in ("layer", "through", "preset_load") and key != "F9"
+    needs_results = name in NEEDS_RESULTS and key != "F9"
     if needs_results:
         with pytest.raises(HairkitError) as caught:
             perform(session, name, values)
