@@ -128,7 +128,9 @@ def test_a_format_carries_what_it_declares(
         elif feature in info.format.partial:
             whole = kept and feature not in CONDITIONAL
             assert not whole, f"{feature.value} is declared changed, but comes back"
-            assert not gone or feature in CONDITIONAL, f"{feature.value} is declared changed, but is lost"
+            assert not gone or feature in CONDITIONAL, (
+                f"{feature.value} is declared changed, but is lost"
+            )
         elif feature not in info.format.partial:
             assert gone, f"{feature.value} comes back, which the declaration does not say"
 
