@@ -6,7 +6,7 @@ import numpy as np
 
 from hairkit.errors import InputError
 from hairkit.geometry.floating_tangents import Arcs, cuts, even, fit_arcs
-from hairkit.geometry.path import Path
+from hairkit.geometry.path import Path, dot
 from hairkit.stored import Float64Array, Int64Array
 from hairkit.strands import Strands
 
@@ -36,7 +36,7 @@ def patent_counts(strands: Strands) -> Int64Array:
         return counts
     first, offsets = cuts(counts)
     _, tangents = path.at(*even(path, counts))
-    cosine = (tangents[first] * tangents[first + 1]).sum(-1)
+    cosine = dot(tangents[first], tangents[first + 1])
     change = (cosine <= SPLIT).astype(np.int64) - (cosine > MERGED)
     between = (path.lengths > SHORT) & (path.lengths < LONG)
     changed = counts + between * np.add.reduceat(change, offsets[:-1])
@@ -55,7 +55,7 @@ def adaptive_counts(
     if not tolerance > 0:
         raise InputError(f"tolerance of the helices is {tolerance}, expected metres above 0")
     start = np.ceil(UNMERGED * _by_length(strands.lengths())).astype(np.int64)
-    counts = np.minimum(np.maximum(patent_counts(strands), start), most)
+    counts: Int64Array = np.minimum(np.maximum(patent_counts(strands), start), most)
     open_ = np.arange(len(strands))
     for _ in range(ROUNDS):
         if not len(open_):
@@ -86,7 +86,7 @@ def mean_error(path: Path, arcs: Arcs) -> Float64Array:
         points, tangents = arcs.at(np.arange(len(strand)), np.full(len(strand), share))
         wanted, _ = path.at(strand, (rank + share) * piece)
         gap = points - wanted
-        across = gap - (gap * tangents).sum(-1, keepdims=True) * tangents
-        total += np.linalg.norm(across, axis=-1)
+        across = gap - dot(gap, tangents)[:, None] * tangents
+        total += np.sqrt(dot(across, across))
     result: Float64Array = np.bincount(strand, total, len(counts)) / (counts * len(_SAMPLES))
     return result

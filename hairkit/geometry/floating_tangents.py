@@ -24,7 +24,7 @@ from scipy.linalg import solveh_banded
 
 from hairkit.geometry.helix import along_arc
 from hairkit.geometry.pairs import helix_through
-from hairkit.geometry.path import Path, unit
+from hairkit.geometry.path import Path, dot, unit
 from hairkit.stored import Float64Array, Int64Array
 from hairkit.strands import Strands
 
@@ -119,9 +119,9 @@ def _frame(
     m = unit(start + end)
     change = end - start
     spare = np.eye(3)[np.argmin(np.abs(m), axis=-1)]
-    tiny = np.linalg.norm(change, axis=-1, keepdims=True) < _COINCIDENT
+    tiny = dot(change, change)[:, None] < _COINCIDENT**2
     e = np.where(tiny, np.cross(m, spare), change)
-    e = unit(e - (e * m).sum(-1, keepdims=True) * m)
+    e = unit(e - dot(e, m)[:, None] * m)
     return e, m, np.cross(m, e)
 
 
@@ -134,17 +134,17 @@ def _excess(
     """
     _, m, b = _frame(tangents, first)
     chord = points[first + 1] - points[first]
-    half = np.linalg.norm(tangents[first + 1] - tangents[first], axis=-1) / 2
+    change = tangents[first + 1] - tangents[first]
+    half = np.sqrt(dot(change, change)) / 2
     bound = (2 / np.pi) * half / np.sqrt(np.maximum(1 - half**2, 1e-6)) + _COINCIDENT
-    slope = (chord * b).sum(-1) / _along(chord, m)
+    slope = dot(chord, b) / _along(chord, m)
     return np.sign(slope) * np.maximum(np.abs(slope) - bound, 0.0), bound
 
 
 def _along(chord: Float64Array, m: Float64Array) -> Float64Array:
     """Return the chords' parts along m, kept away from 0, by which slopes are taken."""
-    result: Float64Array = np.maximum(
-        (chord * m).sum(-1), np.maximum(0.3 * np.linalg.norm(chord, axis=-1), 1e-12)
-    )
+    least = np.maximum(0.3 * np.sqrt(dot(chord, chord)), 1e-12)
+    result: Float64Array = np.maximum(dot(chord, m), least)
     return result
 
 
@@ -157,7 +157,7 @@ def _turned(points: Float64Array, tangents: Float64Array, first: Int64Array) -> 
     excess, _ = _excess(points, tangents, first)
     e, m, b = _frame(tangents, first)
     chord = points[first + 1] - points[first]
-    slope = np.clip((chord * e).sum(-1) / _along(chord, m), -FARTHEST, FARTHEST)
+    slope = np.clip(dot(chord, e) / _along(chord, m), -FARTHEST, FARTHEST)
     wish = slope[:, None] * e + np.clip(excess, -FARTHEST, FARTHEST)[:, None] * b
     wishes, arcs = np.zeros_like(tangents), np.zeros(len(tangents))
     for corner in (first, first + 1):
@@ -186,7 +186,7 @@ def _release(
     own = np.where(rooted, 1.0, 2.0)
     band = np.zeros((4, len(first), 2))
     band[3] = np.where(active, own[:, None], 1.0)
-    band[2, :, 1] = own * (rows[:, 0] * rows[:, 1]).sum(-1)
+    band[2, :, 1] = own * dot(rows[:, 0], rows[:, 1])
     joint = np.where(rooted[1:, None, None], 0.0, -rows[:-1] @ rows[1:].swapaxes(1, 2))
     band[1, 1:, 0], band[0, 1:, 1] = joint[:, 0, 0], joint[:, 0, 1]
     band[2, 1:, 0], band[1, 1:, 1] = joint[:, 1, 0], joint[:, 1, 1]

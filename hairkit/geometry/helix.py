@@ -67,7 +67,7 @@ def cross_matrix(vector: npt.ArrayLike) -> Float64Array:
 def rotation(vector: npt.ArrayLike) -> Float64Array:
     """Return (..., 3, 3) the rotation by |v| radians about v (Rodrigues)."""
     v = np.asarray(vector, np.float64)
-    sine, versine, _ = turn_coefficients((v * v).sum(-1))
+    sine, versine, _ = turn_coefficients(np.einsum("...i,...i->...", v, v))
     turn = cross_matrix(v)
     result: Float64Array = (
         np.eye(3) + sine[..., None, None] * turn + versine[..., None, None] * (turn @ turn)
@@ -82,7 +82,7 @@ def mean_rotation(vector: npt.ArrayLike) -> Float64Array:
     `mean_rotation(v) dv`, in the fixed frame.
     """
     v = np.asarray(vector, np.float64)
-    _, versine, rest = turn_coefficients((v * v).sum(-1))
+    _, versine, rest = turn_coefficients(np.einsum("...i,...i->...", v, v))
     turn = cross_matrix(v)
     result: Float64Array = (
         np.eye(3) + versine[..., None, None] * turn + rest[..., None, None] * (turn @ turn)

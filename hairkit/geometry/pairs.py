@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.geometry.path import dot, unit
 from hairkit.stored import BoolArray, Float64Array
 
 COINCIDENT = 1e-12
@@ -42,7 +43,7 @@ def helix_through(
     start, end = np.asarray(t0, np.float64), np.asarray(t1, np.float64)
     chord = np.asarray(p1, np.float64) - np.asarray(p0, np.float64)
     middle, across, half_cosine, half_sine = _basis(start, end, chord)
-    along, aside = _dot(chord, middle), _dot(chord, across)
+    along, aside = dot(chord, middle), dot(chord, across)
     beta = _axis_angle(half_cosine, half_sine, np.arctan2(np.abs(aside), along))
     side = np.where(aside < 0, -1.0, 1.0)
     axis = np.sin(beta)[..., None] * middle - (side * np.cos(beta))[..., None] * across
@@ -60,15 +61,15 @@ def _basis(
 ) -> tuple[Float64Array, Float64Array, Float64Array, Float64Array]:
     """Return m, b and the cosine and sine of half the angle between the tangents."""
     total, change = start + end, end - start
-    half_cosine = np.linalg.norm(total, axis=-1) / 2
-    half_sine = np.linalg.norm(change, axis=-1) / 2
+    half_cosine = np.sqrt(dot(total, total)) / 2
+    half_sine = np.sqrt(dot(change, change)) / 2
     scale = np.hypot(half_cosine, half_sine)
     middle = np.where(half_cosine[..., None] > COINCIDENT, total, chord)
-    middle = _unit(middle)
+    middle = unit(middle)
     # equal tangents have no e: any axis in the plane of tangent and chord will do
-    free = chord - _dot(chord, middle)[..., None] * middle
+    free = chord - dot(chord, middle)[..., None] * middle
     across = np.where(half_sine[..., None] > COINCIDENT, np.cross(middle, change), free)
-    return middle, _unit(across), half_cosine / scale, half_sine / scale
+    return middle, unit(across), half_cosine / scale, half_sine / scale
 
 
 def _chord(
@@ -131,15 +132,5 @@ def _turning_sign(
     known: BoolArray,
 ) -> Float64Array:
     """Return +1 or -1: the sense about the axis that turns the first tangent into the last."""
-    sense = _dot(np.cross(start, end), axis) * np.where(half_turn < np.pi / 2, 1.0, -1.0)
+    sense = dot(np.cross(start, end), axis) * np.where(half_turn < np.pi / 2, 1.0, -1.0)
     return np.where(known & (sense < 0), -1.0, 1.0)
-
-
-def _dot(a: Float64Array, b: Float64Array) -> Float64Array:
-    result: Float64Array = (a * b).sum(-1)
-    return result
-
-
-def _unit(vector: Float64Array) -> Float64Array:
-    length = np.linalg.norm(vector, axis=-1, keepdims=True)
-    return vector / np.where(length > 0, length, 1.0)

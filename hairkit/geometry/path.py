@@ -58,9 +58,15 @@ class Path:
         return bent, unit(slope)
 
 
+def dot(a: Float64Array, b: Float64Array) -> Float64Array:
+    """Return the inner products (...) of vectors (..., 3)."""
+    result: Float64Array = np.einsum("...i,...i->...", a, b)  # many times faster than a sum
+    return result
+
+
 def unit(vector: Float64Array) -> Float64Array:
     """Return vectors (..., 3) at length 1; zeros stay."""
-    length = np.linalg.norm(vector, axis=-1, keepdims=True)
+    length = np.sqrt(dot(vector, vector))[..., None]
     result: Float64Array = vector / np.where(length > 0, length, 1.0)
     return result
 
