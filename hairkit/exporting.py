@@ -72,12 +72,13 @@ def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
         Nothing is left to write, or the cache is of another groom.
     """
     path = options.cache if isinstance(options, AnimationOptions) else None
-    cache = None if path is None else read_cache(path, _guides_of(groom))
+    guides = _guides_of(groom)
+    cache = None if path is None else read_cache(path, guides)
     if options.hairs > len(groom.strands):
         groom = dense_groom(groom, options.hairs, options.seed)
     groom = completed(groom)
     strands = groom.strands
-    frames = None if cache is None else follow(strands, cache.points)
+    frames = None if cache is None else _frames(strands, guides.strands, cache.points)
     keep = _chosen(strands, options.strands) & ~_degenerate(strands)
     if not keep.any():
         raise InputError(f"the groom has no strands to write with strands={options.strands}")
@@ -85,6 +86,15 @@ def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
         frames = frames[:, keep[strands.strand_of_point]]
         cache = PointCache(frames, cache.times, cache.head_from_rest)
     return PreparedGroom(selected(groom, keep), cache)
+
+
+def _frames(strands: Strands, guides: Strands, cached: Float32Array) -> Float32Array:
+    """Return (T, P, 3) the strands moved with the cached guides, which may have been resampled."""
+    written = strands.select(guide_mask(strands))
+    count = int(written.counts[0])
+    if not np.array_equal(written.points, guides.points):
+        cached = guides.moved_and_resampled(cached, count)
+    return follow(strands, cached)
 
 
 def dense_groom(groom: Groom, count: int, seed: int = 0) -> Groom:

@@ -146,6 +146,9 @@ def adopt(
         No strand has any length.
     """
     strands = _with_length(strands, source)
+    if strands.guide is not None and not strands.guide.any():
+        _log.warning("%s: no strand is marked as a guide; all are taken as guides", source)
+        strands = replace(strands, guide=None)
     if options.reverse:
         strands = reversed_strands(strands)
         if material is not None:

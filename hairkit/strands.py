@@ -143,6 +143,22 @@ class Strands(Stored):
 
     def _at(self, counts: Int64Array) -> Strands:
         offsets = np.concatenate([[0], np.cumsum(counts)])
+        after, t = self._places(counts)
+        points = _mix(self.points, after, t[:, None])
+        widths = None if self.widths is None else _mix(self.widths, after, t)
+        return replace(self, points=points, offsets=offsets, widths=widths)
+
+    def moved_and_resampled(self, frames: Float32Array, count: int) -> Float32Array:
+        """Return frames (T, P, 3) of these strands at the points (T, S count, 3) of `resampled`.
+
+        The points are the same matter in every frame, wherever it has moved.
+        """
+        after, t = self._places(np.full(len(self), count))
+        return _mix(frames.swapaxes(0, 1), after, t[:, None, None]).swapaxes(0, 1)
+
+    def _places(self, counts: Int64Array) -> tuple[Int64Array, Float64Array]:
+        """Return the point after each new one, and how far on the new one lies between both."""
+        offsets = np.concatenate([[0], np.cumsum(counts)])
         arc = self.arc_lengths()
         length = arc[self.offsets[1:] - 1]
         rank = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
@@ -158,10 +174,7 @@ class Strands(Stored):
             np.repeat(self.offsets[1:], counts) - 1,
         )
         span = np.maximum(key[after] - key[after - 1], 1e-12)
-        t = np.clip((target - key[after - 1]) / span, 0, 1)
-        points = _mix(self.points, after, t[:, None])
-        widths = None if self.widths is None else _mix(self.widths, after, t)
-        return replace(self, points=points, offsets=offsets, widths=widths)
+        return after, np.clip((target - key[after - 1]) / span, 0, 1)
 
     @staticmethod
     def from_list(strands: Sequence[npt.ArrayLike]) -> Strands:

@@ -118,8 +118,9 @@ def test_a_cache_comes_along_for_the_strands_that_are_written(tmp_path: Path) ->
         np.stack([guides, guides + shift]), np.array([0.0, 0.1]), np.tile(np.eye(4), (2, 1, 1))
     )
     cache.save(tmp_path / "cache.npz")
-    for choice in ("all", "guides", "hair"):
-        ready = prepared(groom, Animated(strands=choice, cache=tmp_path / "cache.npz"))
+    for choice, hairs in (("all", 0), ("guides", 0), ("hair", 0), ("all", 400), ("hair", 400)):
+        options = Animated(strands=choice, hairs=hairs, cache=tmp_path / "cache.npz")
+        ready = prepared(groom, options)
         assert ready.cache is not None
         rest = ready.groom.strands.points
         assert np.allclose(ready.cache.points[0], rest, atol=1e-7)

@@ -13,6 +13,7 @@ from hairkit.errors import FormatError, InputError
 from hairkit.file_space import SpaceOptions
 from hairkit.groom import HairMaterial
 from hairkit.groom_file import write_groom
+from hairkit.guide_weights import guide_mask
 from hairkit.head_placing import find_place, placed
 from hairkit.importing import (
     ImportOptions,
@@ -177,3 +178,11 @@ def test_the_mean_width_becomes_the_look(caplog: pytest.LogCaptureFixture) -> No
     groom = adopt(replace(hair, widths=np.full(len(hair.points), 5e-5)), ImportOptions(), "a.hair")
     assert groom.material.width == pytest.approx(5e-5)
     assert "widths" not in caplog.text
+
+
+def test_strands_that_are_all_no_guides_become_guides(caplog: pytest.LogCaptureFixture) -> None:
+    """Programs that know no guides write 0 everywhere; a groom without guides helps nobody."""
+    strands = replace(bristle_groom().strands, guide=np.zeros(len(bristle_groom().strands), bool))
+    groom = adopt(strands, ImportOptions(), "file")
+    assert guide_mask(groom.strands).all()
+    assert "no strand is marked as a guide" in caplog.text

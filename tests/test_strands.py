@@ -93,6 +93,16 @@ def test_resampling_keeps_what_belongs_to_a_strand(strands: Strands) -> None:
     assert new.widths.max() <= strands.widths.max() + 1e-6
 
 
+@given(bundles(), st.integers(2, 9))
+def test_frames_are_resampled_as_the_strands_at_rest(strands: Strands, count: int) -> None:
+    """Matter points: resampled, then stretched and moved is stretched and moved, then resampled."""
+    frames = np.stack([strands.points, strands.points @ np.diag([1.0, 3.0, 0.2]) + 0.5])
+    found = strands.moved_and_resampled(frames.astype(np.float32), count)
+    rest = strands.resampled(count).points
+    np.testing.assert_array_equal(found[0], rest)
+    np.testing.assert_allclose(found[1], rest @ np.diag([1.0, 3.0, 0.2]) + 0.5, atol=1e-4)
+
+
 @given(bundles(), st.data())
 def test_selecting_gives_those_strands_in_that_order(strands: Strands, data: st.DataObject) -> None:
     """An index array permutes and repeats; a mask keeps the order."""
