@@ -14,6 +14,7 @@ from hairkit.errors import InputError, OptionError
 from hairkit.groom import Groom
 from hairkit.guide_weights import guide_mask
 from hairkit.manager import Manager
+from hairkit.simplify import simplified
 
 _DESCRIPTION = """\
 Example: hairkit convert a.tfx b.abc --scale 0.0023 --up y
@@ -36,6 +37,13 @@ def register(subparsers: Any) -> None:
     add("source", metavar="IN", type=Path, help="file of any format that a plugin imports")
     add("target", metavar="OUT", type=Path, help="file of any format that a plugin exports")
     add_reader_arguments(parser)
+    add(
+        "--guides",
+        type=int,
+        metavar="N",
+        help="mark N strands of full hair as its guides; with --set writer.strands=guides write"
+        " these only",
+    )
     add("--to", metavar="PLUGIN", help="export plugin; by default the one of the ending")
     add(
         "--set",
@@ -73,6 +81,8 @@ def run(args: argparse.Namespace) -> int:
     if target.exists() and target.samefile(source):
         raise InputError(f"{target}: is the file that is read; name another to write")
     groom = load_groom(manager, source, reading, reader)
+    if args.guides is not None:
+        groom = simplified(groom, args.guides)
     manager.call("export_groom", writer, options, groom=groom, path=target)
     print(_summary(groom, target, time.perf_counter() - start))
     return 0

@@ -150,3 +150,15 @@ def test_the_table_in_the_documents_is_the_generated_one(
     text = (project / "docs" / "formats.md").read_text()
     inside = text.partition("<!-- formats -->\n")[2].partition("\n<!-- end -->")[0]
     assert inside == capsys.readouterr().out.rstrip("\n")
+
+
+def test_guides_are_picked_from_full_hair(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`--guides 20` marks 20 strands; written alone they are 20 of the strands that were read."""
+    words = ["convert", "groom.npz", "g.npz", "--guides", "20"]
+    assert main([*words, "--set", "writer.strands=guides"]) == 0
+    found, full = read_groom("g.npz").strands, bristle_groom().strands
+    assert len(found) == 20
+    assert {tuple(p) for p in found.points.tolist()} <= {tuple(p) for p in full.points.tolist()}
+    capsys.readouterr()
+    assert main(["convert", "groom.npz", "g.npz", "--guides", "0"]) == 2
+    assert "0 guides are wanted" in capsys.readouterr().err
