@@ -78,7 +78,7 @@ def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
         groom = dense_groom(groom, options.hairs, options.seed)
     groom = completed(groom)
     strands = groom.strands
-    frames = None if cache is None else _frames(strands, guides.strands, cache.points)
+    frames = None if cache is None else _frames(strands, guides.strands, cache)
     keep = _chosen(strands, options.strands) & ~_degenerate(strands)
     if not keep.any():
         raise InputError(f"the groom has no strands to write with strands={options.strands}")
@@ -88,13 +88,13 @@ def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
     return PreparedGroom(selected(groom, keep), cache)
 
 
-def _frames(strands: Strands, guides: Strands, cached: Float32Array) -> Float32Array:
+def _frames(strands: Strands, guides: Strands, cache: PointCache) -> Float32Array:
     """Return (T, P, 3) the strands moved with the cached guides, which may have been resampled."""
     written = strands.select(guide_mask(strands))
-    count = int(written.counts[0])
+    cached, count = cache.points, int(written.counts[0])
     if not np.array_equal(written.points, guides.points):
         cached = guides.moved_and_resampled(cached, count)
-    return follow(strands, cached)
+    return follow(strands, cached, cache.head_from_rest)
 
 
 def dense_groom(groom: Groom, count: int, seed: int = 0) -> Groom:

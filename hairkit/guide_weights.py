@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hairkit.errors import InputError
-from hairkit.stored import BoolArray, Float32Array, Int32Array, Int64Array
+from hairkit.stored import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.strands import Strands
 
 CLOSEST = 3
@@ -60,7 +60,9 @@ def closest_guides(strands: Strands) -> GuideWeights:
     return GuideWeights(guides.astype(np.int32), weights)
 
 
-def follow(strands: Strands, guide_frames: Float32Array) -> Float32Array:
+def follow(
+    strands: Strands, guide_frames: Float32Array, head_from_rest: Float64Array | None = None
+) -> Float32Array:
     """Return (T, P, 3) all strands moved with their guides.
 
     Parameters
@@ -69,8 +71,11 @@ def follow(strands: Strands, guide_frames: Float32Array) -> Float32Array:
         Guides and hair at rest; equal counts of points are not needed.
     guide_frames
         (T, G, 3) the guides' points only, in their order in `strands`.
+    head_from_rest
+        (T, 4, 4) rigid motion of the head; None: it rests. Hair goes along with it whole.
 
-    Each hair keeps its offset from the weighted guides at the same share of its length.
+    Each hair keeps its offset, seen from the head, from the weighted guides at the same share of
+    its length.
     """
     guide = guide_mask(strands)
     rows = np.flatnonzero(guide[strands.strand_of_point])
@@ -84,12 +89,24 @@ def follow(strands: Strands, guide_frames: Float32Array) -> Float32Array:
     first[rows] = np.arange(len(rows))
     low = first[at]
     rest = strands.points[rows]
-    for frame, moved in zip(frames, guide_frames, strict=True):
-        shift = np.concatenate([moved - rest, np.zeros((1, 3), np.float32)])
+    still = np.eye(4)[None].repeat(len(guide_frames), axis=0)
+    motions = still if head_from_rest is None else head_from_rest
+    for frame, moved, motion in zip(frames, guide_frames, motions, strict=True):
+        seen = _turned(moved, np.linalg.inv(motion))
+        shift = np.concatenate([seen - rest, np.zeros((1, 3), np.float32)])
         for k in range(CLOSEST):
             frame += share[:, k, :1] * shift[low[:, k]] + share[:, k, 1:] * shift[low[:, k] + 1]
+        frame[:] = _turned(frame, motion)
         frame[rows] = moved
     return frames
+
+
+def _turned(points: Float32Array, motion: Float64Array) -> Float32Array:
+    """Return points (P, 3) under a rigid motion (4, 4); as they are where it is none."""
+    if np.array_equal(motion, np.eye(4)):
+        return points
+    moved: Float32Array = (points @ motion[:3, :3].T + motion[:3, 3]).astype(np.float32)
+    return moved
 
 
 def _places_on_guides(strands: Strands, mix: GuideWeights) -> tuple[Int64Array, Float32Array]:

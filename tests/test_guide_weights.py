@@ -89,3 +89,15 @@ def test_a_cache_of_another_groom_is_refused() -> None:
     strands = rich_groom().strands
     with pytest.raises(InputError, match="the guides have"):
         follow(strands, np.zeros((1, 3, 3), np.float32))
+
+
+def test_hair_stays_on_a_head_that_turns() -> None:
+    """Where head and guides move as one body, the hair between them moves with them."""
+    strands = rich_groom().strands
+    rows = guide_mask(strands)[strands.strand_of_point]
+    motion = np.eye(4)
+    motion[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    motion[:3, 3] = 0.1, -0.2, 0.3
+    wanted = strands.points @ motion[:3, :3].T + motion[:3, 3]
+    frames = wanted[rows][None].astype(np.float32)
+    assert np.allclose(follow(strands, frames, motion[None])[0], wanted, atol=1e-6)
