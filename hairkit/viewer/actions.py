@@ -246,9 +246,10 @@ def colours(session: Session, by: str = "") -> None:
     F7={"name": "hull"},
     F8={"name": "field"},
     F9={"name": "head"},
+    F10={"name": "torso"},
 )
 def layer(session: Session, name: str, on: bool | None = None) -> None:
-    """Show or hide photos, masks, orientation, cameras, hull, field, head."""
+    """Show or hide photos, masks, orientation, cameras, hull, field, head, torso."""
     session.layers.check(name)
     layers = session.shown.layers
     shown = name not in layers if on is None else on

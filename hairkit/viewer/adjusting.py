@@ -152,6 +152,5 @@ class Rerun:
 
     def _listen(self) -> None:
         assert self.process.stderr is not None
-        for line in self.process.stderr:
-            if line.strip():
-                self.lines.append(line.strip())
+        with self.process.stderr as said:
+            self.lines.extend(line.strip() for line in said if line.strip())

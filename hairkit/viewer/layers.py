@@ -15,22 +15,25 @@ import numpy as np
 from hairkit.camera import Camera
 from hairkit.capture_reader import read_capture
 from hairkit.errors import HairkitError, InputError
+from hairkit.head import Head
 from hairkit.mask import HAIR, PERSON, Mask
 from hairkit.orientation import OrientationMap
 from hairkit.pipeline import PHOTOS
 from hairkit.render.head import Solid
 from hairkit.scene import Scene
 from hairkit.stored import Float32Array, Float64Array, Stored, UInt8Array, from_arrays, read_npz
+from hairkit.synth.bust import Bust
 from hairkit.viewer.line_pass import Board, LineSet
 from hairkit.volume import Hull, OrientationField
 from hairkit.volume_surface import volume_surface
 
 BOARDS = ("photos", "masks", "orientation")
 """Layers of pictures in space, one a camera."""
-NAMES = ("head", *BOARDS, "cameras", "hull", "field")
+NAMES = ("head", "torso", *BOARDS, "cameras", "hull", "field")
 FRUSTUM = 0.35
 """Metres from a camera to its picture."""
 CLAY = (0.30, 0.28, 0.26)
+CLOTH = (0.05, 0.06, 0.08)
 FIELD_LINES = 4000
 _Found = TypeVar("_Found", bound=Stored)
 
@@ -46,7 +49,11 @@ class Layers:
     @property
     def available(self) -> tuple[str, ...]:
         """Names of the layers that can be shown."""
-        have = {"head": True, "photos": self.capture is not None and bool(self.cameras)}
+        have = {
+            "head": True,
+            "torso": True,
+            "photos": self.capture is not None and bool(self.cameras),
+        }
         files = {"masks": "segment-*", "orientation": "orient-*", "cameras": "scene"}
         files |= {"hull": "hull", "field": "field"}
         for name, pattern in files.items():
@@ -99,6 +106,12 @@ class Layers:
         vertices, faces, normals = volume_surface(hull.grid, hull.dense)
         colours = np.tile(np.array(CLAY, np.float32), (len(vertices), 1))
         return Solid(vertices, faces, normals, colours, scatter=0.0)
+
+    def torso(self, head: Head) -> Solid:
+        """Return shoulders under a head, which photos do not tell of."""
+        bust = Bust.under(head)
+        colours = np.tile(np.array(CLOTH, np.float32), (len(bust.vertices), 1))
+        return Solid(bust.vertices, bust.faces, bust.normals, colours, scatter=0.0)
 
     def field_lines(self) -> LineSet | None:
         """Return short strokes along the field, coloured by their direction."""

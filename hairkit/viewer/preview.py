@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hairkit.render.context import Renderer
-from hairkit.render.head import head_solid
+from hairkit.render.head import Solid, head_solid
 from hairkit.stored import UInt8Array
 from hairkit.viewer.budget import LEVELS, Budget
 from hairkit.viewer.colouring import point_values, ramp
@@ -172,14 +173,19 @@ class Preview:
         return tuple(names)
 
     def _shown_solids(self, stage: Stage) -> tuple[str, ...]:
-        if "hull" not in self.session.shown.layers:
-            return ()
-        if "hull" not in self._kept:
-            solid = self.session.layers.hull()
-            self._kept["hull"] = [] if solid is None else ["hull"]
-            if solid is not None:
-                stage.keep_solid("hull", solid)
-        return tuple(self._kept["hull"])
+        session = self.session
+        finders: dict[str, Callable[[], Solid | None]] = {
+            "hull": session.layers.hull,
+            "torso": lambda: session.layers.torso(session.opened.groom.head),
+        }
+        names = [name for name in finders if name in session.shown.layers]
+        for name in names:
+            if name not in self._kept:
+                solid = finders[name]()
+                self._kept[name] = [] if solid is None else [name]
+                if solid is not None:
+                    stage.keep_solid(name, solid)
+        return tuple(kept for name in names for kept in self._kept[name])
 
     def _keep_picture(self) -> None:
         session = self.session

@@ -11,6 +11,7 @@ from hairkit.camera import Camera
 from hairkit.render.context import Renderer
 from hairkit.render.head import Solid
 from hairkit.render.projection import DepthRange, set_camera, set_uniforms
+from hairkit.stored import Float64Array
 
 
 class SolidPass:
@@ -21,13 +22,26 @@ class SolidPass:
         self.solid = solid
         self._program = gl.program("skin")
         values = np.concatenate([solid.vertices, solid.normals, solid.colours], axis=1)
-        self._vertices = gl.context.buffer(np.ascontiguousarray(values, np.float32))
+        self._values = np.ascontiguousarray(values, np.float32)
+        self._placed = np.eye(4)
+        self._vertices = gl.context.buffer(self._values)
         self._faces = gl.context.buffer(np.ascontiguousarray(solid.faces, np.uint32))
         self._array = gl.context.vertex_array(
             self._program,
             [(self._vertices, "3f 3f 3f", "in_position", "in_normal", "in_colour")],
             index_buffer=self._faces,
         )
+
+    def place(self, matrix: Float64Array) -> None:
+        """Put the mesh elsewhere by a rigid motion (4, 4), from where it was made."""
+        if np.array_equal(matrix, self._placed):
+            return
+        self._placed = matrix
+        moved = self._values.copy()
+        turn = matrix[:3, :3].T.astype(np.float32)
+        moved[:, :3] = self._values[:, :3] @ turn + matrix[:3, 3].astype(np.float32)
+        moved[:, 3:6] = self._values[:, 3:6] @ turn
+        self._vertices.write(moved)
 
     def draw(
         self, camera: Camera, depth: DepthRange, push: float, lighting: dict[str, Any]

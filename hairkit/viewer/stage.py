@@ -29,6 +29,8 @@ STUDIO_SIZE = (160, 90)
 NEAR_HAIR, OFF_GUIDES = 0.05, 0.06
 """Metres: hair nearer than the first may be anywhere in the picture; hair keeps within the second
 of the guides."""
+STANDING = ("torso",)
+"""Solids that stay in the world when the head moves."""
 PULL = 0.002
 """Overlaid lines are drawn this share of the depth range nearer, so that skin does not cut them."""
 
@@ -181,6 +183,9 @@ class Stage:
         if shot.show_head:
             self._head.draw(own, depth, HEAD_PUSH, lighting)
         for name in shot.solids:
+            if name in STANDING:
+                still: Float64Array = np.linalg.inv(shot.world_from_head)
+                self._solids[name].place(still)
             self._solids[name].draw(own, depth, 0.0, lighting)
         self.gl.context.cull_face = "back"
 

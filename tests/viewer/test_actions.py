@@ -46,7 +46,7 @@ def test_every_key_can_be_pressed(session: Session, key: str, tmp_path: Path) ->
     name, values = bindings()[key]
     if name == "record":
         values = {"file": str(tmp_path / "frames")}
-    needs_results = name in NEEDS_RESULTS and key != "F9"
+    needs_results = name in NEEDS_RESULTS and key not in ("F9", "F10")
     if needs_results:
         with pytest.raises(HairkitError) as caught:
             perform(session, name, values)

@@ -97,7 +97,7 @@ def test_confidence_is_the_fields_at_the_guides(results: Path) -> None:
 def test_a_groom_alone_has_the_head_alone(tmp_path: Path) -> None:
     """Layers that are not there are refused with what to do."""
     layers = Layers(None)
-    assert layers.available == ("head",)
+    assert layers.available == ("head", "torso")
     with pytest.raises(InputError, match="open the folder that hairkit reconstruct wrote"):
         layers.check("hull")
     with pytest.raises(InputError, match="no layer 'hat'"):
@@ -121,7 +121,7 @@ def test_every_layer_changes_the_picture(results: Path, swaying_manager: Manager
         preview = Preview(gl, session)
         preview.frame(0.0, still=True)
         plain = preview.picture().copy()
-        for layer in (*BOARDS[1:], "cameras", "hull", "field", "head"):
+        for layer in (*BOARDS[1:], "cameras", "hull", "field", "head", "torso"):
             perform(session, "layer", {"name": layer})
             preview.frame(0.0, still=True)
             assert (preview.picture() != plain).any(), layer

@@ -15,6 +15,7 @@ from hairkit.stored import Float32Array, UInt8Array
 from hairkit.testing import bristle_groom
 from hairkit.viewer.hair_body import HairBody
 from hairkit.viewer.hair_pass import HairLook
+from hairkit.viewer.light_pass import TURNS
 from hairkit.viewer.line_pass import LineSet
 from hairkit.viewer.motion import rotation_about
 from hairkit.viewer.stage import Shot, Stage
@@ -163,3 +164,13 @@ def test_lines_are_drawn_in_their_colour(stage: Stage) -> None:
     with renderer():
         drawn = picture(stage, shot(hair=None, lines=((line, False),)))
     assert (np.abs(drawn[59:62, 80].astype(int) - [0, 255, 0]).max(axis=1) < 30).any()
+
+
+def test_light_made_in_turns_is_light_made_at_once(stage: Stage) -> None:
+    """After enough pictures of the same, a picture is that of a still."""
+    with renderer():
+        once = picture(stage, shot())
+        picture(stage, shot(hair=None))  # other light
+        for _ in range(2 * TURNS + 1):
+            in_turns = picture(stage, shot(whole_light=False))
+    assert np.abs(once.astype(int) - in_turns).max() <= 1

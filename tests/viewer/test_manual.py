@@ -1,0 +1,46 @@
+"""Laws of the manual page: it names what there is, and what it shows runs."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from hairkit.viewer.actions import ACTIONS
+from hairkit.viewer.colouring import COLOURINGS
+from hairkit.viewer.hud import help_lines, key_label
+from hairkit.viewer.script import read_script
+
+
+@pytest.fixture(scope="module")
+def page(project: Path) -> str:
+    """The manual."""
+    return (project / "docs" / "viewer.md").read_text()
+
+
+def test_the_manual_names_every_action_and_colouring(page: str) -> None:
+    """Nothing that a user can do is left out."""
+    words = set(re.findall(r"\w+", page))
+    assert set(ACTIONS) <= words, sorted(set(ACTIONS) - words)
+    assert set(COLOURINGS) <= words
+
+
+def test_the_scripts_of_the_manual_are_scripts(page: str, project: Path, tmp_path: Path) -> None:
+    """TOML blocks and the scripts of the animated pictures are read without complaint."""
+    blocks = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    assert blocks
+    for number, block in enumerate(blocks):
+        path = tmp_path / f"{number}.toml"
+        path.write_text(block)
+        assert read_script(path).steps
+    for path in (project / "docs" / "images").glob("*.toml"):
+        assert read_script(path).steps
+
+
+def test_the_help_sheet_names_every_key() -> None:
+    """Each bound key stands on the sheet, as it is called on a keyboard."""
+    sheet = "\n".join(help_lines())
+    for action in ACTIONS.values():
+        for key in action.keys:
+            assert key_label(key) in sheet
