@@ -27,7 +27,7 @@ class Options:
     """Settings of the super-helix simulator."""
 
     elements: int = option(
-        10, low=0, high=64, doc="Elements a guide; 0 takes as many as its shape needs."
+        0, low=0, high=64, doc="Elements a guide; 0 takes as many as its shape needs, 8 to 32."
     )
     stiffness: float = option(
         4.0, low=0.0001, high=1000.0, doc="Times stiffer than one hair: guides stand for locks."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +17,8 @@ from hairkit.strands import Strands
 from .nodes import carried, compiled, node, onward, times, turns
 from .rods import Rods
 
+SHAPE, FEWEST, MOST = 0.0015, 8, 32
+"""Elements as a guide's shape needs: mean distance in metres, and bounds of the number."""
 SHORTEST = 1e-4
 """Guides shorter than this, metres, are refused."""
 
@@ -31,6 +34,8 @@ class Binding(NamedTuple):
     """(P, 3) from there to the point, in the frame there."""
     bounds: Int64Array
     """(S + 1,) of the points, as the strands'."""
+    step: Float64Array
+    """(P,) metres from each point's predecessor to it."""
 
 
 def rods_of(strands: Strands, elements: int) -> tuple[Rods, Binding]:
@@ -49,7 +54,9 @@ def rods_of(strands: Strands, elements: int) -> tuple[Rods, Binding]:
             f"{len(short)} guides are shorter than {SHORTEST * 1e3} mm (the first is {short[0]}); "
             "remove them"
         )
-    counts = np.full(len(strands), elements) if elements else adaptive_counts(strands)
+    counts = np.full(len(strands), elements)
+    if not elements:
+        counts = np.maximum(adaptive_counts(strands, SHAPE, most=MOST), FEWEST)
     path = Path.of(strands)
     arcs = fit_arcs(path, counts)
     frames, q = travelling(arcs)
@@ -69,13 +76,14 @@ def rods_of(strands: Strands, elements: int) -> tuple[Rods, Binding]:
     rank = np.minimum(place.astype(np.int64), counts[strand] - 1)
     element = arcs.offsets[:-1][strand] + rank
     arc = (place - rank) * arcs.lengths[element]
-    binding = Binding(element, arc, np.zeros((len(arc), 3)), strands.offsets)
+    step = np.linalg.norm(np.diff(path.points, axis=0, prepend=0.0), axis=1)
+    binding = Binding(element, arc, np.zeros((len(arc), 3)), strands.offsets, step)
     return rods, binding._replace(offset=_offsets(rods, binding, path.points))
 
 
 def _offsets(rods: Rods, binding: Binding, wanted: Float64Array) -> Float64Array:
     bare, frames = np.empty_like(wanted), np.empty((len(wanted), 3, 3))
-    draw(rods, rods.captured, np.eye(4), binding, bare, frames, 0, len(rods.offsets) - 1)
+    draw(rods, rods.captured, np.eye(4), binding, bare, frames, False, 0, len(rods.offsets) - 1)
     return np.ascontiguousarray(np.einsum("pji,pj->pi", frames, wanted - bare))
 
 
@@ -87,10 +95,15 @@ def draw(
     binding: Binding,
     points: Float64Array,
     frames: Float64Array,
+    keep: bool,
     begin: int,
     stop: int,
 ) -> None:
-    """Write the points (P, 3) and frames (P, 3, 3) of strands `begin` to `stop`, world."""
+    """Write the points (P, 3) and frames (P, 3, 3) of strands `begin` to `stop`, world.
+
+    Points off the rod's line come apart or together where it bends; they are then set at their
+    rest distances along the strand, in the directions found.
+    """
     local, slope, arm = np.empty(3), np.empty((3, 3)), np.empty(3)
     turn, mean = np.empty((3, 3)), np.empty((3, 3))
     frame, root = np.empty((3, 3)), np.empty(3)
@@ -117,3 +130,21 @@ def draw(
                         + frame[i, 1] * turn[1, j]
                         + frame[i, 2] * turn[2, j]
                     )
+        if keep:
+            _keep_lengths(points, binding.step, binding.bounds[strand], binding.bounds[strand + 1])
+
+
+@compiled
+def _keep_lengths(points: Float64Array, step: Float64Array, first: int, last: int) -> None:
+    """Set points `first` to `last` of a strand at the distances `step`, root to tip."""
+    shift, before = np.zeros(3), points[first].copy()
+    for p in range(first + 1, last):
+        size = 0.0
+        for i in range(3):
+            size += (points[p, i] - before[i]) ** 2
+        factor = step[p] / max(math.sqrt(size), 1e-12)
+        for i in range(3):
+            along = points[p, i] - before[i]
+            before[i] = points[p, i]
+            shift[i] += (factor - 1.0) * along
+            points[p, i] += shift[i]

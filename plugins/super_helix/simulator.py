@@ -108,13 +108,14 @@ class SuperHelices:
         count = max(1, int(np.ceil(seconds / FRAME * self._options.substeps - 1e-6)))
         start, end = self._head, surroundings.head_from_rest
         turns = rotation.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
+        air = self._air(surroundings)
         for substep in range(1, count + 1):
             share = substep / count
             head = end.copy()
             if substep < count:
                 head[:3, :3] = rotation.to_matrix(rotation.slerp(turns[0], turns[1], share))
                 head[:3, 3] = (1 - share) * start[:3, 3] + share * end[:3, 3]
-            self._substep(seconds / count, head, surroundings)
+            self._substep(seconds / count, head, surroundings, air)
 
     def measure(self) -> Measures:
         """Return the present read-outs."""
@@ -127,7 +128,9 @@ class SuperHelices:
             self._potential(own, self._motion.q, gravity) - self._rest_energy,
         )
 
-    def _substep(self, seconds: float, head: Float64Array, around: Surroundings) -> None:
+    def _substep(
+        self, seconds: float, head: Float64Array, around: Surroundings, air: Float64Array
+    ) -> None:
         options = self._options
         gravity = self._rest_gravity if around.gravity is None else around.gravity
         two_step = options.second_order and abs(self._before - seconds) < 1e-9
@@ -146,7 +149,7 @@ class SuperHelices:
             1.0 if grid is None else float(grid.grid.spacing),
             np.zeros((0, 0, 0), np.float32) if grid is None else np.array(grid.distance),
         )
-        loads = self._loads(around)
+        loads = self._loads(around, air)
         if options.solver == "recursion":
             over_strands(step_strands, self._rods.offsets, self._rods, self._motion, loads, step)
         else:
@@ -154,12 +157,16 @@ class SuperHelices:
         self._head, self._before = step.head, seconds
         self._time += seconds
 
-    def _loads(self, around: Surroundings) -> Loads:
+    def _air(self, around: Surroundings) -> Float64Array:
+        """Return (E, NODES, 3) the air's velocity, gusts taken at the middle of each element."""
+        middle = np.ascontiguousarray(self._motion.points[:, NODES // 2])
+        air = air_velocity(middle, self._time, around.wind, around.turbulence)
+        return np.repeat(air[:, None], NODES, axis=1)
+
+    def _loads(self, around: Surroundings, air: Float64Array) -> Loads:
         motion, masses = self._motion, self._rods.masses
         shape = masses.shape
-        flat = motion.points.reshape(-1, 3)
-        air = air_velocity(flat, self._time, around.wind, around.turbulence)
-        air, drag = air.reshape(motion.points.shape), self._options.air_drag * masses
+        drag = self._options.air_drag * masses
         if self._options.hair_friction > 0 or self._options.hair_push > 0:
             drag, air = self._neighbours.act(
                 motion.points,
@@ -173,7 +180,9 @@ class SuperHelices:
         drawn = self._drawn() if around.grabs else None
         for grab in around.grabs:
             if drawn is None or not 0 <= grab.point < len(drawn):
-                raise InputError(f"grab of point {grab.point}, expected 0 to {len(flat) - 1}")
+                raise InputError(
+                    f"grab of point {grab.point}, expected 0 to {len(self._binding.arc) - 1}"
+                )
             element = self._binding.element[grab.point]
             node = int(
                 np.argmin(np.linalg.norm(motion.points[element] - drawn[grab.point], axis=1))
@@ -208,6 +217,7 @@ class SuperHelices:
             self._binding,
             points,
             frames,
+            True,
         )
         return points
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from hairkit.stored import Float64Array
 
-CLOSE = 0.01
+CLOSE = 0.03
 """Radians by which an iteration turns no element more once a strand's step is solved."""
 FAR = 0.1
 """Radians in the last iteration above which a step is given up for a shorter-sighted one."""

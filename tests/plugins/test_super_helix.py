@@ -65,14 +65,14 @@ def test_the_captured_shape_rests_under_gravity() -> None:
 
 
 def test_nothing_stretches_on_a_shaken_head() -> None:
-    """Elements keep their length; what rides beside them changes by less than 1 %."""
+    """Points keep their distances along the strand, to float32."""
     simulator = SuperHelices(hanging(), FEW)
     most = 0.0
     for frame in range(60):
         head = turned(0.5 * np.sin(0.2 * frame))
         simulator.advance(1 / 60, Surroundings(head))
         most = max(most, simulator.measure().stretch)
-    assert most < 0.01
+    assert most < 1e-4
     moved = np.abs(simulator.points - hanging().strands.points @ head[:3, :3].T).max()
     assert moved > 1e-3
 
@@ -184,7 +184,7 @@ def test_both_solvers_move_alike() -> None:
         for frame in range(4):
             simulator.advance(1 / 60, Surroundings(turned(0.1 * frame)))
         frames.append(simulator.points)
-    np.testing.assert_allclose(*frames, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(*frames, rtol=0, atol=1e-5)
 
 
 def test_hair_around_drags_to_its_own_speed(rng: np.random.Generator) -> None:
