@@ -71,7 +71,8 @@ class HeadMotion:
         motion = self._keyed(time)
         if not self.shakes:
             return motion
-        return motion @ self._shaken(time)
+        both: Float64Array = motion @ self._shaken(time)
+        return both
 
     @property
     def end(self) -> float:
@@ -82,9 +83,9 @@ class HeadMotion:
         """Cubic through the keys (Catmull-Rom with the keys' own times), turns and places alike."""
         count = len(self.times)
         if count == 1 or time <= self.times[0]:
-            return self.keys[0].copy()
+            return np.array(self.keys[0])
         if time >= self.times[-1]:
-            return self.keys[-1].copy()
+            return np.array(self.keys[-1])
         at = int(np.searchsorted(self.times, time, side="right")) - 1
         span = self.times[at + 1] - self.times[at]
         share = (time - self.times[at]) / span
@@ -219,7 +220,8 @@ def _continuous(turns: Float64Array) -> Float64Array:
     """Choose the quaternions' signs so that neighbours are near each other."""
     sign = np.sign((turns[1:] * turns[:-1]).sum(axis=1))
     sign[sign == 0] = 1.0
-    return turns * np.concatenate([[1.0], np.cumprod(sign)])[:, None]
+    near: Float64Array = turns * np.concatenate([[1.0], np.cumprod(sign)])[:, None]
+    return near
 
 
 def _slope(times: Float64Array, values: Float64Array, k: int) -> Float64Array:

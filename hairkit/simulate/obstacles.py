@@ -85,9 +85,7 @@ def capsule_distance(capsules: Capsules, points: npt.ArrayLike) -> Float32Array:
     """
     at = np.asarray(points, np.float32)
     best = np.full(len(at), np.inf, np.float32)
-    for first, second, radius in zip(
-        capsules.first, capsules.second, capsules.radius, strict=True
-    ):
+    for first, second, radius in zip(capsules.first, capsules.second, capsules.radius, strict=True):
         axis = second - first
         share = (at - first) @ axis / max(float(axis @ axis), 1e-12)
         share = np.clip(share, 0.0, 1.0)[:, None]

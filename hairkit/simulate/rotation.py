@@ -28,7 +28,8 @@ def product(a: Float64Array, b: Float64Array) -> Float64Array:
 
 def inverse(q: Float64Array) -> Float64Array:
     """Return the turn back."""
-    return q * np.array([1.0, -1.0, -1.0, -1.0])
+    back: Float64Array = q * np.array([1.0, -1.0, -1.0, -1.0])
+    return back
 
 
 def unit(q: Float64Array) -> Float64Array:

@@ -90,7 +90,7 @@ class Options:
 
     def resolved(self, physics: HairPhysics) -> Options:
         """Return options without None, what lacks taken from the groom and kept within bounds."""
-        own = {
+        own: dict[str, Any] = {
             "stiffness": min(max(physics.stiffness, 0.0), 1.0),
             "bend": min(max(physics.bend_stiffness, 0.0), 1.0),
             "damping": min(max(physics.damping, 0.0), 0.9),

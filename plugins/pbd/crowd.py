@@ -39,11 +39,15 @@ class Crowd:
         return np.maximum(self.density, least).reshape(self.shape)
 
     def rubbed(
-        self, state: State, mass: Float64Array, ride: Float64Array, rates: tuple[float, float, float]
+        self,
+        state: State,
+        mass: Float64Array,
+        ride: Float64Array,
+        rates: tuple[float, float, float],
     ) -> State:
         """Return the state with velocities after hair has acted on hair; roots keep theirs.
 
-        `ride` (4, 4) is how the head moves in the meantime, `rates` are cohesion, pressure, seconds.
+        `ride` (4, 4) is how the head moves meanwhile, `rates` are cohesion, pressure, seconds.
         """
         cohesion, pressure, seconds = rates
         riding = (state.position - moved(ride, state.position)) / seconds
@@ -82,15 +86,19 @@ class Crowd:
         filled = self._summed(corner, share)
         result = velocity
         if cohesion > 0:
-            cells = np.stack(
-                [self._summed(corner, share * velocity[:, k, None]) for k in range(3)], axis=-1
-            ) / np.maximum(filled, 1e-30)[:, None]
+            cells = (
+                np.stack(
+                    [self._summed(corner, share * velocity[:, k, None]) for k in range(3)], axis=-1
+                )
+                / np.maximum(filled, 1e-30)[:, None]
+            )
             mean = np.einsum("nc,nck->nk", weight, cells[corner])
             result = velocity + (1 - np.exp(-cohesion * seconds)) * (mean - velocity)
         if pressure > 0:
             usual = self.usual.reshape(-1)
             crowded = np.maximum(filled - usual, 0.0) / usual
-            slope = np.stack(np.gradient(np.minimum(crowded, 4.0).reshape(self.shape)), axis=-1)
+            field = np.minimum(crowded, 4.0).reshape(self.shape)
+            slope = np.stack([np.gradient(field, axis=k) for k in range(3)], axis=-1)
             push = np.einsum("nc,nck->nk", weight, slope.reshape(-1, 3)[corner])
             result = result - pressure * seconds * push
         return result
@@ -107,7 +115,8 @@ class Crowd:
         return (low[:, None] + bits) @ stride, weight
 
     def _summed(self, corner: Int64Array, value: Float64Array) -> Float64Array:
-        return np.bincount(corner.ravel(), value.ravel(), int(np.prod(self.shape)))
+        cells = int(np.prod(self.shape))
+        return np.bincount(corner.ravel(), value.ravel(), cells).astype(np.float64)
 
 
 def crowd_of(position: Float64Array, mass: Float64Array) -> Crowd:

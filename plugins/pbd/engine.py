@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+import numpy as np
+
 from hairkit.stored import Float32Array, Float64Array
 
 from .crowd import Crowd
@@ -28,8 +30,8 @@ class Engine(Protocol):
         """Let hair act on hair: cohesion, pressure, seconds."""
         ...
 
-    def node(self, rod: int, node: int) -> tuple[Float64Array, Float64Array]:
-        """Return place and velocity (3,) of one node, head axes."""
+    def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
+        """Return places and velocities (n, 3) of one rod, head axes."""
         ...
 
     def points(self, riders: Riders, head: Float64Array) -> Float32Array:
@@ -53,10 +55,11 @@ class ReferenceEngine:
         """Let hair act on hair."""
         self.state = crowd.rubbed(self.state, self._rods.mass, ride, rates)
 
-    def node(self, rod: int, node: int) -> tuple[Float64Array, Float64Array]:
-        """Return place and velocity (3,) of one node, head axes."""
-        return self.state.position[rod, node], self.state.velocity[rod, node]
+    def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
+        """Return places and velocities (n, 3) of one rod, head axes."""
+        return self.state.position[rod], self.state.velocity[rod]
 
     def points(self, riders: Riders, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
-        return moved(head, riders.points(self.state.position, self.state.frames)).astype("f4")
+        local = riders.points(self.state.position, self.state.frames).astype(np.float64)
+        return moved(head, local).astype(np.float32)

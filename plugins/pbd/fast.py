@@ -16,6 +16,7 @@ from hairkit.stored import Float32Array, Float64Array
 from . import kernels
 from .crowd import Crowd
 from .guides import Riders
+from .kernel_math import LANES
 from .kernel_ride import ride_points, rub_nodes
 from .reference import Contact, Load, State, at_rest
 from .rods import Rods
@@ -75,22 +76,27 @@ class FastEngine:
             np.array(rates, np.float32),
         )  # fmt: skip
 
-    def node(self, rod: int, node: int) -> tuple[Float64Array, Float64Array]:
-        """Return place and velocity (3,) of one node, head axes."""
-        block, lane = divmod(rod, kernels.LANES)
-        return (
-            self._x[block, node, :3, lane].astype(np.float64),
-            self._x[block, node, 3:6, lane].astype(np.float64),
-        )
+    def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
+        """Return places and velocities (n, 3) of one rod, head axes."""
+        block, lane = divmod(rod, LANES)
+        nodes = self._x[block, :, :, lane].astype(np.float64)
+        return nodes[:, :3], nodes[:, 3:6]
 
     def points(self, riders: Riders, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
         rod, segment, share, offset = riders.packed()
         return np.asarray(
             ride_points(
-                self._x, self._q, riders.identity, rod, segment, share, offset,
-                head[:3].astype(np.float32), self._count,
-            )  # fmt: skip
+                self._x,
+                self._q,
+                riders.identity,
+                rod,
+                segment,
+                share,
+                offset,
+                head[:3].astype(np.float32),
+                self._count,
+            )
         )
 
     def _unpacked(self, values: Float32Array) -> Float64Array:
@@ -104,12 +110,12 @@ class FastEngine:
 
     def _air(self, air: Float64Array) -> Float32Array:
         if air.ndim == 1:
-            return np.repeat(air.astype(np.float32)[None, None, :, None], kernels.LANES, axis=3)
+            return np.repeat(air.astype(np.float32)[None, None, :, None], LANES, axis=3)
         return kernels.padded(air.astype(np.float32))
 
     def _force(self, force: Float64Array | None) -> Float32Array:
         if force is None:
-            return np.zeros((1, 1, 3, kernels.LANES), np.float32)
+            return np.zeros((1, 1, 3, LANES), np.float32)
         return kernels.padded((force / self._unit[:, None, None]).astype(np.float32))
 
 
@@ -147,9 +153,7 @@ def _factor(bands: Float64Array) -> Float64Array:
         own, one, two = bands[:, j, 0], bands[:, j, 1], bands[:, j, 2]
         second = two / pivot[:, j]  # pivot of row j - 2 stands at j
         first[:, j + 2] = (one - second * pivot[:, j] * first[:, j + 1]) / pivot[:, j + 1]
-        pivot[:, j + 2] = (
-            own - first[:, j + 2] ** 2 * pivot[:, j + 1] - second**2 * pivot[:, j]
-        )
+        pivot[:, j + 2] = own - first[:, j + 2] ** 2 * pivot[:, j + 1] - second**2 * pivot[:, j]
         result[:, j] = np.stack([first[:, j + 2], second, 1 / pivot[:, j + 2]], axis=-1)
     return result
 

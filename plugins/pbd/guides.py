@@ -36,7 +36,7 @@ def node_points(strands: Strands, nodes: int) -> Float64Array:
         some = points[sharp]
         some[:, 1:-1] = 0.25 * some[:, :-2] + 0.5 * some[:, 1:-1] + 0.25 * some[:, 2:]
         offsets = np.arange(len(some) + 1) * nodes
-        even = Strands(some.reshape(-1, 3), offsets).resampled(nodes)
+        even = Strands(some.reshape(-1, 3).astype(np.float32), offsets).resampled(nodes)
         points[sharp] = even.points.reshape(some.shape)
     length = np.linalg.norm(np.diff(points, axis=1), axis=-1)
     bad = (length.min(axis=1) < SHORTEST / nodes) | (_sharpest(points) > LARGEST_TURN)
@@ -116,9 +116,10 @@ def _places(
     last = position.shape[1] - 1
     t = share[:, None]
     a, b = position[rod, segment], position[rod, segment + 1]
-    before, after = position[rod, np.maximum(segment - 1, 0)], position[
-        rod, np.minimum(segment + 2, last)
-    ]
+    before, after = (
+        position[rod, np.maximum(segment - 1, 0)],
+        position[rod, np.minimum(segment + 2, last)],
+    )
     slope_a = np.where((segment == 0)[:, None], b - a, (b - before) / 2)
     slope_b = np.where((segment == last - 1)[:, None], b - a, (after - a) / 2)
     one, two = t * t * (3 - 2 * t), t * (1 - t)

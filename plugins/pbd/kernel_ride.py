@@ -87,9 +87,9 @@ def rub_nodes(  # type: ignore[no-untyped-def]
             b, fb = _corner(p1, origin[1], s1)
             c, fc = _corner(p2, origin[2], s2)
             for i in range(8):
-                k, l, o = i >> 2 & 1, i >> 1 & 1, i & 1
-                weight = (fa if k else ONE - fa) * (fb if l else ONE - fb) * (fc if o else ONE - fc)
-                cell = cells[a + k, b + l, c + o]
+                k, y, o = i >> 2 & 1, i >> 1 & 1, i & 1
+                weight = (fa if k else ONE - fa) * (fb if y else ONE - fb) * (fc if o else ONE - fc)
+                cell = cells[a + k, b + y, c + o]
                 cell[0] += weight * m
                 cell[1] += weight * u0
                 cell[2] += weight * u1
@@ -118,9 +118,9 @@ def rub_nodes(  # type: ignore[no-untyped-def]
             c, fc = _corner(p2, origin[2], s2)
             m0, m1, m2, g0, g1, g2 = ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
             for i in range(8):
-                k, l, o = i >> 2 & 1, i >> 1 & 1, i & 1
-                weight = (fa if k else ONE - fa) * (fb if l else ONE - fb) * (fc if o else ONE - fc)
-                i0, i1, i2 = a + k, b + l, c + o
+                k, y, o = i >> 2 & 1, i >> 1 & 1, i & 1
+                weight = (fa if k else ONE - fa) * (fb if y else ONE - fb) * (fc if o else ONE - fc)
+                i0, i1, i2 = a + k, b + y, c + o
                 cell = cells[i0, i1, i2]
                 m0 += weight * cell[1]
                 m1 += weight * cell[2]

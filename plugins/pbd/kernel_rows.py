@@ -47,7 +47,14 @@ def predict_row(x, node, air, constants, force, is_root) -> None:  # type: ignor
     r0, r1, r2, _, t0, t1, t2, step = constants
     h, damping, over = step[0], step[1], step[2]
     for w in range(LANES):
-        x0, x1, x2, v0, v1, v2 = x[w], x[LANES + w], x[2 * LANES + w], x[3 * LANES + w], x[4 * LANES + w], x[5 * LANES + w]
+        x0, x1, x2, v0, v1, v2 = (
+            x[w],
+            x[LANES + w],
+            x[2 * LANES + w],
+            x[3 * LANES + w],
+            x[4 * LANES + w],
+            x[5 * LANES + w],
+        )
         u0 = r0[0] * v0 + r0[1] * v1 + r0[2] * v2
         u1 = r1[0] * v0 + r1[1] * v1 + r1[2] * v2
         u2 = r2[0] * v0 + r2[1] * v1 + r2[2] * v2
@@ -69,8 +76,17 @@ def predict_row(x, node, air, constants, force, is_root) -> None:  # type: ignor
         m, drag, shape = node[MASS * LANES + w], node[DRAG * LANES + w], node[SHAPE * LANES + w]
         force[w] = m * (t0[3] + drag * a0 + damping * c0 + shape * (node[w] - p0))
         force[LANES + w] = m * (t1[3] + drag * a1 + damping * c1 + shape * (node[LANES + w] - p1))
-        force[2 * LANES + w] = m * (t2[3] + drag * a2 + damping * c2 + shape * (node[2 * LANES + w] - p2))
-        x[w], x[LANES + w], x[2 * LANES + w], x[3 * LANES + w], x[4 * LANES + w], x[5 * LANES + w] = p0, p1, p2, u0, u1, u2
+        force[2 * LANES + w] = m * (
+            t2[3] + drag * a2 + damping * c2 + shape * (node[2 * LANES + w] - p2)
+        )
+        (
+            x[w],
+            x[LANES + w],
+            x[2 * LANES + w],
+            x[3 * LANES + w],
+            x[4 * LANES + w],
+            x[5 * LANES + w],
+        ) = p0, p1, p2, u0, u1, u2
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
@@ -78,7 +94,11 @@ def swing_row(xa, xb, q, el, constants, segment) -> None:  # type: ignore[no-unt
     """A segment as predicted, and its frame transported on to it."""
     r0, r1, r2, r3 = constants[3]
     for w in range(LANES):
-        e0, e1, e2 = xb[w] - xa[w], xb[LANES + w] - xa[LANES + w], xb[2 * LANES + w] - xa[2 * LANES + w]
+        e0, e1, e2 = (
+            xb[w] - xa[w],
+            xb[LANES + w] - xa[LANES + w],
+            xb[2 * LANES + w] - xa[2 * LANES + w],
+        )
         over = ONE / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2)
         d0, d1, d2 = e0 * over, e1 * over, e2 * over
         s, t, u, o = q[w], q[LANES + w], q[2 * LANES + w], q[3 * LANES + w]
@@ -87,10 +107,14 @@ def swing_row(xa, xb, q, el, constants, segment) -> None:  # type: ignore[no-unt
         q2 = r0 * u - r1 * o + r2 * s + r3 * t
         q3 = r0 * o + r1 * u - r2 * t + r3 * s
         q0, q1, q2, q3 = swing_frame(q0, q1, q2, q3, d0, d1, d2)
-        l = el[OVER * LANES + w]
+        span = el[OVER * LANES + w]
         segment[w], segment[LANES + w], segment[2 * LANES + w] = e0, e1, e2
         segment[3 * LANES + w], segment[4 * LANES + w], segment[5 * LANES + w] = d0, d1, d2
-        segment[6 * LANES + w], segment[7 * LANES + w], segment[8 * LANES + w] = e0 * l, e1 * l, e2 * l
+        segment[6 * LANES + w], segment[7 * LANES + w], segment[8 * LANES + w] = (
+            e0 * span,
+            e1 * span,
+            e2 * span,
+        )
         q[w], q[LANES + w], q[2 * LANES + w], q[3 * LANES + w] = q0, q1, q2, q3
 
 
@@ -101,7 +125,9 @@ def twist_row(before, after, segment, el, out) -> None:  # type: ignore[no-untyp
         a = (before[w], before[LANES + w], before[2 * LANES + w], before[3 * LANES + w])
         b = (after[w], after[LANES + w], after[2 * LANES + w], after[3 * LANES + w])
         mid, quarter = half_way_frame(a, b)
-        c = rotate(mid, el[CURVE * LANES + w], el[(CURVE + 1) * LANES + w], el[(CURVE + 2) * LANES + w])
+        c = rotate(
+            mid, el[CURVE * LANES + w], el[(CURVE + 1) * LANES + w], el[(CURVE + 2) * LANES + w]
+        )
         d = (segment[3 * LANES + w], segment[4 * LANES + w], segment[5 * LANES + w])
         p = rotate(a, ZERO, ZERO, ONE)
         t = (d[0] - p[0], d[1] - p[1], d[2] - p[2])
@@ -109,7 +135,9 @@ def twist_row(before, after, segment, el, out) -> None:  # type: ignore[no-untyp
         g = cross(c, t)
         aside = cross(quarter, g)
         curved = dot(c, t)
-        out[TORQUE * LANES + w] = el[TWIST * LANES + w] * (twist_angle(a, b) - el[NATURAL * LANES + w])
+        out[TORQUE * LANES + w] = el[TWIST * LANES + w] * (
+            twist_angle(a, b) - el[NATURAL * LANES + w]
+        )
         out[(TO_BEFORE) * LANES + w] = HALF * bend * (dot(p, g) - dot(p, aside))
         out[(TO_AFTER) * LANES + w] = HALF * bend * (dot(d, g) + dot(d, aside))
         out[FIRM * LANES + w] = QUARTER * bend * (curved if curved > ZERO else ZERO)
@@ -123,8 +151,17 @@ def spin_row(q, segment, angle) -> None:  # type: ignore[no-untyped-def] # pragm
         turn = turn if turn < LARGEST_SPIN else LARGEST_SPIN
         half = HALF * (turn if turn > -LARGEST_SPIN else -LARGEST_SPIN)
         over = ONE / np.sqrt(ONE + half * half)
-        r1, r2, r3 = half * segment[3 * LANES + w], half * segment[4 * LANES + w], half * segment[5 * LANES + w]
-        s, t, u, o = q[w] * over, q[LANES + w] * over, q[2 * LANES + w] * over, q[3 * LANES + w] * over
+        r1, r2, r3 = (
+            half * segment[3 * LANES + w],
+            half * segment[4 * LANES + w],
+            half * segment[5 * LANES + w],
+        )
+        s, t, u, o = (
+            q[w] * over,
+            q[LANES + w] * over,
+            q[2 * LANES + w] * over,
+            q[3 * LANES + w] * over,
+        )
         q[w] = s - r1 * t - r2 * u - r3 * o
         q[LANES + w] = t + r1 * s + r2 * o - r3 * u
         q[2 * LANES + w] = u - r1 * o + r2 * s + r3 * t
@@ -138,7 +175,9 @@ def elastic_row(before, after, reach, segment, el, out) -> None:  # type: ignore
         a = (before[w], before[LANES + w], before[2 * LANES + w], before[3 * LANES + w])
         b = (after[w], after[LANES + w], after[2 * LANES + w], after[3 * LANES + w])
         mid, quarter = half_way_frame(a, b)
-        c = rotate(mid, el[CURVE * LANES + w], el[(CURVE + 1) * LANES + w], el[(CURVE + 2) * LANES + w])
+        c = rotate(
+            mid, el[CURVE * LANES + w], el[(CURVE + 1) * LANES + w], el[(CURVE + 2) * LANES + w]
+        )
         d = (segment[3 * LANES + w], segment[4 * LANES + w], segment[5 * LANES + w])
         p = rotate(a, ZERO, ZERO, ONE)
         t0 = segment[6 * LANES + w] - reach[w]

@@ -103,7 +103,12 @@ def _distance(grid, p0, p1, p2, clear):  # type: ignore[no-untyped-def] # pragma
     v010, v011 = values[i, j + 1, k], values[i, j + 1, k + 1]
     v100, v101 = values[i + 1, j, k], values[i + 1, j, k + 1]
     v110, v111 = values[i + 1, j + 1, k], values[i + 1, j + 1, k + 1]
-    l00, l01, l10, l11 = v000 * f + v001 * c, v010 * f + v011 * c, v100 * f + v101 * c, v110 * f + v111 * c
+    l00, l01, l10, l11 = (
+        v000 * f + v001 * c,
+        v010 * f + v011 * c,
+        v100 * f + v101 * c,
+        v110 * f + v111 * c,
+    )
     low, high = l00 * e + l01 * b, l10 * e + l11 * b
     g0 = high - low
     g1 = (l01 - l00) * d + (l11 - l10) * a

@@ -213,5 +213,3 @@ def padded(values: Float32Array, lanes: int = LANES) -> Float32Array:
     rows = np.minimum(np.arange(blocks * lanes), count - 1)
     spread = values[rows].reshape(blocks, lanes, *values.shape[1:])
     return np.ascontiguousarray(np.moveaxis(spread, 1, -1), np.float32)
-
-

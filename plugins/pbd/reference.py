@@ -194,9 +194,7 @@ def tension(
     return result
 
 
-def collided(
-    rods: Rods, state: State, contact: Contact, ride: Float64Array, step: float
-) -> State:
+def collided(rods: Rods, state: State, contact: Contact, ride: Float64Array, step: float) -> State:
     """Return the state with nodes brought out of the obstacles, with Coulomb friction."""
     shape = state.position.shape
     distance, normal = contact.obstacles.at(state.position.reshape(-1, 3))
@@ -235,7 +233,8 @@ def relengthened(rods: Rods, position: Float64Array, normal: Float64Array) -> Fl
     def eased(nodes: slice) -> Float64Array:
         """What each segment's pull does to the node at its start or its end."""
         across = (normal[:, nodes] * direction).sum(axis=-1, keepdims=True) * normal[:, nodes]
-        return ease[:, nodes, None] * (direction - across)
+        moved_by: Float64Array = ease[:, nodes, None] * (direction - across)
+        return moved_by
 
     start, end = eased(slice(None, -1)), eased(slice(1, None))
     diagonal = (direction * (start + end)).sum(axis=-1)
@@ -258,9 +257,7 @@ def _edges_transposed(pull: Float64Array) -> Float64Array:
     return pull - shifted(pull)
 
 
-def _tridiagonal(
-    diagonal: Float64Array, beside: Float64Array, right: Float64Array
-) -> Float64Array:
+def _tridiagonal(diagonal: Float64Array, beside: Float64Array, right: Float64Array) -> Float64Array:
     """Solve symmetric tridiagonal systems (S, m) by elimination along the rods (Thomas)."""
     count = diagonal.shape[1]
     pivot, value = diagonal.copy(), right.copy()

@@ -54,7 +54,7 @@ class Rods:
     @property
     def nodes(self) -> int:
         """Nodes of every rod."""
-        return self.points.shape[1]
+        return int(self.points.shape[1])
 
     def before(self, frames: Float64Array) -> Float64Array:
         """Return (S, n - 1, 4) the frame before each element: the root's, then the segments'."""

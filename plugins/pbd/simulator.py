@@ -12,7 +12,7 @@ import numpy.typing as npt
 from hairkit.exporting import selected
 from hairkit.groom import Groom
 from hairkit.guide_weights import guide_mask
-from hairkit.simulate import Grab, Measures, Surroundings, rotation
+from hairkit.simulate import Measures, Surroundings, rotation
 from hairkit.simulate.obstacles import Obstacles, head_obstacles
 from hairkit.simulate.wind import air_velocity
 from hairkit.stored import Float32Array, Float64Array
@@ -20,8 +20,9 @@ from hairkit.strands import Strands
 
 from .crowd import Crowd, crowd_of
 from .energies import elastic_energy, largest_stretch
-from .guides import node_points, riders
 from .engine import Engine, ReferenceEngine
+from .grabbing import pulls
+from .guides import node_points, riders
 from .reference import Contact, Load, at_rest, moved
 from .rods import Rods, loaded, make_rods
 from .system import Rates, System, assemble
@@ -45,6 +46,8 @@ class PbdSimulator:
         guides = selected(groom, guide_mask(groom.strands))
         self._groom = guides
         self._obstacles: Obstacles = head_obstacles(guides.head)
+        self._points: Float32Array | None = None
+        self._head: Float64Array = np.eye(4)
         self._tune(options)
         self.reset()
 
@@ -97,7 +100,7 @@ class PbdSimulator:
         self._head = np.eye(4) if head_from_rest is None else np.asarray(head_from_rest, np.float64)
         self._engine.state = at_rest(self._rods)
         self._time = 0.0
-        self._points: Float32Array | None = None
+        self._points = None
 
     def retune(self, options: Options) -> None:
         """Take other options from now on; positions and velocities stay."""
@@ -166,7 +169,10 @@ class PbdSimulator:
             ride = inverse_motion(after) @ head if (after != head).any() else np.eye(4)
             load = Load(ride, after[:3, :3].T, gravity, air)
             if around.grabs:  # a pull depends on where the node is
-                force = self._grabbed(around.grabs, system, load, after)
+                force = pulls(
+                    around.grabs, self._engine, self._rods, self._riders, system, load,
+                    inverse_motion(after), self._options.grab_speed,
+                )  # fmt: skip
                 self._engine.run(system, [replace(load, force=force)], self._options.iterations)
             else:
                 loads.append(load)
@@ -195,24 +201,6 @@ class PbdSimulator:
         share = ((at - some[after - 1]) / (some[after] - some[after - 1]))[:, None]
         result: Float64Array = found[:, after - 1] * (1 - share) + found[:, after] * share
         return result
-
-    def _grabbed(
-        self, grabs: tuple[Grab, ...], system: System, load: Load, after: Float64Array
-    ) -> Float64Array:
-        """Force on the nodes nearest to grabbed points that brings them to their targets."""
-        force = np.zeros_like(self._rods.points)
-        back = inverse_motion(after)
-        for grab in grabs:
-            rod = int(self._riders.rod[grab.point])
-            node = int(self._riders.segment[grab.point] + (self._riders.share[grab.point] >= 0.5))
-            node = max(node, 1)
-            place, velocity = self._engine.node(rod, node)
-            expected = moved(load.ride, place) + system.step * load.ride[:3, :3] @ velocity
-            wanted = moved(back, np.asarray(grab.target, np.float64)) - expected
-            far = float(np.linalg.norm(wanted))
-            wanted *= min(1.0, self._options.grab_speed * system.step / max(far, 1e-12))
-            force[rod, node] += wanted / system.inverse[rod, node - 1, node - 1]
-        return force
 
 
 def between(start: Float64Array, end: Float64Array, share: float) -> Float64Array:

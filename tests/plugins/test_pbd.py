@@ -1,0 +1,198 @@
+"""The pbd plugin: grooms at rest, shaken, blown and held; backends against each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hairkit_plugins.pbd import Options
+from hairkit_plugins.pbd.simulator import PbdSimulator
+
+from hairkit.groom import Groom
+from hairkit.head_distance import distance_to
+from hairkit.manager import Manager
+from hairkit.simulate import Grab, Simulator, Surroundings, rotation, run, shaken, still
+from hairkit.strands import Strands
+from hairkit.testing import bristle_groom
+
+
+@pytest.fixture(scope="module")
+def groom() -> Groom:
+    """Return 40 waved strands of 9 to 18 cm, of 20 to 39 points, on the ball head."""
+    ball = bristle_groom()
+    pick = np.linspace(0, len(ball.strands) - 1, 40).astype(int)
+    roots = ball.strands.roots[pick].astype(np.float64)
+    out = roots / np.linalg.norm(roots, axis=1, keepdims=True)
+    strands = []
+    for k, (root, way) in enumerate(zip(roots, out, strict=True)):
+        s = np.linspace(0, 0.09 + 0.0023 * k, 20 + k // 2)[:, None]
+        side = np.cross(way, [0.3, 0.2, 0.9])
+        fall = np.array([0.0, -1.0, 0.0]) * s**2 * 3 + way * s
+        strands.append(root + fall + 0.004 * np.sin(60 * s) * side)
+    return replace(
+        ball,
+        strands=Strands.from_list(strands),
+        root_triangle=ball.root_triangle[pick],
+        root_barycentric=ball.root_barycentric[pick],
+    )
+
+
+@pytest.mark.parametrize("backend", ["reference", "fast"])
+def test_captured_hair_does_not_sag(groom: Groom, backend: str) -> None:
+    """Two seconds under gravity move no point by 0.1 mm."""
+    simulator = PbdSimulator(groom, Options(backend=backend))
+    for _ in range(20):
+        simulator.advance(0.1, Surroundings())
+    assert np.abs(simulator.points - groom.strands.points).max() < 1e-4
+
+
+def test_backends_agree(groom: Groom) -> None:
+    """Shaken, in gusts, for half a second: no point differs by 0.02 mm."""
+    motion = shaken(["yaw:25:2", "pitch:10:1.3"], groom.head)
+    wind = np.array([2.0, 0.0, 1.0])
+    both = [PbdSimulator(groom, Options(backend=name)) for name in ("reference", "fast")]
+    for frame in range(1, 31):
+        around = Surroundings(motion(frame / 60), wind, 0.4)
+        for simulator in both:
+            simulator.advance(1 / 60, around)
+    assert np.abs(both[0].points - groom.strands.points).max() > 0.01
+    assert np.abs(both[0].points - both[1].points).max() < 2e-5
+
+
+def test_shaken_hair_keeps_its_length_and_stays_out_of_the_head(groom: Groom) -> None:
+    """Stretch below 1 % at every frame; no node more than 2 mm inside."""
+    simulator = PbdSimulator(groom, Options())
+    motion, deepest, stretch = shaken(["yaw:30:2"], groom.head), 0.0, 0.0
+    rest = distance_to(groom.head, groom.strands.points)
+    for frame in range(1, 61):
+        head = motion(frame / 60)
+        simulator.advance(1 / 60, Surroundings(head))
+        stretch = max(stretch, simulator.measure().stretch)
+        local = (simulator.points - head[:3, 3]) @ head[:3, :3]
+        inside = np.minimum(rest, 0.0) - distance_to(groom.head, local)
+        deepest = max(deepest, float(inside.max()))
+    assert stretch < 0.01
+    assert deepest < 0.002
+
+
+def test_shaken_hair_comes_back_to_rest(groom: Groom) -> None:
+    """Three seconds after a short shake the hair is within 2 mm of where it was."""
+    motion = shaken(["roll:20:2:0.5"], groom.head)
+    cache = run(PbdSimulator(groom, Options(friction=0.0)), motion, 210)
+    away = np.linalg.norm(cache.points - groom.strands.points, axis=2).max(axis=1)
+    assert away[20] > 0.01
+    assert away[-1] < 0.002
+
+
+def test_roots_ride_on_the_head(groom: Groom) -> None:
+    """Whatever happens, a root is where the head carries it."""
+    simulator = PbdSimulator(groom, Options())
+    head = shaken(["yaw:40:1"], groom.head)(0.3)
+    simulator.advance(0.05, Surroundings(head, np.array([5.0, 0, 0])))
+    roots = simulator.points[groom.strands.offsets[:-1]]
+    wanted = groom.strands.roots @ head[:3, :3].T + head[:3, 3]
+    np.testing.assert_allclose(roots, wanted, atol=1e-6)
+
+
+def test_a_carried_head_carries_hair_at_rest(groom: Groom) -> None:
+    """Reset on a turned and moved head: the captured shape, turned and moved, without motion."""
+    simulator = PbdSimulator(groom, Options())
+    head = shaken(["yaw:90:1"], groom.head)(0.25)
+    head[:3, 3] += [10.0, 0.0, -3.0]
+    simulator.reset(head)
+    for _ in range(10):
+        simulator.advance(1 / 60, Surroundings(head))
+    wanted = groom.strands.points @ head[:3, :3].T + head[:3, 3]
+    np.testing.assert_allclose(simulator.points, wanted, atol=1e-4)
+
+
+@pytest.mark.parametrize("backend", ["reference", "fast"])
+def test_motion_does_not_depend_on_how_frames_are_cut(groom: Groom, backend: str) -> None:
+    """In steady wind, one call of a tenth of a second equals six of a sixtieth."""
+    around = Surroundings(wind=np.array([3.0, 0.0, 0.0]))
+    one, six = (PbdSimulator(groom, Options(backend=backend)) for _ in range(2))
+    one.advance(0.1, around)
+    for _ in range(6):
+        six.advance(1 / 60, around)
+    np.testing.assert_allclose(one.points, six.points, atol=1e-6)
+
+
+@pytest.mark.parametrize("backend", ["reference", "fast"])
+def test_a_grabbed_point_comes_to_the_hand(groom: Groom, backend: str) -> None:
+    """A held tip goes most of the way against its stiffness; the strand keeps its length."""
+    simulator = PbdSimulator(groom, Options(backend=backend))
+    tip = int(groom.strands.offsets[9]) - 1
+    root = groom.strands.roots[8].astype(np.float64)
+    turn = rotation.to_matrix(rotation.about([0.0, 1.0, 0.0], 0.3))
+    target = root + 0.97 * turn @ (groom.strands.points[tip] - root)
+    grab = Grab(tip, (target[0], target[1], target[2]))
+    for _ in range(30):
+        simulator.advance(1 / 60, Surroundings(grabs=(grab,)))
+    way = np.linalg.norm(groom.strands.points[tip] - target)
+    assert np.linalg.norm(simulator.points[tip] - target) < 0.3 * way
+    assert simulator.measure().stretch < 0.01
+
+
+def test_more_stiffness_moves_less(groom: Groom) -> None:
+    """Wind blows hair less far the stiffer it is, by either option."""
+    around = Surroundings(wind=np.array([4.0, 0.0, 0.0]))
+
+    def blown(**options: float) -> float:
+        simulator = PbdSimulator(groom, Options(**options))
+        for _ in range(30):
+            simulator.advance(1 / 60, around)
+        return float(np.linalg.norm(simulator.points - groom.strands.points, axis=1).mean())
+
+    assert blown(stiffness=0.9) < blown(stiffness=0.4) < blown(stiffness=0.0)
+    assert blown(bend=0.9) < blown(bend=0.2)
+
+
+def test_retuning_keeps_the_positions(groom: Groom) -> None:
+    """New options move nothing by themselves, and None is resolved by the groom."""
+    simulator = PbdSimulator(groom, Options())
+    simulator.advance(0.1, Surroundings(wind=np.array([4.0, 0.0, 0.0])))
+    before = simulator.points.copy()
+    simulator.retune(Options(stiffness=0.9))
+    np.testing.assert_allclose(simulator.points, before, atol=1e-6)
+    assert simulator.options.stiffness == 0.9
+    assert simulator.options.damping == groom.physics.damping
+
+
+def test_equal_input_gives_equal_frames(groom: Groom) -> None:
+    """Two runs with gusts are the same to the last bit."""
+    around = Surroundings(wind=np.array([3.0, 0.0, 0.0]), turbulence=0.5)
+    frames = []
+    for _ in range(2):
+        simulator = PbdSimulator(groom, Options())
+        simulator.advance(0.2, around)
+        frames.append(simulator.points)
+    assert (frames[0] == frames[1]).all()
+
+
+def test_folded_and_tiny_strands_stay_finite(groom: Groom) -> None:
+    """Strands that fold back, lie in one point or hold two points are simulated all the same."""
+    root = groom.strands.roots[0].astype(np.float64)
+    fold = root + np.array([[0, 0, 0], [0, 0.05, 0], [0, 0, 0], [0, 0.05, 0]])
+    odd = Strands.from_list(
+        [fold, np.repeat(root[None], 3, axis=0), root + np.array([[0, 0, 0], [0, 0.1, 0]])]
+    )
+    few = replace(
+        groom,
+        strands=odd,
+        root_triangle=groom.root_triangle[:3],
+        root_barycentric=groom.root_barycentric[:3],
+    )
+    cache = run(PbdSimulator(few, Options()), shaken(["yaw:30:3"], few.head), 40)
+    assert np.abs(cache.points).max() < 0.5
+
+
+def test_the_plugin_makes_a_simulator(manager: Manager, groom: Groom) -> None:
+    """By name it gives what the contract asks for; only guides are simulated."""
+    guide = np.arange(len(groom.strands)) % 2 == 0
+    mixed = replace(groom, strands=replace(groom.strands, guide=guide))
+    simulator = manager.call("make_simulator", "pbd", {"nodes": 8}, groom=mixed)
+    assert isinstance(simulator, Simulator)
+    assert len(simulator.strands) == guide.sum()
+    cache = run(simulator, still(), 2)
+    assert cache.points.shape == (2, len(simulator.strands.points), 3)

@@ -1,0 +1,124 @@
+"""Laws of runs without a window, and of `hairkit simulate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hairkit import cli
+from hairkit.errors import HairkitError, InputError
+from hairkit.groom import Groom
+from hairkit.groom_file import write_groom
+from hairkit.manager import Manager
+from hairkit.point_cache import PointCache, read_cache
+from hairkit.simulate import Weather, run, shaken, still
+from hairkit.testing import bristle_groom
+
+
+@pytest.fixture(scope="module")
+def groom() -> Groom:
+    """Return a few bristles."""
+    ball = bristle_groom()
+    pick = np.arange(0, len(ball.strands), 12)
+    from hairkit.exporting import selected
+
+    keep = np.zeros(len(ball.strands), bool)
+    keep[pick] = True
+    return selected(ball, keep)
+
+
+def made(manager: Manager, groom: Groom, **options: object) -> object:
+    """Return the simulator of the reference backend: nothing is compiled."""
+    return manager.call("make_simulator", "pbd", {"backend": "reference", **options}, groom=groom)
+
+
+def test_the_first_frame_is_the_rest(manager: Manager, groom: Groom) -> None:
+    """Frame 0 is the captured hair on the head's first key; times and heads are the motion's."""
+    motion = shaken(["yaw:20:2"], groom.head)
+    cache = run(made(manager, groom), motion, 5, 50.0)
+    np.testing.assert_array_equal(cache.points[0], groom.strands.points)
+    np.testing.assert_allclose(cache.times, np.arange(5) / 50)
+    np.testing.assert_allclose(cache.head_from_rest[3], motion(3 / 50))
+
+
+def test_warm_up_is_the_end_of_a_longer_run(manager: Manager, groom: Groom) -> None:
+    """Frames after a warm-up are the frames of the same run without it."""
+    weather = Weather(np.array([3.0, 0.0, 0.0]), 0.3)
+    simulator = made(manager, groom)
+    long = run(simulator, still(), 8, weather=weather)
+    short = run(simulator, still(), 3, weather=weather, warm_up=5 / 60)
+    np.testing.assert_array_equal(short.points, long.points[5:])
+
+
+def test_what_is_not_finite_is_an_error(manager: Manager, groom: Groom) -> None:
+    """A simulator that blows up is named, not written."""
+    simulator = made(manager, groom)
+
+    class Exploding:
+        strands, points = simulator.strands, np.full_like(simulator.points, np.nan)
+
+        def reset(self, head: object) -> None: ...
+        def advance(self, seconds: float, around: object) -> None: ...
+
+    with pytest.raises(HairkitError, match="not finite"):
+        run(Exploding(), still(), 2)
+    with pytest.raises(InputError, match="frames"):
+        run(simulator, still(), 0)
+
+
+def simulate(groom: Groom, folder: Path, *more: str) -> int:
+    """Run the verb on a groom's file."""
+    write_groom(folder / "groom.npz", groom)
+    words = ["simulate", str(folder / "groom.npz"), "--frames", "4", "--quiet"]
+    return cli.main([*words, "--set", "pbd.backend=reference", *more])
+
+
+def test_the_verb_writes_a_cache_of_the_groom(groom: Groom, tmp_path: Path) -> None:
+    """The cache belongs to the groom and equal commands write equal bytes."""
+    files = []
+    for name in ("a.npz", "b.npz"):
+        path = tmp_path / name
+        words = ["--shake", "yaw:20:3", "--wind", "3,0,1", "--turbulence", "0.3"]
+        assert simulate(groom, tmp_path, "-o", str(path), *words) == 0
+        files.append(path.read_bytes())
+    assert len(read_cache(tmp_path / "a.npz", groom)) == 4
+    assert files[0] == files[1]
+
+
+def test_other_endings_go_through_their_exporter(groom: Groom, tmp_path: Path) -> None:
+    """`-o hair.abc` writes an animated file; formats without animation are refused by name."""
+    assert simulate(groom, tmp_path, "-o", str(tmp_path / "hair.abc")) == 0
+    assert (tmp_path / "hair.abc").stat().st_size > 1000
+    assert simulate(groom, tmp_path, "-o", str(tmp_path / "hair.apx")) == 2
+    assert not (tmp_path / "hair.apx").exists()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["--wind", "3,0"], ["--shake", "yaw:x:1"], ["--fps", "0"], ["--set", "pbd.dampin=1"],
+     ["--set", "gabor.angles=3"], ["--using", "gabor"], ["--motion", "nowhere.json"]],
+)  # fmt: skip
+def test_bad_words_are_one_line(
+    groom: Groom, tmp_path: Path, words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2, one line, nothing written."""
+    assert simulate(groom, tmp_path, "-o", str(tmp_path / "c.npz"), *words) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+    assert not (tmp_path / "c.npz").exists()
+
+
+def test_interrupted_runs_leave_nothing(
+    groom: Groom, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C while frames are made or written leaves neither file nor part."""
+
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    for owner, name in ((PointCache, "save"), (np, "isfinite")):
+        with monkeypatch.context() as patch:
+            patch.setattr(owner, name, interrupted)
+            assert simulate(groom, tmp_path, "-o", str(tmp_path / "c.npz")) == 2
+        assert [p.name for p in tmp_path.iterdir()] in (["groom.npz"], [])
