@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from hairkit.camera import Camera
 from hairkit.capture import Capture
@@ -22,7 +24,7 @@ from hairkit.errors import InputError
 from hairkit.head import Head
 from hairkit.manager import Manager
 from hairkit.pose import fit_similarity
-from hairkit.stored import Float64Array
+from hairkit.stored import Float32Array, Float64Array
 from hairkit.viewer.motion import AXES, rotation_about
 
 PLUGIN = "manual"
@@ -55,10 +57,8 @@ class Adjustment:
         nominal = start.cameras()
         names = [name for name in nominal if name in cameras]
         if len(names) >= 3:
-            places = [[c[name].position for name in names] for c in (cameras, nominal)]
-            fit = fit_similarity(places[0], places[1])
-            start.pose[:3, :3] = fit.scale * fit.rotation
-            start.pose[:3, 3] = fit.translation
+            found = [cameras[n].resized(nominal[n].width, nominal[n].height) for n in names]
+            start.pose = _fitted_pose(found, [nominal[n] for n in names], head.vertices)
         return start
 
     def cameras(self) -> dict[str, Camera]:
@@ -99,6 +99,31 @@ class Adjustment:
         linear = self.pose[:3, :3]
         result: Float64Array = linear @ way / np.cbrt(np.linalg.det(linear))
         return result
+
+
+def _fitted_pose(
+    found: list[Camera], nominal: list[Camera], vertices: Float32Array
+) -> Float64Array:
+    """Return the pose (4, 4) with which nominal cameras see the head where `found` ones do."""
+    points = vertices[np.linspace(0, len(vertices) - 1, 40).astype(int)].astype(np.float64)
+    wanted = np.stack([camera.project(points) for camera in found])
+    rough = fit_similarity([c.position for c in found], [c.position for c in nominal])
+    turn = Rotation.from_matrix(rough.rotation).as_rotvec()
+    start = np.concatenate([[np.log(rough.scale)], turn, rough.translation])
+
+    def pose(values: Float64Array) -> Float64Array:
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.exp(values[0]) * Rotation.from_rotvec(values[1:4]).as_matrix()
+        matrix[:3, 3] = values[4:]
+        return matrix
+
+    def misfit(values: Float64Array) -> Float64Array:
+        matrix = pose(values)
+        moved = points @ matrix[:3, :3].T + matrix[:3, 3]
+        seen = np.stack([camera.project(moved) for camera in nominal])
+        return np.nan_to_num((seen - wanted).ravel(), nan=1e4)
+
+    return pose(least_squares(misfit, start).x)
 
 
 @dataclass

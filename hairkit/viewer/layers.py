@@ -49,11 +49,8 @@ class Layers:
     @property
     def available(self) -> tuple[str, ...]:
         """Names of the layers that can be shown."""
-        have = {
-            "head": True,
-            "torso": True,
-            "photos": self.capture is not None and bool(self.cameras),
-        }
+        photos = self.capture is not None and bool(self.cameras)
+        have = {"head": True, "torso": True, "photos": photos}
         files = {"masks": "segment-*", "orientation": "orient-*", "cameras": "scene"}
         files |= {"hull": "hull", "field": "field"}
         for name, pattern in files.items():

@@ -184,8 +184,7 @@ class Stage:
             self._head.draw(own, depth, HEAD_PUSH, lighting)
         for name in shot.solids:
             if name in STANDING:
-                still: Float64Array = np.linalg.inv(shot.world_from_head)
-                self._solids[name].place(still)
+                self._solids[name].place(np.asarray(np.linalg.inv(shot.world_from_head), float))
             self._solids[name].draw(own, depth, 0.0, lighting)
         self.gl.context.cull_face = "back"
 

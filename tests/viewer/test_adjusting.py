@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hairkit.camera import Camera
 from hairkit.capture_file import HeadEntry, head_entry, read_capture_file, write_head_entry
 from hairkit.capture_reader import sample_folder
 from hairkit.errors import InputError
@@ -106,6 +108,26 @@ def test_it_begins_where_the_cameras_were_found(manager: Manager, adjustment: Ad
     found = adjustment.cameras()
     again = Adjustment.of(manager, sample_folder(), ball_head(), found)
     np.testing.assert_allclose(again.pose, adjustment.pose, atol=1e-6)
+
+
+def test_it_begins_where_photos_show_the_head(manager: Manager, adjustment: Adjustment) -> None:
+    """Other focal lengths and distances give the pose that keeps the head's place in the photos."""
+    found = {
+        name: replace(camera, focal=1.3 * camera.focal, camera_from_head=farther(camera, 1.3))
+        for name, camera in adjustment.cameras().items()
+    }
+    cameras = Adjustment.of(manager, sample_folder(), ball_head(), found).cameras()
+    points = ball_head().vertices[::7]
+    for name, camera in found.items():
+        gap = np.linalg.norm(camera.project(points) - cameras[name].project(points), axis=1)
+        assert gap.max() < 0.03 * camera.width
+
+
+def farther(camera: Camera, times: float) -> np.ndarray:
+    """Return where a camera is so many times as far from the origin."""
+    matrix = camera.camera_from_head.copy()
+    matrix[:3, 3] *= times
+    return matrix
 
 
 def test_without_photos_there_is_nothing_to_adjust(session: Session) -> None:
