@@ -18,6 +18,7 @@ on it keeps the arc at half a turn: no loops where two tangents happen to be ali
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -73,7 +74,8 @@ def fit_arcs(path: Path | Strands, counts: Int64Array, *, turning: bool = True) 
     if turning:
         points, tangents = _released(points, tangents, first)
     else:
-        points = points + _release(points, tangents, first, np.zeros(len(first)))
+        frame = _frame(tangents, first)
+        points = points + _release(points, frame, first, np.zeros(len(first)))
     last = first + 1
     darboux, lengths = helix_through(points[first], tangents[first], points[last], tangents[last])
     return Arcs(points[first], tangents[first], darboux, lengths, offsets)
@@ -99,22 +101,32 @@ def _released(
     """Return points and tangents with co-helical pairs whose arcs turn at most half a turn."""
     for _ in range(TANGENT_STEPS):
         tangents = _turned(points, tangents, first)
-    limit = np.zeros(len(first))
-    moved = points + _release(points, tangents, first, limit)
+    limit, frame = np.zeros(len(first)), _frame(tangents, first)
+    moved = points + _release(points, frame, first, limit)
     for _ in range(LIMIT_STEPS):
-        excess, bound = _excess(moved, tangents, first)
+        excess, bound = _excess(moved, frame, first)
         new = (limit == 0) & (excess != 0)
         if not new.any():
             break
         limit = np.where(new, np.sign(excess) * bound, limit)
-        moved = points + _release(points, tangents, first, limit)
+        moved = points + _release(points, frame, first, limit)
     return moved, tangents
 
 
-def _frame(
-    tangents: Float64Array, first: Int64Array
-) -> tuple[Float64Array, Float64Array, Float64Array]:
-    """Return unit e along each change of tangent, m along the sum, and b = m x e."""
+class _Frame(NamedTuple):
+    """Directions of every pair of tangents."""
+
+    e: Float64Array
+    """(A, 3) unit, along the change of tangent."""
+    m: Float64Array
+    """(A, 3) unit, along the sum."""
+    b: Float64Array
+    """(A, 3) m x e."""
+    bound: Float64Array
+    """(A,) the chord's slope to b on an arc of half a turn, (2 / pi) tan(half the angle)."""
+
+
+def _frame(tangents: Float64Array, first: Int64Array) -> _Frame:
     start, end = tangents[first], tangents[first + 1]
     m = unit(start + end)
     change = end - start
@@ -122,23 +134,18 @@ def _frame(
     tiny = dot(change, change)[:, None] < _COINCIDENT**2
     e = np.where(tiny, np.cross(m, spare), change)
     e = unit(e - dot(e, m)[:, None] * m)
-    return e, m, np.cross(m, e)
+    half = np.sqrt(dot(change, change)) / 2
+    bound = (2 / np.pi) * half / np.sqrt(np.maximum(1 - half**2, 1e-6)) + _COINCIDENT
+    return _Frame(e, m, np.cross(m, e), bound)
 
 
 def _excess(
-    points: Float64Array, tangents: Float64Array, first: Int64Array
+    points: Float64Array, frame: _Frame, first: Int64Array
 ) -> tuple[Float64Array, Float64Array]:
-    """Return each chord's slope to b beyond that of half a turn, signed, and that slope.
-
-    An arc of half a turn has the slope (2 / pi) tan(half the angle between its tangents).
-    """
-    _, m, b = _frame(tangents, first)
+    """Return each chord's slope to b beyond that of half a turn, signed, and that slope."""
     chord = points[first + 1] - points[first]
-    change = tangents[first + 1] - tangents[first]
-    half = np.sqrt(dot(change, change)) / 2
-    bound = (2 / np.pi) * half / np.sqrt(np.maximum(1 - half**2, 1e-6)) + _COINCIDENT
-    slope = dot(chord, b) / _along(chord, m)
-    return np.sign(slope) * np.maximum(np.abs(slope) - bound, 0.0), bound
+    slope = dot(chord, frame.b) / _along(chord, frame.m)
+    return np.sign(slope) * np.maximum(np.abs(slope) - frame.bound, 0.0), frame.bound
 
 
 def _along(chord: Float64Array, m: Float64Array) -> Float64Array:
@@ -154,8 +161,9 @@ def _turned(points: Float64Array, tangents: Float64Array, first: Int64Array) -> 
     A pair wants its mean tangent to turn by what stands in the way of a co-helical arc of up to
     half a turn: the chord's slope to e, and its excess to b.
     """
-    excess, _ = _excess(points, tangents, first)
-    e, m, b = _frame(tangents, first)
+    frame = _frame(tangents, first)
+    excess, _ = _excess(points, frame, first)
+    e, m, b, _ = frame
     chord = points[first + 1] - points[first]
     slope = np.clip(dot(chord, e) / _along(chord, m), -FARTHEST, FARTHEST)
     wish = slope[:, None] * e + np.clip(excess, -FARTHEST, FARTHEST)[:, None] * b
@@ -170,14 +178,14 @@ def _turned(points: Float64Array, tangents: Float64Array, first: Int64Array) -> 
 
 
 def _release(
-    points: Float64Array, tangents: Float64Array, first: Int64Array, limit: Float64Array
+    points: Float64Array, frame: _Frame, first: Int64Array, limit: Float64Array
 ) -> Float64Array:
     """Return the smallest moves (C, 3) of the cuts that make all pairs co-helical.
 
     Where `limit` (A,) is not 0 the chord also gets that slope to b. Rows of the conditions are two
     an arc, the second one empty where there is no limit.
     """
-    e, m, b = _frame(tangents, first)
+    e, m, b, _ = frame
     rows = np.stack([e, unit(b - limit[:, None] * m)], axis=1)
     active = np.stack([np.ones(len(first), bool), limit != 0], axis=1)
     rows = np.where(active[..., None], rows, 0.0)
