@@ -20,7 +20,7 @@ from hairkit.viewer.hair_body import MAX_HAIRS
 from hairkit.viewer.motion import AXES, Shake
 from hairkit.viewer.picking import grab_lock, nearest_point, surface_point
 from hairkit.viewer.presets import presets_path, read_preset, write_preset
-from hairkit.viewer.recording import Recorder
+from hairkit.viewer.recording import Recorder, free_name
 from hairkit.viewer.session import Session
 
 __all__ = ["ACTIONS", "LOOKS", "bindings", "perform", "pose_actions"]
@@ -330,7 +330,8 @@ def record(session: Session, on: bool | None = None, file: str = "hairkit.mp4") 
         session.message = f"{session.recorder.count} pictures in {session.recorder.path}"
         session.recorder = None
     if wanted:
-        session.recorder = Recorder(Path(file))
+        path = Path(file)
+        session.recorder = Recorder(path if session.overwrite else free_name(path))
 
 
 @action(H={})

@@ -16,6 +16,7 @@ from hairkit.errors import RenderError
 from hairkit.options import OptionInfo
 from hairkit.viewer.actions import LOOKS
 from hairkit.viewer.colouring import COLOURINGS
+from hairkit.viewer.motion import AXES
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
 
@@ -40,16 +41,17 @@ class Panel:
 
     def __init__(self, window: Any) -> None:
         self._imgui, self._backend = _load(window)
+        self._shown = False
 
     @property
     def wants_mouse(self) -> bool:
         """True while the mouse is over the panel."""
-        return self._imgui is not None and bool(self._imgui.get_io().want_capture_mouse)
+        return self._shown and bool(self._imgui.get_io().want_capture_mouse)
 
     @property
     def wants_keys(self) -> bool:
         """True while a text is typed."""
-        return self._imgui is not None and bool(self._imgui.get_io().want_text_input)
+        return self._shown and bool(self._imgui.get_io().want_text_input)
 
     def listen(self) -> None:
         """Hear of characters, which the window does not use."""
@@ -81,7 +83,8 @@ class Panel:
     def draw(self, session: Session, preview: Preview, perform: Perform) -> None:
         """Draw the panel and do what was asked for in it."""
         imgui = self._imgui
-        if imgui is None or not session.shown.panel:
+        self._shown = imgui is not None and session.shown.panel
+        if not self._shown:
             return
         self._backend.process_inputs()
         imgui.new_frame()
@@ -101,6 +104,8 @@ class Panel:
             imgui.same_line()
             if imgui.button("Load preset"):
                 perform("preset_load", {})
+        if session.layers.capture is not None and imgui.collapsing_header("Head in the photos"):
+            _pose(imgui, session, perform)
         imgui.end()
         imgui.render()
         self._backend.render(imgui.get_draw_data())
@@ -166,6 +171,41 @@ def _air(imgui: Any, session: Session, perform: Perform) -> None:
     imgui.same_line()
     if imgui.button("go on" if session.paused else "pause"):
         perform("pause", {})
+
+
+def _pose(imgui: Any, session: Session, perform: Perform) -> None:
+    changed, on = imgui.checkbox("place the head", session.adjustment is not None)
+    if changed:
+        perform("adjust", {"on": on})
+    if session.adjustment is None:
+        return
+    moves = {"left": -0.002, "right": 0.002, "up": 0.002, "down": -0.002}
+    for label, metres in moves.items():
+        if imgui.button(label):
+            axis = "right" if label in ("left", "right") else "up"
+            perform("head_move", {axis: metres})
+        imgui.same_line()
+    for label, factor in (("larger", 1.01), ("smaller", 1 / 1.01)):
+        if imgui.button(label):
+            perform("head_scale", {"factor": factor})
+        imgui.same_line()
+    imgui.new_line()
+    for axis in AXES:
+        for label, degrees in ((f"{axis} -", -1.0), (f"{axis} +", 1.0)):
+            if imgui.button(label):
+                perform("head_turn", {"axis": axis, "degrees": degrees})
+            imgui.same_line()
+    imgui.new_line()
+    for label, values in (("next photo", {"step": 1}), ("photo before", {"step": -1})):
+        if imgui.button(label):
+            perform("through", values)
+        imgui.same_line()
+    if imgui.button("save"):
+        perform("head_save", {})
+    if imgui.button("reconstruct from here") and session.rerun is None:
+        perform("reconstruct", {})
+    if session.rerun is not None:
+        imgui.text(session.rerun.progress)
 
 
 def _option(imgui: Any, session: Session, info: OptionInfo, perform: Perform) -> None:

@@ -18,7 +18,7 @@ from hairkit.viewer.hair_pass import HairLook
 from hairkit.viewer.hud import Readings
 from hairkit.viewer.layers import BOARDS
 from hairkit.viewer.line_pass import LineSet
-from hairkit.viewer.recording import write_png
+from hairkit.viewer.recording import free_name, write_png
 from hairkit.viewer.session import Session
 from hairkit.viewer.stage import Shot, Stage
 
@@ -222,15 +222,6 @@ class Preview:
             self.stage.framebuffer.width / self.session.size[0],
             readings.renderer,
         )
-
-
-def free_name(path: Path) -> Path:
-    """Return the path, or the first of `name_1`, `name_2` ... that is not taken."""
-    number, free = 0, path
-    while free.exists():
-        number += 1
-        free = path.with_stem(f"{path.stem}_{number}")
-    return free
 
 
 def _guide_lines(rows: Any, colours: Any) -> LineSet:

@@ -21,6 +21,15 @@ def write_png(path: Path, picture: UInt8Array) -> None:
     write_bytes(path, data.tobytes(), durable=False)
 
 
+def free_name(path: Path) -> Path:
+    """Return the path, or the first of `name_1`, `name_2` ... that is not taken."""
+    number, free = 0, path
+    while free.exists():
+        number += 1
+        free = path.with_stem(f"{path.stem}_{number}")
+    return free
+
+
 class Recorder:
     """Takes one picture after the other; `close` ends the recording."""
 

@@ -209,6 +209,9 @@ class Session:
         )
         self.tuned.simulator.advance(STEP, surroundings)
         self.steps += 1
+        if not np.isfinite(self.tuned.simulator.points).all():
+            self.reset()
+            self.message = "the simulation became unstable and was put back to rest"
 
     def reset(self) -> None:
         """Put head and hair back to rest."""

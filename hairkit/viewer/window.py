@@ -189,7 +189,12 @@ class Window:
         self._fit()
         self._reload_changed()
         with renderer() as gl:
-            self.preview.frame(seconds, still=bool(self.session.screenshots))
+            try:
+                self.preview.frame(seconds, still=bool(self.session.screenshots))
+            except (HairkitError, OSError) as error:  # a full disk, a simulator at its end
+                self.session.message = " ".join(str(error).split())
+                self.session.paused, self.session.recorder = True, None
+                self.session.screenshots = []
             self._show(gl)
             self._panel.draw(self.session, self.preview, self.perform)
             self._glfw.swap_buffers(self._window)

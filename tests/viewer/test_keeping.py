@@ -1,0 +1,113 @@
+"""Laws of what the viewer keeps and watches: pictures, recordings, changed files, runaway hair."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from hairkit.errors import InputError
+from hairkit.options import describe
+from hairkit.viewer.actions import perform
+from hairkit.viewer.recording import Recorder, free_name, write_png
+from hairkit.viewer.session import Session
+from hairkit.viewer.simulation import StillHair
+from hairkit.viewer.watching import EVERY, Watch, shader_files
+
+PICTURE = np.full((48, 64, 3), (200, 60, 20), np.uint8)
+
+
+def test_a_recording_holds_every_picture_in_order(tmp_path: Path) -> None:
+    """An MP4 can be read again: as many pictures, of about the same colours."""
+    path = tmp_path / "a.mp4"
+    recorder = Recorder(path)
+    for number in range(5):
+        recorder.add(np.full((48, 64, 3), 40 * number + 20, np.uint8))
+    recorder.close()
+    video = cv2.VideoCapture(str(path))
+    means = []
+    while (found := video.read())[0]:
+        means.append(float(np.mean(found[1])))
+    video.release()
+    np.testing.assert_allclose(means, [20, 60, 100, 140, 180], atol=6)
+
+
+def test_a_folder_of_pictures_is_numbered(tmp_path: Path) -> None:
+    """PNG files keep red red."""
+    recorder = Recorder(tmp_path / "frames")
+    recorder.add(PICTURE)
+    recorder.add(PICTURE)
+    recorder.close()
+    read = cv2.imread(str(tmp_path / "frames" / "0001.png"))
+    assert read is not None
+    assert read[0, 0].tolist() == [20, 60, 200]
+    with pytest.raises(InputError, match=r"\.mp4 files or folders"):
+        Recorder(tmp_path / "a.avi")
+
+
+def test_names_that_are_taken_get_a_number(tmp_path: Path) -> None:
+    """Nothing is written over."""
+    path = tmp_path / "a.png"
+    assert free_name(path) == path
+    write_png(path, PICTURE)
+    assert free_name(path) == tmp_path / "a_1.png"
+
+
+def test_a_changed_file_is_noticed_once(tmp_path: Path) -> None:
+    """After the next look it counts as seen; a file that comes later counts as a change."""
+    path = tmp_path / "groom.npz"
+    watch = Watch([path])
+    assert not watch.changed(EVERY + 1)
+    path.write_bytes(b"1")
+    assert not watch.changed(EVERY + 1.1)  # too early to look again
+    assert watch.changed(2 * EVERY + 2)
+    assert not watch.changed(3 * EVERY + 3)
+    os.utime(path, ns=(1, 1))
+    assert watch.changed(4 * EVERY + 4)
+
+
+def test_all_shaders_of_the_viewer_are_watched() -> None:
+    """A checkout's shaders are reloaded when they are saved."""
+    names = {path.name for path in shader_files()}
+    assert {"viewer_stroke.comp", "marschner.glsl", "skin.frag"} <= names
+
+
+def test_runaway_hair_is_put_back_to_rest(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A simulator that gives no numbers any more does not take the viewer with it."""
+    simulator = session.tuned.simulator
+    rest = simulator.points.copy()
+
+    def explode(seconds: float, surroundings: object) -> None:
+        simulator.points = np.full_like(rest, np.nan)  # type: ignore[misc]
+
+    monkeypatch.setattr(simulator, "advance", explode)
+    session.advance(0.05)
+    np.testing.assert_array_equal(session.tuned.simulator.points, rest)
+    assert "unstable" in session.message
+
+
+def test_without_a_simulator_hair_goes_rigidly_with_the_head(session: Session) -> None:
+    """Points keep their places in the head's frame, and read-outs say that all is calm."""
+    still = StillHair(session.opened.groom)
+    matrix = np.eye(4)
+    matrix[:3, 3] = (0.1, 0.0, -0.2)
+    still.reset(matrix)
+    moved = still.points - session.opened.groom.strands.points
+    np.testing.assert_allclose(moved, np.broadcast_to(matrix[:3, 3], moved.shape), atol=1e-6)
+    assert still.measure().stretch == 0
+
+
+def test_every_option_can_be_changed_by_keys(session: Session) -> None:
+    """Each kind of option has a next value, and within its bounds."""
+    for info in describe(type(session.tuned.simulator.options)):
+        before = session.tuned.value(info.name)
+        for steps in (1, -1, 200, -400):
+            value = session.tuned.nudged(info.name, steps)
+            perform(session, "option", {"name": info.name, "value": value})  # is within bounds
+        perform(session, "option", {"name": info.name, "value": before})
+        assert session.tuned.nudged(info.name, 1) != before
