@@ -10,10 +10,12 @@ BPY_PYTHON ?= python3.11
 DEMO := demo-out
 EXAMPLE := examples/hairkit-sobel
 LIBRARIES := libegl1 libgl1 libgl1-mesa-dri libosmesa6
+DISPLAYS := xvfb
 
 .PHONY: test test-clients demo lint bench clean
 
 test: $(VENV)/.tests
+	@sh .ci/libraries $(DISPLAYS)
 	@sh .ci/validator $(CLIENTS)
 	$(BIN)/python -m pytest --ignore tests/clients
 
@@ -23,8 +25,9 @@ test-clients: $(VENV)/.tests $(CLIENTS)/.blender
 
 demo: $(VENV)/.hairkit
 	$(BIN)/hairkit reconstruct hairkit/sample -o $(DEMO)
-	@echo "Your hair is in $(DEMO)/: look at $(DEMO)/contact_sheet.png, load the .apx in a"
-	@echo "HairWorks viewer, or go on with: $(BIN)/hairkit info $(DEMO)/groom.npz"
+	@echo "Your hair is in $(DEMO)/: look at $(DEMO)/contact_sheet.png, open groom.glb (head and"
+	@echo "hair) or groom.abc (strands) in Blender, groom.apx in HairWorks, or move it here:"
+	@echo "  $(BIN)/hairkit view $(DEMO)/groom.npz"
 
 lint: $(VENV)/.lint
 	$(BIN)/ruff check .
