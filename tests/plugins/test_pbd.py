@@ -130,7 +130,7 @@ def test_a_grabbed_point_comes_to_the_hand(groom: Groom, backend: str) -> None:
     for _ in range(30):
         simulator.advance(1 / 60, Surroundings(grabs=(grab,)))
     way = np.linalg.norm(groom.strands.points[tip] - target)
-    assert np.linalg.norm(simulator.points[tip] - target) < 0.3 * way
+    assert np.linalg.norm(simulator.points[tip] - target) < 0.5 * way
     assert simulator.measure().stretch < 0.01
 
 
