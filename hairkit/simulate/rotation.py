@@ -78,6 +78,10 @@ def about(axis: npt.ArrayLike, angle: npt.ArrayLike) -> Float64Array:
 def from_matrix(matrix: npt.ArrayLike) -> Float64Array:
     """Return the quaternions (..., 4) of rotation matrices (..., 3, 3), w not negative."""
     m = np.asarray(matrix, np.float64)
+    if m.ndim == 2 and m[0, 0] + m[1, 1] + m[2, 2] > 0:  # one turn of less than 120 degrees
+        w = 0.5 * float(np.sqrt(1.0 + m[0, 0] + m[1, 1] + m[2, 2]))
+        x, y, z = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
+        return np.array([w, x / (4 * w), y / (4 * w), z / (4 * w)])
     xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
     # Four candidates, each exact where its own component is the largest (Shepperd 1978).
     squares = np.stack([xx + yy + zz, xx - yy - zz, yy - xx - zz, zz - xx - yy], axis=-1) + 1.0

@@ -16,10 +16,11 @@ from hairkit.stored import Float64Array, Int64Array
 
 from .reference import State, moved
 
-SPACING = 0.015
+SPACING = 0.02
 """Metres between the grid's values: some distances between guides."""
-ROOM = 0.15
+ROOM = 0.1
 """How far the grid goes beyond the captured hair, metres."""
+_BITS = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +99,20 @@ class Crowd:
             usual = self.usual.reshape(-1)
             crowded = np.maximum(filled - usual, 0.0) / usual
             field = np.minimum(crowded, 4.0).reshape(self.shape)
-            slope = np.stack([np.gradient(field, axis=k) for k in range(3)], axis=-1)
-            push = np.einsum("nc,nck->nk", weight, slope.reshape(-1, 3)[corner])
+            push = np.einsum("nck,nc->nk", self._slopes(position), field.reshape(-1)[corner])
             result = result - pressure * seconds * push
         return result
+
+    def _slopes(self, position: Float64Array) -> Float64Array:
+        """(N, 8, 3) weights whose sum with the corners' values is the gradient within the cell."""
+        at = np.clip((position - self.origin) / SPACING, 0.0, np.array(self.shape) - 1.001)
+        t = (at - np.floor(at))[:, None]
+        part = np.where(_BITS, t, 1 - t)
+        sign = 2.0 * _BITS - 1.0
+        pairs = [(1, 2), (0, 2), (0, 1)]
+        return np.stack(
+            [sign[:, k] * part[..., a] * part[..., b] for k, (a, b) in enumerate(pairs)], axis=-1
+        )
 
     def _corners(self, position: Float64Array) -> tuple[Int64Array, Float64Array]:
         """Numbers (N, 8) of the cells about each node and their weights (N, 8)."""
@@ -109,10 +120,9 @@ class Crowd:
         at = np.clip(at, 0.0, np.array(self.shape) - 1.001)
         low = at.astype(np.int64)
         t = at - low
-        bits = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)])
-        weight = np.where(bits, t[:, None], 1 - t[:, None]).prod(axis=-1)
+        weight = np.where(_BITS, t[:, None], 1 - t[:, None]).prod(axis=-1)
         stride = np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
-        return (low[:, None] + bits) @ stride, weight
+        return (low[:, None] + _BITS) @ stride, weight
 
     def _summed(self, corner: Int64Array, value: Float64Array) -> Float64Array:
         cells = int(np.prod(self.shape))

@@ -8,7 +8,7 @@ from numba import njit, prange
 from .kernel_math import LANES, carry, rotate
 
 ONE, TWO, HALF, ZERO = np.float32(1), np.float32(2), np.float32(0.5), np.float32(0)
-THREE, FOUR, CELL = np.float32(3), np.float32(4), np.float32(1 / 0.015)
+THREE, FOUR, CELL = np.float32(3), np.float32(4), np.float32(1 / 0.02)
 
 
 @njit(parallel=True, fastmath=True, error_model="numpy", cache=True)
@@ -99,12 +99,13 @@ def rub_nodes(  # type: ignore[no-untyped-def]
         for b in range(s1):
             for c in range(s2):
                 cell, use = cells[a, b, c], usual[a, b, c]
+                if cell[0] == ZERO:
+                    continue
                 crowded[a, b, c] = min(max((cell[0] - use) / use, ZERO), FOUR)
                 scale = ONE / max(cell[0], np.float32(1e-30))
                 cell[1] *= scale
                 cell[2] *= scale
                 cell[3] *= scale
-    slopes = _slopes(crowded)
     for s in range(count):
         block, lane = s // LANES, s % LANES
         for j in range(1, n):
@@ -125,28 +126,13 @@ def rub_nodes(  # type: ignore[no-untyped-def]
                 m0 += weight * cell[1]
                 m1 += weight * cell[2]
                 m2 += weight * cell[3]
-                slope = slopes[i0, i1, i2]
-                g0 += weight * slope[0]
-                g1 += weight * slope[1]
-                g2 += weight * slope[2]
+                value = crowded[i0, i1, i2]
+                wa, wb = fa if k else ONE - fa, fb if y else ONE - fb
+                wc = fc if o else ONE - fc
+                g0 += value * wb * wc * (ONE if k else -ONE)
+                g1 += value * wa * wc * (ONE if y else -ONE)
+                g2 += value * wa * wb * (ONE if o else -ONE)
             push = pressure * seconds
             x[block, j, 3, lane] = h0 + u0 + taken * (m0 - u0) - push * g0
             x[block, j, 4, lane] = h1 + u1 + taken * (m1 - u1) - push * g1
             x[block, j, 5, lane] = h2 + u2 + taken * (m2 - u2) - push * g2
-
-
-@njit(fastmath=True, error_model="numpy", cache=True)
-def _slopes(values):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return (X, Y, Z, 3) differences in units of a cell, central, one-sided at the ends."""
-    s0, s1, s2 = values.shape
-    out = np.zeros((s0, s1, s2, 3), np.float32)
-    for a in range(s0):
-        a0, a1 = max(a - 1, 0), min(a + 1, s0 - 1)
-        for b in range(s1):
-            b0, b1 = max(b - 1, 0), min(b + 1, s1 - 1)
-            for c in range(s2):
-                c0, c1 = max(c - 1, 0), min(c + 1, s2 - 1)
-                out[a, b, c, 0] = (values[a1, b, c] - values[a0, b, c]) / np.float32(a1 - a0)
-                out[a, b, c, 1] = (values[a, b1, c] - values[a, b0, c]) / np.float32(b1 - b0)
-                out[a, b, c, 2] = (values[a, b, c1] - values[a, b, c0]) / np.float32(c1 - c0)
-    return out

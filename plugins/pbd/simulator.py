@@ -209,9 +209,15 @@ def between(start: Float64Array, end: Float64Array, share: float) -> Float64Arra
         return start
     if share >= 1.0:
         return end
-    turns = rotation.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
+    w, x, y, z = rotation.from_matrix(end[:3, :3] @ start[:3, :3].T)
+    sine = math.sqrt(x * x + y * y + z * z)
+    half = share * math.atan2(sine, w)
+    scale = math.sin(half) / sine if sine > 1e-12 else 0.0
+    cross = 2 * scale * np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # Rodrigues: 1 + 2 c K + 2 K K with K the half turn's cross product
+    turn = np.eye(3) + math.cos(half) * cross + 0.5 * cross @ cross
     result = np.eye(4)
-    result[:3, :3] = rotation.to_matrix(rotation.slerp(turns[0], turns[1], share))
+    result[:3, :3] = turn @ start[:3, :3]
     result[:3, 3] = (1 - share) * start[:3, 3] + share * end[:3, 3]
     return result
 
