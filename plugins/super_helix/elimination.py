@@ -21,14 +21,16 @@ def eliminate(
 ) -> None:
     """Eliminate from the tip to the root, then go back; leaves -dq in `gradient[:, 6:]`."""
     count = len(form)
-    tip, pull = np.zeros((6, 6)), np.zeros(6)
+    tip, pull, d = np.zeros((6, 6)), np.zeros(6), np.empty(3)
     for k in range(count - 1, -1, -1):
         a, b = form[k], gradient[k]
+        if k < count - 1:
+            for i in range(3):
+                d[i] = ends[k + 1, i] - ends[k, i]
+            _join(a, b, tip, pull, d, spin[k], shift[k])
         for i in range(9):
             for j in range(i):
                 a[i, j] = a[j, i]
-        if k < count - 1:
-            _join(a, b, tip, pull, ends[k + 1] - ends[k], spin[k], shift[k])
         _invert(a)
         _take_out(a, b, tip, pull)
     twist, turned = np.zeros(6), np.zeros(6)
@@ -37,8 +39,10 @@ def eliminate(
         for i in range(3):
             for j in range(6):
                 b[6 + i] += a[6 + i, j] * twist[j]  # holds A_qq^-1 (A_qV V + gradient) = -dq
-        d = ends[k + 1] - ends[k]
-        turned[:] = twist
+        for i in range(3):
+            d[i] = ends[k + 1, i] - ends[k, i]
+        for i in range(6):
+            turned[i] = twist[i]
         turned[3] += twist[1] * d[2] - twist[2] * d[1]
         turned[4] += twist[2] * d[0] - twist[0] * d[2]
         turned[5] += twist[0] * d[1] - twist[1] * d[0]
@@ -46,7 +50,8 @@ def eliminate(
             for j in range(3):
                 turned[i] -= spin[k, i, j] * b[6 + j]
                 turned[3 + i] -= shift[k, i, j] * b[6 + j]
-        twist[:] = turned
+        for i in range(6):
+            twist[i] = turned[i]
 
 
 @compiled
@@ -59,29 +64,44 @@ def _join(
     spin: Float64Array,
     shift: Float64Array,
 ) -> None:
-    """Add what hangs on an element's end: its twist is the element's own, moved, and S dq."""
-    to = np.zeros((6, 9))
-    for i in range(6):
-        to[i, i] = 1.0
-    to[3, 1], to[3, 2], to[4, 0] = d[2], -d[1], -d[2]
-    to[4, 2], to[5, 0], to[5, 1] = d[0], d[1], -d[0]
+    """Add what hangs on an element's end to the upper triangle of its form.
+
+    The end's twist is X (turn, move) + S dq, X = [[1, 0], [-[d]x, 1]] and S = [spin; shift]; the
+    form of the end is [[A, B], [B', C]].
+    """
+    moved, carried = np.empty((3, 3)), np.empty((6, 3))
     for i in range(3):
+        p, q = (i + 1) % 3, (i + 2) % 3  # row i of [d]x M is d_p M_q - d_q M_p
         for j in range(3):
-            to[i, 6 + j], to[3 + i, 6 + j] = spin[i, j], shift[i, j]
-    carried = np.zeros(6)
-    for j in range(9):
-        for i in range(6):
+            moved[i, j] = tip[i, 3 + j] + d[p] * tip[3 + q, 3 + j] - d[q] * tip[3 + p, 3 + j]
+            a[i, 3 + j] += moved[i, j]
+        b[i] += pull[i] + d[p] * pull[3 + q] - d[q] * pull[3 + p]
+        b[3 + i] += pull[3 + i]
+    for i in range(3):
+        p, q = (i + 1) % 3, (i + 2) % 3
+        for j in range(i, 3):
+            r, s = (j + 1) % 3, (j + 2) % 3  # column j of M [d]x is M_r d_s - M_s d_r
+            back = moved[i, r] * d[s] - moved[i, s] * d[r]
+            a[i, j] += tip[i, j] - back + d[p] * tip[j, 3 + q] - d[q] * tip[j, 3 + p]
+            a[3 + i, 3 + j] += tip[3 + i, 3 + j]
+    for i in range(6):
+        for j in range(3):
             total = 0.0
-            for k in range(6):
-                total += tip[i, k] * to[k, j]
-            carried[i] = total
-        for i in range(9):
+            for k in range(3):
+                total += tip[i, k] * spin[k, j] + tip[i, 3 + k] * shift[k, j]
+            carried[i, j] = total
+    for j in range(3):
+        for i in range(3):
+            p, q = (i + 1) % 3, (i + 2) % 3
+            a[i, 6 + j] += carried[i, j] + d[p] * carried[3 + q, j] - d[q] * carried[3 + p, j]
+            a[3 + i, 6 + j] += carried[3 + i, j]
+        for i in range(j + 1):
             total = 0.0
-            for k in range(6):
-                total += to[k, i] * carried[k]
-            a[i, j] += total
-        for i in range(6):
-            b[j] += to[i, j] * pull[i]
+            for k in range(3):
+                total += spin[k, i] * carried[k, j] + shift[k, i] * carried[3 + k, j]
+            a[6 + i, 6 + j] += total
+        for k in range(3):
+            b[6 + j] += spin[k, j] * pull[k] + shift[k, j] * pull[3 + k]
 
 
 @compiled
@@ -121,8 +141,8 @@ def _take_out(a: Float64Array, b: Float64Array, tip: Float64Array, pull: Float64
         pull[i] = b[i]
         for k in range(3):
             pull[i] -= a[i, 6 + k] * b[6 + k]
-        for j in range(6):
+        for j in range(i, 6):
             total = a[i, j]
             for k in range(3):
                 total -= a[i, 6 + k] * a[6 + k, j]
-            tip[i, j] = total
+            tip[i, j] = tip[j, i] = total

@@ -145,7 +145,7 @@ def _element(
 ) -> None:
     """Add the Gauss points of element e to its form in (turn, move, dq) and its gradient."""
     local, slope = np.empty(3), np.empty((3, 3))
-    by_twist, weight, pull = np.zeros((3, 9)), np.empty((3, 3)), np.empty(3)
+    by_change, weight, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     point, before, wanted, arm = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for g in range(NODES):
         node(motion.q[e], rods.lengths[e] * SHARES[g], local, slope)
@@ -165,32 +165,78 @@ def _element(
                 + drag * (point[i] - before[i] - h * loads.air[e, g, i])
                 + spring * (point[i] - loads.anchor[e, g, i])
             )
-        weight[:] = 0.0
+        product(frame, slope, by_change)
+        total = mass + drag + spring
         for i in range(3):
-            weight[i, i] = mass + drag + spring
+            for k in range(3):
+                weight[i, k] = total if i == k else 0.0
+        touched = False
         if len(step.distance):
-            touch(step, mass, h, loads.gap[e, g], point, before, weight, pull)
-        by_twist[0, 1], by_twist[0, 2] = arm[2], -arm[1]
-        by_twist[1, 0], by_twist[1, 2] = -arm[2], arm[0]
-        by_twist[2, 0], by_twist[2, 1] = arm[1], -arm[0]
+            touched = touch(step, mass, h, loads.gap[e, g], point, before, weight, pull)
+        if touched:
+            _add(form, gradient, arm, by_change, weight, pull)
+        else:
+            _add_alike(form, gradient, arm, by_change, total, pull)
+
+
+@compiled
+def _add(
+    form: Float64Array,
+    gradient: Float64Array,
+    arm: Float64Array,
+    by_change: Float64Array,
+    weight: Float64Array,
+    pull: Float64Array,
+) -> None:
+    """Add a point with a weight (3, 3): it moves by move + turn x arm + by_change dq."""
+    by = np.zeros((3, 9))
+    for i in range(3):
+        p, q = (i + 1) % 3, (i + 2) % 3
+        by[i, p], by[i, q], by[i, 3 + i] = arm[q], -arm[p], 1.0
+        for j in range(3):
+            by[i, 6 + j] = by_change[i, j]
+    for j in range(9):
+        x = y = z = 0.0
         for i in range(3):
-            by_twist[i, 3 + i] = 1.0
-            for j in range(3):
-                by_twist[i, 6 + j] = (
-                    frame[i, 0] * slope[0, j]
-                    + frame[i, 1] * slope[1, j]
-                    + frame[i, 2] * slope[2, j]
+            x += weight[0, i] * by[i, j]
+            y += weight[1, i] * by[i, j]
+            z += weight[2, i] * by[i, j]
+        for i in range(j + 1):
+            form[i, j] += by[0, i] * x + by[1, i] * y + by[2, i] * z
+        for i in range(3):
+            gradient[j] += by[i, j] * pull[i]
+
+
+@compiled
+def _add_alike(
+    form: Float64Array,
+    gradient: Float64Array,
+    arm: Float64Array,
+    by_change: Float64Array,
+    weight: float,
+    pull: Float64Array,
+) -> None:
+    """Add a point whose weight is alike in all directions: `_add` with most products known."""
+    square = arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]
+    for i in range(3):
+        p, q = (i + 1) % 3, (i + 2) % 3
+        form[i, i] += weight * square
+        form[3 + i, 3 + i] += weight
+        form[i, 3 + q] += weight * arm[p]
+        form[i, 3 + p] -= weight * arm[q]
+        gradient[i] += arm[p] * pull[q] - arm[q] * pull[p]
+        gradient[3 + i] += pull[i]
+        for j in range(3):
+            if i <= j:
+                form[i, j] -= weight * arm[i] * arm[j]
+                form[6 + i, 6 + j] += weight * (
+                    by_change[0, i] * by_change[0, j]
+                    + by_change[1, i] * by_change[1, j]
+                    + by_change[2, i] * by_change[2, j]
                 )
-        for j in range(9):
-            x = y = z = 0.0
-            for i in range(3):
-                x += weight[0, i] * by_twist[i, j]
-                y += weight[1, i] * by_twist[i, j]
-                z += weight[2, i] * by_twist[i, j]
-            for i in range(j + 1):
-                form[i, j] += by_twist[0, i] * x + by_twist[1, i] * y + by_twist[2, i] * z
-            for i in range(3):
-                gradient[j] += by_twist[i, j] * pull[i]
+            form[i, 6 + j] += weight * (arm[p] * by_change[q, j] - arm[q] * by_change[p, j])
+            form[3 + i, 6 + j] += weight * by_change[i, j]
+            gradient[6 + j] += by_change[i, j] * pull[i]
 
 
 @compiled

@@ -30,8 +30,8 @@ def touch(
     before: Float64Array,
     weight: Float64Array,
     pull: Float64Array,
-) -> None:
-    """Add to a point's weight and gradient what the obstacles do to it.
+) -> bool:
+    """Add to a point's weight and gradient what the obstacles do to it; return whether they do.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def touch(
             local[i] += step.head[j, i] * (point[j] - step.head[j, 3])
     depth = gap - distance_at(step.origin, step.spacing, step.distance, local, normal)
     if depth <= 0:
-        return
+        return False
     n, slide = np.empty(3), np.empty(3)
     speed = 0.0
     for i in range(3):
@@ -76,6 +76,7 @@ def touch(
         weight[i, i] += grip
         for j in range(3):
             weight[i, j] += (stiff - grip) * n[i] * n[j]
+    return True
 
 
 @compiled
