@@ -183,6 +183,8 @@ class Window:
             before = now
         if self.session.recorder is not None:
             self.session.recorder.close()
+        if self.session.rerun is not None:
+            self.session.rerun.stop()
 
     def picture(self, seconds: float) -> None:
         """Let time pass and show a picture."""
