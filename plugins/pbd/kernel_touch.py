@@ -15,13 +15,12 @@ SLACK = 6
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
-def touch(x, node, ride, grid, settings, normals) -> bool:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Bring nodes out of the obstacles; write normals where they touch, tell whether any does.
+def touch(x, node, ride, grid, settings, normals) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Bring nodes out of the obstacles; write normals where they touch, else 0.
 
     A node is looked up again only when it may have gone as far as it was away the last time.
     """
     h = settings[0]
-    any_touches = False
     for j in range(1, x.shape[0]):
         xj, nj = x[j], normals[j]
         _worn_row(xj, ride[0], ride[1], ride[2], h)
@@ -33,10 +32,8 @@ def touch(x, node, ride, grid, settings, normals) -> bool:  # type: ignore[no-un
             distance, n0, n1, n2 = _distance(grid, xj[0, w], xj[1, w], xj[2, w], clear)
             xj[SLACK, w] = distance - clear
             if distance < clear:
-                any_touches = True
                 nj[0, w], nj[1, w], nj[2, w] = n0, n1, n2
                 _out(xj, w, ride, clear - distance, n0, n1, n2, settings)
-    return any_touches
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)

@@ -133,7 +133,8 @@ def _substep(  # type: ignore[no-untyped-def]
             _redirected(segment, free, change)
     for j in range(1, n):
         _apply_row(x[j], free[j], change[j], ONE / settings[0])
-    if settings[5] > ZERO and touch(x, node, ride, grid, settings, vector[3]):
+    if settings[5] > ZERO:
+        touch(x, node, ride, grid, settings, vector[3])
         relengthen(x, node, element, vector, line, ONE / settings[0])
 
 
