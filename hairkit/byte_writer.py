@@ -1,4 +1,4 @@
-"""Binary files put together in one buffer."""
+"""Arrays as the bytes of binary files."""
 
 from __future__ import annotations
 
@@ -6,6 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+
+
+def as_bytes(kind: npt.DTypeLike, values: npt.ArrayLike) -> memoryview:
+    """Return an array as bytes, converted to its type in the file; copied only where it must be.
+
+    >>> bytes(as_bytes("<u2", [1, 2]))
+    b'\\x01\\x00\\x02\\x00'
+    """
+    return np.ascontiguousarray(values, kind).reshape(-1).view(np.uint8).data
 
 
 def joined(parts: Sequence[tuple[npt.DTypeLike, npt.ArrayLike]]) -> memoryview:

@@ -17,6 +17,7 @@ from hairkit.groom import Groom
 from hairkit.guide_weights import follow, guide_mask
 from hairkit.head import Roots
 from hairkit.options import option
+from hairkit.point_blocks import colours
 from hairkit.point_cache import PointCache, read_cache
 from hairkit.scalp import roots_at, sample_roots
 from hairkit.stored import BoolArray, Float32Array
@@ -159,17 +160,8 @@ def bound_roots(groom: Groom) -> Roots:
 
 def point_colours(groom: Groom) -> Float32Array:
     """Return (P, 3) linear RGB, from the root's colour to the tip's along each strand."""
-    strands, look = groom.strands, groom.material
-    counts = strands.counts
-    rank = np.arange(len(strands.points)) - np.repeat(strands.offsets[:-1], counts)
-    share = rank.astype(np.float32) / np.repeat((counts - 1).astype(np.float32), counts)
-    rest = 1 - share
-    colours = np.empty((len(share), 3), np.float32)
-    for channel in range(3):
-        root, tip = look.root_colour[channel], look.tip_colour[channel]
-        np.multiply(rest, root, out=colours[:, channel])
-        colours[:, channel] += tip * share
-    return colours
+    linear: Float32Array = colours(groom.material, groom.strands.counts).at()
+    return linear
 
 
 def shorter_than(strands: Strands, length: float) -> BoolArray:

@@ -80,6 +80,10 @@ def _turned(vectors: npt.ArrayLike, turn: Float64Array, factor: float) -> Float3
     """Signed permutations are written out: no rounding but that of the unit, and fast."""
     with np.errstate(over="ignore"):  # readers refuse what is not finite, in their own words
         source = np.asarray(vectors, np.float32)
+        if np.array_equal(turn, np.eye(3)):
+            # nobody can write to what is read-only, so it may be shared
+            alike = factor == 1.0 and not source.flags.writeable
+            return source if alike else source * np.float32(factor)
         result = np.empty_like(source)
         for row in range(3):
             column = int(np.abs(turn[row]).argmax())

@@ -52,7 +52,8 @@ def frozen_array(
 ) -> npt.NDArray[Any]:
     """Return `value` as a read-only contiguous array; `None` in `shape` matches any size.
 
-    Raises `InputError` naming the array when the shape differs or a float is not finite.
+    An array that is read-only and owns its memory is shared, any other one copied. Raises
+    `InputError` naming the array when the shape differs or a float is not finite.
     """
     array = np.ascontiguousarray(value, dtype=dtype)
     if array.ndim != len(shape) or any(
@@ -60,14 +61,20 @@ def frozen_array(
     ):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
         raise InputError(f"{name} has shape {array.shape}, expected {wanted}")
-    if array.dtype.kind == "f" and not np.isfinite(array).all():
+    if array.dtype.kind == "f" and not _all_finite(array):
         raise InputError(
             f"{name} holds {np.count_nonzero(~np.isfinite(array))} values that are not finite"
         )
-    if array is value or array.base is not None:
+    if array.base is not None or (array is value and array.flags.writeable):
         array = array.copy()
     array.setflags(write=False)
     return array
+
+
+def _all_finite(array: npt.NDArray[np.floating[Any]]) -> bool:
+    """Return whether all numbers are finite; their sum tells without a mask, if it is finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isfinite(array.sum()) or np.isfinite(array).all())
 
 
 class Stored:

@@ -8,24 +8,25 @@ Thickness is taken as the strand's diameter in the file's unit.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.byte_reader import ByteReader, finite, read_file
-from hairkit.byte_writer import joined
+from hairkit.byte_writer import as_bytes
 from hairkit.errors import InputError
-from hairkit.exporting import ExportOptions, point_colours, prepared
+from hairkit.exporting import ExportOptions, prepared
 from hairkit.file_format import Feature, FileFormat
 from hairkit.file_space import FileSpace, SpaceOptions
 from hairkit.groom import Groom, HairMaterial
 from hairkit.hookspecs import hookimpl
 from hairkit.importing import ImportOptions, adopt, packed, plain_widths, rows_kept
 from hairkit.options import option
-from hairkit.stored import Float32Array, Int64Array, write_bytes
+from hairkit.point_blocks import blocks, colours
+from hairkit.stored import Float32Array, Int64Array, write_pieces
 from hairkit.strands import Strands
 
 FORMAT = FileFormat(
@@ -67,7 +68,10 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the strands with their thickness, and their colours if asked for."""
     ready = prepared(groom, options).groom
-    write_bytes(path, _file_bytes(ready, options))
+    longest = ready.strands.counts.max()
+    if longest > _MOST_SEGMENTS + 1:
+        raise InputError(f"a strand has {longest} points, .hair holds {_MOST_SEGMENTS + 1} at most")
+    write_pieces(path, _pieces(ready, options))
     return True
 
 
@@ -94,30 +98,26 @@ def import_groom(path: Path, options: Options) -> Groom:
     return adopt(strands, options, path, _material(header, strands, colours, space))
 
 
-def _file_bytes(groom: Groom, options: Options) -> memoryview:
-    """Return the whole file; every array is written in its place, once."""
-    strands, space = groom.strands, options.space
-    segments = strands.counts - 1
-    if segments.max() > _MOST_SEGMENTS:
-        raise InputError(
-            f"a strand has {segments.max() + 1} points, .hair holds {_MOST_SEGMENTS + 1} at most"
-        )
+def _pieces(groom: Groom, options: Options) -> Iterator[memoryview]:
+    """Yield the file's bytes: the header, then one array after the other."""
+    strands, space, look = groom.strands, options.space, groom.material
     header = np.zeros((), HEADER)
     header["signature"], header["info"] = SIGNATURES[0], _INFO
     header["strands"], header["points"] = len(strands), len(strands.points)
     header["arrays"] = SEGMENTS | POINTS | THICKNESS | (COLOURS if options.colours else 0)
-    header["thickness"] = groom.material.width / space.metres
-    look = groom.material
+    header["thickness"] = look.width / space.metres
     header["colour"] = (look.root_colour.astype(np.float64) + look.tip_colour) / 2
-    parts: list[tuple[npt.DTypeLike, npt.ArrayLike]] = [
-        (HEADER, header),
-        ("<u2", segments),
-        ("<f4", space.points_to_file(strands.points)),
-        ("<f4", np.asarray(strands.widths) / np.float32(space.metres)),
-    ]
+    yield as_bytes(HEADER, header)
+    yield as_bytes("<u2", strands.counts - 1)
+    for block in blocks(strands):
+        yield as_bytes("<f4", space.points_to_file(strands.points[block.points]))
+    for block in blocks(strands):
+        widths = np.asarray(strands.widths)[block.points]
+        yield as_bytes("<f4", widths / np.float32(space.metres))
     if options.colours:
-        parts.append(("<f4", point_colours(groom)))
-    return joined(parts)
+        shades = colours(look, strands.counts)
+        for block in blocks(strands):
+            yield as_bytes("<f4", shades.at(block.strands))
 
 
 def _header(reader: ByteReader) -> Any:

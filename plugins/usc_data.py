@@ -7,6 +7,7 @@ point, of which the first three are the place; the rest is written as zeros.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,13 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.byte_reader import ByteReader, finite, read_file
+from hairkit.byte_writer import as_bytes
 from hairkit.exporting import ExportOptions, prepared
 from hairkit.file_format import Feature, FileFormat
-from hairkit.file_space import SpaceOptions
+from hairkit.file_space import FileSpace, SpaceOptions
 from hairkit.groom import Groom
 from hairkit.hookspecs import hookimpl
 from hairkit.importing import ImportOptions, adopt, packed
-from hairkit.stored import BoolArray, Float32Array, Int64Array, write_bytes
+from hairkit.point_blocks import blocks
+from hairkit.stored import BoolArray, Int64Array, write_pieces
+from hairkit.strands import Strands
 
 FORMAT = FileFormat(
     "USC-HairSalon, CT2Hair",
@@ -38,8 +42,7 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the strands' points."""
     strands = prepared(groom, options).groom.strands
-    points = options.space.points_to_file(strands.points)
-    write_bytes(path, _file_bytes(points, strands.counts, _numbers_a_point(path)))
+    write_pieces(path, _pieces(strands, options.space, _numbers_a_point(path)))
     return True
 
 
@@ -62,15 +65,19 @@ def _numbers_a_point(path: Path) -> int:
     return 7 if path.suffix.lower() == ".bin" else 3
 
 
-def _file_bytes(points: Float32Array, counts: Int64Array, width: int) -> memoryview:
-    """Return the file; counts stand between the points, so both fill one buffer of words."""
-    is_count = _is_count(counts, width)
-    words = np.empty(len(is_count), "<i4")
-    words[is_count] = np.concatenate([[len(counts)], counts])
-    row = np.zeros((len(points), width), "<f4")
-    row[:, :3] = points
-    words[~is_count] = row.reshape(-1).view("<i4")
-    return words.view(np.uint8).data
+def _pieces(strands: Strands, space: FileSpace, width: int) -> Iterator[memoryview]:
+    """Yield the file's bytes; counts stand between the points, so both fill one block of words."""
+    yield as_bytes("<i4", len(strands))
+    for block in blocks(strands):
+        points = space.points_to_file(strands.points[block.points])
+        row = np.zeros((len(points), width), "<f4")
+        row[:, :3] = points
+        counts = strands.counts[block.strands]
+        is_count = _is_count(counts, width)[1:]
+        words = np.empty(len(is_count), "<i4")
+        words[is_count] = counts
+        words[~is_count] = row.reshape(-1).view("<i4")
+        yield as_bytes("<i4", words)
 
 
 def _is_count(counts: Int64Array, width: int) -> BoolArray:

@@ -68,7 +68,10 @@ def test_saving_twice_gives_the_same_bytes(tmp_path: Path) -> None:
 def test_another_type_is_refused(kind: type[Stored], tmp_path: Path) -> None:
     """A file of something else is no groom, and the error names the file."""
     ITEMS["mask"].save(tmp_path / "x.npz")
-    with pytest.raises(FormatError, match=rf"x\.npz: not a (stored )?{kind.__name__.lower()}|stored {kind.__name__}"):
+    with pytest.raises(
+        FormatError,
+        match=rf"x\.npz: not a (stored )?{kind.__name__.lower()}|stored {kind.__name__}",
+    ):
         kind.load(tmp_path / "x.npz")
 
 
@@ -157,6 +160,25 @@ def test_written_files_have_the_usual_rights(tmp_path: Path) -> None:
     write_bytes(tmp_path / "a", b"")
     (tmp_path / "b").write_bytes(b"")
     assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
+
+
+def test_frozen_arrays_are_shared_and_what_others_may_write_to_is_not() -> None:
+    """Freezing again costs no copy; a view, or an array that can be written to, is copied."""
+    kept = frozen_array(np.ones((4, 3)), np.float32, (None, 3), "points")
+    assert frozen_array(kept, np.float32, (None, 3), "points") is kept
+    mine = np.ones((4, 3), np.float32)
+    view = mine[:]
+    view.setflags(write=False)
+    for array in (mine, view):
+        assert not np.shares_memory(frozen_array(array, np.float32, (None, 3), "points"), mine)
+
+
+def test_sums_beyond_the_range_are_not_taken_for_values() -> None:
+    """Large numbers whose sum overflows are finite; infinities that cancel are not."""
+    most = np.finfo(np.float32).max
+    assert len(frozen_array([most, most], np.float32, (2,), "points")) == 2
+    with pytest.raises(InputError, match="2 values"):
+        frozen_array([np.inf, -np.inf], np.float32, (2,), "points")
 
 
 def test_frozen_arrays_are_checked_copies() -> None:

@@ -8,6 +8,7 @@ orders, with strands or with edges alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -16,16 +17,17 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.byte_reader import finite, read_file
-from hairkit.byte_writer import joined
+from hairkit.byte_writer import as_bytes
 from hairkit.errors import FormatError, InputError
-from hairkit.exporting import ExportOptions, point_colours, prepared
+from hairkit.exporting import ExportOptions, prepared
 from hairkit.file_format import Feature, FileFormat
-from hairkit.file_space import SpaceOptions
+from hairkit.file_space import FileSpace, SpaceOptions
 from hairkit.groom import Groom, HairMaterial
 from hairkit.hookspecs import hookimpl
 from hairkit.importing import ImportOptions, adopt, packed, plain_widths, rows_kept, with_mean_width
+from hairkit.point_blocks import blocks, colours
 from hairkit.polylines import chains
-from hairkit.stored import Float32Array, Int64Array, write_bytes
+from hairkit.stored import Float32Array, Int64Array, write_pieces
 from hairkit.strands import Strands
 
 from .elements import Elements, read_elements
@@ -66,32 +68,10 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write vertices, edges and strands."""
     ready = prepared(groom, options).groom
-    strands, space = ready.strands, options.space
-    segments = strands.counts - 1
-    if segments.max() > _MOST_SEGMENTS:
-        raise InputError(
-            f"a strand has {segments.max() + 1} points, .ply holds {_MOST_SEGMENTS + 1} at most"
-        )
-    vertex = np.empty(len(strands.points), np.dtype(_VERTEX + _COLOUR))
-    place = space.points_to_file(strands.points)
-    for column, name in enumerate("xyz"):
-        vertex[name] = place[:, column]
-    vertex["thickness"] = np.asarray(strands.widths) / np.float32(space.metres)
-    colours = _to_bytes(point_colours(ready))
-    for column, (name, _) in enumerate(_COLOUR):
-        vertex[name] = colours[:, column]
-    strand = np.empty(len(strands), np.dtype(_STRAND))
-    strand["nsegs"], strand["group"], strand["guide"] = segments, strands.group, strands.guide
-    strand["u"], strand["v"] = np.asarray(strands.root_uv).T
-    edge = np.empty((len(vertex) - len(strand), 2), "<i4")
-    edge[:, 0] = np.delete(np.arange(len(vertex)), strands.offsets[1:] - 1)
-    edge[:, 1] = edge[:, 0] + 1
-    header = _header({"vertex": vertex, "strand": strand, "edge": edge})
-    start = np.frombuffer(header.encode("ascii"), np.uint8)
-    write_bytes(
-        path,
-        joined([("u1", start), (vertex.dtype, vertex), (strand.dtype, strand), ("<i4", edge)]),
-    )
+    longest = ready.strands.counts.max()
+    if longest > _MOST_SEGMENTS + 1:
+        raise InputError(f"a strand has {longest} points, .ply holds {_MOST_SEGMENTS + 1} at most")
+    write_pieces(path, _pieces(ready, options.space))
     return True
 
 
@@ -119,12 +99,45 @@ def import_groom(path: Path, options: Options) -> Groom:
     return adopt(strands, options, path, _look(colours, strands))
 
 
-def _header(elements: dict[str, npt.NDArray[np.generic]]) -> str:
+def _pieces(groom: Groom, space: FileSpace) -> Iterator[bytes | memoryview]:
+    """Yield the file's bytes: the header, then vertices, strands and edges."""
+    strands = groom.strands
+    yield _header(len(strands.points), len(strands)).encode("ascii")
+    shades = colours(groom.material, strands.counts).mapped(_to_bytes)
+    for block in blocks(strands):
+        points = space.points_to_file(strands.points[block.points])
+        shade = shades.at(block.strands)
+        vertex = np.empty(len(points), _VERTEX + _COLOUR)
+        for column, name in enumerate("xyz"):
+            vertex[name] = points[:, column]
+        vertex["thickness"] = np.asarray(strands.widths)[block.points] / np.float32(space.metres)
+        for column, (name, _) in enumerate(_COLOUR):
+            vertex[name] = shade[:, column]
+        yield as_bytes(vertex.dtype, vertex)
+    strand = np.empty(len(strands), _STRAND)
+    strand["nsegs"], strand["group"], strand["guide"] = (
+        strands.counts - 1,
+        strands.group,
+        strands.guide,
+    )
+    strand["u"], strand["v"] = np.asarray(strands.root_uv).T
+    yield as_bytes(strand.dtype, strand)
+    for block in blocks(strands):
+        number = np.arange(block.points.start, block.points.stop, dtype=np.int32)
+        first = np.delete(number, strands.offsets[1:][block.strands] - 1 - block.points.start)
+        yield as_bytes("<i4", np.stack([first, first + 1], axis=1))
+
+
+def _header(points: int, strands: int) -> str:
     lines = ["ply", "format binary_little_endian 1.0", "comment hair strands, written by hairkit"]
-    fields = {"vertex": _VERTEX + _COLOUR, "edge": _EDGE, "strand": _STRAND}
-    for name, rows in elements.items():
-        lines.append(f"element {name} {len(rows)}")
-        lines += [f"property {_NAMES[kind]} {field}" for field, kind in fields[name]]
+    elements = [
+        ("vertex", points, _VERTEX + _COLOUR),
+        ("strand", strands, _STRAND),
+        ("edge", points - strands, _EDGE),
+    ]
+    for name, rows, fields in elements:
+        lines.append(f"element {name} {rows}")
+        lines += [f"property {_NAMES[kind]} {field}" for field, kind in fields]
     return "\n".join([*lines, "end_header", ""])
 
 

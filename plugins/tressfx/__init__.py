@@ -15,21 +15,22 @@ from types import MappingProxyType
 import numpy as np
 
 from hairkit.byte_reader import ByteReader, read_file
-from hairkit.exporting import ExportOptions, point_colours, prepared
+from hairkit.exporting import ExportOptions, prepared
 from hairkit.file_format import Feature, FileFormat
 from hairkit.file_space import SpaceOptions
 from hairkit.groom import Groom, HairMaterial
 from hairkit.hookspecs import hookimpl
 from hairkit.importing import ImportOptions, adopt, packed, plain_widths, rows_kept, with_mean_width
 from hairkit.options import option
-from hairkit.stored import Float32Array, write_bytes
+from hairkit.stored import Float32Array, write_bytes, write_pieces
 from hairkit.strands import Strands
 
-from .binary import TfxHair, read_binary, tfx_bytes
+from .binary import TfxHair, read_binary
 from .bones import bone_bytes
 from .text import is_text, read_text
+from .writer import tfx_pieces
 
-__all__ = ["FORMAT", "Options", "TfxHair", "bone_bytes", "read_binary", "read_text", "tfx_bytes"]
+__all__ = ["FORMAT", "Options", "TfxHair", "bone_bytes", "read_binary", "read_text", "tfx_pieces"]
 
 POINTS = (4, 8, 16, 32, 64)
 """Points of every strand that TressFX's threads can share out."""
@@ -64,7 +65,9 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the strands, and the .tfxbone beside the file."""
     ready = _resampled(prepared(groom, options).groom, options.points_per_strand)
-    write_bytes(path, tfx_bytes(_hair(ready, options)))
+    uv = _flipped(np.asarray(ready.strands.root_uv), options)
+    count, coloured = options.points_per_strand, options.colours
+    write_pieces(path, tfx_pieces(ready, count, options.space, uv, coloured=coloured))
     if options.bones:
         write_bytes(path.with_suffix(".tfxbone"), bone_bytes(len(ready.strands)))
     return True
@@ -93,18 +96,6 @@ def _resampled(groom: Groom, count: int) -> Groom:
     if (groom.strands.counts == count).all():
         return groom
     return replace(groom, strands=groom.strands.resampled(count))
-
-
-def _hair(groom: Groom, options: Options) -> TfxHair:
-    """Return what goes into the file, in its unit and axes."""
-    strands, space, count = groom.strands, options.space, options.points_per_strand
-    widths = np.asarray(strands.widths, np.float64).reshape(-1, count).mean(axis=1)
-    return TfxHair(
-        space.points_to_file(strands.points).reshape(-1, count, 3),
-        _flipped(np.asarray(strands.root_uv), options),
-        (widths / space.metres).astype(np.float32),
-        point_colours(groom).reshape(-1, count, 3) if options.colours else None,
-    )
 
 
 def _flipped(uv: Float32Array, options: Options) -> Float32Array:

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.byte_reader import ByteReader, finite
-from hairkit.byte_writer import joined
 from hairkit.stored import Float32Array, Int64Array
 
 HEADER = np.dtype(
@@ -28,8 +26,6 @@ HEADER = np.dtype(
 """160 bytes; `points` is of each strand, what follows it is where arrays begin, 0 for none."""
 
 VERSION = 4.0
-FIXED = 2
-"""Points at the root that do not move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,37 +40,6 @@ class TfxHair:
     """(S,) one width a strand."""
     colours: Float32Array | None
     """(S, N, 3) linear RGB."""
-
-
-def tfx_bytes(hair: TfxHair) -> memoryview:
-    """Return the whole file; arrays stand in the header's order, at multiples of eight bytes."""
-    strands, count = hair.points.shape[:2]
-    header = np.zeros((), HEADER)
-    header["version"], header["strands"], header["points"] = VERSION, strands, count
-    parts: list[tuple[npt.DTypeLike, npt.ArrayLike]] = [(HEADER, header)]
-    arrays = {
-        "position": _with_fourth(hair.points, 0.0, FIXED),
-        "strand_uv": hair.uv,
-        "thickness": hair.thickness,
-        "colour": None if hair.colours is None else _with_fourth(hair.colours, 1.0, 0),
-    }
-    at = HEADER.itemsize
-    for name, array in arrays.items():
-        if array is not None:
-            header[name] = at
-            padding = -array.size % 2
-            parts += [("<f4", array), ("<f4", np.zeros(padding))]
-            at += 4 * (array.size + padding)
-    return joined(parts)
-
-
-def _with_fourth(values: Float32Array, first: float, count: int) -> Float32Array:
-    """Return (S, N, 4): the values and a fourth number, `first` for the first points, then 1."""
-    result = np.empty((*values.shape[:2], 4), np.float32)
-    result[..., :3] = values
-    result[..., 3] = 1.0
-    result[:, :count, 3] = first
-    return result
 
 
 def read_binary(reader: ByteReader) -> tuple[TfxHair, Int64Array]:

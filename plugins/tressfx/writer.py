@@ -1,0 +1,76 @@
+"""The binary .tfx of TressFX 4, piece by piece: arrays stand in the header's order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hairkit.byte_writer import as_bytes
+from hairkit.file_space import FileSpace
+from hairkit.groom import Groom
+from hairkit.point_blocks import blocks, colours
+from hairkit.stored import Float32Array
+
+from .binary import HEADER, VERSION
+
+FIXED = 2
+"""Points at the root that do not move."""
+
+
+def tfx_pieces(
+    groom: Groom, count: int, space: FileSpace, uv: Float32Array, *, coloured: bool
+) -> Iterator[memoryview]:
+    """Yield the file's bytes.
+
+    Parameters
+    ----------
+    groom
+        Its strands have `count` points each, and widths.
+    space
+        The file's axes and unit.
+    uv
+        (S, 2) texture coordinates of the roots, as they stand in the file.
+    coloured
+        Also write a colour at every point.
+    """
+    strands = groom.strands
+    yield as_bytes(HEADER, _header(len(strands), count, coloured=coloured))
+    for block in blocks(strands):
+        place = np.empty((block.strands.stop - block.strands.start, count, 4), np.float32)
+        place[..., :3] = space.points_to_file(strands.points[block.points]).reshape(-1, count, 3)
+        place[..., 3] = 1.0
+        place[:, :FIXED, 3] = 0.0
+        yield as_bytes("<f4", place)
+    yield as_bytes("<f4", uv)
+    widths = np.asarray(strands.widths).reshape(-1, count).mean(axis=1, dtype=np.float64)
+    yield as_bytes("<f4", (widths / space.metres).astype(np.float32))
+    yield as_bytes("<f4", np.zeros(_padding(len(strands))))
+    if coloured:
+        shades = colours(groom.material, strands.counts).mapped(_opaque)
+        for block in blocks(strands):
+            yield as_bytes("<f4", shades.at(block.strands))
+
+
+def _header(
+    strands: int, count: int, *, coloured: bool
+) -> np.ndarray[tuple[()], np.dtype[np.void]]:
+    """Return the header; arrays begin at multiples of eight bytes."""
+    header = np.zeros((), HEADER)
+    header["version"], header["strands"], header["points"] = VERSION, strands, count
+    header["position"] = HEADER.itemsize
+    header["strand_uv"] = header["position"] + 16 * strands * count
+    header["thickness"] = header["strand_uv"] + 8 * strands
+    if coloured:
+        header["colour"] = header["thickness"] + 4 * (strands + _padding(strands))
+    return header
+
+
+def _padding(numbers: int) -> int:
+    """Return the numbers of four bytes that fill up eight."""
+    return numbers % 2
+
+
+def _opaque(linear: Float32Array) -> Float32Array:
+    """Return RGBA (K, 4) of colours (K, 3)."""
+    return np.concatenate([linear, np.ones((len(linear), 1), np.float32)], axis=1)
