@@ -24,6 +24,8 @@ from hairkit.viewer.stage import Shot, Stage
 
 GUIDE_WIDER = 7.0
 """Guides shown alone are drawn this many times wider than hair."""
+FEW = 4_000
+"""So few strands always have soft edges: that is cheap, and each of them is seen."""
 MEASURE_EVERY = 12
 """Pictures between two looks at the simulator's read-outs."""
 PICKED = (1.0, 0.85, 0.1)
@@ -128,7 +130,7 @@ class Preview:
         count = max(round(count * (1.0 if shown.guides_only else share)), 1)
         return HairLook(
             count,
-            smooth,
+            smooth or count <= FEW,
             _triple(material.root_colour),
             _triple(material.tip_colour),
             by_direction=shown.colours == "direction",
