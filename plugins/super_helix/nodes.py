@@ -31,9 +31,9 @@ def compiled(function: _Function) -> _Function:
 
 
 @compiled
-def _sum(series: npt.NDArray[np.float64], x: float) -> float:
+def _sum(series: npt.NDArray[np.float64], x: float, terms: int) -> float:
     total = 0.0
-    for k in range(len(series) - 1, -1, -1):
+    for k in range(terms - 1, -1, -1):
         total = total * x + series[k]
     return total
 
@@ -42,12 +42,13 @@ def _sum(series: npt.NDArray[np.float64], x: float) -> float:
 def coefficients(x: float) -> tuple[float, float, float, float, float]:
     """Return sin(a)/a, (1 - cos a)/a^2, (a - sin a)/a^3 and slopes of the last two, x = a^2."""
     if x < 1.0:
+        terms = 5 if x < 0.02 else 7 if x < 0.25 else _TERMS - 1  # enough for rounding
         return (
-            _sum(_SINE, x),
-            _sum(_VERSINE, x),
-            _sum(_REST, x),
-            _sum(_VERSINE_SLOPE, x),
-            _sum(_REST_SLOPE, x),
+            _sum(_SINE, x, terms + 1),
+            _sum(_VERSINE, x, terms),
+            _sum(_REST, x, terms),
+            _sum(_VERSINE_SLOPE, x, terms),
+            _sum(_REST_SLOPE, x, terms),
         )
     angle = math.sqrt(x)
     sine = math.sin(angle) / angle

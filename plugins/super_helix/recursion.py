@@ -97,13 +97,13 @@ def newton(
     frames, ends = np.empty((count + 1, 3, 3)), np.empty((count + 1, 3))
     spin, shift = np.empty((count, 3, 3)), np.empty((count, 3, 3))
     form, gradient = np.zeros((count, 9, 9)), np.zeros((count, 9))
+    scratch = np.empty((7, 3, 3))
     frames[0], ends[0] = frame, root
     for k in range(count):
         e = first + k
-        _element(
-            rods, motion, loads, step, two_step, h, e, frames[k], ends[k], form[k], gradient[k]
-        )
-        _onward(motion.q[e], rods.lengths[e], frames, ends, spin, shift, k)
+        own = (frames[k], ends[k], form[k], gradient[k])
+        _element(rods, motion, loads, step, two_step, h, e, *own, scratch)
+        _onward(motion.q[e], rods.lengths[e], frames, ends, spin, shift, k, scratch)
         for j in range(3):
             stiff = rods.lengths[e] * rods.stiffness[e, j]
             form[k, 6 + j, 6 + j] += h * (h + step.friction) * stiff
@@ -142,11 +142,12 @@ def _element(
     end: Float64Array,
     form: Float64Array,
     gradient: Float64Array,
+    scratch: Float64Array,
 ) -> None:
     """Add the Gauss points of element e to its form in (turn, move, dq) and its gradient."""
-    local, slope = np.empty(3), np.empty((3, 3))
-    by_change, weight, pull = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    point, before, wanted, arm = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    slope, by_change, weight = scratch[0], scratch[1], scratch[2]
+    local, pull, point = scratch[3, 0], scratch[3, 1], scratch[3, 2]
+    before, arm = scratch[4, 0], scratch[4, 1]
     for g in range(NODES):
         node(motion.q[e], rods.lengths[e] * SHARES[g], local, slope)
         mass = rods.density[e] * rods.lengths[e] * WEIGHTS[g]
@@ -159,9 +160,9 @@ def _element(
                 old = (4 * old - motion.points_before[e, g, i]) / 3
                 rate = (4 * rate - motion.velocity_before[e, g, i]) / 3
             before[i] = old
-            wanted[i] = old + h * rate + h * h * step.gravity[i]
+            wanted = old + h * rate + h * h * step.gravity[i]
             pull[i] = (
-                mass * (point[i] - wanted[i])
+                mass * (point[i] - wanted)
                 + drag * (point[i] - before[i] - h * loads.air[e, g, i])
                 + spring * (point[i] - loads.anchor[e, g, i])
             )
@@ -172,7 +173,17 @@ def _element(
                 weight[i, k] = total if i == k else 0.0
         touched = False
         if len(step.distance):
-            touched = touch(step, mass, h, loads.gap[e, g], point, before, weight, pull)
+            touched = touch(
+                step,
+                mass,
+                h,
+                loads.gap[e, g],
+                point,
+                before,
+                weight,
+                pull,
+                scratch[5:7].reshape(6, 3)[:4],
+            )
         if touched:
             _add(form, gradient, arm, by_change, weight, pull)
         else:
@@ -248,9 +259,10 @@ def _onward(
     spin: Float64Array,
     shift: Float64Array,
     k: int,
+    scratch: Float64Array,
 ) -> None:
     """Place the end of element k and how it moves with dq."""
-    local, slope, turn, mean = np.empty(3), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    slope, turn, mean, local = scratch[0], scratch[1], scratch[2], scratch[3, 0]
     node(q, length, local, slope)
     turns(q, length, turn, mean)
     product(frames[k], turn, frames[k + 1])

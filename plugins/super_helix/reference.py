@@ -160,5 +160,6 @@ def _point_loads(
                 back[e, g],
                 weight[e, g],
                 pull[e, g],
+                np.empty((4, 3)),
             )
     return weight, pull

@@ -51,6 +51,8 @@ class SuperHelices:
         if obstacles is None and options.contact and len(groom.strands):
             obstacles = head_obstacles(groom.head)
         self._obstacles = obstacles
+        empty = np.zeros((0, 0, 0), np.float32)
+        self._distance = empty if obstacles is None else np.array(obstacles.distance)
         self.retune(options)
         self.reset()
 
@@ -147,7 +149,7 @@ class SuperHelices:
             float(options.friction or 0.0),
             np.zeros(3) if grid is None else np.array(grid.grid.origin, np.float64),
             1.0 if grid is None else float(grid.grid.spacing),
-            np.zeros((0, 0, 0), np.float32) if grid is None else np.array(grid.distance),
+            self._distance,
         )
         loads = self._loads(around, air)
         if options.solver == "recursion":

@@ -30,6 +30,7 @@ def touch(
     before: Float64Array,
     weight: Float64Array,
     pull: Float64Array,
+    scratch: Float64Array,
 ) -> bool:
     """Add to a point's weight and gradient what the obstacles do to it; return whether they do.
 
@@ -45,8 +46,10 @@ def touch(
         (3,) where the point is, and where from it has come in `h`, world.
     weight, pull
         (3, 3) and (3,) changed in place.
+    scratch
+        (4, 3) anything.
     """
-    local, normal = np.empty(3), np.empty(3)
+    local, normal, n, slide = scratch[0], scratch[1], scratch[2], scratch[3]
     for i in range(3):
         local[i] = 0.0
         for j in range(3):
@@ -54,7 +57,6 @@ def touch(
     depth = gap - distance_at(step.origin, step.spacing, step.distance, local, normal)
     if depth <= 0:
         return False
-    n, slide = np.empty(3), np.empty(3)
     speed = 0.0
     for i in range(3):
         n[i] = surface = 0.0

@@ -35,7 +35,7 @@ def test_a_rod_is_the_solution_of_its_equation(size: float, rng: np.random.Gener
     np.testing.assert_allclose(placed.ends[-1], state[9:], rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("size", [0.0, 1e-6, 0.99, 1.01, 5.0])
+@pytest.mark.parametrize("size", [0.0, 1e-6, 0.141, 0.142, 0.499, 0.501, 0.99, 1.01, 5.0])
 def test_compiled_kinematics_equal_their_twin(size: float, rng: np.random.Generator) -> None:
     """Points, slopes, rotations and mean rotations of one element, through zero curvature."""
     s = 0.03
