@@ -2,11 +2,11 @@
 
     python benchmarks/simulation.py [--guides 1000 10000] [--steps 60] [--referee PYTHON]
 
-Each row is steps of 1/60 s a second of wall clock, best of several runs, with the largest stretch
-of a horizontal strand that falls and settles. Beside pbd's own backends stands the plain method,
-distance constraints by Gauss-Seidel in NumPy over all strands at once (Mueller et al. 2007), at the
-fewest iterations whose stretch is no larger than 1 %, and, where `--referee` names a Python that
-has pyPBD, that library's rods at the same count of nodes.
+Each row is steps of 1/60 s a second of wall clock, and the largest stretch: for pbd of guides whose
+head is shaken, for the others of horizontal strands that fall. The plain method is distance
+constraints by Gauss-Seidel in NumPy over all strands at once (Mueller et al. 2007), at several
+counts of iterations: compare the rows of about 1 %. Where `--referee` names a Python that has pyPBD,
+that library's distance constraints follow, at the same count of nodes.
 """
 
 from __future__ import annotations
