@@ -5,7 +5,7 @@
 Each row is steps of 1/60 s a second of wall clock, and the largest stretch: for pbd of guides whose
 head is shaken, for the others of horizontal strands that fall. The plain method is distance
 constraints by Gauss-Seidel in NumPy over all strands at once (Mueller et al. 2007), at several
-counts of iterations: compare the rows of about 1 %. Where `--referee` names a Python that has pyPBD,
+counts of iterations: compare the rows of about 1 %. Where `--referee` names a Python with pyPBD,
 that library's distance constraints follow, at the same count of nodes.
 """
 
