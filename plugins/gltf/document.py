@@ -13,8 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 import hairkit
+from hairkit.byte_writer import as_bytes
 from hairkit.glb_file import BINARY_CHUNK, JSON_CHUNK
 from hairkit.stored import write_pieces
+
+from .streamed import Streamed
 
 _COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 _SHAPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
@@ -30,7 +33,7 @@ class Document:
         self.json: dict[str, Any] = {
             "asset": {"version": "2.0", "generator": f"hairkit {hairkit.__version__}"}
         }
-        self._arrays: list[npt.NDArray[Any]] = []
+        self._arrays: list[npt.NDArray[Any] | Streamed] = []
         self._pictures: dict[bytes, int] = {}
         self._end = 0
 
@@ -42,7 +45,7 @@ class Document:
 
     def accessor(
         self,
-        array: npt.NDArray[Any],
+        array: npt.NDArray[Any] | Streamed,
         target: int | None = VERTICES,
         *,
         bounds: bool = False,
@@ -57,12 +60,13 @@ class Document:
         target
             What the GPU uses it for, or None.
         bounds
-            Say the smallest and largest elements, as glTF wants of positions and times.
+            Say the smallest and largest elements, as glTF wants of positions and times; not of
+            streamed arrays.
         normalised
             Whole numbers stand for 0 to 1.
         """
         low = high = None
-        if bounds:
+        if bounds and not isinstance(array, Streamed):
             low, high = _bounds(array)
         return self.add(
             "accessors",
@@ -77,10 +81,9 @@ class Document:
 
     def indices(self, array: npt.NDArray[Any], vertices: int) -> int:
         """Store vertex numbers, in two bytes each where they fit."""
-        kind = np.uint16 if vertices < 2**16 - 1 else np.uint32
-        return self.accessor(array.reshape(-1).astype(kind, copy=False), INDICES)
+        return self.accessor(array.reshape(-1).astype(index_type(vertices), copy=False), INDICES)
 
-    def view(self, array: npt.NDArray[Any], target: int | None = None) -> int:
+    def view(self, array: npt.NDArray[Any] | Streamed, target: int | None = None) -> int:
         """Store bytes in the buffer, at a multiple of four, and return their buffer view."""
         start = self._end
         self._arrays.append(array)
@@ -115,8 +118,14 @@ class Document:
 
     def _pieces(self) -> Iterator[bytes | memoryview]:
         for array in self._arrays:
-            yield np.ascontiguousarray(array).reshape(-1).view(np.uint8).data
+            for piece in array.pieces() if isinstance(array, Streamed) else (array,):
+                yield as_bytes(piece.dtype, piece)
             yield bytes(-array.nbytes % 4)
+
+
+def index_type(vertices: int) -> type[np.uint16 | np.uint32]:
+    """Return the type of indices that may name so many vertices; its largest value is none."""
+    return np.uint16 if vertices < 2**16 - 1 else np.uint32
 
 
 def _bounds(array: npt.NDArray[Any]) -> tuple[list[float], list[float]]:

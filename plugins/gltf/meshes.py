@@ -11,9 +11,12 @@ from hairkit.errors import InputError
 from hairkit.exporting import selected
 from hairkit.groom import Groom
 from hairkit.guide_weights import guide_mask
-from hairkit.stored import Float32Array, Float64Array, Int64Array, UInt8Array
+from hairkit.point_blocks import shares
+from hairkit.stored import Float32Array, Float64Array, UInt8Array
+from hairkit.strands import Strands
 
-from .document import Document
+from .document import INDICES, Document, index_type
+from .streamed import Streamed, at_points, repeated, segments
 from .strips import HairMesh
 from .texture import white_picture
 
@@ -84,34 +87,35 @@ class Meshes:
             shapes = shapes[:, keep[groom.strands.strand_of_point]]
             groom = selected(groom, keep)
         strands, add = groom.strands, self.document.accessor
-        owner, counts = strands.strand_of_point, strands.counts
         attributes = {
             "POSITION": add(strands.points, bounds=True),
-            "_STRAND_ID": add(owner.astype(np.float32)),
-            "_STRAND_T": add(_shares(counts)),
+            "_STRAND_ID": add(_at_points(strands, np.arange(len(strands)))),
+            "_STRAND_T": add(_shares(strands)),
             **self._skin(len(strands.points)),
         }
         described: dict[str, Any] = {"strands": len(strands)}
-        if (counts == counts[0]).all():
-            described["points_per_strand"] = int(counts[0])
+        if (strands.counts == strands.counts[0]).all():
+            described["points_per_strand"] = int(strands.counts[0])
         else:
             described["offsets"] = strands.offsets.tolist()
         if strands.widths is not None:
-            attributes["_RADIUS"] = add(strands.widths / 2)
+            widths = strands.widths
+            attributes["_RADIUS"] = add(
+                at_points(strands, np.float32, lambda block: widths[block.points] / 2)
+            )
         if strands.root_uv is not None:
             # a scalar each: Blender 4.5 mixes up custom attributes of different widths
-            u, v = np.repeat(_upside_down(strands.root_uv), counts, axis=0).T
-            attributes |= {"_ROOT_U": add(u), "_ROOT_V": add(v)}
+            u, v = _upside_down(strands.root_uv).T
+            attributes |= {"_ROOT_U": add(_at_points(strands, u))}
+            attributes |= {"_ROOT_V": add(_at_points(strands, v))}
         for name, values in (("group", strands.group), ("guide", strands.guide)):
             if values is not None and (values == values[0]).all():
                 described[name] = values[0].item()
             elif values is not None:
-                attributes[f"_{name.upper()}"] = add(np.repeat(values, counts).astype(np.float32))
-        first = np.delete(np.arange(len(strands.points), dtype=np.uint32), strands.offsets[1:] - 1)
-        segments = np.stack([first, first + 1], axis=1)
+                attributes[f"_{name.upper()}"] = add(_at_points(strands, values))
         primitive = {
             "attributes": attributes,
-            "indices": self.document.indices(segments, len(strands.points)),
+            "indices": add(segments(strands, index_type(len(strands.points))), INDICES),
             "material": _plain(self.document, "guides", brightest(groom)),
             "mode": LINES,
             "extras": {"hairkit": described},
@@ -132,18 +136,23 @@ class Meshes:
 
     def _skin(self, count: int) -> dict[str, int]:
         """Return the attributes that tie vertices to the head joint alone."""
-        joints, weights = np.zeros((2, count, 4), np.uint8)
-        joints[:, 0], weights[:, 0] = HEAD_JOINT, 255
+        joints, weights = np.zeros((2, 4), np.uint8)
+        joints[0], weights[0] = HEAD_JOINT, 255
         add = self.document.accessor
-        return {"JOINTS_0": add(joints), "WEIGHTS_0": add(weights, normalised=True)}
+        bound, whole = repeated(joints, count), repeated(weights, count)
+        return {"JOINTS_0": add(bound), "WEIGHTS_0": add(whole, normalised=True)}
 
 
-def _shares(counts: Int64Array) -> Float32Array:
+def _at_points(strands: Strands, values: npt.NDArray[Any]) -> Streamed:
+    """Return (P,) float32 of which every point has its strand's value (S,)."""
+    single, counts = values.astype(np.float32), strands.counts
+    return at_points(strands, np.float32, lambda b: np.repeat(single[b.strands], counts[b.strands]))
+
+
+def _shares(strands: Strands) -> Streamed:
     """Return (P,) 0 at the root of each strand to 1 at its tip."""
-    first = np.cumsum(counts) - counts
-    rank = np.arange(counts.sum()) - np.repeat(first, counts)
-    result: Float32Array = (rank / np.repeat(counts - 1, counts)).astype(np.float32)
-    return result
+    profile = shares(strands.counts).mapped(lambda share: share.astype(np.float32))
+    return at_points(strands, np.float32, lambda block: profile.at(block.strands))
 
 
 def _upside_down(uv: Float32Array) -> Float32Array:
