@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numba import njit, prange
 
-from hairkit.combing import gradient
+from hairkit.field_sampling import gradient_at, sample_at
 from hairkit.strands import Strands
 from hairkit.volume import Hull
 
@@ -19,8 +20,22 @@ def kept_outside(strands: Strands, hull: Hull, clearance: float) -> Strands:
     points = strands.points.astype(np.float64)
     free = np.ones(len(points), bool)
     free[strands.offsets[:-1]] = False
-    for _ in range(ROUNDS):
-        lack = clearance - hull.grid.sample(hull.head_distance, points)
-        near = np.flatnonzero((lack > 0) & free)
-        points[near] += lack[near, None] * gradient(hull.grid, hull.head_distance, points[near])
+    distance = hull.head_distance[..., None]
+    _lift(hull.grid.origin, hull.grid.spacing, distance, clearance, free, points)
     return replace(strands, points=points.astype(np.float32))
+
+
+@njit(cache=True, parallel=True)
+def _lift(origin, spacing, distance, clearance, free, points):  # type: ignore[no-untyped-def]
+    """Move free points (P, 3) along the distance's gradient until they are `clearance` off."""
+    for i in prange(len(points)):
+        if free[i]:
+            level, normal = np.empty(1), np.empty(3)
+            for _ in range(ROUNDS):
+                sample_at(origin, spacing, distance, points[i], level)
+                lack = clearance - level[0]
+                if lack <= 0:
+                    break
+                gradient_at(origin, spacing, distance, points[i], normal)
+                for axis in range(3):
+                    points[i, axis] += lack * normal[axis]

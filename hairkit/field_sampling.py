@@ -19,12 +19,12 @@ def sample_at(origin, spacing, values, p, result):  # type: ignore[no-untyped-de
     ix, iy, iz = int(fx), int(fy), int(fz)
     tx, ty, tz = fx - ix, fy - iy, fz - iz
     for c in range(channels):
-        total = 0.0
-        for corner in range(8):
-            a, b, d = corner & 1, corner >> 1 & 1, corner >> 2 & 1
-            weight = (tx if a else 1 - tx) * (ty if b else 1 - ty) * (tz if d else 1 - tz)
-            total += weight * values[ix + a, iy + b, iz + d, c]
-        result[c] = total
+        result[c] = 0.0
+    for corner in range(8):
+        a, b, d = corner & 1, corner >> 1 & 1, corner >> 2 & 1
+        weight = (tx if a else 1 - tx) * (ty if b else 1 - ty) * (tz if d else 1 - tz)
+        for c in range(channels):
+            result[c] += weight * values[ix + a, iy + b, iz + d, c]
 
 
 @njit(cache=True)

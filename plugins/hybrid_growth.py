@@ -124,8 +124,8 @@ def grown(
         options.slide_from,
         int(way / options.step),
     )
-    volumes = (direction, distance[..., None])
-    _grow(field.grid.origin, field.grid.spacing, volumes, rules, starts, points, counts)
+    volume = np.concatenate([direction, distance[..., None]], axis=3)
+    _grow(field.grid.origin, field.grid.spacing, volume, rules, starts, points, counts)
     rows = np.arange(points.shape[1])[None] < counts[:, None]
     return Strands(points[rows], np.concatenate([[0], np.cumsum(counts)]))
 
@@ -153,58 +153,55 @@ def _distance(field: OrientationField, hull: Hull) -> Float32Array:
 
 
 @njit(cache=True, parallel=True)
-def _grow(origin, spacing, volumes, rules, starts, points, counts):  # type: ignore[no-untyped-def]
+def _grow(origin, spacing, volume, rules, starts, points, counts):  # type: ignore[no-untyped-def]
     for s in prange(len(starts)):
-        counts[s] = _grow_one(origin, spacing, volumes, rules, starts[s], points[s])
+        counts[s] = _grow_one(origin, spacing, volume, rules, starts[s], points[s])
 
 
 @njit(cache=True)
-def _slide(origin, spacing, distance, p, sine, skin, d):  # type: ignore[no-untyped-def]
-    """Take from d (3,) its part along the internal distance's gradient, p beyond the surface."""
-    level, normal = np.empty(1), np.empty(3)
-    sample_at(origin, spacing, distance, p, level)
-    if level[0] < skin:
-        return
-    gradient_at(origin, spacing, distance, p, normal)
-    outward = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]
-    if 0 < outward < sine:
-        for axis in range(3):
-            d[axis] -= outward * normal[axis]
-        make_unit(d)
-
-
-@njit(cache=True)
-def _grow_one(origin, spacing, volumes, rules, start, points):  # type: ignore[no-untyped-def]
+def _grow_one(origin, spacing, volume, rules, start, points):  # type: ignore[no-untyped-def]
     """Write every KEPT-th point of one strand, and its last; returns how many, at least two."""
-    direction, distance = volumes
     step, bound, inertia, blind, steps, sine, skin, sliding = rules
-    p, d, found, inside = np.empty(3), np.zeros(3), np.empty(3), np.empty(1)
+    p, d, found = np.empty(3), np.zeros(3), np.empty(4)
     p[:] = start
     points[0] = p
     count = 1
     for i in range(1, steps + 1):
-        sample_at(origin, spacing, direction, p, found)
-        known = make_unit(found)
+        sample_at(origin, spacing, volume, p, found)
+        known = make_unit(found[:3])
+        if i > blind and (found[3] > bound or not known):
+            if (i - 1) % KEPT != 0:
+                points[count] = p
+                count += 1
+            break
         if known and i > 1:
             for axis in range(3):
                 d[axis] = inertia * d[axis] + (1 - inertia) * found[axis]
         elif known:
-            d[:] = found
+            d[:] = found[:3]
         if not make_unit(d):
             break
-        if i < sliding:
-            _slide(origin, spacing, distance, p, sine, skin, d)
+        if i < sliding and found[3] >= skin:
+            _slide(origin, spacing, volume, p, sine, d)
         for axis in range(3):
             p[axis] += step * d[axis]
-        sample_at(origin, spacing, distance, p, inside)
-        ended = i > blind and (inside[0] > bound or not known)
-        if ended or i % KEPT == 0 or i == steps:
+        if i % KEPT == 0 or i == steps:
             points[count] = p
             count += 1
-        if ended:
-            break
     if count == 1:  # nothing is known at the root: a stub keeps the strand's place
         points[1] = points[0]
         points[1, 1] += step
         count = 2
     return count
+
+
+@njit(cache=True)
+def _slide(origin, spacing, volume, p, sine, d):  # type: ignore[no-untyped-def]
+    """Take from d (3,) its part along the internal distance's gradient, p beyond the surface."""
+    normal = np.empty(3)
+    gradient_at(origin, spacing, volume[..., 3:], p, normal)
+    outward = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]
+    if 0 < outward < sine:
+        for axis in range(3):
+            d[axis] -= outward * normal[axis]
+        make_unit(d)
