@@ -67,28 +67,38 @@ class Renderer:
             compute.release()
         self._programs, self._computes = {}, {}
 
-    def compute(self, name: str) -> moderngl.ComputeShader:
-        """Return the compute shader `name.comp`."""
-        if name not in self._computes:
-            self._computes[name] = _compiled(
-                name, lambda: self.context.compute_shader(shader_source(f"{name}.comp"))
-            )
-        return self._computes[name]
+    def compute(self, name: str, **definitions: int) -> moderngl.ComputeShader:
+        """Return the compute shader `name.comp`, with numbers that its text leaves open."""
+        key = " ".join([name, *(f"{word}={value}" for word, value in definitions.items())])
+        if key not in self._computes:
+            source = shader_source(f"{name}.comp")
+            lines = [f"#define {word} {value}\n" for word, value in definitions.items()]
+            version, text = source.split("\n", 1)
+            full = "\n".join([version, "".join(lines) + text])
+            self._computes[key] = _compiled(key, lambda: self.context.compute_shader(full))
+        return self._computes[key]
 
 
 @contextlib.contextmanager
 def renderer() -> Iterator[Renderer]:
     """Give the process's renderer to the calling thread until the block ends.
 
+    A block may stand in another one of the same thread.
+
     Raises `RenderError` when no context can be made, or when the block left an OpenGL error.
     """
-    global _renderer
+    global _renderer, _depth
     with _lock:
         if _renderer is None or _owner != os.getpid():
-            _renderer = _create()
-        with _renderer.context:
-            yield _renderer
-            error = _renderer.context.error
+            _renderer, _depth = _create(), 0
+        _depth += 1
+        try:
+            # an inner block would leave no context behind for the outer one
+            with _renderer.context if _depth == 1 else contextlib.nullcontext():
+                yield _renderer
+                error = _renderer.context.error
+        finally:
+            _depth -= 1
         if error != "GL_NO_ERROR":
             raise RenderError(f"drawing failed: OpenGL reports {error} ({_renderer.backend})")
 
@@ -126,6 +136,7 @@ def _compiled(name: str, compile_: Callable[[], Compiled]) -> Compiled:
 _lock = threading.RLock()
 _renderer: Renderer | None = None
 _owner = 0
+_depth = 0
 
 
 def _create() -> Renderer:

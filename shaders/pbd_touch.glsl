@@ -1,0 +1,78 @@
+// Nodes out of the obstacles with friction, then the lengths again. Part of pbd_substeps.comp.
+const float FURTHER = 1.05;       // slack wears off a little faster than the way that a node goes
+const float DIAGONAL = 1.8;       // a distance changes by less within a cell, in cells
+
+float distance_at(ivec3 cell) { return distances[(cell.x * u_cells.y + cell.y) * u_cells.z + cell.z]; }
+
+// Trilinear distance and its direction; one look tells most nodes that they are far.
+float obstacle_distance(vec3 p, float clear, out vec3 normal) {
+    vec3 at = (p - u_grid.xyz) * u_grid.w;
+    normal = vec3(0.0);
+    if (any(lessThan(at, vec3(0.0))) || any(greaterThan(at, vec3(u_cells - 1)))) return clear + u_room;
+    ivec3 low = min(ivec3(at), u_cells - 2);
+    float first = distance_at(low), least = first - DIAGONAL / u_grid.w;
+    if (least > clear) return least;
+    vec3 t = at - vec3(low);
+    vec4 front = vec4(first, distance_at(low + ivec3(0, 0, 1)), distance_at(low + ivec3(0, 1, 0)),
+                      distance_at(low + ivec3(0, 1, 1)));
+    vec4 back = vec4(distance_at(low + ivec3(1, 0, 0)), distance_at(low + ivec3(1, 0, 1)),
+                     distance_at(low + ivec3(1, 1, 0)), distance_at(low + ivec3(1, 1, 1)));
+    vec4 across = mix(front, back, t.x);
+    vec4 slope = back - front;
+    vec2 line = mix(across.xz, across.yw, t.z), steep = mix(slope.xz, slope.yw, t.z);
+    vec2 deep = across.yw - across.xz;
+    vec3 way = vec3(mix(steep.x, steep.y, t.y), line.y - line.x, mix(deep.x, deep.y, t.y));
+    normal = way / max(length(way), 1e-12);
+    return mix(line.x, line.y, t.y);
+}
+
+// Restore the lengths; a node at an obstacle moves only along it, square to its normal.
+void relengthen(vec3 normal[NODES]) {
+    vec3 end_before = vec3(0.0);
+    for (int j = 0; j < SEGMENTS; j++) {
+        vec3 way = place[j + 1] - place[j];
+        float reach = length(way);
+        direction[j] = way / reach;
+        float a = dot(normal[j], direction[j]), b = dot(normal[j + 1], direction[j]);
+        vec3 start = node(j, EASE) * (direction[j] - a * normal[j]);
+        vec3 end = node(j + 1, EASE) * (direction[j] - b * normal[j + 1]);
+        pivot[j] = dot(direction[j], start + end) + SOFTEST * (node(j, EASE) + node(j + 1, EASE));
+        beside[j] = -dot(end_before, direction[j]);
+        value[j] = reach - element(j, LENGTH);
+        end_before = end;
+    }
+    solve_tridiagonal();
+    for (int j = 1; j < NODES; j++) {
+        vec3 pull = -value[j - 1] * direction[j - 1];
+        if (j < SEGMENTS) pull += value[j] * direction[j];
+        vec3 change = node(j, EASE) * (pull - dot(pull, normal[j]) * normal[j]);
+        place[j] += change;
+        speed[j] += change / u_seconds;
+    }
+}
+
+// A node is looked up again only when it may have gone as far as it was away the last time.
+void touch(int k) {
+    vec3 normal[NODES];
+    normal[0] = vec3(0.0);
+    for (int j = 1; j < NODES; j++) {
+        vec3 relative = speed[j] - drift(k, place[j]);
+        normal[j] = vec3(0.0);
+        slack[j] -= FURTHER * u_seconds * length(relative);
+        if (slack[j] > 0.0) continue;
+        vec3 out_way;
+        float clear = node(j, CLEAR);
+        slack[j] = obstacle_distance(place[j], clear, out_way) - clear;
+        if (slack[j] >= 0.0) continue;
+        normal[j] = out_way;
+        float across = dot(relative, out_way), inward = max(-across, 0.0);
+        // what came in during this substep goes out again; older depth leaves at a limited speed
+        float depth = min(-slack[j], (inward + u_fastest) * u_seconds);
+        vec3 along = relative - across * out_way;
+        float size = length(along);
+        vec3 brake = along * (min(u_friction * inward, size) / max(size, 1e-12));
+        speed[j] += inward * out_way - brake;
+        place[j] += depth * out_way - u_seconds * brake;
+    }
+    relengthen(normal);
+}

@@ -1,0 +1,44 @@
+// Unit quaternions (x, y, z, w) of frames whose third axis is a segment's direction.
+const float LEAST = 1e-4;  // 1 + cosine of a half turn, which has no shortest way
+
+vec4 product(vec4 a, vec4 b) {
+    return vec4(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));
+}
+
+vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
+
+vec3 third_axis(vec4 q) {
+    return vec3(2.0 * (q.x * q.z + q.w * q.y), 2.0 * (q.y * q.z - q.w * q.x),
+                1.0 - 2.0 * (q.x * q.x + q.y * q.y));
+}
+
+// The frame turned the shortest way so that its third axis is `direction`.
+vec4 swung(vec4 q, vec3 direction) {
+    vec3 axis = third_axis(q);
+    vec4 turn = vec4(cross(axis, direction), max(1.0 + dot(axis, direction), LEAST));
+    return normalize(product(turn, q));
+}
+
+// The frame half way between neighbours, and the axis of the turn between them times the tangent
+// of a quarter of its angle.
+vec4 half_way(vec4 before, vec4 after, out vec3 quarter) {
+    float cosine = dot(before, after), sign_ = cosine < 0.0 ? -1.0 : 1.0;
+    vec3 turn = before.w * after.xyz - after.w * before.xyz + cross(before.xyz, after.xyz);
+    quarter = turn * (sign_ / (1.0 + sign_ * cosine));
+    return normalize(before + sign_ * after);
+}
+
+// Twist about their direction between neighbouring frames: twice the angle of (w, z) of the turn.
+// The arc tangent's polynomial is off by 1e-5 (Abramowitz and Stegun 1964, 4.4.49), near 0 its
+// series by less.
+float twist_between(vec4 before, vec4 after) {
+    float w = dot(before, after);
+    float z = before.w * after.z - before.x * after.y + before.y * after.x - before.z * after.w;
+    float steep = abs(z) > abs(w) ? 1.0 : 0.0;
+    float t = min(abs(z), abs(w)) / max(abs(z), abs(w)), s = t * t;
+    float wide = t * (0.9998660 + s * (-0.3302995 + s * (0.1801410 + s * (-0.0851330 + s * 0.0208351))));
+    float small = t * (1.0 - s * (1.0 / 3.0 - s * (0.2 - s / 7.0)));
+    float angle = s < 0.04 ? small : wide;
+    angle = mix(angle, 0.5 * 3.14159265 - angle, steep);
+    return 2.0 * ((w < 0.0) == (z < 0.0) ? angle : -angle);
+}
