@@ -43,7 +43,7 @@ def closest_guides(strands: Strands) -> GuideWeights:
         raise InputError("the groom has no guides; export it with strands=hair")
     roots = strands.roots.astype(np.float64)
     count = min(CLOSEST, len(index))
-    distance, near = cKDTree(roots[index]).query(roots, k=[1, 2, 3][:count])
+    distance, near = cKDTree(roots[index]).query(roots, k=[1, 2, 3][:count], workers=-1)
     near = index[near]
     # a guide comes first in its own list even where another guide shares its root
     own = np.zeros(len(strands), bool)

@@ -25,6 +25,7 @@ from hairkit.head import Head
 from hairkit.head_files import read_head
 from hairkit.head_placing import find_place, placed
 from hairkit.options import option
+from hairkit.point_blocks import bounds
 from hairkit.scalp import bind, roots_at
 from hairkit.stored import BoolArray, Float32Array, Int64Array
 from hairkit.strands import Strands
@@ -187,7 +188,8 @@ def with_mean_width(strands: Strands) -> HairMaterial:
 
 
 def _with_length(strands: Strands, source: object) -> Strands:
-    extent = float(np.ptp(strands.points, axis=0).max())
+    low, high = bounds(strands.points)
+    extent = float((high - low).max())
     keep = ~shorter_than(strands, max(NO_LENGTH * extent, float(np.finfo(np.float32).tiny)))
     if not keep.any():
         raise FormatError(f"{source}: none of its {len(keep)} strands has any length")

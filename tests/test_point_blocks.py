@@ -5,7 +5,7 @@ import pytest
 
 from hairkit import point_blocks
 from hairkit.exporting import point_colours
-from hairkit.point_blocks import blocks, colours, shares
+from hairkit.point_blocks import blocks, bounds, colours, shares
 from hairkit.strands import Strands
 from tests.rich_groom import rich_groom
 
@@ -54,3 +54,12 @@ def test_blocks_of_a_profile_are_the_profile() -> None:
     np.testing.assert_array_equal(np.concatenate(parts), point_colours(groom))
     doubled = shades.mapped(lambda rows: 2 * rows).at()
     np.testing.assert_array_equal(doubled, 2 * point_colours(groom))
+
+
+@pytest.mark.parametrize("count", [1, 1023, 1024, 5000])
+def test_bounds_are_the_extremes_of_each_column(count: int) -> None:
+    """However many points there are, none is left out."""
+    rows = np.random.default_rng(count).normal(size=(count, 3)).astype(np.float32)
+    low, high = bounds(rows)
+    np.testing.assert_array_equal(low, rows.min(axis=0))
+    np.testing.assert_array_equal(high, rows.max(axis=0))
