@@ -17,12 +17,12 @@ ROUNDS = 3
 
 def kept_outside(strands: Strands, hull: Hull, clearance: float) -> Strands:
     """Return strands whose points, but for the roots, keep `clearance` metres from the head."""
-    points = strands.points.astype(np.float64)
+    points = strands.points.copy()
     free = np.ones(len(points), bool)
     free[strands.offsets[:-1]] = False
     distance = hull.head_distance[..., None]
     _lift(hull.grid.origin, hull.grid.spacing, distance, clearance, free, points)
-    return replace(strands, points=points.astype(np.float32))
+    return replace(strands, points=points)
 
 
 @njit(cache=True, parallel=True)
@@ -30,12 +30,14 @@ def _lift(origin, spacing, distance, clearance, free, points):  # type: ignore[n
     """Move free points (P, 3) along the distance's gradient until they are `clearance` off."""
     for i in prange(len(points)):
         if free[i]:
-            level, normal = np.empty(1), np.empty(3)
+            p, level, normal = np.empty(3), np.empty(1), np.empty(3)
+            p[:] = points[i]
             for _ in range(ROUNDS):
-                sample_at(origin, spacing, distance, points[i], level)
+                sample_at(origin, spacing, distance, p, level)
                 lack = clearance - level[0]
                 if lack <= 0:
                     break
-                gradient_at(origin, spacing, distance, points[i], normal)
+                gradient_at(origin, spacing, distance, p, normal)
                 for axis in range(3):
-                    points[i, axis] += lack * normal[axis]
+                    p[axis] += lack * normal[axis]
+                    points[i, axis] = p[axis]

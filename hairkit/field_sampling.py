@@ -18,13 +18,16 @@ def sample_at(origin, spacing, values, p, result):  # type: ignore[no-untyped-de
     fz = min(max((p[2] - origin[2]) / spacing - 0.5, 0.0), nz - 1.001)
     ix, iy, iz = int(fx), int(fy), int(fz)
     tx, ty, tz = fx - ix, fy - iy, fz - iz
-    for c in range(channels):
-        result[c] = 0.0
-    for corner in range(8):
-        a, b, d = corner & 1, corner >> 1 & 1, corner >> 2 & 1
-        weight = (tx if a else 1 - tx) * (ty if b else 1 - ty) * (tz if d else 1 - tz)
-        for c in range(channels):
-            result[c] += weight * values[ix + a, iy + b, iz + d, c]
+    for c in range(channels):  # along z, then y, then x: seven mixes instead of eight products
+        v00, v01 = values[ix, iy, iz, c], values[ix, iy + 1, iz, c]
+        v10, v11 = values[ix + 1, iy, iz, c], values[ix + 1, iy + 1, iz, c]
+        v00 += (values[ix, iy, iz + 1, c] - v00) * tz
+        v01 += (values[ix, iy + 1, iz + 1, c] - v01) * tz
+        v10 += (values[ix + 1, iy, iz + 1, c] - v10) * tz
+        v11 += (values[ix + 1, iy + 1, iz + 1, c] - v11) * tz
+        v00 += (v01 - v00) * ty
+        v10 += (v11 - v10) * ty
+        result[c] = v00 + (v10 - v00) * tx
 
 
 @njit(cache=True)

@@ -22,10 +22,10 @@ from hairkit.stored import Float32Array
 from hairkit.volume import cell_slopes, symmetric_matrices
 from hairkit.waves import add_waves, measure_waves
 
-KEPT = 4
-"""Every so many steps a point is kept: strands are resampled anyway."""
-BLOCK = 20_000
-"""Strands grown at a time, which bounds the memory."""
+NEAR = 4
+"""Cells of the grid in a row whose roots are grown together."""
+PARTS = 64
+"""Runs of roots that are grown side by side."""
 
 
 @dataclass(frozen=True)
@@ -76,16 +76,7 @@ def track(
 ) -> Strands:
     """Grow one strand from every root."""
     way = hair_length(hull, scalp_way(scene.head, hull))
-    direction = _signed(field)
-    distance = _distance(field, hull)
-    parts = [
-        grown(field, direction, distance, roots.positions[i : i + BLOCK], way, options)
-        for i in range(0, len(roots), BLOCK)
-    ]
-    points = np.concatenate([part.points for part in parts])
-    ends = [0, *np.cumsum([len(part.points) for part in parts[:-1]])]
-    offsets = [part.offsets[1:] + end for part, end in zip(parts, ends, strict=True)]
-    strands = Strands(points, np.concatenate([[0], *offsets])).resampled(options.points)
+    strands = grown(field, _signed(field), _distance(field, hull), roots.positions, way, options)
     strands = replace(strands, root_uv=roots.uv)
     if options.waves:
         strands = add_waves(strands, measure_waves(orientations, masks, scene.cameras))
@@ -112,8 +103,7 @@ def grown(
         Longest way through the hair, metres; strands slide along its surface only up to there.
     """
     steps = max(int(min(options.max_length, options.reach * way) / options.step), 2)
-    points = np.zeros((len(starts), steps // KEPT + 2, 3), np.float32)
-    counts = np.zeros(len(starts), np.int64)
+    points = np.zeros((len(starts), options.points, 3), np.float32)
     rules = (
         options.step,
         options.bound,
@@ -125,9 +115,10 @@ def grown(
         int(way / options.step),
     )
     volume = np.concatenate([direction, distance[..., None]], axis=3)
-    _grow(field.grid.origin, field.grid.spacing, volume, rules, starts, points, counts)
-    rows = np.arange(points.shape[1])[None] < counts[:, None]
-    return Strands(points[rows], np.concatenate([[0], np.cumsum(counts)]))
+    # neighbours grow one after the other: what they read of the field is still in the cache
+    order = np.lexsort((field.grid.nearest_cell(starts) // NEAR).T)
+    _grow(field.grid.origin, field.grid.spacing, volume, rules, starts, order, points)
+    return Strands(points.reshape(-1, 3), np.arange(len(starts) + 1) * options.points)
 
 
 def _signed(field: OrientationField) -> Float32Array:
@@ -153,26 +144,40 @@ def _distance(field: OrientationField, hull: Hull) -> Float32Array:
 
 
 @njit(cache=True, parallel=True)
-def _grow(origin, spacing, volume, rules, starts, points, counts):  # type: ignore[no-untyped-def]
-    for s in prange(len(starts)):
-        counts[s] = _grow_one(origin, spacing, volume, rules, starts[s], points[s])
+def _grow(origin, spacing, volume, rules, starts, order, points):  # type: ignore[no-untyped-def]
+    """Write strands (N, M, 3) of equal steps, grown in `order` (N,)."""
+    parts = min(PARTS, len(order))
+    for part in prange(parts):
+        course = np.empty((rules[4] + 1, 3))
+        for k in range(part * len(order) // parts, (part + 1) * len(order) // parts):
+            s = order[k]
+            count = _grow_one(origin, spacing, volume, rules, starts[s], course)
+            _evenly(course, count, points[s])
 
 
 @njit(cache=True)
-def _grow_one(origin, spacing, volume, rules, start, points):  # type: ignore[no-untyped-def]
-    """Write every KEPT-th point of one strand, and its last; returns how many, at least two."""
+def _evenly(course, count, points):  # type: ignore[no-untyped-def]
+    """Write points (M, 3) at equal shares of a course of `count` points, all steps equal."""
+    for m in range(len(points)):
+        at = m * (count - 1) / (len(points) - 1)
+        before = min(int(at), count - 2)
+        for axis in range(3):
+            first = course[before, axis]
+            points[m, axis] = first + (course[before + 1, axis] - first) * (at - before)
+
+
+@njit(cache=True)
+def _grow_one(origin, spacing, volume, rules, start, course):  # type: ignore[no-untyped-def]
+    """Write one strand's points into course (M, 3); returns how many, at least two."""
     step, bound, inertia, blind, steps, sine, skin, sliding = rules
     p, d, found = np.empty(3), np.zeros(3), np.empty(4)
     p[:] = start
-    points[0] = p
+    course[0] = p
     count = 1
     for i in range(1, steps + 1):
         sample_at(origin, spacing, volume, p, found)
         known = make_unit(found[:3])
         if i > blind and (found[3] > bound or not known):
-            if (i - 1) % KEPT != 0:
-                points[count] = p
-                count += 1
             break
         if known and i > 1:
             for axis in range(3):
@@ -185,12 +190,11 @@ def _grow_one(origin, spacing, volume, rules, start, points):  # type: ignore[no
             _slide(origin, spacing, volume, p, sine, d)
         for axis in range(3):
             p[axis] += step * d[axis]
-        if i % KEPT == 0 or i == steps:
-            points[count] = p
-            count += 1
+        course[count] = p
+        count += 1
     if count == 1:  # nothing is known at the root: a stub keeps the strand's place
-        points[1] = points[0]
-        points[1, 1] += step
+        course[1] = course[0]
+        course[1, 1] += step
         count = 2
     return count
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from types import ModuleType
 
@@ -106,12 +106,16 @@ def test_a_field_without_signs_is_followed_along_its_growth() -> None:
     np.testing.assert_allclose(found.roots, roots.positions, atol=1e-7)
 
 
-def test_blocks_grow_what_one_run_grows(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Many strands are grown in blocks; the result does not depend on them."""
+def test_strands_do_not_depend_on_each_other() -> None:
+    """Every second root alone gives the same strands; points stand at equal steps."""
     roots = scalp_roots(ball_head())
     whole = follow_ball(FREE, roots)
-    monkeypatch.setattr(hybrid_growth, "BLOCK", 50)
-    np.testing.assert_array_equal(follow_ball(FREE, roots).points, whole.points)
+    half = Roots(*(getattr(roots, f.name)[::2] for f in fields(roots)))
+    np.testing.assert_array_equal(
+        follow_ball(FREE, half).points, whole.select(np.arange(0, len(whole), 2)).points
+    )
+    step = np.linalg.norm(whole.segments()[0], axis=1).reshape(len(whole), -1)[:, 20:]
+    assert (np.ptp(step, axis=1) < 0.2 * step.mean(axis=1)).mean() > 0.9
 
 
 def test_the_step_hardly_matters() -> None:
