@@ -21,6 +21,7 @@ from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, 
 from hairkit.clearance import kept_outside
 from hairkit.combing import combing_direction, hair_length, scalp_way
 from hairkit.field_sampling import gradient_at, make_unit, principal_direction, sample_at
+from hairkit.geometry import smoothed
 from hairkit.options import option
 from hairkit.stored import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.waves import add_waves, measure_waves
@@ -78,6 +79,13 @@ class Options:
         high=1,
         doc="Share of upward steps that marks a U-shaped strand (mu); 1 never trims.",
     )
+    helix_tolerance: float = option(
+        0.0,
+        low=0,
+        high=0.01,
+        unit="m",
+        doc="Smooth strands by helix arcs within this mean distance; 0: leave them.",
+    )
     waves: bool = option(True, doc="Wind the strands as the photos' waves do.")
     points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
 
@@ -102,6 +110,8 @@ def track(
     strands = Strands(points[rows], offsets).resampled(options.points)
     smooth = _smoothed(strands.points.reshape(len(roots), options.points, 3), options.smoothing)
     result = Strands(smooth.reshape(-1, 3), strands.offsets, root_uv=roots.uv)
+    if options.helix_tolerance > 0:
+        result = smoothed(result, options.helix_tolerance)
     if options.waves:
         result = add_waves(result, measure_waves(orientations, masks, scene.cameras))
     return kept_outside(result, hull, options.clearance)

@@ -17,6 +17,7 @@ from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, 
 from hairkit.clearance import kept_outside
 from hairkit.combing import hair_length, scalp_way
 from hairkit.field_sampling import gradient_at, make_unit, sample_at
+from hairkit.geometry import smoothed
 from hairkit.options import option
 from hairkit.stored import Float32Array
 from hairkit.volume import cell_slopes, symmetric_matrices
@@ -60,6 +61,13 @@ class Options:
         0.92, low=0, high=0.99, doc="Share of the previous direction in the next step's."
     )
     clearance: float = option(0.001, low=0, high=0.02, unit="m", doc="Distance kept from the head.")
+    helix_tolerance: float = option(
+        0.0,
+        low=0,
+        high=0.01,
+        unit="m",
+        doc="Smooth strands by helix arcs within this mean distance; 0: leave them.",
+    )
     waves: bool = option(True, doc="Wind the strands as the photos' waves do.")
     points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
 
@@ -78,6 +86,8 @@ def track(
     way = hair_length(hull, scalp_way(scene.head, hull))
     strands = grown(field, _signed(field), _distance(field, hull), roots.positions, way, options)
     strands = replace(strands, root_uv=roots.uv)
+    if options.helix_tolerance > 0:
+        strands = smoothed(strands, options.helix_tolerance)
     if options.waves:
         strands = add_waves(strands, measure_waves(orientations, masks, scene.cameras))
     return kept_outside(strands, hull, options.clearance)

@@ -136,3 +136,26 @@ def test_the_page_has_every_option_with_its_default(project: Path, plugin: Modul
     for info in describe(plugin.Options):
         default = str(info.default).lower() if info.type is bool else info.default
         assert f"| `{info.name}` | {default} |" in page, info.name
+
+
+def test_strands_can_be_smoothed_by_helix_arcs() -> None:
+    """Noise in the field goes, within the tolerance; roots stay."""
+    rng = np.random.default_rng(5)
+    field = combed_field()
+    noisy = replace(field, tensor=field.tensor + 0.15 * rng.standard_normal(field.tensor.shape))
+    roots = scalp_roots(ball_head())
+    scene, hull = turn_scene(), shell_hull()
+    options = replace(FREE, inertia=0.0, reach=2.0)
+    rough, calm = (
+        track(scene, (), (), hull, noisy, roots, replace(options, helix_tolerance=t))
+        for t in (0.0, 0.0005)
+    )
+
+    def unrest(strands: Strands) -> float:
+        points = strands.points.reshape(len(strands), -1, 3).astype(np.float64)
+        return float(np.linalg.norm(np.diff(points, n=3, axis=1), axis=2).mean())
+
+    assert unrest(calm) < 0.9 * unrest(rough)
+    np.testing.assert_allclose(calm.roots, rough.roots, atol=1e-7)
+    apart = np.linalg.norm(calm.points - rough.points, axis=1)
+    assert apart.mean() < 0.0007
