@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hairkit.cli.export import plugin_for
+from hairkit.groom_opening import plugin_for
 from hairkit.groom import Groom
 from hairkit.guide_weights import guide_mask
 from hairkit.manager import Manager

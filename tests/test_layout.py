@@ -29,6 +29,7 @@ FLOORS = {
     "manager": 2,
     "recipe": 2,
     "scaffold": 2,
+    "groom_opening": 2,
     "format_table": 2,
     "hookspecs": 2,
     "simulate": 1,

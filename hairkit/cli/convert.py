@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.cli.export import assigned, check_target, load_groom, plugin_for
+from hairkit.cli.export import assigned, check_target
 from hairkit.errors import InputError, OptionError
 from hairkit.groom import Groom
+from hairkit.groom_opening import load_groom, plugin_for
 from hairkit.guide_weights import guide_mask
 from hairkit.manager import Manager
 from hairkit.simplify import simplified

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from hairkit.errors import InputError, OptionError
-from hairkit.groom import Groom
-from hairkit.groom_file import read_groom
+from hairkit.groom_opening import load_groom, plugin_for
 from hairkit.manager import Manager
 
 _DESCRIPTION = """\
@@ -46,53 +45,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def load_groom(
-    manager: Manager, path: Path, settings: Mapping[str, object], plugin: str | None = None
-) -> Groom:
-    """Return the groom in a file.
-
-    Parameters
-    ----------
-    manager
-        The plugins.
-    path
-        A groom.npz, or a file of any format that a plugin imports.
-    settings
-        Options of the import plugin by name.
-    plugin
-        The import plugin; by default the one of the file's ending.
-    """
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    if plugin is None and path.suffix == ".npz" and not settings:
-        return read_groom(path)
-    name = plugin or plugin_for(manager, "import_groom", path)
-    groom = manager.call("import_groom", name, manager.options(name, settings), path=path)
-    if not isinstance(groom, Groom):  # the manager has checked it; this tells the type
-        raise InputError(f"{path}: {name} made no groom of it")
-    return groom
-
-
 def check_target(path: Path) -> None:
     """Raise `InputError` when a file cannot be put there, before any work is done."""
     if not path.parent.is_dir():
         raise InputError(f"{path.parent}: no such folder; make it first")
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file")
-
-
-def plugin_for(manager: Any, stage: str, path: Path) -> str:
-    """Return the plugin of the longest ending that fits the file's name."""
-    fitting = [
-        (len(suffix), name)
-        for name in manager.names(stage)
-        for suffix in manager.info(name).suffixes
-        if path.name.lower().endswith(suffix)
-    ]
-    if not fitting:
-        known = sorted({s for name in manager.names(stage) for s in manager.info(name).suffixes})
-        raise InputError(f"{path}: no plugin for files of this name; known: {', '.join(known)}")
-    return str(max(fitting)[1])
 
 
 def assigned(assignments: Iterable[str], plugin: str) -> dict[str, object]:

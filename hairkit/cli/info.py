@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from hairkit.cli.convert import add_reader_arguments, reader_settings
-from hairkit.cli.export import assigned, load_groom, plugin_for
+from hairkit.cli.export import assigned
 from hairkit.errors import FormatError, InputError
+from hairkit.groom_opening import load_groom, plugin_for
 from hairkit.guide_weights import guide_mask
 from hairkit.manager import Manager
 from hairkit.stored import Float32Array

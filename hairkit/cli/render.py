@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from hairkit.camera import Camera
 from hairkit.capture_reader import TURN
-from hairkit.cli.export import load_groom
 from hairkit.densify import densify
 from hairkit.errors import InputError
+from hairkit.groom_opening import load_groom
 from hairkit.manager import Manager
 from hairkit.render import Lights, draw_views
 from hairkit.scene import read_cameras
@@ -60,7 +60,7 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw and print the names of the pictures."""
-    groom = load_groom(Manager.loaded(), args.groom, {})
+    groom = load_groom(Manager.loaded(), args.groom)
     if not 1 <= args.hairs <= MOST_HAIRS:
         raise InputError(f"--hairs is {args.hairs}, expected 1 to {MOST_HAIRS}")
     hair = densify(groom, args.hairs, args.seed)

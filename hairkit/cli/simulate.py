@@ -49,7 +49,7 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate, write the cache or the animated file, and print its name."""
-    from hairkit.cli.export import plugin_for
+    from hairkit.groom_opening import load_groom, plugin_for
     from hairkit.manager import Manager
     from hairkit.progress import progress_for
     from hairkit.simulate import Weather, read_motion, shaken, still
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         exporter = plugin_for(manager, "export_groom", args.out)
     _refuse_unknown(others, exporter)
     weather = Weather(_vector("--wind", args.wind), args.turbulence, _gravity(args.gravity))
-    groom = _read(manager, args.groom)
+    groom = load_groom(manager, args.groom)
     motion = still() if args.motion is None else read_motion(args.motion)
     motion = shaken(args.shake, groom.head, motion)
     simulator = manager.call("make_simulator", args.using, options, groom=groom)
@@ -115,15 +115,6 @@ def _gravity(down: float | None) -> Float64Array | None:
     if not (math.isfinite(down) and abs(down) <= 1000):
         raise InputError(f"--gravity is {down}, expected metres per second squared")
     return np.array([0.0, -down, 0.0])
-
-
-def _read(manager: Any, source: Path) -> Any:
-    from hairkit.cli.export import plugin_for
-    from hairkit.groom_file import read_groom
-
-    if source.suffix == ".npz" or not source.exists():
-        return read_groom(source)
-    return manager.call("import_groom", plugin_for(manager, "import_groom", source), path=source)
 
 
 def _settings(
