@@ -8,6 +8,7 @@ Source: Autodesk's description of Maya ASCII files and of `setAttr -type nurbsCu
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -21,8 +22,10 @@ from hairkit.file_format import Feature, FileFormat
 from hairkit.file_space import SPACES, FileSpace, SpaceOptions
 from hairkit.groom import Groom
 from hairkit.hookspecs import hookimpl
+from hairkit.number_text import written_rows
 from hairkit.options import option
-from hairkit.stored import BoolArray, Float32Array, write_bytes
+from hairkit.point_blocks import blocks
+from hairkit.stored import BoolArray, Int64Array, write_pieces
 from hairkit.strands import Strands
 
 FORMAT = FileFormat(
@@ -59,8 +62,8 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     space = options.space
     unit = _unit(space)
     strands = prepared(groom, options).groom.strands
-    parts = [_HEADER.format(unit=unit, top=_TOP), *_scene(strands, space)]
-    write_bytes(path, "".join(parts).encode("ascii"))
+    header = _HEADER.format(unit=unit, top=_TOP)
+    write_pieces(path, itertools.chain([header.encode("ascii")], _scene(strands, space)))
     return True
 
 
@@ -75,17 +78,16 @@ def _unit(space: FileSpace) -> str:
     )
 
 
-def _scene(strands: Strands, space: FileSpace) -> Iterator[str]:
+def _scene(strands: Strands, space: FileSpace) -> Iterator[bytes]:
     """Yield the groups, each with its curves."""
-    points = space.points_to_file(strands.points)
     for kind, chosen in _kinds(strands):
         assert strands.group is not None
         groups = np.unique(strands.group[chosen])
         for group in groups.tolist():
             name = kind.group if len(groups) == 1 else _numbered(kind.group, group)
-            yield f'createNode transform -n "{name}" -p "|{_TOP}";\n'
+            yield f'createNode transform -n "{name}" -p "|{_TOP}";\n'.encode("ascii")
             index = np.flatnonzero(chosen & (strands.group == group))
-            yield from _curves(strands, points, index.tolist(), name, kind.curve)
+            yield from _curves(strands, space, index, name.encode(), kind.curve.encode())
 
 
 @dataclass(frozen=True)
@@ -105,29 +107,40 @@ def _numbered(name: str, number: int) -> str:
 
 
 def _curves(
-    strands: Strands, points: Float32Array, index: list[int], parent: str, kind: str
-) -> Iterator[str]:
+    strands: Strands, space: FileSpace, index: Int64Array, group: bytes, kind: bytes
+) -> Iterator[bytes]:
     """Yield the text of the curves; strand numbers are in the names, all with as many digits."""
     digits = len(str(len(strands) - 1))
-    offsets = strands.offsets.tolist()
-    for strand in index:
-        rows = points[offsets[strand] : offsets[strand + 1]]
-        name = f"{kind}_{strand:0{digits}}"
-        yield _template(len(rows)) % (name, parent, name, parent, name, *rows.ravel().tolist())
+    for block in blocks(strands):
+        chosen = index[(index >= block.strands.start) & (index < block.strands.stop)]
+        if not len(chosen):
+            continue
+        part = strands.select(chosen)
+        text, ends = written_rows(b"\t\t%.9g %.9g %.9g\n", space.points_to_file(part.points))
+        places = [0, *ends[part.offsets[1:] - 1].tolist()]
+        pieces = []
+        for strand, count, start, stop in zip(
+            chosen.tolist(), part.counts.tolist(), places, places[1:], strict=False
+        ):
+            name = b"%s_%0*d" % (kind, digits, strand)
+            pieces.append(_template(count) % (name, group, name, group, name))
+            pieces += (text[start:stop], b"\t\t;\n")
+        yield b"".join(pieces)
 
 
 @cache
-def _template(count: int) -> str:
-    """Return the text of a curve of `count` points, with places for names and coordinates.
+def _template(count: int) -> bytes:
+    """Return how a curve of `count` points begins, with places for names.
 
     Degree, spans, form (0 open), rational, dimensions; as many knots as points, 0, 1, 2 ...
     """
-    return (
+    text = (
         f'createNode transform -n "%s" -p "|{_TOP}|%s";\n'
         f'createNode nurbsCurve -n "%sShape" -p "|{_TOP}|%s|%s";\n'
         '\tsetAttr -k off ".v";\n'
         '\tsetAttr ".cc" -type "nurbsCurve"\n'
         f"\t\t1 {count - 1} 0 no 3\n"
         f"\t\t{count} {' '.join(map(str, range(count)))}\n"
-        f"\t\t{count}\n" + "\t\t%.9g %.9g %.9g\n" * count + "\t\t;\n"
+        f"\t\t{count}\n"
     )
+    return text.encode("ascii")

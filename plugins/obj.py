@@ -16,18 +16,17 @@ from hairkit.byte_reader import read_file
 from hairkit.errors import FormatError
 from hairkit.exporting import ExportOptions, prepared
 from hairkit.file_format import Feature, FileFormat
-from hairkit.file_space import SpaceOptions
+from hairkit.file_space import FileSpace, SpaceOptions
 from hairkit.groom import Groom
 from hairkit.hookspecs import hookimpl
 from hairkit.importing import ImportOptions, adopt, packed
-from hairkit.number_text import read_numbers, written_rows
+from hairkit.number_text import read_numbers, stripped, whole_digits, written_rows
+from hairkit.point_blocks import blocks
 from hairkit.polylines import chains
-from hairkit.stored import Float64Array, Int64Array, write_bytes
+from hairkit.stored import Float64Array, Int64Array, write_pieces
 from hairkit.strands import Strands
 
 FORMAT = FileFormat("OBJ lines", (".obj",), exact=frozenset({Feature.POINTS, Feature.COUNTS}))
-
-_STRANDS_AT_ONCE = 4096
 
 
 @dataclass(frozen=True)
@@ -38,10 +37,7 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the strands as lines."""
-    strands = prepared(groom, options).groom.strands
-    points = options.space.points_to_file(strands.points)
-    parts = ["# hair strands, written by hairkit\n", *written_rows("v %.9g %.9g %.9g\n", points)]
-    write_bytes(path, "".join([*parts, *_lines(strands)]).encode("ascii"))
+    write_pieces(path, _pieces(prepared(groom, options).groom.strands, options.space))
     return True
 
 
@@ -62,15 +58,20 @@ def import_groom(path: Path, options: Options) -> Groom:
     return adopt(strands, options, path)
 
 
-def _lines(strands: Strands) -> Iterator[str]:
-    """Yield the `l` elements, one a strand, vertices counted from 1."""
-    counts = strands.counts
-    pattern = {int(count): "l" + " %d" * int(count) + "\n" for count in np.unique(counts)}
-    for start in range(0, len(counts), _STRANDS_AT_ONCE):
-        stop = min(start + _STRANDS_AT_ONCE, len(counts))
-        numbers = range(int(strands.offsets[start]) + 1, int(strands.offsets[stop]) + 1)
-        text = "".join(map(pattern.__getitem__, counts[start:stop].tolist()))
-        yield text % tuple(numbers)
+def _pieces(strands: Strands, space: FileSpace) -> Iterator[bytes]:
+    """Yield the vertices, then an `l` element for each strand, vertices counted from 1."""
+    yield b"# hair strands, written by hairkit\n"
+    for block in blocks(strands):
+        points = space.points_to_file(strands.points[block.points])
+        yield written_rows(b"v %.9g %.9g %.9g\n", points)[0]
+    for block in blocks(strands):
+        start = block.points.start
+        digits = whole_digits(np.arange(start + 1, block.points.stop + 1))
+        around = np.zeros((3, digits.shape[1]), np.uint8)
+        around[0, strands.offsets[:-1][block.strands] - start] = ord("l")
+        around[1] = ord(" ")
+        around[2, strands.offsets[1:][block.strands] - 1 - start] = ord("\n")
+        yield stripped(np.concatenate([around[:2], digits, around[2:]]))[0]
 
 
 def _elements(text: str) -> tuple[list[str], list[str], list[int]]:
