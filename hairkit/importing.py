@@ -200,7 +200,7 @@ def _with_length(strands: Strands, source: object) -> Strands:
 
 
 def _check_spread(strands: Strands, options: ImportOptions, source: object) -> None:
-    """Refuse strands of another unit; a few roots far off do not count."""
+    """Refuse strands of another unit, unless the user named it; roots far off do not count."""
     low, high = np.percentile(strands.roots, _OUTER, axis=0)
     spread = float((high - low).max())
     lone = len(strands) == 1  # roots tell nothing, the length does
@@ -211,10 +211,14 @@ def _check_spread(strands: Strands, options: ImportOptions, source: object) -> N
     unit = options.space.metres if isinstance(options, SpaceOptions) else 1.0
     longest = float(np.percentile(strands.lengths(), 90))
     guess = unit * _TYPICAL_SPREAD / max(spread, longest / 4, 1e-30)
-    raise InputError(
+    wrong = (
         f"{source}: the roots spread over {spread:.4g} m, a head of hair's over about"
-        f" {_TYPICAL_SPREAD} m; give metres per unit of the file: scale={guess:.2g}"
+        f" {_TYPICAL_SPREAD} m; "
     )
+    if isinstance(options, SpaceOptions) and options.scale > 0:
+        _log.warning("%sscale=%.2g would make it so", wrong, guess)
+    else:
+        raise InputError(f"{wrong}give metres per unit of the file: scale={guess:.2g}")
 
 
 def _head(strands: Strands, options: ImportOptions, own: Head | None, source: object) -> Head:

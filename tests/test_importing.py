@@ -186,3 +186,10 @@ def test_strands_that_are_all_no_guides_become_guides(caplog: pytest.LogCaptureF
     groom = adopt(strands, ImportOptions(), "file")
     assert guide_mask(groom.strands).all()
     assert "no strand is marked as a guide" in caplog.text
+
+
+def test_a_named_unit_is_taken_at_its_word(caplog: pytest.LogCaptureFixture) -> None:
+    """With `scale` given, hair of any size is read; what would be usual is said."""
+    groom = adopt(hair_on(0.01), Options(scale=0.01), "a.hair")
+    assert float(np.ptp(groom.strands.roots, axis=0).max()) < 0.03
+    assert "would make it so" in caplog.text

@@ -37,6 +37,9 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show the groom until the window is closed, or play the script."""
+    from hairkit.groom_opening import groom_path
+
+    groom_path(args.groom)  # before a window opens for nothing
     if args.headless:
         return _headless(args)
     from hairkit.viewer.window import show
