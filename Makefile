@@ -17,11 +17,11 @@ DISPLAYS := xvfb
 test: $(VENV)/.tests
 	@sh .ci/libraries $(DISPLAYS)
 	@sh .ci/validator $(CLIENTS)
-	$(BIN)/python -m pytest --ignore tests/clients
+	$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/clients
 
 test-clients: $(VENV)/.tests $(CLIENTS)/.blender
 	@sh .ci/validator $(CLIENTS)
-	$(BIN)/python -m pytest tests/clients tests/plugins
+	$(BIN)/python -m pytest -n auto --dist worksteal tests/clients tests/plugins
 
 demo: $(VENV)/.hairkit
 	$(BIN)/hairkit reconstruct hairkit/sample -o $(DEMO)
