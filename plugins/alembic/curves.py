@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hairkit.errors import InputError
-from hairkit.exporting import PreparedGroom, point_colours
+from hairkit.exporting import PreparedGroom
 from hairkit.file_space import FileSpace
 from hairkit.guide_weights import GuideWeights, closest_guides, guide_mask
+from hairkit.point_blocks import Profile, colours
 from hairkit.point_cache import PointCache
 from hairkit.stored import BoolArray, Float32Array, Int32Array, Int64Array
 from hairkit.strands import Strands
@@ -36,7 +37,7 @@ class GroomCurves:
     """(P,) diameters."""
     root_uv: Float32Array
     """(S, 2)."""
-    colour: Float32Array
+    colour: Profile
     """(P, 3) linear RGB."""
     group: Int32Array
     """(S,)."""
@@ -71,7 +72,6 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
     fitted, cache = _limited(strands, ready.cache, options.max_points)
     guide = guide_mask(strands)
     marked = options.mark_guides or not guide.all()
-    look = replace(ready.groom, strands=fitted)
     assert fitted.widths is not None  # `prepared` has filled in all three
     assert fitted.root_uv is not None
     assert fitted.group is not None
@@ -82,7 +82,7 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
         counts=fitted.counts.astype(np.int32),
         widths=fitted.widths / np.float32(space.metres),
         root_uv=fitted.root_uv,
-        colour=point_colours(look),
+        colour=colours(ready.groom.material, fitted.counts),
         group=fitted.group,
         guide=guide if marked else None,
         closest=closest_guides(strands) if marked and guide.any() else None,

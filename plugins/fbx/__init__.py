@@ -20,7 +20,7 @@ from hairkit.file_space import SPACES, FileSpace, SpaceOptions
 from hairkit.groom import Groom
 from hairkit.hookspecs import hookimpl
 from hairkit.options import option
-from hairkit.stored import write_bytes
+from hairkit.stored import write_pieces
 
 FORMAT = FileFormat(
     title="FBX",
@@ -50,8 +50,8 @@ class Options(SpaceOptions, ExportOptions):
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the groom's head, and its strands where asked for."""
-    from .scene import scene_bytes
+    from .scene import scene_pieces
 
     strands = prepared(groom, options).groom.strands if options.curves else None
-    write_bytes(path, scene_bytes(groom.head, strands, options.written_space))
+    write_pieces(path, scene_pieces(groom.head, strands, options.written_space))
     return True

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from hairkit.stored import Float64Array
 from hairkit.strands import Strands
 
-from .records import array, number, record, text
+from .records import Record, array, number, record, text
 from .scene import SCENE, Scene
 
 ORDER = 2
@@ -38,12 +40,21 @@ def _add_group(scene: Scene, name: str) -> int:
 
 def _add_curve(scene: Scene, name: str, parent: int, points: Float64Array) -> None:
     """Add one curve through points (n, 4), the last column weights of 1."""
-    last = float(len(points) - 1)
-    knots = np.concatenate([[0.0], np.arange(len(points)), [last]])
     geometry = scene.add(
         "Geometry",
         name,
         "NurbsCurve",
+        *_of_curves(),
+        record("Points", array("d", points)),
+        _knots(len(points)),
+    )
+    scene.connect(geometry, scene.add_model(name, "NurbsCurve", parent))
+
+
+@cache
+def _of_curves() -> tuple[Record, ...]:
+    """Return what all curves have."""
+    return (
         record("GeometryVersion", number("I", 124)),
         record("Type", text("NurbsCurve")),
         record("NurbsCurveVersion", number("I", 100)),
@@ -51,7 +62,11 @@ def _add_curve(scene: Scene, name: str, parent: int, points: Float64Array) -> No
         record("Dimension", number("I", 3)),
         record("Form", text("Open")),
         record("Rational", number("I", 0)),
-        record("Points", array("d", points)),
-        record("KnotVector", array("d", knots)),
     )
-    scene.connect(geometry, scene.add_model(name, "NurbsCurve", parent))
+
+
+@cache
+def _knots(count: int) -> Record:
+    """Return the knots of a curve of `count` points, the first and the last twice."""
+    knots = np.concatenate([[0.0], np.arange(count), [count - 1.0]])
+    return record("KnotVector", array("d", knots))

@@ -68,40 +68,40 @@ def array(kind: str, values: npt.ArrayLike) -> bytes:
     return kind.encode() + struct.pack("<III", held.size, 0, held.nbytes) + held.tobytes()
 
 
-def file_bytes(records: Sequence[Record]) -> bytes:
-    """Return the whole file: magic, records, footer.
+def file_pieces(records: Sequence[Record]) -> list[bytes]:
+    """Return the whole file in pieces: magic, records, footer.
 
     Raises
     ------
     InputError
         The file would be larger than 4 GiB, the most that version 7.4 can name.
     """
-    parts = [MAGIC + struct.pack("<I", VERSION)]
-    at = len(parts[0])
+    pieces = [MAGIC + struct.pack("<I", VERSION)]
+    at = len(pieces[0])
     for top in records:
-        parts.append(_serialized(top, at))
-        at += len(parts[-1])
+        found, at = _pieces(top, at)
+        pieces += found
     footer = CLOSE + _FOOTER_ID + b"\0" * 4
     padding = -(at + len(footer)) % 16 or 16
-    parts += [footer, b"\0" * padding, struct.pack("<I", VERSION), b"\0" * 120, _FOOTER_END]
-    return b"".join(parts)
+    return [*pieces, footer, b"\0" * padding, struct.pack("<I", VERSION), b"\0" * 120, _FOOTER_END]
 
 
 def _counted(kind: bytes, value: bytes) -> bytes:
     return kind + struct.pack("<I", len(value)) + value
 
 
-def _serialized(node: Record, start: int) -> bytes:
+def _pieces(node: Record, start: int) -> tuple[list[bytes], int]:
+    """Return a record's own bytes, those of each child, and where in the file they end."""
     body = b"".join(node.values)
-    parts = [node.name, body]
+    pieces = []
     end = start + _HEADER.size + len(node.name) + len(body)
     for child in node.children:
-        parts.append(_serialized(child, end))
-        end += len(parts[-1])
+        found, end = _pieces(child, end)
+        pieces.append(b"".join(found) if len(found) > 1 else found[0])
     if node.children or not node.values:
-        parts.append(CLOSE)
+        pieces.append(CLOSE)
         end += len(CLOSE)
     if end >= 2**32:
         raise InputError("the FBX file would be larger than 4 GiB; write fewer strands")
     header = _HEADER.pack(end, len(node.values), len(body), len(node.name))
-    return header + b"".join(parts)
+    return [header + node.name + body, *pieces], end

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 from hairkit.file_space import FileSpace
 from hairkit.head import Head
@@ -15,7 +16,7 @@ from .records import (
     FILE_ID,
     VERSION,
     Record,
-    file_bytes,
+    file_pieces,
     number,
     object_name,
     raw,
@@ -49,19 +50,9 @@ class Scene:
 
     def add_model(self, name: str, subkind: str, parent: int, *properties: Record) -> int:
         """Add a node of the hierarchy below `parent` and return its id."""
-        always = (
-            one("DefaultAttributeIndex", "int", "Integer", "", 0),
-            one("InheritType", "enum", "", "", 1),
-        )
-        model = self.add(
-            "Model",
-            name,
-            subkind,
-            record("Version", number("I", 232)),
-            properties70(*properties, *always),
-            record("Shading", number("C", True)),
-            record("Culling", text("CullingOff")),
-        )
+        version, always, *drawn = _of_models()
+        own = properties70(*properties, *always.children) if properties else always
+        model = self.add("Model", name, subkind, version, own, *drawn)
         self.connect(model, parent)
         return model
 
@@ -70,8 +61,8 @@ class Scene:
         self.connections.append((child, parent))
 
 
-def scene_bytes(head: Head, strands: Strands | None, space: FileSpace) -> bytes:
-    """Return the file of a head, and of strands where there are some."""
+def scene_pieces(head: Head, strands: Strands | None, space: FileSpace) -> list[bytes]:
+    """Return the file, in pieces, of a head, and of strands where there are some."""
     from .body import add_body
     from .curves import add_curves
 
@@ -79,7 +70,7 @@ def scene_bytes(head: Head, strands: Strands | None, space: FileSpace) -> bytes:
     add_body(scene, head)
     if strands is not None:
         add_curves(scene, strands)
-    return file_bytes(_document(scene))
+    return file_pieces(_document(scene))
 
 
 def properties70(*properties: Record) -> Record:
@@ -92,6 +83,20 @@ def one(name: str, kind: str, label: str, flags: str, *values: float) -> Record:
     code = _VALUES.get(kind, "D")
     numbers = [number(code, value) for value in values]
     return record("P", text(name), text(kind), text(label), text(flags), *numbers)
+
+
+@cache
+def _of_models() -> tuple[Record, ...]:
+    """Return what all models have: version, properties, and how they are drawn."""
+    return (
+        record("Version", number("I", 232)),
+        properties70(
+            one("DefaultAttributeIndex", "int", "Integer", "", 0),
+            one("InheritType", "enum", "", "", 1),
+        ),
+        record("Shading", number("C", True)),
+        record("Culling", text("CullingOff")),
+    )
 
 
 def _document(scene: Scene) -> list[Record]:

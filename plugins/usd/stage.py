@@ -103,6 +103,8 @@ def _export(stage: Any, path: Path) -> None:
     os.close(handle)
     try:
         stage.GetRootLayer().Export(temporary)
+        with open(temporary, "rb+") as file:
+            os.fsync(file.fileno())  # as hairkit.stored does: the name is not before the bytes
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, path)
     except BaseException:
