@@ -1,16 +1,11 @@
 // The grid of hair among hair (see plugins/pbd/crowd.py): sums in whole numbers, so that their
 // order does not matter. Mass is in units that all hair together does not overflow.
-layout(std430, binding = 2) readonly buffer Masses { float masses[]; };
-layout(std430, binding = 3) buffer Filled { int filled[]; };      // mass and momentum of a cell
-layout(std430, binding = 4) buffer Cells { vec4 cells[]; };       // mean velocity, crowding
-layout(std430, binding = 5) readonly buffer Usual { float usual[]; };
+layout(std430, binding = 0) buffer Filled { int filled[]; };  // mass and momentum of a cell
 
 uniform ivec3 u_cells;
 uniform vec4 u_grid;          // place of the first cell, 1/spacing
 uniform vec4 u_drift[3];      // velocity of a point that rides on the head
 uniform float u_momentum;     // units of momentum in a unit of mass at 1 m/s
-uniform float u_capacity;     // units of mass that a cell's momentum holds
-uniform vec2 u_rates;         // share of velocity taken on, push in m/s
 const float FASTEST = 10.0;   // m/s that a component of velocity counts for
 
 vec3 drift(vec3 p) {
@@ -26,6 +21,5 @@ ivec3 corner_of(vec3 p, out vec3 share) {
     return low;
 }
 
-int cell_of(ivec3 at) { return (at.x * u_cells.y + at.y) * u_cells.z + at.z; }
 ivec3 corner(int i) { return ivec3(i >> 2 & 1, i >> 1 & 1, i & 1); }
 vec3 parts(vec3 share, ivec3 at) { return mix(1.0 - share, share, vec3(at)); }

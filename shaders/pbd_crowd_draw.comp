@@ -2,20 +2,25 @@
 // Hair among hair, third: nodes take on their neighbours' velocity and leave crowded places.
 #include "pbd_layout.glsl"
 #include "pbd_crowd.glsl"
+layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
+uniform sampler3D u_means;    // mean velocity and crowding of cells, along z, y, x
+uniform vec2 u_rates;         // share of velocity taken on, push in m/s
+uniform int u_nodes;          // NODES, which the compiler shall not know here: it would unroll
 
 void main() {
-    for (int j = 1; j < NODES; j++) {
-        int at = node_at(j);
-        vec3 p = node_place(at), speed = node_speed(at), share;
+    int rod = int(gl_GlobalInvocationID.x);
+    if (rod >= u_rods) return;
+    for (int j = 1; j < u_nodes; j++) {
+        vec3 p = node_place(rod, j).xyz, speed = node_speed(rod, j).xyz, share;
         vec3 mean = vec3(0.0), slope = vec3(0.0);
         ivec3 low = corner_of(p, share);
         for (int i = 0; i < 8; i++) {
             vec3 part = parts(share, corner(i)), way = 2.0 * vec3(corner(i)) - 1.0;
-            vec4 cell = cells[cell_of(low + corner(i))];
+            vec4 cell = texelFetch(u_means, (low + corner(i)).zyx, 0);
             mean += part.x * part.y * part.z * cell.xyz;
             slope += cell.w * way * part.yxx * part.zzy;
         }
         speed += u_rates.x * (mean - (speed - drift(p))) - u_rates.y * slope;
-        set_node(at + SPEED * LANES, speed);
+        imageStore(u_new_state, texel(rod, 2 * j + 1, STATE_ROWS), vec4(speed, 0.0));
     }
 }

@@ -2,20 +2,22 @@
 // Hair among hair, first: spreads mass and momentum of all nodes to the grid.
 #include "pbd_layout.glsl"
 #include "pbd_crowd.glsl"
+uniform sampler2D u_masses;
+uniform int u_nodes;  // NODES, which the compiler shall not know here: it would unroll
 
 void main() {
-    for (int j = 0; j < NODES; j++) {
-        int at = node_at(j);
-        float mass = masses[(block() * NODES + j) * LANES + lane()];
-        if (mass == 0.0) continue;  // lanes beyond the last rod
-        vec3 p = node_place(at), share;
-        vec3 speed = clamp(node_speed(at) - drift(p), -FASTEST, FASTEST) * u_momentum;
+    int rod = int(gl_GlobalInvocationID.x);
+    if (rod >= u_rods) return;
+    for (int j = 0; j < u_nodes; j++) {
+        vec3 p = node_place(rod, j).xyz, share;
+        vec3 speed = clamp(node_speed(rod, j).xyz - drift(p), -FASTEST, FASTEST) * u_momentum;
+        float mass = texelFetch(u_masses, texel(rod, j, NODES), 0).x;
         ivec3 low = corner_of(p, share);
         for (int i = 0; i < 8; i++) {
             vec3 part = parts(share, corner(i));
             float weight = mass * part.x * part.y * part.z;
-            int cell = 4 * cell_of(low + corner(i));
-            ivec3 momentum = ivec3(round(weight * speed));
+            ivec3 at = low + corner(i), momentum = ivec3(round(weight * speed));
+            int cell = 4 * ((at.x * u_cells.y + at.y) * u_cells.z + at.z);
             atomicAdd(filled[cell], int(round(weight)));
             if (momentum.x != 0) atomicAdd(filled[cell + 1], momentum.x);
             if (momentum.y != 0) atomicAdd(filled[cell + 2], momentum.y);

@@ -1,16 +1,15 @@
 #version 430
 // Substeps of rods, one rod an invocation: the steps of plugins/pbd/reference.py in their order.
-// Masses are shares of the rod's mean, so that stiffness is in 1/s^2.
+// Masses are shares of the rod's mean, so that stiffness is in 1/s^2. Loops go over whole arrays, a
+// condition within instead of other bounds: then compilers unroll them and keep arrays in registers.
 #include "pbd_layout.glsl"
 #include "pbd_turns.glsl"
 
-const int ROOT = 0;                                     // rows: frame (w, x, y, z), direction
-const int NODE = 7, NODE_ROWS = 8;
-const int REST = 0, MASS = 3, DRAG = 4, SHAPE = 5, CLEAR = 6, EASE = 7;
-const int ELEMENT = NODE + NODES * NODE_ROWS, ELEMENT_ROWS = 11;
-const int LENGTH = 0, OVER = 1, BEND = 2, TWIST = 3, CURVE = 4, NATURAL = 7;
-const int FIRST = 8, SECOND = 9, PIVOT = 10;            // of the banded factor L D L^T
-const int METRIC = ELEMENT + SEGMENTS * ELEMENT_ROWS, METRIC_ROWS = SEGMENTS * NODES / 2;
+// Rows of a rod's constants: its root's frame; of nodes the place at rest and mass, then drag, pull
+// to that place, clearance and 1/mass; of elements three; the lengths' metric.
+const int NODE_ROW = 1, ELEMENT_ROW = NODE_ROW + 2 * NODES, METRIC_ROW = ELEMENT_ROW + 3 * SEGMENTS;
+const int PAIRS = SEGMENTS * NODES / 2, ROWS = METRIC_ROW + (PAIRS + 3) / 4;
+const int MOST_STEPS = 64;
 const float SHARPEST = 0.3, LARGEST_SPIN = 0.3, SOFTEST = 1e-3, SINGULAR = 1e-6;
 
 // What holds for all rods in one substep, head axes after it.
@@ -20,12 +19,12 @@ struct Step {
     vec4 air[3];      // rows of the turn from the world's axes, and gravity
     vec4 ride_turn;   // as a quaternion
 };
-layout(std430, binding = 2) readonly buffer Constants { float constants[]; };
-layout(std430, binding = 3) readonly buffer Steps { Step steps[]; };
-layout(std430, binding = 4) readonly buffer Distances { float distances[]; };
-layout(std430, binding = 5) readonly buffer Air { float air[]; };      // rows x, y, z of a node, world
-layout(std430, binding = 6) readonly buffer Force { float forces[]; }; // the same, over mass, head axes
-
+layout(std140, binding = 0) uniform Steps { Step steps[MOST_STEPS]; };
+layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
+uniform sampler2D u_constants;
+uniform sampler2D u_wind;      // of each node, world, m/s
+uniform sampler2D u_force;     // on each node over the rod's mean mass, head axes
+uniform sampler3D u_distances; // to the obstacles, along z, y, x
 uniform int u_substeps;
 uniform int u_iterations;
 uniform float u_seconds;       // of a substep
@@ -40,72 +39,68 @@ uniform ivec3 u_cells;         // of the distances
 uniform vec4 u_grid;           // place of the first distance, 1/spacing
 uniform float u_room;          // m, around the grid without obstacles
 
+int rod;
 vec3 place[NODES], speed[NODES], force[NODES], solved[NODES];
 float slack[NODES];
 vec4 frame[SEGMENTS];
 vec3 edge[SEGMENTS], direction[SEGMENTS];
 float pivot[SEGMENTS], beside[SEGMENTS], value[SEGMENTS];
 
-float constant(int row) { return constants[(block() * (METRIC + METRIC_ROWS) + row) * LANES + lane()]; }
-float node(int j, int row) { return constant(NODE + j * NODE_ROWS + row); }
-float element(int j, int row) { return constant(ELEMENT + j * ELEMENT_ROWS + row); }
-vec3 node3(int j, int row) { return vec3(node(j, row), node(j, row + 1), node(j, row + 2)); }
-vec3 element3(int j, int row) { return vec3(element(j, row), element(j, row + 1), element(j, row + 2)); }
-vec4 root_frame() { return vec4(constant(ROOT + 1), constant(ROOT + 2), constant(ROOT + 3), constant(ROOT)); }
-vec3 root_direction() { return vec3(constant(ROOT + 4), constant(ROOT + 5), constant(ROOT + 6)); }
+vec4 constant(int row) { return texelFetch(u_constants, texel(rod, row, ROWS), 0); }
+vec4 rest_and_mass(int j) { return constant(NODE_ROW + 2 * j); }
+vec4 rates(int j) { return constant(NODE_ROW + 2 * j + 1); }
+vec4 banded(int j) { return constant(ELEMENT_ROW + 3 * j); }       // two lower entries, 1/pivot; length
+vec4 stiffness(int j) { return constant(ELEMENT_ROW + 3 * j + 1); } // bend, twist, natural twist, 1/length
+vec3 curvature(int j) { return constant(ELEMENT_ROW + 3 * j + 2).xyz; }
+float metric(int pair) { return constant(METRIC_ROW + pair / 4)[pair % 4]; }
 vec3 rows(vec4 a, vec4 b, vec4 c, vec4 v) { return vec3(dot(a, v), dot(b, v), dot(c, v)); }
 vec3 ridden(int k, vec4 v) { return rows(steps[k].ride[0], steps[k].ride[1], steps[k].ride[2], v); }
 vec3 drift(int k, vec3 p) {
     return rows(steps[k].drift[0], steps[k].drift[1], steps[k].drift[2], vec4(p, 1.0));
 }
 
-vec3 pushed(int j) {
-    int at = (block() * NODES + j) * 3 * LANES + lane();
-    return vec3(forces[at], forces[at + LANES], forces[at + 2 * LANES]);
-}
-
-vec3 blown(int j) {
-    int at = (block() * NODES + j) * 3 * LANES + lane();
-    return u_gusts ? vec3(air[at], air[at + LANES], air[at + 2 * LANES]) : u_air;
-}
-
 // Carry a node into the new axes, go on straight, and add up what acts on it.
 void predict(int k, int j) {
-    vec3 p = ridden(k, vec4(place[j], 1.0)), rest = node3(j, REST);
-    vec3 u = j == 0 ? (rest - p) / u_seconds : ridden(k, vec4(speed[j], 0.0));
+    vec4 rest = rest_and_mass(j), rate = rates(j);
+    vec3 p = ridden(k, vec4(place[j], 1.0));
+    vec3 u = j == 0 ? (rest.xyz - p) / u_seconds : ridden(k, vec4(speed[j], 0.0));
     p += u_seconds * u;
-    vec4 wind = vec4(blown(j), 0.0);
+    vec4 wind = vec4(u_gusts ? texelFetch(u_wind, texel(rod, j, NODES), 0).xyz : u_air, 0.0);
     vec3 drawn = rows(steps[k].air[0], steps[k].air[1], steps[k].air[2], wind) - u;
     vec3 gravity = vec3(steps[k].air[0].w, steps[k].air[1].w, steps[k].air[2].w);
-    force[j] = node(j, MASS) * (gravity + node(j, DRAG) * drawn + u_damping * (drift(k, p) - u)
-                                + node(j, SHAPE) * (rest - p));
-    if (u_forced) force[j] += pushed(j);
+    force[j] = rest.w * (gravity + rate.x * drawn + u_damping * (drift(k, p) - u)
+                         + rate.y * (rest.xyz - p));
+    if (u_forced) force[j] += texelFetch(u_force, texel(rod, j, NODES), 0).xyz;
     place[j] = p;
     speed[j] = u;
 }
 
 // Solve the tridiagonal system that `pivot`, `beside` (j - 1 and j) and `value` hold.
 void solve_tridiagonal() {
-    for (int j = 1; j < SEGMENTS; j++) {
-        float factor = beside[j] / pivot[j - 1];
-        pivot[j] -= factor * beside[j];
-        value[j] -= factor * value[j - 1];
+    for (int j = 0; j < SEGMENTS; j++)
+        if (j > 0) {
+            float factor = beside[j] / pivot[j - 1];
+            pivot[j] -= factor * beside[j];
+            value[j] -= factor * value[j - 1];
+        }
+    for (int j = SEGMENTS - 1; j >= 0; j--) {
+        if (j + 1 < SEGMENTS) value[j] -= beside[j + 1] * value[j + 1];
+        value[j] /= pivot[j];
     }
-    value[SEGMENTS - 1] /= pivot[SEGMENTS - 1];
-    for (int j = SEGMENTS - 2; j >= 0; j--) value[j] = (value[j] - beside[j + 1] * value[j + 1]) / pivot[j];
 }
 
 // Spin frames about their segments until torques balance: one Newton step.
 void untwist() {
-    vec4 before = root_frame();
+    vec4 before = constant(0);
     for (int j = 0; j < SEGMENTS; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
-        vec3 natural = turned(half_way(before, after, quarter), element3(j, CURVE));
+        vec3 natural = turned(half_way(before, after, quarter), curvature(j));
         vec3 turn = direction[j] - axis;
-        float bend = element(j, BEND), twist = element(j, TWIST);
+        vec4 firmness = stiffness(j);
+        float bend = firmness.x, twist = firmness.y;
         vec3 spun = cross(natural, turn), aside = cross(quarter, spun);
-        float torque = twist * (twist_between(before, after) - element(j, NATURAL));
+        float torque = twist * (twist_between(before, after) - firmness.z);
         float firm = 0.25 * bend * max(dot(natural, turn), 0.0);
         pivot[j] = twist + firm;
         beside[j] = firm - twist;
@@ -126,22 +121,23 @@ void untwist() {
 
 // Bending and twist as forces on the nodes, minus the energy's slope.
 void add_elastic() {
-    vec4 before = root_frame();
-    vec3 reach_before = root_direction(), pull = vec3(0.0);
+    vec4 before = constant(0);
+    vec3 reach_before = third_axis(before), pull = vec3(0.0);
     for (int j = 0; j < SEGMENTS; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
-        vec3 natural = turned(half_way(before, after, quarter), element3(j, CURVE));
-        float bend = element(j, BEND), over = element(j, OVER);
+        vec3 natural = turned(half_way(before, after, quarter), curvature(j));
+        vec4 firmness = stiffness(j);
+        float bend = firmness.x, over = firmness.w;
         vec3 reach = edge[j] * over, turn = reach - reach_before;
         vec3 spun = cross(natural, turn), aside = cross(quarter, spun);
-        float torque = element(j, TWIST) * (twist_between(before, after) - element(j, NATURAL));
+        float torque = firmness.y * (twist_between(before, after) - firmness.z);
         vec3 twisting = cross(axis, direction[j])
             * (torque / max(1.0 + dot(axis, direction[j]), SHARPEST));
         vec3 moment = bend * (natural - turn);
         if (j > 0) {
             pull += cross(0.5 * bend * (spun - aside), axis) - moment - twisting;
-            vec3 done = pull * element(j - 1, OVER);
+            vec3 done = pull * stiffness(j - 1).w;
             force[j - 1] -= done;
             force[j] += done;
         }
@@ -149,51 +145,55 @@ void add_elastic() {
         before = after;
         reach_before = reach;
     }
-    force[SEGMENTS - 1] -= pull * element(SEGMENTS - 1, OVER);
-    force[SEGMENTS] += pull * element(SEGMENTS - 1, OVER);
+    force[SEGMENTS - 1] -= pull * stiffness(SEGMENTS - 1).w;
+    force[SEGMENTS] += pull * stiffness(SEGMENTS - 1).w;
 }
 
 // Write A^-1 force of the free nodes to `solved`.
 void solve_banded() {
     vec3 one = vec3(0.0), two = vec3(0.0);
-    solved[0] = vec3(0.0);
-    for (int j = 1; j < NODES; j++) {
-        vec3 here = force[j] - element(j - 1, FIRST) * one - element(j - 1, SECOND) * two;
-        two = one;
-        one = here;
-        solved[j] = here * element(j - 1, PIVOT);
+    for (int j = 0; j < NODES; j++) {
+        solved[j] = vec3(0.0);
+        if (j > 0) {
+            vec4 factor = banded(j - 1);
+            vec3 here = force[j] - factor.x * one - factor.y * two;
+            two = one;
+            one = here;
+            solved[j] = here * factor.z;
+        }
     }
-    for (int j = NODES - 2; j > 0; j--) {
-        solved[j] -= element(j, FIRST) * solved[j + 1];
-        if (j + 2 < NODES) solved[j] -= element(j + 1, SECOND) * solved[j + 2];
+    for (int j = NODES - 1; j >= 0; j--) {
+        if (j > 0 && j + 1 < NODES) solved[j] -= banded(j).x * solved[j + 1];
+        if (j > 0 && j + 2 < NODES) solved[j] -= banded(j + 1).y * solved[j + 2];
     }
 }
 
 // Write the pull along the segments that brings them to their lengths to `value`: the factor
 // L D L^T of metric * (d d^T), row by row, with its forward substitution.
 void solve_lengths() {
-    float factor[METRIC_ROWS], scaled[SEGMENTS];
+    float factor[SEGMENTS][SEGMENTS], scaled[SEGMENTS];
     for (int i = 0; i < SEGMENTS; i++) {
-        int base = i * (i + 1) / 2;
         vec3 excess = edge[i] + solved[i + 1] - solved[i];
-        float right = dot(excess, direction[i]) - element(i, LENGTH);
-        float own = constant(METRIC + base + i), last = own * dot(direction[i], direction[i]);
-        for (int j = 0; j < i; j++) {
-            int other = j * (j + 1) / 2;
-            float here = constant(METRIC + base + j) * dot(direction[i], direction[j]);
-            for (int k = 0; k < j; k++) here -= scaled[k] * factor[other + k];
-            scaled[j] = here;
-            float low = here * pivot[j];
-            factor[base + j] = low;
-            last -= here * low;
-            right -= low * value[j];
-        }
+        float right = dot(excess, direction[i]) - banded(i).w;
+        float own = metric(i * (i + 1) / 2 + i), last = own * dot(direction[i], direction[i]);
+        for (int j = 0; j < SEGMENTS; j++)
+            if (j < i) {
+                float here = metric(i * (i + 1) / 2 + j) * dot(direction[i], direction[j]);
+                for (int k = 0; k < SEGMENTS; k++)
+                    if (k < j) here -= scaled[k] * factor[j][k];
+                scaled[j] = here;
+                float low = here * pivot[j];
+                factor[i][j] = low;
+                last -= here * low;
+                right -= low * value[j];
+            }
         pivot[i] = 1.0 / max(last, SINGULAR * own);
         value[i] = right;
     }
     for (int i = SEGMENTS - 1; i >= 0; i--) {
         value[i] *= pivot[i];
-        for (int k = i + 1; k < SEGMENTS; k++) value[i] -= factor[k * (k + 1) / 2 + i] * value[k];
+        for (int k = 0; k < SEGMENTS; k++)
+            if (k > i) value[i] -= factor[k][i] * value[k];
     }
 }
 
@@ -215,7 +215,7 @@ void go_on() {
         }
         solve_banded();
     }
-    for (int j = 1; j < NODES; j++) {
+    for (int j = 0; j < NODES; j++) {  // both are 0 at the root
         vec3 change = free[j] - solved[j];
         place[j] += change;
         speed[j] += change / u_seconds;
@@ -225,13 +225,15 @@ void go_on() {
 #include "pbd_touch.glsl"
 
 void main() {
+    rod = int(gl_GlobalInvocationID.x);
+    if (rod >= u_rods) return;
     for (int j = 0; j < NODES; j++) {
-        int at = node_at(j);
-        place[j] = node_place(at);
-        speed[j] = node_speed(at);
-        slack[j] = nodes[at + SLACK * LANES];
+        vec4 at = node_place(rod, j);
+        place[j] = at.xyz;
+        slack[j] = at.w;
+        speed[j] = node_speed(rod, j).xyz;
     }
-    for (int j = 0; j < SEGMENTS; j++) frame[j] = frame_of(frame_at(j));
+    for (int j = 0; j < SEGMENTS; j++) frame[j] = segment_frame(rod, j);
     for (int k = 0; k < u_substeps; k++) {
         for (int j = 0; j < NODES; j++) predict(k, j);
         for (int j = 0; j < SEGMENTS; j++) {
@@ -245,16 +247,9 @@ void main() {
         if (u_obstacles) touch(k);
     }
     for (int j = 0; j < NODES; j++) {
-        int at = node_at(j);
-        set_node(at, place[j]);
-        set_node(at + SPEED * LANES, speed[j]);
-        nodes[at + SLACK * LANES] = slack[j];
+        imageStore(u_new_state, texel(rod, 2 * j, STATE_ROWS), vec4(place[j], slack[j]));
+        imageStore(u_new_state, texel(rod, 2 * j + 1, STATE_ROWS), vec4(speed[j], 0.0));
     }
-    for (int j = 0; j < SEGMENTS; j++) {
-        int at = frame_at(j);
-        frames[at] = frame[j].w;
-        frames[at + LANES] = frame[j].x;
-        frames[at + 2 * LANES] = frame[j].y;
-        frames[at + 3 * LANES] = frame[j].z;
-    }
+    for (int j = 0; j < SEGMENTS; j++)
+        imageStore(u_new_state, texel(rod, 2 * NODES + j, STATE_ROWS), frame[j]);
 }

@@ -2,7 +2,7 @@
 const float FURTHER = 1.05;       // slack wears off a little faster than the way that a node goes
 const float DIAGONAL = 1.8;       // a distance changes by less within a cell, in cells
 
-float distance_at(ivec3 cell) { return distances[(cell.x * u_cells.y + cell.y) * u_cells.z + cell.z]; }
+float distance_at(ivec3 cell) { return texelFetch(u_distances, cell.zyx, 0).x; }
 
 // Trilinear distance and its direction; one look tells most nodes that they are far.
 float obstacle_distance(vec3 p, float clear, out vec3 normal) {
@@ -34,45 +34,54 @@ void relengthen(vec3 normal[NODES]) {
         float reach = length(way);
         direction[j] = way / reach;
         float a = dot(normal[j], direction[j]), b = dot(normal[j + 1], direction[j]);
-        vec3 start = node(j, EASE) * (direction[j] - a * normal[j]);
-        vec3 end = node(j + 1, EASE) * (direction[j] - b * normal[j + 1]);
-        pivot[j] = dot(direction[j], start + end) + SOFTEST * (node(j, EASE) + node(j + 1, EASE));
+        float ease = rates(j).w, ease_after = rates(j + 1).w;
+        vec3 start = ease * (direction[j] - a * normal[j]);
+        vec3 end = ease_after * (direction[j] - b * normal[j + 1]);
+        pivot[j] = dot(direction[j], start + end) + SOFTEST * (ease + ease_after);
         beside[j] = -dot(end_before, direction[j]);
-        value[j] = reach - element(j, LENGTH);
+        value[j] = reach - banded(j).w;
         end_before = end;
     }
     solve_tridiagonal();
-    for (int j = 1; j < NODES; j++) {
-        vec3 pull = -value[j - 1] * direction[j - 1];
+    for (int j = 0; j < NODES; j++) {
+        vec3 pull = vec3(0.0);
+        if (j > 0) pull -= value[j - 1] * direction[j - 1];
         if (j < SEGMENTS) pull += value[j] * direction[j];
-        vec3 change = node(j, EASE) * (pull - dot(pull, normal[j]) * normal[j]);
+        vec3 change = rates(j).w * (pull - dot(pull, normal[j]) * normal[j]);
         place[j] += change;
         speed[j] += change / u_seconds;
     }
 }
 
-// A node is looked up again only when it may have gone as far as it was away the last time.
-void touch(int k) {
-    vec3 normal[NODES];
-    normal[0] = vec3(0.0);
-    for (int j = 1; j < NODES; j++) {
-        vec3 relative = speed[j] - drift(k, place[j]);
-        normal[j] = vec3(0.0);
-        slack[j] -= FURTHER * u_seconds * length(relative);
-        if (slack[j] > 0.0) continue;
-        vec3 out_way;
-        float clear = node(j, CLEAR);
-        slack[j] = obstacle_distance(place[j], clear, out_way) - clear;
-        if (slack[j] >= 0.0) continue;
-        normal[j] = out_way;
-        float across = dot(relative, out_way), inward = max(-across, 0.0);
+// Bring a node out of the obstacles; return their normal where it touches, else 0. A node is looked
+// up again only when it may have gone as far as it was away the last time.
+vec3 touched(int k, int j) {
+    vec3 p = place[j], relative = speed[j] - drift(k, p), normal = vec3(0.0);
+    float clear = rates(j).z, left = slack[j] - FURTHER * u_seconds * length(relative);
+    if (left <= 0.0) {
+        left = obstacle_distance(p, clear, normal) - clear;
+        float across = dot(relative, normal), inward = max(-across, 0.0);
         // what came in during this substep goes out again; older depth leaves at a limited speed
-        float depth = min(-slack[j], (inward + u_fastest) * u_seconds);
-        vec3 along = relative - across * out_way;
+        float depth = min(-left, (inward + u_fastest) * u_seconds);
+        vec3 along = relative - across * normal;
         float size = length(along);
         vec3 brake = along * (min(u_friction * inward, size) / max(size, 1e-12));
-        speed[j] += inward * out_way - brake;
-        place[j] += depth * out_way - u_seconds * brake;
+        if (left < 0.0) {
+            speed[j] += inward * normal - brake;
+            place[j] += depth * normal - u_seconds * brake;
+        } else {
+            normal = vec3(0.0);
+        }
+    }
+    slack[j] = left;
+    return normal;
+}
+
+void touch(int k) {
+    vec3 normal[NODES];
+    for (int j = 0; j < NODES; j++) {
+        normal[j] = vec3(0.0);
+        if (j > 0) normal[j] = touched(k, j);
     }
     relengthen(normal);
 }

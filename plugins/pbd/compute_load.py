@@ -18,13 +18,15 @@ ROOM = 0.02
 """Metres around the grid of distances in which nothing is looked up."""
 UNITS = 2.0**30
 """Units of mass that all hair has, and of momentum that a cell holds."""
+MOST_STEPS = 64
+"""Substeps in one run of the shader."""
 FULLEST, FASTEST = 32.0, 10.0
 """A cell holds the momentum of the densest captured cell's mass so many times, at so many m/s."""
 
 
 def step_words(loads: Sequence[Load], step: float) -> Float32Array:
-    """Return (K, 10, 4) words of substeps: see `Step` in the shader."""
-    words = np.zeros((len(loads), 10, 4))
+    """Return (MOST_STEPS, 10, 4) words of substeps: see `Step` in the shader."""
+    words = np.zeros((MOST_STEPS, 10, 4))
     for k, load in enumerate(loads):
         words[k, :3] = load.ride[:3]
         words[k, 3:6] = drift_rows(load.ride, step)

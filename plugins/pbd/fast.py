@@ -1,7 +1,5 @@
 """The fast backend: packs rods for the kernels and runs them on all cores, float32.
 
-The packed arrays (blocks of strands, constants of nodes and elements, the triangle of the length
-metric) are also what a compute shader takes, one strand an invocation.
 """
 
 from __future__ import annotations
@@ -18,6 +16,7 @@ from .crowd import Crowd
 from .guides import Riders
 from .kernel_math import LANES
 from .kernel_ride import ride_points, rub_nodes
+from .packing import banded_factor
 from .reference import Contact, Load, State, at_rest
 from .rods import Rods
 from .system import System
@@ -137,25 +136,11 @@ def _constants(
     element[..., kernels.TWIST] = rods.twist / unit[:, None]
     element[..., kernels.CURVE : kernels.CURVE + 3] = rods.curvature
     element[..., kernels.NATURAL] = rods.natural_twist
-    element[..., kernels.FIRST :] = _factor(system.banded / unit[:, None, None])
+    element[..., kernels.FIRST :] = banded_factor(system.banded / unit[:, None, None])
     row, column = np.tril_indices(nodes - 1)
     metric = system.metric[:, row, column] * unit[:, None]
     packed = [kernels.padded(part.astype(np.float32)) for part in (node, element, metric)]
     return packed[0], packed[1], packed[2]
-
-
-def _factor(bands: Float64Array) -> Float64Array:
-    """L D L^T of matrices of two lower bands (S, m, 3): both lower entries and 1/D of each row."""
-    result = np.zeros_like(bands)
-    pivot = np.ones((len(bands), bands.shape[1] + 2))
-    first = np.zeros(pivot.shape)
-    for j in range(bands.shape[1]):
-        own, one, two = bands[:, j, 0], bands[:, j, 1], bands[:, j, 2]
-        second = two / pivot[:, j]  # pivot of row j - 2 stands at j
-        first[:, j + 2] = (one - second * pivot[:, j] * first[:, j + 1]) / pivot[:, j + 1]
-        pivot[:, j + 2] = own - first[:, j + 2] ** 2 * pivot[:, j + 1] - second**2 * pivot[:, j]
-        result[:, j] = np.stack([first[:, j + 2], second, 1 / pivot[:, j + 2]], axis=-1)
-    return result
 
 
 def _rides(loads: Sequence[Load]) -> Float32Array:

@@ -1,0 +1,10 @@
+#version 430
+// The state of one rod, to be read back.
+#include "pbd_layout.glsl"
+layout(std430, binding = 0) writeonly buffer One { vec4 one[]; };
+uniform int u_rod;
+
+void main() {
+    int row = int(gl_GlobalInvocationID.x);
+    if (row < STATE_ROWS) one[row] = state(u_rod, row);
+}
