@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from .kernel_math import LANES, carry, rotate
+from .kernel_math import LANES, carry, rotate, row
 
 ONE, TWO, HALF, ZERO = np.float32(1), np.float32(2), np.float32(0.5), np.float32(0)
 THREE, FOUR, CELL = np.float32(3), np.float32(4), np.float32(1 / 0.02)
@@ -32,13 +32,9 @@ def ride_points(  # type: ignore[no-untyped-def]
         block, lane = rod[i] // LANES, rod[i] % LANES
         j, t = segment[i], share[i]
         one, two = t * t * (THREE - TWO * t), t * (ONE - t)
-        before, after = max(j - 1, 0), min(j + 2, n - 1)
-        place = np.empty(3, np.float32)
-        for c in range(3):
-            a, b = x[block, j, c, lane], x[block, j + 1, c, lane]
-            sa = b - a if j == 0 else (b - x[block, before, c, lane]) * HALF
-            sb = b - a if j == n - 2 else (x[block, after, c, lane] - a) * HALF
-            place[c] = a + (b - a) * one + two * ((ONE - t) * sa - t * sb)
+        p0 = _along(x, block, 0, j, lane, n, t, one, two)
+        p1 = _along(x, block, 1, j, lane, n, t, one, two)
+        p2 = _along(x, block, 2, j, lane, n, t, one, two)
         k = min(max(j + (-1 if t < HALF else 1), 0), n - 2)
         part = abs(t - HALF)
         w = ZERO
@@ -52,12 +48,21 @@ def ride_points(  # type: ignore[no-untyped-def]
         size = ONE / np.sqrt(f0 * f0 + f1 * f1 + f2 * f2 + f3 * f3)
         frame = (f0 * size, f1 * size, f2 * size, f3 * size)
         turned = rotate(frame, offset[i, 0], offset[i, 1], offset[i, 2])
-        p = carry(head, place[0] + turned[0], place[1] + turned[1], place[2] + turned[2])
+        p = carry(head, p0 + turned[0], p1 + turned[1], p2 + turned[2])
         out[i, 0], out[i, 1], out[i, 2] = p
     return out
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
+def _along(x, block, c, j, lane, n, t, one, two):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return one coordinate on the smooth curve through the nodes (Catmull-Rom)."""
+    a, b = x[block, j, c, lane], x[block, j + 1, c, lane]
+    sa = b - a if j == 0 else (b - x[block, j - 1, c, lane]) * HALF
+    sb = b - a if j == n - 2 else (x[block, min(j + 2, n - 1), c, lane] - a) * HALF
+    return a + (b - a) * one + two * ((ONE - t) * sa - t * sb)
+
+
+@row
 def _corner(p, origin, shape):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     """Return the cell and the shares within it of a place along one axis."""
     at = min(max((p - origin) * CELL, ZERO), np.float32(shape) - np.float32(1.001))
@@ -65,7 +70,7 @@ def _corner(p, origin, shape):  # type: ignore[no-untyped-def] # pragma: no cove
     return low, at - np.float32(low)
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@njit(parallel=True, fastmath=True, error_model="numpy", cache=True)
 def rub_nodes(  # type: ignore[no-untyped-def]
     x, mass, count, ride, origin, shape, usual, rates
 ) -> None:  # pragma: no cover - compiled
@@ -94,7 +99,7 @@ def rub_nodes(  # type: ignore[no-untyped-def]
                 cell[1] += weight * u0
                 cell[2] += weight * u1
                 cell[3] += weight * u2
-    crowded = np.zeros((s0, s1, s2), np.float32)
+    crowded, push = np.zeros((s0, s1, s2), np.float32), pressure * seconds
     for a in range(s0):
         for b in range(s1):
             for c in range(s2):
@@ -106,7 +111,8 @@ def rub_nodes(  # type: ignore[no-untyped-def]
                 cell[1] *= scale
                 cell[2] *= scale
                 cell[3] *= scale
-    for s in range(count):
+    for number in prange(count):
+        s = np.int64(number)
         block, lane = s // LANES, s % LANES
         for j in range(1, n):
             p0, p1, p2 = x[block, j, 0, lane], x[block, j, 1, lane], x[block, j, 2, lane]
@@ -132,7 +138,6 @@ def rub_nodes(  # type: ignore[no-untyped-def]
                 g0 += value * wb * wc * (ONE if k else -ONE)
                 g1 += value * wa * wc * (ONE if y else -ONE)
                 g2 += value * wa * wb * (ONE if o else -ONE)
-            push = pressure * seconds
             x[block, j, 3, lane] = h0 + u0 + taken * (m0 - u0) - push * g0
             x[block, j, 4, lane] = h1 + u1 + taken * (m1 - u1) - push * g1
             x[block, j, 5, lane] = h2 + u2 + taken * (m2 - u2) - push * g2

@@ -7,9 +7,8 @@ that it need not ask whether rows overlap.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from .kernel_math import LANES, cross, dot, half_way_frame, rotate, swing_frame, twist_angle
+from .kernel_math import LANES, cross, dot, half_way_frame, rotate, row, swing_frame, twist_angle
 
 EDGE, DIRECTION, REACH = 0, 3, 6
 """Rows of a segment: its vector, its direction, its vector over its length."""
@@ -21,7 +20,7 @@ ONE, HALF, QUARTER, ZERO = np.float32(1), np.float32(0.5), np.float32(0.25), np.
 SHARPEST, LARGEST_SPIN = np.float32(0.3), np.float32(0.3)
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def constants_of(ride, turn, gravity, settings):  # type: ignore[no-untyped-def] # pragma: no cover
     """Return the substep's scalars, so that loops keep them in registers."""
     g = (
@@ -41,7 +40,7 @@ def constants_of(ride, turn, gravity, settings):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def predict_row(x, node, air, constants, force, is_root) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Carry a node into the new head axes, go on straight, and add up what acts on it."""
     r0, r1, r2, _, t0, t1, t2, step = constants
@@ -89,7 +88,7 @@ def predict_row(x, node, air, constants, force, is_root) -> None:  # type: ignor
         ) = p0, p1, p2, u0, u1, u2
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def swing_row(xa, xb, q, el, constants, segment) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """A segment as predicted, and its frame transported on to it."""
     r0, r1, r2, r3 = constants[3]
@@ -118,7 +117,7 @@ def swing_row(xa, xb, q, el, constants, segment) -> None:  # type: ignore[no-unt
         q[w], q[LANES + w], q[2 * LANES + w], q[3 * LANES + w] = q0, q1, q2, q3
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def twist_row(before, after, segment, el, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Torque of an element's twist, and what its bending turns the frames at its ends with."""
     for w in range(LANES):
@@ -143,7 +142,7 @@ def twist_row(before, after, segment, el, out) -> None:  # type: ignore[no-untyp
         out[FIRM * LANES + w] = QUARTER * bend * (curved if curved > ZERO else ZERO)
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def spin_row(q, segment, angle) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Spin a frame about its segment."""
     for w in range(LANES):
@@ -168,7 +167,7 @@ def spin_row(q, segment, angle) -> None:  # type: ignore[no-untyped-def] # pragm
         q[3 * LANES + w] = o + r1 * u - r2 * t + r3 * s
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def elastic_row(before, after, reach, segment, el, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Pull of an element on the direction after it (rows 0 to 2) and before it (3 to 5)."""
     for w in range(LANES):

@@ -3,56 +3,74 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from .kernel_math import LANES
+from .kernel_math import LANES, row
 
 LENGTH, FIRST, SECOND, PIVOT = 0, 8, 9, 10
 ONE, ZERO = np.float32(1), np.float32(0)
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def banded_solve(element, force, result) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write A^-1 force of the free nodes (rows 1 to n), by the factor L D L^T of two bands."""
     n = force.shape[0]
-    for c in range(3):
-        result[0, c][:] = ZERO
+    elements = element.reshape(n - 1, element.shape[1] * LANES)
+    forces, results = force.reshape(n, 3 * LANES), result.reshape(n, 3 * LANES)
+    results[0, :] = ZERO
     for j in range(1, n):
-        el, a, b = element[j - 1], result[max(j - 1, 0)], result[max(j - 2, 0)]
-        fj, rj = force[j], result[j]
-        for c in range(3):
-            for w in range(LANES):
-                rj[c, w] = fj[c, w] - el[FIRST, w] * a[c, w] - el[SECOND, w] * b[c, w]
+        before = results[max(j - 2, 0)]
+        _forward_row(forces[j], elements[j - 1], results[j - 1], before, results[j])
     for j in range(n - 1, 0, -1):
-        el, rj = element[j - 1], result[j]
-        last, next_last = j + 1 < n, j + 2 < n
-        ea, eb = element[min(j, n - 2)], element[min(j + 1, n - 2)]
-        ra, rb = result[min(j + 1, n - 1)], result[min(j + 2, n - 1)]
-        one, two = ONE if last else ZERO, ONE if next_last else ZERO
-        for c in range(3):
-            for w in range(LANES):
-                rj[c, w] = (
-                    rj[c, w] * el[PIVOT, w]
-                    - one * ea[FIRST, w] * ra[c, w]
-                    - two * eb[SECOND, w] * rb[c, w]
-                )
+        one, two = ONE if j + 1 < n else ZERO, ONE if j + 2 < n else ZERO
+        _backward_row(
+            elements[j - 1], elements[min(j, n - 2)], elements[min(j + 1, n - 2)],
+            results[min(j + 1, n - 1)], results[min(j + 2, n - 1)], one, two, results[j],
+        )  # fmt: skip
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
+def _forward_row(force, el, a, b, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """One row of L, three coordinates at once; a and b are the rows before."""
+    for w in range(LANES):
+        p, q = el[FIRST * LANES + w], el[SECOND * LANES + w]
+        out[w] = force[w] - p * a[w] - q * b[w]
+        out[LANES + w] = force[LANES + w] - p * a[LANES + w] - q * b[LANES + w]
+        out[2 * LANES + w] = force[2 * LANES + w] - p * a[2 * LANES + w] - q * b[2 * LANES + w]
+
+
+@row
+def _backward_row(el, after, beyond, a, b, one, two, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """One row of D^-1 and L^T; a and b are the rows after, one and two 0 where there is none."""
+    for w in range(LANES):
+        d, p = el[PIVOT * LANES + w], one * after[FIRST * LANES + w]
+        q = two * beyond[SECOND * LANES + w]
+        out[w] = out[w] * d - p * a[w] - q * b[w]
+        out[LANES + w] = out[LANES + w] * d - p * a[LANES + w] - q * b[LANES + w]
+        out[2 * LANES + w] = out[2 * LANES + w] * d - p * a[2 * LANES + w] - q * b[2 * LANES + w]
+
+
+@row
 def excess_of(segment, change, element, excess) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write by how much segments are too long along their directions."""
-    for j in range(element.shape[0]):
-        s, a, b, el, out = segment[j], change[j], change[j + 1], element[j], excess[j]
-        for w in range(LANES):
-            out[w] = (
-                (s[0, w] + b[0, w] - a[0, w]) * s[3, w]
-                + (s[1, w] + b[1, w] - a[1, w]) * s[4, w]
-                + (s[2, w] + b[2, w] - a[2, w]) * s[5, w]
-                - el[LENGTH, w]
-            )
+    n = segment.shape[0]
+    parts, changes = segment.reshape(n, 9 * LANES), change.reshape(n, 3 * LANES)
+    for j in range(n - 1):
+        _excess_row(parts[j], changes[j], changes[j + 1], element[j, LENGTH], excess[j])
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
+def _excess_row(s, a, b, length, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """One segment of `excess_of`."""
+    for w in range(LANES):
+        out[w] = (
+            (s[w] + b[w] - a[w]) * s[3 * LANES + w]
+            + (s[LANES + w] + b[LANES + w] - a[LANES + w]) * s[4 * LANES + w]
+            + (s[2 * LANES + w] + b[2 * LANES + w] - a[2 * LANES + w]) * s[5 * LANES + w]
+            - length[w]
+        )
+
+
+@row
 def factorise_lengths(metric, segment, factor, pivot, scaled) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write the factor L D L^T of metric * (d d^T), lower rows packed; `pivot` is 1/D."""
     m = segment.shape[0] - 1
@@ -93,7 +111,7 @@ def factorise_lengths(metric, segment, factor, pivot, scaled) -> None:  # type: 
             out[w] = ONE / (last[w] if last[w] > least else least)
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def lengths_solve(factor, pivot, value, m) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Solve with the factor of `factorise_lengths`, in place; columns go in pairs."""
     for i in range(1, m):
@@ -125,23 +143,27 @@ def lengths_solve(factor, pivot, value, m) -> None:  # type: ignore[no-untyped-d
                 here[w] -= a[w] * x[w]
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def pull_back(tension, segment, force) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Write the force on the nodes of tensions along the segments."""
+    """Write the force on the nodes of tensions along the segments; the tip's last is 0."""
     n = force.shape[0]
+    parts, forces = segment.reshape(n, 9 * LANES), force.reshape(n, 3 * LANES)
+    tension[n - 1, :] = ZERO
     for j in range(1, n):
-        fj, dj, tj = force[j], segment[j - 1], tension[j - 1]
-        for c in range(3):
-            for w in range(LANES):
-                fj[c, w] = tj[w] * dj[3 + c, w]
-        if j < n - 1:
-            dk, tk = segment[j], tension[j]
-            for c in range(3):
-                for w in range(LANES):
-                    fj[c, w] -= tk[w] * dk[3 + c, w]
+        last = min(j, n - 2)
+        _pull_row(tension[j - 1], parts[j - 1], tension[j], parts[last], forces[j])
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
+def _pull_row(t, a, u, b, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Force on the node between two segments."""
+    for w in range(LANES):
+        out[w] = t[w] * a[3 * LANES + w] - u[w] * b[3 * LANES + w]
+        out[LANES + w] = t[w] * a[4 * LANES + w] - u[w] * b[4 * LANES + w]
+        out[2 * LANES + w] = t[w] * a[5 * LANES + w] - u[w] * b[5 * LANES + w]
+
+
+@row
 def tridiagonal_solve(diagonal, beside, value, m) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Solve a symmetric tridiagonal system in place; `beside[j]` stands between j - 1 and j."""
     for j in range(1, m):

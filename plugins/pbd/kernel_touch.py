@@ -3,28 +3,30 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from .kernel_math import LANES, carry
+from .kernel_math import LANES, carry, row
 from .kernel_solve import tridiagonal_solve
 
 LENGTH, CLEAR, EASE = 0, 6, 7
-ONE, ZERO, HALF, SOFTEST = np.float32(1), np.float32(0), np.float32(0.5), np.float32(1e-3)
-FAR, FURTHER = np.float32(1.0), np.float32(1.05)
+ONE, ZERO, SOFTEST = np.float32(1), np.float32(0), np.float32(1e-3)
+FURTHER = np.float32(1.05)
 SLACK = 6
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def touch(x, node, ride, grid, settings, normals) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Bring nodes out of the obstacles; write normals where they touch, else 0.
 
     A node is looked up again only when it may have gone as far as it was away the last time.
     """
-    h = settings[0]
-    for j in range(1, x.shape[0]):
+    n = x.shape[0]
+    flat, flat_normals = x.reshape(n, x.shape[1] * LANES), normals.reshape(n, 3 * LANES)
+    way = _shift_of(ride)
+    flat_normals[:, :] = ZERO
+    for j in range(1, n):
+        if _worn_row(flat[j], way, settings[0]) == ZERO:
+            continue
         xj, nj = x[j], normals[j]
-        _worn_row(xj, ride[0], ride[1], ride[2], h)
-        nj[:] = ZERO
         for w in range(LANES):
             if xj[SLACK, w] > ZERO:
                 continue
@@ -36,21 +38,33 @@ def touch(x, node, ride, grid, settings, normals) -> None:  # type: ignore[no-un
                 _out(xj, w, ride, clear - distance, n0, n1, n2, settings)
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
-def _worn_row(x, r0, r1, r2, h) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Take the way that nodes have gone over the head off their slack."""
-    a, b, c, s = r0[0], r0[1], r0[2], r0[3]
-    d, e, f, t = r1[0], r1[1], r1[2], r1[3]
-    g, i, k, u = r2[0], r2[1], r2[2], r2[3]
+@row
+def _shift_of(ride):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return a motion's rows as scalars, less the identity: what it moves a point by."""
+    return (
+        (ride[0, 0] - ONE, ride[0, 1], ride[0, 2], ride[0, 3]),
+        (ride[1, 0], ride[1, 1] - ONE, ride[1, 2], ride[1, 3]),
+        (ride[2, 0], ride[2, 1], ride[2, 2] - ONE, ride[2, 3]),
+    )
+
+
+@row
+def _worn_row(x, ride, h):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """X"""
+    r, s, t = ride
+    near = ZERO
     for w in range(LANES):
-        p0, p1, p2 = x[0, w], x[1, w], x[2, w]
-        w0 = h * x[3, w] - (p0 - (a * p0 + b * p1 + c * p2 + s))
-        w1 = h * x[4, w] - (p1 - (d * p0 + e * p1 + f * p2 + t))
-        w2 = h * x[5, w] - (p2 - (g * p0 + i * p1 + k * p2 + u))
-        x[SLACK, w] -= FURTHER * np.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
+        p0, p1, p2 = x[w], x[LANES + w], x[2 * LANES + w]
+        w0 = h * x[3 * LANES + w] + r[0] * p0 + r[1] * p1 + r[2] * p2 + r[3]
+        w1 = h * x[4 * LANES + w] + s[0] * p0 + s[1] * p1 + s[2] * p2 + s[3]
+        w2 = h * x[5 * LANES + w] + t[0] * p0 + t[1] * p1 + t[2] * p2 + t[3]
+        left = x[SLACK * LANES + w] - FURTHER * np.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
+        x[SLACK * LANES + w] = left
+        near += ZERO if left > ZERO else ONE
+    return near
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def _out(xj, w, ride, depth, n0, n1, n2, settings) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Move one node out, with friction."""
     h, friction, fastest = settings[0], settings[2], settings[3]
@@ -74,7 +88,7 @@ def _out(xj, w, ride, depth, n0, n1, n2, settings) -> None:  # type: ignore[no-u
     xj[2, w] = p2 + out * n2 - h * slowed * a2
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def _distance(grid, p0, p1, p2, clear):  # type: ignore[no-untyped-def] # pragma: no cover
     """Trilinear distance and its direction; one look tells most nodes that they are far."""
     values, place = grid
@@ -114,48 +128,102 @@ def _distance(grid, p0, p1, p2, clear):  # type: ignore[no-untyped-def] # pragma
     return low * d + high * a, g0 * size, g1 * size, g2 * size
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
-def relengthen(x, node, element, vector, line, over) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+@row
+def relengthen(x, node, element, segment, normals, line, over) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Restore the lengths; a touching node moves only along the obstacle."""
     n = x.shape[0]
-    start, end, way, normals = vector[0], vector[1], vector[2], vector[3]
+    nodes, flat = node.reshape(n, node.shape[1] * LANES), x.reshape(n, x.shape[1] * LANES)
+    parts, ends = segment.reshape(n, 9 * LANES), normals.reshape(n, 3 * LANES)
     diagonal, beside, pull = line[0], line[1], line[2]
     for j in range(n - 1):
-        xa, xb, na, nb = x[j], x[j + 1], normals[j], normals[j + 1]
-        ea, eb, el = node[j, EASE], node[j + 1, EASE], element[j]
-        sj, tj, dj, dg, pj = start[j], end[j], way[j], diagonal[j], pull[j]
-        for w in range(LANES):
-            d0, d1, d2 = xb[0, w] - xa[0, w], xb[1, w] - xa[1, w], xb[2, w] - xa[2, w]
-            reach = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-            size = ONE / reach
-            d0, d1, d2 = d0 * size, d1 * size, d2 * size
-            a = na[0, w] * d0 + na[1, w] * d1 + na[2, w] * d2
-            b = nb[0, w] * d0 + nb[1, w] * d1 + nb[2, w] * d2
-            sj[0, w] = ea[w] * (d0 - a * na[0, w])
-            sj[1, w] = ea[w] * (d1 - a * na[1, w])
-            sj[2, w] = ea[w] * (d2 - a * na[2, w])
-            tj[0, w] = eb[w] * (d0 - b * nb[0, w])
-            tj[1, w] = eb[w] * (d1 - b * nb[1, w])
-            tj[2, w] = eb[w] * (d2 - b * nb[2, w])
-            dj[0, w], dj[1, w], dj[2, w] = d0, d1, d2
-            dg[w] = (
-                d0 * (sj[0, w] + tj[0, w])
-                + d1 * (sj[1, w] + tj[1, w])
-                + d2 * (sj[2, w] + tj[2, w])
-                + SOFTEST * (ea[w] + eb[w])
-            )
-            pj[w] = reach - el[LENGTH, w]
-    for j in range(1, n - 1):
-        tj, dj, bs = end[j - 1], way[j], beside[j]
-        for w in range(LANES):
-            bs[w] = -(tj[0, w] * dj[0, w] + tj[1, w] * dj[1, w] + tj[2, w] * dj[2, w])
+        _ease_row(flat[j], flat[j + 1], ends[j], ends[j + 1], nodes[j], nodes[j + 1], parts[j])
+        _weight_row(nodes[j], nodes[j + 1], parts[j], diagonal[j])
+        _excess_row(flat[j], flat[j + 1], parts[j], element[j, LENGTH], pull[j])
+        if j > 0:
+            _beside_row(parts[j - 1], parts[j], beside[j])
     tridiagonal_solve(diagonal, beside, pull, n - 1)
-    for j in range(n - 1):
-        xa, xb, sj, tj, pj = x[j], x[j + 1], start[j], end[j], pull[j]
-        for c in range(3):
-            for w in range(LANES):
-                xa[c, w] += pj[w] * sj[c, w]
-                xa[3 + c, w] += pj[w] * sj[c, w] * over
-            for w in range(LANES):
-                xb[c, w] -= pj[w] * tj[c, w]
-                xb[3 + c, w] -= pj[w] * tj[c, w] * over
+    pull[n - 1] = ZERO
+    for j in range(1, n):
+        _shift_row(pull[j - 1], parts[j - 1], pull[j], parts[min(j, n - 2)], over, flat[j])
+
+
+@row
+def _ease_row(xa, xb, na, nb, node_a, node_b, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """What a segment's pull does to its start (0 to 2) and its end (3 to 5); its direction."""
+    for w in range(LANES):
+        d0 = xb[w] - xa[w]
+        d1 = xb[LANES + w] - xa[LANES + w]
+        d2 = xb[2 * LANES + w] - xa[2 * LANES + w]
+        size = ONE / np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+        d0, d1, d2 = d0 * size, d1 * size, d2 * size
+        a0, a1, a2 = na[w], na[LANES + w], na[2 * LANES + w]
+        b0, b1, b2 = nb[w], nb[LANES + w], nb[2 * LANES + w]
+        ea, eb = node_a[EASE * LANES + w], node_b[EASE * LANES + w]
+        a, b = a0 * d0 + a1 * d1 + a2 * d2, b0 * d0 + b1 * d1 + b2 * d2
+        out[w], out[LANES + w], out[2 * LANES + w] = (
+            ea * (d0 - a * a0),
+            ea * (d1 - a * a1),
+            ea * (d2 - a * a2),
+        )
+        out[3 * LANES + w], out[4 * LANES + w], out[5 * LANES + w] = (
+            eb * (d0 - b * b0),
+            eb * (d1 - b * b1),
+            eb * (d2 - b * b2),
+        )
+        out[6 * LANES + w], out[7 * LANES + w], out[8 * LANES + w] = d0, d1, d2
+
+
+@row
+def _weight_row(node_a, node_b, part, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """How far a unit pull shortens its own segment."""
+    for w in range(LANES):
+        d0, d1, d2 = part[6 * LANES + w], part[7 * LANES + w], part[8 * LANES + w]
+        out[w] = (
+            d0 * (part[w] + part[3 * LANES + w])
+            + d1 * (part[LANES + w] + part[4 * LANES + w])
+            + d2 * (part[2 * LANES + w] + part[5 * LANES + w])
+            + SOFTEST * (node_a[EASE * LANES + w] + node_b[EASE * LANES + w])
+        )
+
+
+@row
+def _excess_row(xa, xb, part, length, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """By how much a segment is too long."""
+    for w in range(LANES):
+        out[w] = (
+            part[6 * LANES + w] * (xb[w] - xa[w])
+            + part[7 * LANES + w] * (xb[LANES + w] - xa[LANES + w])
+            + part[8 * LANES + w] * (xb[2 * LANES + w] - xa[2 * LANES + w])
+            - length[w]
+        )
+
+
+@row
+def _beside_row(before, here, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """How far a unit pull of the segment before shortens this one."""
+    for w in range(LANES):
+        out[w] = -(
+            before[3 * LANES + w] * here[6 * LANES + w]
+            + before[4 * LANES + w] * here[7 * LANES + w]
+            + before[5 * LANES + w] * here[8 * LANES + w]
+        )
+
+
+@row
+def _shift_row(pull_a, part_a, pull_b, part_b, over, x) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Move a node by the pulls before it and after it."""
+    for w in range(LANES):
+        p, q = pull_a[w], pull_b[w]
+        m0 = q * part_b[w] - p * part_a[3 * LANES + w]
+        m1 = q * part_b[LANES + w] - p * part_a[4 * LANES + w]
+        m2 = q * part_b[2 * LANES + w] - p * part_a[5 * LANES + w]
+        x[w], x[LANES + w], x[2 * LANES + w] = (
+            x[w] + m0,
+            x[LANES + w] + m1,
+            x[2 * LANES + w] + m2,
+        )
+        x[3 * LANES + w], x[4 * LANES + w], x[5 * LANES + w] = (
+            x[3 * LANES + w] + m0 * over,
+            x[4 * LANES + w] + m1 * over,
+            x[5 * LANES + w] + m2 * over,
+        )

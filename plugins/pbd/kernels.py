@@ -13,7 +13,7 @@ from numba import njit, prange
 
 from hairkit.stored import Float32Array
 
-from .kernel_math import LANES
+from .kernel_math import LANES, row
 from .kernel_rows import (
     DIRECTION,
     EDGE,
@@ -96,7 +96,7 @@ def run_substeps(  # type: ignore[no-untyped-def]
             )  # fmt: skip
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def _substep(  # type: ignore[no-untyped-def]
     x, q, root, node, element, metric, ride, turn, gravity, air, extra, grid, settings,
     segment, work, vector, line, lengths,
@@ -113,7 +113,7 @@ def _substep(  # type: ignore[no-untyped-def]
             force[j].reshape(-1), j == 0,
         )  # fmt: skip
         if pushed:
-            force[j] += extra[j]
+            _add_row(extra[j].reshape(-1), force[j].reshape(-1))
     frames, parts = q.reshape(n - 1, 4 * LANES), segment.reshape(n, 9 * LANES)
     elements, works = element.reshape(n - 1, ELEMENT * LANES), work.reshape(n, 6 * LANES)
     held = root.reshape(7 * LANES)
@@ -132,13 +132,13 @@ def _substep(  # type: ignore[no-untyped-def]
         if iteration + 1 < iterations:
             _redirected(segment, free, change)
     for j in range(1, n):
-        _apply_row(x[j], free[j], change[j], ONE / settings[0])
+        _apply_row(flat[j], free[j].reshape(-1), change[j].reshape(-1), ONE / settings[0])
     if settings[5] > ZERO:
         touch(x, node, ride, grid, settings, vector[3])
-        relengthen(x, node, element, vector, line, ONE / settings[0])
+        relengthen(x, node, element, segment, vector[3], line, ONE / settings[0])
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def _untwist(q, root, parts, elements, element, work, works, line) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Spin frames about their segments until torques balance: one Newton step, tridiagonal."""
     m = q.shape[0]
@@ -163,7 +163,7 @@ def _untwist(q, root, parts, elements, element, work, works, line) -> None:  # t
         spin_row(q[j], parts[j], angle[j])
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def _elastic(q, root, parts, elements, element, work, works, force) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Bending and twist as forces on the nodes."""
     m = q.shape[0]
@@ -182,7 +182,7 @@ def _elastic(q, root, parts, elements, element, work, works, force) -> None:  # 
                 fb[c, w] += (here[c, w] + inner * after[3 + c, w]) * el[OVER, w]
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@row
 def _redirected(segment, free, change) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Turn the directions to where the solution leads, for another round."""
     for j in range(segment.shape[0] - 1):
@@ -197,14 +197,29 @@ def _redirected(segment, free, change) -> None:  # type: ignore[no-untyped-def] 
             sj[DIRECTION + 2, w] = e2 * size
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
-def _apply_row(xj, free, change, over) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+@row
+def _add_row(extra, force) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Add further force."""
+    for w in range(3 * LANES):
+        force[w] += extra[w]
+
+
+@row
+def _apply_row(x, free, change, over) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Take the change on, place and velocity."""
-    for c in range(3):
-        for w in range(LANES):
-            moved = free[c, w] - change[c, w]
-            xj[PLACE + c, w] += moved
-            xj[SPEED + c, w] += moved * over
+    for w in range(LANES):
+        m0, m1 = free[w] - change[w], free[LANES + w] - change[LANES + w]
+        m2 = free[2 * LANES + w] - change[2 * LANES + w]
+        x[w], x[LANES + w], x[2 * LANES + w] = (
+            x[w] + m0,
+            x[LANES + w] + m1,
+            x[2 * LANES + w] + m2,
+        )
+        x[3 * LANES + w], x[4 * LANES + w], x[5 * LANES + w] = (
+            x[3 * LANES + w] + m0 * over,
+            x[4 * LANES + w] + m1 * over,
+            x[5 * LANES + w] + m2 * over,
+        )
 
 
 def padded(values: Float32Array, lanes: int = LANES) -> Float32Array:
