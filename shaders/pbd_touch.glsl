@@ -2,7 +2,8 @@
 const float FURTHER = 1.05;       // slack wears off a little faster than the way that a node goes
 const float DIAGONAL = 1.8;       // a distance changes by less within a cell, in cells
 
-float distance_at(ivec3 cell) { return texelFetch(u_distances, cell.zyx, 0).x; }
+// Distances at the four corners of a cell's face across x, along (z, y): a texel holds them all.
+vec4 face(ivec3 cell) { return texelFetch(u_distances, cell.zyx, 0); }
 
 // Trilinear distance and its direction; one look tells most nodes that they are far.
 float obstacle_distance(vec3 p, float clear, out vec3 normal) {
@@ -10,15 +11,11 @@ float obstacle_distance(vec3 p, float clear, out vec3 normal) {
     normal = vec3(0.0);
     if (any(lessThan(at, vec3(0.0))) || any(greaterThan(at, vec3(u_cells - 1)))) return clear + u_room;
     ivec3 low = min(ivec3(at), u_cells - 2);
-    float first = distance_at(low), least = first - DIAGONAL / u_grid.w;
+    vec4 front = face(low);
+    float least = front.x - DIAGONAL / u_grid.w;
     if (least > clear) return least;
     vec3 t = at - vec3(low);
-    vec4 front = vec4(first, distance_at(low + ivec3(0, 0, 1)), distance_at(low + ivec3(0, 1, 0)),
-                      distance_at(low + ivec3(0, 1, 1)));
-    vec4 back = vec4(distance_at(low + ivec3(1, 0, 0)), distance_at(low + ivec3(1, 0, 1)),
-                     distance_at(low + ivec3(1, 1, 0)), distance_at(low + ivec3(1, 1, 1)));
-    vec4 across = mix(front, back, t.x);
-    vec4 slope = back - front;
+    vec4 back = face(low + ivec3(1, 0, 0)), across = mix(front, back, t.x), slope = back - front;
     vec2 line = mix(across.xz, across.yw, t.z), steep = mix(slope.xz, slope.yw, t.z);
     vec2 deep = across.yw - across.xz;
     vec3 way = vec3(mix(steep.x, steep.y, t.y), line.y - line.x, mix(deep.x, deep.y, t.y));

@@ -7,6 +7,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from importlib import resources
+from pathlib import Path
 from typing import Any, TypeVar
 
 import moderngl
@@ -16,6 +17,10 @@ from hairkit.render.osmesa import OSMesaContext
 
 REQUIRED_VERSION = 430
 """OpenGL 4.3, for buffers read by vertex shaders."""
+
+_CARDS = ("dri/renderD*", "nvidia[0-9]*")
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr")
+"""Words in the names of renderers that run on the processor."""
 
 Compiled = TypeVar("Compiled")
 
@@ -101,6 +106,19 @@ def renderer() -> Iterator[Renderer]:
             _depth -= 1
         if error != "GL_NO_ERROR":
             raise RenderError(f"drawing failed: OpenGL reports {error} ({_renderer.backend})")
+
+
+def on_graphics_card() -> bool:
+    """Return whether this process draws with a graphics card, or could; false for software."""
+    made = _renderer is not None and _owner == os.getpid()
+    if not made and not any(found for pattern in _CARDS for found in Path("/dev").glob(pattern)):
+        return False
+    try:
+        with renderer() as gl:
+            name = str(gl.context.info["GL_RENDERER"]).lower()
+    except RenderError:
+        return False
+    return not any(word in name for word in _SOFTWARE)
 
 
 def install(context: moderngl.Context, backend: str) -> Renderer:

@@ -84,8 +84,9 @@ class Options:
     seed: int = option(0, low=0, doc="Seed of the gusts.")
     backend: str = option(
         "auto",
-        choices=("auto", "reference", "fast"),
-        doc="What computes: plain NumPy in float64, or compiled float32.",
+        choices=("auto", "reference", "fast", "compute"),
+        doc="What computes: plain NumPy in float64, compiled float32, or compute shaders; auto takes"
+        " shaders where there is a graphics card, else the compiled one.",
     )
 
     def resolved(self, physics: HairPhysics) -> Options:

@@ -18,7 +18,7 @@ from hairkit.render.projection import set_uniforms
 from hairkit.simulate import rotation
 from hairkit.stored import Float32Array, Float64Array
 
-from .compute_load import MOST_STEPS, Units, step_words, touching
+from .compute_load import MOST_STEPS, Units, faces, step_words, touching
 from .compute_store import Store
 from .crowd import Crowd
 from .guides import Riders
@@ -44,8 +44,7 @@ class ComputeEngine:
         self._riders: Riders | None = None
         with renderer() as gl:
             self._store = Store(gl, self._count)
-            empty = np.zeros((1, 1, 1), np.float32)
-            self._store.put_grid("u_distances", empty if contact is None else contact.obstacles.distance)
+            self._store.put_grid("u_distances", faces(contact))
             for name in ("u_wind", "u_force"):
                 self._store.put_rods(name, np.zeros((self._count, 1, 3)))
         self.state = at_rest(rods)

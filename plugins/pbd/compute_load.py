@@ -57,6 +57,16 @@ def touching(contact: Contact | None) -> dict[str, Any]:
     }
 
 
+def faces(contact: Contact | None) -> Float32Array:
+    """Return (X, Y, Z, 4) distances of the corners (y, z), (y, z + 1), (y + 1, z), both + 1."""
+    if contact is None:
+        return np.zeros((1, 1, 1, 4), np.float32)
+    distance = contact.obstacles.distance
+    full = np.pad(distance, ((0, 0), (0, 1), (0, 1)), mode="edge")
+    parts = [full[:, :-1, :-1], full[:, :-1, 1:], full[:, 1:, :-1], full[:, 1:, 1:]]
+    return np.stack(parts, axis=-1)
+
+
 @dataclass(frozen=True, eq=False)
 class Units:
     """Whole numbers that a crowd is summed up in: the sum does not depend on the order."""

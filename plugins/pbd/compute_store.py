@@ -20,8 +20,8 @@ class Store:
 
     def __init__(self, gl: Renderer, count: int) -> None:
         self._gl, self._count = gl, count
-        self.width = min(count, WIDTH)
-        """Rods side by side."""
+        self.width = min(1 << (count - 1).bit_length(), WIDTH)
+        """Rods side by side: powers of two, for which drivers compile once."""
         self._named: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:

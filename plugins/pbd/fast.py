@@ -1,6 +1,4 @@
-"""The fast backend: packs rods for the kernels and runs them on all cores, float32.
-
-"""
+"""The fast backend: packs rods for the kernels and runs them on all cores, float32."""
 
 from __future__ import annotations
 

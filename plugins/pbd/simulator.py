@@ -12,6 +12,7 @@ import numpy.typing as npt
 from hairkit.exporting import selected
 from hairkit.groom import Groom
 from hairkit.guide_weights import guide_mask
+from hairkit.render.context import on_graphics_card
 from hairkit.simulate import Measures, Surroundings, rotation
 from hairkit.simulate.obstacles import Obstacles, head_obstacles
 from hairkit.simulate.wind import air_velocity
@@ -233,6 +234,10 @@ def inverse_motion(motion: Float64Array) -> Float64Array:
 def _engine(name: str, rods: Rods, contact: Contact) -> Engine:
     if name == "reference":
         return ReferenceEngine(rods, contact)
+    if name == "compute" or (name == "auto" and on_graphics_card()):
+        from .compute import ComputeEngine
+
+        return ComputeEngine(rods, contact)
     from .fast import FastEngine  # Numba loads where it is used
 
     return FastEngine(rods, contact)
