@@ -86,9 +86,7 @@ class Units:
         capacity = min(1.0, FULLEST * float(crowd.density.max()) / total) * UNITS
         return cls(crowd, UNITS / total, UNITS / (capacity * FASTEST), capacity)
 
-    def uniforms(
-        self, ride: Float64Array, rates: tuple[float, float, float]
-    ) -> dict[str, Any]:
+    def uniforms(self, ride: Float64Array, rates: tuple[float, float, float]) -> dict[str, Any]:
         """Return what the passes over the crowd's grid need."""
         cohesion, pressure, seconds = rates
         return {
