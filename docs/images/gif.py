@@ -1,8 +1,9 @@
 """Make the animated pictures of the README; needs Pillow beside hairkit.
 
-python docs/images/gif.py
+python docs/images/gif.py [pbd] [super_helix]
 
-grows straight and wavy hair, plays shake.toml and wind.toml headless, packs every other picture.
+grows straight and wavy hair, plays shake.toml and wind.toml headless with each simulator, packs
+every other picture: shake.gif and wind.gif for pbd, shake_super_helix.gif and so on for others.
 """
 
 from __future__ import annotations
@@ -22,16 +23,21 @@ MILLISECONDS = 70
 
 
 def main() -> int:
-    """Write shake.gif and wind.gif beside this program."""
+    """Write the pictures of the simulators that are named, or of pbd, beside this program."""
+    simulators = sys.argv[1:] or ["pbd"]
     shown: dict[str, StyleName] = {"shake": "straight", "wind": "wavy"}
     with tempfile.TemporaryDirectory() as folder:
         for name, style in shown.items():
             groom = Path(folder) / f"{style}.npz"
             write_groom(groom, grow(style, default_head(), 600))
-            words = ["view", str(groom), "--headless", "--script", str(HERE / f"{name}.toml")]
-            if hairkit([*words, "--out", folder]):
-                return 1
-            pack(sorted((Path(folder) / name).glob("*.png")), HERE / f"{name}.gif")
+            for simulator in simulators:
+                words = ["view", str(groom), "--headless", "--simulator", simulator]
+                words += ["--script", str(HERE / f"{name}.toml")]
+                out = Path(folder) / simulator
+                if hairkit([*words, "--out", str(out)]):
+                    return 1
+                ending = "" if simulator == "pbd" else f"_{simulator}"
+                pack(sorted((out / name).glob("*.png")), HERE / f"{name}{ending}.gif")
     return 0
 
 
