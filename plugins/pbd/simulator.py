@@ -22,7 +22,7 @@ from hairkit.strands import Strands
 from .crowd import Crowd, crowd_of
 from .energies import elastic_energy, largest_stretch
 from .engine import Engine, ReferenceEngine
-from .grabbing import pulls
+from .grabbing import Hand
 from .guides import node_points, riders
 from .reference import Contact, Load, at_rest, moved
 from .rods import Rods, loaded, make_rods
@@ -49,6 +49,7 @@ class PbdSimulator:
         self._obstacles: Obstacles = head_obstacles(guides.head)
         self._points: Float32Array | None = None
         self._head: Float64Array = np.eye(4)
+        self._hand = Hand()
         self._tune(options)
         self.reset()
 
@@ -110,6 +111,7 @@ class PbdSimulator:
         """Put the guides at rest on a head at `head_from_rest` (4, 4), without velocity."""
         self._head = np.eye(4) if head_from_rest is None else np.asarray(head_from_rest, np.float64)
         self._engine.state = at_rest(self._rods)
+        self._hand = Hand()
         self._time = 0.0
         self._points = None
 
@@ -180,7 +182,7 @@ class PbdSimulator:
             ride = inverse_motion(after) @ head if (after != head).any() else np.eye(4)
             load = Load(ride, after[:3, :3].T, gravity, air)
             if around.grabs:  # a pull depends on where the node is
-                force = pulls(
+                force = self._hand.pulls(
                     around.grabs, self._engine, self._rods, self._riders, system, load,
                     inverse_motion(after), self._options.grab_speed,
                 )  # fmt: skip
