@@ -11,7 +11,7 @@ from hairkit.stored import Float32Array, Float64Array
 
 from .crowd import Crowd
 from .guides import Riders
-from .reference import Contact, Load, State, at_rest, moved, substep
+from .reference import Contact, Load, State, at_rest, moved, substep, uncovered
 from .rods import Rods
 from .system import System
 
@@ -62,4 +62,6 @@ class ReferenceEngine:
     def points(self, riders: Riders, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
         local = riders.points(self.state.position, self.state.frames).astype(np.float64)
+        if self._contact is not None and not riders.identity:
+            local = uncovered(local, self._contact)
         return moved(head, local).astype(np.float32)

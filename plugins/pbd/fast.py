@@ -14,6 +14,7 @@ from .crowd import Crowd
 from .guides import Riders
 from .kernel_math import LANES
 from .kernel_ride import ride_points, rub_nodes
+from .kernel_touch import uncover
 from .packing import banded_factor
 from .reference import Contact, Load, State, at_rest
 from .rods import Rods
@@ -24,6 +25,7 @@ class FastEngine:
     """Rods in blocks of lanes."""
 
     def __init__(self, rods: Rods, contact: Contact | None) -> None:
+        kernels.tell_of_compiling()
         self._rods = rods
         self._count = len(rods.points)
         self._unit = rods.mass.mean(axis=1)
@@ -32,6 +34,8 @@ class FastEngine:
         self._root = kernels.padded(np.concatenate([rods.root_frame, held], axis=1))
         self._packed: tuple[System, Float32Array, Float32Array, Float32Array] | None = None
         self._grid = _grid(contact)
+        deepest = None if contact is None else contact.deepest
+        self._deepest = None if deepest is None else deepest.astype(np.float32)
         self.state = at_rest(rods)
 
     @property
@@ -81,20 +85,13 @@ class FastEngine:
 
     def points(self, riders: Riders, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
-        rod, segment, share, offset = riders.packed()
-        return np.asarray(
-            ride_points(
-                self._x,
-                self._q,
-                riders.identity,
-                rod,
-                segment,
-                share,
-                offset,
-                head[:3].astype(np.float32),
-                self._count,
-            )
+        motion = head[:3].astype(np.float32)
+        found = np.asarray(
+            ride_points(self._x, self._q, riders.identity, *riders.packed(), motion, self._count)
         )
+        if self._deepest is not None and not riders.identity:
+            uncover(found, self._deepest, motion, self._grid)
+        return found
 
     def _unpacked(self, values: Float32Array) -> Float64Array:
         spread = np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:-1])

@@ -227,3 +227,18 @@ def _shift_row(pull_a, part_a, pull_b, part_b, over, x) -> None:  # type: ignore
             x[4 * LANES + w] + m1 * over,
             x[5 * LANES + w] + m2 * over,
         )
+
+
+@row
+def uncover(points, deepest, head, grid) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Bring the guides' points (P, 3), world, out of the obstacles where they lie too deep."""
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0] - head[0, 3], points[i, 1] - head[1, 3], points[i, 2] - head[2, 3]
+        a = head[0, 0] * x + head[1, 0] * y + head[2, 0] * z
+        b = head[0, 1] * x + head[1, 1] * y + head[2, 1] * z
+        c = head[0, 2] * x + head[1, 2] * y + head[2, 2] * z
+        distance, n0, n1, n2 = _distance(grid, a, b, c, deepest[i])
+        depth = deepest[i] - distance
+        if depth > ZERO:
+            for k in range(3):
+                points[i, k] += depth * (head[k, 0] * n0 + head[k, 1] * n1 + head[k, 2] * n2)

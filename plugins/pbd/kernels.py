@@ -8,6 +8,9 @@ Masses are shares of the strand's mean node mass, so that stiffness is in 1/s^2.
 
 from __future__ import annotations
 
+import logging
+from pathlib import Path
+
 import numpy as np
 from numba import njit, prange
 
@@ -219,6 +222,16 @@ def _apply_row(x, free, change, over) -> None:  # type: ignore[no-untyped-def] #
             x[3 * LANES + w] + m0 * over,
             x[4 * LANES + w] + m1 * over,
             x[5 * LANES + w] + m2 * over,
+        )
+
+
+def tell_of_compiling() -> None:
+    """Warn where nothing compiled is kept yet: the first step will take half a minute."""
+    if run_substeps.signatures:
+        return
+    if not any(Path(run_substeps.stats.cache_path).glob("kernels.run_substeps-*.nbi")):
+        logging.getLogger("hairkit").warning(
+            "compiling the simulator, once per machine (half a minute)"
         )
 
 

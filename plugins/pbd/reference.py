@@ -47,6 +47,8 @@ class Contact:
     """Coulomb's coefficient."""
     fastest: float
     """m/s, at which a node deep inside is brought out."""
+    deepest: Float64Array | None = None
+    """(P,) least distance, metres, of the guides' own points where they are drawn; None: any."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,6 +218,16 @@ def collided(rods: Rods, state: State, contact: Contact, ride: Float64Array, ste
     position = state.position + touching * (out[..., None] * normal + step * brake)
     fixed = relengthened(rods, position, touching * normal)
     return replace(state, position=fixed, velocity=velocity + (fixed - position) / step)
+
+
+def uncovered(points: Float64Array, contact: Contact) -> Float64Array:
+    """Return the guides' points (P, 3), head axes, with those out that lie too deep."""
+    if contact.deepest is None:
+        return points
+    distance, normal = contact.obstacles.at(points)
+    depth = np.maximum(contact.deepest - distance, 0.0)
+    result: Float64Array = points + depth[:, None] * normal
+    return result
 
 
 def relengthened(rods: Rods, position: Float64Array, normal: Float64Array) -> Float64Array:

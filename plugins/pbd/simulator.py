@@ -153,7 +153,7 @@ class PbdSimulator:
         self._options = resolved
         self._rates = _rates(resolved, rods, width_of)
         self._systems: dict[float, System] = {}
-        self._contact = _contact(resolved, self._obstacles, points)
+        self._contact = _contact(resolved, self._obstacles, points, strands)
         self._crowd: Crowd = crowd_of(points.reshape(-1, 3), self._rods.mass.reshape(-1))
         self._engine = _engine(resolved.backend, self._rods, self._contact)
 
@@ -267,8 +267,12 @@ def _rates(options: Options, rods: Rods, width: Float64Array) -> Rates:
     )
 
 
-def _contact(options: Options, obstacles: Obstacles, points: Float64Array) -> Contact:
+def _contact(
+    options: Options, obstacles: Obstacles, points: Float64Array, strands: Strands
+) -> Contact:
     """Captured hair that is nearer than the clearance keeps its own distance."""
     distance = obstacles.at(points.reshape(-1, 3))[0].reshape(points.shape[:2])
     clearance = np.minimum(options.clearance, distance)
-    return Contact(obstacles, clearance, options.rubbing(), options.depenetration)
+    # finer points ride between nodes that are out of the head and may cut through it
+    deepest = np.minimum(obstacles.at(strands.points)[0], 0.001) - 1e-5
+    return Contact(obstacles, clearance, options.rubbing(), options.depenetration, deepest)

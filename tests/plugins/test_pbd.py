@@ -76,6 +76,20 @@ def test_shaken_hair_keeps_its_length_and_stays_out_of_the_head(groom: Groom) ->
     assert deepest < 0.002
 
 
+@pytest.mark.parametrize("backend", ["reference", "fast"])
+def test_fine_points_do_not_cut_through_the_head(groom: Groom, backend: str) -> None:
+    """Four nodes a guide, pressed on the head by wind: its points are at most 2 mm inside."""
+    wind, deepest = Surroundings(wind=np.array([0.0, -14.0, 0.0])), 0.0
+    simulator = PbdSimulator(groom, Options(backend=backend, nodes=4, bend=0.0, stiffness=0.0))
+    rest = np.minimum(distance_to(groom.head, groom.strands.points), 0.0)
+    np.testing.assert_allclose(simulator.points, groom.strands.points, atol=1e-6)
+    for _ in range(40):
+        simulator.advance(1 / 60, wind)
+        inside = rest - distance_to(groom.head, simulator.points)
+        deepest = max(deepest, float(inside.max()))
+    assert deepest < 0.002
+
+
 def test_shaken_hair_comes_back_to_rest(groom: Groom) -> None:
     """Three seconds after a short shake the hair is within 2 mm of where it was."""
     motion = shaken(["roll:20:2:0.5"], groom.head)
