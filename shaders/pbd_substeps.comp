@@ -8,7 +8,7 @@
 // Rows of a rod's constants: its root's frame; of nodes the place at rest and mass, then drag, pull
 // to that place, clearance and 1/mass; of elements three; the lengths' metric.
 const int NODE_ROW = 1, ELEMENT_ROW = NODE_ROW + 2 * NODES, METRIC_ROW = ELEMENT_ROW + 3 * SEGMENTS;
-const int PAIRS = SEGMENTS * NODES / 2, ROWS = METRIC_ROW + (PAIRS + 3) / 4;
+const int PAIRS = SEGMENTS * NODES / 2, QUADS = (PAIRS + 3) / 4, ROWS = METRIC_ROW + QUADS;
 const int MOST_STEPS = 64;
 const float SHARPEST = 0.3, LARGEST_SPIN = 0.3, SOFTEST = 1e-3, SINGULAR = 1e-6;
 
@@ -47,12 +47,28 @@ vec3 edge[SEGMENTS], direction[SEGMENTS];
 float pivot[SEGMENTS], beside[SEGMENTS], value[SEGMENTS];
 
 vec4 constant(int row) { return texelFetch(u_constants, texel(rod, row, ROWS), 0); }
-vec4 rest_and_mass(int j) { return constant(NODE_ROW + 2 * j); }
-vec4 rates(int j) { return constant(NODE_ROW + 2 * j + 1); }
-vec4 banded(int j) { return constant(ELEMENT_ROW + 3 * j); }       // two lower entries, 1/pivot; length
-vec4 stiffness(int j) { return constant(ELEMENT_ROW + 3 * j + 1); } // bend, twist, natural twist, 1/length
-vec3 curvature(int j) { return constant(ELEMENT_ROW + 3 * j + 2).xyz; }
-float metric(int pair) { return constant(METRIC_ROW + pair / 4)[pair % 4]; }
+
+// Read once, used in every substep.
+vec4 rest_and_mass[NODES], rates[NODES];
+vec4 banded[SEGMENTS];     // two lower entries, 1/pivot; length
+vec4 stiffness[SEGMENTS];  // bend, twist, natural twist, 1/length
+vec3 curvature[SEGMENTS];
+vec4 metrics[QUADS];
+float metric(int pair) { return metrics[pair / 4][pair % 4]; }
+
+void read_constants() {
+    for (int j = 0; j < NODES; j++) {
+        rest_and_mass[j] = constant(NODE_ROW + 2 * j);
+        rates[j] = constant(NODE_ROW + 2 * j + 1);
+    }
+    for (int j = 0; j < SEGMENTS; j++) {
+        banded[j] = constant(ELEMENT_ROW + 3 * j);
+        stiffness[j] = constant(ELEMENT_ROW + 3 * j + 1);
+        curvature[j] = constant(ELEMENT_ROW + 3 * j + 2).xyz;
+    }
+    for (int i = 0; i < QUADS; i++) metrics[i] = constant(METRIC_ROW + i);
+}
+
 vec3 rows(vec4 a, vec4 b, vec4 c, vec4 v) { return vec3(dot(a, v), dot(b, v), dot(c, v)); }
 vec3 ridden(int k, vec4 v) { return rows(steps[k].ride[0], steps[k].ride[1], steps[k].ride[2], v); }
 vec3 drift(int k, vec3 p) {
@@ -61,7 +77,7 @@ vec3 drift(int k, vec3 p) {
 
 // Carry a node into the new axes, go on straight, and add up what acts on it.
 void predict(int k, int j) {
-    vec4 rest = rest_and_mass(j), rate = rates(j);
+    vec4 rest = rest_and_mass[j], rate = rates[j];
     vec3 p = ridden(k, vec4(place[j], 1.0));
     vec3 u = j == 0 ? (rest.xyz - p) / u_seconds : ridden(k, vec4(speed[j], 0.0));
     p += u_seconds * u;
@@ -95,9 +111,9 @@ void untwist() {
     for (int j = 0; j < SEGMENTS; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
-        vec3 natural = turned(half_way(before, after, quarter), curvature(j));
+        vec3 natural = turned(half_way(before, after, quarter), curvature[j]);
         vec3 turn = direction[j] - axis;
-        vec4 firmness = stiffness(j);
+        vec4 firmness = stiffness[j];
         float bend = firmness.x, twist = firmness.y;
         vec3 spun = cross(natural, turn), aside = cross(quarter, spun);
         float torque = twist * (twist_between(before, after) - firmness.z);
@@ -126,8 +142,8 @@ void add_elastic() {
     for (int j = 0; j < SEGMENTS; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
-        vec3 natural = turned(half_way(before, after, quarter), curvature(j));
-        vec4 firmness = stiffness(j);
+        vec3 natural = turned(half_way(before, after, quarter), curvature[j]);
+        vec4 firmness = stiffness[j];
         float bend = firmness.x, over = firmness.w;
         vec3 reach = edge[j] * over, turn = reach - reach_before;
         vec3 spun = cross(natural, turn), aside = cross(quarter, spun);
@@ -137,7 +153,7 @@ void add_elastic() {
         vec3 moment = bend * (natural - turn);
         if (j > 0) {
             pull += cross(0.5 * bend * (spun - aside), axis) - moment - twisting;
-            vec3 done = pull * stiffness(j - 1).w;
+            vec3 done = pull * stiffness[j - 1].w;
             force[j - 1] -= done;
             force[j] += done;
         }
@@ -145,8 +161,8 @@ void add_elastic() {
         before = after;
         reach_before = reach;
     }
-    force[SEGMENTS - 1] -= pull * stiffness(SEGMENTS - 1).w;
-    force[SEGMENTS] += pull * stiffness(SEGMENTS - 1).w;
+    force[SEGMENTS - 1] -= pull * stiffness[SEGMENTS - 1].w;
+    force[SEGMENTS] += pull * stiffness[SEGMENTS - 1].w;
 }
 
 // Write A^-1 force of the free nodes to `solved`.
@@ -155,7 +171,7 @@ void solve_banded() {
     for (int j = 0; j < NODES; j++) {
         solved[j] = vec3(0.0);
         if (j > 0) {
-            vec4 factor = banded(j - 1);
+            vec4 factor = banded[j - 1];
             vec3 here = force[j] - factor.x * one - factor.y * two;
             two = one;
             one = here;
@@ -163,8 +179,8 @@ void solve_banded() {
         }
     }
     for (int j = NODES - 1; j >= 0; j--) {
-        if (j > 0 && j + 1 < NODES) solved[j] -= banded(j).x * solved[j + 1];
-        if (j > 0 && j + 2 < NODES) solved[j] -= banded(j + 1).y * solved[j + 2];
+        if (j > 0 && j + 1 < NODES) solved[j] -= banded[j].x * solved[j + 1];
+        if (j > 0 && j + 2 < NODES) solved[j] -= banded[j + 1].y * solved[j + 2];
     }
 }
 
@@ -174,7 +190,7 @@ void solve_lengths() {
     float factor[SEGMENTS][SEGMENTS], scaled[SEGMENTS];
     for (int i = 0; i < SEGMENTS; i++) {
         vec3 excess = edge[i] + solved[i + 1] - solved[i];
-        float right = dot(excess, direction[i]) - banded(i).w;
+        float right = dot(excess, direction[i]) - banded[i].w;
         float own = metric(i * (i + 1) / 2 + i), last = own * dot(direction[i], direction[i]);
         for (int j = 0; j < SEGMENTS; j++)
             if (j < i) {
@@ -234,6 +250,7 @@ void main() {
         speed[j] = node_speed(rod, j).xyz;
     }
     for (int j = 0; j < SEGMENTS; j++) frame[j] = segment_frame(rod, j);
+    read_constants();
     for (int k = 0; k < u_substeps; k++) {
         for (int j = 0; j < NODES; j++) predict(k, j);
         for (int j = 0; j < SEGMENTS; j++) {

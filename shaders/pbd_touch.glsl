@@ -31,12 +31,12 @@ void relengthen(vec3 normal[NODES]) {
         float reach = length(way);
         direction[j] = way / reach;
         float a = dot(normal[j], direction[j]), b = dot(normal[j + 1], direction[j]);
-        float ease = rates(j).w, ease_after = rates(j + 1).w;
+        float ease = rates[j].w, ease_after = rates[j + 1].w;
         vec3 start = ease * (direction[j] - a * normal[j]);
         vec3 end = ease_after * (direction[j] - b * normal[j + 1]);
         pivot[j] = dot(direction[j], start + end) + SOFTEST * (ease + ease_after);
         beside[j] = -dot(end_before, direction[j]);
-        value[j] = reach - banded(j).w;
+        value[j] = reach - banded[j].w;
         end_before = end;
     }
     solve_tridiagonal();
@@ -44,7 +44,7 @@ void relengthen(vec3 normal[NODES]) {
         vec3 pull = vec3(0.0);
         if (j > 0) pull -= value[j - 1] * direction[j - 1];
         if (j < SEGMENTS) pull += value[j] * direction[j];
-        vec3 change = rates(j).w * (pull - dot(pull, normal[j]) * normal[j]);
+        vec3 change = rates[j].w * (pull - dot(pull, normal[j]) * normal[j]);
         place[j] += change;
         speed[j] += change / u_seconds;
     }
@@ -54,7 +54,7 @@ void relengthen(vec3 normal[NODES]) {
 // up again only when it may have gone as far as it was away the last time.
 vec3 touched(int k, int j) {
     vec3 p = place[j], relative = speed[j] - drift(k, p), normal = vec3(0.0);
-    float clear = rates(j).z, left = slack[j] - FURTHER * u_seconds * length(relative);
+    float clear = rates[j].z, left = slack[j] - FURTHER * u_seconds * length(relative);
     if (left <= 0.0) {
         left = obstacle_distance(p, clear, normal) - clear;
         float across = dot(relative, normal), inward = max(-across, 0.0);
