@@ -205,6 +205,55 @@ def test_a_beam_sings_at_its_first_tone() -> None:
     assert (count - 0.5) * step == pytest.approx(np.pi / 2 / omega, rel=0.005)
 
 
+def test_a_beam_sings_at_its_second_tone() -> None:
+    """omega_2 = 4.69409^2 sqrt(EI / (rho A L^4)) without gravity: the quarter period to 1.5 %."""
+    bending, nodes, k = 1e-8, 41, 4.69409113
+    rods = make_rods(straight(1, nodes), DENSITY, bending, straight=True)
+    omega, s = k**2 * np.sqrt(bending / DENSITY / LENGTH**4), np.linspace(0, 1, nodes)
+    ratio = (np.cosh(k) + np.cos(k)) / (np.sinh(k) + np.sin(k))
+    shape = np.cosh(k * s) - np.cos(k * s) - ratio * (np.sinh(k * s) - np.sin(k * s))
+    state = displaced(rods, 1e-4 * shape[:, None] * np.array([0, 1.0, 0]))
+    step = 2 * np.pi / omega / 4000
+    system, load = system_of(rods, step), Load(np.eye(4), np.eye(3), np.zeros(3), np.zeros(3))
+    count = 0
+    while float(shape @ state.position[0, :, 1]) > 0:
+        state, count = substep(rods, system, state, load), count + 1
+    assert (count - 0.5) * step == pytest.approx(np.pi / 2 / omega, rel=0.015)
+
+
+def test_a_chain_swings_in_its_second_mode_as_laguerre_says() -> None:
+    """omega^2 = (N g / L) x2, x2 the second zero of L_N: the quarter period to 0.5 %."""
+    beads, step = 15, 1e-4
+    rods = make_rods(straight(1, beads + 1, (0, -1, 0)), DENSITY, 1e-18, straight=True)
+    rods = replace(rods, mass=np.full_like(rods.mass, WEIGHT / G * LENGTH / beads))
+    omega, shape = (
+        np.sqrt(beads * G / LENGTH * roots_laguerre(beads)[0][1]),
+        mode_of_chain(beads, 1),
+    )
+    state = displaced(rods, 1e-4 * shape[:, None] * np.array([1.0, 0, 0]))
+    system, load = system_of(rods, step), Load(np.eye(4), np.eye(3), DOWN, np.zeros(3))
+    count, now, before = 0, 1.0, 1.0
+    while now > 0:
+        state, count, before = substep(rods, system, state, load), count + 1, now
+        now = float(shape @ state.position[0, :, 0])
+    crossing = step * (count - now / (now - before))
+    assert crossing - step / 2 == pytest.approx(np.pi / 2 / omega, rel=0.005)
+
+
+@pytest.mark.parametrize("turn", [0.5, 1.0])
+def test_constant_natural_curvature_makes_an_arc(turn: float) -> None:
+    """A straight rod of natural curvature 2 pi turn / L becomes that arc: tip to 0.5 % of L."""
+    nodes, angle = 33, 2 * np.pi * turn
+    rods = make_rods(straight(1, nodes), DENSITY, 1e-8, straight=True)
+    # an element turns by its share of the arc; the chord of the turn is 2 sin(half of it)
+    span = np.append(0.5, np.ones(nodes - 2)) / (nodes - 1)
+    bent = rotation.rotated(rods.frames[:, :1] * [1, -1, -1, -1], np.array([0.0, 1.0, 0.0]))
+    rods = replace(rods, curvature=bent * (2 * np.sin(angle * span / 2))[None, :, None])
+    tip = settled(rods, np.zeros(3), drag=8.0, step=1 / 200, steps=600).position[0, -1] / LENGTH
+    arc = np.array([np.sin(angle), 1 - np.cos(angle), 0.0]) / angle
+    np.testing.assert_allclose(tip, arc, atol=0.005)
+
+
 def test_upright_hair_falls_over_beyond_the_critical_length() -> None:
     """Gamma_c = 7.8373: at 7.5 a small lean heals, at 8.2 it grows."""
     gamma = np.array([7.5, 8.2])
@@ -346,12 +395,12 @@ def displaced(rods: Rods, shift: Float64Array) -> State:
     return State(position, np.zeros_like(position), frames)
 
 
-def mode_of_chain(beads: int) -> Float64Array:
-    """Return the slowest mode (beads + 1,) of a chain hanging from its first node, tip 1."""
+def mode_of_chain(beads: int, number: int = 0) -> Float64Array:
+    """Return a mode (beads + 1,), the slowest first, of a chain hanging from its first node."""
     tension = np.arange(beads, 0, -1.0)
     stiffness = np.diag(tension + np.append(tension[1:], 0)) - np.diag(tension[1:], 1)
     values, vectors = np.linalg.eigh(stiffness - np.diag(tension[1:], -1))
-    mode = vectors[:, np.argmin(values)]
+    mode = vectors[:, np.argsort(values)[number]]
     return np.concatenate([[0.0], mode / mode[-1]])
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +87,57 @@ def test_the_verb_writes_a_cache_of_the_groom(groom: Groom, tmp_path: Path) -> N
         files.append(path.read_bytes())
     assert len(read_cache(tmp_path / "a.npz", groom)) == 4
     assert files[0] == files[1]
+
+
+@pytest.mark.parametrize("name", ["head.glb", "head.json"])
+def test_the_verb_follows_a_motion_file(groom: Groom, tmp_path: Path, name: str) -> None:
+    """A yaw of 30 degrees a tenth of a second turns the head of every frame by its share."""
+    path, half = tmp_path / name, np.radians(15.0)
+    if name == "head.glb":
+        path.write_bytes(
+            turning_head([0.0, 0.1], [[0, 0, 0, 1], [0, np.sin(half), 0, np.cos(half)]])
+        )
+    else:
+        keys = [{"time": 0.1 * k, "turn_deg": [0, 30 * k, 0]} for k in range(2)]
+        path.write_text(json.dumps({"frames": keys}))
+    cache = tmp_path / "c.npz"
+    assert simulate(groom, tmp_path, "-o", str(cache), "--motion", str(path), "--frames", "7") == 0
+    heads = read_cache(cache, groom).head_from_rest
+    turned = np.degrees(np.arctan2(heads[:, 0, 2], heads[:, 0, 0]))
+    np.testing.assert_allclose(turned[[0, 3, 6]], [0.0, 15.0, 30.0], atol=0.05)
+    roots = read_cache(cache, groom).points[6][groom.strands.offsets[:-1]]
+    wanted = groom.strands.roots @ heads[6, :3, :3].T + heads[6, :3, 3]
+    np.testing.assert_allclose(roots, wanted, atol=1e-6)
+
+
+def turning_head(times: list[float], rotations: list[list[float]]) -> bytes:
+    """Return a .glb with one node, `head`, whose rotation (x, y, z, w) is animated."""
+    data = np.array(times, "<f4").tobytes() + np.array(rotations, "<f4").tobytes()
+    views = [
+        {"buffer": 0, "byteOffset": 0, "byteLength": 4 * len(times)},
+        {"buffer": 0, "byteOffset": 4 * len(times), "byteLength": 16 * len(times)},
+    ]
+    kinds: list[dict[str, object]] = [
+        {"type": "SCALAR", "min": [min(times)], "max": [max(times)]},
+        {"type": "VEC4"},
+    ]
+    document = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "head"}], "buffers": [{"byteLength": len(data)}], "bufferViews": views,
+        "accessors": [
+            {"bufferView": k, "componentType": 5126, "count": len(times)} | kind
+            for k, kind in enumerate(kinds)
+        ],
+        "animations": [{
+            "samplers": [{"input": 0, "output": 1}],
+            "channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}],
+        }],
+    }  # fmt: skip
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text
+    chunks += struct.pack("<I4s", len(data), b"BIN\0") + data
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
 def test_other_endings_go_through_their_exporter(groom: Groom, tmp_path: Path) -> None:
