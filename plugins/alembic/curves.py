@@ -45,6 +45,8 @@ class GroomCurves:
     """(S,) or None where guides and hair are not told apart."""
     closest: GuideWeights | None
     """Guides of each curve; None where there are none to follow."""
+    attributes: bool
+    """False: curves, widths and uv alone."""
     cache: PointCache | None
     """Frames (T, P, 3) in the head frame, or None for a still groom."""
     space: FileSpace
@@ -71,7 +73,7 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
     strands, space = ready.groom.strands, options.space
     fitted, cache = _limited(strands, ready.cache, options.max_points)
     guide = guide_mask(strands)
-    marked = options.mark_guides or not guide.all()
+    marked, listed = options.mark_guides or not guide.all(), options.attributes
     assert fitted.widths is not None  # `prepared` has filled in all three
     assert fitted.root_uv is not None
     assert fitted.group is not None
@@ -85,7 +87,8 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
         colour=colours(ready.groom.material, fitted.counts),
         group=fitted.group,
         guide=guide if marked else None,
-        closest=closest_guides(strands) if marked and guide.any() else None,
+        closest=closest_guides(strands) if listed and marked and guide.any() else None,
+        attributes=listed,
         cache=cache,
         space=space,
     )

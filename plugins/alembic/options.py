@@ -27,3 +27,8 @@ class Options(SpaceOptions, ImportOptions, AnimationOptions, ExportOptions):
         False,
         doc="Mark guides in a file of guides alone, which Unreal then does not draw.",
     )
+    attributes: bool = option(
+        True,
+        doc="Write the groom_* attributes (ids, groups, guides and their weights, colours); false"
+        " leaves curves, widths and uv, which is all that Blender and Unity read.",
+    )

@@ -87,7 +87,8 @@ def _write(curves: GroomCurves, part: Path) -> None:
     schema = AbcGeom.OCurves(groom, "strands", sampling).getSchema()
     for number in range(1 if curves.cache is None else len(curves.cache)):
         schema.set(_sample(curves, number))
-    _write_attributes(schema.getArbGeomParams(), curves)
+    if curves.attributes:
+        _write_attributes(schema.getArbGeomParams(), curves)
 
 
 def _write_groom_properties(groom: Any) -> None:

@@ -44,6 +44,11 @@ class Options(SpaceOptions, ImportOptions, AnimationOptions, ExportOptions):
     """
 
     head_mesh: bool = option(True, doc="Write the head's mesh.")
+    attributes: bool = option(
+        True,
+        doc="Write ids, groups, guides and their weights, uv and colours of the strands; false"
+        " leaves points and widths.",
+    )
 
 
 @hookimpl

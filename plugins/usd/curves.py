@@ -21,6 +21,8 @@ def add_hair(
     skeleton: Any,
     material: Any,
     codes: list[float],
+    *,
+    attributes: bool = True,
 ) -> None:
     """Add all strands as one linear BasisCurves, its points and extent at every time code too."""
     from pxr import UsdGeom, UsdShade, Vt
@@ -41,7 +43,8 @@ def add_hair(
         when = () if code is None else (code,)
         points.Set(place, *when)
         extent.Set(UsdGeom.Curves.ComputeExtent(place, widths), *when)
-    _add_primvars(UsdGeom.PrimvarsAPI(hair.GetPrim()), ready.groom)
+    if attributes:
+        _add_primvars(UsdGeom.PrimvarsAPI(hair.GetPrim()), ready.groom)
     UsdShade.MaterialBindingAPI.Apply(hair.GetPrim()).Bind(material)
     if ready.cache is None:
         _bind_to_head(hair.GetPrim(), skeleton)

@@ -25,6 +25,8 @@ class StageOptions(Protocol):
     def space(self) -> FileSpace: ...
     @property
     def head_mesh(self) -> bool: ...
+    @property
+    def attributes(self) -> bool: ...
 
 
 def write_stage(ready: PreparedGroom, path: Path, options: StageOptions) -> None:
@@ -49,7 +51,7 @@ def write_stage(ready: PreparedGroom, path: Path, options: StageOptions) -> None
         raise MissingExtraError(MISSING) from error
     stage = Usd.Stage.CreateInMemory(f"groom{path.suffix.lower()}")
     _describe(stage, ready, space)
-    _fill(stage, ready, space, options.head_mesh)
+    _fill(stage, ready, space, options)
     _export(stage, path)
 
 
@@ -76,7 +78,7 @@ def time_codes(ready: PreparedGroom) -> list[float]:
     return [round(float(time) * rate, DIGITS) for time in ready.cache.times]
 
 
-def _fill(stage: Any, ready: PreparedGroom, space: FileSpace, head_mesh: bool) -> None:
+def _fill(stage: Any, ready: PreparedGroom, space: FileSpace, options: StageOptions) -> None:
     from pxr import Kind, Usd, UsdSkel
 
     from .body import add_head, add_skeleton
@@ -90,9 +92,17 @@ def _fill(stage: Any, ready: PreparedGroom, space: FileSpace, head_mesh: bool) -
     root.SetCustomData({"hairkit": settings_of(ready.groom)})
     materials = add_materials(stage, ready.groom)
     skeleton = add_skeleton(stage, ready, space, time_codes(ready))
-    if head_mesh:
+    if options.head_mesh:
         add_head(stage, ready.groom.head, space, skeleton, materials.skin)
-    add_hair(stage, ready, space, skeleton, materials.hair, time_codes(ready))
+    add_hair(
+        stage,
+        ready,
+        space,
+        skeleton,
+        materials.hair,
+        time_codes(ready),
+        attributes=options.attributes,
+    )
 
 
 def _export(stage: Any, path: Path) -> None:

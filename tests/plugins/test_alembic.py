@@ -15,7 +15,7 @@ from hairkit_plugins import alembic
 from hairkit_plugins.alembic import curves, writer
 
 from hairkit.errors import InputError
-from hairkit.exporting import selected
+from hairkit.exporting import completed, selected
 from hairkit.groom import Groom, HairMaterial
 from hairkit.guide_weights import closest_guides
 from hairkit.point_cache import PointCache
@@ -376,3 +376,19 @@ def test_the_room_made_is_enough(tmp_path: Path, caplog: pytest.LogCaptureFixtur
         size = writer._size(curves.groom_curves(ready, alembic.Options(**options)))
         have = written(groom, tmp_path, **options).stat().st_size
         assert have <= size < 2 * have + 50_000
+
+
+def test_attributes_can_be_left_out(tmp_path: Path) -> None:
+    """Points, widths and uv stay; what only grooms have is not in the file, which is smaller."""
+    groom = hair_groom()
+    whole = written(groom, tmp_path)
+    size = whole.stat().st_size
+    whole.rename(tmp_path / "whole.abc")
+    bare = written(groom, tmp_path, attributes=False)
+    assert bare.stat().st_size < 0.8 * size
+    assert b"groom_id" in (tmp_path / "whole.abc").read_bytes()
+    assert b"groom_id" not in bare.read_bytes()
+    back = alembic.import_groom(bare, alembic.Options()).strands
+    np.testing.assert_array_equal(back.points, groom.strands.points)
+    np.testing.assert_array_equal(back.widths, completed(groom).strands.widths)
+    assert back.guide is None

@@ -321,3 +321,16 @@ def test_without_the_library_one_line_names_the_extra(
         manager.call(
             "import_groom", "usd", manager.options("usd", {}), path=tmp_path / "groom.usdc"
         )
+
+
+def test_attributes_can_be_left_out(manager: Manager, tmp_path: Path) -> None:
+    """Points and widths stay, the primvars of strands go; the validators stay silent."""
+    from pxr import UsdGeom
+
+    groom = rich_groom()
+    path = exported(manager, groom, tmp_path, attributes=False)
+    stage = opened(path)
+    hair = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/Groom/Hair"))
+    assert not [p for p in hair.GetPrimvars() if p.GetPrimvarName().startswith("groom_")]
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Groom/Hair"))
+    np.testing.assert_array_equal(curves.GetPointsAttr().Get(), groom.strands.points)
