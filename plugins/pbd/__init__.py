@@ -41,7 +41,7 @@ class Options:
         " the groom's.",
     )
     twist: float = option(
-        0.77, low=0.01, high=10.0, doc="Torsional over bending stiffness, GJ/EI; 0.77 for fibres."
+        0.77, low=0.01, high=1.0, doc="Torsional over bending stiffness, GJ/EI; 0.77 for fibres."
     )
     damping: float | None = option(
         None,

@@ -172,6 +172,18 @@ def test_more_stiffness_moves_less(groom: Groom) -> None:
     assert blown(bend=0.9) < blown(bend=0.2)
 
 
+@pytest.mark.parametrize("bend", [0.0, 1.0])
+def test_the_stiffest_torsion_is_stable(groom: Groom, bend: float) -> None:
+    """At the upper bound of twist, shaken hair calms down in a second and a half."""
+    simulator = PbdSimulator(groom, Options(backend="reference", twist=1.0, bend=bend))
+    motion, energy = shaken(["yaw:30:2:0.5", "roll:25:3:0.5"], groom.head), []
+    for frame in range(1, 121):
+        simulator.advance(1 / 60, Surroundings(motion(frame / 60)))
+        energy.append(simulator.measure().kinetic_energy)
+    assert energy[-1] < 0.01 * max(energy)
+    assert simulator.measure().stretch < 0.01
+
+
 def test_retuning_keeps_the_positions(groom: Groom) -> None:
     """New options move nothing by themselves, and None is resolved by the groom."""
     simulator = PbdSimulator(groom, Options())
