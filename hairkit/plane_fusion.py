@@ -9,6 +9,7 @@ cell's depth behind the first hair the view sees.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit, prange
@@ -17,15 +18,73 @@ from scipy import ndimage
 from hairkit.camera import Camera
 from hairkit.eigen import smallest_eigenvectors
 from hairkit.mask import Mask
+from hairkit.options import option
 from hairkit.orientation import OrientationMap
 from hairkit.projection import pack_cameras, project_row, splat_depth
 from hairkit.stored import Float32Array, Float64Array, Int64Array
 from hairkit.volume import Hull, outer_products
+from hairkit.waves import Waves, measure_waves, without_slant
 
 DEPTH_SHRINK = 3
 """Depth maps of the hull are this much smaller than the pictures: cells are larger than pixels."""
 POOL_CELLS = 2
 """Planes are pooled on cells this many times as large."""
+
+
+@dataclass(frozen=True)
+class FusionOptions:
+    """Options of every field method that fuses views; plugins inherit them."""
+
+    see_through: float = option(
+        0.02,
+        low=0,
+        high=0.2,
+        unit="m",
+        doc="Depth behind the first hair at which a view's weight falls to 1/e; 0: visible only.",
+    )
+    free_depth: float = option(
+        0.006, low=0, high=0.05, unit="m", doc="Depth behind the first hair that costs no weight."
+    )
+    unslant: bool = option(
+        True, doc="Take off the slant that the near halves of waves show in every view."
+    )
+    pool: float = option(
+        0.15,
+        low=0,
+        high=1,
+        doc="Gaussian, as a share of the waves' pitch, over which planes of wavy hair are pooled.",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class FusedViews:
+    """What all views say together."""
+
+    orientations: tuple[OrientationMap, ...]
+    """The maps, the waves' slant taken off where it was asked for."""
+    tensor: Float32Array
+    """(N, 6) D D^T of every loose cell."""
+    certainty: Float32Array
+    """(N,) gap between the two smallest eigenvalues of the planes."""
+
+
+def fuse_views(
+    cameras: Sequence[Camera],
+    masks: Sequence[Mask],
+    orientations: Sequence[OrientationMap],
+    hull: Hull,
+    options: FusionOptions,
+    min_views: int = 1,
+) -> FusedViews:
+    """Return the directions of all loose cells, waves measured and taken into account."""
+    wavy = options.unslant or options.pool > 0
+    waves = measure_waves(orientations, masks, cameras) if wavy else Waves()
+    maps = tuple(orientations)
+    if options.unslant:
+        maps = tuple(without_slant(found, waves) for found in orientations)
+    planes, views = fuse_planes(cameras, masks, maps, hull, options.see_through, options.free_depth)
+    planes = pooled_planes(planes, hull, options.pool * waves.pitch)
+    return FusedViews(maps, *plane_directions(planes, views, min_views))
 
 
 def fuse_planes(

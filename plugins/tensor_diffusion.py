@@ -19,37 +19,17 @@ from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimp
 from hairkit.combing import ScalpPrior, growth_potential, with_scalp_prior
 from hairkit.diffusion import solve_screened
 from hairkit.options import option
-from hairkit.plane_fusion import fuse_planes, plane_directions, pooled_planes
-from hairkit.waves import Waves, measure_waves, without_slant
+from hairkit.plane_fusion import FusionOptions, fuse_views
 
 HARD_WEIGHT = 1e3
 """Weight against `smoothness` that keeps a cell as it is."""
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(FusionOptions):
     """Settings of fusion and diffusion."""
 
-    see_through: float = option(
-        0.02,
-        low=0,
-        high=0.2,
-        unit="m",
-        doc="Depth behind the first hair at which a view's weight falls to 1/e; 0: visible only.",
-    )
-    free_depth: float = option(
-        0.006, low=0, high=0.05, unit="m", doc="Depth behind the first hair that costs no weight."
-    )
     min_views: int = option(1, low=1, high=8, doc="Views a cell needs to be fused.")
-    unslant: bool = option(
-        True, doc="Take off the slant that the near halves of waves show in every view."
-    )
-    pool: float = option(
-        0.15,
-        low=0,
-        high=1,
-        doc="Gaussian, as a share of the waves' pitch, over which planes of wavy hair are pooled.",
-    )
     smoothness: float = option(0.4, low=1e-4, high=100, doc="Weight of the diffusion.")
     scalp_weight: float = option(
         0.1, low=0, high=100, doc="Weight of the combing prior at the scalp; large values fix it."
@@ -83,20 +63,12 @@ def solve_field(
 ) -> OrientationField:
     """Fuse, add the scalp prior, diffuse over the loose hull, and measure the way from the
     scalp."""
-    wavy = options.unslant or options.pool > 0
-    waves = measure_waves(orientations, masks, scene.cameras) if wavy else Waves()
-    if options.unslant:
-        orientations = tuple(without_slant(found, waves) for found in orientations)
     growth = growth_potential(scene.head, hull, options.tip_share)
-    planes, views = fuse_planes(
-        scene.cameras, masks, orientations, hull, options.see_through, options.free_depth
-    )
-    planes = pooled_planes(planes, hull, options.pool * waves.pitch)
-    tensor, certainty = plane_directions(planes, views, options.min_views)
+    fused = fuse_views(scene.cameras, masks, orientations, hull, options, options.min_views)
     prior = ScalpPrior(
         options.scalp_weight, options.scalp_reach, options.scalp_lift, options.scalp == "normal"
     )
-    data, weight = with_scalp_prior(scene.head, hull, growth, tensor, certainty, prior)
+    data, weight = with_scalp_prior(scene.head, hull, growth, fused.tensor, fused.certainty, prior)
     if options.hard:
         weight = np.where(weight > 0, HARD_WEIGHT, 0).astype(np.float32)
     solved = solve_screened(

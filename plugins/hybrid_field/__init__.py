@@ -23,8 +23,7 @@ import numpy as np
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
 from hairkit.combing import ScalpPrior, growth_potential, with_scalp_prior
 from hairkit.options import option
-from hairkit.plane_fusion import fuse_planes, plane_directions, pooled_planes
-from hairkit.waves import Waves, measure_waves, without_slant
+from hairkit.plane_fusion import FusionOptions, fuse_views
 
 from .fields import (
     Fields,
@@ -41,25 +40,9 @@ __all__ = ["Options", "blended", "find_segments", "internal_distance", "ribbons"
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(FusionOptions):
     """Settings of segments, fields and their weights."""
 
-    see_through: float = option(
-        0.02,
-        low=0,
-        high=0.2,
-        unit="m",
-        doc="Depth behind the first hair at which a view's weight falls to 1/e.",
-    )
-    free_depth: float = option(
-        0.006, low=0, high=0.05, unit="m", doc="Depth behind the first hair that costs no weight."
-    )
-    unslant: bool = option(
-        True, doc="Take off the slant that the near halves of waves show in every view."
-    )
-    pool: float = option(
-        0.15, low=0, high=1, doc="Pooling of planes of wavy hair, as a share of the waves' pitch."
-    )
     line_spacing: int = option(
         6, low=2, high=100, unit="px", doc="Distance between lines followed in a photo."
     )
@@ -111,21 +94,13 @@ def solve_field(
     options: Options,
 ) -> OrientationField:
     """Return the blended field with its signs and the internal distance."""
-    wavy = options.unslant or options.pool > 0
-    waves = measure_waves(orientations, masks, scene.cameras) if wavy else Waves()
-    if options.unslant:
-        orientations = tuple(without_slant(found, waves) for found in orientations)
     growth = growth_potential(scene.head, hull, options.tip_share)
-    planes, views = fuse_planes(
-        scene.cameras, masks, orientations, hull, options.see_through, options.free_depth
-    )
-    planes = pooled_planes(planes, hull, options.pool * waves.pitch)
-    tensor, certainty = plane_directions(planes, views, 1)
-    segments = find_segments(
-        scene.cameras, masks, orientations, hull, growth, tensor, certainty, options
-    )
+    fused = fuse_views(scene.cameras, masks, orientations, hull, options)
+    segments = find_segments(scene.cameras, masks, fused, hull, growth, options)
     prior = ScalpPrior(options.scalp_weight, options.scalp_reach, options.scalp_lift)
-    wanted, weight = with_scalp_prior(scene.head, hull, growth, tensor, certainty, prior)
+    wanted, weight = with_scalp_prior(
+        scene.head, hull, growth, fused.tensor, fused.certainty, prior
+    )
     band = ribbons(segments, hull, options.ribbon)
     signs = growth_direction(scene.head, hull, growth, band, options)
     inner = internal_direction(hull, wanted, weight, band, options)

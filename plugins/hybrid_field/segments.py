@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from hairkit import Camera, Hull, Mask, OrientationMap, Strands
 from hairkit.field_sampling import make_unit, principal_direction, sample_at
-from hairkit.plane_fusion import DEPTH_SHRINK, front_depths
+from hairkit.plane_fusion import DEPTH_SHRINK, FusedViews, front_depths
 from hairkit.projection import pack_cameras
 from hairkit.stored import Float32Array, Float64Array, Int64Array
 
@@ -46,25 +46,24 @@ class SegmentOptions(Protocol):
 def find_segments(
     cameras: Sequence[Camera],
     masks: Sequence[Mask],
-    orientations: Sequence[OrientationMap],
+    fused: FusedViews,
     hull: Hull,
     growth: Float32Array,
-    tensor: Float32Array,
-    certainty: Float32Array,
     options: SegmentOptions,
 ) -> Strands:
     """Return segments root to tip, points `STEP` apart, in the head frame.
 
     Parameters
     ----------
+    fused
+        The maps of all views, and what they say together about the loose cells.
     growth
         (X, Y, Z) potential that grows root to tip: the first guess of a segment's sign.
-    tensor, certainty
-        (N, 6) and (N,) of the loose cells, fused from all views.
     """
+    certainty = fused.certainty
     volume = np.zeros((*hull.grid.shape, 6), np.float32)
-    volume[hull.loose] = tensor * np.minimum(certainty, 1)[:, None]
-    lines = lifted_lines(cameras, masks, orientations, hull, options)
+    volume[hull.loose] = fused.tensor * np.minimum(certainty, 1)[:, None]
+    lines = lifted_lines(cameras, masks, fused.orientations, hull, options)
     lines = _agreeing(lines, hull, volume, options.agreement_deg)
     inner = lines_through_cells(hull, volume, certainty, options.longest)
     points = np.concatenate([lines.points, inner.points])

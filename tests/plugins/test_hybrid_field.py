@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins import hybrid_field
 from hairkit_plugins.hybrid_field import Options, solve_field
 from hairkit_plugins.hybrid_field.fields import (
     Band,
@@ -16,11 +15,12 @@ from hairkit_plugins.hybrid_field.fields import (
 )
 from hairkit_plugins.hybrid_field.segments import directed, find_segments
 
+from hairkit import plane_fusion
 from hairkit.camera import Camera
 from hairkit.combing import growth_potential
 from hairkit.mask import HAIR, Mask
 from hairkit.orientation import OrientationMap, wrap_angle
-from hairkit.plane_fusion import fuse_planes, plane_directions
+from hairkit.plane_fusion import fuse_views
 from hairkit.scene import Scene
 from hairkit.stored import Float64Array
 from hairkit.strands import Strands
@@ -37,7 +37,7 @@ PLAIN = Options(scalp_weight=0.0, pool=0.0, unslant=False, outward=0.0)
 @pytest.fixture(autouse=True)
 def _straight_hair(monkeypatch: pytest.MonkeyPatch) -> None:
     """Measuring waves takes longer than all the rest, and these heads have none."""
-    monkeypatch.setattr(hybrid_field, "measure_waves", lambda *_: Waves())
+    monkeypatch.setattr(plane_fusion, "measure_waves", lambda *_: Waves())
 
 
 def cameras() -> tuple[Camera, ...]:
@@ -92,8 +92,8 @@ def segments(options: Options = PLAIN) -> tuple[Strands, Hull]:
     views, masks, maps = photos()
     hull = bun()
     growth = growth_potential(ball_head(), hull, 0.6)
-    tensor, certainty = plane_directions(*fuse_planes(views, masks, maps, hull, 0.02, 0.006), 1)
-    return find_segments(views, masks, maps, hull, growth, tensor, certainty, options), hull
+    fused = fuse_views(views, masks, maps, hull, options)
+    return find_segments(views, masks, fused, hull, growth, options), hull
 
 
 def test_segments_run_along_the_hair_they_were_seen_on() -> None:
