@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,8 @@ each format carries."""
 UP = {"y": "y_up_metres", "z": "z_up_metres"}
 """Axis option of the reader for each way up."""
 READER, WRITER = "reader", "writer"
+CURLS = 400
+"""Strands at most whose curl is measured."""
 
 
 def register(subparsers: Any) -> None:
@@ -44,6 +47,11 @@ def register(subparsers: Any) -> None:
         metavar="N",
         help="mark N strands of full hair as its guides; with --set writer.strands=guides write"
         " these only",
+    )
+    add(
+        "--measure-curl",
+        action="store_true",
+        help="measure the strands' waves or coils for the material (HairWorks draws them)",
     )
     add("--to", metavar="PLUGIN", help="export plugin; by default the one of the ending")
     add(
@@ -84,9 +92,20 @@ def run(args: argparse.Namespace) -> int:
     groom = load_groom(manager, source, reading, reader)
     if args.guides is not None:
         groom = simplified(groom, args.guides)
+    if args.measure_curl:
+        groom = _with_curl(groom)
     manager.call("export_groom", writer, options, groom=groom, path=target)
     print(_summary(groom, target, time.perf_counter() - start))
     return 0
+
+
+def _with_curl(groom: Groom) -> Groom:
+    """Return the groom with the median radius and pitch of its strands, or a sample of them."""
+    from hairkit.geometry import measure_curl
+
+    count = min(len(groom.strands), CURLS)
+    some = groom.strands.select(np.linspace(0, len(groom.strands) - 1, count).astype(np.int64))
+    return replace(groom, material=measure_curl(some).written_to(groom.material))
 
 
 def reader_settings(manager: Manager, reader: str, args: argparse.Namespace) -> dict[str, object]:

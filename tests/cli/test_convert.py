@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from hairkit.cli import main
 from hairkit.groom_file import read_groom, write_groom
 from hairkit.manager import DISABLE_AUTOLOAD
+from hairkit.strands import Strands
 from hairkit.testing import bristle_groom
 
 
@@ -162,3 +164,20 @@ def test_guides_are_picked_from_full_hair(folder: Path, capsys: pytest.CaptureFi
     capsys.readouterr()
     assert main(["convert", "groom.npz", "g.npz", "--guides", "0"]) == 2
     assert "0 guides are wanted" in capsys.readouterr().err
+
+
+def test_curl_is_measured_where_asked(folder: Path) -> None:
+    """Coils of 8 mm radius and 4 cm pitch are found; without the word the material stays."""
+    straight = bristle_groom()
+    t = np.linspace(0, 0.24, 120)
+    coil = np.stack([0.008 * np.cos(t * 157.08), -t, 0.008 * np.sin(t * 157.08)], axis=1)
+    points = straight.strands.roots[:, None] + (coil - coil[0])
+    offsets = np.arange(len(points) + 1) * 120
+    strands = Strands(points.reshape(-1, 3).astype(np.float32), offsets)
+    write_groom("coils.npz", replace(straight, strands=strands))
+    assert main(["convert", "coils.npz", "plain.npz"]) == 0
+    assert read_groom("plain.npz").material.curl_radius == 0
+    assert main(["convert", "coils.npz", "known.npz", "--measure-curl"]) == 0
+    look = read_groom("known.npz").material
+    assert abs(look.curl_radius - 0.008) < 0.0015
+    assert abs(look.curl_pitch - 0.04) < 0.006
