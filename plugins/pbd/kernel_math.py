@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numba import njit
 
 LANES = 64
 """Strands side by side."""
 
-row = njit(fastmath=True, error_model="numpy", cache=True, _nrt=False)
+_HOW: dict[str, Any] = {
+    "fastmath": True, "error_model": "numpy", "cache": True, "_nrt": False,
+}  # fmt: skip
+row: Callable[[Any], Any] = njit(**_HOW)
 """Compiles a function that allocates nothing: views are then not counted, which halves the time of
 short rows and of compiling."""
 

@@ -79,7 +79,8 @@ def rub_nodes(  # type: ignore[no-untyped-def]
     taken, over = ONE - np.exp(-cohesion * seconds), ONE / seconds
     n, s0, s1, s2 = x.shape[1], shape[0], shape[1], shape[2]
     cells = np.zeros((s0, s1, s2, 4), np.float32)
-    for s in range(count):
+    for first in range(count):
+        s = np.int64(first)
         block, lane = s // LANES, s % LANES
         for j in range(n):
             p0, p1, p2 = x[block, j, 0, lane], x[block, j, 1, lane], x[block, j, 2, lane]

@@ -229,7 +229,7 @@ def tell_of_compiling() -> None:
     """Warn where nothing compiled is kept yet: the first step will take half a minute."""
     if run_substeps.signatures:
         return
-    if not any(Path(run_substeps.stats.cache_path).glob("kernels.run_substeps-*.nbi")):
+    if not any(Path(run_substeps.stats.cache_path or ".").glob("kernels.run_substeps-*.nbi")):
         logging.getLogger("hairkit").warning(
             "compiling the simulator, once per machine (half a minute)"
         )
