@@ -5,11 +5,11 @@
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
 uniform sampler3D u_means;    // mean velocity and crowding of cells, along z, y, x
 uniform vec2 u_rates;         // share of velocity taken on, push in m/s
-uniform int u_nodes;          // NODES, which the compiler shall not know here: it would unroll
 
 void main() {
     int rod = int(gl_GlobalInvocationID.x);
     if (rod >= u_rods) return;
+    // u_nodes, not NODES: compilers would unroll this at length
     for (int j = 1; j < u_nodes; j++) {
         vec3 p = node_place(rod, j).xyz, speed = node_speed(rod, j).xyz, share;
         vec3 mean = vec3(0.0), slope = vec3(0.0);

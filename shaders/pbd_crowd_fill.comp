@@ -3,11 +3,11 @@
 #include "pbd_layout.glsl"
 #include "pbd_crowd.glsl"
 uniform sampler2D u_masses;
-uniform int u_nodes;  // NODES, which the compiler shall not know here: it would unroll
 
 void main() {
     int rod = int(gl_GlobalInvocationID.x);
     if (rod >= u_rods) return;
+    // u_nodes, not NODES: compilers would unroll this at length
     for (int j = 0; j < u_nodes; j++) {
         vec3 p = node_place(rod, j).xyz, share;
         vec3 speed = clamp(node_speed(rod, j).xyz - drift(p), -FASTEST, FASTEST) * u_momentum;

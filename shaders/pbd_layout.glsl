@@ -5,6 +5,22 @@ const int SEGMENTS = NODES - 1;
 const int STATE_ROWS = 2 * NODES + SEGMENTS;  // place and slack, velocity of nodes; frames (x, y, z, w)
 layout(local_size_x = 64) in;
 
+// Loops over few nodes have bounds that compilers know: they unroll them and keep arrays in
+// registers. Over many that takes minutes, and bounds are hidden from them.
+uniform int u_nodes;
+#if NODES <= 16
+#define EACH_NODE NODES
+#define EACH_SEGMENT SEGMENTS
+#define BELOW(j) SEGMENTS
+const int NODE_ROOM = NODES;
+#else
+#define EACH_NODE u_nodes
+#define EACH_SEGMENT (u_nodes - 1)
+#define BELOW(j) (j)
+const int NODE_ROOM = 64;  // access to shorter arrays becomes a ladder of conditions
+#endif
+const int SEGMENT_ROOM = NODE_ROOM - 1;
+
 uniform sampler2D u_state;
 uniform int u_rods;
 uniform int u_width;

@@ -1,7 +1,7 @@
 #version 430
 // Substeps of rods, one rod an invocation: the steps of plugins/pbd/reference.py in their order.
 // Masses are shares of the rod's mean, so that stiffness is in 1/s^2. Loops go over whole arrays, a
-// condition within instead of other bounds: then compilers unroll them and keep arrays in registers.
+// condition within instead of other bounds: then compilers unroll them.
 #include "pbd_layout.glsl"
 #include "pbd_turns.glsl"
 
@@ -40,33 +40,33 @@ uniform vec4 u_grid;           // place of the first distance, 1/spacing
 uniform float u_room;          // m, around the grid without obstacles
 
 int rod;
-vec3 place[NODES], speed[NODES], force[NODES], solved[NODES];
-float slack[NODES];
-vec4 frame[SEGMENTS];
-vec3 edge[SEGMENTS], direction[SEGMENTS];
-float pivot[SEGMENTS], beside[SEGMENTS], value[SEGMENTS];
+vec3 place[NODE_ROOM], speed[NODE_ROOM], force[NODE_ROOM], solved[NODE_ROOM];
+float slack[NODE_ROOM];
+vec4 frame[SEGMENT_ROOM];
+vec3 edge[SEGMENT_ROOM], direction[SEGMENT_ROOM];
+float pivot[SEGMENT_ROOM], beside[SEGMENT_ROOM], value[SEGMENT_ROOM];
 
 vec4 constant(int row) { return texelFetch(u_constants, texel(rod, row, ROWS), 0); }
 
 // Read once, used in every substep.
-vec4 rest_and_mass[NODES], rates[NODES];
-vec4 banded[SEGMENTS];     // two lower entries, 1/pivot; length
-vec4 stiffness[SEGMENTS];  // bend, twist, natural twist, 1/length
-vec3 curvature[SEGMENTS];
-vec4 metrics[QUADS];
+vec4 rest_and_mass[NODE_ROOM], rates[NODE_ROOM];
+vec4 banded[SEGMENT_ROOM];     // two lower entries, 1/pivot; length
+vec4 stiffness[SEGMENT_ROOM];  // bend, twist, natural twist, 1/length
+vec3 curvature[SEGMENT_ROOM];
+vec4 metrics[(SEGMENT_ROOM * NODE_ROOM / 2 + 3) / 4];
 float metric(int pair) { return metrics[pair / 4][pair % 4]; }
 
 void read_constants() {
-    for (int j = 0; j < NODES; j++) {
+    for (int j = 0; j < EACH_NODE; j++) {
         rest_and_mass[j] = constant(NODE_ROW + 2 * j);
         rates[j] = constant(NODE_ROW + 2 * j + 1);
     }
-    for (int j = 0; j < SEGMENTS; j++) {
+    for (int j = 0; j < EACH_SEGMENT; j++) {
         banded[j] = constant(ELEMENT_ROW + 3 * j);
         stiffness[j] = constant(ELEMENT_ROW + 3 * j + 1);
         curvature[j] = constant(ELEMENT_ROW + 3 * j + 2).xyz;
     }
-    for (int i = 0; i < QUADS; i++) metrics[i] = constant(METRIC_ROW + i);
+    for (int i = 0; i < (EACH_SEGMENT * EACH_NODE / 2 + 3) / 4; i++) metrics[i] = constant(METRIC_ROW + i);
 }
 
 vec3 rows(vec4 a, vec4 b, vec4 c, vec4 v) { return vec3(dot(a, v), dot(b, v), dot(c, v)); }
@@ -93,13 +93,13 @@ void predict(int k, int j) {
 
 // Solve the tridiagonal system that `pivot`, `beside` (j - 1 and j) and `value` hold.
 void solve_tridiagonal() {
-    for (int j = 0; j < SEGMENTS; j++)
+    for (int j = 0; j < EACH_SEGMENT; j++)
         if (j > 0) {
             float factor = beside[j] / pivot[j - 1];
             pivot[j] -= factor * beside[j];
             value[j] -= factor * value[j - 1];
         }
-    for (int j = SEGMENTS - 1; j >= 0; j--) {
+    for (int j = EACH_SEGMENT - 1; j >= 0; j--) {
         if (j + 1 < SEGMENTS) value[j] -= beside[j + 1] * value[j + 1];
         value[j] /= pivot[j];
     }
@@ -108,7 +108,7 @@ void solve_tridiagonal() {
 // Spin frames about their segments until torques balance: one Newton step.
 void untwist() {
     vec4 before = constant(0);
-    for (int j = 0; j < SEGMENTS; j++) {
+    for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
         vec3 natural = turned(half_way(before, after, quarter), curvature[j]);
@@ -128,7 +128,7 @@ void untwist() {
         before = after;
     }
     solve_tridiagonal();
-    for (int j = 0; j < SEGMENTS; j++) {
+    for (int j = 0; j < EACH_SEGMENT; j++) {
         // half angles by a rational cosine and sine, as in the reference
         float angle = 0.5 * clamp(value[j], -LARGEST_SPIN, LARGEST_SPIN);
         frame[j] = product(vec4(angle * direction[j], 1.0) / sqrt(1.0 + angle * angle), frame[j]);
@@ -139,7 +139,7 @@ void untwist() {
 void add_elastic() {
     vec4 before = constant(0);
     vec3 reach_before = third_axis(before), pull = vec3(0.0);
-    for (int j = 0; j < SEGMENTS; j++) {
+    for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
         vec3 natural = turned(half_way(before, after, quarter), curvature[j]);
@@ -168,7 +168,7 @@ void add_elastic() {
 // Write A^-1 force of the free nodes to `solved`.
 void solve_banded() {
     vec3 one = vec3(0.0), two = vec3(0.0);
-    for (int j = 0; j < NODES; j++) {
+    for (int j = 0; j < EACH_NODE; j++) {
         solved[j] = vec3(0.0);
         if (j > 0) {
             vec4 factor = banded[j - 1];
@@ -178,7 +178,7 @@ void solve_banded() {
             solved[j] = here * factor.z;
         }
     }
-    for (int j = NODES - 1; j >= 0; j--) {
+    for (int j = EACH_NODE - 1; j >= 0; j--) {
         if (j > 0 && j + 1 < NODES) solved[j] -= banded[j].x * solved[j + 1];
         if (j > 0 && j + 2 < NODES) solved[j] -= banded[j + 1].y * solved[j + 2];
     }
@@ -187,15 +187,15 @@ void solve_banded() {
 // Write the pull along the segments that brings them to their lengths to `value`: the factor
 // L D L^T of metric * (d d^T), row by row, with its forward substitution.
 void solve_lengths() {
-    float factor[SEGMENTS][SEGMENTS], scaled[SEGMENTS];
-    for (int i = 0; i < SEGMENTS; i++) {
+    float factor[SEGMENT_ROOM][SEGMENT_ROOM], scaled[SEGMENT_ROOM];
+    for (int i = 0; i < EACH_SEGMENT; i++) {
         vec3 excess = edge[i] + solved[i + 1] - solved[i];
         float right = dot(excess, direction[i]) - banded[i].w;
         float own = metric(i * (i + 1) / 2 + i), last = own * dot(direction[i], direction[i]);
-        for (int j = 0; j < SEGMENTS; j++)
+        for (int j = 0; j < BELOW(i); j++)
             if (j < i) {
                 float here = metric(i * (i + 1) / 2 + j) * dot(direction[i], direction[j]);
-                for (int k = 0; k < SEGMENTS; k++)
+                for (int k = 0; k < BELOW(j); k++)
                     if (k < j) here -= scaled[k] * factor[j][k];
                 scaled[j] = here;
                 float low = here * pivot[j];
@@ -206,32 +206,32 @@ void solve_lengths() {
         pivot[i] = 1.0 / max(last, SINGULAR * own);
         value[i] = right;
     }
-    for (int i = SEGMENTS - 1; i >= 0; i--) {
+    for (int i = EACH_SEGMENT - 1; i >= 0; i--) {
         value[i] *= pivot[i];
-        for (int k = 0; k < SEGMENTS; k++)
+        for (int k = 0; k < EACH_SEGMENT; k++)
             if (k > i) value[i] -= factor[k][i] * value[k];
     }
 }
 
 // Go on by the solution of forces under the lengths.
 void go_on() {
-    vec3 free[NODES];
+    vec3 free[NODE_ROOM];
     solve_banded();
-    for (int j = 0; j < NODES; j++) free[j] = solved[j];
+    for (int j = 0; j < EACH_NODE; j++) free[j] = solved[j];
     for (int iteration = 0; iteration < u_iterations; iteration++) {
         if (iteration > 0)
-            for (int j = 0; j < SEGMENTS; j++) {
+            for (int j = 0; j < EACH_SEGMENT; j++) {
                 direction[j] = normalize(edge[j] + (free[j + 1] - solved[j + 1]) - (free[j] - solved[j]));
             }
-        for (int j = 0; j < NODES; j++) solved[j] = free[j];
+        for (int j = 0; j < EACH_NODE; j++) solved[j] = free[j];
         solve_lengths();
-        for (int j = 0; j < NODES; j++) {
+        for (int j = 0; j < EACH_NODE; j++) {
             vec3 pull = j > 0 ? value[j - 1] * direction[j - 1] : vec3(0.0);
             force[j] = j < SEGMENTS ? pull - value[j] * direction[j] : pull;
         }
         solve_banded();
     }
-    for (int j = 0; j < NODES; j++) {  // both are 0 at the root
+    for (int j = 0; j < EACH_NODE; j++) {  // both are 0 at the root
         vec3 change = free[j] - solved[j];
         place[j] += change;
         speed[j] += change / u_seconds;
@@ -243,17 +243,17 @@ void go_on() {
 void main() {
     rod = int(gl_GlobalInvocationID.x);
     if (rod >= u_rods) return;
-    for (int j = 0; j < NODES; j++) {
+    for (int j = 0; j < EACH_NODE; j++) {
         vec4 at = node_place(rod, j);
         place[j] = at.xyz;
         slack[j] = at.w;
         speed[j] = node_speed(rod, j).xyz;
     }
-    for (int j = 0; j < SEGMENTS; j++) frame[j] = segment_frame(rod, j);
+    for (int j = 0; j < EACH_SEGMENT; j++) frame[j] = segment_frame(rod, j);
     read_constants();
     for (int k = 0; k < u_substeps; k++) {
-        for (int j = 0; j < NODES; j++) predict(k, j);
-        for (int j = 0; j < SEGMENTS; j++) {
+        for (int j = 0; j < EACH_NODE; j++) predict(k, j);
+        for (int j = 0; j < EACH_SEGMENT; j++) {
             edge[j] = place[j + 1] - place[j];
             direction[j] = normalize(edge[j]);
             frame[j] = swung(product(steps[k].ride_turn, frame[j]), direction[j]);
@@ -263,10 +263,10 @@ void main() {
         go_on();
         if (u_obstacles) touch(k);
     }
-    for (int j = 0; j < NODES; j++) {
+    for (int j = 0; j < EACH_NODE; j++) {
         imageStore(u_new_state, texel(rod, 2 * j, STATE_ROWS), vec4(place[j], slack[j]));
         imageStore(u_new_state, texel(rod, 2 * j + 1, STATE_ROWS), vec4(speed[j], 0.0));
     }
-    for (int j = 0; j < SEGMENTS; j++)
+    for (int j = 0; j < EACH_SEGMENT; j++)
         imageStore(u_new_state, texel(rod, 2 * NODES + j, STATE_ROWS), frame[j]);
 }

@@ -24,9 +24,9 @@ float obstacle_distance(vec3 p, float clear, out vec3 normal) {
 }
 
 // Restore the lengths; a node at an obstacle moves only along it, square to its normal.
-void relengthen(vec3 normal[NODES]) {
+void relengthen(vec3 normal[NODE_ROOM]) {
     vec3 end_before = vec3(0.0);
-    for (int j = 0; j < SEGMENTS; j++) {
+    for (int j = 0; j < EACH_SEGMENT; j++) {
         vec3 way = place[j + 1] - place[j];
         float reach = length(way);
         direction[j] = way / reach;
@@ -40,7 +40,7 @@ void relengthen(vec3 normal[NODES]) {
         end_before = end;
     }
     solve_tridiagonal();
-    for (int j = 0; j < NODES; j++) {
+    for (int j = 0; j < EACH_NODE; j++) {
         vec3 pull = vec3(0.0);
         if (j > 0) pull -= value[j - 1] * direction[j - 1];
         if (j < SEGMENTS) pull += value[j] * direction[j];
@@ -75,8 +75,8 @@ vec3 touched(int k, int j) {
 }
 
 void touch(int k) {
-    vec3 normal[NODES];
-    for (int j = 0; j < NODES; j++) {
+    vec3 normal[NODE_ROOM];
+    for (int j = 0; j < EACH_NODE; j++) {
         normal[j] = vec3(0.0);
         if (j > 0) normal[j] = touched(k, j);
     }

@@ -101,7 +101,7 @@ class ComputeEngine:
         with renderer():
             if self._units is None or self._units.crowd is not crowd:
                 self._units = self._put_crowd(crowd)
-            uniforms = self._units.uniforms(ride, rates) | {"u_nodes": self._nodes}
+            uniforms = self._units.uniforms(ride, rates)
             self._store["filled"].bind_to_storage_buffer(0)
             self._dispatch("pbd_crowd_fill", self._count, uniforms)
             self._write_to("u_means")
@@ -143,7 +143,8 @@ class ComputeEngine:
     def _dispatch(self, shader: str, invocations: int, uniforms: dict[str, Any]) -> None:
         with renderer() as gl:
             program = gl.compute(shader, NODES=self._nodes)
-            set_uniforms(program, u_rods=self._count, u_width=self._store.width, **uniforms)
+            own = {"u_rods": self._count, "u_nodes": self._nodes, "u_width": self._store.width}
+            set_uniforms(program, **own, **uniforms)
             textures = [name for name in _TEXTURES if name in program]
             for unit, name in enumerate(textures):
                 program[name] = unit
