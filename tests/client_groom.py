@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hairkit.groom_opening import plugin_for
 from hairkit.groom import Groom
+from hairkit.groom_opening import plugin_for
 from hairkit.guide_weights import guide_mask
 from hairkit.manager import Manager
 from hairkit.point_cache import PointCache

@@ -85,8 +85,8 @@ class Options:
     backend: str = option(
         "auto",
         choices=("auto", "reference", "fast", "compute"),
-        doc="What computes: plain NumPy in float64, compiled float32, or compute shaders; auto takes"
-        " shaders where there is a graphics card, else the compiled one.",
+        doc="What computes: plain NumPy in float64, compiled float32, or compute shaders; auto"
+        " takes shaders where there is a graphics card, else the compiled one.",
     )
 
     def resolved(self, physics: HairPhysics) -> Options:
