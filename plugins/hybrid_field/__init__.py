@@ -44,7 +44,7 @@ class Options(FusionOptions):
     """Settings of segments, fields and their weights."""
 
     line_spacing: int = option(
-        6, low=2, high=100, unit="px", doc="Distance between lines followed in a photo."
+        10, low=2, high=100, unit="px", doc="Distance between lines followed in a photo."
     )
     longest: float = option(
         0.06, low=0.005, high=0.5, unit="m", doc="Length of the longest segment."

@@ -11,8 +11,9 @@ from scipy import ndimage
 from hairkit import Head, Hull, Strands
 from hairkit.combing import combing_direction
 from hairkit.diffusion import solve_screened
+from hairkit.eigen import smallest_eigenvectors
 from hairkit.stored import BoolArray, Float32Array, Float64Array
-from hairkit.volume import cell_slopes, outer_products, symmetric_matrices
+from hairkit.volume import cell_slopes, outer_products
 
 FIXED = 1e3
 """Weight against a smoothness of 1 that keeps a cell as it is (Dirichlet)."""
@@ -188,7 +189,7 @@ def blended(
     """
     spacing = hull.grid.spacing
     off = ndimage.distance_transform_edt(~band.cells)[hull.loose] * spacing
-    main = np.linalg.eigh(symmetric_matrices(fields.inner))[1][:, :, 2]
+    main = smallest_eigenvectors(-fields.inner.astype(np.float64))[0]  # the largest of V
     main *= np.where((main * fields.growth).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     slope = cell_slopes(fields.distance)[hull.loose]
     slope /= np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
