@@ -85,6 +85,17 @@ def substep(
     `iterations` linearise the lengths anew about the last solution; the default is enough at the
     default substeps, since positions and directions are predicted to second order.
     """
+    new, _ = pulled(rods, system, state, load, iterations)
+    return new if contact is None else collided(rods, new, contact, load.ride, system.step)
+
+
+def pulled(
+    rods: Rods, system: System, state: State, load: Load, iterations: int = 1
+) -> tuple[State, Float64Array]:
+    """Return the state one substep later where nothing is touched, and the tension in newtons.
+
+    The tension (S, n - 1) of the segments is what kept their lengths in this substep.
+    """
     h, rates = system.step, system.rates
     old = carried(state, load.ride, rods, h)
     predicted = old.position + h * old.velocity
@@ -105,16 +116,15 @@ def substep(
         force += load.force
     free = system.inverse @ force[:, 1:]
     change = free
+    pull = np.zeros_like(rods.length)
     for _ in range(iterations):
-        change = free - system.inverse @ _edges_transposed(
-            tension(system, edge + _edges(free), direction, rods.length)[..., None] * direction
-        )
+        pull = tension(system, edge + _edges(free), direction, rods.length)
+        change = free - system.inverse @ _edges_transposed(pull[..., None] * direction)
         direction = rotation.unit(edge + _edges(change))
     position, velocity = predicted.copy(), old.velocity.copy()
     position[:, 1:] += change
     velocity[:, 1:] += change / h
-    new = State(position, velocity, frames)
-    return new if contact is None else collided(rods, new, contact, load.ride, h)
+    return State(position, velocity, frames), pull
 
 
 def moved(motion: Float64Array, points: Float64Array) -> Float64Array:
@@ -155,6 +165,8 @@ def untwisted(rods: Rods, frames: Float64Array) -> Float64Array:
     firm = 0.25 * rods.bend * np.maximum((natural * turn).sum(axis=-1), 0.0)
     diagonal = rods.twist + shifted(rods.twist) + firm + shifted(firm)
     beside = firm[:, 1:] - rods.twist[:, 1:]
+    if rods.tip_held:
+        gradient[:, -1], beside[:, -1] = 0.0, 0.0
     angle = _tridiagonal(np.where(diagonal > 0, diagonal, 1.0), beside, -gradient)
     angle = np.clip(angle, -LARGEST_SPIN, LARGEST_SPIN)
     # half angles by a rational cosine and sine: exact turns, the angle right to third order

@@ -50,6 +50,9 @@ class Rods:
     """(S, n - 1, 3) natural turn c of each element, in the frame half way."""
     natural_twist: Float64Array
     """(S, n - 1) natural twist of each element, radians."""
+    tip_held: bool = False
+    """True keeps the last segments from spinning: clamped tips, whose last two nodes something else
+    holds. Only the reference knows them."""
 
     @property
     def nodes(self) -> int:
