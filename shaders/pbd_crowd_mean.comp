@@ -8,7 +8,7 @@ uniform float u_capacity;     // units of mass that a cell's momentum holds
 const float MOST = 4.0;       // crowding that counts
 
 void main() {
-    int cell = int(gl_GlobalInvocationID.x);
+    int cell = invocation();
     if (cell >= u_cells.x * u_cells.y * u_cells.z) return;
     ivec3 at = ivec3(cell % u_cells.z, cell / u_cells.z % u_cells.y, cell / (u_cells.z * u_cells.y));
     int mass = filled[4 * cell];

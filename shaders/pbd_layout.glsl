@@ -5,6 +5,11 @@ const int SEGMENTS = NODES - 1;
 const int STATE_ROWS = 2 * NODES + SEGMENTS;  // place and slack, velocity of nodes; frames (x, y, z, w)
 layout(local_size_x = 64) in;
 
+// Which one this is of all that were asked for; work groups beyond what x holds stand along y.
+int invocation() {
+    return int(gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * gl_WorkGroupSize.x);
+}
+
 // Loops over few nodes have bounds that compilers know: they unroll them and keep arrays in
 // registers. Over many that takes minutes, and bounds are hidden from them.
 uniform int u_nodes;

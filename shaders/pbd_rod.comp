@@ -5,6 +5,6 @@ layout(std430, binding = 0) writeonly buffer One { vec4 one[]; };
 uniform int u_rod;
 
 void main() {
-    int row = int(gl_GlobalInvocationID.x);
+    int row = invocation();
     if (row < STATE_ROWS) one[row] = state(u_rod, row);
 }

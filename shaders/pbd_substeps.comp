@@ -4,27 +4,15 @@
 // condition within instead of other bounds: then compilers unroll them.
 #include "pbd_layout.glsl"
 #include "pbd_turns.glsl"
+#include "pbd_constants.glsl"
+#include "pbd_steps.glsl"
 
-// Rows of a rod's constants: its root's frame; of nodes the place at rest and mass, then drag, pull
-// to that place, clearance and 1/mass; of elements three; the lengths' metric.
-const int NODE_ROW = 1, ELEMENT_ROW = NODE_ROW + 2 * NODES, METRIC_ROW = ELEMENT_ROW + 3 * SEGMENTS;
-const int PAIRS = SEGMENTS * NODES / 2, QUADS = (PAIRS + 3) / 4, ROWS = METRIC_ROW + QUADS;
-const int MOST_STEPS = 64;
 const float SHARPEST = 0.3, LARGEST_SPIN = 0.3, SOFTEST = 1e-3, SINGULAR = 1e-6;
 
-// What holds for all rods in one substep, head axes after it.
-struct Step {
-    vec4 ride[3];     // rows of turn and shift from the axes before
-    vec4 drift[3];    // rows of velocity of a point that rides on the head: matrix and minus shift
-    vec4 air[3];      // rows of the turn from the world's axes, and gravity
-    vec4 ride_turn;   // as a quaternion
-};
-layout(std140, binding = 0) uniform Steps { Step steps[MOST_STEPS]; };
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
-uniform sampler2D u_constants;
 uniform sampler2D u_wind;      // of each node, world, m/s
 uniform sampler2D u_force;     // on each node over the rod's mean mass, head axes
-uniform sampler3D u_distances; // to the obstacles, along z, y, x
+uniform int u_first;           // substep
 uniform int u_substeps;
 uniform int u_iterations;
 uniform float u_seconds;       // of a substep
@@ -32,12 +20,8 @@ uniform float u_damping;       // 1/s
 uniform vec3 u_air;            // m/s, world, where u_gusts is false
 uniform bool u_gusts;
 uniform bool u_forced;
-uniform bool u_obstacles;
 uniform float u_friction;
 uniform float u_fastest;       // m/s
-uniform ivec3 u_cells;         // of the distances
-uniform vec4 u_grid;           // place of the first distance, 1/spacing
-uniform float u_room;          // m, around the grid without obstacles
 
 int rod;
 vec3 place[NODE_ROOM], speed[NODE_ROOM], force[NODE_ROOM], solved[NODE_ROOM];
@@ -45,8 +29,6 @@ float slack[NODE_ROOM];
 vec4 frame[SEGMENT_ROOM];
 vec3 edge[SEGMENT_ROOM], direction[SEGMENT_ROOM];
 float pivot[SEGMENT_ROOM], beside[SEGMENT_ROOM], value[SEGMENT_ROOM];
-
-vec4 constant(int row) { return texelFetch(u_constants, texel(rod, row, ROWS), 0); }
 
 // Read once, used in every substep.
 vec4 rest_and_mass[NODE_ROOM], rates[NODE_ROOM];
@@ -58,19 +40,17 @@ float metric(int pair) { return metrics[pair / 4][pair % 4]; }
 
 void read_constants() {
     for (int j = 0; j < EACH_NODE; j++) {
-        rest_and_mass[j] = constant(NODE_ROW + 2 * j);
-        rates[j] = constant(NODE_ROW + 2 * j + 1);
+        rest_and_mass[j] = constant(rod, NODE_ROW + 2 * j);
+        rates[j] = constant(rod, NODE_ROW + 2 * j + 1);
     }
     for (int j = 0; j < EACH_SEGMENT; j++) {
-        banded[j] = constant(ELEMENT_ROW + 3 * j);
-        stiffness[j] = constant(ELEMENT_ROW + 3 * j + 1);
-        curvature[j] = constant(ELEMENT_ROW + 3 * j + 2).xyz;
+        banded[j] = constant(rod, ELEMENT_ROW + 3 * j);
+        stiffness[j] = constant(rod, ELEMENT_ROW + 3 * j + 1);
+        curvature[j] = constant(rod, ELEMENT_ROW + 3 * j + 2).xyz;
     }
-    for (int i = 0; i < (EACH_SEGMENT * EACH_NODE / 2 + 3) / 4; i++) metrics[i] = constant(METRIC_ROW + i);
+    for (int i = 0; i < (EACH_SEGMENT * EACH_NODE / 2 + 3) / 4; i++) metrics[i] = constant(rod, METRIC_ROW + i);
 }
 
-vec3 rows(vec4 a, vec4 b, vec4 c, vec4 v) { return vec3(dot(a, v), dot(b, v), dot(c, v)); }
-vec3 ridden(int k, vec4 v) { return rows(steps[k].ride[0], steps[k].ride[1], steps[k].ride[2], v); }
 vec3 drift(int k, vec3 p) {
     return rows(steps[k].drift[0], steps[k].drift[1], steps[k].drift[2], vec4(p, 1.0));
 }
@@ -107,7 +87,7 @@ void solve_tridiagonal() {
 
 // Spin frames about their segments until torques balance: one Newton step.
 void untwist() {
-    vec4 before = constant(0);
+    vec4 before = constant(rod, 0);
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
@@ -137,7 +117,7 @@ void untwist() {
 
 // Bending and twist as forces on the nodes, minus the energy's slope.
 void add_elastic() {
-    vec4 before = constant(0);
+    vec4 before = constant(rod, 0);
     vec3 reach_before = third_axis(before), pull = vec3(0.0);
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
@@ -241,7 +221,7 @@ void go_on() {
 #include "pbd_touch.glsl"
 
 void main() {
-    rod = int(gl_GlobalInvocationID.x);
+    rod = invocation();
     if (rod >= u_rods) return;
     for (int j = 0; j < EACH_NODE; j++) {
         vec4 at = node_place(rod, j);
@@ -251,7 +231,7 @@ void main() {
     }
     for (int j = 0; j < EACH_SEGMENT; j++) frame[j] = segment_frame(rod, j);
     read_constants();
-    for (int k = 0; k < u_substeps; k++) {
+    for (int k = u_first; k < u_first + u_substeps; k++) {
         for (int j = 0; j < EACH_NODE; j++) predict(k, j);
         for (int j = 0; j < EACH_SEGMENT; j++) {
             edge[j] = place[j + 1] - place[j];

@@ -1,27 +1,6 @@
 // Nodes out of the obstacles with friction, then the lengths again. Part of pbd_substeps.comp.
+#include "pbd_distance.glsl"
 const float FURTHER = 1.05;       // slack wears off a little faster than the way that a node goes
-const float DIAGONAL = 1.8;       // a distance changes by less within a cell, in cells
-
-// Distances at the four corners of a cell's face across x, along (z, y): a texel holds them all.
-vec4 face(ivec3 cell) { return texelFetch(u_distances, cell.zyx, 0); }
-
-// Trilinear distance and its direction; one look tells most nodes that they are far.
-float obstacle_distance(vec3 p, float clear, out vec3 normal) {
-    vec3 at = (p - u_grid.xyz) * u_grid.w;
-    normal = vec3(0.0);
-    if (any(lessThan(at, vec3(0.0))) || any(greaterThan(at, vec3(u_cells - 1)))) return clear + u_room;
-    ivec3 low = min(ivec3(at), u_cells - 2);
-    vec4 front = face(low);
-    float least = front.x - DIAGONAL / u_grid.w;
-    if (least > clear) return least;
-    vec3 t = at - vec3(low);
-    vec4 back = face(low + ivec3(1, 0, 0)), across = mix(front, back, t.x), slope = back - front;
-    vec2 line = mix(across.xz, across.yw, t.z), steep = mix(slope.xz, slope.yw, t.z);
-    vec2 deep = across.yw - across.xz;
-    vec3 way = vec3(mix(steep.x, steep.y, t.y), line.y - line.x, mix(deep.x, deep.y, t.y));
-    normal = way / max(length(way), 1e-12);
-    return mix(line.x, line.y, t.y);
-}
 
 // Restore the lengths; a node at an obstacle moves only along it, square to its normal.
 void relengthen(vec3 normal[NODE_ROOM]) {

@@ -39,14 +39,25 @@ def air_velocity(
     seed
         Of the gusts; equal seeds give equal gusts.
     """
-    speed = float(np.linalg.norm(wind))
     mean = np.broadcast_to(wind, points.shape)
-    if turbulence == 0.0 or speed == 0.0:
+    waves, amplitudes, phases = gust_waves(time, wind, turbulence, seed)
+    if not amplitudes.any():
         return mean.astype(np.float64)
-    waves, amplitudes, rates, phases = _modes(seed)
-    angle = points @ waves.T + (phases - (waves @ wind + rates) * time)
-    result: Float64Array = mean + turbulence * speed * (np.cos(angle) @ amplitudes)
+    result: Float64Array = mean + np.cos(points @ waves.T + phases) @ amplitudes
     return result
+
+
+def gust_waves(
+    time: float, wind: Float64Array, turbulence: float, seed: int = 0
+) -> tuple[Float64Array, Float64Array, Float64Array]:
+    """Return what gusts are made of at a time: the sum of `amplitudes` cos(waves . x + phases).
+
+    Wave vectors (M, 3) in radians a metre, amplitudes (M, 3) in metres per second, phases (M,) in
+    radians; parameters as of `air_velocity`. For those who evaluate gusts elsewhere.
+    """
+    waves, amplitudes, rates, phases = _modes(seed)
+    strength = turbulence * float(np.linalg.norm(wind))
+    return waves, strength * amplitudes, phases - (waves @ wind + rates) * time
 
 
 @lru_cache(maxsize=8)

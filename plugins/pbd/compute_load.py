@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -12,16 +12,17 @@ from hairkit.simulate import rotation
 from hairkit.stored import Float32Array, Float64Array
 
 from .crowd import SPACING, Crowd
-from .reference import Contact, Load
+from .reference import Load
 
-ROOM = 0.02
-"""Metres around the grid of distances in which nothing is looked up."""
 UNITS = 2.0**30
 """Units of mass that all hair has, and of momentum that a cell holds."""
 MOST_STEPS = 64
 """Substeps in one run of the shader."""
 FULLEST, FASTEST = 32.0, 10.0
 """A cell holds the momentum of the densest captured cell's mass so many times, at so many m/s."""
+
+AirWaves: TypeAlias = tuple[Float64Array, Float64Array, Float64Array]
+"""Wave vectors (M, 3), amplitudes (M, 3) and phases (M,) of `hairkit.simulate.wind.gust_waves`."""
 
 
 def step_words(loads: Sequence[Load], step: float) -> Float32Array:
@@ -36,35 +37,23 @@ def step_words(loads: Sequence[Load], step: float) -> Float32Array:
     return words.astype(np.float32)
 
 
+def air_uniforms(waves: AirWaves, wind: Float64Array, head: Float64Array) -> dict[str, Any]:
+    """Return the uniforms of gusts on a head at `head`: waves in its axes, the air in the world."""
+    vectors, amplitudes, phases = waves
+    # whole turns are left out here, where float64 still tells them apart
+    turned = np.fmod(phases + vectors @ head[:3, 3], 2 * np.pi)
+    local = np.concatenate([vectors @ head[:3, :3], turned[:, None]], axis=1)
+    return {
+        "u_mean": tuple(wind),
+        "u_waves": [tuple(wave) for wave in local],
+        "u_amplitudes": [(*amplitude, 0.0) for amplitude in amplitudes],
+    }
+
+
 def drift_rows(ride: Float64Array, seconds: float) -> Float64Array:
     """Return (3, 4) that gives the velocity of points which ride on the head, head axes, m/s."""
     result: Float64Array = (np.eye(4) - ride)[:3] / seconds
     return result
-
-
-def touching(contact: Contact | None) -> dict[str, Any]:
-    """Return the uniforms of contacts."""
-    if contact is None:
-        return {"u_obstacles": False}
-    grid = contact.obstacles.grid
-    return {
-        "u_obstacles": True,
-        "u_friction": contact.friction,
-        "u_fastest": contact.fastest,
-        "u_cells": grid.shape,
-        "u_grid": (*(grid.origin + 0.5 * grid.spacing), 1 / grid.spacing),
-        "u_room": ROOM,
-    }
-
-
-def faces(contact: Contact | None) -> Float32Array:
-    """Return (X, Y, Z, 4) distances of the corners (y, z), (y, z + 1), (y + 1, z), both + 1."""
-    if contact is None:
-        return np.zeros((1, 1, 1, 4), np.float32)
-    distance = contact.obstacles.distance
-    full = np.pad(distance, ((0, 0), (0, 1), (0, 1)), mode="edge")
-    parts = [full[:, :-1, :-1], full[:, :-1, 1:], full[:, 1:, :-1], full[:, 1:, 1:]]
-    return np.stack(parts, axis=-1)
 
 
 @dataclass(frozen=True, eq=False)

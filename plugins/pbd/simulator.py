@@ -15,7 +15,7 @@ from hairkit.guide_weights import guide_mask
 from hairkit.render.context import on_graphics_card
 from hairkit.simulate import Measures, Surroundings, rotation
 from hairkit.simulate.obstacles import Obstacles, head_obstacles
-from hairkit.simulate.wind import air_velocity
+from hairkit.simulate.wind import air_velocity, gust_waves
 from hairkit.stored import Float32Array, Float64Array
 from hairkit.strands import Strands
 
@@ -90,6 +90,18 @@ class PbdSimulator:
         """
         made = getattr(self._engine, "points_buffer", None)
         return None if made is None else made(self._riders, self._head)
+
+    def rows_buffer(
+        self, before: npt.NDArray[np.integer[Any]], part: npt.NDArray[np.floating[Any]]
+    ) -> Any:
+        """Return places between the points, head axes, as a moderngl buffer (*before.shape, 3).
+
+        Each is `part` of the way from the point of number `before` to the next one: guides at any
+        shares of their lengths. Both arrays are looked at when `before` is another object than the
+        last time. Otherwise as `points_buffer`.
+        """
+        made = getattr(self._engine, "rows_buffer", None)
+        return None if made is None else made(self._riders, before, part)
 
     def advance(self, seconds: float, surroundings: Surroundings) -> None:
         """Go on by `seconds`, in pieces of at most a sixtieth of a second, each in substeps."""
@@ -176,12 +188,13 @@ class PbdSimulator:
         if self._options.cohesion > 0 or self._options.pressure > 0:
             rates = (self._options.cohesion, self._options.pressure, seconds)
             self._engine.rub(self._crowd, inverse_motion(end) @ start, rates)
+        held = self._held(around, start)
         loads, head = [], start
         for k in range(count):
             after = between(start, end, (k + 1) / count)
             ride = inverse_motion(after) @ head if (after != head).any() else np.eye(4)
             load = Load(ride, after[:3, :3].T, gravity, air)
-            if around.grabs:  # a pull depends on where the node is
+            if around.grabs and not held:  # a pull depends on where the node is
                 force = self._hand.pulls(
                     around.grabs, self._engine, self._rods, self._riders, system, load,
                     inverse_motion(after), self._options.grab_speed,
@@ -194,6 +207,14 @@ class PbdSimulator:
             self._engine.run(system, loads, self._options.iterations)
         self._time += seconds
 
+    def _held(self, around: Surroundings, head: Float64Array) -> bool:
+        """Return whether the engine pulls held points by itself; if so, tell it of them."""
+        hold = getattr(self._engine, "hold", None)
+        if hold is None:
+            return False
+        hold(around.grabs, self._riders, inverse_motion(head), self._options.grab_speed)
+        return True
+
     def _gravity(self, around: Surroundings | None) -> Float64Array:
         if around is None or around.gravity is None:
             return np.array([0.0, -self._groom.physics.gravity, 0.0])
@@ -201,8 +222,15 @@ class PbdSimulator:
 
     def _air(self, around: Surroundings, head: Float64Array) -> Float64Array:
         """Velocity of the air at the nodes, world; gusts are mixed between every fourth node."""
-        if around.turbulence == 0.0 or not around.wind.any():
-            return np.asarray(around.wind, np.float64)
+        wind, gusty = np.asarray(around.wind, np.float64), around.turbulence != 0.0
+        gusty = gusty and bool(wind.any())
+        blow = getattr(self._engine, "blow", None)
+        if blow is not None:  # shaders find the gusts where the rods are
+            seed = self._options.seed
+            waves = gust_waves(self._time, wind, around.turbulence, seed) if gusty else None
+            blow(waves, wind, head)
+        if blow is not None or not gusty:
+            return wind
         nodes = self._rods.nodes
         some = np.unique(np.append(np.arange(0, nodes, 4), nodes - 1))
         where = moved(head, self._engine.state.position[:, some])
