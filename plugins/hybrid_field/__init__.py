@@ -25,13 +25,13 @@ from hairkit.combing import ScalpPrior, growth_potential, with_scalp_prior
 from hairkit.options import option
 from hairkit.plane_fusion import FusionOptions, fuse_views
 
+from .band import ribbons
 from .fields import (
     Fields,
     blended,
     growth_direction,
     internal_direction,
     internal_distance,
-    ribbons,
     surface_structure,
 )
 from .segments import find_segments

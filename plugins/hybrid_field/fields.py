@@ -15,6 +15,8 @@ from hairkit.eigen import smallest_eigenvectors
 from hairkit.stored import BoolArray, Float32Array, Float64Array
 from hairkit.volume import cell_slopes, outer_products
 
+from .band import Band
+
 FIXED = 1e3
 """Weight against a smoothness of 1 that keeps a cell as it is (Dirichlet)."""
 UNIT = 0.01
@@ -44,49 +46,6 @@ class FieldOptions(Protocol):
     def signed(self) -> float: ...
     @property
     def tolerance(self) -> float: ...
-
-
-@dataclass(frozen=True, eq=False)
-class Band:
-    """Ribbons on the grid."""
-
-    cells: BoolArray
-    """(X, Y, Z) loose cells that a ribbon runs through."""
-    direction: Float32Array
-    """(X, Y, Z, 3) mean signed tangent, not longer than 1; 0 elsewhere."""
-
-
-def ribbons(segments: Strands, hull: Hull, reach: float) -> Band:
-    """Return the cells of all ribbons and their mean signed tangents.
-
-    A ribbon is a segment widened by `reach` metres to both sides, along the hull's surface and
-    square to the segment.
-    """
-    shape = hull.grid.shape
-    total = np.zeros((int(np.prod(shape)), 3))
-    count = np.zeros(len(total))
-    if len(segments):
-        tangent = segments.tangents().astype(np.float64)
-        side = np.cross(tangent, _outward(hull, segments.points))
-        side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
-        steps = max(int(np.ceil(reach / (0.5 * hull.grid.spacing))), 1) if reach > 0 else 0
-        for k in range(-steps, steps + 1):
-            shift = reach * k / max(steps, 1)
-            weight = np.exp(-0.5 * (2 * k / max(steps, 1)) ** 2)
-            cell = hull.grid.nearest_cell(segments.points + shift * side)
-            flat = np.ravel_multi_index(tuple(cell.T), shape)
-            count += weight * np.bincount(flat, minlength=len(total))
-            for axis in range(3):
-                total[:, axis] += weight * np.bincount(flat, tangent[:, axis], len(total))
-    cells = (count > 0).reshape(shape) & hull.loose
-    mean = (total / np.maximum(count, 1e-12)[:, None]).reshape(*shape, 3)
-    return Band(cells, np.where(cells[..., None], mean, 0).astype(np.float32))
-
-
-def _outward(hull: Hull, points: Float32Array) -> Float64Array:
-    """Return (N, 3) minus the gradient of the smoothed occupancy."""
-    soft = ndimage.gaussian_filter(hull.dense.astype(np.float32), 2.0)
-    return -hull.grid.sample(cell_slopes(soft), points).astype(np.float64)
 
 
 def surface_structure(hull: Hull, band: Band, tolerance: float) -> Float32Array:

@@ -10,35 +10,20 @@ from numba import njit, prange
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from hairkit import Camera, Hull, Mask, OrientationMap, Strands
+from hairkit import Camera, Hull, Mask, Strands
 from hairkit.field_sampling import make_unit, principal_direction, sample_at
-from hairkit.plane_fusion import DEPTH_SHRINK, FusedViews, front_depths
-from hairkit.projection import pack_cameras
-from hairkit.stored import Float32Array, Float64Array, Int64Array
+from hairkit.plane_fusion import FusedViews
+from hairkit.stored import Float32Array
 
-PIXELS = 2.0
-"""Step along a line in a photo."""
-CONFIDENT = 0.25
-"""Least confidence along a line, both of a pixel and, as a share of the best, of a cell."""
-DEPTH_JUMP = 0.008
-"""Metres by which the hull's front may change in one step along a line."""
-STEP = 0.002
-"""Metres between a segment's points."""
-SMOOTHING = 3.0
-"""Points over which lifted lines are smoothed: the hull's front is a staircase."""
-FEWEST = 5
-"""Points of the shortest segment."""
+from .photo_lines import CONFIDENT, FEWEST, STEP, LineOptions, agreeing, join, lifted_lines
+
 NEIGHBOURS, ROUNDS = 8, 10
 """Segments that a segment compares its sign with, and how often."""
 
 
-class SegmentOptions(Protocol):
+class SegmentOptions(LineOptions, Protocol):
     """What finding segments asks of the plugin's options."""
 
-    @property
-    def line_spacing(self) -> int: ...
-    @property
-    def longest(self) -> float: ...
     @property
     def agreement_deg(self) -> float: ...
 
@@ -64,155 +49,13 @@ def find_segments(
     volume = np.zeros((*hull.grid.shape, 6), np.float32)
     volume[hull.loose] = fused.tensor * np.minimum(certainty, 1)[:, None]
     lines = lifted_lines(cameras, masks, fused.orientations, hull, options)
-    lines = _agreeing(lines, hull, volume, options.agreement_deg)
+    lines = agreeing(lines, hull, volume, options.agreement_deg)
     inner = lines_through_cells(hull, volume, certainty, options.longest)
     points = np.concatenate([lines.points, inner.points])
     offsets = np.concatenate([lines.offsets, inner.offsets[1:] + lines.offsets[-1]])
     if len(offsets) == 1:
         return Strands(points, offsets)
     return directed(Strands(points, offsets), hull, growth)
-
-
-def lifted_lines(
-    cameras: Sequence[Camera],
-    masks: Sequence[Mask],
-    orientations: Sequence[OrientationMap],
-    hull: Hull,
-    options: SegmentOptions,
-) -> Strands:
-    """Return lines that follow the 2D orientation in each photo, lifted to the hull's front."""
-    found = []
-    fronts = front_depths(cameras, orientations, hull)
-    for camera, mask, oriented, front in zip(cameras, masks, orientations, fronts, strict=True):
-        weight = (oriented.confidence * mask.hair).astype(np.float32)
-        seeds = _seeds(weight, options.line_spacing)
-        steps = int(options.longest / PIXELS * camera.focal / _middle(front))
-        lines = np.zeros((len(seeds), 2 * max(steps // 2, FEWEST) + 1, 3), np.float32)
-        counts = np.zeros(len(seeds), np.int64)
-        _follow_photo(oriented.angle, weight, front, DEPTH_SHRINK, seeds, lines, counts)
-        row = pack_cameras([camera])[0]
-        long = counts >= FEWEST
-        real = np.arange(lines.shape[1])[None] < counts[long, None]
-        points = _unprojected(row, lines[long][real].astype(np.float64))
-        found.append(_smoothed(points, counts[long]))
-    points = np.concatenate([points for points, _ in found])
-    counts = np.concatenate([counts for _, counts in found])
-    return _even(points, counts)
-
-
-def _middle(front: Float32Array) -> float:
-    seen = front[np.isfinite(front)]
-    return float(np.median(seen)) if len(seen) else 1.0
-
-
-def _seeds(weight: Float32Array, spacing: int) -> Int64Array:
-    """Return (N, 2) row and column of the most confident pixel of each square of `spacing`."""
-    height, width = (n // spacing for n in weight.shape)
-    squares = weight[: height * spacing, : width * spacing]
-    squares = squares.reshape(height, spacing, width, spacing).swapaxes(1, 2)
-    squares = squares.reshape(height, width, spacing * spacing)
-    best = squares.argmax(axis=2)
-    row, column = np.nonzero(squares.max(axis=2) > CONFIDENT)
-    inside = best[row, column]
-    return np.stack([row * spacing + inside // spacing, column * spacing + inside % spacing], 1)
-
-
-@njit(cache=True, parallel=True)
-def _follow_photo(angle, weight, front, shrink, seeds, lines, counts):  # type: ignore[no-untyped-def]
-    """Write u, v, depth of each line's points in order into lines (N, M, 3), counts into (N,)."""
-    half = lines.shape[1] // 2
-    for s in prange(len(seeds)):
-        back = np.empty((half, 3), np.float32)
-        ahead = np.empty((half, 3), np.float32)
-        before = _follow_one(angle, weight, front, shrink, seeds[s], -1.0, back)
-        after = _follow_one(angle, weight, front, shrink, seeds[s], 1.0, ahead)
-        total = 0
-        for k in range(before - 1, 0, -1):  # the seed itself is the first point of `ahead`
-            lines[s, total] = back[k]
-            total += 1
-        for k in range(after):
-            lines[s, total] = ahead[k]
-            total += 1
-        counts[s] = total
-
-
-@njit(cache=True)
-def _follow_one(angle, weight, front, shrink, seed, sign, line):  # type: ignore[no-untyped-def]
-    height, width = angle.shape
-    y, x = seed[0] + 0.5, seed[1] + 0.5
-    dx, dy, before = 0.0, 0.0, 0.0
-    for k in range(len(line)):
-        i, j = int(y), int(x)
-        if i < 0 or j < 0 or i >= height or j >= width or weight[i, j] < CONFIDENT:
-            return k
-        depth = front[min(i // shrink, front.shape[0] - 1), min(j // shrink, front.shape[1] - 1)]
-        if not np.isfinite(depth) or (k > 0 and abs(depth - before) > DEPTH_JUMP):
-            return k
-        before = depth
-        line[k, 0], line[k, 1], line[k, 2] = x, y, depth
-        c, s = np.cos(angle[i, j]), np.sin(angle[i, j])
-        if k == 0:
-            c, s = sign * c, sign * s
-        elif c * dx + s * dy < 0:
-            c, s = -c, -s
-        if k > 0 and c * dx + s * dy < 0.8:  # a bend of more than 37 degrees is another strand
-            return k + 1
-        dx, dy = c, s
-        x += PIXELS * c
-        y += PIXELS * s
-    return len(line)
-
-
-def _unprojected(row: Float64Array, pixels: Float64Array) -> Float64Array:
-    """Return head frame points (N, 3) of pixels and axial depths (N, 3), of a packed camera."""
-    depth = pixels[:, 2]
-    scale = np.ones_like(depth) if row[15] > 0.5 else depth
-    local = np.empty_like(pixels)
-    local[:, 0] = (pixels[:, 0] - row[13]) / row[12] * scale
-    local[:, 1] = (pixels[:, 1] - row[14]) / row[12] * scale
-    local[:, 2] = depth
-    result: Float64Array = (local - row[9:12]) @ row[:9].reshape(3, 3)
-    return result
-
-
-def _smoothed(points: Float64Array, counts: Int64Array) -> tuple[Float64Array, Int64Array]:
-    """Return packed lines smoothed by a Gaussian along them, ends included."""
-    owner = np.repeat(np.arange(len(counts)), counts)
-    total, norm = np.zeros_like(points), np.zeros(len(points))
-    reach = int(3 * SMOOTHING)
-    for shift in range(-reach, reach + 1):
-        other = np.clip(np.arange(len(points)) + shift, 0, max(len(points) - 1, 0))
-        weight = np.exp(-0.5 * (shift / SMOOTHING) ** 2) * (owner[other] == owner)
-        total += weight[:, None] * points[other]
-        norm += weight
-    return total / np.maximum(norm, 1e-12)[:, None], counts
-
-
-def _even(points: Float64Array, counts: Int64Array) -> Strands:
-    strands = Strands(points.astype(np.float32), np.concatenate([[0], np.cumsum(counts)]))
-    if not len(strands):
-        return strands
-    strands = strands.select(strands.lengths() >= (FEWEST - 1) * STEP)
-    return strands.resampled_by_length(STEP) if len(strands) else strands
-
-
-def _agreeing(lines: Strands, hull: Hull, volume: Float32Array, angle_deg: float) -> Strands:
-    """Return the lines whose points on average run along the fused tensor where it is sure."""
-    if not len(lines):
-        return lines
-    tangent = lines.tangents().astype(np.float64)
-    tensor = hull.grid.sample(volume, lines.points)
-    trace = tensor[:, :3].sum(axis=1)
-    along = (
-        (tensor[:, :3] * tangent**2).sum(axis=1)
-        + 2 * tensor[:, 3] * tangent[:, 0] * tangent[:, 1]
-        + 2 * tensor[:, 4] * tangent[:, 0] * tangent[:, 2]
-        + 2 * tensor[:, 5] * tangent[:, 1] * tangent[:, 2]
-    )
-    share = np.add.reduceat(along, lines.offsets[:-1]) / np.maximum(
-        np.add.reduceat(trace, lines.offsets[:-1]), 1e-6
-    )
-    return lines.select(share >= np.cos(np.radians(angle_deg)) ** 2)
 
 
 def lines_through_cells(
@@ -248,14 +91,7 @@ def _follow_cells(origin, spacing, volume, inside, seeds, lines, counts):  # typ
         back, ahead = np.empty((half, 3)), np.empty((half, 3))
         before = _follow_tensor(origin, spacing, volume, inside, seeds[s], -way, back)
         after = _follow_tensor(origin, spacing, volume, inside, seeds[s], way, ahead)
-        total = 0
-        for k in range(before - 1, 0, -1):
-            lines[s, total] = back[k]
-            total += 1
-        for k in range(after):
-            lines[s, total] = ahead[k]
-            total += 1
-        counts[s] = total
+        counts[s] = join(back, before, ahead, after, lines[s])
 
 
 @njit(cache=True)

@@ -7,12 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.hybrid_field import Options, solve_field
-from hairkit_plugins.hybrid_field.fields import (
-    Band,
-    internal_distance,
-    ribbons,
-    surface_structure,
-)
+from hairkit_plugins.hybrid_field.band import Band, ribbons
+from hairkit_plugins.hybrid_field.fields import internal_distance, surface_structure
+from hairkit_plugins.hybrid_field.photo_lines import SMOOTHING, agreeing, lifted
 from hairkit_plugins.hybrid_field.segments import directed, find_segments
 
 from hairkit import plane_fusion
@@ -25,7 +22,7 @@ from hairkit.scene import Scene
 from hairkit.stored import Float64Array
 from hairkit.strands import Strands
 from hairkit.testing import ball_head
-from hairkit.volume import Hull, VoxelGrid
+from hairkit.volume import Hull, VoxelGrid, outer_products
 from hairkit.waves import Waves
 
 CENTRE = np.array([0.0, 0.16, 0.0])
@@ -109,6 +106,39 @@ def test_segments_are_no_longer_than_allowed() -> None:
     """`longest` bounds them, but for half the rounding of both halves."""
     found, _ = segments(replace(PLAIN, longest=0.02))
     assert found.lengths().max() < 0.02 + 0.012
+
+
+def test_a_line_is_lifted_and_smoothed_the_same_wherever_it_stands_in_the_pack() -> None:
+    """The compiled lift of many lines is, line by line, a truncated Gaussian along points that
+    the camera sees where the line was followed."""
+    camera = cameras()[0]
+    rng = np.random.default_rng(3)
+    lines = rng.uniform(40, 80, (5, 30, 3)).astype(np.float32)
+    lines[..., 2] = rng.uniform(0.4, 0.6, (5, 30))
+    counts = np.array([30, 2, 5, 12, 30])
+    points, kept = lifted(camera, lines, counts)
+    np.testing.assert_array_equal(kept, [30, 5, 12, 30])
+    ends = np.cumsum(kept)
+    for line, last, count in zip(lines[[0, 2, 3, 4]], ends, kept, strict=True):
+        pixel = line[:count].astype(np.float64)
+        local = np.ones((count, 3))
+        local[:, :2] = (pixel[:, :2] - camera.centre) / camera.focal
+        local = local * pixel[:, 2:] - camera.translation
+        away = np.subtract.outer(np.arange(count), np.arange(count))
+        weight = np.exp(-0.5 * (away / SMOOTHING) ** 2) * (np.abs(away) <= 3 * SMOOTHING)
+        smooth = weight @ (local @ camera.rotation) / weight.sum(axis=1, keepdims=True)
+        np.testing.assert_allclose(points[last - count : last], smooth, atol=1e-6)
+
+
+def test_lines_agree_with_the_tensors_along_them_only() -> None:
+    """A line along the field stays; one square to it, and one where nothing is known, go."""
+    hull = bun()
+    volume = np.zeros((*hull.grid.shape, 6), np.float32)
+    volume[hull.loose] = outer_products([0.0, 1.0, 0.0])
+    course = np.linspace(-0.02, 0.02, 9)[:, None]
+    lines = [CENTRE + course * [0, 1.0, 0], CENTRE + course * [1.0, 0, 0], [[9, 9, 9], [9, 8, 9]]]
+    kept = agreeing(Strands.from_list(lines), hull, volume, 35.0)
+    np.testing.assert_allclose(kept.points, lines[0], atol=1e-6)
 
 
 def test_segments_agree_on_which_end_is_the_root() -> None:
