@@ -51,6 +51,12 @@ class Renderer:
         info = self.context.info
         return f"{self.backend}: {info['GL_RENDERER']}, OpenGL {info['GL_VERSION']}"
 
+    @property
+    def software(self) -> bool:
+        """Whether the renderer runs on the processor."""
+        name = str(self.context.info["GL_RENDERER"]).lower()
+        return any(word in name for word in _SOFTWARE)
+
     def program(self, name: str, fragment: str | None = None) -> moderngl.Program:
         """Return the program of `name.vert` and `fragment.frag` (None: `name.frag`)."""
         key = f"{name}/{fragment or name}"
@@ -115,10 +121,9 @@ def on_graphics_card() -> bool:
         return False
     try:
         with renderer() as gl:
-            name = str(gl.context.info["GL_RENDERER"]).lower()
+            return not gl.software
     except RenderError:
         return False
-    return not any(word in name for word in _SOFTWARE)
 
 
 def install(context: moderngl.Context, backend: str) -> Renderer:

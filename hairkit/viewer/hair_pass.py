@@ -1,4 +1,4 @@
-"""Draws hair that follows guides, by compute shaders only; the sums are resolved by the stage.
+"""Draws hair that follows guides by compute shaders; without a card `soft_hair` is faster.
 
 Passes: guides turned since rest; hair placed, projected and counted in cells of the view; cells
 summed to what hides what; hair shaded and drawn.
@@ -16,39 +16,18 @@ from hairkit.camera import Camera
 from hairkit.errors import InputError
 from hairkit.render.context import Renderer
 from hairkit.render.hair import strand_numbers
-from hairkit.render.projection import DepthRange, set_camera, set_uniforms
+from hairkit.render.projection import set_camera, set_uniforms
 from hairkit.stored import Float32Array
 from hairkit.viewer.hair_body import HairBody
+from hairkit.viewer.hair_look import HairLook, HairScene, HairView
 
 SLICES, TILE = 32, 16
 """As in viewer_hair.glsl."""
 _GROUP = 64
 MOST_GUIDES = 65_535
-FULL_LOOK = 50_000
-"""Fewer hairs are drawn wider, so that they cover the head as this many would."""
-WIDEST = 5.0
-
-
-@dataclass(frozen=True)
-class HairLook:
-    """How the hair is drawn in one picture."""
-
-    hairs: int
-    """Strands drawn, the guides first."""
-    smooth: bool
-    """True: strokes have soft edges; False is faster."""
-    root_colour: tuple[float, float, float]
-    tip_colour: tuple[float, float, float]
-    by_direction: bool = False
-    wider: float | None = None
-    """How many times wider than they are strands are drawn; None: by their number."""
-
-    @property
-    def times_wider(self) -> float:
-        """How many times wider strands are drawn."""
-        if self.wider is not None:
-            return self.wider
-        return float(np.clip(np.sqrt(FULL_LOOK / max(self.hairs, 1)), 1.0, WIDEST))
+NEAR_HAIR, OFF_GUIDES = 0.05, 0.06
+"""Metres: hair nearer than the first may be anywhere in the picture; hair keeps within the second
+of the guides."""
 
 
 class HairPass:
@@ -66,99 +45,100 @@ class HairPass:
         self._guides = context.buffer(reserve=20 * len(body.guides) * points)
         self._hairs = context.buffer(_hair_records(body))
         self._offsets = context.buffer(_offset_records(body))
-        self.places = context.buffer(reserve=12 * count * points)
+        self._places = context.buffer(reserve=12 * count * points)
         self._view: _ViewBuffers | None = None
-
-    @property
-    def sums(self) -> moderngl.Buffer | None:
-        """Sums of colour and weight a pixel, None before the first picture."""
-        return None if self._view is None else self._view.sums
+        self._resolve = context.vertex_array(gl.program("viewer_screen", "viewer_resolve"), [])
 
     def release(self) -> None:
         """Free the buffers."""
-        buffers = (self._rest, self._now, self._guides, self._hairs, self._offsets, self.places)
+        buffers = (self._rest, self._now, self._guides, self._hairs, self._offsets, self._places)
         for buffer in buffers:
             buffer.release()
+        self._resolve.release()
         if self._view is not None:
             self._view.release()
 
+    def places(self) -> moderngl.Buffer:
+        """Return (S, m, 3) float32 where the hair was last placed, metres."""
+        return self._places
+
     def move_guides(self, rows: Float32Array) -> None:
         """Put the guides at `rows` (G, m, 3), head frame, metres."""
+        self._rows = rows
         self._now.write(np.ascontiguousarray(rows, np.float32))
         self._rest.bind_to_storage_buffer(0)
         self._now.bind_to_storage_buffer(1)
         self._guides.bind_to_storage_buffer(2)
         self._run("viewer_guide", len(self.body.guides) * self.body.points_each)
 
-    def place(
-        self, camera: Camera, hair_depth: DepthRange, depth: DepthRange, look: HairLook
-    ) -> None:
-        """Place the hair and find what of it hides what; `hair_depth` holds the hair alone."""
-        view = self._sized(camera)
-        slices = (hair_depth.near, SLICES / (hair_depth.far - hair_depth.near))
+    def place(self, view: HairView, look: HairLook) -> None:
+        """Place the hair and find what of it hides what."""
+        buffers = self._sized(view.camera)
+        near, far = view.hair_depth.near, view.hair_depth.far
         self._shared: dict[str, Any] = {
-            "u_tiles": view.tiles,
-            "u_slice_range": slices,
+            "u_tiles": buffers.tiles,
+            "u_slice_range": (near, SLICES / (far - near)),
             "u_wider": look.times_wider,
         }
-        view.filled.clear()
+        buffers.filled.clear()
         self._guides.bind_to_storage_buffer(0)
         self._hairs.bind_to_storage_buffer(1)
         self._offsets.bind_to_storage_buffer(2)
-        self.places.bind_to_storage_buffer(3)
-        view.filled.bind_to_storage_buffer(4)
-        self._run("viewer_hair", look.hairs, camera, depth, **self._shared)
-        view.opacity.bind_to_image(0, read=False, write=True)
-        self._run("viewer_opacity", view.tiles[0] * view.tiles[1], **self._shared)
+        self._places.bind_to_storage_buffer(3)
+        buffers.filled.bind_to_storage_buffer(4)
+        self._run("viewer_hair", look.hairs, view, **self._shared)
+        buffers.opacity.bind_to_image(0, read=False, write=True)
+        self._run("viewer_opacity", buffers.tiles[0] * buffers.tiles[1], **self._shared)
 
-    def draw(
-        self,
-        camera: Camera,
-        depth: DepthRange,
-        look: HairLook,
-        solid_depth: moderngl.Texture,
-        lighting: dict[str, Any],
-    ) -> None:
-        """Draw the placed hair into `sums`, hidden by what `solid_depth` holds.
-
-        `lighting` are the values of the lights; the light volume's texture is bound as `u_light`
-        says.
-        """
-        view = self._sized(camera)
-        solid_depth.use(1)
-        view.opacity.use(2)
+    def draw(self, scene: HairScene) -> None:
+        """Draw the placed hair over the picture, hidden by the solids."""
+        view, look = scene.view, scene.look
+        buffers = self._sized(view.camera)
+        scene.solid_depth.use(1)
+        buffers.opacity.use(2)
         self._hairs.bind_to_storage_buffer(1)
         self._offsets.bind_to_storage_buffer(2)
-        self.places.bind_to_storage_buffer(3)
-        view.sums.bind_to_storage_buffer(7)
+        self._places.bind_to_storage_buffer(3)
+        buffers.sums.bind_to_storage_buffer(7)
         self._run(
             "viewer_stroke",
             look.hairs,
-            camera,
-            depth,
-            u_eye=tuple(camera.position.tolist()),
+            view,
+            u_eye=tuple(view.camera.position.tolist()),
             u_root_colour=look.root_colour,
             u_tip_colour=look.tip_colour,
             u_show_direction=float(look.by_direction),
             u_solid_depth=1,
             u_opacity=2,
-            u_picture=(camera.width, camera.height),
+            u_picture=buffers.size,
             u_smooth=float(look.smooth),
             **self._shared,
-            **lighting,
+            **scene.lights.uniforms(),
+            **scene.light.uniforms(),
         )
+        self._lay_over(scene.target, buffers, _frame_of(view.camera, self._rows))
 
-    def _run(
+    def _lay_over(
         self,
-        shader: str,
-        count: int,
-        camera: Camera | None = None,
-        depth: DepthRange | None = None,
-        **uniforms: Any,
+        target: moderngl.Framebuffer,
+        buffers: _ViewBuffers,
+        frame: tuple[int, int, int, int],
     ) -> None:
+        """Resolve the sums inside a frame, which takes them all."""
+        context = self._gl.context
+        target.use()
+        target.scissor = frame
+        context.enable_only(moderngl.BLEND)
+        context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+        set_uniforms(self._gl.program("viewer_screen", "viewer_resolve"), u_picture=buffers.size)
+        buffers.sums.bind_to_storage_buffer(7)
+        self._resolve.render(moderngl.TRIANGLES, vertices=3)
+        target.scissor = (0, 0, *buffers.size)
+
+    def _run(self, shader: str, count: int, view: HairView | None = None, **uniforms: Any) -> None:
         program = self._gl.compute(shader)
-        if camera is not None and depth is not None:
-            set_camera(program, camera, depth)
+        if view is not None:
+            set_camera(program, view.camera, view.depth)
         set_uniforms(program, u_points=self.body.points_each, u_count=count, **uniforms)
         program.run(max(-(-count // _GROUP), 1))
         self._gl.context.memory_barrier()
@@ -198,6 +178,20 @@ class _ViewBuffers:
     def release(self) -> None:
         for part in (self.filled, self.opacity, self.sums):
             part.release()
+
+
+def _frame_of(camera: Camera, rows: Float32Array) -> tuple[int, int, int, int]:
+    """Return x, y, width and height in pixels of where hair that follows guides can be."""
+    size = np.array([camera.width, camera.height])
+    depth = camera.depth(rows.reshape(-1, 3))
+    if depth.min() < NEAR_HAIR:
+        return 0, 0, camera.width, camera.height
+    pixels = camera.project(rows.reshape(-1, 3))
+    margin = 8 + OFF_GUIDES * camera.focal / float(depth.min())
+    low = np.clip(np.floor(pixels.min(axis=0) - margin), 0, size)
+    high = np.clip(np.ceil(pixels.max(axis=0) + margin), low + 1, size + 1)
+    x, y, width, height = np.concatenate([low, high - low]).astype(int).tolist()
+    return x, y, width, height
 
 
 def _hair_records(body: HairBody) -> bytes:

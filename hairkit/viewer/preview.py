@@ -14,7 +14,7 @@ from hairkit.render.head import Solid, head_solid
 from hairkit.stored import UInt8Array
 from hairkit.viewer.budget import LEVELS, Budget
 from hairkit.viewer.colouring import point_values, ramp
-from hairkit.viewer.hair_pass import HairLook
+from hairkit.viewer.hair_look import HairLook
 from hairkit.viewer.hud import Readings
 from hairkit.viewer.layers import BOARDS
 from hairkit.viewer.line_pass import LineSet

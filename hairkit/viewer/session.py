@@ -191,15 +191,21 @@ class Session:
         if self.paused:
             return
         self._behind += seconds
-        began = time.perf_counter()
+        before, began = self.steps, time.perf_counter()
         while self._behind >= STEP * (1 - 1e-6):
             self._behind -= STEP
-            self.step()
+            self._step()
             if self.most_seconds is not None and time.perf_counter() - began > self.most_seconds:
                 self._behind = 0.0
+        if self.steps > before:
+            self._look_for_runaways()
 
     def step(self) -> None:
         """Let one step of time pass."""
+        self._step()
+        self._look_for_runaways()
+
+    def _step(self) -> None:
         self.motion.advance(STEP)
         surroundings = Surroundings(
             head_from_rest=self.world_from_head,
@@ -209,6 +215,8 @@ class Session:
         )
         self.tuned.simulator.advance(STEP, surroundings)
         self.steps += 1
+
+    def _look_for_runaways(self) -> None:
         if not np.isfinite(self.tuned.simulator.points).all():
             self.reset()
             self.message = "the simulation became unstable and was put back to rest"

@@ -15,12 +15,12 @@ from hairkit.stored import Float64Array
 
 
 class SolidPass:
-    """One shaded mesh on the GPU."""
+    """One shaded mesh on the GPU, lit at its pixels or, for software renderers, at its vertices."""
 
-    def __init__(self, gl: Renderer, solid: Solid) -> None:
+    def __init__(self, gl: Renderer, solid: Solid, *, by_vertex: bool = False) -> None:
         self._gl = gl
         self.solid = solid
-        self._program = gl.program("skin")
+        self._program = gl.program("viewer_skin", "hair") if by_vertex else gl.program("skin")
         values = np.concatenate([solid.vertices, solid.normals, solid.colours], axis=1)
         self._values = np.ascontiguousarray(values, np.float32)
         self._placed = np.eye(4)

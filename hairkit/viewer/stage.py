@@ -16,9 +16,12 @@ from hairkit.render.picture import BACKDROP_BOTTOM, BACKDROP_TOP, HEAD_PUSH
 from hairkit.render.projection import DepthRange, set_uniforms
 from hairkit.stored import Float32Array, Float64Array, UInt8Array
 from hairkit.viewer.hair_body import HairBody
-from hairkit.viewer.hair_pass import HairLook, HairPass
+from hairkit.viewer.hair_look import HairDrawer, HairLook, HairScene, HairView
+from hairkit.viewer.hair_pass import HairPass
 from hairkit.viewer.light_pass import TURNS, LightPass
 from hairkit.viewer.line_pass import Board, BoardPass, LineSet, draw_lines
+from hairkit.viewer.soft_hair import SoftHairPass
+from hairkit.viewer.soft_light import SoftLightPass
 from hairkit.viewer.solid_pass import SolidPass
 
 KEY = (-0.45, 0.6, 0.75)
@@ -26,9 +29,6 @@ KEY = (-0.45, 0.6, 0.75)
 RIM = (0.55, 0.6, -0.55)
 STUDIO_SIZE = (160, 90)
 """Pixels of the studio's picture, which is smooth and spread over the whole."""
-NEAR_HAIR, OFF_GUIDES = 0.05, 0.06
-"""Metres: hair nearer than the first may be anywhere in the picture; hair keeps within the second
-of the guides."""
 STANDING = ("torso",)
 """Solids that stay in the world when the head moves."""
 PULL = 0.002
@@ -69,30 +69,40 @@ class Stage:
     gl: Renderer
     head: Solid
     body: HairBody
+    soft: bool | None = None
+    """True draws hair on the processor, False by shaders; None: what suits the renderer."""
     _size: tuple[int, int] = (0, 0)
     _solids: dict[str, SolidPass] = field(default_factory=dict)
     _boards: dict[str, BoardPass] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.hair = HairPass(self.gl, self.body)
-        self._light = LightPass(self.gl, self.body.guides, [self.head])
-        self._head = SolidPass(self.gl, self.head)
+        if self.soft is None:
+            self.soft = self.gl.software
+        self.hair = self._drawer(self.body)
+        volume = SoftLightPass if self.soft else LightPass
+        self._light = volume(self.gl, self.body.guides, [self.head])
+        self._head = SolidPass(self.gl, self.head, by_vertex=self.soft)
+        low, high = self.head.vertices.min(axis=0), self.head.vertices.max(axis=0)
+        middle = np.asarray((low + high) / 2, np.float64)
+        size = float(np.linalg.norm(self.head.vertices - middle, axis=1).max())
+        self._head_room = middle, size
         self._fresh = True
-        self._resolve, self._spread, self._backdrop = (
+        self._spread, self._backdrop = (
             self.gl.context.vertex_array(self.gl.program("viewer_screen", fragment), [])
-            for fragment in ("viewer_resolve", "viewer_set", "viewer_studio")
+            for fragment in ("viewer_set", "viewer_studio")
         )
-        self._studio_texture = self.gl.context.texture(STUDIO_SIZE, 4, dtype="f2")
-        self._studio_texture.repeat_x = self._studio_texture.repeat_y = False
-        self._studio = self.gl.context.framebuffer([self._studio_texture])
+        self._sketch_texture = self.gl.context.texture(STUDIO_SIZE, 4, dtype="f2")
+        self._sketch_texture.repeat_x = self._sketch_texture.repeat_y = False
+        self._sketch = self.gl.context.framebuffer([self._sketch_texture])
+        self._studio_made: object = None
         self._set_made: object = None
         self._age = 0
 
     def release(self) -> None:
         """Free everything on the GPU."""
         parts: list[Any] = [self.hair, self._light, self._head, *self._solids.values()]
-        parts += [*self._boards.values(), self._resolve, self._spread, self._backdrop]
-        for part in [*parts, self._studio, self._studio_texture]:
+        parts += [*self._boards.values(), self._spread, self._backdrop]
+        for part in [*parts, self._sketch, self._sketch_texture]:
             part.release()
         self._release_targets()
 
@@ -100,14 +110,14 @@ class Stage:
         """Show other hair."""
         self.hair.release()
         self.body = body
-        self.hair = HairPass(self.gl, body)
+        self.hair = self._drawer(body)
         self._fresh = True
 
     def keep_solid(self, name: str, solid: Solid) -> None:
         """Hold a mesh that shots may show by name."""
         if name in self._solids:
             self._solids[name].release()
-        self._solids[name] = SolidPass(self.gl, solid)
+        self._solids[name] = SolidPass(self.gl, solid, by_vertex=bool(self.soft))
 
     def keep_board(self, name: str, board: Board) -> None:
         """Hold a picture that shots may show by name."""
@@ -126,20 +136,24 @@ class Stage:
             self.hair.move_guides(rows)
             self._rows = rows
         depth = self._depth(shot, own)
+        view = HairView(own, depth, _hair_depth(own, self._rows))
         if shot.hair is not None:
-            self.hair.place(own, _hair_depth(own, self._rows), depth, shot.hair)
+            self.hair.place(view, shot.hair)
         hairs = 0 if shot.hair is None else shot.hair.hairs
         whole = shot.whole_light or self._fresh
-        self._light.update(self.hair.places, self.body.points_each, hairs, lights, whole=whole)
+        self._light.update(self.hair, hairs, lights, whole=whole)
         self._fresh = False
         self._light.texture.use(0)
         self._draw_set(shot, own, depth, lighting)
         self.gl.context.copy_framebuffer(self.framebuffer, self._set)
         if shot.hair is not None:
-            self.hair.draw(own, depth, shot.hair, self._depth_texture, lighting)
-            self._draw_hair(_frame_of(own, self._rows))
+            parts = self._set, self._depth_texture, self.framebuffer
+            self.hair.draw(HairScene(view, shot.hair, lights, self._light, *parts))
         self._draw_overlays(shot, own, depth)
         self.gl.home.use()
+
+    def _drawer(self, body: HairBody) -> HairDrawer:
+        return SoftHairPass(self.gl, body) if self.soft else HairPass(self.gl, body)
 
     def read(self) -> UInt8Array:
         """Return the picture (H, W, 3) RGB."""
@@ -154,9 +168,9 @@ class Stage:
 
     def _depth(self, shot: Shot, own: Camera) -> DepthRange:
         """Return a range that changes only with the camera, so that still parts can be kept."""
-        cloud = np.concatenate([self._rows.reshape(-1, 3), self.head.vertices])
-        middle = (self.head.vertices.min(axis=0) + self.head.vertices.max(axis=0)) / 2
-        farthest = float(np.sqrt(((cloud - middle) ** 2).sum(axis=1).max()))
+        middle, size = self._head_room
+        off = self._rows.reshape(-1, 3) - middle.astype(np.float32)
+        farthest = max(size, float(np.sqrt(np.einsum("pc,pc->p", off, off).max())))
         radius = np.ceil(farthest / 0.25 + 0.1) * 0.25 + (0.6 if shot.boards or shot.lines else 0)
         centre = float(own.depth(middle))
         return DepthRange(max(centre - radius, 0.01), centre + radius)
@@ -171,13 +185,9 @@ class Stage:
             return
         self._set_made, self._age = key, 0
         self._draw_studio(shot)
+        self.gl.context.copy_framebuffer(self._set, self._studio)
+        self._depths.clear(depth=1.0)
         self._set.use()
-        self._set.clear(depth=1.0)
-        self.gl.context.enable_only(moderngl.NOTHING)
-        self._studio_texture.use(4)
-        spread = self.gl.program("viewer_screen", "viewer_set")
-        set_uniforms(spread, u_studio=4, u_size=self._size)
-        self._spread.render(moderngl.TRIANGLES, vertices=3)
         self.gl.context.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self.gl.context.cull_face = "front"  # pictures are drawn upside down
         if shot.show_head:
@@ -189,8 +199,13 @@ class Stage:
         self.gl.context.cull_face = "back"
 
     def _draw_studio(self, shot: Shot) -> None:
+        """Draw what changes with the camera only: small, for it is smooth, and then spread."""
         camera = shot.camera.resized(*STUDIO_SIZE)
-        self._studio.use()
+        key = (camera.camera_from_head.tobytes(), camera.focal, shot.floor)
+        if key == self._studio_made:
+            return
+        self._studio_made = key
+        self._sketch.use()
         self.gl.context.enable_only(moderngl.NOTHING)
         shares = np.diag([camera.width, camera.height, 1.0])
         rays = camera.rotation.T @ np.linalg.inv(_intrinsics(camera)) @ shares
@@ -205,19 +220,11 @@ class Stage:
             u_shadow_radius=0.35,
         )
         self._backdrop.render(moderngl.TRIANGLES, vertices=3)
-
-    def _draw_hair(self, frame: tuple[int, int, int, int]) -> None:
-        """Resolve the sums inside a frame, which takes them all."""
-        context = self.gl.context
-        self.framebuffer.use()
-        self.framebuffer.scissor = frame
-        context.enable_only(moderngl.BLEND)
-        context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-        set_uniforms(self.gl.program("viewer_screen", "viewer_resolve"), u_picture=self._size)
-        if self.hair.sums is not None:
-            self.hair.sums.bind_to_storage_buffer(7)
-        self._resolve.render(moderngl.TRIANGLES, vertices=3)
-        self.framebuffer.scissor = (0, 0, *self._size)
+        self._studio.use()
+        self._sketch_texture.use(4)
+        spread = self.gl.program("viewer_screen", "viewer_set")
+        set_uniforms(spread, u_studio=4, u_size=self._size)
+        self._spread.render(moderngl.TRIANGLES, vertices=3)
 
     def _draw_overlays(self, shot: Shot, own: Camera, depth: DepthRange) -> None:
         if not shot.lines and not shot.boards:
@@ -238,23 +245,27 @@ class Stage:
             return
         self._release_targets()
         context = self.gl.context
+        self._studio_texture = context.texture(size, 4)
+        self._studio = context.framebuffer([self._studio_texture])
         self._set_texture = context.texture(size, 4)
         self._depth_texture = context.depth_texture(size)
         self._depth_texture.compare_func = ""
         self._depth_texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._set = context.framebuffer([self._set_texture], self._depth_texture)
+        self._depths = context.framebuffer([], self._depth_texture)
         self.texture = context.texture(size, 4)
         self.framebuffer = context.framebuffer([self.texture])
         self._overlaid = context.framebuffer([self.texture], self._depth_texture)
         self._size = size
-        self._set_made = None
+        self._set_made = self._studio_made = None
 
     def _release_targets(self) -> None:
         if self._size == (0, 0):
             return
-        for part in (self.framebuffer, self._overlaid, self._set, self.texture, self._set_texture):
+        for part in (self.framebuffer, self._overlaid, self._set, self._studio, self._depths):
             part.release()
-        self._depth_texture.release()
+        for texture in (self.texture, self._set_texture, self._studio_texture, self._depth_texture):
+            texture.release()
         self._size = (0, 0)
 
 
@@ -273,20 +284,6 @@ def _in_head(camera: Camera, world_from_head: Float64Array) -> Camera:
 def _hair_depth(camera: Camera, rows: Float32Array) -> DepthRange:
     depth = camera.depth(rows.reshape(-1, 3))
     return DepthRange(float(depth.min()) - 0.005, float(depth.max()) + 0.005)
-
-
-def _frame_of(camera: Camera, rows: Float32Array) -> tuple[int, int, int, int]:
-    """Return x, y, width and height in pixels of where hair that follows guides can be."""
-    size = np.array([camera.width, camera.height])
-    depth = camera.depth(rows.reshape(-1, 3))
-    if depth.min() < NEAR_HAIR:
-        return 0, 0, camera.width, camera.height
-    pixels = camera.project(rows.reshape(-1, 3))
-    margin = 8 + OFF_GUIDES * camera.focal / float(depth.min())
-    low = np.clip(np.floor(pixels.min(axis=0) - margin), 0, size)
-    high = np.clip(np.ceil(pixels.max(axis=0) + margin), low + 1, size + 1)
-    x, y, width, height = np.concatenate([low, high - low]).astype(int).tolist()
-    return x, y, width, height
 
 
 def _set_key(shot: Shot, depth: DepthRange) -> tuple[object, ...]:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from hairkit.camera import Camera
-from hairkit.render.context import renderer
+from hairkit.render.context import Renderer, renderer
 from hairkit.render.head import head_solid
 from hairkit.stored import Float32Array, UInt8Array
 from hairkit.testing import bristle_groom
 from hairkit.viewer.hair_body import HairBody
-from hairkit.viewer.hair_pass import HairLook
+from hairkit.viewer.hair_look import HairLook
 from hairkit.viewer.light_pass import TURNS
 from hairkit.viewer.line_pass import LineSet
 from hairkit.viewer.motion import rotation_about
@@ -25,14 +25,19 @@ CAMERA = Camera.on_turn(20.0, distance=0.6, focal=260.0, width=160, height=120)
 LOOK = HairLook(3000, True, (0.4, 0.05, 0.05), (0.4, 0.05, 0.05))
 
 
-@pytest.fixture(scope="module")
-def stage() -> Iterator[Stage]:
-    """A stage with the ball head and 3000 bristles."""
-    body = HairBody.of(GROOM.strands, GROOM.head, GROOM.material, 3000)
+@pytest.fixture(scope="module", params=[True, False], ids=["processor", "shaders"])
+def stage(request: pytest.FixtureRequest) -> Iterator[Stage]:
+    """A stage with the ball head and 3000 bristles, drawn either way."""
     with renderer() as gl:
-        stage = Stage(gl, head_solid(GROOM.head, GROOM.material), body)
+        stage = made_stage(gl, soft=request.param)
         yield stage
         stage.release()
+
+
+def made_stage(gl: Renderer, *, soft: bool) -> Stage:
+    """Return a stage with the ball head and 3000 bristles."""
+    body = HairBody.of(GROOM.strands, GROOM.head, GROOM.material, 3000)
+    return Stage(gl, head_solid(GROOM.head, GROOM.material), body, soft)
 
 
 def shot(**changes: object) -> Shot:
@@ -84,6 +89,17 @@ def test_the_head_hides_hair_behind_it(stage: Stage) -> None:
     centre = np.s_[55:66, 75:86]
     assert not changed(hidden, bare)[centre].any()
     assert changed(seen, hidden)[centre].any()
+
+
+def test_the_head_is_drawn_in_the_first_picture_and_in_later_ones(stage: Stage) -> None:
+    """Skin stands before the studio from the first picture on."""
+    with renderer() as gl:
+        fresh = made_stage(gl, soft=bool(stage.soft))
+        first, without = (picture(fresh, shot(hair=None, show_head=s)) for s in (True, False))
+        again = picture(fresh, shot(hair=None))
+        fresh.release()
+    assert changed(first, without)[60, 80]
+    assert (first == again).all()
 
 
 def test_colour_is_the_materials(stage: Stage) -> None:
@@ -144,16 +160,18 @@ def twin(body: HairBody, rows: Float32Array) -> Float32Array:
     return course + turned
 
 
-def test_the_shader_places_hair_as_its_twin(stage: Stage) -> None:
+def test_hair_is_placed_as_its_twin_says(stage: Stage) -> None:
     """Hair keeps its offset from the guides' mix, turned as the nearest guide turns."""
     t = np.linspace(0, 1, stage.body.points_each, dtype=np.float32)[None, :, None]
     rows = stage.body.guide_rest + np.float32([0.02, -0.01, 0.0]) * t**2
     with renderer():
         picture(stage, shot(guide_rows=rows))
-        data = np.frombuffer(stage.hair.places.read(), np.float32)
+        places = stage.hair.places()
+        if not stage.soft:
+            places = np.frombuffer(places.read(), np.float32).reshape(3000, -1, 3)
+        placed = places.copy()
         picture(stage, shot())
-    places = data.reshape(3000, -1, 3)
-    np.testing.assert_allclose(places, twin(stage.body, rows), atol=2e-5)
+    np.testing.assert_allclose(placed, twin(stage.body, rows), atol=2e-5)
 
 
 def test_lines_are_drawn_in_their_colour(stage: Stage) -> None:
@@ -174,3 +192,23 @@ def test_light_made_in_turns_is_light_made_at_once(stage: Stage) -> None:
         for _ in range(2 * TURNS + 1):
             in_turns = picture(stage, shot(whole_light=False))
     assert np.abs(once.astype(int) - in_turns).max() <= 1
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+@pytest.mark.parametrize("direction", [True, False])
+def test_processor_and_shaders_draw_the_same(smooth: bool, direction: bool) -> None:
+    """Both ways to draw differ by roundings, and by how finely skin and shadows are sampled."""
+    look = replace(LOOK, smooth=smooth, by_direction=direction, wider=2.0)
+    wanted = shot(hair=look)
+    with renderer() as gl:
+        stages = [made_stage(gl, soft=soft) for soft in (True, False)]
+        first, second = (picture(stage, wanted).astype(int) for stage in stages)
+        bare = picture(stages[0], shot(hair=None))
+        for stage in stages:
+            stage.release()
+    off = np.abs(first - second)
+    hair = changed(first, bare)
+    assert hair.sum() > 1000
+    assert off[hair].mean() < 3
+    assert np.quantile(off[hair], 0.99) < 16
+    assert abs((first - second)[hair].mean()) < 2

@@ -1,0 +1,157 @@
+"""Draws placed hair into sums a pixel: the compiled twin of viewer_stroke.comp.
+
+A sum is one 64-bit word of four 16-bit numbers, red, green, blue and weight, where the weight is
+the coverage of the pixel times the share of light that hair in front lets by. Threads have sums of
+their own, which `resolve` adds up; whole numbers make the order of adding irrelevant.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+
+from hairkit.viewer.soft_places import inlined, pixels_a_metre, row
+from hairkit.viewer.soft_shading import HIDDEN
+
+SUM_UNIT = np.float32(1024)
+"""As in viewer_sums.glsl."""
+_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
+_WIDEST = np.float32(64)
+_TINY = np.float32(1e-6)
+_GOLDEN, _PLASTIC = np.float32(0.618034), np.float32(0.7548777)
+_BLUE, _GREEN, _RED = np.uint64(16), np.uint64(32), np.uint64(48)
+_PART = np.uint64(0xFFFF)
+
+
+@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
+def draw_hair(  # type: ignore[no-untyped-def]
+    seen, looks, widths, random, solid, camera, wider, smooth, count, frame, sums
+):  # pragma: no cover - compiled
+    """Draw the first `count` hairs into `sums` (chunks, at least H W) of 64-bit words.
+
+    `seen` is that of `place_hair`, `looks` of `shade_hair`; `frame` holds the lowest x and y of
+    the part of the picture that is drawn, and `solid` (H, W) the depth buffer of it.
+    """
+    chunks = sums.shape[0]
+    for number in prange(chunks):
+        chunk = np.int64(number)
+        first, last = count * chunk // chunks, count * (chunk + 1) // chunks
+        _draw_chunk(
+            seen, looks, widths, random, solid, camera, wider, smooth, first, last, frame,
+            sums[chunk],
+        )  # fmt: skip
+
+
+@row
+def _draw_chunk(  # type: ignore[no-untyped-def]
+    seen, looks, widths, random, solid, camera, wider, smooth, first, last, frame, sums
+) -> None:  # pragma: no cover - compiled
+    for s in range(first, last):
+        for k in range(1, seen.shape[1]):
+            if looks[s, k, 3] > HIDDEN and looks[s, k - 1, 3] > HIDDEN:
+                width = widths[s, k] * wider * pixels_a_metre(camera, seen[s, k, 3])
+                dither = random[s] + np.float32(k) * _PLASTIC
+                dither -= np.floor(dither)
+                _stroke(seen, looks, s, k, width, dither, smooth, solid, frame, sums)
+
+
+@row
+def _stroke(  # type: ignore[no-untyped-def]
+    seen, looks, s, k, width, dither, smooth, solid, frame, sums
+) -> None:  # pragma: no cover - compiled
+    """Draw the piece from point k - 1 to k."""
+    ax, ay, az = seen[s, k - 1, 0] - frame[0], seen[s, k - 1, 1] - frame[1], seen[s, k - 1, 2]
+    bx, by, bz = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
+    hidden = _behind(ax, ay, az, solid) + _behind(bx, by, bz, solid)
+    hidden += _behind(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid)
+    if hidden == 3:
+        return
+    steep = abs(by - ay) > abs(bx - ax)
+    if steep:
+        ax, ay, bx, by = ay, ax, by, bx
+    begin, end = k - 1, k
+    if bx < ax:
+        ax, ay, az, bx, by, bz = bx, by, bz, ax, ay, az
+        begin, end = k, k - 1
+    high, wide = solid.shape
+    solids = solid.reshape(high * wide)
+    stride_x, stride_y, limit_x, limit_y = (wide, 1, high, wide) if steep else (1, wide, wide, high)
+    along, slope = bx - ax, by - ay
+    across = min(width * np.sqrt(along * along + slope * slope) / max(along, _TINY), _WIDEST)
+    pace = _ONE / max(along, _TINY)
+    x: Any = max(np.int64(np.ceil(ax - _HALF)), 0)
+    last = min(np.int64(np.ceil(bx - _HALF)), limit_x)
+    t = (np.float32(x) + _HALF - ax) * pace
+    y, slope = ay + t * slope, slope * pace
+    unit = min(across, _ONE) * SUM_UNIT
+    near, far = looks[s, begin, 3] * unit, looks[s, end, 3] * unit
+    r, g, b = looks[s, begin, 0] * near, looks[s, begin, 1] * near, looks[s, begin, 2] * near
+    dr, dg = looks[s, end, 0] * far - r, looks[s, end, 1] * far - g
+    db = looks[s, end, 2] * far - b
+    w, dw = near, far - near
+    half = _HALF * max(across, _ONE)
+    thin = smooth == 0 and across <= _ONE
+    while x < last:
+        shift = dither + _GOLDEN * np.float32(x)
+        shift -= np.floor(shift)
+        reach = _ZERO if thin else half
+        low: Any = max(np.int64(np.floor(y - reach)), 0)
+        top: Any = min(np.int64(np.floor(y + reach)), limit_y - 1)
+        for line in range(low, top + 1):
+            at = x * stride_x + line * stride_y
+            if hidden > 0 and az + t * (bz - az) > solids[at]:
+                continue
+            part = _ONE
+            if not thin:
+                part = min(y + half, np.float32(line + 1)) - max(y - half, np.float32(line))
+            sums[at] += (
+                np.uint64(np.int64((r + t * dr) * part + shift)) << _RED
+                | np.uint64(np.int64((g + t * dg) * part + shift)) << _GREEN
+                | np.uint64(np.int64((b + t * db) * part + shift)) << _BLUE
+                | np.uint64(np.int64((w + t * dw) * part + shift))
+            )
+        x += 1
+        t += pace
+        y += slope
+
+
+@inlined
+def _behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return 1 where a solid is nearer than a point, in pixels of the frame."""
+    column = min(max(np.int64(x), 0), solid.shape[1] - 1)
+    row = min(max(np.int64(y), 0), solid.shape[0] - 1)
+    return 1 if depth > solid[row, column] else 0
+
+
+@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
+def resolve(sums, picture):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Write (H, W, 4) bytes, colour and opacity, of the sums, and leave them empty."""
+    high, wide = picture.shape[:2]
+    chunks = sums.shape[0]
+    for number in prange(high):
+        y = np.int64(number)
+        for x in range(wide):
+            at = y * wide + x
+            word = np.uint64(0)
+            for chunk in range(chunks):
+                word += sums[chunk, at]
+                sums[chunk, at] = np.uint64(0)
+            weight = np.float32(word & _PART)
+            if word == np.uint64(0):
+                picture[y, x, 3] = 0
+                continue
+            share = np.float32(255) / max(weight, _ONE)
+            cover = weight / SUM_UNIT
+            opaque = min(cover * (_ONE + np.float32(0.8) * cover), _ONE)
+            picture[y, x, 0] = np.uint8(
+                min(np.float32(word >> _RED) * share + _HALF, np.float32(255))
+            )
+            picture[y, x, 1] = np.uint8(
+                min(np.float32((word >> _GREEN) & _PART) * share + _HALF, np.float32(255))
+            )
+            picture[y, x, 2] = np.uint8(
+                min(np.float32((word >> _BLUE) & _PART) * share + _HALF, np.float32(255))
+            )
+            picture[y, x, 3] = np.uint8(opaque * np.float32(255) + _HALF)

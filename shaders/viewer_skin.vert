@@ -1,0 +1,19 @@
+#version 430
+// Skin lit at its vertices: software renderers have many pixels and a fine mesh.
+#include "skin.glsl"
+
+uniform mat4 u_clip_from_head;
+uniform float u_push_m;
+
+in vec3 in_position;
+in vec3 in_normal;
+in vec3 in_colour;
+
+out vec3 v_colour;
+
+void main() {
+    vec4 clip = u_clip_from_head * vec4(in_position, 1.0);
+    vec4 pushed = u_clip_from_head * vec4(in_position + u_push_m * u_forward, 1.0);
+    gl_Position = vec4(clip.xy, pushed.z / pushed.w * clip.w, clip.w);
+    v_colour = skin(in_position, normalize(in_normal), in_colour);
+}
