@@ -49,6 +49,9 @@ class Contact:
     """m/s, at which a node deep inside is brought out."""
     deepest: Float64Array | None = None
     """(P,) least distance, metres, of the guides' own points where they are drawn; None: any."""
+    rounds: int = 0
+    """Rounds of friction under the tension that restores the lengths. Without, taut strands rub too
+    little around bends; with 4 the rope's law holds. Only the reference knows them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +89,7 @@ def substep(
     default substeps, since positions and directions are predicted to second order.
     """
     new, _ = pulled(rods, system, state, load, iterations)
-    return new if contact is None else collided(rods, new, contact, load.ride, system.step)
+    return new if contact is None else collided(rods, new, contact, load.ride, system.step)[0]
 
 
 def pulled(
@@ -208,28 +211,46 @@ def tension(
     return result
 
 
-def collided(rods: Rods, state: State, contact: Contact, ride: Float64Array, step: float) -> State:
-    """Return the state with nodes brought out of the obstacles, with Coulomb friction."""
+def collided(
+    rods: Rods, state: State, contact: Contact, ride: Float64Array, step: float
+) -> tuple[State, Float64Array]:
+    """Return the state with nodes brought out of the obstacles, with Coulomb friction.
+
+    Beside it the tension (S, n - 1), newtons, that brings the lengths back, on top of what the
+    substep has had before: a strand that lies taut around an obstacle is pressed on it by both.
+    """
     shape = state.position.shape
     distance, normal = contact.obstacles.at(state.position.reshape(-1, 3))
-    distance, normal = distance.reshape(shape[:2]), normal.reshape(shape)
-    depth = contact.clearance - distance
+    depth = contact.clearance - distance.reshape(shape[:2])
     depth[:, 0] = 0.0
+    normal = (depth > 0)[..., None] * normal.reshape(shape)
     riding = (state.position - moved(ride, state.position)) / step
-    relative = state.velocity - riding
-    inward = np.maximum(-(relative * normal).sum(axis=-1), 0.0)
+    inward = np.maximum(-((state.velocity - riding) * normal).sum(axis=-1), 0.0)
     # What came in during this substep goes out again; older depth leaves at a limited speed.
     out = np.clip(depth, 0.0, (inward + contact.fastest) * step)
-    touching = (depth > 0)[..., None]
+    velocity = state.velocity + inward[..., None] * normal
+    position = state.position + out[..., None] * normal
+    grip, tension_here = contact.friction * inward, np.zeros_like(rods.length)
+    for _ in range(1 + contact.rounds):
+        brake = braking(velocity - riding, normal, grip)
+        position, velocity = position + step * brake, velocity + brake
+        fixed, pull, pressed = relengthened(rods, position, normal)
+        velocity, position = velocity + (fixed - position) / step, fixed
+        tension_here += pull / step**2
+        grip += contact.friction * pressed / step - np.linalg.norm(brake, axis=-1)
+    return replace(state, position=position, velocity=velocity), tension_here
+
+
+def braking(relative: Float64Array, normal: Float64Array, grip: Float64Array) -> Float64Array:
+    """Return the change (S, n, 3) of velocities along the obstacle, at most `grip` (S, n), m/s.
+
+    Coulomb: the change along is at most the coefficient times the change across.
+    """
     along = relative - (relative * normal).sum(axis=-1, keepdims=True) * normal
     speed = np.linalg.norm(along, axis=-1)
-    # Coulomb: the change along is at most the coefficient times the change across.
-    slowed = np.minimum(contact.friction * inward, speed) / np.maximum(speed, 1e-12)
-    brake = -slowed[..., None] * along
-    velocity = state.velocity + touching * (inward[..., None] * normal + brake)
-    position = state.position + touching * (out[..., None] * normal + step * brake)
-    fixed = relengthened(rods, position, touching * normal)
-    return replace(state, position=fixed, velocity=velocity + (fixed - position) / step)
+    slowed = np.clip(grip, 0.0, speed) / np.maximum(speed, 1e-12)
+    result: Float64Array = -slowed[..., None] * along
+    return result
 
 
 def uncovered(points: Float64Array, contact: Contact) -> Float64Array:
@@ -242,11 +263,15 @@ def uncovered(points: Float64Array, contact: Contact) -> Float64Array:
     return result
 
 
-def relengthened(rods: Rods, position: Float64Array, normal: Float64Array) -> Float64Array:
-    """Return positions with the lengths restored that contacts have changed.
+def relengthened(
+    rods: Rods, position: Float64Array, normal: Float64Array
+) -> tuple[Float64Array, Float64Array, Float64Array]:
+    """Return positions with the lengths restored that contacts have changed, and what it takes.
 
     One tridiagonal solve (Han and Harada 2013) in which a node at an obstacle moves only along it,
-    square to `normal` (S, n, 3), which is 0 where a node is free; the root does not move.
+    square to `normal` (S, n, 3), which is 0 where a node is free; the root does not move. What it
+    takes: the pulls (S, n - 1) of the segments, kg m, and how far they would press the nodes (S, n)
+    into the obstacles, metres.
     """
     ease = 1.0 / rods.mass
     ease[:, 0] = 0.0
@@ -264,11 +289,14 @@ def relengthened(rods: Rods, position: Float64Array, normal: Float64Array) -> Fl
     diagonal = (direction * (start + end)).sum(axis=-1)
     diagonal += SOFTEST * (ease[:, :-1] + ease[:, 1:])
     beside = -(end[:, :-1] * direction[:, 1:]).sum(axis=-1)
-    pull = _tridiagonal(diagonal, beside, reach - rods.length)[..., None]
+    pull = _tridiagonal(diagonal, beside, reach - rods.length)
     fixed = position.copy()
-    fixed[:, :-1] += pull * start
-    fixed[:, 1:] -= pull * end
-    return fixed
+    fixed[:, :-1] += pull[..., None] * start
+    fixed[:, 1:] -= pull[..., None] * end
+    push = _edges_transposed(pull[..., None] * direction)
+    pressed = np.zeros_like(ease)
+    pressed[:, 1:] = ease[:, 1:] * (push * normal[:, 1:]).sum(axis=-1)
+    return fixed, pull, pressed
 
 
 def _edges(change: Float64Array) -> Float64Array:
