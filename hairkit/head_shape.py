@@ -10,8 +10,10 @@ centre); they are proportions of an average adult, scaled to a head breadth of 1
 
 from __future__ import annotations
 
+from functools import cache
+from typing import Any
+
 import numpy as np
-from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from hairkit.stored import Float64Array
 
@@ -61,8 +63,6 @@ _NOSE = np.array(
         [-95.0, 0.0, 7.0],
     ]
 )
-
-_NOSE_CURVES = PchipInterpolator(_NOSE[::-1, 0], _NOSE[::-1, 1:])
 
 # Centre (x, y, z), reach (x, y, z), displacement (x, y, z); those beside the middle are mirrored.
 _BUMPS = np.array(
@@ -121,7 +121,6 @@ _HAIRLINE = np.array(
         [180.0, -97.0],
     ]
 )
-_HAIRLINE_CURVE = PchipInterpolator(_HAIRLINE[:, 0], _HAIRLINE[:, 1])
 _HAIRLINE_FADE = 8.0
 
 
@@ -141,10 +140,9 @@ def scalp_weight(points: Float64Array) -> Float64Array:
     """Return (N,) how surely hair grows at points (N, 3), metres: 1, 0.5 at the hairline, 0."""
     x, y, z = points.T * 1e3
     azimuth = np.degrees(np.arctan2(np.abs(x), z + 10.0))
-    slope = np.degrees(_HAIRLINE_CURVE.derivative()(azimuth)) / np.maximum(
-        np.hypot(x, z + 10.0), 20.0
-    )
-    beyond = (y - _HAIRLINE_CURVE(azimuth)) / np.sqrt(1 + slope**2)
+    hairline = _hairline()
+    slope = np.degrees(hairline.derivative()(azimuth)) / np.maximum(np.hypot(x, z + 10.0), 20.0)
+    beyond = (y - hairline(azimuth)) / np.sqrt(1 + slope**2)
     t = np.clip(0.5 + beyond / _HAIRLINE_FADE, 0, 1)
     result: Float64Array = t * t * (3 - 2 * t)
     return result
@@ -153,7 +151,8 @@ def scalp_weight(points: Float64Array) -> Float64Array:
 def _level_curves(polar: Float64Array, azimuth: Float64Array) -> Float64Array:
     """Points (N, 3) of the smooth head without features, mm."""
     angle = np.degrees(polar)
-    front, back, side = _PROFILES(angle), _PROFILES(-angle), _PROFILES(angle)[:, :3]
+    profiles = _profiles()
+    front, back, side = profiles(angle), profiles(-angle), profiles(angle)[:, :3]
     ahead = np.cos(azimuth) > 0
     power = np.where(ahead, front[:, 5], back[:, 5])
     cosine, sine = np.abs(np.cos(azimuth)), np.abs(np.sin(azimuth))
@@ -171,23 +170,40 @@ def _level_curves(polar: Float64Array, azimuth: Float64Array) -> Float64Array:
     return result
 
 
-def _profiles() -> CubicSpline:
+# SciPy's splines take as long to load as NumPy: they are loaded when a head is made.
+@cache
+def _profiles() -> Any:
     """Side (x, y, z), median (y, z) and exponent over the angle: in front above 0, behind below.
 
     One closed curve through both poles, so that the surface is smooth there; x is odd.
     """
+    from scipy.interpolate import CubicSpline
+
     front = _LEVELS[:, [3, 4, 5, 1, 2, 8]]
     back = _LEVELS[:0:-1, [3, 4, 5, 6, 7, 9]] * [-1, 1, 1, 1, 1, 1]
     angles = np.concatenate([-_LEVELS[:0:-1, 0], _LEVELS[:, 0]])
     return CubicSpline(angles, np.concatenate([back, front]), bc_type="periodic")
 
 
-_PROFILES = _profiles()
+@cache
+def _nose_curves() -> Any:
+    """How far the ridge stands out, and its half width, over the height."""
+    from scipy.interpolate import PchipInterpolator
+
+    return PchipInterpolator(_NOSE[::-1, 0], _NOSE[::-1, 1:])
+
+
+@cache
+def _hairline() -> Any:
+    """The hairline's height over the azimuth."""
+    from scipy.interpolate import PchipInterpolator
+
+    return PchipInterpolator(_HAIRLINE[:, 0], _HAIRLINE[:, 1])
 
 
 def _nose(base: Float64Array) -> Float64Array:
     x, y, z = base.T
-    height = _NOSE_CURVES(np.clip(y, _NOSE[-1, 0], _NOSE[0, 0]))
+    height = _nose_curves()(np.clip(y, _NOSE[-1, 0], _NOSE[0, 0]))
     out = np.where(z > 40, height[:, 0], 0) * np.exp(-((np.abs(x) / height[:, 1]) ** 2.2))
     result: Float64Array = np.stack([np.zeros_like(out), np.zeros_like(out), out], axis=1)
     return result

@@ -122,9 +122,9 @@ class Manager:
             A plugin file cannot be used. Broken installed plugins are only recorded.
         """
         own_only = not autoload or bool(os.environ.get(DISABLE_AUTOLOAD))
-        for entry in _entry_points():
-            if _distribution(entry) == hookspecs.PROJECT or not own_only:
-                self._load_entry_point(entry)
+        for distribution, version, entry in _entry_points():
+            if distribution == hookspecs.PROJECT or not own_only:
+                self._load_entry_point(entry, distribution, version)
         for file in plugin_files:
             self._load_file(Path(file))
 
@@ -274,9 +274,9 @@ class Manager:
         if not callers:
             raise PluginError("it implements no hook; mark its function with @hairkit.hookimpl")
 
-    def _load_entry_point(self, entry: importlib.metadata.EntryPoint) -> None:
-        distribution = _distribution(entry)
-        version = entry.dist.version if entry.dist is not None else ""
+    def _load_entry_point(
+        self, entry: importlib.metadata.EntryPoint, distribution: str, version: str
+    ) -> None:
         try:
             self.register(entry.load(), entry.name, distribution, version)
         except (Exception, SystemExit) as error:  # a plugin may do anything while it is imported
@@ -297,16 +297,21 @@ class Manager:
             raise PluginError(f"--plugin {path}: {_one_line(reason)}") from error
 
 
-def _entry_points() -> list[importlib.metadata.EntryPoint]:
-    """Return the entry points, hairkit's own first so that nobody can take their names."""
-    found = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
-    return sorted(
-        found, key=lambda e: (_distribution(e) != hookspecs.PROJECT, _distribution(e), e.name)
-    )
+def _entry_points() -> list[tuple[str, str, importlib.metadata.EntryPoint]]:
+    """Return entry points with the name and version of their distributions, hairkit's own first
+    so that nobody can take their names."""
+    entries = importlib.metadata.entry_points(group=ENTRY_POINT_GROUP)
+    # a distribution parses its metadata whenever it is asked, and one may have many plugins
+    distributions = {id(entry.dist): entry.dist for entry in entries}
+    origins = {key: _origin(found) for key, found in distributions.items()}
+    found = [(*origins[id(entry.dist)], entry) for entry in entries]
+    return sorted(found, key=lambda f: (f[0] != hookspecs.PROJECT, f[0], f[2].name))
 
 
-def _distribution(entry: importlib.metadata.EntryPoint) -> str:
-    return entry.dist.name if entry.dist is not None else "unknown distribution"
+def _origin(distribution: importlib.metadata.Distribution | None) -> tuple[str, str]:
+    if distribution is None:
+        return "unknown distribution", ""
+    return distribution.name, distribution.version
 
 
 def _import_file(path: Path) -> ModuleType:

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import RBFInterpolator
 
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
 from hairkit.coherence import Outlines
@@ -155,6 +154,8 @@ def _bilinear(field: Float32Array, column: Float64Array, row: Float64Array) -> F
 def _moved(head: Head, places: Float64Array, moves: Float64Array, smoothing: Float64Array) -> Head:
     """Return the head, its joints and capsules carried along by the spline through `moves` at
     `places`."""
+    from scipy.interpolate import RBFInterpolator  # loads half of SciPy
+
     spline = RBFInterpolator(places, moves, smoothing=smoothing, kernel="linear", degree=1)
 
     def carry(points: Float32Array) -> Float32Array:

@@ -182,6 +182,27 @@ def test_a_broken_plugin_is_recorded_and_the_rest_loads(monkeypatch: pytest.Monk
         manager.call("orient", "bad")
 
 
+def test_a_distribution_is_asked_who_it_is_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many plugins it has: it parses its metadata anew for every answer."""
+    asked = []
+
+    class Distribution:
+        version = "1.2"
+
+        @property
+        def name(self) -> str:
+            asked.append(1)
+            return "studio-hair"
+
+    shared = Distribution()
+    found = [entry(name, Upright()) for name in ("up", "right", "there")]
+    for one in found:
+        one.dist = shared
+    entry_points(monkeypatch, *found)
+    assert {info.distribution for info in Manager.loaded().plugins()} == {"studio-hair"}
+    assert len(asked) == 1
+
+
 def misspelt() -> object:
     """Return a plugin whose hook's name is misspelt."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from xml.sax.saxutils import escape
+from html import escape
 
 import numpy as np
 import numpy.typing as npt
@@ -145,4 +145,4 @@ def _escaped(name: str, text: str) -> str:
         raise InputError(
             f"{name} is {text[:40]!r}, expected at most {schema.MAX_STRING} printable ASCII letters"
         )
-    return escape(text)
+    return escape(text, quote=False)

@@ -144,6 +144,17 @@ def test_only_the_verb_asked_for_is_imported() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_plugins_are_listed_without_what_only_their_work_needs() -> None:
+    """SciPy's splines, the web and the exporters' libraries load when a stage runs."""
+    heavy = ("scipy.interpolate", "scipy.optimize", "urllib.request", "alembic3d", "pygltflib")
+    code = (
+        "import sys; from hairkit.cli import main; main(['plugins']);"
+        f"print('loaded', [m for m in {heavy} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "loaded []"
+
+
 def test_every_verb_is_a_file() -> None:
     """The list of verbs is the list of files."""
     folder = Path(cli.__file__).parent
