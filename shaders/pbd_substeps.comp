@@ -25,30 +25,23 @@ uniform float u_fastest;       // m/s
 
 int rod;
 vec3 place[NODE_ROOM], speed[NODE_ROOM], force[NODE_ROOM], solved[NODE_ROOM];
+vec3 free[NODE_ROOM];          // the solution without lengths
 float slack[NODE_ROOM];
 vec4 frame[SEGMENT_ROOM];
 vec3 edge[SEGMENT_ROOM], direction[SEGMENT_ROOM];
 float pivot[SEGMENT_ROOM], beside[SEGMENT_ROOM], value[SEGMENT_ROOM];
+float factor[SEGMENTS * (SEGMENTS - 1) / 2], scaled[SEGMENT_ROOM];
 
-// Read once, used in every substep.
-vec4 rest_and_mass[NODE_ROOM], rates[NODE_ROOM];
-vec4 banded[SEGMENT_ROOM];     // two lower entries, 1/pivot; length
-vec4 stiffness[SEGMENT_ROOM];  // bend, twist, natural twist, 1/length
-vec3 curvature[SEGMENT_ROOM];
-vec4 metrics[(SEGMENT_ROOM * NODE_ROOM / 2 + 3) / 4];
-float metric(int pair) { return metrics[pair / 4][pair % 4]; }
-
-void read_constants() {
-    for (int j = 0; j < EACH_NODE; j++) {
-        rest_and_mass[j] = constant(rod, NODE_ROW + 2 * j);
-        rates[j] = constant(rod, NODE_ROW + 2 * j + 1);
-    }
-    for (int j = 0; j < EACH_SEGMENT; j++) {
-        banded[j] = constant(rod, ELEMENT_ROW + 3 * j);
-        stiffness[j] = constant(rod, ELEMENT_ROW + 3 * j + 1);
-        curvature[j] = constant(rod, ELEMENT_ROW + 3 * j + 2).xyz;
-    }
-    for (int i = 0; i < (EACH_SEGMENT * EACH_NODE / 2 + 3) / 4; i++) metrics[i] = constant(rod, METRIC_ROW + i);
+// Constants are read where they are used: kept, they would only fill the memory of local arrays.
+vec4 rest_and_mass(int j) { return constant(rod, NODE_ROW + 2 * j); }
+vec4 rates(int j) { return constant(rod, NODE_ROW + 2 * j + 1); }          // drag, pull, clearance, 1/mass
+vec4 banded(int j) { return constant(rod, ELEMENT_ROW + 3 * j); }          // two lower entries, 1/pivot; length
+vec4 stiffness(int j) { return constant(rod, ELEMENT_ROW + 3 * j + 1); }   // bend, twist, natural twist, 1/length
+vec3 curvature(int j) { return constant(rod, ELEMENT_ROW + 3 * j + 2).xyz; }
+vec4 metrics;
+float next_metric(int pair) {  // one after the other
+    if (pair % 4 == 0) metrics = constant(rod, METRIC_ROW + pair / 4);
+    return metrics[pair % 4];
 }
 
 vec3 drift(int k, vec3 p) {
@@ -57,7 +50,7 @@ vec3 drift(int k, vec3 p) {
 
 // Carry a node into the new axes, go on straight, and add up what acts on it.
 void predict(int k, int j) {
-    vec4 rest = rest_and_mass[j], rate = rates[j];
+    vec4 rest = rest_and_mass(j), rate = rates(j);
     vec3 p = ridden(k, vec4(place[j], 1.0));
     vec3 u = j == 0 ? (rest.xyz - p) / u_seconds : ridden(k, vec4(speed[j], 0.0));
     p += u_seconds * u;
@@ -91,9 +84,9 @@ void untwist() {
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
-        vec3 natural = turned(half_way(before, after, quarter), curvature[j]);
+        vec3 natural = turned(half_way(before, after, quarter), curvature(j));
         vec3 turn = direction[j] - axis;
-        vec4 firmness = stiffness[j];
+        vec4 firmness = stiffness(j);
         float bend = firmness.x, twist = firmness.y;
         vec3 spun = cross(natural, turn), aside = cross(quarter, spun);
         float torque = twist * (twist_between(before, after) - firmness.z);
@@ -122,8 +115,8 @@ void add_elastic() {
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
-        vec3 natural = turned(half_way(before, after, quarter), curvature[j]);
-        vec4 firmness = stiffness[j];
+        vec3 natural = turned(half_way(before, after, quarter), curvature(j));
+        vec4 firmness = stiffness(j);
         float bend = firmness.x, over = firmness.w;
         vec3 reach = edge[j] * over, turn = reach - reach_before;
         vec3 spun = cross(natural, turn), aside = cross(quarter, spun);
@@ -133,7 +126,7 @@ void add_elastic() {
         vec3 moment = bend * (natural - turn);
         if (j > 0) {
             pull += cross(0.5 * bend * (spun - aside), axis) - moment - twisting;
-            vec3 done = pull * stiffness[j - 1].w;
+            vec3 done = pull * stiffness(j - 1).w;
             force[j - 1] -= done;
             force[j] += done;
         }
@@ -141,8 +134,8 @@ void add_elastic() {
         before = after;
         reach_before = reach;
     }
-    force[SEGMENTS - 1] -= pull * stiffness[SEGMENTS - 1].w;
-    force[SEGMENTS] += pull * stiffness[SEGMENTS - 1].w;
+    force[SEGMENTS - 1] -= pull * stiffness(SEGMENTS - 1).w;
+    force[SEGMENTS] += pull * stiffness(SEGMENTS - 1).w;
 }
 
 // Write A^-1 force of the free nodes to `solved`.
@@ -151,7 +144,7 @@ void solve_banded() {
     for (int j = 0; j < EACH_NODE; j++) {
         solved[j] = vec3(0.0);
         if (j > 0) {
-            vec4 factor = banded[j - 1];
+            vec4 factor = banded(j - 1);
             vec3 here = force[j] - factor.x * one - factor.y * two;
             two = one;
             one = here;
@@ -159,57 +152,60 @@ void solve_banded() {
         }
     }
     for (int j = EACH_NODE - 1; j >= 0; j--) {
-        if (j > 0 && j + 1 < NODES) solved[j] -= banded[j].x * solved[j + 1];
-        if (j > 0 && j + 2 < NODES) solved[j] -= banded[j + 1].y * solved[j + 2];
+        if (j > 0 && j + 1 < NODES) solved[j] -= banded(j).x * solved[j + 1];
+        if (j > 0 && j + 2 < NODES) solved[j] -= banded(j + 1).y * solved[j + 2];
     }
 }
 
 // Write the pull along the segments that brings them to their lengths to `value`: the factor
 // L D L^T of metric * (d d^T), row by row, with its forward substitution.
 void solve_lengths() {
-    float factor[SEGMENT_ROOM][SEGMENT_ROOM], scaled[SEGMENT_ROOM];
     for (int i = 0; i < EACH_SEGMENT; i++) {
-        vec3 excess = edge[i] + solved[i + 1] - solved[i];
-        float right = dot(excess, direction[i]) - banded[i].w;
-        float own = metric(i * (i + 1) / 2 + i), last = own * dot(direction[i], direction[i]);
+        vec3 way = direction[i], excess = edge[i] + free[i + 1] - free[i];
+        float right = dot(excess, way) - banded(i).w;
+        float last = 0.0;
         for (int j = 0; j < BELOW(i); j++)
             if (j < i) {
-                float here = metric(i * (i + 1) / 2 + j) * dot(direction[i], direction[j]);
+                float here = next_metric(i * (i + 1) / 2 + j) * dot(way, direction[j]);
                 for (int k = 0; k < BELOW(j); k++)
-                    if (k < j) here -= scaled[k] * factor[j][k];
+                    if (k < j) here -= scaled[k] * factor[j * (j - 1) / 2 + k];
                 scaled[j] = here;
                 float low = here * pivot[j];
-                factor[i][j] = low;
+                factor[i * (i - 1) / 2 + j] = low;
                 last -= here * low;
                 right -= low * value[j];
             }
-        pivot[i] = 1.0 / max(last, SINGULAR * own);
+        float own = next_metric(i * (i + 1) / 2 + i);
+        pivot[i] = 1.0 / max(last + own * dot(way, way), SINGULAR * own);
         value[i] = right;
     }
     for (int i = EACH_SEGMENT - 1; i >= 0; i--) {
-        value[i] *= pivot[i];
+        float pull = value[i] * pivot[i];
         for (int k = 0; k < EACH_SEGMENT; k++)
-            if (k > i) value[i] -= factor[k][i] * value[k];
+            if (k > i) pull -= factor[k * (k - 1) / 2 + i] * value[k];
+        value[i] = pull;
     }
 }
 
-// Go on by the solution of forces under the lengths.
+// Go on by the solution of forces under the lengths: solve for the forces, then in turns for the
+// lengths and their pulls, about the directions of the last solution.
 void go_on() {
-    vec3 free[NODE_ROOM];
-    solve_banded();
-    for (int j = 0; j < EACH_NODE; j++) free[j] = solved[j];
-    for (int iteration = 0; iteration < u_iterations; iteration++) {
-        if (iteration > 0)
-            for (int j = 0; j < EACH_SEGMENT; j++) {
-                direction[j] = normalize(edge[j] + (free[j + 1] - solved[j + 1]) - (free[j] - solved[j]));
-            }
-        for (int j = 0; j < EACH_NODE; j++) solved[j] = free[j];
-        solve_lengths();
-        for (int j = 0; j < EACH_NODE; j++) {
-            vec3 pull = j > 0 ? value[j - 1] * direction[j - 1] : vec3(0.0);
-            force[j] = j < SEGMENTS ? pull - value[j] * direction[j] : pull;
-        }
+    for (int turn = 0; turn <= u_iterations; turn++) {
         solve_banded();
+        if (turn == 0) {
+            for (int j = 0; j < EACH_NODE; j++) free[j] = solved[j];
+        } else if (turn < u_iterations) {
+            for (int j = 0; j < EACH_SEGMENT; j++)
+                direction[j] = normalize(edge[j] + (free[j + 1] - solved[j + 1]) - (free[j] - solved[j]));
+        }
+        if (turn == u_iterations) break;
+        solve_lengths();
+        vec3 before = vec3(0.0);
+        for (int j = 0; j < EACH_NODE; j++) {
+            vec3 after = j < SEGMENTS ? value[j] * direction[j] : vec3(0.0);
+            force[j] = before - after;
+            before = after;
+        }
     }
     for (int j = 0; j < EACH_NODE; j++) {  // both are 0 at the root
         vec3 change = free[j] - solved[j];
@@ -230,7 +226,6 @@ void main() {
         speed[j] = node_speed(rod, j).xyz;
     }
     for (int j = 0; j < EACH_SEGMENT; j++) frame[j] = segment_frame(rod, j);
-    read_constants();
     for (int k = u_first; k < u_first + u_substeps; k++) {
         for (int j = 0; j < EACH_NODE; j++) predict(k, j);
         for (int j = 0; j < EACH_SEGMENT; j++) {

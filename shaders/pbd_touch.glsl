@@ -2,20 +2,22 @@
 #include "pbd_distance.glsl"
 const float FURTHER = 1.05;       // slack wears off a little faster than the way that a node goes
 
+vec3 normal[NODE_ROOM];           // of what a node touches, else 0
+
 // Restore the lengths; a node at an obstacle moves only along it, square to its normal.
-void relengthen(vec3 normal[NODE_ROOM]) {
+void relengthen() {
     vec3 end_before = vec3(0.0);
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec3 way = place[j + 1] - place[j];
         float reach = length(way);
         direction[j] = way / reach;
         float a = dot(normal[j], direction[j]), b = dot(normal[j + 1], direction[j]);
-        float ease = rates[j].w, ease_after = rates[j + 1].w;
+        float ease = rates(j).w, ease_after = rates(j + 1).w;
         vec3 start = ease * (direction[j] - a * normal[j]);
         vec3 end = ease_after * (direction[j] - b * normal[j + 1]);
         pivot[j] = dot(direction[j], start + end) + SOFTEST * (ease + ease_after);
         beside[j] = -dot(end_before, direction[j]);
-        value[j] = reach - banded[j].w;
+        value[j] = reach - banded(j).w;
         end_before = end;
     }
     solve_tridiagonal();
@@ -23,7 +25,7 @@ void relengthen(vec3 normal[NODE_ROOM]) {
         vec3 pull = vec3(0.0);
         if (j > 0) pull -= value[j - 1] * direction[j - 1];
         if (j < SEGMENTS) pull += value[j] * direction[j];
-        vec3 change = rates[j].w * (pull - dot(pull, normal[j]) * normal[j]);
+        vec3 change = rates(j).w * (pull - dot(pull, normal[j]) * normal[j]);
         place[j] += change;
         speed[j] += change / u_seconds;
     }
@@ -32,32 +34,28 @@ void relengthen(vec3 normal[NODE_ROOM]) {
 // Bring a node out of the obstacles; return their normal where it touches, else 0. A node is looked
 // up again only when it may have gone as far as it was away the last time.
 vec3 touched(int k, int j) {
-    vec3 p = place[j], relative = speed[j] - drift(k, p), normal = vec3(0.0);
-    float clear = rates[j].z, left = slack[j] - FURTHER * u_seconds * length(relative);
+    vec3 p = place[j], relative = speed[j] - drift(k, p), way = vec3(0.0);
+    float clear = rates(j).z, left = slack[j] - FURTHER * u_seconds * length(relative);
     if (left <= 0.0) {
-        left = obstacle_distance(p, clear, normal) - clear;
-        float across = dot(relative, normal), inward = max(-across, 0.0);
+        left = obstacle_distance(p, clear, way) - clear;
+        float across = dot(relative, way), inward = max(-across, 0.0);
         // what came in during this substep goes out again; older depth leaves at a limited speed
         float depth = min(-left, (inward + u_fastest) * u_seconds);
-        vec3 along = relative - across * normal;
-        float size = length(along);
-        vec3 brake = along * (min(u_friction * inward, size) / max(size, 1e-12));
+        vec3 slide = relative - across * way;
+        float size = length(slide);
+        vec3 brake = slide * (min(u_friction * inward, size) / max(size, 1e-12));
         if (left < 0.0) {
-            speed[j] += inward * normal - brake;
-            place[j] += depth * normal - u_seconds * brake;
+            speed[j] += inward * way - brake;
+            place[j] += depth * way - u_seconds * brake;
         } else {
-            normal = vec3(0.0);
+            way = vec3(0.0);
         }
     }
     slack[j] = left;
-    return normal;
+    return way;
 }
 
 void touch(int k) {
-    vec3 normal[NODE_ROOM];
-    for (int j = 0; j < EACH_NODE; j++) {
-        normal[j] = vec3(0.0);
-        if (j > 0) normal[j] = touched(k, j);
-    }
-    relengthen(normal);
+    for (int j = 0; j < EACH_NODE; j++) normal[j] = j > 0 ? touched(k, j) : vec3(0.0);
+    relengthen();
 }

@@ -44,6 +44,7 @@ def air_uniforms(waves: AirWaves, wind: Float64Array, head: Float64Array) -> dic
     turned = np.fmod(phases + vectors @ head[:3, 3], 2 * np.pi)
     local = np.concatenate([vectors @ head[:3, :3], turned[:, None]], axis=1)
     return {
+        "u_count": len(vectors),
         "u_mean": tuple(wind),
         "u_waves": [tuple(wave) for wave in local],
         "u_amplitudes": [(*amplitude, 0.0) for amplitude in amplitudes],
