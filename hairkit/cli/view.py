@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from hairkit.cli.render import parse_size
 from hairkit.errors import InputError
 
+MOST_HAIRS = 200_000
 _DESCRIPTION = """\
 Example: hairkit view out/groom.npz
 
@@ -37,16 +39,39 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Show the groom until the window is closed, or play the script."""
+    _check(args)
+    return _headless(args) if args.headless else _window(args)
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuse what cannot be shown before a window opens for nothing."""
     from hairkit.groom_opening import groom_path
 
-    groom_path(args.groom)  # before a window opens for nothing
-    if args.headless:
-        return _headless(args)
+    groom_path(args.groom)
+    if args.hairs is not None and not 0 <= args.hairs <= MOST_HAIRS:
+        raise InputError(f"--hairs is {args.hairs}, expected 0 to {MOST_HAIRS}")
+    if args.capture is not None and not args.capture.is_dir():
+        raise InputError(f"--capture {args.capture}: no such folder")
+    for text in args.set:
+        _assignment(text)
+
+
+def _window(args: argparse.Namespace) -> int:
+    from hairkit.viewer.script import read_script
+    from hairkit.viewer.starting import AbandonedError
     from hairkit.viewer.window import show
 
     if args.out is not None:
         raise InputError("--out is for --headless; in the window pictures go to this folder")
-    show(lambda size: _session(args, size), _size(args), script=args.script, budget=_budget(args))
+    script = None if args.script is None else read_script(args.script)
+    budget, size = _budget(args), _size(args)
+    manager = _manager(args)
+    print(f"opening {args.groom}; H in the window shows the keys", file=sys.stderr)
+    try:
+        show(lambda size: _session(args, manager, size), size, script=script, budget=budget)
+    except AbandonedError:  # a thread that compiles cannot be ended, nor is it worth waiting for
+        sys.stderr.flush()
+        os._exit(0)
     return 0
 
 
@@ -63,7 +88,7 @@ def _headless(args: argparse.Namespace) -> int:
     size = _size(args) if args.size else script.setup.size
     with renderer() as gl:
         print(gl.description, file=sys.stderr)
-        preview = Preview(gl, _session(args, size, script.setup.seed))
+        preview = Preview(gl, _session(args, _manager(args), size, script.setup.seed))
         play(preview, script, args.out or Path())
         preview.release()
     for path in preview.written:
@@ -71,12 +96,23 @@ def _headless(args: argparse.Namespace) -> int:
     return 0
 
 
-def _session(args: argparse.Namespace, size: tuple[int, int], seed: int = 0) -> Any:
+def _manager(args: argparse.Namespace) -> Any:
+    """Return the plugins, when one of them reads the groom and one moves it."""
+    from hairkit.groom_opening import groom_path, plugin_for
     from hairkit.manager import Manager
+
+    manager = Manager.loaded(args.plugin)
+    path = groom_path(args.groom)
+    if path.suffix != ".npz":
+        plugin_for(manager, "import_groom", path)
+    return manager
+
+
+def _session(args: argparse.Namespace, manager: Any, size: tuple[int, int], seed: int = 0) -> Any:
     from hairkit.viewer.session import HAIRS, Session
 
     session = Session(
-        Manager.loaded(args.plugin),
+        manager,
         args.groom,
         size=size,
         simulator=args.simulator,
@@ -84,12 +120,16 @@ def _session(args: argparse.Namespace, size: tuple[int, int], seed: int = 0) -> 
         capture=args.capture,
         seed=seed,
     )
-    for text in args.set:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not equals:
-            raise InputError(f"--set {text}: expected option=value")
+    for name, value in map(_assignment, args.set):
         session.tuned.set(name.removeprefix(f"{session.tuned.plugin}."), value)
     return session
+
+
+def _assignment(text: str) -> tuple[str, str]:
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise InputError(f"--set {text}: expected option=value")
+    return name, value
 
 
 def _size(args: argparse.Namespace) -> tuple[int, int]:

@@ -43,16 +43,21 @@ def perform(session: Session, name: str, values: Mapping[str, object] | None = N
     InputError, OptionError
         There is no such action, a value is unknown, missing or refused, or it cannot be done here.
     """
+    wanted = checked_values(name, values or {})
+    ACTIONS[name].do(session, **wanted)
+
+
+def checked_values(name: str, values: Mapping[str, object]) -> dict[str, Any]:
+    """Return all values of an action, defaults among them; raises as `perform`."""
     if name not in ACTIONS:
         raise InputError(unknown_name("action", name, sorted(ACTIONS)))
-    action = ACTIONS[name]
-    given = dict(values or {})
-    checked = make_options(action.values, given, name)
-    wanted = {f.name: getattr(checked, f.name) for f in dataclasses.fields(action.values)}
+    kind = ACTIONS[name].values
+    checked = make_options(kind, dict(values), name)
+    wanted = {f.name: getattr(checked, f.name) for f in dataclasses.fields(kind)}
     missing = [key for key, value in wanted.items() if value is _MISSING]
     if missing:
         raise InputError(f"{name}: no value for {', '.join(missing)}")
-    action.do(session, **wanted)
+    return wanted
 
 
 def bindings() -> dict[str, tuple[str, Mapping[str, object]]]:

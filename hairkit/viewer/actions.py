@@ -14,7 +14,7 @@ import numpy as np
 from hairkit.errors import InputError
 from hairkit.options import unknown_name
 from hairkit.viewer import pose_actions  # adds its own to the table
-from hairkit.viewer.action_table import ACTIONS, action, bindings, perform
+from hairkit.viewer.action_table import ACTIONS, action, bindings, checked_values, perform
 from hairkit.viewer.colouring import COLOURINGS
 from hairkit.viewer.hair_body import MAX_HAIRS
 from hairkit.viewer.motion import AXES, Shake
@@ -23,7 +23,7 @@ from hairkit.viewer.presets import presets_path, read_preset, write_preset
 from hairkit.viewer.recording import Recorder, free_name
 from hairkit.viewer.session import Session
 
-__all__ = ["ACTIONS", "LOOKS", "bindings", "perform", "pose_actions"]
+__all__ = ["ACTIONS", "LOOKS", "bindings", "checked_values", "perform", "pose_actions"]
 
 LOOKS = {"front": (0.0, 0.0), "side": (90.0, 0.0), "back": (180.0, 0.0), "top": (0.0, 89.0)}
 """Named views: azimuth and elevation, degrees."""

@@ -18,14 +18,14 @@ from __future__ import annotations
 
 import time
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hairkit.errors import HairkitError, InputError
 from hairkit.options import make_options, option
-from hairkit.viewer.actions import ACTIONS, perform
+from hairkit.viewer.actions import checked_values, perform
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import FRAMES_PER_SECOND
 from hairkit.viewer.session import Session
@@ -65,27 +65,45 @@ def read_script(path: Path) -> Script:
     if not isinstance(steps, list) or not all(isinstance(step, Mapping) for step in steps):
         raise InputError(f"{path}: steps are no tables; begin each with [[steps]]")
     setup = make_options(Setup, document, str(path))
-    return Script(path, setup, tuple(_step(path, i, dict(s)) for i, s in enumerate(steps)))
+    return Script(path, setup, tuple(_step(path, i, dict(s)) for i, s in enumerate(steps, 1)))
 
 
 def play(preview: Preview, script: Script, out: Path) -> None:
-    """Do the steps one after the other; files go to the folder `out`, names are from there."""
+    """Do the steps one after the other; files go to the folder `out`, names are from there.
+
+    Files take the place of older ones of the same name.
+
+    Raises
+    ------
+    InputError
+        A step cannot be done; the text says which one.
+    """
     out.mkdir(parents=True, exist_ok=True)
     session = preview.session
     session.overwrite = True
-    for index, (name, values) in enumerate(script.steps):
+    try:
+        for _ in performed(session, script, out):
+            _let_time_pass(preview)
+            _wait_for_rerun(session)
+            if session.screenshots:
+                preview.frame(0.0, still=True)
+            if session.finished:
+                break
+    finally:
+        if session.rerun is not None:
+            session.rerun.stop()
+        if session.recorder is not None:
+            session.recorder.close()
+
+
+def performed(session: Session, script: Script, out: Path) -> Iterator[None]:
+    """Do one step at each `next`, and leave it to the caller to let time pass."""
+    for number, (name, values) in enumerate(script.steps, 1):
         try:
             perform(session, name, _placed(name, values, out, script.path.parent))
         except HairkitError as error:
-            raise InputError(f"{script.path}: step {index}: {error}") from error
-        _let_time_pass(preview)
-        _wait_for_rerun(session)
-        if session.screenshots:
-            preview.frame(0.0, still=True)
-        if session.finished:
-            break
-    if session.recorder is not None:
-        session.recorder.close()
+            raise InputError(f"{script.path}: step {number}: {error}") from error
+        yield
 
 
 def _let_time_pass(preview: Preview) -> None:
@@ -105,18 +123,18 @@ def _wait_for_rerun(session: Session) -> None:
         session.look_after_rerun()
 
 
-def _step(path: Path, index: int, table: dict[str, Any]) -> tuple[str, dict[str, Any]]:
-    name = table.pop("do", None)
-    if name not in ACTIONS:
-        raise InputError(
-            f"{path}: step {index}: do is {name!r}, expected one of {', '.join(sorted(ACTIONS))}"
-        )
-    return str(name), table
+def _step(path: Path, number: int, table: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    name = str(table.pop("do", None))
+    try:
+        checked_values(name, table)
+    except HairkitError as error:
+        raise InputError(f"{path}: step {number}: {error}") from error
+    return name, table
 
 
 def _placed(name: str, values: dict[str, Any], out: Path, here: Path) -> dict[str, Any]:
     """Return the values with file names taken from the right folder."""
     base = out if name in _WRITES else here if name in _READS else None
-    if base is None or "file" not in values:
+    if base is None:
         return values
-    return {**values, "file": str(base / str(values["file"]))}
+    return {**values, "file": str(base / str(checked_values(name, values)["file"]))}

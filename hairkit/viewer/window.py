@@ -6,6 +6,7 @@ The window's OpenGL context becomes the one that all of hairkit draws with in th
 from __future__ import annotations
 
 import contextlib
+import logging
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -24,11 +25,12 @@ from hairkit.viewer.keyboard import key_name
 from hairkit.viewer.mouse import Mouse
 from hairkit.viewer.panel import Panel, load_windowing
 from hairkit.viewer.preview import Preview
-from hairkit.viewer.script import play, read_script
+from hairkit.viewer.recording import FRAMES_PER_SECOND
+from hairkit.viewer.script import Script, performed
 from hairkit.viewer.session import Session
+from hairkit.viewer.starting import TITLE, AbandonedError, Waiting, warm_up
 from hairkit.viewer.watching import Watch, shader_files
 
-TITLE = "hairkit"
 TEXT_EVERY = 6
 """Pictures between two redraws of the text."""
 LONGEST_PAUSE = 0.1
@@ -43,10 +45,10 @@ def show(
     make_session: Callable[[tuple[int, int]], Session],
     size: tuple[int, int],
     *,
-    script: Path | None = None,
+    script: Script | None = None,
     budget: float = 1 / 20,
 ) -> None:
-    """Open the window and stay until it is closed.
+    """Open the window and stay until it is closed, or interrupted.
 
     Parameters
     ----------
@@ -63,12 +65,11 @@ def show(
     ------
     RenderError
         No window can be opened, or it has no OpenGL 4.3; the text says what to install.
+    AbandonedError
+        The window was closed before its first picture; a thread may still be at work.
     """
-    with opened(make_session, size, budget) as window:
-        if script is not None:
-            with renderer():
-                play(window.preview, read_script(script), Path())
-        window.loop()
+    with opened(make_session, size, budget) as window, contextlib.suppress(KeyboardInterrupt):
+        window.loop(None if script is None else performed(window.session, script, Path()))
 
 
 @contextlib.contextmanager
@@ -79,11 +80,33 @@ def opened(
     context = _Context(size)
     try:
         install(moderngl.create_context(REQUIRED_VERSION, **context.settings), "window")
-        with renderer():
-            session = make_session(size)
-        yield Window(context, session, budget)
-    finally:
+        window = _started(context, make_session, size, budget)
+    except AbandonedError:  # what a thread still draws with must stay until the process ends
+        context.glfw.hide_window(context.window)
+        raise
+    except BaseException:
         context.close()
+        raise
+    try:
+        yield window
+    finally:
+        window.leave()
+        context.close()
+
+
+def _started(
+    context: _Context,
+    make_session: Callable[[tuple[int, int]], Session],
+    size: tuple[int, int],
+    budget: float,
+) -> Window:
+    """Return the window with its first picture drawn, though not shown."""
+    waiting = Waiting(context.glfw, context.window)
+    session = waiting.until("opening the groom", lambda: make_session(size))
+    waiting.until("making the hair move", lambda: warm_up(session))
+    window = Window(context, session, budget)
+    waiting.until("drawing the first picture", window.draw_aside, draws=True)
+    return window
 
 
 class _Context:
@@ -148,7 +171,7 @@ class Window:
     def __init__(self, context: _Context, session: Session, budget: float) -> None:
         self._glfw, self._window = context.glfw, context.window
         self.session = session
-        session.most_seconds = 0.4 * budget if budget > 0 else None
+        self._most_seconds = 0.4 * budget if budget > 0 else None
         self._keys = bindings()
         self.mouse = Mouse(self.perform, session.size[1])
         self._watch_groom = Watch([session.opened.path])
@@ -162,6 +185,8 @@ class Window:
             self._text = gl.context.texture((1, 1), 4, b"\0\0\0\0")
             self._screen = gl.context.detect_framebuffer(0)
             self._panel = Panel(self._window)
+        self._warnings = _Warnings(session)
+        logging.getLogger("hairkit").addHandler(self._warnings)
         self._listen()
 
     def perform(self, name: str, values: Mapping[str, object]) -> None:
@@ -173,26 +198,43 @@ class Window:
         except (HairkitError, OSError) as error:
             self.session.message = " ".join(str(error).split())
 
-    def loop(self) -> None:
-        """Draw until the window is closed."""
+    def loop(self, steps: Iterator[None] | None = None) -> None:
+        """Draw until the window is closed; `steps` does an action of a script at each `next`."""
         before = time.perf_counter()
         while not (self.session.finished or self._glfw.window_should_close(self._window)):
             self._glfw.poll_events()
-            now = time.perf_counter()
-            self.picture(min(now - before, LONGEST_PAUSE))
-            before = now
+            steps = self._next(steps)
+            passed = time.perf_counter() - before
+            if self.session.recorder is not None:  # a film has its own time, slower or not
+                wait, passed = 1 / FRAMES_PER_SECOND - passed, 1 / FRAMES_PER_SECOND
+                time.sleep(max(wait, 0.0))
+            before = time.perf_counter()
+            passed = min(passed, LONGEST_PAUSE)
+            self.picture(passed)
+            self.session.pending = max(self.session.pending - passed, 0.0)
+
+    def leave(self) -> None:
+        """Finish what is being written and end what runs aside."""
+        logging.getLogger("hairkit").removeHandler(self._warnings)
         if self.session.recorder is not None:
             self.session.recorder.close()
         if self.session.rerun is not None:
             self.session.rerun.stop()
 
+    def draw_aside(self) -> None:
+        """Draw a picture that nobody sees, so that shaders are compiled."""
+        with renderer():
+            self.preview.draw()
+
     def picture(self, seconds: float) -> None:
         """Let time pass and show a picture."""
         self._fit()
         self._reload_changed()
+        filmed = self.session.recorder is not None
+        self.session.most_seconds = None if filmed else self._most_seconds
         with renderer() as gl:
             try:
-                self.preview.frame(seconds, still=bool(self.session.screenshots))
+                self.preview.frame(seconds, still=filmed or bool(self.session.screenshots))
             except (HairkitError, OSError) as error:  # a full disk, a simulator at its end
                 self.session.message = " ".join(str(error).split())
                 self.session.paused, self.session.recorder = True, None
@@ -201,6 +243,21 @@ class Window:
             self._panel.draw(self.session, self.preview, self.perform)
             self._glfw.swap_buffers(self._window)
             gl.home.use()
+
+    def _next(self, steps: Iterator[None] | None) -> Iterator[None] | None:
+        """Do the next action of a script when the last one has had its time."""
+        session = self.session
+        if steps is None or session.pending > 1e-9 or session.rerun is not None:
+            return steps
+        try:
+            with renderer():
+                next(steps)
+        except StopIteration:
+            return None
+        except (HairkitError, OSError) as error:
+            session.message = " ".join(str(error).split())
+            return None
+        return steps
 
     def _show(self, gl: Any) -> None:
         """Bring the picture and the text onto the screen."""
@@ -294,8 +351,22 @@ class Window:
     def on_drop(self, window: Any, paths: list[str]) -> None:
         """Files were dropped; the first one is opened."""
         if paths:
+            self.session.message = f"opening {paths[0]}"
+            self.picture(0.0)
             self.perform("open_file", {"file": str(paths[0])})
             self._watch_groom = Watch([self.session.opened.path])
+
+
+class _Warnings(logging.Handler):
+    """Tells in the picture what is warned of."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(logging.WARNING)
+        self._session = session
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show it until the next action."""
+        self._session.message = " ".join(record.getMessage().split())
 
 
 def _text(text: bytes | str) -> str:

@@ -9,7 +9,7 @@ import pytest
 
 from hairkit.viewer.actions import ACTIONS
 from hairkit.viewer.colouring import COLOURINGS
-from hairkit.viewer.hud import help_lines, key_label
+from hairkit.viewer.hud import help_lines, keys_label
 from hairkit.viewer.script import read_script
 
 
@@ -39,8 +39,18 @@ def test_the_scripts_of_the_manual_are_scripts(page: str, project: Path, tmp_pat
 
 
 def test_the_help_sheet_names_every_key() -> None:
-    """Each bound key stands on the sheet, as it is called on a keyboard."""
-    sheet = "\n".join(help_lines())
+    """Each action's keys stand beside what it does, as they are called on a keyboard."""
+    sheet = help_lines()
     for action in ACTIONS.values():
-        for key in action.keys:
-            assert key_label(key) in sheet
+        if action.keys:
+            keys = keys_label(list(action.keys))
+            assert f"{keys}\t{action.doc.removesuffix('.')}" in sheet
+
+
+def test_keys_are_called_as_they_are_printed_on_a_keyboard() -> None:
+    """Groups are shortened, and keys that say the same are said once."""
+    assert keys_label(["CTRL_LEFT", "CTRL_RIGHT", "CTRL_UP", "CTRL_DOWN"]) == "ctrl+arrows"
+    assert keys_label(["N1", "N3"]) == "1 3"
+    assert keys_label(["F2", "F10"]) == "F2 F10"
+    assert keys_label(["EQUAL", "MINUS", "KP_ADD", "KP_SUBTRACT"]) == "+ -"
+    assert keys_label(["TAB", "SHIFT_TAB"]) == "tab shift+tab"

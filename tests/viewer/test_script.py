@@ -86,7 +86,10 @@ def test_a_script_run_again_gives_the_same_pictures(session: Session, tmp_path: 
     ("text", "message"),
     [
         ("steps = 3", "begin each with"),
-        ("[[steps]]\ndo = 'fly'", "step 0: do is 'fly', expected one of"),
+        ("[[steps]]\ndo = 'fly'", "step 1: no action 'fly'; valid: adjust"),
+        ("[[steps]]\ndo = 'zoom'", "step 1: zoom: no value for factor"),
+        ("[[steps]]\ndo = 'wind'\nspeeed = 3", "step 1: wind: no option 'speeed'"),
+        ("[[steps]]\ndo = 'wind'\nspeed = 'fast'", "step 1: wind: option speed is 'fast'"),
         ("size = [3, 3]", "size"),
         ("hears = 3", "did you mean 'hairs'"),
         ("[[steps", "not a TOML file"),
@@ -101,9 +104,10 @@ def test_a_wrong_script_is_refused_in_one_line(tmp_path: Path, text: str, messag
 
 
 def test_a_step_that_fails_is_numbered(session: Session, tmp_path: Path) -> None:
-    """The error of an action names the script's step."""
-    script = read_script(write(tmp_path, "[[steps]]\ndo = 'pause'\n[[steps]]\ndo = 'zoom'"))
-    with renderer() as gl, pytest.raises(HairkitError, match=r"step 1: zoom: no value for factor"):
+    """The error of an action names the script's step, the first one being 1."""
+    text = "[[steps]]\ndo = 'pause'\n[[steps]]\ndo = 'look'\nname = 'left'"
+    script = read_script(write(tmp_path, text))
+    with renderer() as gl, pytest.raises(HairkitError, match=r"step 2: no view 'left'"):
         play(Preview(gl, session), script, tmp_path)
 
 
