@@ -4,7 +4,8 @@ python benchmarks/viewer.py --guides 600 --hairs 10000 --size 1280x720
 
 Each row is the median picture of a shaken head in wind, as wall time, and as processor time of all
 threads over the number of cores: what the wall time is on a machine that does nothing else.
-`chosen` is what the frame budget settles on by itself.
+`chosen` is what the frame budget settles on by itself. Hair is drawn by compute shaders, which a
+graphics card wants, or by compiled loops, which is what the viewer does without one.
 """
 
 from __future__ import annotations
@@ -20,13 +21,19 @@ from hairkit.cli.render import parse_size
 from hairkit.default_head import default_head
 from hairkit.groom_file import write_groom
 from hairkit.manager import Manager
-from hairkit.render.context import renderer
+from hairkit.render.context import Renderer, renderer
 from hairkit.synth import grow
 from hairkit.viewer.actions import perform
 from hairkit.viewer.budget import LEVELS, Budget
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
 
+HEADINGS = (
+    "simulation", "hair by", "quality", "wall ms", "fps", "processor ms / cores",
+    "fps idle machine",
+)  # fmt: skip
+ROWS = ((False, 0), (False, 1), (True, 0), (True, 1), (True, 3), (None, None))
+"""Whether hair is drawn by the processor, and the level of quality."""
 WARM = 12
 """Pictures before the measured ones."""
 
@@ -39,8 +46,7 @@ def main() -> int:
         write_groom(path, grow("straight", default_head(), args.guides))
         print(f"{gl.description}, {os.cpu_count()} cores\n")
         print(f"{args.guides} guides, {args.hairs} hairs, {args.size}, {args.pictures} pictures\n")
-        print("| simulation | quality | wall ms | fps | processor ms / cores | fps idle machine |")
-        print("|---|---|---|---|---|---|")
+        print(f"| {' | '.join(HEADINGS)} |\n|{'---|' * len(HEADINGS)}")
         for simulator in ("none", None):
             session = Session(
                 Manager.loaded(),
@@ -49,16 +55,25 @@ def main() -> int:
                 simulator=simulator,
                 hairs=args.hairs,
             )
-            for level in (0, 1, 2, 3, None):
-                _row(args, gl, session, level)
+            for soft, level in (
+                (False, 0),
+                (False, 1),
+                (True, 0),
+                (True, 1),
+                (True, 3),
+                (None, None),
+            ):
+                _row(args, gl, session, level, soft)
     return 0
 
 
-def _row(args: argparse.Namespace, gl: object, session: Session, level: int | None) -> None:
+def _row(
+    args: argparse.Namespace, gl: Renderer, session: Session, level: int | None, soft: bool | None
+) -> None:
     """Print one line: a fixed level of quality, or the budget's choice."""
     budget = Budget(1 / 20)
     session.most_seconds = 0.4 * budget.seconds
-    preview = Preview(gl, session, budget)  # type: ignore[arg-type]
+    preview = Preview(gl, session, budget, soft)
     walls, processors = [], []
     for picture in range(WARM + args.pictures + (80 if level is None else 0)):
         if picture % 60 == 0:
@@ -68,7 +83,7 @@ def _row(args: argparse.Namespace, gl: object, session: Session, level: int | No
             budget.level, budget._wait = level, 99
         wall, processor = time.perf_counter(), time.process_time()
         preview.frame(1 / 30)
-        gl.context.finish()  # type: ignore[attr-defined]
+        gl.context.finish()
         walls.append(time.perf_counter() - wall)
         processors.append(time.process_time() - processor)
     wall = statistics.median(walls[-args.pictures :])
@@ -78,7 +93,8 @@ def _row(args: argparse.Namespace, gl: object, session: Session, level: int | No
         f"{'chosen: ' if level is None else ''}scale {quality.scale}, {quality.share:.0%} of hairs"
     )
     print(
-        f"| {session.tuned.plugin} | {name}{', soft' if quality.smooth else ''} | {1e3 * wall:.0f}"
+        f"| {session.tuned.plugin} | {'processor' if preview.stage.soft else 'shaders'}"
+        f" | {name}{', soft' if quality.smooth else ''} | {1e3 * wall:.0f}"
         f" | {1 / wall:.1f} | {1e3 * processor:.0f} | {1 / processor:.1f} |",
         flush=True,
     )

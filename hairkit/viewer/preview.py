@@ -35,8 +35,16 @@ PICKED = (1.0, 0.85, 0.1)
 class Preview:
     """Draws a session; used inside `renderer()` only."""
 
-    def __init__(self, gl: Renderer, session: Session, budget: Budget | None = None) -> None:
+    def __init__(
+        self,
+        gl: Renderer,
+        session: Session,
+        budget: Budget | None = None,
+        soft: bool | None = None,
+    ) -> None:
+        """Draw within a budget, by default the best; `soft` as in `Stage`."""
         self.gl = gl
+        self.soft = soft
         self.session = session
         self.budget = budget or Budget(0.0)
         self.readings = Readings(renderer=gl.description)
@@ -58,7 +66,8 @@ class Preview:
         if self._stage is None or self._drawn[0] is not now[0]:
             self.release()
             groom = session.opened.groom
-            self._stage = Stage(self.gl, head_solid(groom.head, groom.material), session.body)
+            solid = head_solid(groom.head, groom.material)
+            self._stage = Stage(self.gl, solid, session.body, self.soft)
         elif self._drawn[1] is not now[1]:
             self._stage.replace_body(session.body)
         self._drawn = now
