@@ -92,10 +92,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def explain(error: BaseException) -> tuple[str, int]:
     """Return the one line that tells a user about an error, and the exit code."""
+    if _interrupted(error):
+        return "interrupted; run it again to go on where it stopped", 2
     if isinstance(error, HairkitError):
         return _one_line(error), 2
-    if isinstance(error, KeyboardInterrupt):
-        return "interrupted; run it again to go on where it stopped", 2
     if isinstance(error, MemoryError):
         return f"out of memory; use smaller pictures or larger voxels ({_one_line(error)})", 2
     if isinstance(error, OSError):
@@ -161,6 +161,13 @@ def _log_to_stderr(level: int) -> None:
         handler = logging.StreamHandler()
         handler.setFormatter(logging.Formatter("hairkit: %(levelname)s: %(message)s"))
         logger.addHandler(handler)
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Say whether Ctrl-C is behind an error: a library may make an ImportError of it."""
+    if error is None or isinstance(error, KeyboardInterrupt):
+        return error is not None
+    return _interrupted(error.__cause__ or error.__context__)
 
 
 def _one_line(error: BaseException) -> str:

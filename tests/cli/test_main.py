@@ -144,6 +144,38 @@ def test_only_the_verb_asked_for_is_imported() -> None:
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+@pytest.mark.parametrize("module", ["hairkit.cli", "argparse", "numpy", "numba", "hairkit.manager"])
+def test_ctrl_c_is_one_line_whatever_is_just_loading(module: str) -> None:
+    """The first press while modules load ends the command like a later one: no traceback."""
+    code = f"""
+import signal, sys
+class Pressed:
+    def find_spec(self, name, path, target=None):
+        if name == {module!r}:
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Pressed())
+sys.argv = ["hairkit", "plugins"]
+from hairkit.__main__ import main
+sys.exit(main())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("hairkit: interrupted")
+    assert done.stderr.count("\n") == 1
+
+
+def test_ctrl_c_is_recognised_behind_another_error() -> None:
+    """A library that was loading may report it as its own failure."""
+    try:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as pressed:
+            raise ImportError("cannot import") from pressed
+    except ImportError as error:
+        assert cli.explain(error) == cli.explain(KeyboardInterrupt())
+
+
 def test_plugins_are_listed_without_what_only_their_work_needs() -> None:
     """SciPy's splines, the web and the exporters' libraries load when a stage runs."""
     heavy = ("scipy.interpolate", "scipy.optimize", "urllib.request", "alembic3d", "pygltflib")
