@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hairkit.simulate import rotation
 from hairkit.stored import Float32Array, Float64Array
@@ -12,13 +14,20 @@ from hairkit.stored import Float32Array, Float64Array
 from . import kernels
 from .crowd import Crowd
 from .guides import Riders
-from .kernel_math import LANES
-from .kernel_ride import ride_points, rub_nodes
-from .kernel_touch import uncover
+from .kernel_air import blow_nodes
+from .kernel_lanes import LANES
+from .kernel_ride import ride_points
+from .kernel_rub import rub_nodes
 from .packing import banded_factor
 from .reference import Contact, Load, State, at_rest
 from .rods import Rods
 from .system import System
+
+Array = npt.NDArray[Any]
+AirWaves = tuple[Float64Array, Float64Array, Float64Array]
+NOWHERE = np.zeros(0, np.float32)
+FEW, GRIDS = 2000, 4
+"""Of fewer rods the nodes are spread to one grid, of more to so many at a time."""
 
 
 class FastEngine:
@@ -31,11 +40,19 @@ class FastEngine:
         self._unit = rods.mass.mean(axis=1)
         self._contact = contact
         held = rotation.third_axis(rods.root_frame)
-        self._root = kernels.padded(np.concatenate([rods.root_frame, held], axis=1))
+        self._root = kernels.padded(np.concatenate([rods.root_frame, held], axis=1)[:, None])
         self._packed: tuple[System, Float32Array, Float32Array, Float32Array] | None = None
         self._grid = _grid(contact)
         deepest = None if contact is None else contact.deepest
-        self._deepest = None if deepest is None else deepest.astype(np.float32)
+        self._deepest = NOWHERE if deepest is None else deepest.astype(np.float32)
+        clear = np.zeros(rods.mass.shape) if contact is None else contact.clearance
+        self._clear = kernels.padded(clear.astype(np.float32))
+        self._mass = kernels.padded(rods.mass.astype(np.float32))
+        self._mass[-1, :, (self._count - 1) % LANES + 1 :] = 0.0
+        self._cells: Float32Array | None = None
+        self._blown: Float32Array | None = None
+        self._air_work: Float32Array | None = None
+        self._riding: tuple[Riders, tuple[Array, ...]] | None = None
         self.state = at_rest(rods)
 
     @property
@@ -64,18 +81,37 @@ class FastEngine:
         )
         kernels.run_substeps(
             self._x, self._q, self._root, node, element, metric,
-            _rides(loads), np.stack([load.turn for load in loads]).astype(np.float32),
-            loads[0].gravity.astype(np.float32), self._air(loads[0].air),
+            *_motions(loads), loads[0].gravity.astype(np.float32), self._air(loads[0].air),
             self._force(loads[0].force), self._grid, settings,
         )  # fmt: skip
 
     def rub(self, crowd: Crowd, ride: Float64Array, rates: tuple[float, float, float]) -> None:
         """Let hair act on hair."""
+        if self._cells is None or self._cells.shape[1:4] != crowd.shape:
+            grids = 1 if self._count < FEW else GRIDS
+            self._cells = np.zeros((grids, *crowd.shape, 4), np.float32)
         rub_nodes(
-            self._x, self._mass_of_nodes(), self._count, ride.astype(np.float32),
-            crowd.origin.astype(np.float32), crowd.shape, crowd.usual.astype(np.float32),
-            np.array(rates, np.float32),
+            self._x, self._mass, (ride - np.eye(4))[:3].astype(np.float32),
+            crowd.origin.astype(np.float32), crowd.usual.astype(np.float32),
+            np.array(rates, np.float32), self._cells,
         )  # fmt: skip
+
+    def blow(self, waves: AirWaves | None, wind: Float64Array, head: Float64Array) -> None:
+        """Take gusts (see `wind.gust_waves`) for the substeps to come; None: the wind alone."""
+        self._blown = None
+        if waves is None:
+            return
+        vectors, amplitudes, phases = waves
+        phases = np.remainder((phases + vectors @ head[:3, 3]) / (2 * np.pi), 1.0)
+        turns = np.column_stack([vectors @ head[:3, :3] / (2 * np.pi), phases])
+        if self._air_work is None:
+            shape = (*self._x.shape[:2], 3, LANES)
+            self._air_work = np.zeros(shape, np.float32)
+        blow_nodes(
+            self._x, turns.astype(np.float32), amplitudes.astype(np.float32),
+            wind.astype(np.float32), self._air_work,
+        )  # fmt: skip
+        self._blown = self._air_work
 
     def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
         """Return places and velocities (n, 3) of one rod, head axes."""
@@ -85,24 +121,25 @@ class FastEngine:
 
     def points(self, riders: Riders, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
+        if self._riding is None or self._riding[0] is not riders:
+            self._riding = (riders, _riding(riders, self._count, self._x.shape[1]))
+        out = np.empty((len(self._riding[1][0]), 3), np.float32)
+        deepest = NOWHERE if riders.identity else self._deepest
         motion = head[:3].astype(np.float32)
-        found = np.asarray(
-            ride_points(self._x, self._q, riders.identity, *riders.packed(), motion, self._count)
-        )
-        if self._deepest is not None and not riders.identity:
-            uncover(found, self._deepest, motion, self._grid)
-        return found
+        rod, segment, weight, offset = self._riding[1]
+        ride_points(
+            self._x, self._q, self._clear, rod, segment, weight, offset, deepest, motion,
+            self._grid, out,
+        )  # fmt: skip
+        return out
 
     def _unpacked(self, values: Float32Array) -> Float64Array:
         spread = np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:-1])
         return spread[: self._count].astype(np.float64)
 
-    def _mass_of_nodes(self) -> Float32Array:
-        if not hasattr(self, "_mass"):
-            self._mass = kernels.padded(self._rods.mass.astype(np.float32))
-        return self._mass
-
     def _air(self, air: Float64Array) -> Float32Array:
+        if self._blown is not None:
+            return self._blown
         if air.ndim == 1:
             return np.repeat(air.astype(np.float32)[None, None, :, None], LANES, axis=3)
         return kernels.padded(air.astype(np.float32))
@@ -138,12 +175,47 @@ def _constants(
     return packed[0], packed[1], packed[2]
 
 
-def _rides(loads: Sequence[Load]) -> Float32Array:
-    rides = np.zeros((len(loads), 3, 8))
+def _motions(loads: Sequence[Load]) -> tuple[Float32Array, Float32Array]:
+    """Pack rides and turns as `kernels.run_substeps` takes them."""
+    rides, turns = np.zeros((len(loads), 3, 12)), np.zeros((len(loads), 3, 4))
     for k, load in enumerate(loads):
         rides[k, :, :4] = load.ride[:3]
-        rides[k, 0, 4:] = rotation.from_matrix(load.ride[:3, :3])
-    return rides.astype(np.float32)
+        rides[k, :, 4:8] = load.ride[:3] - np.eye(
+            3, 4
+        )  # in float64: hardly moved heads keep digits
+        rides[k, 0, 8:] = rotation.from_matrix(load.ride[:3, :3])
+        turns[k, :, :3] = load.turn
+    return rides.astype(np.float32), turns.astype(np.float32)
+
+
+def _riding(riders: Riders, rods: int, nodes: int) -> tuple[Array, ...]:
+    """Return rod, segment, weights (P, 6) of four nodes and two frames, and offset of points."""
+    if riders.identity:
+        rod = np.repeat(np.arange(rods, dtype=np.int32), nodes)
+        segment = np.tile(np.minimum(np.arange(nodes, dtype=np.int32), nodes - 2), rods)
+        weight = np.zeros((len(rod), 6), np.float32)
+        weight[:, 1] = np.tile(np.arange(nodes) < nodes - 1, rods)
+        weight[:, 2] = 1.0 - weight[:, 1]
+        return rod, segment, weight, np.zeros((len(rod), 3), np.float32)
+    t, last = riders.share, nodes - 2
+    one, two = t * t * (3 - 2 * t), t * (1 - t)
+    start, end = two * (1 - t), -two * t  # of the slopes, per segment
+    first, final = riders.segment == 0, riders.segment == last
+    weight = np.stack(
+        [
+            np.where(first, 0.0, -0.5 * start),
+            1 - one - np.where(first, start, 0.0) - np.where(final, end, 0.5 * end),
+            one + np.where(first, start, 0.5 * start) + np.where(final, end, 0.0),
+            np.where(final, 0.0, 0.5 * end),
+            np.where(t < 0.5, 0.5 - t, 0.0),
+            np.where(t < 0.5, 0.0, t - 0.5),
+        ],
+        axis=1,
+    )
+    return (
+        riders.rod.astype(np.int32), riders.segment.astype(np.int32), weight.astype(np.float32),
+        riders.offset.astype(np.float32),
+    )  # fmt: skip
 
 
 def _grid(contact: Contact | None) -> tuple[Float32Array, Float32Array]:

@@ -1,4 +1,4 @@
-"""Vectors and quaternions as scalars of float32, for the kernels' lanes."""
+"""Vectors and quaternions for the kernels: tuples of numbers, or of lanes of them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-LANES = 64
-"""Strands side by side."""
+from .kernel_lanes import at, lane_root, pick, put
 
 _HOW: dict[str, Any] = {
     "fastmath": True, "error_model": "numpy", "cache": True, "_nrt": False,
@@ -18,10 +17,58 @@ row: Callable[[Any], Any] = njit(**_HOW)
 """Compiles a function that allocates nothing: views are then not counted, which halves the time of
 short rows and of compiling."""
 
-ONE, TWO, TINY = np.float32(1), np.float32(2), np.float32(1e-4)
+ZERO, ONE, TWO, TINY = np.float32(0), np.float32(1), np.float32(2), np.float32(1e-4)
 _C1, _C3, _C5 = np.float32(0.9998660), np.float32(-0.3302995), np.float32(0.1801410)
 _C7, _C9 = np.float32(-0.0851330), np.float32(0.0208351)
-_HALF_PI = np.float32(np.pi / 2)
+_THIRD, _FIFTH, _SEVENTH = np.float32(1 / 3), np.float32(0.2), np.float32(1 / 7)
+_HALF_PI, _SMALL = np.float32(np.pi / 2), np.float32(0.04)
+
+
+@row
+def three(array, j, c):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the lanes of three parts of row j, from part c."""
+    return at(array, (j, c)), at(array, (j, c + 1)), at(array, (j, c + 2))
+
+
+@row
+def four(array, j):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the lanes of the first four parts of row j."""
+    return at(array, (j, 0)), at(array, (j, 1)), at(array, (j, 2)), at(array, (j, 3))
+
+
+@row
+def put_three(array, j, c, v) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Lay a vector down in three parts of row j, from part c."""
+    put(array, (j, c), v[0])
+    put(array, (j, c + 1), v[1])
+    put(array, (j, c + 2), v[2])
+
+
+@row
+def put_four(array, j, q) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Lay a quaternion down in row j."""
+    put(array, (j, 0), q[0])
+    put(array, (j, 1), q[1])
+    put(array, (j, 2), q[2])
+    put(array, (j, 3), q[3])
+
+
+@row
+def plus(a, b):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the sum."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@row
+def minus(a, b):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the difference."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@row
+def times(size, a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the vector times a number."""
+    return size * a[0], size * a[1], size * a[2]
 
 
 @row
@@ -37,60 +84,89 @@ def cross(a, b):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
 
 
 @row
-def carry(motion, x, y, z):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return a point moved rigidly; column 3 is the shift."""
+def rows_of(motion, c):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the three rows of four numbers of an array (3, ...), from column c, as scalars."""
     return (
-        motion[0, 0] * x + motion[0, 1] * y + motion[0, 2] * z + motion[0, 3],
-        motion[1, 0] * x + motion[1, 1] * y + motion[1, 2] * z + motion[1, 3],
-        motion[2, 0] * x + motion[2, 1] * y + motion[2, 2] * z + motion[2, 3],
+        (motion[0, c], motion[0, c + 1], motion[0, c + 2], motion[0, c + 3]),
+        (motion[1, c], motion[1, c + 1], motion[1, c + 2], motion[1, c + 3]),
+        (motion[2, c], motion[2, c + 1], motion[2, c + 2], motion[2, c + 3]),
     )
 
 
 @row
-def rotate(q, x, y, z):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+def turned(rows, a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return a vector under the linear part of a motion."""
+    return dot(rows[0], a), dot(rows[1], a), dot(rows[2], a)
+
+
+@row
+def carry(rows, a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return a point under a motion; the rows' fourth numbers are the shift."""
+    return dot(rows[0], a) + rows[0][3], dot(rows[1], a) + rows[1][3], dot(rows[2], a) + rows[2][3]
+
+
+@row
+def product(r, q):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the quaternion product r q."""
+    return (
+        r[0] * q[0] - r[1] * q[1] - r[2] * q[2] - r[3] * q[3],
+        r[0] * q[1] + r[1] * q[0] + r[2] * q[3] - r[3] * q[2],
+        r[0] * q[2] - r[1] * q[3] + r[2] * q[0] + r[3] * q[1],
+        r[0] * q[3] + r[1] * q[2] - r[2] * q[1] + r[3] * q[0],
+    )
+
+
+@row
+def rotate(q, v):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     """Return a vector turned by a unit quaternion."""
-    a = TWO * (q[2] * z - q[3] * y)
-    b = TWO * (q[3] * x - q[1] * z)
-    c = TWO * (q[1] * y - q[2] * x)
-    return (
-        x + q[0] * a + q[2] * c - q[3] * b,
-        y + q[0] * b + q[3] * a - q[1] * c,
-        z + q[0] * c + q[1] * b - q[2] * a,
-    )
+    axis = (q[1], q[2], q[3])
+    a = times(TWO, cross(axis, v))
+    return plus(plus(v, times(q[0], a)), cross(axis, a))
 
 
 @row
-def swing_frame(q0, q1, q2, q3, d0, d1, d2):  # type: ignore[no-untyped-def] # pragma: no cover
+def absolute(a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return lanes without their sign."""
+    return pick(a, ZERO, ZERO - a, a)
+
+
+@row
+def unit_four(q):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return lanes of quaternions at length one."""
+    size = ONE / lane_root(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return q[0] * size, q[1] * size, q[2] * size, q[3] * size
+
+
+@row
+def swing_frame(q, d):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     """Return the frame turned the shortest way so that its third axis is d."""
-    t0 = TWO * (q1 * q3 + q0 * q2)
-    t1 = TWO * (q2 * q3 - q0 * q1)
-    t2 = ONE - TWO * (q1 * q1 + q2 * q2)
-    r0 = ONE + t0 * d0 + t1 * d1 + t2 * d2
-    r0 = r0 if r0 > TINY else TINY
-    r1 = t1 * d2 - t2 * d1
-    r2 = t2 * d0 - t0 * d2
-    r3 = t0 * d1 - t1 * d0
-    s = r0 * q0 - r1 * q1 - r2 * q2 - r3 * q3
-    t = r0 * q1 + r1 * q0 + r2 * q3 - r3 * q2
-    u = r0 * q2 - r1 * q3 + r2 * q0 + r3 * q1
-    o = r0 * q3 + r1 * q2 - r2 * q1 + r3 * q0
-    size = ONE / np.sqrt(s * s + t * t + u * u + o * o)
-    return s * size, t * size, u * size, o * size
+    t = (
+        TWO * (q[1] * q[3] + q[0] * q[2]),
+        TWO * (q[2] * q[3] - q[0] * q[1]),
+        ONE - TWO * (q[1] * q[1] + q[2] * q[2]),
+    )
+    cosine = ONE + dot(t, d)
+    axis = cross(t, d)
+    cosine = pick(cosine, TINY, TINY, cosine)
+    return unit_four(product((cosine, axis[0], axis[1], axis[2]), q))
 
 
 @row
-def half_way_frame(a, b):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the frame half way, and the axis times the tangent of a quarter of the angle."""
+def half_way(a, b, v):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return v turned by the frame half way from a to b, and the axis of b a^-1 times the tangent
+    of a quarter of its angle.
+
+    The sum of two unit quaternions has the square 2 + 2 w, w their product.
+    """
     w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
-    sign = ONE if w >= np.float32(0) else -ONE
-    m0, m1, m2, m3 = a[0] + sign * b[0], a[1] + sign * b[1], a[2] + sign * b[2], a[3] + sign * b[3]
-    size = ONE / np.sqrt(m0 * m0 + m1 * m1 + m2 * m2 + m3 * m3)
-    over = sign / (ONE + sign * w)
-    # the vector part of b a^-1
-    x = -b[0] * a[1] + b[1] * a[0] - b[2] * a[3] + b[3] * a[2]
-    y = -b[0] * a[2] + b[1] * a[3] + b[2] * a[0] - b[3] * a[1]
-    z = -b[0] * a[3] - b[1] * a[2] + b[2] * a[1] + b[3] * a[0]
-    return (m0 * size, m1 * size, m2 * size, m3 * size), (x * over, y * over, z * over)
+    sign = pick(w, ZERO, -ONE, ONE)
+    over = ONE / (ONE + sign * w)
+    axis = (a[1] + sign * b[1], a[2] + sign * b[2], a[3] + sign * b[3])
+    aside = cross(axis, v)
+    turn = plus(times(a[0] + sign * b[0], aside), cross(axis, aside))
+    va, vb = (a[1], a[2], a[3]), (b[1], b[2], b[3])
+    vector = minus(minus(times(a[0], vb), times(b[0], va)), cross(vb, va))
+    return plus(v, times(over, turn)), times(sign * over, vector)
 
 
 @row
@@ -102,15 +178,13 @@ def twist_angle(a, b):  # type: ignore[no-untyped-def] # pragma: no cover - comp
     """
     w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
     z = a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0]
-    sign = ONE if w >= np.float32(0) else -ONE
-    w, z = sign * w, sign * z
-    size = abs(z)
-    steep = size > w
-    low, high = (w, size) if steep else (size, w)
-    t = low / high  # one of both is at least the root of a half, or the frames are opposite
+    z, w = pick(w, ZERO, ZERO - z, z), absolute(w)
+    size = absolute(z)
+    # one of both is at least the root of a half, or the frames are opposite
+    t = pick(w, size, w, size) / pick(w, size, size, w)
     s = t * t
     angle = t * (_C1 + s * (_C3 + s * (_C5 + s * (_C7 + s * _C9))))
-    small = t * (ONE - s * (np.float32(1 / 3) - s * (np.float32(0.2) - s * np.float32(1 / 7))))
-    angle = small if s < np.float32(0.04) else angle
-    angle = _HALF_PI - angle if steep else angle
-    return TWO * angle if z >= np.float32(0) else -TWO * angle
+    small = t * (ONE - s * (_THIRD - s * (_FIFTH - s * _SEVENTH)))
+    angle = pick(s, _SMALL, small, angle)
+    angle = TWO * pick(w, size, _HALF_PI - angle, angle)
+    return pick(z, ZERO, ZERO - angle, angle)

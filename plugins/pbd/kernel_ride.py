@@ -1,144 +1,140 @@
-"""Kernels around the substeps: the guides' points in the world, and hair among hair."""
+"""The guides' own points in the kernels: carried by the rods, kept out of the obstacles."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
 
-from .kernel_math import LANES, carry, rotate, row
+from .kernel_lanes import LANES
+from .kernel_math import carry, dot, minus, plus, rotate, row, rows_of, times
 
-ONE, TWO, HALF, ZERO = np.float32(1), np.float32(2), np.float32(0.5), np.float32(0)
-THREE, FOUR, CELL = np.float32(3), np.float32(4), np.float32(1 / 0.02)
+ONE, ZERO = np.float32(1), np.float32(0)
+SLACK = 6
+TOGETHER = 512
+"""Points that one thread takes at a time."""
 
 
 @njit(parallel=True, fastmath=True, error_model="numpy", cache=True)
 def ride_points(  # type: ignore[no-untyped-def]
-    x, q, identity, rod, segment, share, offset, head, count
-):  # pragma: no cover - compiled
-    """Return (P, 3) the guides' points in the world (see `guides.Riders`)."""
-    n = x.shape[1]
-    if identity:
-        out = np.empty((count * n, 3), np.float32)
-        for number in prange(count):
-            s = np.int64(number)
-            block, lane = s // LANES, s % LANES
-            for j in range(n):
-                p = carry(head, x[block, j, 0, lane], x[block, j, 1, lane], x[block, j, 2, lane])
-                out[s * n + j, 0], out[s * n + j, 1], out[s * n + j, 2] = p
-        return out
-    out = np.empty((len(rod), 3), np.float32)
-    for number in prange(len(rod)):
-        i = np.int64(number)
-        block, lane = rod[i] // LANES, rod[i] % LANES
-        j, t = segment[i], share[i]
-        one, two = t * t * (THREE - TWO * t), t * (ONE - t)
-        p0 = _along(x, block, 0, j, lane, n, t, one, two)
-        p1 = _along(x, block, 1, j, lane, n, t, one, two)
-        p2 = _along(x, block, 2, j, lane, n, t, one, two)
-        k = min(max(j + (-1 if t < HALF else 1), 0), n - 2)
-        part = abs(t - HALF)
-        w = ZERO
-        for c in range(4):
-            w += q[block, j, c, lane] * q[block, k, c, lane]
-        mix = part if w >= ZERO else -part
-        f0 = (ONE - part) * q[block, j, 0, lane] + mix * q[block, k, 0, lane]
-        f1 = (ONE - part) * q[block, j, 1, lane] + mix * q[block, k, 1, lane]
-        f2 = (ONE - part) * q[block, j, 2, lane] + mix * q[block, k, 2, lane]
-        f3 = (ONE - part) * q[block, j, 3, lane] + mix * q[block, k, 3, lane]
-        size = ONE / np.sqrt(f0 * f0 + f1 * f1 + f2 * f2 + f3 * f3)
-        frame = (f0 * size, f1 * size, f2 * size, f3 * size)
-        turned = rotate(frame, offset[i, 0], offset[i, 1], offset[i, 2])
-        p = carry(head, p0 + turned[0], p1 + turned[1], p2 + turned[2])
-        out[i, 0], out[i, 1], out[i, 2] = p
-    return out
-
-
-@row
-def _along(x, block, c, j, lane, n, t, one, two):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return one coordinate on the smooth curve through the nodes (Catmull-Rom)."""
-    a, b = x[block, j, c, lane], x[block, j + 1, c, lane]
-    sa = b - a if j == 0 else (b - x[block, j - 1, c, lane]) * HALF
-    sb = b - a if j == n - 2 else (x[block, min(j + 2, n - 1), c, lane] - a) * HALF
-    return a + (b - a) * one + two * ((ONE - t) * sa - t * sb)
-
-
-@row
-def _corner(p, origin, shape):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the cell and the shares within it of a place along one axis."""
-    at = min(max((p - origin) * CELL, ZERO), np.float32(shape) - np.float32(1.001))
-    low = int(at)
-    return low, at - np.float32(low)
-
-
-@njit(parallel=True, fastmath=True, error_model="numpy", cache=True)
-def rub_nodes(  # type: ignore[no-untyped-def]
-    x, mass, count, ride, origin, shape, usual, rates
+    x, q, clear, rod, segment, weight, offset, deepest, head, grid, out
 ) -> None:  # pragma: no cover - compiled
-    """Draw velocities to those of the neighbours, and push out of crowded places, in place."""
-    cohesion, pressure, seconds = rates[0], rates[1], rates[2]
-    taken, over = ONE - np.exp(-cohesion * seconds), ONE / seconds
-    n, s0, s1, s2 = x.shape[1], shape[0], shape[1], shape[2]
-    cells = np.zeros((s0, s1, s2, 4), np.float32)
-    for first in range(count):
-        s = np.int64(first)
-        block, lane = s // LANES, s % LANES
-        for j in range(n):
-            p0, p1, p2 = x[block, j, 0, lane], x[block, j, 1, lane], x[block, j, 2, lane]
-            r0, r1, r2 = carry(ride, p0, p1, p2)
-            m = mass[block, j, lane]
-            u0 = m * (x[block, j, 3, lane] - (p0 - r0) * over)
-            u1 = m * (x[block, j, 4, lane] - (p1 - r1) * over)
-            u2 = m * (x[block, j, 5, lane] - (p2 - r2) * over)
-            a, fa = _corner(p0, origin[0], s0)
-            b, fb = _corner(p1, origin[1], s1)
-            c, fc = _corner(p2, origin[2], s2)
-            for i in range(8):
-                k, y, o = i >> 2 & 1, i >> 1 & 1, i & 1
-                weight = (fa if k else ONE - fa) * (fb if y else ONE - fb) * (fc if o else ONE - fc)
-                cell = cells[a + k, b + y, c + o]
-                cell[0] += weight * m
-                cell[1] += weight * u0
-                cell[2] += weight * u1
-                cell[3] += weight * u2
-    crowded, push = np.zeros((s0, s1, s2), np.float32), pressure * seconds
-    for a in range(s0):
-        for b in range(s1):
-            for c in range(s2):
-                cell, use = cells[a, b, c], usual[a, b, c]
-                if cell[0] == ZERO:
-                    continue
-                crowded[a, b, c] = min(max((cell[0] - use) / use, ZERO), FOUR)
-                scale = ONE / max(cell[0], np.float32(1e-30))
-                cell[1] *= scale
-                cell[2] *= scale
-                cell[3] *= scale
-    for number in prange(count):
-        s = np.int64(number)
-        block, lane = s // LANES, s % LANES
-        for j in range(1, n):
-            p0, p1, p2 = x[block, j, 0, lane], x[block, j, 1, lane], x[block, j, 2, lane]
-            r0, r1, r2 = carry(ride, p0, p1, p2)
-            h0, h1, h2 = (p0 - r0) * over, (p1 - r1) * over, (p2 - r2) * over
-            u0, u1 = x[block, j, 3, lane] - h0, x[block, j, 4, lane] - h1
-            u2 = x[block, j, 5, lane] - h2
-            a, fa = _corner(p0, origin[0], s0)
-            b, fb = _corner(p1, origin[1], s1)
-            c, fc = _corner(p2, origin[2], s2)
-            m0, m1, m2, g0, g1, g2 = ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
-            for i in range(8):
-                k, y, o = i >> 2 & 1, i >> 1 & 1, i & 1
-                weight = (fa if k else ONE - fa) * (fb if y else ONE - fb) * (fc if o else ONE - fc)
-                i0, i1, i2 = a + k, b + y, c + o
-                cell = cells[i0, i1, i2]
-                m0 += weight * cell[1]
-                m1 += weight * cell[2]
-                m2 += weight * cell[3]
-                value = crowded[i0, i1, i2]
-                wa, wb = fa if k else ONE - fa, fb if y else ONE - fb
-                wc = fc if o else ONE - fc
-                g0 += value * wb * wc * (ONE if k else -ONE)
-                g1 += value * wa * wc * (ONE if y else -ONE)
-                g2 += value * wa * wb * (ONE if o else -ONE)
-            x[block, j, 3, lane] = h0 + u0 + taken * (m0 - u0) - push * g0
-            x[block, j, 4, lane] = h1 + u1 + taken * (m1 - u1) - push * g1
-            x[block, j, 5, lane] = h2 + u2 + taken * (m2 - u2) - push * g2
+    """Write (P, 3) the guides' points in the world (see `guides.Riders`).
+
+    Parameters
+    ----------
+    x, q, clear
+        (B, n, STATE, W) nodes, (B, n - 1, 4, W) frames, (B, n, W) least distances of the nodes.
+    rod, segment, weight, offset
+        (P,), (P,), (P, 6) of the four nodes around and of the two frames, (P, 3) in the frame.
+    deepest
+        (P,) least distance of each point, or (0,) where they may be anywhere.
+    head
+        (3, 4) from the head axes to the world.
+    grid
+        Obstacles as in `kernels.run_substeps`.
+    """
+    count = rod.shape[0]
+    for number in prange((count + TOGETHER - 1) // TOGETHER):
+        first = np.int64(number) * TOGETHER
+        _ride(
+            x, q, clear, rod, segment, weight, offset, deepest, head, grid, out,
+            first, min(first + TOGETHER, count),
+        )  # fmt: skip
+
+
+@row
+def _ride(  # type: ignore[no-untyped-def]
+    x, q, clear, rod, segment, weight, offset, deepest, head, grid, out, first, last
+) -> None:  # pragma: no cover - compiled
+    """Write some of the points."""
+    motion = rows_of(head, 0)
+    for i in range(first, last):
+        block, lane = rod[i] // LANES, rod[i] % LANES
+        nodes, j = x[block], segment[i]
+        place = _on_curve(nodes, j, lane, weight[i])
+        frame = _frame(q[block], j, lane, weight[i, 4], weight[i, 5])
+        place = plus(place, rotate(frame, (offset[i, 0], offset[i, 1], offset[i, 2])))
+        if deepest.shape[0] > 0:
+            near = j if weight[i, 1] > weight[i, 2] else j + 1
+            away = minus(place, (nodes[near, 0, lane], nodes[near, 1, lane], nodes[near, 2, lane]))
+            room = nodes[near, SLACK, lane] + clear[block, near, lane] - deepest[i]
+            # nothing is to be looked up where the node has been seen to be far away
+            if not (room > ZERO and dot(away, away) < room * room):
+                distance, n0, n1, n2 = distance_to(grid, place, deepest[i])
+                place = plus(place, times(max(deepest[i] - distance, ZERO), (n0, n1, n2)))
+        out[i, 0], out[i, 1], out[i, 2] = carry(motion, place)
+
+
+@row
+def _on_curve(x, j, lane, weight):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return a place on the smooth curve through the nodes (Catmull-Rom)."""
+    a, d = max(j - 1, 0), min(j + 2, x.shape[0] - 1)
+    wa, wb, wc, wd = weight[0], weight[1], weight[2], weight[3]
+    return (
+        wa * x[a, 0, lane] + wb * x[j, 0, lane] + wc * x[j + 1, 0, lane] + wd * x[d, 0, lane],
+        wa * x[a, 1, lane] + wb * x[j, 1, lane] + wc * x[j + 1, 1, lane] + wd * x[d, 1, lane],
+        wa * x[a, 2, lane] + wb * x[j, 2, lane] + wc * x[j + 1, 2, lane] + wd * x[d, 2, lane],
+    )
+
+
+@row
+def _frame(q, j, lane, before, after):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the frame of segment j mixed with the ones beside it; one of the shares is 0."""
+    k = max(j - 1, 0) if before > ZERO else min(j + 1, q.shape[0] - 1)
+    part = before + after
+    a0, a1, a2, a3 = q[j, 0, lane], q[j, 1, lane], q[j, 2, lane], q[j, 3, lane]
+    b0, b1, b2, b3 = q[k, 0, lane], q[k, 1, lane], q[k, 2, lane], q[k, 3, lane]
+    mix = part if a0 * b0 + a1 * b1 + a2 * b2 + a3 * b3 >= ZERO else -part
+    here = ONE - part
+    f0, f1, f2, f3 = (
+        here * a0 + mix * b0,
+        here * a1 + mix * b1,
+        here * a2 + mix * b2,
+        here * a3 + mix * b3,
+    )
+    size = ONE / np.sqrt(f0 * f0 + f1 * f1 + f2 * f2 + f3 * f3)
+    return f0 * size, f1 * size, f2 * size, f3 * size
+
+
+@row
+def distance_to(grid, p, clear):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Trilinear distance and its direction; one look tells most places that they are far."""
+    values, place = grid
+    u, v, w = (
+        (p[0] - place[0]) * place[3],
+        (p[1] - place[1]) * place[3],
+        (p[2] - place[2]) * place[3],
+    )
+    s0, s1, s2 = values.shape
+    if not (
+        u >= ZERO
+        and v >= ZERO
+        and w >= ZERO
+        and u <= np.float32(s0 - 1)
+        and v <= np.float32(s1 - 1)
+        and w <= np.float32(s2 - 1)
+    ):
+        return clear + place[4], ZERO, ZERO, ZERO
+    i, j, k = min(int(u), s0 - 2), min(int(v), s1 - 2), min(int(w), s2 - 2)
+    # within a cell the distance changes by at most its diagonal
+    least = values[i, j, k] - np.float32(1.8) / place[3]
+    if least > clear:
+        return least, ZERO, ZERO, ZERO
+    a, b, c = u - np.float32(i), v - np.float32(j), w - np.float32(k)
+    d, e, f = ONE - a, ONE - b, ONE - c
+    v000, v001 = values[i, j, k], values[i, j, k + 1]
+    v010, v011 = values[i, j + 1, k], values[i, j + 1, k + 1]
+    v100, v101 = values[i + 1, j, k], values[i + 1, j, k + 1]
+    v110, v111 = values[i + 1, j + 1, k], values[i + 1, j + 1, k + 1]
+    l00, l01, l10, l11 = (
+        v000 * f + v001 * c,
+        v010 * f + v011 * c,
+        v100 * f + v101 * c,
+        v110 * f + v111 * c,
+    )
+    low, high = l00 * e + l01 * b, l10 * e + l11 * b
+    g0 = high - low
+    g1 = (l01 - l00) * d + (l11 - l10) * a
+    g2 = ((v001 - v000) * e + (v011 - v010) * b) * d + ((v101 - v100) * e + (v111 - v110) * b) * a
+    size = ONE / max(np.sqrt(g0 * g0 + g1 * g1 + g2 * g2), np.float32(1e-12))
+    return low * d + high * a, g0 * size, g1 * size, g2 * size
