@@ -167,13 +167,9 @@ sys.exit(main())
 
 def test_ctrl_c_is_recognised_behind_another_error() -> None:
     """A library that was loading may report it as its own failure."""
-    try:
-        try:
-            raise KeyboardInterrupt
-        except KeyboardInterrupt as pressed:
-            raise ImportError("cannot import") from pressed
-    except ImportError as error:
-        assert cli.explain(error) == cli.explain(KeyboardInterrupt())
+    failure = ImportError("cannot import")
+    failure.__cause__ = KeyboardInterrupt()
+    assert cli.explain(failure) == cli.explain(KeyboardInterrupt())
 
 
 def test_plugins_are_listed_without_what_only_their_work_needs() -> None:
