@@ -1,10 +1,15 @@
 #version 430
-// Where each point of the guides is, and how far the guide has turned there since rest.
+// Where each point of the guides is, and how far the guide has turned there since rest; and a box
+// around them all.
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Rest { float rest[]; };
 layout(std430, binding = 1) readonly buffer Now { float now[]; };
 layout(std430, binding = 2) writeonly buffer Guides { uint guides[]; };   // 5 words a point
+layout(std430, binding = 3) buffer Bounds { int bounds[]; };    // lowest and highest x, y, z
+
+shared int low[3];
+shared int high[3];
 
 uniform int u_points;
 uniform int u_count;    // of guide points
@@ -17,9 +22,13 @@ vec4 quaternion_between(vec3 a, vec3 b) {
     return dot(q, q) > 1e-8 ? normalize(q) : vec4(0.0, 0.0, 1.0, 0.0);
 }
 
-void main() {
-    int index = int(gl_GlobalInvocationID.x);
-    if (index >= u_count) return;
+// Whole numbers in the order of the numbers whose bits they are.
+int ordered(float x) {
+    int bits = floatBitsToInt(x);
+    return bits < 0 ? bits ^ 0x7FFFFFFF : bits;
+}
+
+void place_guide(int index) {
     int k = index % u_points;
     int before = k > 0 ? index - 1 : index;
     int after = k < u_points - 1 ? index + 1 : index;
@@ -33,4 +42,23 @@ void main() {
     guides[5 * index + 2] = floatBitsToUint(place.z);
     guides[5 * index + 3] = packSnorm2x16(turn.xy);
     guides[5 * index + 4] = packSnorm2x16(turn.zw);
+    for (int c = 0; c < 3; c++) {
+        atomicMin(low[c], ordered(place[c]));
+        atomicMax(high[c], ordered(place[c]));
+    }
+}
+
+void main() {
+    int index = int(gl_GlobalInvocationID.x);
+    if (gl_LocalInvocationID.x < 3u) {
+        low[gl_LocalInvocationID.x] = 0x7FFFFFFF;
+        high[gl_LocalInvocationID.x] = int(0x80000000u);
+    }
+    barrier();
+    if (index < u_count) place_guide(index);
+    barrier();
+    if (gl_LocalInvocationID.x < 3u) {
+        atomicMin(bounds[gl_LocalInvocationID.x], low[gl_LocalInvocationID.x]);
+        atomicMax(bounds[gl_LocalInvocationID.x + 3u], high[gl_LocalInvocationID.x]);
+    }
 }

@@ -92,12 +92,13 @@ class GuideSampler:
     """Brings guides' points to equal counts, at shares (m,) of the arc length at rest."""
 
     def __init__(self, guides: Strands, shares: Float64Array) -> None:
-        self._before, self._part = _places(guides, shares)
+        self.before, self.part = _places(guides, shares)
+        """(G, m) points before the places, and (G, m, 1) how far these are on to the next ones."""
 
     def __call__(self, points: Float32Array) -> Float32Array:
         """Return points (P, 3) as (G, m, 3)."""
-        low = points[self._before]
-        rows: Float32Array = low + (points[self._before + 1] - low) * self._part
+        low = points[self.before]
+        rows: Float32Array = low + (points[self.before + 1] - low) * self.part
         return rows
 
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from hairkit.viewer.hair_body import HairBody
 
+GuidePlaces = Any
+"""(G, m, 3) float32: an array, or a moderngl buffer for drawers by shaders."""
 FULL_LOOK = 50_000
 """Fewer hairs are drawn wider, so that they cover the head as this many would."""
 WIDEST = 5.0
@@ -84,8 +86,12 @@ class HairDrawer(Protocol):
     def places(self) -> Any:
         """Return (S, m, 3) float32 where the hair was last placed, metres: a buffer or an array."""
 
-    def move_guides(self, rows: Float32Array) -> None:
-        """Put the guides at `rows` (G, m, 3), head frame, metres."""
+    def move_guides(self, rows: GuidePlaces) -> Float32Array:
+        """Put the guides at `rows` (G, m, 3), head frame, metres; return points around them.
+
+        The points (N, 3) are the rows, or corners of a box around them where only the graphics card
+        knows these.
+        """
 
     def place(self, view: HairView, look: HairLook) -> None:
         """Place the hair and find what of it hides what."""

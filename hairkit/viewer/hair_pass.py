@@ -6,6 +6,7 @@ summed to what hides what; hair shaded and drawn.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,12 +20,15 @@ from hairkit.render.hair import strand_numbers
 from hairkit.render.projection import set_camera, set_uniforms
 from hairkit.stored import Float32Array
 from hairkit.viewer.hair_body import HairBody
-from hairkit.viewer.hair_look import HairLook, HairScene, HairView
+from hairkit.viewer.hair_look import GuidePlaces, HairLook, HairScene, HairView
 
 SLICES, TILE = 32, 16
 """As in viewer_hair.glsl."""
 _GROUP = 64
 MOST_GUIDES = 65_535
+LATE = 0.05
+"""Metres that a box of the picture before is made larger by."""
+_NOTHING = np.array([2**31 - 1] * 3 + [-(2**31)] * 3, np.int32).tobytes()
 NEAR_HAIR, OFF_GUIDES = 0.05, 0.06
 """Metres: hair nearer than the first may be anywhere in the picture; hair keeps within the second
 of the guides."""
@@ -46,13 +50,15 @@ class HairPass:
         self._hairs = context.buffer(_hair_records(body))
         self._offsets = context.buffer(_offset_records(body))
         self._places = context.buffer(reserve=12 * count * points)
+        self._bounds = context.buffer(_NOTHING)
+        self._box = False
         self._view: _ViewBuffers | None = None
         self._resolve = context.vertex_array(gl.program("viewer_screen", "viewer_resolve"), [])
 
     def release(self) -> None:
         """Free the buffers."""
         buffers = (self._rest, self._now, self._guides, self._hairs, self._offsets, self._places)
-        for buffer in buffers:
+        for buffer in (*buffers, self._bounds):
             buffer.release()
         self._resolve.release()
         if self._view is not None:
@@ -62,14 +68,39 @@ class HairPass:
         """Return (S, m, 3) float32 where the hair was last placed, metres."""
         return self._places
 
-    def move_guides(self, rows: Float32Array) -> None:
-        """Put the guides at `rows` (G, m, 3), head frame, metres."""
-        self._rows = rows
-        self._now.write(np.ascontiguousarray(rows, np.float32))
+    def move_guides(self, rows: GuidePlaces) -> Float32Array:
+        """Put the guides at `rows` (G, m, 3), head frame, metres; return points around them.
+
+        Guides in a buffer are not read back, only the box around them, and that of the picture
+        before, which the card has finished; hair moves less than `LATE` meanwhile.
+        """
+        given = isinstance(rows, moderngl.Buffer)
+        if not given:
+            self._now.write(np.ascontiguousarray(rows, np.float32))
         self._rest.bind_to_storage_buffer(0)
-        self._now.bind_to_storage_buffer(1)
+        (rows if given else self._now).bind_to_storage_buffer(1)
         self._guides.bind_to_storage_buffer(2)
+        before = self._box
+        self._bounds.bind_to_storage_buffer(3)
+        late = self._read_box() if given and before else None
+        self._bounds.write(_NOTHING)
         self._run("viewer_guide", len(self.body.guides) * self.body.points_each)
+        self._box = given
+        if not given:
+            self._cloud = np.asarray(rows, np.float32).reshape(-1, 3)
+            return self._cloud
+        low, high = self._read_box() if late is None else late
+        box = np.stack([low - LATE, high + LATE])
+        corners = np.array(list(itertools.product((0, 1), repeat=3)))
+        self._cloud = box[corners, np.arange(3)].astype(np.float32)
+        return self._cloud
+
+    def _read_box(self) -> tuple[Float32Array, Float32Array]:
+        """Return the lowest and the highest coordinates (3,) of the guides."""
+        code = np.frombuffer(self._bounds.read(), np.int32)
+        # the bits of negative numbers are turned over in the shader so that they can be compared
+        values = np.where(code < 0, code ^ 0x7FFFFFFF, code).astype(np.int32).view(np.float32)
+        return values[:3], values[3:]
 
     def place(self, view: HairView, look: HairLook) -> None:
         """Place the hair and find what of it hides what."""
@@ -116,7 +147,7 @@ class HairPass:
             **scene.lights.uniforms(),
             **scene.light.uniforms(),
         )
-        self._lay_over(scene.target, buffers, _frame_of(view.camera, self._rows))
+        self._lay_over(scene.target, buffers, _frame_of(view.camera, self._cloud))
 
     def _lay_over(
         self,
@@ -180,13 +211,13 @@ class _ViewBuffers:
             part.release()
 
 
-def _frame_of(camera: Camera, rows: Float32Array) -> tuple[int, int, int, int]:
+def _frame_of(camera: Camera, cloud: Float32Array) -> tuple[int, int, int, int]:
     """Return x, y, width and height in pixels of where hair that follows guides can be."""
     size = np.array([camera.width, camera.height])
-    depth = camera.depth(rows.reshape(-1, 3))
+    depth = camera.depth(cloud)
     if depth.min() < NEAR_HAIR:
         return 0, 0, camera.width, camera.height
-    pixels = camera.project(rows.reshape(-1, 3))
+    pixels = camera.project(cloud)
     margin = 8 + OFF_GUIDES * camera.focal / float(depth.min())
     low = np.clip(np.floor(pixels.min(axis=0) - margin), 0, size)
     high = np.clip(np.ceil(pixels.max(axis=0) + margin), low + 1, size + 1)

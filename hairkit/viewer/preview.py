@@ -103,7 +103,8 @@ class Preview:
         stage, session = self.stage, self.session
         quality = LEVELS[0] if still else self.budget.quality
         width, height = (max(round(n * quality.scale), 16) for n in session.size)
-        rows = session.guide_rows()
+        buffer = None if stage.soft else session.guide_buffer()
+        rows = session.guide_rows() if buffer is None or self._needs_rows else None
         look = self._look(quality.smooth, quality.share)
         overlays = self._overlays(rows)
         boards, solids = self._shown_boards(stage), self._shown_solids(stage)
@@ -111,7 +112,7 @@ class Preview:
             Shot(
                 session.camera((width, height)),
                 session.world_from_head,
-                rows,
+                rows if buffer is None else buffer,
                 look,
                 show_head="head" in session.shown.layers,
                 floor=session.floor,
@@ -124,6 +125,14 @@ class Preview:
             )
         )
         self._hairs = 0 if look is None else look.hairs
+        if not np.isfinite(stage.cloud).all():
+            session.look_for_runaways()
+
+    @property
+    def _needs_rows(self) -> bool:
+        """Whether lines are drawn along guides."""
+        shown = self.session.shown.colours
+        return shown not in ("hair", "direction") or self.session.picked is not None
 
     def picture(self) -> UInt8Array:
         """Return the last picture (H, W, 3) RGB, as large as it was drawn."""

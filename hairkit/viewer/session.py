@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -110,6 +111,8 @@ class Session:
         self.steps = 0
         """Steps since the groom was opened."""
         self._behind = 0.0
+        self.on_card = False
+        """True while the guides are drawn from where shaders left them."""
         self.overwrite = False
         """True lets screenshots take the place of older ones of the same name."""
         self.finished = False
@@ -197,13 +200,13 @@ class Session:
             self._step()
             if self.most_seconds is not None and time.perf_counter() - began > self.most_seconds:
                 self._behind = 0.0
-        if self.steps > before:
-            self._look_for_runaways()
+        if self.steps > before and not self.on_card:
+            self.look_for_runaways()
 
     def step(self) -> None:
         """Let one step of time pass."""
         self._step()
-        self._look_for_runaways()
+        self.look_for_runaways()
 
     def _step(self) -> None:
         self.motion.advance(STEP)
@@ -216,7 +219,8 @@ class Session:
         self.tuned.simulator.advance(STEP, surroundings)
         self.steps += 1
 
-    def _look_for_runaways(self) -> None:
+    def look_for_runaways(self) -> None:
+        """Put hair that is nowhere any more back to rest."""
         if not np.isfinite(self.tuned.simulator.points).all():
             self.reset()
             self.message = "the simulation became unstable and was put back to rest"
@@ -230,9 +234,20 @@ class Session:
 
     def guide_rows(self) -> Float32Array:
         """Return (G, m, 3) the present guides in the head frame."""
-        matrix = self.world_from_head
-        points = (self.tuned.simulator.points - matrix[:3, 3]) @ matrix[:3, :3]
-        return self._sampler(points.astype(np.float32))
+        matrix = self.world_from_head.astype(np.float32)
+        rows = self._sampler(self.tuned.simulator.points)
+        return np.asarray((rows - matrix[:3, 3]) @ matrix[:3, :3], np.float32)
+
+    def guide_buffer(self) -> Any:
+        """Return the same as a moderngl buffer, None where the simulator does not keep hair there.
+
+        A simulator that computes by shaders has `rows_buffer(before, part)` (see the one of `pbd`);
+        use it inside `renderer()`.
+        """
+        made = getattr(self.tuned.simulator, "rows_buffer", None)
+        buffer = None if made is None else made(self._sampler.before, self._sampler.part)
+        self.on_card = buffer is not None
+        return buffer
 
     def measures(self) -> Measures:
         """Return the simulator's read-outs."""

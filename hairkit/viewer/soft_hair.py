@@ -17,7 +17,7 @@ from hairkit.render.projection import clip_from_camera, set_uniforms
 from hairkit.stored import Float32Array
 from hairkit.viewer import soft_places, soft_shading, soft_strokes
 from hairkit.viewer.hair_body import HairBody
-from hairkit.viewer.hair_look import HairLook, HairScene, HairView
+from hairkit.viewer.hair_look import GuidePlaces, HairLook, HairScene, HairView
 
 MOST_CHUNKS = 8
 """Each thread draws into sums of its own, which are added up for every picture."""
@@ -55,10 +55,11 @@ class SoftHairPass:
         """Return (S, m, 3) where the hair was last placed, metres."""
         return self._places
 
-    def move_guides(self, rows: Float32Array) -> None:
-        """Put the guides at `rows` (G, m, 3), head frame, metres."""
+    def move_guides(self, rows: GuidePlaces) -> Float32Array:
+        """Put the guides at `rows` (G, m, 3), head frame, metres; return them as points (N, 3)."""
         self._now = np.ascontiguousarray(rows, np.float32)
         self._turns = soft_places.guide_turns(self._rest, self._now)
+        return self._now.reshape(-1, 3)
 
     def place(self, view: HairView, look: HairLook) -> None:
         """Place the hair and find what of it hides what."""

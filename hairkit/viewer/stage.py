@@ -16,7 +16,7 @@ from hairkit.render.picture import BACKDROP_BOTTOM, BACKDROP_TOP, HEAD_PUSH
 from hairkit.render.projection import DepthRange, set_uniforms
 from hairkit.stored import Float32Array, Float64Array, UInt8Array
 from hairkit.viewer.hair_body import HairBody
-from hairkit.viewer.hair_look import HairDrawer, HairLook, HairScene, HairView
+from hairkit.viewer.hair_look import GuidePlaces, HairDrawer, HairLook, HairScene, HairView
 from hairkit.viewer.hair_pass import HairPass
 from hairkit.viewer.light_pass import TURNS, LightPass
 from hairkit.viewer.line_pass import Board, BoardPass, LineSet, draw_lines
@@ -43,8 +43,9 @@ class Shot:
     """Of the world, at the picture's size."""
     world_from_head: Float64Array
     """(4, 4) where the head is."""
-    guide_rows: Float32Array | None
-    """(G, m, 3) present guides, head frame; None where they are since the last picture."""
+    guide_rows: GuidePlaces | None
+    """(G, m, 3) present guides, head frame, an array or, drawn by shaders, a moderngl buffer; None
+    where they are since the last picture."""
     hair: HairLook | None
     """None draws no hair."""
     show_head: bool = True
@@ -133,10 +134,10 @@ class Stage:
         lighting = {**lights.uniforms(), **self._light.uniforms()}
         if shot.guide_rows is not None or self._fresh:
             rows = self.body.guide_rest if shot.guide_rows is None else shot.guide_rows
-            self.hair.move_guides(rows)
-            self._rows = rows
+            self.cloud = self.hair.move_guides(rows)
+            """(N, 3) points that stand for where the guides are, head frame."""
         depth = self._depth(shot, own)
-        view = HairView(own, depth, _hair_depth(own, self._rows))
+        view = HairView(own, depth, _hair_depth(own, self.cloud))
         if shot.hair is not None:
             self.hair.place(view, shot.hair)
         hairs = 0 if shot.hair is None else shot.hair.hairs
@@ -169,7 +170,7 @@ class Stage:
     def _depth(self, shot: Shot, own: Camera) -> DepthRange:
         """Return a range that changes only with the camera, so that still parts can be kept."""
         middle, size = self._head_room
-        off = self._rows.reshape(-1, 3) - middle.astype(np.float32)
+        off = self.cloud - middle.astype(np.float32)
         farthest = max(size, float(np.sqrt(np.einsum("pc,pc->p", off, off).max())))
         radius = np.ceil(farthest / 0.25 + 0.1) * 0.25 + (0.6 if shot.boards or shot.lines else 0)
         centre = float(own.depth(middle))
@@ -281,8 +282,8 @@ def _in_head(camera: Camera, world_from_head: Float64Array) -> Camera:
     return replace(camera, camera_from_head=camera.camera_from_head @ world_from_head)
 
 
-def _hair_depth(camera: Camera, rows: Float32Array) -> DepthRange:
-    depth = camera.depth(rows.reshape(-1, 3))
+def _hair_depth(camera: Camera, cloud: Float32Array) -> DepthRange:
+    depth = camera.depth(cloud)
     return DepthRange(float(depth.min()) - 0.005, float(depth.max()) + 0.005)
 
 
