@@ -173,7 +173,10 @@ def _grow(
 
 
 class _Volumes(NamedTuple):
-    """What the compiled walk reads; scalars have a last axis of one."""
+    """What the compiled walk reads; scalars have a last axis of one.
+
+    Only to be read: in a parallel loop Numba loses what is written through a tuple's field.
+    """
 
     origin: Float64Array
     spacing: float

@@ -1,8 +1,8 @@
-"""Laws of strand tracking: in made-up fields around a ball of a head."""
+"""Laws of the tracker's walk: in made-up fields around a ball of a head."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -11,24 +11,29 @@ import numba
 import numpy as np
 import pytest
 from hairkit_plugins import certainty_tracker, tensor_diffusion, visual_hull
-from hairkit_plugins.certainty_tracker import Options, _smoothed, _trimmed, track
+from hairkit_plugins.certainty_tracker import Options
+from tracked_ball import (
+    CENTRES,
+    DISTANCE,
+    FREE,
+    GRID,
+    SPACING,
+    UP,
+    constant,
+    crown,
+    field_along,
+    filled,
+    polylines,
+    roots_where,
+    run,
+)
 
-from hairkit.head import Roots
 from hairkit.options import describe
-from hairkit.stored import BoolArray, Float32Array, Float64Array
+from hairkit.stored import Float64Array
 from hairkit.strands import Strands
 from hairkit.testing import scalp_roots, turn_scene
-from hairkit.volume import Hull, OrientationField, VoxelGrid, outer_products
-from hairkit.waves import Waves
+from hairkit.volume import Hull
 
-BALL = 0.1
-SPACING = 0.01
-GRID = VoxelGrid.around(np.full(3, -0.27), np.full(3, 0.27), SPACING)
-CENTRES = GRID.centres().astype(np.float64)
-DISTANCE = np.linalg.norm(CENTRES, axis=-1) - BALL
-UP = np.array([0.0, 1.0, 0.0])
-FREE = Options(waves=False, slide_sine=0.0, u_share=1.0, smoothing=0, max_length=0.13)
-"""Nothing but the walk through the field."""
 ALL_THREADS = numba.config.NUMBA_NUM_THREADS
 
 
@@ -38,69 +43,12 @@ def _all_threads_again() -> Iterator[None]:
     numba.set_num_threads(ALL_THREADS)
 
 
-def roots_where(keep: Callable[[Float64Array], BoolArray]) -> Roots:
-    """Roots of the ball's scalp whose normals pass."""
-    roots = scalp_roots(turn_scene().head)
-    picked = keep(roots.normals.astype(np.float64))
-    return Roots(
-        roots.positions[picked] * (BALL / np.linalg.norm(roots.positions[picked], axis=1))[:, None],
-        roots.normals[picked],
-        roots.uv[picked],
-        roots.triangle[picked],
-        roots.barycentric[picked],
-    )
-
-
-def with_normals(normals: Float64Array) -> Roots:
-    """Roots on the ball with these normals."""
-    count = len(normals)
-    weights = np.full((count, 3), 1 / 3, np.float32)
-    uv, triangle = np.zeros((count, 2), np.float32), np.zeros(count, np.int32)
-    return Roots((BALL * normals).astype(np.float32), normals, uv, triangle, weights)
-
-
-def filled(hair: BoolArray | None = None) -> Hull:
-    """Hair everywhere outside of the head, or where it is told."""
-    outside = DISTANCE > -SPACING
-    return Hull(
-        GRID, outside if hair is None else hair & outside, outside, DISTANCE.astype(np.float32)
-    )
-
-
-def field_along(directions: Float64Array, growth: Float64Array) -> OrientationField:
-    """The field of unit directions (3,) or (X, Y, Z, 3), and its growth (X, Y, Z)."""
-    everywhere = np.broadcast_to(directions, CENTRES.shape)
-    tensor = outer_products(everywhere).astype(np.float32)
-    sure = np.ones(GRID.shape, np.float32)
-    return OrientationField(GRID, tensor, sure, growth.astype(np.float32))
-
-
-def constant(direction: Float64Array) -> OrientationField:
-    """One direction everywhere, in which hair also grows."""
-    unit = direction / np.linalg.norm(direction)
-    return field_along(unit, CENTRES @ unit)
-
-
-def run(field: OrientationField, hull: Hull, roots: Roots, options: Options) -> Strands:
-    """Track; no photos are needed without waves."""
-    return track(turn_scene(), (), (), hull, field, roots, options)
-
-
-def polylines(strands: Strands) -> Float64Array:
-    """Points (S, M, 3) of strands with equal counts."""
-    return strands.points.astype(np.float64).reshape(len(strands), -1, 3)
-
-
 def off_deg(strands: Strands, direction: Float64Array, after: float) -> Float64Array:
     """Angles of all segments that start beyond a share of the strand to a signed direction."""
     steps = np.diff(polylines(strands), axis=1)
     steps = steps[:, int(after * steps.shape[1]) :]
     cosine = steps @ direction / np.linalg.norm(steps, axis=2) / np.linalg.norm(direction)
     return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-
-
-def crown(normals: Float64Array) -> BoolArray:
-    return np.asarray(normals[:, 1] > 0.93)
 
 
 @pytest.mark.parametrize("direction", [[0.3, 0.8, 0.2], [-0.5, 0.7, -0.3], [0.0, 1.0, 0.0]])
@@ -143,25 +91,6 @@ def test_a_root_where_nothing_is_known_still_has_a_strand() -> None:
     options = replace(FREE, blind_steps=0, max_score=3)
     strands = run(empty, far, roots_where(crown), options)
     np.testing.assert_allclose(strands.lengths(), options.step * SPACING, atol=FREE.clearance)
-
-
-@pytest.mark.parametrize("clearance", [0.0, 0.001, 0.004])
-@pytest.mark.parametrize("wound", [False, True])
-def test_strands_stay_out_of_the_head(
-    clearance: float, wound: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where the field leads through the head they go round, at the clearance; also when wound."""
-    waves = Waves(0.008, 0.04, 0.3)
-    monkeypatch.setattr(certainty_tracker, "measure_waves", lambda *_: waves)
-    roots = scalp_roots(turn_scene().head)
-    options = Options(clearance=clearance, waves=wound, max_length=0.4)
-    strands = run(constant(np.array([0.1, -1.0, 0.2])), filled(), roots, options)
-    free = np.ones(len(strands.points), bool)
-    free[strands.offsets[:-1]] = False
-    distance = np.linalg.norm(strands.points[free], axis=1) - BALL
-    assert distance.min() > clearance - 0.0007  # the distance is interpolated in cells of 1 cm
-    assert GRID.sample(filled().head_distance, strands.points[free]).min() > clearance - 1e-4
-    assert np.median(strands.tips[:, 1]) < -0.1
 
 
 def test_strands_end_where_the_hair_ends() -> None:
@@ -261,130 +190,6 @@ def test_without_sliding_the_skin_bends_nothing() -> None:
     np.testing.assert_allclose(strands.points, reference.points, atol=2e-3)
 
 
-def bent_starts(normals: Float64Array, bend_deg: float) -> Float64Array:
-    """First directions: where no field is known, blind strands keep them."""
-    empty = field_along(np.zeros(3), 0 * DISTANCE)
-    options = replace(FREE, start="bent_normal", bend_deg=bend_deg, blind_steps=6, clearance=0.0)
-    points = polylines(run(empty, filled(), with_normals(normals), options))
-    steps = np.diff(points, axis=1)
-    np.testing.assert_allclose(steps, np.repeat(steps[:, :1], steps.shape[1], axis=1), atol=1e-5)
-    direction: Float64Array = points[:, -1] - points[:, 0]
-    return direction / np.linalg.norm(direction, axis=1, keepdims=True)
-
-
-@pytest.mark.parametrize("bend_deg", [0.0, 30.0, 50.0])
-def test_bent_normals_lean_down_by_the_bend(bend_deg: float) -> None:
-    """The start is the normal turned towards the ground in the vertical plane that holds it."""
-    normals = np.array([[1.0, 0, 0], [0, 0, -1], [0.6, 0.8, 0], [0.48, 0.6, 0.64]])
-    start = bent_starts(normals, bend_deg)
-    np.testing.assert_allclose(
-        np.sum(start * normals, axis=1), np.cos(np.radians(bend_deg)), atol=1e-3
-    )
-    np.testing.assert_allclose(np.cross(normals, start) @ UP, 0, atol=1e-3)
-    if bend_deg:
-        assert (start[:, 1] < normals[:, 1] - 0.05).all()
-
-
-@pytest.mark.parametrize("height", [1.0, -1.0])
-def test_where_no_side_is_lower_the_normal_stays(height: float) -> None:
-    """Straight above and below the head the axis of the bend vanishes."""
-    np.testing.assert_allclose(bent_starts(height * UP[None], 50.0), height * UP[None], atol=1e-4)
-
-
-def heights(*steps: float) -> tuple[Float32Array, np.ndarray]:
-    """One strand whose heights change by these steps, padded with a point that is not its own."""
-    y = np.concatenate([[0.0], np.cumsum(steps), [1e3]])
-    points = np.zeros((1, len(y), 3), np.float32)
-    points[0, :, 1] = y
-    points[0, :, 0] = np.arange(len(y))
-    return points, np.array([len(steps) + 1])
-
-
-def trimmed_twin(steps: list[float], mu: float) -> int:
-    """The thesis's rule in words of a loop; returns the number of points that stay."""
-    first_down = next((k for k, step in enumerate(steps) if step < 0), None)
-    if first_down is None:
-        return len(steps) + 1
-    ups = [k for k in range(first_down + 1, len(steps)) if steps[k] > 0]
-    if len(ups) > mu * max(len(steps) - first_down - 1, 1):
-        return max(ups[0] + 1, 2)
-    return len(steps) + 1
-
-
-def test_strands_that_turn_up_into_a_u_are_cut_at_its_bottom() -> None:
-    """Ten steps down and ten up leave the ten down; the points that stay are not moved."""
-    points, counts = heights(*[-1] * 10, *[1] * 10)
-    same, kept = _trimmed(points, counts, 0.3)
-    assert kept.tolist() == [11]
-    np.testing.assert_array_equal(same, points)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.6])
-def test_trimming_follows_the_rule_of_the_thesis(share: float) -> None:
-    """Random strands, up first or down first, have as many points left as the loop says."""
-    rng = np.random.default_rng(6)
-    for _ in range(60):
-        steps = rng.choice([-1.0, -1.0, 0.0, 1.0], rng.integers(2, 25)).tolist()
-        points, counts = heights(*steps)
-        assert _trimmed(points, counts, share)[1].tolist() == [trimmed_twin(steps, share)]
-
-
-@pytest.mark.parametrize(
-    "steps", [[1] * 8, [-1] * 8, [1, 1, 1, -1, -1, -1], [-1] * 9 + [1, 1], [0, 0, 0]]
-)
-def test_rising_falling_and_little_curled_strands_are_not_trimmed(steps: list[int]) -> None:
-    """Up then down is an arch, no U; a tip that turns up a little may."""
-    points, counts = heights(*steps)
-    assert _trimmed(points, counts, 0.3)[1].tolist() == [len(steps) + 1]
-    bowl, full = heights(-1, 1, 1, 1)
-    assert _trimmed(bowl, full, 1.0)[1].tolist() == [5]
-
-
-def test_tracked_strands_are_trimmed_and_the_option_keeps_them() -> None:
-    """In a field that circles, strands rise, fall and rise again; trimmed, they end below."""
-    x, y = CENTRES[..., 0] - 0.1, CENTRES[..., 1] - 0.1
-    circle = np.stack([y, -x, 0 * x], axis=-1)
-    circle /= np.maximum(np.linalg.norm(circle, axis=-1, keepdims=True), 1e-9)
-    field = field_along(circle, CENTRES[..., 0])
-    roots = roots_where(lambda n: (n[:, 1] > 0.8) & (np.abs(n[:, 2]) < 0.3))
-    options = replace(FREE, max_length=0.5, max_turn_deg=80)
-    whole, cut = (run(field, filled(), roots, replace(options, u_share=u)) for u in (1.0, 0.3))
-    shorter = cut.lengths() < whole.lengths() - 0.01
-    assert shorter.any()
-    rise = np.diff(polylines(cut)[shorter][:, :, 1], axis=1)
-    assert (rise[:, -2] < 0).all()
-
-
-def test_smoothing_keeps_root_and_length_and_takes_off_the_zigzag() -> None:
-    """Every segment keeps its length; angles between segments shrink, more with each pass."""
-    rng = np.random.default_rng(7)
-    walk = np.cumsum(rng.normal((0, -0.005, 0), 0.003, (20, 30, 3)), axis=1)
-    points = walk.astype(np.float32)
-
-    def roughness(lines: Float32Array) -> float:
-        edges = np.diff(lines.astype(np.float64), axis=1)
-        edges /= np.linalg.norm(edges, axis=2, keepdims=True)
-        return float(np.arccos(np.clip(np.sum(edges[:, 1:] * edges[:, :-1], axis=2), -1, 1)).mean())
-
-    before = np.linalg.norm(np.diff(points, axis=1), axis=2)
-    rough = [roughness(points)]
-    for iterations in (1, 5):
-        smooth = _smoothed(points, iterations)
-        np.testing.assert_array_equal(smooth[:, 0], points[:, 0])
-        after = np.linalg.norm(np.diff(smooth, axis=1), axis=2)
-        np.testing.assert_allclose(after, before, atol=1e-6)
-        rough.append(roughness(smooth))
-    assert rough[2] < 0.7 * rough[1] < 0.7 * 0.8 * rough[0]
-    np.testing.assert_array_equal(_smoothed(points, 0), points)
-
-
-def test_smoothing_leaves_straight_strands() -> None:
-    """A line has nothing to smooth, however uneven its segments."""
-    t = np.cumsum(np.random.default_rng(8).uniform(0.001, 0.01, 20))
-    line = (t[None, :, None] * np.array([0.6, -0.8, 0.0])).astype(np.float32)
-    np.testing.assert_allclose(_smoothed(line, 5), line, atol=1e-6)
-
-
 def test_the_number_of_threads_does_not_change_a_byte() -> None:
     """One thread and all threads give the same strands."""
     results = []
@@ -393,21 +198,6 @@ def test_the_number_of_threads_does_not_change_a_byte() -> None:
         strands = run(constant(-UP), filled(), scalp_roots(turn_scene().head), Options(waves=False))
         results.append(strands.points.tobytes())
     assert results[0] == results[1]
-
-
-def test_waves_are_wound_unless_the_option_says_no(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wound strands start at the same roots and are longer by about the length of the helix."""
-    waves = Waves(0.006, 0.04, 0.3)
-    monkeypatch.setattr(certainty_tracker, "measure_waves", lambda *_: waves)
-    roots = roots_where(crown)
-    options = replace(FREE, max_length=0.15, points=200)
-    plain, wound = (
-        run(constant(UP), filled(), roots, replace(options, waves=w)) for w in (False, True)
-    )
-    np.testing.assert_array_equal(plain.roots, wound.roots)
-    helix = np.hypot(1, 2 * np.pi * waves.radius / waves.pitch)
-    ratio = (wound.lengths() / plain.lengths()).mean()
-    assert 1 + 0.75 * (helix - 1) < ratio < helix
 
 
 @pytest.mark.parametrize("plugin", [visual_hull, tensor_diffusion, certainty_tracker])
