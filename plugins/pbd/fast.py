@@ -12,12 +12,13 @@ from hairkit.simulate import rotation
 from hairkit.stored import Float32Array, Float64Array
 
 from . import kernels
+from .crew import Crew
 from .crowd import Crowd
 from .guides import Riders
 from .kernel_air import blow_nodes
 from .kernel_lanes import LANES
 from .kernel_ride import ride_points
-from .kernel_rub import rub_nodes
+from .kernel_rub import draw_nodes, settle_cells, spread_nodes
 from .packing import banded_factor
 from .reference import Contact, Load, State, at_rest
 from .rods import Rods
@@ -26,6 +27,8 @@ from .system import System
 Array = npt.NDArray[Any]
 AirWaves = tuple[Float64Array, Float64Array, Float64Array]
 NOWHERE = np.zeros(0, np.float32)
+WORTH = 64 // LANES
+"""Blocks that are worth another thread's while."""
 FEW, GRIDS = 2000, 4
 """Of fewer rods the nodes are spread to one grid, of more to so many at a time."""
 
@@ -49,7 +52,9 @@ class FastEngine:
         self._clear = kernels.padded(clear.astype(np.float32))
         self._mass = kernels.padded(rods.mass.astype(np.float32))
         self._mass[-1, :, (self._count - 1) % LANES + 1 :] = 0.0
-        self._cells: Float32Array | None = None
+        self._cells = np.zeros((1, 0, 4), np.float32)
+        self._usual = np.zeros(0, np.float32)
+        self._crew = Crew()
         self._blown: Float32Array | None = None
         self._air_work: Float32Array | None = None
         self._riding: tuple[Riders, tuple[Array, ...]] | None = None
@@ -79,7 +84,8 @@ class FastEngine:
             [system.step, system.rates.damping, *touching, iterations, contact is not None],
             np.float32,
         )
-        kernels.run_substeps(
+        self._crew.share(
+            kernels.run_substeps, len(self._x), WORTH,
             self._x, self._q, self._root, node, element, metric,
             *_motions(loads), loads[0].gravity.astype(np.float32), self._air(loads[0].air),
             self._force(loads[0].force), self._grid, settings,
@@ -87,13 +93,20 @@ class FastEngine:
 
     def rub(self, crowd: Crowd, ride: Float64Array, rates: tuple[float, float, float]) -> None:
         """Let hair act on hair."""
-        if self._cells is None or self._cells.shape[1:4] != crowd.shape:
+        size = int(np.prod(crowd.shape))
+        if self._cells.shape[1] != size:
             grids = 1 if self._count < FEW else GRIDS
-            self._cells = np.zeros((grids, *crowd.shape, 4), np.float32)
-        rub_nodes(
-            self._x, self._mass, (ride - np.eye(4))[:3].astype(np.float32),
-            crowd.origin.astype(np.float32), crowd.usual.astype(np.float32),
-            np.array(rates, np.float32), self._cells,
+            self._cells = np.zeros((grids, size, 4), np.float32)
+            self._usual = crowd.usual.astype(np.float32).reshape(-1)
+        shift, origin = (ride - np.eye(4))[:3].astype(np.float32), crowd.origin.astype(np.float32)
+        self._crew.share(
+            spread_nodes, len(self._cells), 1, self._x, self._mass, shift, origin, crowd.shape,
+            np.float32(rates[2]), self._cells,
+        )  # fmt: skip
+        settle_cells(0, size, self._cells, self._usual)
+        self._crew.share(
+            draw_nodes, len(self._x), 4 * WORTH, self._x, shift, origin, crowd.shape,
+            np.array(rates, np.float32), self._cells[0],
         )  # fmt: skip
 
     def blow(self, waves: AirWaves | None, wind: Float64Array, head: Float64Array) -> None:
@@ -107,9 +120,9 @@ class FastEngine:
         if self._air_work is None:
             shape = (*self._x.shape[:2], 3, LANES)
             self._air_work = np.zeros(shape, np.float32)
-        blow_nodes(
-            self._x, turns.astype(np.float32), amplitudes.astype(np.float32),
-            wind.astype(np.float32), self._air_work,
+        self._crew.share(
+            blow_nodes, len(self._x), 4 * WORTH, self._x, turns.astype(np.float32),
+            amplitudes.astype(np.float32), wind.astype(np.float32), self._air_work,
         )  # fmt: skip
         self._blown = self._air_work
 
@@ -127,9 +140,9 @@ class FastEngine:
         deepest = NOWHERE if riders.identity else self._deepest
         motion = head[:3].astype(np.float32)
         rod, segment, weight, offset = self._riding[1]
-        ride_points(
-            self._x, self._q, self._clear, rod, segment, weight, offset, deepest, motion,
-            self._grid, out,
+        self._crew.share(
+            ride_points, len(out), 4096, self._x, self._q, self._clear, rod, segment, weight,
+            offset, deepest, motion, self._grid, out,
         )  # fmt: skip
         return out
 

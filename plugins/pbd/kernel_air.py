@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from .kernel_lanes import pick, whole
 from .kernel_math import ZERO, dot, minus, plus, put_three, row, three, times
@@ -14,16 +14,14 @@ PLACE = 0
 ONE, HALF, QUARTER = np.float32(1), np.float32(0.5), np.float32(0.25)
 APART = 4
 """Gusts are mixed between every so many nodes."""
-TOGETHER = 8
-"""Blocks that one thread takes at a time."""
 # cos(2 pi t) for |t| <= 1/4 in powers of t^2 (Taylor's series): off by less than 1e-7
 _C = [np.float32((-1) ** k * (2 * np.pi) ** (2 * k) / math.factorial(2 * k)) for k in range(7)]
 _C1, _C2, _C3, _C4, _C5, _C6 = _C[1:]
 
 
-@njit(parallel=True, fastmath=True, error_model="numpy", cache=True)
-def blow_nodes(x, waves, amplitudes, wind, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Write the velocity of the air at the nodes, world.
+@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+def blow_nodes(first, last, x, waves, amplitudes, wind, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Write the velocity of the air at the nodes of some blocks, world.
 
     Parameters
     ----------
@@ -36,11 +34,8 @@ def blow_nodes(x, waves, amplitudes, wind, out) -> None:  # type: ignore[no-unty
     out
         (B, n, 3, W).
     """
-    blocks = x.shape[0]
-    for number in prange((blocks + TOGETHER - 1) // TOGETHER):
-        first = np.int64(number) * TOGETHER
-        for block in range(first, min(first + TOGETHER, blocks)):
-            _blow(x[block], waves, amplitudes, wind, out[block])
+    for block in range(first, last):
+        _blow(x[block], waves, amplitudes, wind, out[block])
 
 
 @row

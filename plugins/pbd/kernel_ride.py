@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from .kernel_lanes import LANES
 from .kernel_math import carry, dot, minus, plus, rotate, row, rows_of, times
 
 ONE, ZERO = np.float32(1), np.float32(0)
 SLACK = 6
-TOGETHER = 512
-"""Points that one thread takes at a time."""
 
 
-@njit(parallel=True, fastmath=True, error_model="numpy", cache=True)
+@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
 def ride_points(  # type: ignore[no-untyped-def]
-    x, q, clear, rod, segment, weight, offset, deepest, head, grid, out
+    first, last, x, q, clear, rod, segment, weight, offset, deepest, head, grid, out
 ) -> None:  # pragma: no cover - compiled
-    """Write (P, 3) the guides' points in the world (see `guides.Riders`).
+    """Write the guides' points from `first` to before `last` in the world (see `guides.Riders`).
 
     Parameters
     ----------
@@ -32,21 +30,9 @@ def ride_points(  # type: ignore[no-untyped-def]
         (3, 4) from the head axes to the world.
     grid
         Obstacles as in `kernels.run_substeps`.
+    out
+        (P, 3).
     """
-    count = rod.shape[0]
-    for number in prange((count + TOGETHER - 1) // TOGETHER):
-        first = np.int64(number) * TOGETHER
-        _ride(
-            x, q, clear, rod, segment, weight, offset, deepest, head, grid, out,
-            first, min(first + TOGETHER, count),
-        )  # fmt: skip
-
-
-@row
-def _ride(  # type: ignore[no-untyped-def]
-    x, q, clear, rod, segment, weight, offset, deepest, head, grid, out, first, last
-) -> None:  # pragma: no cover - compiled
-    """Write some of the points."""
     motion = rows_of(head, 0)
     for i in range(first, last):
         block, lane = rod[i] // LANES, rod[i] % LANES

@@ -7,7 +7,7 @@ crowded it is and the mean velocity.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from .kernel_lanes import LANES, at, part_of, pick, put, put_quad, quad_at, quad_of
 from .kernel_math import carry, minus, plus, put_three, row, rows_of, three, times
@@ -15,13 +15,13 @@ from .kernel_math import carry, minus, plus, put_three, row, rows_of, three, tim
 ZERO, ONE, FOUR, ROOM = np.float32(0), np.float32(1), np.float32(4), np.float32(1.001)
 CELL = np.float32(1 / 0.02)
 PLACE, SPEED = 0, 3
-TOGETHER = 8
-"""Blocks that one thread takes at a time."""
 
 
-@njit(parallel=True, fastmath=True, error_model="numpy", cache=True)
-def rub_nodes(x, mass, shift, origin, usual, rates, cells) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Draw velocities to those of the neighbours, and push out of crowded places, in place.
+@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+def spread_nodes(  # type: ignore[no-untyped-def]
+    first, last, x, mass, shift, origin, shape, seconds, cells
+) -> None:  # pragma: no cover - compiled
+    """Sum up masses and momenta relative to the head, in grids from `first` to before `last`.
 
     Parameters
     ----------
@@ -29,37 +29,55 @@ def rub_nodes(x, mass, shift, origin, usual, rates, cells) -> None:  # type: ign
         (B, n, STATE, W) and (B, n, W); lanes that stand for no strand are without mass.
     shift
         (3, 4) motion of the head meanwhile, less the identity.
-    origin, usual
-        (3,) place of the grid's first value; (X, Y, Z) mass that is not crowded.
-    rates
-        (3,) cohesion, pressure, seconds.
+    origin, shape
+        Place (3,) of the grid's first value, and how many there are along each axis.
+    seconds
+        How long the motion takes.
     cells
-        (T, X, Y, Z, 4) work: T grids that nodes are spread to at the same time.
+        (T, C, 4) grids to write; each takes its part of the blocks.
     """
     blocks, grids = x.shape[0], cells.shape[0]
-    flat = cells.reshape(grids, usual.size, 4)
-    for number in prange(grids):
-        part = np.int64(number)
-        first, last = blocks * part // grids, blocks * (part + 1) // grids
-        _spread(x, mass, shift, origin, usual.shape, rates, flat[part], first, last)
-    for number in prange(usual.shape[0]):
-        _settle(flat, usual[np.int64(number)], np.int64(number))
-    for number in prange((blocks + TOGETHER - 1) // TOGETHER):
-        first = np.int64(number) * TOGETHER
-        last = min(first + TOGETHER, blocks)
-        work = np.empty((3, LANES), np.float32)
-        for block in range(first, last):
-            for j in range(1, x.shape[1]):
-                _draw(x[block], j, shift, origin, usual.shape, rates, flat[0], work)
+    for grid in range(first, last):
+        start, end = blocks * grid // grids, blocks * (grid + 1) // grids
+        _spread(x[start:end], mass[start:end], shift, origin, shape, seconds, cells[grid])
+
+
+@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+def settle_cells(first, last, cells, usual) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Turn masses into how crowded it is and momenta into velocities, in the first grid.
+
+    `usual` (C,) is the mass that is not crowded; `first` to before `last` are values of the grid.
+    """
+    for k in range(first, last):
+        value = quad_at(cells, (0, k))
+        for part in range(1, cells.shape[0]):
+            value = value + quad_at(cells, (part, k))
+        filled = part_of(value, 0)
+        if filled > ZERO:
+            put_quad(cells, (0, k), value * (ONE / filled))
+            cells[0, k, 0] = min(max((filled - usual[k]) / usual[k], ZERO), FOUR)
+
+
+@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+def draw_nodes(first, last, x, shift, origin, shape, rates, cells) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Draw velocities to those around, and push out of crowded places, in place.
+
+    `rates` (3,) are cohesion, pressure, seconds; `cells` (C, 4) the settled grid; `first` to before
+    `last` are blocks; the rest is as in `spread_nodes`.
+    """
+    work = np.empty((3, LANES), np.float32)
+    for block in range(first, last):
+        for j in range(1, x.shape[1]):
+            _draw(x[block], j, shift, origin, shape, rates, cells, work)
 
 
 @njit(fastmath=True, error_model="numpy", cache=True)
-def _spread(x, mass, shift, origin, shape, rates, cells, first, last) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Sum up the masses and momenta of some blocks, relative to the head."""
+def _spread(x, mass, shift, origin, shape, seconds, cells) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Sum up the masses and momenta of some blocks."""
     cells[:] = ZERO
     work = np.empty((7, LANES), np.float32)
-    rows, over = rows_of(shift, 0), ONE / rates[2]
-    for block in range(first, last):
+    rows, over = rows_of(shift, 0), ONE / seconds
+    for block in range(x.shape[0]):
         for j in range(x.shape[1]):
             place, speed, m = (
                 three(x[block], j, PLACE), three(x[block], j, SPEED), at(mass[block], j),
@@ -119,22 +137,6 @@ def _spread_edge(cells, cell, stride, value, b, c) -> None:  # type: ignore[no-u
     cell += stride
     put_quad(cells, cell, quad_at(cells, cell) + (far - high))
     put_quad(cells, cell + 1, quad_at(cells, cell + 1) + high)
-
-
-@row
-def _settle(cells, usual, number) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Turn masses into how crowded it is, and momenta into velocities, in the first grid."""
-    flat = usual.reshape(usual.size)
-    first = number * usual.size
-    for k in range(usual.size):
-        value = quad_at(cells, (0, first + k))
-        for part in range(1, cells.shape[0]):
-            value = value + quad_at(cells, (part, first + k))
-        filled = part_of(value, 0)
-        if filled > ZERO:
-            put_quad(cells, (0, first + k), value * (ONE / filled))
-            crowded = (filled - flat[k]) / flat[k]
-            cells[0, first + k, 0] = min(max(crowded, ZERO), FOUR)
 
 
 @row

@@ -12,7 +12,7 @@ import logging
 from pathlib import Path
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from hairkit.stored import Float32Array
 
@@ -33,17 +33,29 @@ PLACE, SPEED, SLACK = 0, 3, 6
 """Rows of a node's state: place (3), velocity (3), and how far it may go before it is looked up."""
 STATE = 7
 EDGE, DIRECTION = 0, 3
-TOGETHER = 64 // LANES
-"""Blocks that one thread takes at a time."""
 
 ONE, ZERO = np.float32(1), np.float32(0)
 
 
-@njit(parallel=True, fastmath=True, error_model="numpy", cache=True)
+@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
 def run_substeps(  # type: ignore[no-untyped-def]
-    x, q, root, node, element, metric, rides, turns, gravity, air, force, grid, settings
+    first,
+    last,
+    x,
+    q,
+    root,
+    node,
+    element,
+    metric,
+    rides,
+    turns,
+    gravity,
+    air,
+    force,
+    grid,
+    settings,
 ) -> None:  # pragma: no cover - compiled
-    """Advance all blocks by as many substeps as there are rides, in place.
+    """Advance blocks `first` to before `last` by as many substeps as there are rides, in place.
 
     Parameters
     ----------
@@ -64,22 +76,20 @@ def run_substeps(  # type: ignore[no-untyped-def]
     settings
         (6,) step, damping, friction, depenetration speed, iterations, contacts.
     """
-    blocks, n = x.shape[0], x.shape[1]
-    for number in prange((blocks + TOGETHER - 1) // TOGETHER):
-        # work: segments (6), torsion (4), forces, solutions and normals (3 each), factor
-        segment, line = np.empty((n - 1, 6, LANES), np.float32), np.empty((5, n, LANES), np.float32)
-        vector = np.empty((4, n, 3, LANES), np.float32)
-        factor = np.empty((metric.shape[1], LANES), np.float32)
-        corners = np.zeros((12, LANES), np.float32)
-        first = np.int64(number) * TOGETHER
-        for block in range(first, min(first + TOGETHER, blocks)):
-            wind, extra = air[min(block, air.shape[0] - 1)], force[min(block, force.shape[0] - 1)]
-            for k in range(rides.shape[0]):
-                _substep(
-                    x[block], q[block], root[block], node[block], element[block], metric[block],
-                    constants_of(rides[k], turns[k], gravity, settings), wind, extra, grid,
-                    settings, segment, vector, line, factor, corners,
-                )  # fmt: skip
+    n = x.shape[1]
+    # work: segments (6), sums along the rod, forces, solutions and normals (3 each), factor, cells
+    segment, line = np.empty((n - 1, 6, LANES), np.float32), np.empty((5, n, LANES), np.float32)
+    vector = np.empty((4, n, 3, LANES), np.float32)
+    factor = np.empty((metric.shape[1], LANES), np.float32)
+    corners = np.zeros((12, LANES), np.float32)
+    for block in range(first, last):
+        wind, extra = air[min(block, air.shape[0] - 1)], force[min(block, force.shape[0] - 1)]
+        for k in range(rides.shape[0]):
+            _substep(
+                x[block], q[block], root[block], node[block], element[block], metric[block],
+                constants_of(rides[k], turns[k], gravity, settings), wind, extra, grid,
+                settings, segment, vector, line, factor, corners,
+            )  # fmt: skip
 
 
 @row

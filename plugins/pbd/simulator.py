@@ -38,6 +38,7 @@ HAIR_DENSITY = 1300.0
 SINGLE_HAIR = 1.2e-3
 """m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""
 _KEPT_SYSTEMS = 4
+_IDENTITY = np.eye(4)
 
 
 class PbdSimulator:
@@ -189,10 +190,8 @@ class PbdSimulator:
             rates = (self._options.cohesion, self._options.pressure, seconds)
             self._engine.rub(self._crowd, inverse_motion(end) @ start, rates)
         held = self._held(around, start)
-        loads, head = [], start
-        for k in range(count):
-            after = between(start, end, (k + 1) / count)
-            ride = inverse_motion(after) @ head if (after != head).any() else np.eye(4)
+        loads = []
+        for after, ride in course(start, end, count):
             load = Load(ride, after[:3, :3].T, gravity, air)
             if around.grabs and not held:  # a pull depends on where the node is
                 force = self._hand.pulls(
@@ -202,7 +201,6 @@ class PbdSimulator:
                 self._engine.run(system, [replace(load, force=force)], self._options.iterations)
             else:
                 loads.append(load)
-            head = after
         if loads:
             self._engine.run(system, loads, self._options.iterations)
         self._time += seconds
@@ -250,17 +248,47 @@ def between(start: Float64Array, end: Float64Array, share: float) -> Float64Arra
         return start
     if share >= 1.0:
         return end
-    w, x, y, z = rotation.from_matrix(end[:3, :3] @ start[:3, :3].T)
-    sine = math.sqrt(x * x + y * y + z * z)
-    half = share * math.atan2(sine, w)
-    scale = math.sin(half) / sine if sine > 1e-12 else 0.0
-    cross = 2 * scale * np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # Rodrigues: 1 + 2 c K + 2 K K with K the half turn's cross product
-    turn = np.eye(3) + math.cos(half) * cross + 0.5 * cross @ cross
+    cross, angle = _screw(end[:3, :3] @ start[:3, :3].T)
+    angle *= share
+    turn = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * (cross @ cross)
     result = np.eye(4)
     result[:3, :3] = turn @ start[:3, :3]
     result[:3, 3] = (1 - share) * start[:3, 3] + share * end[:3, 3]
     return result
+
+
+def course(
+    start: Float64Array, end: Float64Array, count: int
+) -> list[tuple[Float64Array, Float64Array]]:
+    """Return the motion (4, 4) after each of `count` equal steps, and what leads there.
+
+    The latter brings points in the axes of the motion before the step to those after it.
+    """
+    if (start == end).all():
+        return [(end, _IDENTITY)] * count
+    share = np.arange(count + 1)[:, None, None] / count
+    heads = np.tile(_IDENTITY, (count + 1, 1, 1))
+    cross, angle = _screw(end[:3, :3] @ start[:3, :3].T)
+    # Rodrigues: 1 + sin K + (1 - cos) K K with K the axis' cross product
+    turn = np.sin(share * angle) * cross + (1 - np.cos(share * angle)) * (cross @ cross)
+    heads[:, :3, :3] = start[:3, :3] + turn @ start[:3, :3]
+    heads[:, :3, 3] = start[:3, 3] + share[:, 0] * (end[:3, 3] - start[:3, 3])
+    heads[0], heads[-1] = start, end
+    back = heads[1:, :3, :3].swapaxes(1, 2)
+    rides = np.tile(_IDENTITY, (count, 1, 1))
+    rides[:, :3, :3] = back @ heads[:-1, :3, :3]
+    rides[:, :3, 3:] = back @ (heads[:-1] - heads[1:])[:, :3, 3:]
+    return list(zip(heads[1:], rides, strict=True))
+
+
+def _screw(turn: Float64Array) -> tuple[Float64Array, float]:
+    """Return the cross product (3, 3) of a rotation's axis, and its angle; 0 where it is none."""
+    w, x, y, z = rotation.from_matrix(turn).tolist()
+    sine = math.sqrt(x * x + y * y + z * z)
+    if sine < 1e-12:
+        return np.zeros((3, 3)), 0.0
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) / sine
+    return cross, 2 * math.atan2(sine, w)
 
 
 def inverse_motion(motion: Float64Array) -> Float64Array:
