@@ -18,13 +18,11 @@ from numba import njit, prange
 from scipy import ndimage
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, Strands, hookimpl
-from hairkit.clearance import kept_outside
 from hairkit.combing import combing_direction, hair_length, scalp_way
 from hairkit.field_sampling import gradient_at, make_unit, principal_direction, sample_at
-from hairkit.geometry import smoothed
+from hairkit.finishing import FinishOptions, finished
 from hairkit.options import option
 from hairkit.stored import BoolArray, Float32Array, Float64Array, Int64Array
-from hairkit.waves import add_waves, measure_waves
 
 ROOT_STEPS, ROOT_INERTIA = 4, 0.7
 """Near the scalp the field is weak: the first steps keep more of their direction."""
@@ -35,7 +33,7 @@ SKIN_SMOOTHING, SKIN_LEVEL = 1.5, 0.6
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(FinishOptions):
     """Settings of the tracker."""
 
     step: float = option(0.5, low=0.05, high=2, doc="Step in cells of the grid.")
@@ -70,7 +68,6 @@ class Options:
         high=5,
         doc="Strands slide while shorter than this share of the longest way through the hair.",
     )
-    clearance: float = option(0.001, low=0, high=0.02, unit="m", doc="Distance kept from the head.")
     max_length: float = option(1.2, low=0.01, high=5, unit="m", doc="Longest strand.")
     smoothing: int = option(5, low=0, high=50, doc="Smoothing iterations.")
     u_share: float = option(
@@ -79,15 +76,6 @@ class Options:
         high=1,
         doc="Share of upward steps that marks a U-shaped strand (mu); 1 never trims.",
     )
-    helix_tolerance: float = option(
-        0.0,
-        low=0,
-        high=0.01,
-        unit="m",
-        doc="Smooth strands by helix arcs within this mean distance; 0: leave them.",
-    )
-    waves: bool = option(True, doc="Wind the strands as the photos' waves do.")
-    points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
 
 
 @hookimpl
@@ -110,11 +98,7 @@ def track(
     strands = Strands(points[rows], offsets).resampled(options.points)
     smooth = _smoothed(strands.points.reshape(len(roots), options.points, 3), options.smoothing)
     result = Strands(smooth.reshape(-1, 3), strands.offsets, root_uv=roots.uv)
-    if options.helix_tolerance > 0:
-        result = smoothed(result, options.helix_tolerance)
-    if options.waves:
-        result = add_waves(result, measure_waves(orientations, masks, scene.cameras))
-    return kept_outside(result, hull, options.clearance)
+    return finished(result, scene, masks, orientations, hull, options)
 
 
 def _start_directions(

@@ -14,14 +14,12 @@ from numba import njit, prange
 from scipy import ndimage
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, Strands, hookimpl
-from hairkit.clearance import kept_outside
 from hairkit.combing import hair_length, scalp_way
 from hairkit.field_sampling import gradient_at, make_unit, sample_at
-from hairkit.geometry import smoothed
+from hairkit.finishing import FinishOptions, finished
 from hairkit.options import option
 from hairkit.stored import Float32Array
 from hairkit.volume import cell_slopes, symmetric_matrices
-from hairkit.waves import add_waves, measure_waves
 
 NEAR = 4
 """Cells of the grid in a row whose roots are grown together."""
@@ -30,7 +28,7 @@ PARTS = 64
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(FinishOptions):
     """Settings of the growth."""
 
     step: float = option(0.001, low=1e-4, high=0.01, unit="m", doc="Length of a step (delta).")
@@ -60,16 +58,6 @@ class Options:
     inertia: float = option(
         0.92, low=0, high=0.99, doc="Share of the previous direction in the next step's."
     )
-    clearance: float = option(0.001, low=0, high=0.02, unit="m", doc="Distance kept from the head.")
-    helix_tolerance: float = option(
-        0.0,
-        low=0,
-        high=0.01,
-        unit="m",
-        doc="Smooth strands by helix arcs within this mean distance; 0: leave them.",
-    )
-    waves: bool = option(True, doc="Wind the strands as the photos' waves do.")
-    points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
 
 
 @hookimpl
@@ -85,12 +73,7 @@ def track(
     """Grow one strand from every root."""
     way = hair_length(hull, scalp_way(scene.head, hull))
     strands = grown(field, _signed(field), _distance(field, hull), roots.positions, way, options)
-    strands = replace(strands, root_uv=roots.uv)
-    if options.helix_tolerance > 0:
-        strands = smoothed(strands, options.helix_tolerance)
-    if options.waves:
-        strands = add_waves(strands, measure_waves(orientations, masks, scene.cameras))
-    return kept_outside(strands, hull, options.clearance)
+    return finished(replace(strands, root_uv=roots.uv), scene, masks, orientations, hull, options)
 
 
 def grown(

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins import certainty_tracker
 from hairkit_plugins.certainty_tracker import Options, _smoothed, _trimmed
 from tracked_ball import (
     BALL,
@@ -25,6 +24,7 @@ from tracked_ball import (
     with_normals,
 )
 
+from hairkit import finishing
 from hairkit.stored import Float32Array, Float64Array
 from hairkit.testing import scalp_roots, turn_scene
 from hairkit.waves import Waves
@@ -161,7 +161,7 @@ def test_strands_stay_out_of_the_head(
 ) -> None:
     """Where the field leads through the head they go round, at the clearance; also when wound."""
     waves = Waves(0.008, 0.04, 0.3)
-    monkeypatch.setattr(certainty_tracker, "measure_waves", lambda *_: waves)
+    monkeypatch.setattr(finishing, "measure_waves", lambda *_: waves)
     roots = scalp_roots(turn_scene().head)
     options = Options(clearance=clearance, waves=wound, max_length=0.4)
     strands = run(constant(np.array([0.1, -1.0, 0.2])), filled(), roots, options)
@@ -176,7 +176,7 @@ def test_strands_stay_out_of_the_head(
 def test_waves_are_wound_unless_the_option_says_no(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wound strands start at the same roots and are longer by about the length of the helix."""
     waves = Waves(0.006, 0.04, 0.3)
-    monkeypatch.setattr(certainty_tracker, "measure_waves", lambda *_: waves)
+    monkeypatch.setattr(finishing, "measure_waves", lambda *_: waves)
     roots = roots_where(crown)
     options = replace(FREE, max_length=0.15, points=200)
     plain, wound = (

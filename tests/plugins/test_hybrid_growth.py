@@ -11,6 +11,7 @@ import pytest
 from hairkit_plugins import hybrid_field, hybrid_growth
 from hairkit_plugins.hybrid_growth import Options, grown, track
 
+from hairkit import finishing
 from hairkit.head import Roots
 from hairkit.options import describe
 from hairkit.stored import Float32Array
@@ -25,7 +26,7 @@ GRID = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.01)
 
 @pytest.fixture(autouse=True)
 def _straight_hair(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hybrid_growth, "measure_waves", lambda *_: Waves())
+    monkeypatch.setattr(finishing, "measure_waves", lambda *_: Waves())
 
 
 def constant(way: tuple[float, float, float]) -> OrientationField:
