@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -96,17 +97,11 @@ def reconstruct(
             pool.shutdown(wait=False, cancel_futures=True)
             raise
         work.flush()
-        write_groom(folder / "groom.npz", made.groom)
-        _in_photo_pixels(made.scene, capture).write_json(folder / "scene.json")
-        for plugin, path in export_paths(folder, recipe, manager):
-            run.export(plugin, made.groom, path)
-        (folder / SHEET).unlink(missing_ok=True)  # an old one would show another groom
+        _write(folder, run, capture, made, export_paths(folder, recipe, manager))
         if sheet:
             _draw_sheet(folder / SHEET, capture, made, log)
         manager.notify("groom_ready", groom=made.groom)
-        photo = capture.views[0].photo_path
-        if photo is not None:
-            log.noted(f"{PHOTOS}{photo.resolve().parent}")
+        _note_photos(log, capture)
         log.write(folder / "hairkit.log", recipe, manager)
     return made.groom
 
@@ -156,6 +151,21 @@ def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int
     return _Made(labels, angles, hull.value, scene.value, groom)
 
 
+def _write(
+    folder: Path,
+    run: StageRunner,
+    capture: Capture,
+    made: _Made,
+    exports: Sequence[tuple[str, Path]],
+) -> None:
+    """Write the groom, the scene and the exports; away with the sheet of another groom."""
+    write_groom(folder / "groom.npz", made.groom)
+    _in_photo_pixels(made.scene, capture).write_json(folder / "scene.json")
+    for plugin, path in exports:
+        run.export(plugin, made.groom, path)
+    (folder / SHEET).unlink(missing_ok=True)
+
+
 def _draw_sheet(path: Path, capture: Capture, made: _Made, log: RunLog) -> None:
     from hairkit.contact_sheet import write_contact_sheet  # loads OpenGL
 
@@ -168,6 +178,12 @@ def _draw_sheet(path: Path, capture: Capture, made: _Made, log: RunLog) -> None:
     except RenderError as error:
         log.message(f"no contact sheet: {error}")
     log.finished("sheet", time.perf_counter() - began, False)
+
+
+def _note_photos(log: RunLog, capture: Capture) -> None:
+    photo = capture.views[0].photo_path
+    if photo is not None:
+        log.noted(f"{PHOTOS}{photo.resolve().parent}")
 
 
 def _sweep(folder: Path) -> None:
