@@ -16,15 +16,14 @@ uniform int u_nodes;
 #if NODES <= 16
 #define EACH_NODE NODES
 #define EACH_SEGMENT SEGMENTS
-#define BELOW(j) SEGMENTS
 const int NODE_ROOM = NODES;
 #else
 #define EACH_NODE u_nodes
 #define EACH_SEGMENT (u_nodes - 1)
-#define BELOW(j) (j)
 const int NODE_ROOM = 64;  // access to shorter arrays becomes a ladder of conditions
 #endif
 const int SEGMENT_ROOM = NODE_ROOM - 1;
+#define FOURS(count) (((count) + 3) / 4)
 
 uniform sampler2D u_state;
 uniform int u_rods;

@@ -29,8 +29,7 @@ vec3 free[NODE_ROOM];          // the solution without lengths
 float slack[NODE_ROOM];
 vec4 frame[SEGMENT_ROOM];
 vec3 edge[SEGMENT_ROOM], direction[SEGMENT_ROOM];
-float pivot[SEGMENT_ROOM], beside[SEGMENT_ROOM], value[SEGMENT_ROOM];
-float factor[SEGMENTS * (SEGMENTS - 1) / 2], scaled[SEGMENT_ROOM];
+float pivot[SEGMENT_ROOM], beside[SEGMENT_ROOM], value[NODE_ROOM];
 
 // Constants are read where they are used: kept, they would only fill the memory of local arrays.
 vec4 rest_and_mass(int j) { return constant(rod, NODE_ROW + 2 * j); }
@@ -157,35 +156,11 @@ void solve_banded() {
     }
 }
 
-// Write the pull along the segments that brings them to their lengths to `value`: the factor
-// L D L^T of metric * (d d^T), row by row, with its forward substitution.
-void solve_lengths() {
-    for (int i = 0; i < EACH_SEGMENT; i++) {
-        vec3 way = direction[i], excess = edge[i] + free[i + 1] - free[i];
-        float right = dot(excess, way) - banded(i).w;
-        float last = 0.0;
-        for (int j = 0; j < BELOW(i); j++)
-            if (j < i) {
-                float here = next_metric(i * (i + 1) / 2 + j) * dot(way, direction[j]);
-                for (int k = 0; k < BELOW(j); k++)
-                    if (k < j) here -= scaled[k] * factor[j * (j - 1) / 2 + k];
-                scaled[j] = here;
-                float low = here * pivot[j];
-                factor[i * (i - 1) / 2 + j] = low;
-                last -= here * low;
-                right -= low * value[j];
-            }
-        float own = next_metric(i * (i + 1) / 2 + i);
-        pivot[i] = 1.0 / max(last + own * dot(way, way), SINGULAR * own);
-        value[i] = right;
-    }
-    for (int i = EACH_SEGMENT - 1; i >= 0; i--) {
-        float pull = value[i] * pivot[i];
-        for (int k = 0; k < EACH_SEGMENT; k++)
-            if (k > i) pull -= factor[k * (k - 1) / 2 + i] * value[k];
-        value[i] = pull;
-    }
-}
+#if NODES <= 16
+#include "pbd_lengths_unrolled.glsl"
+#else
+#include "pbd_lengths.glsl"
+#endif
 
 // Go on by the solution of forces under the lengths: solve for the forces, then in turns for the
 // lengths and their pulls, about the directions of the last solution.

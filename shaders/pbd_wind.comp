@@ -3,7 +3,6 @@
 // found at every fourth node and mixed between.
 #include "pbd_layout.glsl"
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_wind;
-uniform int u_count;             // of waves
 uniform vec3 u_mean;             // m/s
 uniform vec4 u_waves[WAVES];     // wave vectors, rad/m, head axes; phases, rad
 uniform vec4 u_amplitudes[WAVES];  // m/s, world
@@ -12,8 +11,7 @@ const int APART = 4;
 vec3 air(int rod, int j) {
     vec4 at = vec4(node_place(rod, j).xyz, 1.0);
     vec3 sum = u_mean;
-    // not WAVES: compilers would unroll this at length
-    for (int i = 0; i < u_count; i++) sum += cos(dot(u_waves[i], at)) * u_amplitudes[i].xyz;
+    for (int i = 0; i < WAVES; i++) sum += cos(dot(u_waves[i], at)) * u_amplitudes[i].xyz;
     return sum;
 }
 

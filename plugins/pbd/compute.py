@@ -19,7 +19,7 @@ from hairkit.simulate import Grab, rotation
 from hairkit.stored import Float32Array, Float64Array
 
 from .compute_hand import Held
-from .compute_load import MOST_STEPS, AirWaves, Units, air_uniforms, step_words
+from .compute_load import MOST_STEPS, AirWaves, Units, air_uniforms, step_words, steps_at_once
 from .compute_obstacles import contact_uniforms, faces
 from .compute_rods import constant_rows, offset_words, rider_words, share_words
 from .compute_store import Store
@@ -103,14 +103,16 @@ class ComputeEngine:
                 self._store.put_rods("u_constants", rows)
                 self._system = system
             settings = self._settings(system, loads[0], iterations)
+            most = steps_at_once(self._nodes, iterations)
             for start in range(0, len(loads), MOST_STEPS):
                 some = loads[start : start + MOST_STEPS]
                 self._store.put_words("steps", step_words(some, system.step))
                 self._store["steps"].bind_to_uniform_block(0)
                 if self._held:
                     self._run_held(some, settings)
-                else:
-                    self._step(0, len(some), settings)
+                    continue
+                for first in range(0, len(some), most):
+                    self._step(first, min(most, len(some) - first), settings)
 
     def rub(self, crowd: Crowd, ride: Float64Array, rates: tuple[float, float, float]) -> None:
         """Let hair act on hair."""

@@ -8,6 +8,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from hairkit.errors import RenderError
+from hairkit.render.context import on_graphics_card
 from hairkit.simulate import rotation
 from hairkit.stored import Float32Array, Float64Array
 
@@ -18,6 +20,10 @@ UNITS = 2.0**30
 """Units of mass that all hair has, and of momentum that a cell holds."""
 MOST_STEPS = 64
 """Substeps in one run of the shader."""
+UNROLLED = 16
+"""Nodes up to which compilers unroll the shader's loops, see `pbd_layout.glsl`."""
+MOST_TURNS = 60_000
+"""Turns of loops in one run of a shader: Mesa's llvmpipe leaves all loops after 65536 in all."""
 FULLEST, FASTEST = 32.0, 10.0
 """A cell holds the momentum of the densest captured cell's mass so many times, at so many m/s."""
 
@@ -37,6 +43,24 @@ def step_words(loads: Sequence[Load], step: float) -> Float32Array:
     return words.astype(np.float32)
 
 
+def steps_at_once(nodes: int, iterations: int) -> int:
+    """Return how many substeps the shader may do in one run.
+
+    Raises `RenderError` where a software renderer cannot do one.
+    """
+    if nodes <= UNROLLED:
+        return MOST_STEPS
+    segments = nodes - 1
+    # the factor of the lengths takes four entries in a turn, a row for each segment before
+    turns = iterations * (segments**3 // 24 + segments**2 + 5 * segments) + 20 * nodes
+    if turns > MOST_TURNS and not on_graphics_card():
+        raise RenderError(
+            f"rods of {nodes} nodes with {iterations} iterations take {turns} turns of loops, a"
+            f" software renderer does {MOST_TURNS}; take fewer of either, or pbd.backend=fast"
+        )
+    return min(max(MOST_TURNS // turns, 1), MOST_STEPS)
+
+
 def air_uniforms(waves: AirWaves, wind: Float64Array, head: Float64Array) -> dict[str, Any]:
     """Return the uniforms of gusts on a head at `head`: waves in its axes, the air in the world."""
     vectors, amplitudes, phases = waves
@@ -44,7 +68,6 @@ def air_uniforms(waves: AirWaves, wind: Float64Array, head: Float64Array) -> dic
     turned = np.fmod(phases + vectors @ head[:3, 3], 2 * np.pi)
     local = np.concatenate([vectors @ head[:3, :3], turned[:, None]], axis=1)
     return {
-        "u_count": len(vectors),
         "u_mean": tuple(wind),
         "u_waves": [tuple(wave) for wave in local],
         "u_amplitudes": [(*amplitude, 0.0) for amplitude in amplitudes],
