@@ -93,7 +93,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def explain(error: BaseException) -> tuple[str, int]:
     """Return the one line that tells a user about an error, and the exit code."""
     if _interrupted(error):
-        return "interrupted; run it again to go on where it stopped", 2
+        said = str(error) if isinstance(error, KeyboardInterrupt) else ""
+        return f"interrupted; {said or 'run it again to go on where it stopped'}", 2
     if isinstance(error, HairkitError):
         return _one_line(error), 2
     if isinstance(error, MemoryError):
@@ -116,10 +117,21 @@ def _run(words: list[str]) -> int:
     if verb is None and not {"-h", "--help", "--version"} & set(words):
         parser.print_help(sys.stderr)
         return 2
-    args, unknown = parser.parse_known_args(words)
+    args, unknown = parser.parse_known_args(_vectors_joined(words))
     if unknown:
         _refuse(verb_parser or parser, unknown)
     return int(module.run(args))
+
+
+def _vectors_joined(words: list[str]) -> list[str]:
+    """Return `--wind -3,0,0` as `--wind=-3,0,0`, which argparse would take for two options."""
+    joined: list[str] = []
+    for word in words:
+        if re.fullmatch(r"-[\d.][\d.e+,-]*,[\d.e+,-]+", word) and joined and joined[-1][:2] == "--":
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 class _UsageError(HairkitError):

@@ -17,9 +17,10 @@ from hairkit.stored import Float64Array
 _DESCRIPTION = """\
 Example: hairkit simulate out/groom.npz -o cache.npz --shake yaw:20:1.5 --wind 3,0,1
 
-Simulate a groom's guides and write a point cache (.npz), or with --using's exporter a file of
-another ending with the animation in it: -o hair.abc. The captured hair is at rest at the start.
-Shakes are AXIS:DEGREES:HERTZ[:SECONDS] with yaw, pitch or roll; several go together."""
+Simulate a groom's guides and write a point cache (.npz), or a file with the animation in it, by the
+exporter of its ending: -o hair.abc, .usdc, .glb. The captured hair is at rest at the start.
+Shakes are AXIS:DEGREES:HERTZ[:SECONDS] with yaw, pitch or roll; several go together. Wind is where
+the air goes to: +X the subject's left, +Y up, +Z out of the face."""
 
 SIMULATOR = "pbd"
 MOST_FRAMES = 100_000
@@ -42,14 +43,15 @@ def register(subparsers: Any) -> None:
     add("--turbulence", type=float, default=0.0, metavar="T", help="gusts over the wind (0)")
     add("--gravity", type=float, metavar="G", help="m/s^2 downwards; the groom's by default")
     add("--set", action="append", default=[], metavar="X=V", help="option=V of the simulator")
-    add("--using", default=SIMULATOR, metavar="NAME", help=f"simulator plugin ({SIMULATOR})")
+    add("--preset", metavar="NAME", help="options kept by hairkit view beside the groom")
+    add("--using", metavar="NAME", help=f"simulator plugin ({SIMULATOR}, or the preset's)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--quiet", action="store_true", help="no progress")
 
 
 def run(args: argparse.Namespace) -> int:
     """Simulate, write the cache or the animated file, and print its name."""
-    from hairkit.groom_opening import load_groom, plugin_for
+    from hairkit.groom_opening import load_groom
     from hairkit.manager import Manager
     from hairkit.progress import progress_for
     from hairkit.simulate import Weather, read_motion, shaken, still
@@ -57,25 +59,27 @@ def run(args: argparse.Namespace) -> int:
 
     _check(args)
     manager = Manager.loaded(args.plugin)
-    options, others = _settings(manager, args.using, args.set)
-    exporter = None
-    if args.out.suffix.lower() != ".npz":
-        exporter = plugin_for(manager, "export_groom", args.out)
+    using, kept = _preset(args)
+    options, others = _settings(manager, using, kept, args.set)
+    exporter = _exporter(manager, args.out)
     _refuse_unknown(others, exporter)
     weather = Weather(_vector("--wind", args.wind), args.turbulence, _gravity(args.gravity))
     groom = load_groom(manager, args.groom)
     motion = still() if args.motion is None else read_motion(args.motion)
     motion = shaken(args.shake, groom.head, motion)
-    simulator = manager.call("make_simulator", args.using, options, groom=groom)
-    with progress_for(sys.stderr, quiet=args.quiet) as progress:
-        cache = simulated(
-            simulator, motion, args.frames, args.fps,
-            weather=weather, warm_up=args.warm_up, progress=progress,
-        )  # fmt: skip
-    if exporter is None:
-        cache.save(args.out)
-    else:
-        _export(manager, exporter, others.get(exporter, {}), groom, cache, args.out)
+    simulator = manager.call("make_simulator", using, options, groom=groom)
+    try:
+        with progress_for(sys.stderr, quiet=args.quiet) as progress:
+            cache = simulated(
+                simulator, motion, args.frames, args.fps,
+                weather=weather, warm_up=args.warm_up, progress=progress,
+            )  # fmt: skip
+        if exporter is None:
+            cache.save(args.out)
+        else:
+            _export(manager, exporter, others.get(exporter, {}), groom, cache, args.out)
+    except KeyboardInterrupt as error:
+        raise KeyboardInterrupt(f"{args.out} was not written") from error
     stretch = simulator.measure().stretch
     print(
         f"{args.out.name}: {len(cache)} frames of {len(simulator.strands)} guides,"
@@ -117,11 +121,45 @@ def _gravity(down: float | None) -> Float64Array | None:
     return np.array([0.0, -down, 0.0])
 
 
+def _preset(args: argparse.Namespace) -> tuple[str, dict[str, object]]:
+    """Return the simulator, and the options that `hairkit view` has kept for it."""
+    from hairkit.groom_opening import groom_path
+    from hairkit.viewer.presets import presets_path, read_preset
+
+    if args.preset is None:
+        return args.using or SIMULATOR, {}
+    preset = read_preset(presets_path(groom_path(args.groom)), args.preset)
+    plugin = str(preset.get("simulator", SIMULATOR))
+    if args.using not in (None, plugin):
+        raise InputError(f"--preset {args.preset} is of {plugin}, not of --using {args.using}")
+    return plugin, dict(preset.get("options", {}))
+
+
+def _exporter(manager: Any, path: Path) -> str | None:
+    """Return the plugin that writes the animated file, None for a point cache."""
+    from hairkit.groom_opening import plugin_for
+
+    if path.suffix.lower() == ".npz":
+        return None
+    exporter = plugin_for(manager, "export_groom", path)
+    if not _animated(manager, exporter):
+        able = [name for name in manager.names("export_groom") if _animated(manager, name)]
+        endings = sorted({ending for name in able for ending in manager.info(name).suffixes})
+        raise InputError(
+            f"{path}: {exporter} writes no animation; write a cache .npz, or {', '.join(endings)}"
+        )
+    return exporter
+
+
+def _animated(manager: Any, exporter: str) -> bool:
+    return "cache" in {info.name for info in manager.info(exporter).options}
+
+
 def _settings(
-    manager: Any, simulator: str, assignments: list[str]
+    manager: Any, simulator: str, kept: dict[str, object], assignments: list[str]
 ) -> tuple[Any, dict[str, dict[str, object]]]:
     """Take `option=value` and `plugin.option=value` apart: the simulator's, and other plugins'."""
-    values: dict[str, dict[str, object]] = {simulator: {}}
+    values: dict[str, dict[str, object]] = {simulator: dict(kept)}
     for text in assignments:
         target, equals, value = (part.strip() for part in text.partition("="))
         plugin, dot, name = target.rpartition(".")
@@ -143,9 +181,6 @@ def _export(
     manager: Any, exporter: str, values: dict[str, object], groom: Any, cache: Any, path: Path
 ) -> None:
     """Write the animated file; its exporter reads the frames from a cache that goes away again."""
-    known = {info.name for info in manager.info(exporter).options}
-    if "cache" not in known:
-        raise InputError(f"{path}: {exporter} writes no animation; write a cache .npz or .abc")
     with tempfile.TemporaryDirectory(prefix="hairkit-") as folder:
         frames = Path(folder) / "cache.npz"
         cache.save(frames)

@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from hairkit.cli.render import parse_size
 from hairkit.errors import InputError
@@ -28,6 +28,7 @@ def register(subparsers: Any) -> None:
     add("--capture", type=Path, metavar="FOLDER", help="the photos, to show them in space")
     add("--simulator", metavar="NAME", help="simulator plugin (pbd), or none")
     add("--set", action="append", default=[], metavar="X=V", help="option=V of the simulator")
+    add("--preset", metavar="NAME", help="the simulator's options kept beside the groom")
     add("--hairs", type=int, metavar="N", help="strands drawn (10000)")
     add("--size", metavar="WxH", help="pixels (1280x720)")
     add("--budget", type=float, metavar="MS", help="milliseconds a picture may take (50)")
@@ -35,6 +36,20 @@ def register(subparsers: Any) -> None:
     add("--script", type=Path, metavar="FILE", help="actions to do (TOML)")
     add("--out", type=Path, metavar="FOLDER", help="where a script's pictures go (.)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+    add("--actions", action=_ListActions, nargs=0, help="list what scripts can do, and leave")
+
+
+class _ListActions(argparse.Action):
+    """Prints a line for each action, with its values and their defaults."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from hairkit.viewer.action_table import signature
+        from hairkit.viewer.actions import ACTIONS
+
+        for action in ACTIONS.values():
+            print(signature(action))
+            print(f"    {action.doc}")
+        parser.exit()
 
 
 def run(args: argparse.Namespace) -> int:
@@ -109,17 +124,25 @@ def _manager(args: argparse.Namespace) -> Any:
 
 
 def _session(args: argparse.Namespace, manager: Any, size: tuple[int, int], seed: int = 0) -> Any:
+    from hairkit.groom_opening import groom_path
+    from hairkit.viewer.actions import perform
+    from hairkit.viewer.presets import presets_path, read_preset
     from hairkit.viewer.session import HAIRS, Session
 
+    simulator = args.simulator
+    if args.preset is not None and simulator is None:
+        simulator = read_preset(presets_path(groom_path(args.groom)), args.preset).get("simulator")
     session = Session(
         manager,
         args.groom,
         size=size,
-        simulator=args.simulator,
+        simulator=simulator,
         hairs=HAIRS if args.hairs is None else args.hairs,
         capture=args.capture,
         seed=seed,
     )
+    if args.preset is not None:
+        perform(session, "preset_load", {"name": args.preset})
     for name, value in map(_assignment, args.set):
         session.tuned.set(name.removeprefix(f"{session.tuned.plugin}."), value)
     return session

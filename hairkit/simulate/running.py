@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from time import perf_counter
 
@@ -69,19 +70,40 @@ def run(
     before = round(warm_up * frames_per_second)
     told.started(STAGE, before + frames)
     times = np.arange(before + frames) / frames_per_second
-    heads = np.stack([motion(float(time)) for time in times])
-    points = np.empty((frames, len(simulator.strands.points), 3), np.float32)
-    simulator.reset(heads[0])
-    for frame, head in enumerate(heads):
-        if frame:
+    heads = np.empty((frames, 4, 4))
+    points = _room(frames, len(simulator.strands.points))
+    for frame, time in enumerate(times):
+        head = motion(float(time))
+        if not frame:
+            simulator.reset(head)
+        else:
             around = Surroundings(head, air.wind, air.turbulence, air.gravity)
             simulator.advance(1.0 / frames_per_second, around)
         if frame >= before:
-            points[frame - before] = simulator.points
-            _check(points[frame - before], float(times[frame]))
+            points[frame - before], heads[frame - before] = simulator.points, head
+            _check(points[frame - before], float(time))
         told.stepped(STAGE)
     told.finished(STAGE, perf_counter() - began, False)
-    return PointCache(points, times[:frames], heads[before:])
+    return PointCache(points, times[:frames], heads)
+
+
+def _room(frames: int, points: int) -> Float32Array:
+    """Return room for all frames; says that there is none before hours are spent."""
+    size, memory = frames * points * 12, _memory()
+    if size > memory:
+        raise InputError(
+            f"{frames} frames of {points} points take {size / 2**30:.0f} GiB of memory,"
+            f" here are {memory / 2**30:.0f}; ask for fewer frames"
+        )
+    return np.empty((frames, points, 3), np.float32)
+
+
+def _memory() -> float:
+    """Return the bytes of this machine's memory, infinity where it does not tell."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
 
 
 def _check(points: Float32Array, time: float) -> None:

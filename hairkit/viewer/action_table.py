@@ -60,6 +60,16 @@ def checked_values(name: str, values: Mapping[str, object]) -> dict[str, Any]:
     return wanted
 
 
+def signature(action: Action) -> str:
+    """Return name and values of an action: `zoom factor: float`, `turn yaw: float = 0.0, ...`."""
+    values = []
+    for field in dataclasses.fields(action.values):
+        kind = field.type.__name__ if isinstance(field.type, type) else str(field.type)
+        default = "" if field.default is _MISSING else f" = {field.default!r}"
+        values.append(f"{field.name}: {kind}{default}")
+    return f"{action.name} {', '.join(values)}".strip()
+
+
 def bindings() -> dict[str, tuple[str, Mapping[str, object]]]:
     """Return what each key does: action and values."""
     return {

@@ -85,7 +85,7 @@ def frame(session: Session) -> None:
 
 @action(N={"step": 1}, B={"step": -1})
 def through(session: Session, name: str = "", step: int = 0) -> None:
-    """Look through the camera of a photo: the next one, or by name; without either, leave it."""
+    """Look through the camera of the next photo, of the one before, or by name."""
     names = list(session.photo_cameras)
     if not names:
         raise InputError("there are no photos' cameras here; open the folder of a reconstruction")
@@ -145,15 +145,20 @@ def wind(
     RIGHT={"degrees": 15.0},
     UP={"faster": 1.0},
     DOWN={"faster": -1.0},
+    U={"gustier": 0.1},
+    SHIFT_U={"gustier": -0.1},
 )
-def wind_change(session: Session, degrees: float = 0.0, faster: float = 0.0) -> None:
-    """Turn the wind by degrees, make it faster by metres per second."""
+def wind_change(
+    session: Session, degrees: float = 0.0, faster: float = 0.0, gustier: float = 0.0
+) -> None:
+    """Turn the wind by degrees, make it faster by m/s, more or less turbulent."""
     air = session.wind
     azimuth = (air.azimuth + degrees + 180.0) % 360.0 - 180.0
-    wind(session, on=True, speed=air.speed + faster, azimuth=azimuth)
+    gusts = round(air.turbulence + gustier, 6)
+    wind(session, on=True, speed=air.speed + faster, azimuth=azimuth, turbulence=gusts)
 
 
-@action(S={})
+@action(S={}, SHIFT_S={"axis": "pitch", "degrees": 15.0}, X={"axis": "roll", "degrees": 15.0})
 def shake(
     session: Session,
     axis: str = "yaw",
@@ -177,7 +182,7 @@ def turn(
     roll: float = 0.0,
     straight: bool = False,
 ) -> None:
-    """Turn the head by degrees from where it is, or set it straight."""
+    """Turn the head to its right, its left, up, down, or set it straight."""
     for axis, degrees in (("yaw", yaw), ("pitch", pitch), ("roll", roll)):
         now = 0.0 if straight else session.motion.turn[axis]
         session.motion.turn[axis] = float(np.clip(now + np.radians(degrees), -2.0, 2.0))
@@ -216,7 +221,7 @@ def pick(session: Session, x: float, y: float) -> None:
 
 @action(LEFT_BRACKET={"times": 0.8}, RIGHT_BRACKET={"times": 1.25})
 def hairs(session: Session, count: int = 0, times: float = 1.0) -> None:
-    """Draw so many hairs, or so many times more."""
+    """Draw fewer or more hairs."""
     wanted = count or round(session.shown.hairs * times)
     session.set_hairs(int(np.clip(wanted, len(session.body.guides), MAX_HAIRS)))
     session.message = f"{session.shown.hairs} hairs"
@@ -233,8 +238,11 @@ def colours(session: Session, by: str = "") -> None:
     """Colour by hair, direction, length, stretch, curvature, confidence."""
     if by and by not in COLOURINGS:
         raise InputError(unknown_name("colouring", by, COLOURINGS))
-    after = COLOURINGS[(COLOURINGS.index(session.shown.colours) + 1) % len(COLOURINGS)]
-    session.shown.colours = by or after
+    known = COLOURINGS if session.layers.has_confidence else COLOURINGS[:-1]
+    if by and by not in known:
+        raise InputError("no confidence is here; open the folder that hairkit reconstruct wrote")
+    now = known.index(session.shown.colours) if session.shown.colours in known else -1
+    session.shown.colours = by or known[(now + 1) % len(known)]
     session.message = f"coloured by {session.shown.colours}"
 
 
@@ -256,16 +264,18 @@ def layer(session: Session, name: str, on: bool | None = None) -> None:
     layers.add(name) if shown else layers.discard(name)
 
 
-@action()
-def exposure(session: Session, value: float) -> None:
-    """Make the light brighter or darker; 0.75 at first."""
-    session.shown.exposure = float(np.clip(value, 0.05, 8.0))
+@action(E={"times": 1.15}, SHIFT_E={"times": 1 / 1.15})
+def exposure(session: Session, value: float | None = None, times: float = 1.0) -> None:
+    """Make the light brighter or darker."""
+    wanted = times * (session.shown.exposure if value is None else value)
+    session.shown.exposure = float(np.clip(wanted, 0.05, 8.0))
 
 
-@action()
-def opacity(session: Session, value: float) -> None:
+@action(O={"more": 0.1}, SHIFT_O={"more": -0.1})
+def opacity(session: Session, value: float | None = None, more: float = 0.0) -> None:
     """Make photos in space more or less opaque, 0 to 1."""
-    session.shown.opacity = float(np.clip(value, 0.0, 1.0))
+    wanted = more + (session.shown.opacity if value is None else value)
+    session.shown.opacity = float(np.clip(wanted, 0.0, 1.0))
 
 
 @action()
@@ -313,6 +323,13 @@ def preset_load(session: Session, name: str = "preset") -> None:
         raise InputError(f"preset {name!r} is of {plugin!r}; run view with --simulator {plugin}")
     session.tuned.replace(dict(preset.get("options", {})))
     session.message = f"preset {name}"
+
+
+@action(CTRL_D={})
+def option_defaults(session: Session) -> None:
+    """Take the default of every option of the simulator."""
+    session.tuned.replace({})
+    session.message = f"{session.tuned.plugin} as it is by default"
 
 
 @action(P={})

@@ -33,6 +33,16 @@ EDGE = 640
 """Pixels of the photos' long edge here."""
 
 
+@dataclass(frozen=True)
+class Before:
+    """How a session was before the head is placed."""
+
+    paused: bool
+    photos: bool
+    opacity: float
+    through: str | None
+
+
 @dataclass
 class Adjustment:
     """A capture whose head is being placed."""
@@ -44,6 +54,8 @@ class Adjustment:
     head: Head
     pose: Float64Array
     """(4, 4) similarity, scene_from_head, metres."""
+    before: Before | None = None
+    """What was shown before it began, to be shown again after it."""
 
     @classmethod
     def of(

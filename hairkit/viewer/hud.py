@@ -10,6 +10,7 @@ import numpy as np
 
 from hairkit.stored import Float32Array, UInt8Array
 from hairkit.viewer.actions import ACTIONS
+from hairkit.viewer.colouring import legend
 from hairkit.viewer.session import Session
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
@@ -37,7 +38,6 @@ _LABELS = {
     "RIGHT_BRACKET": "]",
     "EQUAL": "+",
     "MINUS": "-",
-    "SHIFT_TAB": "shift+tab",
     "ESCAPE": "esc",
 }
 _ARROWS = ("LEFT", "RIGHT", "UP", "DOWN")
@@ -65,10 +65,8 @@ class Readings:
 def status_lines(session: Session, readings: Readings) -> list[str]:
     """Return the read-outs as lines."""
     name, shown = session.opened.path.name, session.shown
-    fewer = readings.hairs < shown.hairs and not shown.guides_only and readings.hairs > 0
     lines = [
-        f"{name}: {len(session.body.guides)} guides,"
-        f" {readings.hairs}{f' of {shown.hairs}' if fewer else ''} hairs,"
+        f"{name}: {len(session.body.guides)} guides{_hairs(session, readings)},"
         f" {session.tuned.plugin}{', paused' if session.paused else ''}",
         f"{readings.fps:.1f} fps   simulate {readings.simulate_ms:.1f} ms"
         f"   draw {readings.draw_ms:.1f} ms   scale {readings.scale:.2f}",
@@ -79,9 +77,19 @@ def status_lines(session: Session, readings: Readings) -> list[str]:
         lines.append(f"wind {session.wind.speed:.1f} m/s from {session.wind.azimuth:.0f} deg")
     if shown.through is not None:
         lines.append(f"through the camera of {shown.through}")
+    if shown.colours != "hair":
+        lines.append(legend(shown.colours, session.guide_rows(), session.body.guide_rest))
     if session.recorder is not None:
         lines.append(f"recording {session.recorder.path}: {session.recorder.count}")
     return lines + _guide_lines(session)
+
+
+def _hairs(session: Session, readings: Readings) -> str:
+    """Return how many hairs are drawn, and of how many, when the machine is too slow for all."""
+    wanted = session.shown.hairs
+    if session.shown.guides_only or not readings.hairs:
+        return ""
+    return f", {readings.hairs}{f' of {wanted}' if readings.hairs < wanted else ''} hairs"
 
 
 def help_lines() -> list[str]:
@@ -113,8 +121,9 @@ def key_label(key: str) -> str:
     """Return how a key is called on the keyboard: `N1` is `1`, `PERIOD` is `.`."""
     if key.startswith("N") and key[1:].isdigit():
         return key[1:]
-    if key.startswith("CTRL_"):
-        return f"ctrl+{key_label(key.removeprefix('CTRL_'))}"
+    for modifier in ("CTRL", "SHIFT"):
+        if key.startswith(f"{modifier}_"):
+            return f"{modifier.lower()}+{key_label(key.removeprefix(f'{modifier}_'))}"
     if len(key) == 1 or (key.startswith("F") and key[1:].isdigit()):
         return key
     return _LABELS.get(key, key.replace("_", " ").lower())

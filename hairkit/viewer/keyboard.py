@@ -30,13 +30,13 @@ SPECIAL = (
 
 
 def key_name(glfw: Any, key: int, mods: int) -> str | None:
-    """Return the name of a pressed key, such as `W`, `N1`, `CTRL_S`; None for others."""
+    """Return the name of a pressed key, as `W`, `N1`, `CTRL_S`, `SHIFT_S`; None for others."""
     name = _names(glfw).get(key)
     if name is None:
         return None
     if mods & CONTROL:
         return f"CTRL_{name}"
-    return f"SHIFT_{name}" if mods & SHIFT and name == "TAB" else name
+    return f"SHIFT_{name}" if mods & SHIFT and (name == "TAB" or len(name) == 1) else name
 
 
 def _names(glfw: Any) -> dict[int, str]:

@@ -24,7 +24,7 @@ from hairkit.scene import Scene
 from hairkit.stored import Float32Array, Float64Array, Stored, UInt8Array, from_arrays, read_npz
 from hairkit.synth.bust import Bust
 from hairkit.viewer.line_pass import Board, LineSet
-from hairkit.volume import Hull, OrientationField
+from hairkit.volume import Hull, OrientationField, VoxelGrid
 from hairkit.volume_surface import volume_surface
 
 BOARDS = ("photos", "masks", "orientation")
@@ -130,11 +130,21 @@ class Layers:
 
     def confidence(self, rows: Float32Array) -> Float32Array | None:
         """Return (G, m) the field's confidence along guides (G, m, 3) at rest, None without one."""
-        field = self._read(OrientationField, "field")
-        if field is None:
+        if self._confidence is None:
             return None
-        values = field.grid.sample(field.confidence, rows.reshape(-1, 3))
-        return values.reshape(rows.shape[:2])
+        grid, confidence = self._confidence
+        return grid.sample(confidence, rows.reshape(-1, 3)).reshape(rows.shape[:2])
+
+    @cached_property
+    def _confidence(self) -> tuple[VoxelGrid, Float32Array] | None:
+        """The field's confidence, kept: every picture asks for it, and its file is large."""
+        field = self._read(OrientationField, "field")
+        return None if field is None else (field.grid, field.confidence)
+
+    @property
+    def has_confidence(self) -> bool:
+        """Whether a field's confidence can be shown."""
+        return "field" in self.available
 
     def _photos(self) -> dict[str, UInt8Array]:
         if self.capture is None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import textwrap
 import typing
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -16,12 +17,16 @@ from hairkit.errors import RenderError
 from hairkit.options import OptionInfo
 from hairkit.viewer.actions import LOOKS
 from hairkit.viewer.colouring import COLOURINGS
+from hairkit.viewer.layers import BOARDS
 from hairkit.viewer.motion import AXES
+from hairkit.viewer.presets import preset_names, presets_path
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
 
 WIDTH = 330
 """Pixels."""
+HINT = 48
+"""Letters in a line of a hint."""
 
 Perform = Callable[[str, Mapping[str, object]], None]
 
@@ -42,6 +47,8 @@ class Panel:
     def __init__(self, window: Any) -> None:
         self._imgui, self._backend = _load(window)
         self._shown = False
+        self._size: tuple[int, int] | None = None
+        self._preset = "preset"
 
     @property
     def wants_mouse(self) -> bool:
@@ -83,13 +90,15 @@ class Panel:
     def draw(self, session: Session, preview: Preview, perform: Perform) -> None:
         """Draw the panel and do what was asked for in it."""
         imgui = self._imgui
-        self._shown = imgui is not None and session.shown.panel
+        self._shown = imgui is not None and session.shown.panel and not session.shown.help
         if not self._shown:
             return
         self._backend.process_inputs()
         imgui.new_frame()
-        imgui.set_next_window_pos((session.size[0] - WIDTH - 8, 8), imgui.Cond_.first_use_ever)
-        imgui.set_next_window_size((WIDTH, session.size[1] - 16), imgui.Cond_.first_use_ever)
+        when = imgui.Cond_.first_use_ever if session.size == self._size else imgui.Cond_.always
+        self._size = session.size
+        imgui.set_next_window_pos((session.size[0] - WIDTH - 8, 8), when)
+        imgui.set_next_window_size((WIDTH, session.size[1] - 16), when)
         imgui.begin("hairkit")
         if imgui.collapsing_header("View", imgui.TreeNodeFlags_.default_open):
             _view(imgui, session, perform)
@@ -99,11 +108,7 @@ class Panel:
         if imgui.collapsing_header(title, imgui.TreeNodeFlags_.default_open):
             for info in session.tuned.infos:
                 _option(imgui, session, info, perform)
-            if imgui.button("Save preset"):
-                perform("preset_save", {})
-            imgui.same_line()
-            if imgui.button("Load preset"):
-                perform("preset_load", {})
+            self._preset = _presets(imgui, session, self._preset, perform)
         if session.layers.capture is not None and imgui.collapsing_header("Head in the photos"):
             _pose(imgui, session, perform)
         imgui.end()
@@ -138,15 +143,37 @@ def _view(imgui: Any, session: Session, perform: Perform) -> None:
     if changed:
         perform("guides", {"only": only})
     changed, count = imgui.slider_int("hairs", shown.hairs, 100, 50_000)
+    _hint(imgui, "Strands drawn, guides among them; fewer while the machine is too slow.")
     if changed:
         perform("hairs", {"count": count})
     changed, value = imgui.slider_float("exposure", shown.exposure, 0.1, 3.0)
     if changed:
         perform("exposure", {"value": value})
+    if shown.layers & set(BOARDS):
+        changed, value = imgui.slider_float("opacity", shown.opacity, 0.0, 1.0)
+        _hint(imgui, "Of the photos in space.")
+        if changed:
+            perform("opacity", {"value": value})
     for name in session.layers.available:
         changed, on = imgui.checkbox(name, name in shown.layers)
         if changed:
             perform("layer", {"name": name, "on": on})
+
+
+def _presets(imgui: Any, session: Session, name: str, perform: Perform) -> str:
+    """Draw what keeps options and takes them again; return the name that is typed."""
+    imgui.separator()
+    imgui.set_next_item_width(0.4 * WIDTH)
+    _, name = imgui.input_text("##name", name)
+    imgui.same_line()
+    if imgui.button("keep as preset") and name.strip():
+        perform("preset_save", {"name": name.strip()})
+    for found in preset_names(presets_path(session.opened.path)):
+        if imgui.button(f"take {found}"):
+            perform("preset_load", {"name": found})
+    if imgui.button("defaults"):
+        perform("option_defaults", {})
+    return str(name)
 
 
 def _air(imgui: Any, session: Session, perform: Perform) -> None:
@@ -154,9 +181,14 @@ def _air(imgui: Any, session: Session, perform: Perform) -> None:
     changed, on = imgui.checkbox("wind", air.blowing)
     if changed:
         perform("wind", {"on": on})
-    ranges = (("speed", 0.0, 20.0), ("azimuth", -180.0, 180.0), ("turbulence", 0.0, 2.0))
-    for name, low, high in ranges:
-        changed, value = imgui.slider_float(name, float(getattr(air, name)), low, high)
+    ranges = (
+        ("speed", 0.0, 20.0, "%.1f m/s", "Of the wind."),
+        ("azimuth", -180.0, 180.0, "%.0f deg", "From where: 0 in front, 90 the subject's left."),
+        ("turbulence", 0.0, 2.0, "%.2f", "Gusts as a share of the wind."),
+    )
+    for name, low, high, shape, hint in ranges:
+        changed, value = imgui.slider_float(name, float(getattr(air, name)), low, high, shape)
+        _hint(imgui, hint)
         if changed:
             perform("wind", {"on": air.blowing, name: value})
     if imgui.button("shake"):
@@ -212,6 +244,7 @@ def _option(imgui: Any, session: Session, info: OptionInfo, perform: Perform) ->
     """Draw the slider, box or list of one option."""
     value = session.tuned.value(info.name)
     kind = typing.get_args(info.type) or (info.type,)
+    shape = f"%.4g {info.unit}" if info.unit and "%" not in info.unit else "%.4g"
     changed = False
     if info.choices:
         names = [str(choice) for choice in info.choices]
@@ -226,10 +259,15 @@ def _option(imgui: Any, session: Session, info: OptionInfo, perform: Perform) ->
         low = info.low if info.low is not None else 0.0
         high = info.high if info.high is not None else max(10 * float(value), 1.0)
         flags = imgui.SliderFlags_.logarithmic if high > 1000 * max(low, 1e-9) > 0 else 0
-        changed, value = imgui.slider_float(info.name, float(value), low, high, "%.4g", flags)
+        changed, value = imgui.slider_float(info.name, float(value), low, high, shape, flags)
     else:
         imgui.text(f"{info.name}: {value}")
-    if imgui.is_item_hovered():
-        imgui.set_tooltip(f"{info.doc} {f'({info.unit})' if info.unit else ''}")
+    _hint(imgui, info.doc)
     if changed:
         perform("option", {"name": info.name, "value": value})
+
+
+def _hint(imgui: Any, text: str) -> None:
+    """Tell about the last item while the mouse is over it, in lines that the window holds."""
+    if imgui.is_item_hovered():
+        imgui.set_tooltip("\n".join(textwrap.wrap(text, HINT)))

@@ -6,22 +6,35 @@ from hairkit.camera import Camera
 from hairkit.errors import InputError
 from hairkit.options import unknown_name
 from hairkit.viewer.action_table import action
-from hairkit.viewer.adjusting import PLUGIN, Adjustment, Rerun
+from hairkit.viewer.adjusting import PLUGIN, Adjustment, Before, Rerun
 from hairkit.viewer.motion import AXES
 from hairkit.viewer.session import Session
+
+SEEN_THROUGH = 0.5
+"""Opacity of the photos while the head is placed: both must be seen."""
 
 
 @action(A={})
 def adjust(session: Session, on: bool | None = None) -> None:
     """Place the head by hand against the photos, or leave that."""
     wanted = session.adjustment is None if on is None else on
+    if wanted == (session.adjustment is not None):
+        return
     session.adjust(wanted)
-    if session.adjustment is not None:
-        session.reset()
-        session.paused = True
-        session.shown.layers.add("photos")
-        session.shown.through = session.shown.through or next(iter(session.photo_cameras))
-        session.message = "ctrl+arrows move the head, ctrl+J O I K T Y turn it; ctrl+E saves"
+    if session.adjustment is None:
+        return
+    shown = session.shown
+    photos = "photos" in shown.layers
+    session.adjustment.before = Before(session.paused, photos, shown.opacity, shown.through)
+    session.reset()
+    session.paused = True
+    shown.layers.add("photos")
+    shown.opacity = SEEN_THROUGH
+    shown.through = shown.through or next(iter(session.photo_cameras))
+    session.message = (
+        "ctrl+arrows move the head, ctrl+J O I K T Y turn it; N next photo; O shift+O opacity;"
+        " ctrl+E keeps it, ctrl+R reconstructs from it, A leaves"
+    )
 
 
 @action(

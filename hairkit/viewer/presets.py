@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,19 @@ def read_presets(path: Path) -> dict[str, Preset]:
         if not isinstance(table, Mapping):
             raise InputError(f"{path}: {name} is no table; begin it with [{name}]")
     return document
+
+
+def preset_names(path: Path) -> tuple[str, ...]:
+    """Return the names of the presets, none where the file cannot be read; cheap to ask again."""
+    try:
+        return _names(path, path.stat().st_mtime_ns)
+    except (OSError, InputError):  # told of when one of them is taken
+        return ()
+
+
+@lru_cache(maxsize=1)
+def _names(path: Path, changed: int) -> tuple[str, ...]:
+    return tuple(read_presets(path))
 
 
 def read_preset(path: Path, name: str) -> Preset:

@@ -158,7 +158,13 @@ class Session:
 
     def adjust(self, on: bool) -> None:
         """Begin to place the head by hand, or leave it; raises `InputError` without photos."""
+        before = None if self.adjustment is None else self.adjustment.before
         self.adjustment, self.adjusted = None, None
+        if before is not None:  # what the adjustment has changed goes back
+            self.paused, self.shown.opacity = before.paused, before.opacity
+            self.shown.through = before.through
+            if not before.photos:
+                self.shown.layers.discard("photos")
         if on:
             folder = self.layers.capture
             if folder is None:

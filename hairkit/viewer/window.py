@@ -31,8 +31,8 @@ from hairkit.viewer.session import Session
 from hairkit.viewer.starting import TITLE, AbandonedError, Waiting, warm_up
 from hairkit.viewer.watching import Watch, shader_files
 
-TEXT_EVERY = 6
-"""Pictures between two redraws of the text."""
+TEXT_EVERY = 0.25
+"""Seconds between two redraws of numbers; what the user has asked for is told at once."""
 LONGEST_PAUSE = 0.1
 """Seconds that pass at most between two pictures, as far as the hair is told."""
 _CURE = (
@@ -176,7 +176,8 @@ class Window:
         self.mouse = Mouse(self.perform, session.size[1])
         self._watch_groom = Watch([session.opened.path])
         self._watch_shaders = Watch(shader_files())
-        self._count = 0
+        self._told: object = None
+        self._told_at = 0.0
         with renderer() as gl:
             self._gl = gl
             self.preview = Preview(gl, session, Budget(budget))
@@ -261,8 +262,7 @@ class Window:
 
     def _show(self, gl: Any) -> None:
         """Bring the picture and the text onto the screen."""
-        self._count += 1
-        if self._count % TEXT_EVERY == 1 or self.session.message:
+        if self._text_is_old():
             self._write_text()
         size = self._glfw.get_framebuffer_size(self._window)
         self._screen.use()
@@ -273,6 +273,14 @@ class Window:
         program = gl.program("viewer_screen", "viewer_blit")
         set_uniforms(program, u_picture=5, u_text=6, u_size=size)
         self._blit.render(moderngl.TRIANGLES, vertices=3)
+
+    def _text_is_old(self) -> bool:
+        session, now = self.session, time.monotonic()
+        told = (session.message, session.shown.help, session.shown.numbers, session.size)
+        if told == self._told and now - self._told_at < TEXT_EVERY:
+            return False
+        self._told, self._told_at = told, now
+        return True
 
     def _write_text(self) -> None:
         image = overlay(self.session.size, self.session, self.preview.readings)
@@ -323,6 +331,8 @@ class Window:
         """A key was pressed, released or repeated."""
         self._panel.on_key(key, event, mods)
         name = key_name(self._glfw, key, mods)
+        if name is not None and name not in self._keys:
+            name = name.removeprefix("SHIFT_")  # capital letters do what small ones do
         if event == self._glfw.RELEASE or name not in self._keys or self._panel.wants_keys:
             return
         self.perform(*self._keys[name])

@@ -37,6 +37,7 @@ def outcome(words: list[str]) -> int:
     [
         (InputError("bad\nphoto"), "bad photo", 2),
         (KeyboardInterrupt(), "interrupted; run it again to go on where it stopped", 2),
+        (KeyboardInterrupt("c.npz was not written"), "interrupted; c.npz was not written", 2),
         (
             OSError(errno.ENOSPC, "No space left on device", "out/groom.npz"),
             "out/groom.npz: No space left on device; free some space and run it again",

@@ -12,6 +12,7 @@ import pytest
 from hairkit.cli import main
 from hairkit.groom_file import write_groom
 from hairkit.testing import bristle_groom
+from hairkit.viewer.actions import ACTIONS
 
 
 @pytest.fixture
@@ -59,6 +60,10 @@ def test_a_folder_of_results_is_opened_by_its_name(groom_path: Path, tmp_path: P
         (("--out", "x"), "--out is for --headless"),
         (("--size", "big"), "--size is 'big'"),
         (("--budget", "-1"), "--budget is -1.0"),
+        (("--hairs", "-4"), "--hairs is -4"),
+        (("--capture", "nowhere"), "--capture nowhere: no such folder"),
+        (("--set", "drag"), "--set drag: expected option=value"),
+        (("--script", "nothing.toml"), "nothing.toml: no such file"),
     ],
 )
 def test_mistakes_give_one_line(
@@ -85,6 +90,45 @@ def test_what_is_no_groom_is_refused(
         assert message in capsys.readouterr().err
     assert main(["view", str(groom_path), *map(str, common), "--simulator", "magic"]) == 2
     assert "no simulator 'magic'" in capsys.readouterr().err
+
+
+def test_a_file_that_no_plugin_reads_is_refused_before_a_window_opens(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The line tells what can be read, whether there is a display or not."""
+    (tmp_path / "notes.txt").write_text("hello")
+    assert view(tmp_path / "notes.txt") == 2
+    said = capsys.readouterr().err.strip()
+    assert "no plugin for files of this name" in said
+    assert "\n" not in said
+
+
+def test_the_actions_of_scripts_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every action with its values, what has a default with that."""
+    with pytest.raises(SystemExit) as left:
+        main(["view", "--actions"])
+    assert left.value.code == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "zoom factor: float" in lines
+    assert "pause on: bool | None = None" in lines
+    assert {line.split()[0] for line in lines if line[0] != " "} == set(ACTIONS)
+
+
+def test_a_preset_of_the_window_is_taken(
+    groom_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its simulator and its options; one that is not there is named."""
+    presets = groom_path.with_name("groom.presets.toml")
+    presets.write_text("[heavy]\nsimulator = 'pbd'\noptions = {drag = 7.0}\n")
+    script = tmp_path / "steps.toml"
+    keep = "[[steps]]\ndo = 'preset_save'\nname = 'again'\n"
+    script.write_text(keep)
+    words = ["view", str(groom_path), "--headless", "--script", str(script)]
+    assert main([*words, "--preset", "heavy", "--set", "friction=0.3"]) == 0
+    assert "drag" in presets.read_text().split("again")[1]
+    assert "friction" in presets.read_text().split("again")[1]
+    assert main([*words, "--preset", "light"]) == 2
+    assert "no preset 'light'; valid: heavy, again" in capsys.readouterr().err
 
 
 def test_without_a_display_one_line_says_what_to_do(groom_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -146,6 +147,57 @@ def test_other_endings_go_through_their_exporter(groom: Groom, tmp_path: Path) -
     assert (tmp_path / "hair.abc").stat().st_size > 1000
     assert simulate(groom, tmp_path, "-o", str(tmp_path / "hair.apx")) == 2
     assert not (tmp_path / "hair.apx").exists()
+
+
+def test_formats_without_animation_are_refused_before_anything_is_simulated(
+    groom: Groom,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The line names what does carry animation."""
+    monkeypatch.setattr("hairkit.simulate.run", lambda *_, **__: pytest.fail("simulated"))
+    assert simulate(groom, tmp_path, "-o", str(tmp_path / "hair.obj")) == 2
+    said = capsys.readouterr().err
+    assert "obj writes no animation" in said
+    assert all(ending in said for ending in (".npz", ".abc", ".glb", ".usdc"))
+
+
+def test_wind_may_begin_with_a_minus(groom: Groom, tmp_path: Path) -> None:
+    """Wind along -X is said as it is along +X, and blows the other way."""
+    moved = []
+    for wind in ("-8,0,0", "8,0,0"):
+        cache = tmp_path / "c.npz"
+        assert simulate(groom, tmp_path, "-o", str(cache), "--wind", wind, "--frames", "9") == 0
+        points = read_cache(cache, groom).points
+        moved.append(float((points[8] - points[0])[:, 0].mean()))
+    assert moved[0] < 0 < moved[1]
+
+
+def test_options_found_in_the_window_are_taken_by_name(groom: Groom, tmp_path: Path) -> None:
+    """A preset beside the groom is as good as its options; `--set` goes before it."""
+    (tmp_path / "groom.presets.toml").write_text(
+        "[heavy]\nsimulator = 'pbd'\noptions = {drag = 30.0, backend = 'reference'}\n"
+    )
+    words = ("--wind", "3,0,0", "--frames", "5", "-o", str(tmp_path / "c.npz"))
+    found = []
+    for more in (
+        ("--preset", "heavy"),
+        ("--set", "drag=30", "--set", "backend=reference"),
+        ("--preset", "heavy", "--set", "drag=1"),
+    ):
+        assert simulate(groom, tmp_path, *words, *more) == 0
+        found.append(read_cache(tmp_path / "c.npz", groom).points)
+    assert (found[0] == found[1]).all()
+    assert not (found[0] == found[2]).all()
+    assert simulate(groom, tmp_path, *words, "--preset", "light") == 2
+
+
+def test_frames_that_no_memory_holds_are_refused_at_once(groom: Groom, tmp_path: Path) -> None:
+    """Before the first frame, with the size."""
+    many = SimpleNamespace(strands=SimpleNamespace(points=np.zeros((10**7, 3))))
+    with pytest.raises(InputError, match=r"GiB of memory.*ask for fewer frames"):
+        run(many, still(), 10**6)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
