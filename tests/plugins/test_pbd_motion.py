@@ -46,8 +46,8 @@ def quarter_period(
 ) -> float:
     """Return the time in which a small mode along `way` first comes to zero.
 
-    Implicit Euler's frequency is lower by its damping only; the quarter period is longer by h / 2,
-    which is taken off.
+    Implicit Euler of a mode let go turns it by atan(omega h) in a step: later than the law by
+    (omega h)^2 / 3 only.
     """
     state = displaced(rods, 1e-4 * LENGTH * shape[:, None] * way)
     system, count, now, before = system_of(rods, step), 0, 1.0, 1.0
@@ -55,39 +55,39 @@ def quarter_period(
         state = substep(rods, system, state, load_of(gravity))
         count, before = count + 1, now
         now = float(shape @ (state.position[0] - rods.points[0]) @ way)
-    return step * (count - now / (now - before) - 0.5)
+    return step * (count - now / (now - before))
 
 
 @pytest.mark.parametrize("beads", [7, 15, 31])
 def test_a_chain_of_beads_swings_as_laguerre_says(beads: int) -> None:
-    """omega^2 = (N g / L) x1, x1 the first zero of L_N: the quarter period to 0.3 %."""
+    """omega^2 = (N g / L) x1, x1 the first zero of L_N: the quarter period to 0.02 %."""
     omega = np.sqrt(beads * G / LENGTH * roots_laguerre(beads)[0][0])
-    quarter = quarter_period(chain(beads), mode_of_chain(beads), ACROSS, 5e-4, DOWN)
-    assert quarter == pytest.approx(np.pi / 2 / omega, rel=0.003)
+    quarter = quarter_period(chain(beads), mode_of_chain(beads), ACROSS, 2e-3, DOWN)
+    assert quarter == pytest.approx(np.pi / 2 / omega, rel=2e-4)
 
 
 def test_a_chain_swings_in_its_second_mode_as_laguerre_says() -> None:
-    """omega^2 = (N g / L) x2, x2 the second zero of L_N: the quarter period to 0.5 %."""
+    """omega^2 = (N g / L) x2, x2 the second zero of L_N: the quarter period to 0.05 %."""
     omega = np.sqrt(15 * G / LENGTH * roots_laguerre(15)[0][1])
-    quarter = quarter_period(chain(15), mode_of_chain(15, 1), ACROSS, 4e-4, DOWN)
-    assert quarter == pytest.approx(np.pi / 2 / omega, rel=0.005)
+    quarter = quarter_period(chain(15), mode_of_chain(15, 1), ACROSS, 1e-3, DOWN)
+    assert quarter == pytest.approx(np.pi / 2 / omega, rel=5e-4)
 
 
 @pytest.mark.parametrize(("k", "nodes"), [(1.87510407, 25), (4.69409113, 41)])
 def test_a_beam_sings_at_its_tones(k: float, nodes: int) -> None:
-    """omega = k^2 sqrt(EI / (rho A L^4)), cos k cosh k = -1: two quarter periods to 0.5 %."""
+    """omega = k^2 sqrt(EI / (rho A L^4)), cos k cosh k = -1: two quarter periods to 0.3 %."""
     bending, s = 1e-8, np.linspace(0, 1, nodes)
     rods = make_rods(straight(1, nodes), DENSITY, bending, straight=True)
     omega = k**2 * np.sqrt(bending / DENSITY / LENGTH**4)
     ratio = (np.cosh(k) + np.cos(k)) / (np.sinh(k) + np.sin(k))
     shape = np.cosh(k * s) - np.cos(k * s) - ratio * (np.sinh(k * s) - np.sin(k * s))
-    quarter = quarter_period(rods, shape, ASIDE, 2 * np.pi / omega / 600, NOTHING)
-    assert quarter == pytest.approx(np.pi / 2 / omega, rel=0.005)
+    quarter = quarter_period(rods, shape, ASIDE, 2 * np.pi / omega / 400, NOTHING)
+    assert quarter == pytest.approx(np.pi / 2 / omega, rel=0.003)
 
 
 @pytest.mark.parametrize(("drag", "damping"), [(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)])
 def test_swings_lose_what_air_damping_and_implicit_steps_take(drag: float, damping: float) -> None:
-    """Amplitude after two periods at h = 1/240: exp(-(omega^2 h + c) t / 2), to 2 %.
+    """Amplitude after a period at h = 1/240: exp(-(omega^2 h + c) t / 2), to 2 %.
 
     c is the rate of the air or of the damping. Implicit Euler of x'' + c x' + omega^2 x = 0 keeps
     (1 + c h + omega^2 h^2)^(-1/2) in a step: the product of its complex roots.
@@ -99,7 +99,7 @@ def test_swings_lose_what_air_damping_and_implicit_steps_take(drag: float, dampi
     system = assemble(
         rods, Rates(np.full_like(rods.mass, drag), damping, np.zeros_like(rods.mass)), step
     )
-    first, count = modal_amplitude(state, shape, omega), round(4 * np.pi / omega / step)
+    first, count = modal_amplitude(state, shape, omega), round(2 * np.pi / omega / step)
     for _ in range(count):
         state = substep(rods, system, state, load_of(DOWN))
     left = modal_amplitude(state, shape, omega, drag + damping) / first
@@ -110,7 +110,7 @@ def test_swings_lose_what_air_damping_and_implicit_steps_take(drag: float, dampi
 def test_motion_converges_with_the_first_order_of_the_step() -> None:
     """A chain let go, after 0.1 s: halved steps halve the change, order 0.9 to 1.1."""
     rods, ends = chain(9), []
-    for steps in (24, 48, 96, 192):
+    for steps in (16, 32, 64, 128):
         system = system_of(rods, 0.1 / steps)
         state = displaced(rods, 1e-5 * mode_of_chain(9)[:, None] * ACROSS)
         for _ in range(steps):
