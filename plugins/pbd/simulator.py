@@ -148,27 +148,45 @@ class PbdSimulator:
         return Measures(largest_stretch(rods, state), kinetic, weight + elastic - rest)
 
     def _tune(self, options: Options) -> None:
-        physics, strands = self._groom.physics, self._groom.strands
-        resolved = options.resolved(physics)
-        nodes = resolved.nodes
-        points = node_points(strands, nodes)
-        width = strands.widths
-        width_of = np.full(len(strands), self._groom.material.width)
-        if width is not None:
-            width_of = np.add.reduceat(width, strands.offsets[:-1]) / strands.counts
-            width_of = np.maximum(width_of, 1e-6)
-        density = HAIR_DENSITY * np.pi / 4 * width_of[:, None] ** 2
-        bending = density * SINGLE_HAIR * resolved.firmness()
-        rods = make_rods(points, density, bending, bending * resolved.twist)
-        down = np.array([0.0, -physics.gravity, 0.0])
-        self._rods = loaded(rods, rods.mass[..., None] * down)
-        self._riders = riders(strands, points, self._rods.frames)
+        """Take options; what those that changed say nothing of stays."""
+        resolved = options.resolved(self._groom.physics)
+        before: Options | None = getattr(self, "_options", None)
+        new = before is None or before.nodes != resolved.nodes
+        stiff = before is None or (before.bend, before.twist) != (resolved.bend, resolved.twist)
+        if new:
+            self._lay(resolved.nodes)
+        if new or stiff:
+            self._stiffen(resolved)
+        if new:
+            self._riders = riders(self._groom.strands, self._laid, self._rods.frames)
+            mass = self._rods.mass.reshape(-1)
+            self._crowd: Crowd = crowd_of(self._laid.reshape(-1, 3), mass)
         self._options = resolved
-        self._rates = _rates(resolved, rods, width_of)
+        self._rates = _rates(resolved, self._rods, self._width)
         self._systems: dict[float, System] = {}
-        self._contact = _contact(resolved, self._obstacles, points, strands)
-        self._crowd: Crowd = crowd_of(points.reshape(-1, 3), self._rods.mass.reshape(-1))
+        self._contact = _contact(resolved, self._obstacles, self._near, self._deepest)
         self._engine = _engine(resolved.backend, self._rods, self._contact)
+
+    def _lay(self, nodes: int) -> None:
+        """Put nodes along the guides, and look how near to the obstacles hair was captured."""
+        strands, width = self._groom.strands, self._groom.strands.widths
+        self._laid = node_points(strands, nodes)
+        self._width = np.full(len(strands), self._groom.material.width)
+        if width is not None:
+            mean = np.add.reduceat(width, strands.offsets[:-1]) / strands.counts
+            self._width = np.maximum(mean, 1e-6)
+        near = self._obstacles.at(self._laid.reshape(-1, 3))[0]
+        self._near: Float64Array = near.reshape(self._laid.shape[:2])
+        # finer points ride between nodes that are out of the head and may cut through it
+        self._deepest = np.minimum(self._obstacles.at(strands.points)[0], 0.001) - 1e-5
+
+    def _stiffen(self, options: Options) -> None:
+        """Make the rods, whose natural shape is what carries them as captured."""
+        density = HAIR_DENSITY * np.pi / 4 * self._width[:, None] ** 2
+        bending = density * SINGLE_HAIR * options.firmness()
+        rods = make_rods(self._laid, density, bending, bending * options.twist)
+        down = np.array([0.0, -self._groom.physics.gravity, 0.0])
+        self._rods = loaded(rods, rods.mass[..., None] * down)
 
     def _system(self, step: float) -> System:
         key = round(step, 9)
@@ -324,11 +342,8 @@ def _rates(options: Options, rods: Rods, width: Float64Array) -> Rates:
 
 
 def _contact(
-    options: Options, obstacles: Obstacles, points: Float64Array, strands: Strands
+    options: Options, obstacles: Obstacles, near: Float64Array, deepest: Float64Array
 ) -> Contact:
-    """Captured hair that is nearer than the clearance keeps its own distance."""
-    distance = obstacles.at(points.reshape(-1, 3))[0].reshape(points.shape[:2])
-    clearance = np.minimum(options.clearance, distance)
-    # finer points ride between nodes that are out of the head and may cut through it
-    deepest = np.minimum(obstacles.at(strands.points)[0], 0.001) - 1e-5
+    """Captured hair that is nearer (S, n) than the clearance keeps its own distance."""
+    clearance = np.minimum(options.clearance, near)
     return Contact(obstacles, clearance, options.rubbing(), options.depenetration, deepest)
