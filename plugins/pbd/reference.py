@@ -230,15 +230,15 @@ def collided(
     out = np.clip(depth, 0.0, (inward + contact.fastest) * step)
     velocity = state.velocity + inward[..., None] * normal
     position = state.position + out[..., None] * normal
-    grip, tension_here = contact.friction * inward, np.zeros_like(rods.length)
+    grip, taut = contact.friction * inward, np.zeros_like(rods.length)
     for _ in range(1 + contact.rounds):
         brake = braking(velocity - riding, normal, grip)
         position, velocity = position + step * brake, velocity + brake
         fixed, pull, pressed = relengthened(rods, position, normal)
         velocity, position = velocity + (fixed - position) / step, fixed
-        tension_here += pull / step**2
+        taut += pull / step**2
         grip += contact.friction * pressed / step - np.linalg.norm(brake, axis=-1)
-    return replace(state, position=position, velocity=velocity), tension_here
+    return replace(state, position=position, velocity=velocity), taut
 
 
 def braking(relative: Float64Array, normal: Float64Array, grip: Float64Array) -> Float64Array:

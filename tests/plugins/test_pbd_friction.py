@@ -19,7 +19,8 @@ RADIUS, LEAD = 0.02, 0.04
 """Of the bollard; length of the rope from its root to where it touches, metres."""
 
 
-def test_hair_on_a_slope_slides_when_the_slope_beats_friction() -> None:
+@pytest.mark.parametrize("rounds", [0, 4])
+def test_hair_on_a_slope_slides_when_the_slope_beats_friction(rounds: int) -> None:
     """tan(alpha) = mu: a strand across the slope stays at mu above it and goes at mu below it."""
     alpha, moved = np.radians(30.0), []
     gravity = G * np.array([0.0, -np.cos(alpha), -np.sin(alpha)])
@@ -27,7 +28,7 @@ def test_hair_on_a_slope_slides_when_the_slope_beats_friction() -> None:
     plane = Obstacles(grid, grid.centres()[..., 1])
     rods = make_rods(straight(1, 12), DENSITY, 1e-16, straight=True)
     for share in (1.1, 0.9):
-        contact = Contact(plane, np.zeros_like(rods.mass), share * np.tan(alpha), 0.5)
+        contact = Contact(plane, np.zeros_like(rods.mass), share * np.tan(alpha), 0.5, None, rounds)
         system, state = system_of(rods, 1 / 240), at_rest(rods)
         for _ in range(48):
             state = substep(rods, system, state, load_of(gravity), contact)

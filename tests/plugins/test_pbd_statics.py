@@ -142,7 +142,7 @@ def test_constant_natural_curvature_makes_an_arc() -> None:
 
 
 def test_an_end_moment_makes_an_arc() -> None:
-    """A pure moment M at the tip: curvature M / EI everywhere, the tip to 0.2 % of the length."""
+    """A pure moment M at the tip: curvature M / EI everywhere, the tip to 0.3 % of the length."""
     bending, angle = 1e-8, np.array([np.pi / 2, np.pi])
     rods = make_rods(straight(2, 33), DENSITY, bending, straight=True)
     system, state, force = system_of(rods, 1 / 200, 8.0), at_rest(rods), np.zeros_like(rods.points)
@@ -153,7 +153,7 @@ def test_an_end_moment_makes_an_arc() -> None:
         force[:, -1] = couple[:, None] * np.cross([0.0, 0.0, 1.0], way)
         force[:, -2] = -force[:, -1]
         state = substep(rods, system, state, load_of(force=force), None, 2)
-    np.testing.assert_allclose(state.position[:, -1] / LENGTH, arcs(angle), atol=0.002)
+    np.testing.assert_allclose(state.position[:, -1] / LENGTH, arcs(angle), atol=0.003)
 
 
 def test_a_turned_tip_twists_the_rod_evenly() -> None:
