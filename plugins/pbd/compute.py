@@ -137,6 +137,21 @@ class ComputeEngine:
             found = self._store.words("one").reshape(-1, 4)[:ends, :3].astype(np.float64)
         return found[0::2], found[1::2]
 
+    def measured(self, gravity: Float64Array) -> tuple[float, float, float, float] | None:
+        """Return the largest stretch, and kinetic, gravity's and elastic energy in joules.
+
+        `gravity` (3,) m/s^2 is in head axes. None before the first run, when constants lack.
+        """
+        if self._system is None:
+            return None
+        with renderer():
+            self._store.make_words("sums", 4 * int(np.prod(self._store.groups(self._count))))
+            self._store.read_by("sums")
+            self._store.dispatch("pbd_measure", self._count, {"u_gravity": tuple(gravity)})
+            sums = self._store.words("sums").reshape(-1, 4).astype(np.float64)
+        kinetic, weight, elastic = sums[:, 1:].sum(axis=0).tolist()
+        return float(sums[:, 0].max()), kinetic, weight, elastic
+
     def points(self, riders: Riders, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
         with renderer():

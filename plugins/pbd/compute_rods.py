@@ -42,6 +42,7 @@ def constant_rows(
     element[..., 3], element[..., 7] = rods.length, 1.0 / rods.length
     element[..., 4], element[..., 5] = rods.bend / mean, rods.twist / mean
     element[..., 6], element[..., 8:11] = rods.natural_twist, rods.curvature
+    element[:, 0, 11] = unit  # element 0 alone has the mean mass itself
     metric = rows[:, ends[2] :].reshape(count, -1)
     metric[:, : len(row)] = system.metric[:, row, column] * mean
     return rows

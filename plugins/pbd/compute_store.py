@@ -37,6 +37,12 @@ class Store:
     def __contains__(self, name: str) -> bool:
         return name in self._named
 
+    def groups(self, invocations: int) -> tuple[int, int]:
+        """Return how many work groups are run along x and y."""
+        count = -(-invocations // GROUP)
+        deep = -(-count // MOST_GROUPS)
+        return -(-count // deep), deep
+
     def dispatch(
         self, shader: str, invocations: int, uniforms: dict[str, Any], **definitions: int
     ) -> None:
@@ -48,9 +54,7 @@ class Store:
         for unit, name in enumerate(samplers):
             program[name] = unit
             self._named[name].use(unit)
-        groups = -(-invocations // GROUP)
-        deep = -(-groups // MOST_GROUPS)
-        program.run(-(-groups // deep), deep)
+        program.run(*self.groups(invocations))
         self._gl.context.memory_barrier()
 
     def read_by(self, *names: str) -> None:

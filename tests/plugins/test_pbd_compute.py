@@ -66,6 +66,8 @@ def test_shaders_move_hair_as_the_reference_does(
     one, two = (simulator.measure() for simulator in pair)
     assert two.stretch == pytest.approx(one.stretch, abs=1e-4)
     assert two.kinetic_energy == pytest.approx(one.kinetic_energy, rel=1e-3)
+    most = abs(one.potential_energy) + one.kinetic_energy
+    assert two.potential_energy == pytest.approx(one.potential_energy, abs=1e-3 * most)
 
 
 def test_capsules_hold_hair_off_as_in_the_reference(groom: Groom) -> None:
