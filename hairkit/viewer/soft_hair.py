@@ -8,9 +8,9 @@ draws is what `HairPass` draws; the tests hold both together.
 from __future__ import annotations
 
 import moderngl
-import numba
 import numpy as np
 
+from hairkit.crew import Crew
 from hairkit.render.context import Renderer
 from hairkit.render.hair import strand_numbers
 from hairkit.render.projection import clip_from_camera, set_uniforms
@@ -21,6 +21,8 @@ from hairkit.viewer.hair_look import GuidePlaces, HairLook, HairScene, HairView
 
 MOST_CHUNKS = 8
 """Each thread draws into sums of its own, which are added up for every picture."""
+PIECE = 256
+"""Hairs that a thread shades at a time, at least."""
 EDGE = 3
 """Pixels around the outermost points that strokes may reach."""
 
@@ -38,7 +40,8 @@ class SoftHairPass:
         self._random = np.asarray(strand_numbers(count), np.float32)
         self._rest = np.ascontiguousarray(body.guide_rest, np.float32)
         self._tones = soft_shading.tone_table()
-        self._chunks = min(numba.get_num_threads(), MOST_CHUNKS)
+        self._crew = Crew()
+        self._chunks = min(self._crew.threads, MOST_CHUNKS)
         self._sums = np.zeros((self._chunks, 0), np.uint64)
         self._colours: tuple[object, Float32Array] | None = None
         self._texture: moderngl.Texture | None = None
@@ -70,13 +73,14 @@ class SoftHairPass:
         tiles = (-(-camera.height // soft_places.TILE), -(-camera.width // soft_places.TILE))
         filled = np.empty((self._chunks, soft_places.SLICES, *tiles), np.uint32)
         corners = np.empty((self._chunks, 4), np.float32)
-        soft_places.place_hair(
-            self._now, self._turns, body.followed, body.weights, body.offsets, body.widths,
-            self._camera, self._slices, np.float32(look.times_wider), look.hairs,
-            self._places, self._seen, filled, corners,
+        share, chunks = self._crew.share, self._chunks
+        share(
+            soft_places.place_hair, chunks, 1, self._now, self._turns, body.followed, body.weights,
+            body.offsets, body.widths, self._camera, self._slices, np.float32(look.times_wider),
+            look.hairs, self._places, self._seen, filled, corners,
         )  # fmt: skip
         self._opacity = np.empty((soft_places.SLICES + 1, *tiles), np.float32)
-        soft_places.opacity_before(filled, self._opacity)
+        share(soft_places.opacity_before, tiles[0], 8, filled, self._opacity)
         size = np.array([camera.width, camera.height])
         low = np.clip(np.floor(corners[:, :2].min(axis=0)) - EDGE, 0, size - 1)
         high = np.clip(np.ceil(corners[:, 2:].max(axis=0)) + EDGE, low + 1, size)
@@ -94,17 +98,19 @@ class SoftHairPass:
         shading = soft_shading.shading_of(
             view.camera, scene.lights, scene.light.grid, direction=look.by_direction
         )
-        soft_shading.shade_hair(
-            self._seen, self._places, self._fibres(look), self._random, self._opacity,
-            self._slices, shading, scene.light.array, self._tones, look.hairs, self._looks,
+        share = self._crew.share
+        share(
+            soft_shading.shade_hair, look.hairs, PIECE, self._seen, self._places,
+            self._fibres(look), self._random, self._opacity, self._slices, shading,
+            scene.light.array, self._tones, self._looks,
         )  # fmt: skip
-        soft_strokes.draw_hair(
-            self._seen, self._looks, self.body.widths, self._random, solid, self._camera,
-            np.float32(look.times_wider), int(look.smooth), look.hairs,
-            self._frame[0].astype(np.float32), self._sums,
+        share(
+            soft_strokes.draw_hair, self._chunks, 1, self._seen, self._looks, self.body.widths,
+            self._random, solid, self._camera, np.float32(look.times_wider), int(look.smooth),
+            look.hairs, self._frame[0].astype(np.float32), self._sums,
         )  # fmt: skip
         picture = np.empty((height, width, 4), np.uint8)
-        soft_strokes.resolve(self._sums, picture)
+        share(soft_strokes.resolve, height, 32, self._sums, picture)
         self._lay_over(scene.target, picture, frame)
 
     def _lay_over(

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import get_num_threads, njit, prange
 
+from hairkit.crew import Crew
 from hairkit.render.context import Renderer
 from hairkit.render.head import Mesh
 from hairkit.render.light import Lights
@@ -17,7 +17,7 @@ from hairkit.stored import Float32Array, Int32Array
 from hairkit.strands import Strands
 from hairkit.viewer.hair_look import HairDrawer
 from hairkit.viewer.light_pass import LightVolume, solid_depth
-from hairkit.viewer.soft_places import row
+from hairkit.viewer.soft_places import row, shared
 
 STEPS, GROWTH = 9, 1.35
 SKY_STEPS, SKY_GROWTH = 5, 1.7
@@ -34,23 +34,29 @@ class SoftLightPass(LightVolume):
         super().__init__(gl, guides, solids)
         self._solids = np.ascontiguousarray(solid_depth(self.grid, solids).transpose(2, 1, 0))
         self._taken, self._rough = np.zeros_like(self._solids), np.zeros_like(self._solids)
-        self._dense = np.zeros((get_num_threads(), *self._solids.shape), np.uint32)
+        self._crew = Crew()
+        self._dense = np.zeros((self._crew.threads, *self._solids.shape), np.uint32)
         self._coming = np.ones((*self._solids.shape, 4), np.float32)
         self.array = self._coming.copy()
         """(Z, Y, X, 4) what is seen of key light, rim light and sky."""
 
     def _fill(self, hair: HairDrawer, hairs: int, per_micrometre: float) -> None:
-        origin = self.grid.origin.astype(np.float32)
-        fill_cells(hair.places(), hairs, origin, np.float32(1 / self.grid.spacing), self._dense)
-        sum_cells(self._dense, self._solids, np.float32(per_micrometre), self._taken, self._rough)
+        origin, share = self.grid.origin.astype(np.float32), self._crew.share
+        per_metre, layers = np.float32(1 / self.grid.spacing), len(self._solids)
+        share(fill_cells, len(self._dense), 1, hair.places(), hairs, origin, per_metre, self._dense)
+        taken, rough = self._taken, self._rough
+        per_micrometre = np.float32(per_micrometre)
+        share(sum_cells, layers, 8, self._dense, self._solids, per_micrometre, taken, rough)
+        share(smooth_cells, layers, 8, rough, taken)
 
     def _light(self, lights: Lights, turn: int, turns: int) -> None:
         spacing = self.grid.spacing
         way_of_key, depth = _way(lights.key_direction, STEPS, GROWTH, spacing)
         way_of_rim, _ = _way(lights.rim_direction, STEPS, GROWTH, spacing)
         ways = [_way(direction, SKY_STEPS, SKY_GROWTH, spacing) for direction in _SKY]
-        light_cells(
-            self._taken, np.stack([way_of_key, way_of_rim]), depth,
+        layers = -(-(len(self._taken) - turn) // turns)
+        self._crew.share(
+            light_cells, layers, 2, self._taken, np.stack([way_of_key, way_of_rim]), depth,
             np.stack([way for way, _ in ways]), ways[0][1], turn, turns, self._coming,
         )  # fmt: skip
 
@@ -69,12 +75,13 @@ def _way(
     return cells.astype(np.int32), (length * spacing).astype(np.float32)
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
-def fill_cells(places, count, origin, per_metre, dense):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+@shared
+def fill_cells(  # type: ignore[no-untyped-def]
+    first_chunk, last_chunk, places, count, origin, per_metre, dense
+) -> None:  # pragma: no cover - compiled
     """Write micrometres of hair in each cell, `dense` (chunks, Z, Y, X), of places (S, m, 3)."""
     chunks, deep, high, wide = dense.shape
-    for number in prange(chunks):
-        chunk = np.int64(number)
+    for chunk in range(first_chunk, last_chunk):
         own = dense[chunk]
         own[:] = 0
         for s in range(count * chunk // chunks, count * (chunk + 1) // chunks):
@@ -90,15 +97,16 @@ def fill_cells(places, count, origin, per_metre, dense):  # type: ignore[no-unty
                     own[layer, j, i] += np.uint32(length)
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
-def sum_cells(dense, solids, per_micrometre, taken, rough):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Write (Z, Y, X) what hair and solids take per metre, smoothed by 1 2 1 along each axis.
+@shared
+def sum_cells(  # type: ignore[no-untyped-def]
+    first, last, dense, solids, per_micrometre, taken, rough
+) -> None:  # pragma: no cover - compiled
+    """Write layers of `rough` (Z, Y, X): what hair and solids take per metre, smoothed by 1 2 1.
 
-    `rough` is room for the same, smoothed within layers only.
+    Within the layers only; those of `taken` are overwritten.
     """
-    chunks, deep, high, wide = dense.shape
-    for number in prange(deep):
-        layer = np.int64(number)
+    chunks, _, high, wide = dense.shape
+    for layer in range(first, last):
         plain, lines = taken[layer], rough[layer]
         for j in range(high):
             for i in range(wide):
@@ -117,8 +125,13 @@ def sum_cells(dense, solids, per_micrometre, taken, rough):  # type: ignore[no-u
                 after = lines[j, min(i + 1, wide - 1)]
                 lines[j, i] = _HALF * here + _QUARTER * (before + after)
                 before = here
-    for number in prange(deep):
-        layer = np.int64(number)
+
+
+@shared
+def smooth_cells(first, last, rough, taken) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Write layers of `taken` (Z, Y, X): `rough` smoothed by 1 2 1 across the layers."""
+    deep, high, wide = rough.shape
+    for layer in range(first, last):
         below, above = max(layer - 1, 0), min(layer + 1, deep - 1)
         for j in range(high):
             for i in range(wide):
@@ -126,18 +139,20 @@ def sum_cells(dense, solids, per_micrometre, taken, rough):  # type: ignore[no-u
                 taken[layer, j, i] = _HALF * rough[layer, j, i] + _QUARTER * beside
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
+@shared
 def light_cells(  # type: ignore[no-untyped-def]
-    taken, ways, depth, sky_ways, sky_depth, turn, turns, reached
-):  # pragma: no cover - compiled
-    """Write (Z, Y, X, 4) transmittance towards key and rim light, share of the sky: some layers.
+    first, last, taken, ways, depth, sky_ways, sky_depth, turn, turns, reached
+) -> None:  # pragma: no cover - compiled
+    """Write (Z, Y, X, 4) transmittance towards key and rim light, share of the sky.
+
+    Of every `turns`-th layer, from `turn` on, those of numbers `first` to `last`.
 
     `ways` (2, STEPS, 3) and `sky_ways` (5, SKY_STEPS, 3) are cells z, y, x on the way, of so many
     metres each. Only cells at hair or solids are worked on: nothing is lit elsewhere.
     """
-    deep, high, wide = taken.shape
-    for number in prange((deep - turn + turns - 1) // turns):
-        z = np.int64(number) * turns + turn
+    _, high, wide = taken.shape
+    for number in range(first, last):
+        z = number * turns + turn
         for y in range(high):
             for x in range(wide):
                 if taken[z, y, x] <= 0:

@@ -11,13 +11,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 _HOW: dict[str, Any] = {
     "cache": True, "fastmath": True, "error_model": "numpy", "_nrt": False,
 }  # fmt: skip
 row: Callable[[Any], Any] = njit(**_HOW)
 """Compiles a function that allocates nothing: views are then not counted."""
+shared: Callable[[Any], Any] = njit(nogil=True, **_HOW)
+"""The same for what the threads of a crew (`hairkit.crew`) do at once."""
 inlined: Callable[[Any], Any] = njit(fastmath=True, error_model="numpy", inline="always")
 """Puts a function into its caller, so that loops around it run side by side."""
 SLICES, TILE = 32, 16
@@ -86,20 +88,19 @@ def pixels_a_metre(camera, depth):  # type: ignore[no-untyped-def] # pragma: no 
     return camera[22] / max(depth, _CLOSE) if camera[23] > _HALF else camera[22]
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
+@shared
 def place_hair(  # type: ignore[no-untyped-def]
-    guides, turns, followed, weights, offsets, widths, camera, slices, wider, count, places,
-    seen, filled, frame,
-):  # pragma: no cover - compiled  # fmt: skip
-    """Put `count` hairs where they are, and their pieces into cells of the view.
+    first_chunk, last_chunk, guides, turns, followed, weights, offsets, widths, camera, slices,
+    wider, count, places, seen, filled, frame,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Put chunks of `count` hairs where they are, and their pieces into cells of the view.
 
     Each point keeps its offset from the mix of three guides, turned as the nearest one turns.
     Writes `places` (S, m, 3) metres, `seen` (S, m, 4) of `seen_from`, and for each of the chunks
     `filled` (chunks, SLICES, tiles y, tiles x) and `frame` (chunks, 4): lowest and highest pixel.
     """
     chunks = filled.shape[0]
-    for number in prange(chunks):
-        chunk = np.int64(number)
+    for chunk in range(first_chunk, last_chunk):
         filled[chunk] = 0
         frame[chunk, :2], frame[chunk, 2:] = _FAR, -_FAR
         _place_chunk(
@@ -175,16 +176,15 @@ def _fill(filled, seen, s, k, slices, width) -> None:  # type: ignore[no-untyped
         filled[min(max(layer, 0), SLICES - 1), j, i] += whole
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
-def opacity_before(filled, opacity):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Write (SLICES + 1, tiles y, tiles x) what hair in front of every slice takes from light.
+@shared
+def opacity_before(first, last, filled, opacity) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Write rows of (SLICES + 1, tiles y, tiles x) what hair in front of slices takes from light.
 
     Optical depth, a coarse form of deep opacity maps (Yuksel and Keyser 2008) along the line of
     sight; each tile is smoothed with its neighbours. `filled` is that of `place_hair`.
     """
     chunks, slices, rows, columns = filled.shape
-    for number in prange(rows):
-        j = np.int64(number)
+    for j in range(first, last):
         up, down = max(j - 1, 0), min(j + 1, rows - 1)
         for i in range(columns):
             left, right = max(i - 1, 0), min(i + 1, columns - 1)

@@ -7,7 +7,7 @@ cones, and Kajiya and Kay's (1989) diffuse term for what scatters on. All float3
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from hairkit.camera import Camera
 from hairkit.render.light import Lights
@@ -17,8 +17,6 @@ from hairkit.volume import VoxelGrid
 
 LANES, FIELDS = 64, 14
 """Points that are shaded side by side, and numbers of each."""
-HAIRS = 128
-"""Hairs that a thread takes at a time."""
 HIDDEN = np.float32(0.1)
 """A point of which less arrives is not drawn."""
 
@@ -69,26 +67,22 @@ def fibre_colours(
     return np.asarray(colours * bright[:, None, None], np.float32)
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def shade_hair(  # type: ignore[no-untyped-def]
-    seen, places, colours, random, opacity, slices, shading, light, tones, count, looks,
-):  # pragma: no cover - compiled  # fmt: skip
-    """Write `looks` (S, m, 4) of the first `count` hairs: colour as seen, and what arrives of it.
+    first, last, seen, places, colours, random, opacity, slices, shading, light, tones, looks,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Write `looks` (S, m, 4) of some hairs: colour as seen, and what arrives of it.
 
     `seen`, `places` and `opacity` are those of `soft_places`, `light` (Z, Y, X, 4) what reaches
     each place. Points of which no more than `HIDDEN` arrives get no colour.
     """
-    chunks = (count + HAIRS - 1) // HAIRS
-    for number in prange(chunks):
-        chunk = np.int64(number)
-        last = min(count, (chunk + 1) * HAIRS)
-        points = np.empty(FIELDS * LANES, np.float32)
-        lit = np.empty(3 * LANES, np.float32)
-        which = np.empty((LANES, 2), np.int64)
-        _shade_chunk(
-            seen, places, colours, random, opacity, slices, shading, light, tones,
-            chunk * HAIRS, last, looks, points, lit, which,
-        )  # fmt: skip
+    points = np.empty(FIELDS * LANES, np.float32)
+    lit = np.empty(3 * LANES, np.float32)
+    which = np.empty((LANES, 2), np.int64)
+    _shade_chunk(
+        seen, places, colours, random, opacity, slices, shading, light, tones, first, last, looks,
+        points, lit, which,
+    )  # fmt: skip
 
 
 @row

@@ -10,9 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
 
-from hairkit.viewer.soft_places import inlined, pixels_a_metre, row
+from hairkit.viewer.soft_places import inlined, pixels_a_metre, row, shared
 from hairkit.viewer.soft_shading import HIDDEN
 
 SUM_UNIT = np.float32(1024)
@@ -25,18 +24,18 @@ _BLUE, _GREEN, _RED = np.uint64(16), np.uint64(32), np.uint64(48)
 _PART = np.uint64(0xFFFF)
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
+@shared
 def draw_hair(  # type: ignore[no-untyped-def]
-    seen, looks, widths, random, solid, camera, wider, smooth, count, frame, sums
-):  # pragma: no cover - compiled
-    """Draw the first `count` hairs into `sums` (chunks, at least H W) of 64-bit words.
+    first_chunk, last_chunk, seen, looks, widths, random, solid, camera, wider, smooth, count,
+    frame, sums,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Draw chunks of `count` hairs into `sums` (chunks, at least H W) of 64-bit words.
 
     `seen` is that of `place_hair`, `looks` of `shade_hair`; `frame` holds the lowest x and y of
     the part of the picture that is drawn, and `solid` (H, W) the depth buffer of it.
     """
     chunks = sums.shape[0]
-    for number in prange(chunks):
-        chunk = np.int64(number)
+    for chunk in range(first_chunk, last_chunk):
         first, last = count * chunk // chunks, count * (chunk + 1) // chunks
         _draw_chunk(
             seen, looks, widths, random, solid, camera, wider, smooth, first, last, frame,
@@ -125,13 +124,12 @@ def _behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no co
     return 1 if depth > solid[row, column] else 0
 
 
-@njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
-def resolve(sums, picture):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Write (H, W, 4) bytes, colour and opacity, of the sums, and leave them empty."""
-    high, wide = picture.shape[:2]
+@shared
+def resolve(first, last, sums, picture) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Write rows of (H, W, 4) bytes, colour and opacity, of the sums, and leave these empty."""
+    wide = picture.shape[1]
     chunks = sums.shape[0]
-    for number in prange(high):
-        y = np.int64(number)
+    for y in range(first, last):
         for x in range(wide):
             at = y * wide + x
             word = np.uint64(0)
