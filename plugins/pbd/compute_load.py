@@ -22,7 +22,7 @@ MOST_STEPS = 64
 """Substeps in one run of the shader."""
 UNROLLED = 16
 """Nodes up to which compilers unroll the shader's loops, see `pbd_layout.glsl`."""
-MOST_TURNS = 60_000
+MOST_TURNS = 64_000
 """Turns of loops in one run of a shader: Mesa's llvmpipe leaves all loops after 65536 in all."""
 FULLEST, FASTEST = 32.0, 10.0
 """A cell holds the momentum of the densest captured cell's mass so many times, at so many m/s."""
