@@ -9,6 +9,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import threading
+import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -144,6 +145,9 @@ class Rerun:
 
     process: subprocess.Popen[str]
     lines: list[str] = field(default_factory=list)
+    """What it has said: a line for each stage when that is done."""
+    began: float = field(default_factory=time.monotonic)
+    """Seconds of the monotonic clock."""
     _listener: threading.Thread | None = None
 
     @classmethod
@@ -167,8 +171,9 @@ class Rerun:
 
     @property
     def progress(self) -> str:
-        """The last thing it said."""
-        return self.lines[-1] if self.lines else "starting"
+        """How long it runs, and the last thing it said."""
+        said = " ".join(self.lines[-1].split()) if self.lines else "starting"
+        return f"{time.monotonic() - self.began:.0f} s; {said}"
 
     def wait(self) -> None:
         """Wait for its end and all that it says."""
@@ -179,7 +184,7 @@ class Rerun:
     def check(self) -> None:
         """Raise `InputError` when it has failed."""
         if self.process.poll() not in (None, 0):
-            raise InputError(f"reconstruction failed: {self.progress}")
+            raise InputError(f"reconstruction failed: {self.lines[-1] if self.lines else ''}")
 
     def stop(self) -> None:
         """End it, what is done stays done."""

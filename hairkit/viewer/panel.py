@@ -44,8 +44,11 @@ def load_windowing() -> Any:
 class Panel:
     """Sliders and buttons over the picture; does nothing without imgui-bundle."""
 
+    missing: str
+    """Why there is no panel and what to do, empty where there is one."""
+
     def __init__(self, window: Any) -> None:
-        self._imgui, self._backend = _load(window)
+        self._imgui, self._backend, self.missing = _load(window)
         self._shown = False
         self._size: tuple[int, int] | None = None
         self._preset = "preset"
@@ -116,15 +119,15 @@ class Panel:
         self._backend.render(imgui.get_draw_data())
 
 
-def _load(window: Any) -> tuple[Any, Any]:
+def _load(window: Any) -> tuple[Any, Any, str]:
     try:
         imgui = importlib.import_module("imgui_bundle").imgui
         backends = importlib.import_module("imgui_bundle.python_backends.glfw_backend")
-    except ImportError:
-        return None, None
+    except ImportError as error:
+        return None, None, f"no panel ({error}); pip install 'hairkit[viewer]' brings it"
     imgui.create_context()
     imgui.get_io().set_ini_filename("")  # leave no file behind
-    return imgui, backends.GlfwRenderer(window, attach_callbacks=False)
+    return imgui, backends.GlfwRenderer(window, attach_callbacks=False), ""
 
 
 def _view(imgui: Any, session: Session, perform: Perform) -> None:

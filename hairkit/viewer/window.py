@@ -9,6 +9,7 @@ import contextlib
 import logging
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,22 +24,21 @@ from hairkit.viewer.budget import Budget
 from hairkit.viewer.hud import overlay
 from hairkit.viewer.keyboard import key_name
 from hairkit.viewer.mouse import Mouse
-from hairkit.viewer.panel import Panel, load_windowing
+from hairkit.viewer.panel import Panel
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import FRAMES_PER_SECOND
 from hairkit.viewer.script import Script, performed
 from hairkit.viewer.session import Session
-from hairkit.viewer.starting import TITLE, AbandonedError, Waiting, warm_up
+from hairkit.viewer.starting import AbandonedError, Waiting, warm_up
 from hairkit.viewer.watching import Watch, shader_files
+from hairkit.viewer.window_context import WindowContext
 
 TEXT_EVERY = 0.25
 """Seconds between two redraws of numbers; what the user has asked for is told at once."""
+IDLE = 0.1
+"""Seconds between pictures that nobody has asked for, while time stands still."""
 LONGEST_PAUSE = 0.1
 """Seconds that pass at most between two pictures, as far as the hair is told."""
-_CURE = (
-    "install an OpenGL driver and a display (apt-get install libgl1 libgl1-mesa-dri; xvfb-run"
-    " without a screen), or use --headless"
-)
 
 
 def show(
@@ -77,7 +77,7 @@ def opened(
     make_session: Callable[[tuple[int, int]], Session], size: tuple[int, int], budget: float
 ) -> Iterator[Window]:
     """Open a window for a block; see `show`."""
-    context = _Context(size)
+    context = WindowContext(size)
     try:
         install(moderngl.create_context(REQUIRED_VERSION, **context.settings), "window")
         window = _started(context, make_session, size, budget)
@@ -95,7 +95,7 @@ def opened(
 
 
 def _started(
-    context: _Context,
+    context: WindowContext,
     make_session: Callable[[tuple[int, int]], Session],
     size: tuple[int, int],
     budget: float,
@@ -109,66 +109,10 @@ def _started(
     return window
 
 
-class _Context:
-    """A GLFW window as the context that moderngl takes."""
-
-    def __init__(self, size: tuple[int, int]) -> None:
-        self.glfw = load_windowing()
-        failures: list[str] = []
-        self.glfw.set_error_callback(lambda code, text: failures.append(_text(text)))
-        if not self.glfw.init():
-            raise RenderError(f"no window: {'; '.join(failures) or 'GLFW fails'}; {_CURE}")
-        self.window = self._create(size)
-        if not self.window:
-            raise RenderError(f"no window with OpenGL 4.3: {'; '.join(failures)}; {_CURE}")
-        self.glfw.make_context_current(self.window)
-        self.glfw.swap_interval(0)
-        self._depth = 0
-
-    def _create(self, size: tuple[int, int]) -> Any:
-        glfw = self.glfw
-        for api in (glfw.NATIVE_CONTEXT_API, glfw.EGL_CONTEXT_API):
-            glfw.default_window_hints()
-            glfw.window_hint(glfw.CONTEXT_CREATION_API, api)
-            glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 4)
-            glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
-            glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
-            window = glfw.create_window(*size, TITLE, None, None)
-            if window:
-                return window
-        return None
-
-    @property
-    def settings(self) -> Any:
-        """What moderngl is to be called with."""
-        return {"context": self}
-
-    def load(self, name: str) -> int:
-        """Return the address of an OpenGL function, 0 when there is none."""
-        return self.glfw.get_proc_address(name) or 0
-
-    def release(self) -> None:
-        """The window stays until it is closed."""
-
-    def close(self) -> None:
-        """Close the window."""
-        self.glfw.terminate()
-
-    def __enter__(self) -> _Context:
-        self._depth += 1
-        self.glfw.make_context_current(self.window)
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._depth -= 1
-        if not self._depth:  # no outer block goes on drawing
-            self.glfw.make_context_current(None)
-
-
 class Window:
     """Events in, pictures out."""
 
-    def __init__(self, context: _Context, session: Session, budget: float) -> None:
+    def __init__(self, context: WindowContext, session: Session, budget: float) -> None:
         self._glfw, self._window = context.glfw, context.window
         self.session = session
         self._most_seconds = 0.4 * budget if budget > 0 else None
@@ -176,6 +120,8 @@ class Window:
         self.mouse = Mouse(self.perform, session.size[1])
         self._watch_groom = Watch([session.opened.path])
         self._watch_shaders = Watch(shader_files())
+        self._pace = 0.0
+        """Seconds that a picture takes until it is on the screen, over the last few."""
         self._told: object = None
         self._told_at = 0.0
         with renderer() as gl:
@@ -189,6 +135,7 @@ class Window:
         self._warnings = _Warnings(session)
         logging.getLogger("hairkit").addHandler(self._warnings)
         self._listen()
+        session.message = session.message or "H shows the keys"
 
     def perform(self, name: str, values: Mapping[str, object]) -> None:
         """Do an action; what goes wrong is told in the picture."""
@@ -198,12 +145,14 @@ class Window:
                 perform(self.session, name, values)
         except (HairkitError, OSError) as error:
             self.session.message = " ".join(str(error).split())
+        if name == "panel" and self.session.shown.panel:
+            self.session.message = self._panel.missing
 
     def loop(self, steps: Iterator[None] | None = None) -> None:
         """Draw until the window is closed; `steps` does an action of a script at each `next`."""
         before = time.perf_counter()
         while not (self.session.finished or self._glfw.window_should_close(self._window)):
-            self._glfw.poll_events()
+            self._listen_for_events()
             steps = self._next(steps)
             passed = time.perf_counter() - before
             if self.session.recorder is not None:  # a film has its own time, slower or not
@@ -213,6 +162,13 @@ class Window:
             passed = min(passed, LONGEST_PAUSE)
             self.picture(passed)
             self.session.pending = max(self.session.pending - passed, 0.0)
+
+    def _listen_for_events(self) -> None:
+        """Take note of mouse and keys; where nothing moves, wait for them a little."""
+        still = self.session.paused and not self.session.pending
+        if self.session.recorder is None and (still or self.session.rerun is not None):
+            self._glfw.wait_events_timeout(IDLE)
+        self._glfw.poll_events()
 
     def leave(self) -> None:
         """Finish what is being written and end what runs aside."""
@@ -229,6 +185,7 @@ class Window:
 
     def picture(self, seconds: float) -> None:
         """Let time pass and show a picture."""
+        began = time.perf_counter()
         self._fit()
         self._reload_changed()
         filmed = self.session.recorder is not None
@@ -244,6 +201,8 @@ class Window:
             self._panel.draw(self.session, self.preview, self.perform)
             self._glfw.swap_buffers(self._window)
             gl.home.use()
+        taken = time.perf_counter() - began
+        self._pace += 0.2 * (taken - self._pace) if self._pace else taken
 
     def _next(self, steps: Iterator[None] | None) -> Iterator[None] | None:
         """Do the next action of a script when the last one has had its time."""
@@ -283,7 +242,8 @@ class Window:
         return True
 
     def _write_text(self) -> None:
-        image = overlay(self.session.size, self.session, self.preview.readings)
+        readings = replace(self.preview.readings, fps=1 / max(self._pace, 1e-6))
+        image = overlay(self.session.size, self.session, readings)
         if image is None:
             image = np.zeros((1, 1, 4), np.uint8)
         size = (image.shape[1], image.shape[0])
@@ -377,7 +337,3 @@ class _Warnings(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Show it until the next action."""
         self._session.message = " ".join(record.getMessage().split())
-
-
-def _text(text: bytes | str) -> str:
-    return text.decode(errors="replace") if isinstance(text, bytes) else text

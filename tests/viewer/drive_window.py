@@ -28,6 +28,7 @@ def main() -> None:
     make = lambda size: Session(manager, groom, size=size, hairs=800)  # noqa: E731
     with opened(make, SIZE, 0.0) as window:
         window.session.shown.panel = window.session.shown.numbers = False
+        window.session.message = ""  # the greeting, which goes with the first action
         drive(window, lambda name: keep(window, screen, out / f"{name}.xwd"))
 
 
