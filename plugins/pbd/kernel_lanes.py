@@ -138,6 +138,17 @@ put, put_quad = _laying(lanes), _laying(quad)
 
 
 @word
+def number_at(context: Any, array: Any, index: Any) -> Any:
+    """Return a number of a contiguous array, counted from its first one; never from the end."""
+
+    def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        made = context.make_array(sig.args[0])(context, builder, args[0])
+        return builder.load(builder.gep(made.data, [args[1]], inbounds=True))
+
+    return array.dtype(array, types.int64), build
+
+
+@word
 def lane_root(context: Any, value: Any) -> Any:
     """Return the square root."""
 

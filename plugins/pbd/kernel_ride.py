@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .kernel_lanes import LANES
+from .kernel_lanes import LANES, number_at
 from .kernel_math import carry, dot, minus, plus, rotate, row, rows_of, times
 
 ONE, ZERO = np.float32(1), np.float32(0)
@@ -33,17 +33,26 @@ def ride_points(  # type: ignore[no-untyped-def]
     out
         (P, 3).
     """
-    motion = rows_of(head, 0)
+    motion, n, wide = rows_of(head, 0), x.shape[1], x.shape[2] * LANES
     for i in range(first, last):
-        block, lane = rod[i] // LANES, rod[i] % LANES
-        nodes, j = x[block], segment[i]
-        place = _on_curve(nodes, j, lane, weight[i])
-        frame = _frame(q[block], j, lane, weight[i, 4], weight[i, 5])
-        place = plus(place, rotate(frame, (offset[i, 0], offset[i, 1], offset[i, 2])))
+        j, lane = segment[i], rod[i] % LANES
+        node, one = rod[i] // LANES * n + j, np.int64(6 * i)
+        start = node * wide + lane
+        before, after = start - (wide if j > 0 else 0), start + wide
+        beyond = after + (wide if j + 2 < n else 0)
+        place = _on_curve(x, before, start, after, beyond, weight, one)
+        frame = (node - rod[i] // LANES) * 4 * LANES + lane  # there is one less than nodes
+        other = (-1 if j > 0 else 0) if number_at(weight, one + 4) > ZERO else int(j + 2 < n)
+        turn = _frame(q, frame, frame + other * 4 * LANES, weight, one)
+        away = (offset[i, 0], offset[i, 1], offset[i, 2])
+        place = plus(place, rotate(turn, away))
         if deepest.shape[0] > 0:
-            near = j if weight[i, 1] > weight[i, 2] else j + 1
-            away = minus(place, (nodes[near, 0, lane], nodes[near, 1, lane], nodes[near, 2, lane]))
-            room = nodes[near, SLACK, lane] + clear[block, near, lane] - deepest[i]
+            near, step = start, 0
+            if number_at(weight, one + 1) <= number_at(weight, one + 2):
+                near, step = after, 1
+            room = number_at(x, near + SLACK * LANES) - deepest[i]
+            room += number_at(clear, (node + step) * LANES + lane)
+            away = minus(place, _vector(x, near))
             # nothing is to be looked up where the node has been seen to be far away
             if not (room > ZERO and dot(away, away) < room * room):
                 distance, n0, n1, n2 = distance_to(grid, place, deepest[i])
@@ -52,34 +61,32 @@ def ride_points(  # type: ignore[no-untyped-def]
 
 
 @row
-def _on_curve(x, j, lane, weight):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return a place on the smooth curve through the nodes (Catmull-Rom)."""
-    a, d = max(j - 1, 0), min(j + 2, x.shape[0] - 1)
-    wa, wb, wc, wd = weight[0], weight[1], weight[2], weight[3]
-    return (
-        wa * x[a, 0, lane] + wb * x[j, 0, lane] + wc * x[j + 1, 0, lane] + wd * x[d, 0, lane],
-        wa * x[a, 1, lane] + wb * x[j, 1, lane] + wc * x[j + 1, 1, lane] + wd * x[d, 1, lane],
-        wa * x[a, 2, lane] + wb * x[j, 2, lane] + wc * x[j + 1, 2, lane] + wd * x[d, 2, lane],
-    )
+def _vector(x, start):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return three numbers of a lane."""
+    return number_at(x, start), number_at(x, start + LANES), number_at(x, start + 2 * LANES)
 
 
 @row
-def _frame(q, j, lane, before, after):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the frame of segment j mixed with the ones beside it; one of the shares is 0."""
-    k = max(j - 1, 0) if before > ZERO else min(j + 1, q.shape[0] - 1)
-    part = before + after
-    a0, a1, a2, a3 = q[j, 0, lane], q[j, 1, lane], q[j, 2, lane], q[j, 3, lane]
-    b0, b1, b2, b3 = q[k, 0, lane], q[k, 1, lane], q[k, 2, lane], q[k, 3, lane]
-    mix = part if a0 * b0 + a1 * b1 + a2 * b2 + a3 * b3 >= ZERO else -part
-    here = ONE - part
-    f0, f1, f2, f3 = (
-        here * a0 + mix * b0,
-        here * a1 + mix * b1,
-        here * a2 + mix * b2,
-        here * a3 + mix * b3,
-    )
-    size = ONE / np.sqrt(f0 * f0 + f1 * f1 + f2 * f2 + f3 * f3)
-    return f0 * size, f1 * size, f2 * size, f3 * size
+def _on_curve(x, before, start, after, beyond, weight, one):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Return a place on the smooth curve through the nodes (Catmull-Rom)."""
+    a = times(number_at(weight, one), _vector(x, before))
+    b = times(number_at(weight, one + 1), _vector(x, start))
+    c = times(number_at(weight, one + 2), _vector(x, after))
+    d = times(number_at(weight, one + 3), _vector(x, beyond))
+    return plus(plus(a, b), plus(c, d))
+
+
+@row
+def _frame(q, start, other, weight, one):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return a segment's frame mixed with one beside it."""
+    part = number_at(weight, one + 4) + number_at(weight, one + 5)
+    a, b = _vector(q, start), _vector(q, other)
+    a3, b3 = number_at(q, start + 3 * LANES), number_at(q, other + 3 * LANES)
+    mix = part if dot(a, b) + a3 * b3 >= ZERO else -part
+    f = plus(times(ONE - part, a), times(mix, b))
+    f3 = (ONE - part) * a3 + mix * b3
+    size = ONE / np.sqrt(dot(f, f) + f3 * f3)
+    return f[0] * size, f[1] * size, f[2] * size, f3 * size
 
 
 @row
@@ -103,15 +110,18 @@ def distance_to(grid, p, clear):  # type: ignore[no-untyped-def] # pragma: no co
         return clear + place[4], ZERO, ZERO, ZERO
     i, j, k = min(int(u), s0 - 2), min(int(v), s1 - 2), min(int(w), s2 - 2)
     # within a cell the distance changes by at most its diagonal
-    least = values[i, j, k] - np.float32(1.8) / place[3]
+    first = (i * s1 + j) * s2 + k
+    nearest = number_at(values, first)
+    least = nearest - np.float32(1.8) / place[3]
     if least > clear:
         return least, ZERO, ZERO, ZERO
     a, b, c = u - np.float32(i), v - np.float32(j), w - np.float32(k)
     d, e, f = ONE - a, ONE - b, ONE - c
-    v000, v001 = values[i, j, k], values[i, j, k + 1]
-    v010, v011 = values[i, j + 1, k], values[i, j + 1, k + 1]
-    v100, v101 = values[i + 1, j, k], values[i + 1, j, k + 1]
-    v110, v111 = values[i + 1, j + 1, k], values[i + 1, j + 1, k + 1]
+    next_row, next_layer = first + s2, first + s1 * s2
+    v000, v001 = nearest, number_at(values, first + 1)
+    v010, v011 = number_at(values, next_row), number_at(values, next_row + 1)
+    v100, v101 = number_at(values, next_layer), number_at(values, next_layer + 1)
+    v110, v111 = number_at(values, next_layer + s2), number_at(values, next_layer + s2 + 1)
     l00, l01, l10, l11 = (
         v000 * f + v001 * c,
         v010 * f + v011 * c,

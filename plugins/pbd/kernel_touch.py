@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernel_lanes import LANES, any_below, at, lane_root, pick, put, whole
+from .kernel_lanes import LANES, any_below, at, lane_root, number_at, pick, put, whole
 from .kernel_math import absolute, carry, dot, minus, plus, put_three, row, three, times
 
 PLACE, SPEED, SLACK = 0, 3, 6
@@ -72,9 +72,11 @@ def _clipped(u, top):  # type: ignore[no-untyped-def] # pragma: no cover
 def _take_up(values, corners, lane) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write the values at the corners of the cell of one lane."""
     i, j, k = int(corners[8, lane]), int(corners[9, lane]), int(corners[10, lane])
+    layer, line = values.shape[1] * values.shape[2], values.shape[2]
+    first = i * layer + j * line + k
     for corner in range(8):
-        a, b, c = corner >> 2 & 1, corner >> 1 & 1, corner & 1
-        corners[corner, lane] = values[i + a, j + b, k + c]
+        further = (corner >> 2) * layer + (corner >> 1 & 1) * line + (corner & 1)
+        corners[corner, lane] = number_at(values, first + further)
 
 
 @row
