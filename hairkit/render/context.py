@@ -70,13 +70,24 @@ class Renderer:
             )
         return self._programs[key]
 
-    def forget_programs(self) -> None:
-        """Compile every shader anew when it is next asked for, as its file then is."""
-        for program in self._programs.values():
-            program.release()
-        for compute in self._computes.values():
-            compute.release()
+    def renew_programs(self) -> None:
+        """Compile every shader in use anew, as its file now is.
+
+        Raises `RenderError` when one does not compile; all stay as they are then. Old ones are not
+        released: others may still draw with them.
+        """
+        programs, computes = self._programs, self._computes
         self._programs, self._computes = {}, {}
+        try:
+            for key in programs:
+                self.program(*key.split("/"))
+            for key in computes:
+                name, *definitions = key.split()
+                pairs = (text.split("=") for text in definitions)
+                self.compute(name, **{word: int(value) for word, value in pairs})
+        except BaseException:
+            self._programs, self._computes = programs, computes
+            raise
 
     def compute(self, name: str, **definitions: int) -> moderngl.ComputeShader:
         """Return the compute shader `name.comp`, with numbers that its text leaves open."""

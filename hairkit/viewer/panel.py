@@ -23,8 +23,10 @@ from hairkit.viewer.presets import preset_names, presets_path
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
 
-WIDTH = 330
+WIDTH = 340
 """Pixels."""
+LABELS = 116.0
+"""Of them for names beside sliders."""
 HINT = 48
 """Letters in a line of a hint."""
 
@@ -103,6 +105,7 @@ class Panel:
         imgui.set_next_window_pos((session.size[0] - WIDTH - 8, 8), when)
         imgui.set_next_window_size((WIDTH, session.size[1] - 16), when)
         imgui.begin("hairkit")
+        imgui.push_item_width(-LABELS)
         if imgui.collapsing_header("View", imgui.TreeNodeFlags_.default_open):
             _view(imgui, session, perform)
         if imgui.collapsing_header("Air and head", imgui.TreeNodeFlags_.default_open):
@@ -114,6 +117,7 @@ class Panel:
             self._preset = _presets(imgui, session, self._preset, perform)
         if session.layers.capture is not None and imgui.collapsing_header("Head in the photos"):
             _pose(imgui, session, perform)
+        imgui.pop_item_width()
         imgui.end()
         imgui.render()
         self._backend.render(imgui.get_draw_data())

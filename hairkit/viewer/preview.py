@@ -81,8 +81,8 @@ class Preview:
 
     def restart(self) -> None:
         """Compile all shaders anew; the old ones stay when one does not compile."""
+        self.gl.renew_programs()
         self.release()
-        self.gl.forget_programs()
 
     def frame(self, seconds: float, *, still: bool = False) -> None:
         """Let time pass, draw, and keep the picture where it is asked for.

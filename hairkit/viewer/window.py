@@ -118,7 +118,8 @@ class Window:
         self._most_seconds = 0.4 * budget if budget > 0 else None
         self._keys = bindings()
         self.mouse = Mouse(self.perform, session.size[1])
-        self._watch_groom = Watch([session.opened.path])
+        self._watched = session.opened.path
+        self._watch_groom = Watch([self._watched])
         self._watch_shaders = Watch(shader_files())
         self._pace = 0.0
         """Seconds that a picture takes until it is on the screen, over the last few."""
@@ -264,8 +265,13 @@ class Window:
             try:
                 with renderer():
                     self.session.look_after_rerun()
-            except HairkitError as error:
-                self.session.message = str(error)
+            except (HairkitError, OSError) as error:
+                self.session.message = " ".join(str(error).split())
+            if self.session.rerun is None:  # what it has written is shown already
+                self._watch_groom = Watch([self.session.opened.path])
+        elif self._watched != self.session.opened.path:
+            self._watched = self.session.opened.path
+            self._watch_groom = Watch([self._watched])
         elif self._watch_groom.changed(now):
             self.perform("reload", {})
         if self._watch_shaders.changed(now):
@@ -324,7 +330,6 @@ class Window:
             self.session.message = f"opening {paths[0]}"
             self.picture(0.0)
             self.perform("open_file", {"file": str(paths[0])})
-            self._watch_groom = Watch([self.session.opened.path])
 
 
 class _Warnings(logging.Handler):

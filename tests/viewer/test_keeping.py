@@ -9,9 +9,12 @@ import cv2
 import numpy as np
 import pytest
 
-from hairkit.errors import InputError
+from hairkit.errors import InputError, RenderError
 from hairkit.options import describe
+from hairkit.render import context
+from hairkit.render.context import renderer
 from hairkit.viewer.actions import perform
+from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import Recorder, free_name, write_png
 from hairkit.viewer.session import Session
 from hairkit.viewer.simulation import StillHair
@@ -111,3 +114,25 @@ def test_every_option_can_be_changed_by_keys(session: Session) -> None:
             perform(session, "option", {"name": info.name, "value": value})  # is within bounds
         perform(session, "option", {"name": info.name, "value": before})
         assert session.tuned.nudged(info.name, 1) != before
+
+
+def test_a_broken_shader_leaves_the_picture_as_it_was(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While a shader is being written the old ones draw on; when it compiles they are replaced."""
+    with renderer() as gl:
+        preview = Preview(gl, session)
+        preview.draw()
+        before, program = preview.picture(), gl.program("viewer_screen", "viewer_studio")
+        with monkeypatch.context() as patch:
+            patch.setattr(context, "shader_source", lambda name: "#version 430\nvoid main() { oh")
+            with pytest.raises(RenderError, match="does not compile"):
+                preview.restart()
+        preview.draw()
+        assert (preview.picture() == before).all()
+        assert gl.program("viewer_screen", "viewer_studio") is program
+        preview.restart()
+        preview.draw()
+        assert (preview.picture() == before).all()
+        assert gl.program("viewer_screen", "viewer_studio") is not program
+        preview.release()
