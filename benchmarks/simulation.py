@@ -17,7 +17,8 @@ as always.
 | off | root mean square distance from the converged motion of the same material |
 
 The converged motion is that of many substeps: of pbd for pbd, of the plain scheme in float64 for
-both others. Of pyPBD the time of its own step is counted, not the loops in Python that set roots.
+both others. Of pyPBD the time of its own step is counted, with all threads or with one,
+whichever is faster, and not the loops in Python that set roots.
 """
 
 from __future__ import annotations
@@ -90,8 +91,7 @@ for frame in range(frames):
         step.step(model)
         spent += time.perf_counter() - start
     taken.append(spent)
-    if given["keep"]:
-        found.append([particles.getPosition(k) for k in range(particles.size())])
+    found.append([particles.getPosition(k) for k in range(particles.size())])
 np.savez(result, taken=taken, points=np.array(found))
 """
 
@@ -257,24 +257,32 @@ def plain_speed(groom: Groom, setting: tuple[int, int], steps: int) -> float:
 
 
 def referee(
-    python: str, groom: Groom, setting: tuple[int, int], frames: int, keep: bool
+    python: str, rest: Array, heads: Array, setting: tuple[int, int], threads: str = ""
 ) -> tuple[Array, Array]:
-    """Return seconds (F,) of pyPBD's own steps; to keep, points (F, S, n, 3) of some strands."""
-    rest = few(rest_of(groom)) if keep else rest_of(groom)
+    """Return seconds (F,) of pyPBD's own steps, and its points (F, S, n, 3).
+
+    `threads` are those that it may take; as many as there are where it says nothing.
+    """
     with tempfile.TemporaryDirectory() as folder:
         scene, result = Path(folder, "scene.npz"), Path(folder, "result.npz")
-        heads = heads_of(groom, frames, setting[0])
-        np.savez(scene, rest=rest, heads=heads, frames=frames, keep=keep)
+        np.savez(scene, rest=rest, heads=heads, frames=len(heads) // setting[0])
         words = [python, "-c", PYPBD, scene, result, *setting, BENDING]
-        threads = {"OMP_NUM_THREADS": "1"} if keep else {}  # as many as it likes where time counts
         done = subprocess.run(
             [*map(str, words)], capture_output=True, text=True, timeout=1800,
-            env={**os.environ, **threads},
+            env={**os.environ, **({"OMP_NUM_THREADS": threads} if threads else {})},
         )  # fmt: skip
         if done.returncode:
             raise RuntimeError(done.stderr.strip())
         with np.load(result) as found:
-            return found["taken"], found["points"].reshape(-1, *rest.shape) if keep else rest
+            return found["taken"], found["points"].reshape(-1, *rest.shape)
+
+
+def referee_speed(python: str, groom: Groom, setting: tuple[int, int], steps: int) -> float:
+    """Return pyPBD's steps a second: by all threads or by one, whichever is faster."""
+    rest, heads = rest_of(groom), heads_of(groom, 3 * steps, setting[0])
+    return float(
+        max(1 / referee(python, rest, heads, setting, threads)[0].min() for threads in ("1", ""))
+    )
 
 
 def few(strands: Array) -> Array:
@@ -298,7 +306,7 @@ def errors(
         points = plain_moved(scene, setting, frames)
         found[PLAIN, *setting] = stretch_of(points, rest), off_by(points, converged)
         if python:
-            _, points = referee(python, scene, setting, frames, True)
+            _, points = referee(python, rest, heads_of(scene, frames, setting[0]), setting, "1")
             found[PYPBD_NAME, *setting] = stretch_of(points, rest), off_by(points, converged)
     return found
 
@@ -312,8 +320,7 @@ def speed_of(way: Way, groom: Groom, frames: int, python: str | None) -> float:
         return plain_speed(groom, (substeps, iterations), few_steps)
     if method == PYPBD_NAME:
         assert python is not None
-        taken, _ = referee(python, groom, (substeps, iterations), 3 * few_steps, False)
-        return float(1 / taken.min())
+        return referee_speed(python, groom, (substeps, iterations), few_steps)
     return ours_speed(groom, method.removeprefix("pbd "), substeps, steps)
 
 
