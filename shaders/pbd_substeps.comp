@@ -21,6 +21,7 @@ uniform vec3 u_air;            // m/s, world, where u_gusts is false
 uniform bool u_gusts;
 uniform bool u_forced;
 uniform float u_friction;
+uniform int u_rounds;             // of friction under the strands' own tension
 uniform float u_fastest;       // m/s
 
 int rod;

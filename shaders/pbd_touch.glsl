@@ -3,8 +3,10 @@
 const float FURTHER = 1.05;       // slack wears off a little faster than the way that a node goes
 
 vec3 normal[NODE_ROOM];           // of what a node touches, else 0
+float grip[NODE_ROOM];            // change of velocity, m/s, that friction may still make
 
-// Restore the lengths; a node at an obstacle moves only along it, square to its normal.
+// Restore the lengths; a node at an obstacle moves only along it, square to its normal, and what
+// presses it there grips.
 void relengthen() {
     vec3 end_before = vec3(0.0);
     for (int j = 0; j < EACH_SEGMENT; j++) {
@@ -25,9 +27,27 @@ void relengthen() {
         vec3 pull = vec3(0.0);
         if (j > 0) pull -= value[j - 1] * direction[j - 1];
         if (j < SEGMENTS) pull += value[j] * direction[j];
-        vec3 change = rates(j).w * (pull - dot(pull, normal[j]) * normal[j]);
+        float away = dot(pull, normal[j]);
+        vec3 change = rates(j).w * (pull - away * normal[j]);
         place[j] += change;
         speed[j] += change / u_seconds;
+        grip[j] -= u_friction * rates(j).w * away / u_seconds;
+    }
+}
+
+// Coulomb: the change along the obstacle is at most the grip.
+vec3 braked(int j, vec3 slide) {
+    float size = length(slide), brake = clamp(grip[j], 0.0, size);
+    grip[j] -= brake;
+    return slide * (brake / max(size, 1e-12));
+}
+
+void brake_again(int k) {
+    for (int j = 1; j < EACH_NODE; j++) {
+        vec3 relative = speed[j] - drift(k, place[j]);
+        vec3 brake = braked(j, relative - dot(relative, normal[j]) * normal[j]);
+        speed[j] -= brake;
+        place[j] -= u_seconds * brake;
     }
 }
 
@@ -41,10 +61,9 @@ vec3 touched(int k, int j) {
         float across = dot(relative, way), inward = max(-across, 0.0);
         // what came in during this substep goes out again; older depth leaves at a limited speed
         float depth = min(-left, (inward + u_fastest) * u_seconds);
-        vec3 slide = relative - across * way;
-        float size = length(slide);
-        vec3 brake = slide * (min(u_friction * inward, size) / max(size, 1e-12));
         if (left < 0.0) {
+            grip[j] = u_friction * inward;
+            vec3 brake = braked(j, relative - across * way);
             speed[j] += inward * way - brake;
             place[j] += depth * way - u_seconds * brake;
         } else {
@@ -56,6 +75,12 @@ vec3 touched(int k, int j) {
 }
 
 void touch(int k) {
-    for (int j = 0; j < EACH_NODE; j++) normal[j] = j > 0 ? touched(k, j) : vec3(0.0);
-    relengthen();
+    for (int j = 0; j < EACH_NODE; j++) {
+        grip[j] = 0.0;
+        normal[j] = j > 0 ? touched(k, j) : vec3(0.0);
+    }
+    for (int round = 0; round <= u_rounds; round++) {
+        if (round > 0) brake_again(k);
+        relengthen();
+    }
 }

@@ -69,6 +69,12 @@ class Options:
         unit="m/s^2",
         doc="Push out of places that are twice as dense as captured.",
     )
+    rounds: int = option(
+        4,
+        low=0,
+        high=8,
+        doc="Rounds of friction under the strands' own tension: 0 as if slack, 4 as ropes.",
+    )
     clearance: float = option(
         0.002, low=0.0, high=0.02, unit="m", doc="Distance that hair keeps from the head."
     )

@@ -23,6 +23,7 @@ def contact_uniforms(contact: Contact | None) -> dict[str, Any]:
         "u_obstacles": True,
         "u_friction": contact.friction,
         "u_fastest": contact.fastest,
+        "u_rounds": contact.rounds,
         "u_cells": grid.shape,
         "u_grid": (*(grid.origin + 0.5 * grid.spacing), 1 / grid.spacing),
         "u_room": ROOM,

@@ -56,7 +56,7 @@ class FastEngine:
         self._usual = np.zeros(0, np.float32)
         self._crew = Crew()
         self._blown: Float32Array | None = None
-        self._air_work: Float32Array | None = None
+        self._air_work = kernels.padded(np.zeros(rods.points.shape, np.float32))
         self._riding: tuple[Riders, tuple[Array, ...]] | None = None
         self.state = at_rest(rods)
 
@@ -79,11 +79,10 @@ class FastEngine:
             self._packed = (system, *_constants(self._rods, system, self._contact, self._unit))
         _, node, element, metric = self._packed
         contact = self._contact
-        touching = (contact.friction, contact.fastest) if contact is not None else (0.0, 0.0)
-        settings = np.array(
-            [system.step, system.rates.damping, *touching, iterations, contact is not None],
-            np.float32,
-        )
+        settings = np.array([system.step, system.rates.damping, 0, 0, iterations, 0, 0], "f4")
+        if contact is not None:
+            settings[2:4] = contact.friction, contact.fastest
+            settings[5:] = 1, contact.rounds
         self._crew.share(
             kernels.run_substeps, len(self._x), WORTH,
             self._x, self._q, self._root, node, element, metric,
@@ -117,14 +116,15 @@ class FastEngine:
         vectors, amplitudes, phases = waves
         phases = np.remainder((phases + vectors @ head[:3, 3]) / (2 * np.pi), 1.0)
         turns = np.column_stack([vectors @ head[:3, :3] / (2 * np.pi), phases])
-        if self._air_work is None:
-            shape = (*self._x.shape[:2], 3, LANES)
-            self._air_work = np.zeros(shape, np.float32)
         self._crew.share(
             blow_nodes, len(self._x), 4 * WORTH, self._x, turns.astype(np.float32),
             amplitudes.astype(np.float32), wind.astype(np.float32), self._air_work,
         )  # fmt: skip
         self._blown = self._air_work
+
+    def air(self) -> Float64Array:
+        """Return the air's velocity (S, n, 3) at the nodes, world, as gusts were last taken."""
+        return self._unpacked(self._air_work)
 
     def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
         """Return places and velocities (n, 3) of one rod, head axes."""

@@ -11,7 +11,7 @@ from numba import njit
 from .kernel_lanes import at, lane_root, pick, put
 
 _HOW: dict[str, Any] = {
-    "fastmath": True, "error_model": "numpy", "cache": True, "_nrt": False,
+    "fastmath": True, "error_model": "numpy", "_nrt": False,
 }  # fmt: skip
 row: Callable[[Any], Any] = njit(**_HOW)
 """Compiles a function that allocates nothing: views are then not counted, which halves the time of

@@ -10,14 +10,18 @@ from .kernel_math import absolute, carry, dot, minus, plus, put_three, row, thre
 PLACE, SPEED, SLACK = 0, 3, 6
 LENGTH, CLEAR, EASE = 0, 6, 7
 START, END = 0, 3
+GRIP, PRESS, PRESS_NEXT, LINES = 5, 6, 7, 8
+"""Rows of `line`, and how many: what friction may still change a node's velocity by, and how far a
+segment's pull presses the nodes at its ends into what they touch."""
 ONE, ZERO, SOFTEST = np.float32(1), np.float32(0), np.float32(1e-3)
 FURTHER, ROOM = np.float32(1.05), np.float32(1.001)
 
 
 @row
-def touch(x, node, constants, grid, settings, corners, normals) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def touch(x, node, constants, grid, settings, corners, normals, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Bring nodes out of the obstacles; write normals where they touch, else 0.
 
+    `grips` are what friction may still change their velocity by.
     A node is looked up again only when it may have gone as far as it was away the last time.
     """
     shift, h = constants[1], settings[0]
@@ -27,6 +31,7 @@ def touch(x, node, constants, grid, settings, corners, normals) -> None:  # type
         slack = at(x, (j, SLACK)) - FURTHER * lane_root(dot(way, way))
         put(x, (j, SLACK), slack)
         put_three(normals, j, 0, (ZERO, ZERO, ZERO))
+        put(grips, j, ZERO)
         if any_below(slack, ZERO):
             distance, normal = _distances(grid, place, slack, corners)
             clear = at(node, (j, CLEAR))
@@ -36,7 +41,7 @@ def touch(x, node, constants, grid, settings, corners, normals) -> None:  # type
                 inside = pick(ZERO, depth, ONE + ZERO * depth, ZERO)
                 normal = times(inside, normal)
                 put_three(normals, j, 0, normal)
-                _out(x, j, shift, inside * depth, normal, settings)
+                _out(x, j, shift, inside * depth, normal, settings, grips)
 
 
 @row
@@ -98,32 +103,55 @@ def _mixed(corners, share):  # type: ignore[no-untyped-def] # pragma: no cover
 
 
 @row
-def _out(x, j, shift, depth, normal, settings) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def _out(x, j, shift, depth, normal, settings, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Move nodes out by up to their depth, with friction; nothing happens where normals are 0."""
     h, friction, fastest = settings[0], settings[2], settings[3]
     place, speed = three(x, j, PLACE), three(x, j, SPEED)
-    relative = plus(speed, times(ONE / h, carry(shift, place)))
-    across = dot(relative, normal)
+    across = dot(plus(speed, times(ONE / h, carry(shift, place))), normal)
     inward = pick(across, ZERO, ZERO - across, ZERO)
     most = h * (inward + fastest)
     out = pick(depth, most, depth, most)
-    along = minus(relative, times(across, normal))
-    size = lane_root(dot(along, along)) + np.float32(1e-12)
-    slowed = friction * inward / size
-    slowed = pick(slowed, ONE, slowed, ONE)
-    brake = times(slowed, along)
-    put_three(x, j, SPEED, plus(speed, minus(times(inward, normal), brake)))
-    put_three(x, j, PLACE, plus(place, minus(times(out, normal), times(h, brake))))
+    put(grips, j, friction * inward)
+    put_three(x, j, SPEED, plus(speed, times(inward, normal)))
+    put_three(x, j, PLACE, minus(place, times(ZERO - out, normal)))
+    _brake(x, j, three(x, j, SPEED), place, shift, normal, h, grips)
 
 
 @row
-def relengthen(x, node, element, segment, normals, line, over) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Restore the lengths; a touching node moves only along the obstacle.
+def _brake(x, j, speed, place, shift, normal, h, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Slow a node along the obstacle by no more than its grip; `place` says how the head goes."""
+    relative = plus(speed, times(ONE / h, carry(shift, place)))
+    along = minus(relative, times(dot(relative, normal), normal))
+    size = lane_root(dot(along, along)) + np.float32(1e-12)
+    grip = at(grips, j)
+    slowed = pick(ZERO, grip, grip, ZERO) / size
+    slowed = pick(slowed, ONE, slowed, ONE)
+    put(grips, j, grip - slowed * size)
+    brake = times(slowed, along)
+    put_three(x, j, SPEED, minus(speed, brake))
+    put_three(x, j, PLACE, minus(three(x, j, PLACE), times(h, brake)))
+
+
+@row
+def brake_again(x, constants, settings, normals, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Let nodes that touch rub once more, by what the strands' own tension adds to their grip."""
+    for j in range(1, x.shape[0]):
+        normal = three(normals, j, 0)
+        if any_below(ZERO - dot(normal, normal), ZERO):
+            speed, place = three(x, j, SPEED), three(x, j, PLACE)
+            # where nothing is touched the whole velocity is along, and grip is 0
+            _brake(x, j, speed, place, constants[1], normal, settings[0], grips)
+
+
+@row
+def relengthen(x, node, element, segment, normals, line, settings) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Restore the lengths; a touching node moves only along the obstacle, and is pressed on it.
 
     One tridiagonal solve: elimination runs along with what it needs, row by row.
     """
     m = segment.shape[0]
     pivots, besides, pulls = line[0], line[1], line[2]
+    presses, presses_next = line[PRESS], line[PRESS_NEXT]
     place, normal = three(x, 0, PLACE), three(normals, 1, 0)
     normal = times(ZERO, normal)
     ease, pivot, pull, end = at(node, (0, EASE)), ZERO * normal[0], ZERO * normal[0], normal
@@ -146,8 +174,10 @@ def relengthen(x, node, element, segment, normals, line, over) -> None:  # type:
         put(pivots, j, pivot)
         put(besides, j, beside)
         put(pulls, j, pull)
+        put(presses, j, ease * dot(way, normal))
+        put(presses_next, j, next_ease * dot(way, next_normal))
         place, normal, ease = after, next_normal, next_ease
-    _shift_nodes(x, segment, line, over)
+    _shift_nodes(x, segment, line, settings)
 
 
 @row
@@ -157,15 +187,19 @@ def _eased(ease, way, normal):  # type: ignore[no-untyped-def] # pragma: no cove
 
 
 @row
-def _shift_nodes(x, segment, line, over) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def _shift_nodes(x, segment, line, settings) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Substitute backwards, and move the nodes by the pulls before and after them."""
-    m = segment.shape[0]
-    pivots, besides, pulls = line[0], line[1], line[2]
+    m, over = segment.shape[0], ONE / settings[0]
+    pivots, besides, pulls, grips = line[0], line[1], line[2], line[GRIP]
+    rough = settings[2] * over
     before = times(ZERO, three(segment, 0, START))
-    coupled = before[0]
+    coupled = pressed = before[0]
     for j in range(m - 1, -1, -1):
         pull = (at(pulls, j) - coupled) * at(pivots, j)
         move = minus(before, times(pull, three(segment, j, END)))
         put_three(x, j + 1, PLACE, plus(three(x, j + 1, PLACE), move))
         put_three(x, j + 1, SPEED, plus(three(x, j + 1, SPEED), times(over, move)))
+        pressed = pull * at(line[PRESS_NEXT], j) - pressed
+        put(grips, j + 1, at(grips, j + 1) + rough * pressed)
+        pressed = pull * at(line[PRESS], j)
         before, coupled = times(pull, three(segment, j, START)), at(besides, j) * pull

@@ -20,7 +20,7 @@ from .kernel_lanes import LANES, at, lane_root, put
 from .kernel_math import dot, four, minus, plus, put_three, row, three, times
 from .kernel_rows import bow, constants_of, predict, spin, swing, twist
 from .kernel_solve import banded_solve, excess_of, lengths_solve, pull_back
-from .kernel_touch import relengthen, touch
+from .kernel_touch import GRIP, LINES, brake_again, relengthen, touch
 
 LENGTH, OVER, BEND, TWIST, CURVE, NATURAL, FIRST, SECOND, PIVOT = 0, 1, 2, 3, 4, 7, 8, 9, 10
 """Rows of an element's constants: length, 1/length, stiffnesses, natural turn (3), natural twist,
@@ -74,11 +74,11 @@ def run_substeps(  # type: ignore[no-untyped-def]
         Obstacles: values (X, Y, Z), and where they are (5,): origin, 1/spacing, and how far at
         least everything is outside.
     settings
-        (6,) step, damping, friction, depenetration speed, iterations, contacts.
+        (7,) step, damping, friction, depenetration speed, iterations, contacts, rounds of friction.
     """
     n = x.shape[1]
     # work: segments (6), sums along the rod, forces, solutions and normals (3 each), factor, cells
-    segment, line = np.empty((n - 1, 6, LANES), np.float32), np.empty((5, n, LANES), np.float32)
+    segment, line = np.empty((n - 1, 6, LANES), np.float32), np.empty((LINES, n, LANES), np.float32)
     vector = np.empty((4, n, 3, LANES), np.float32)
     factor = np.empty((metric.shape[1], LANES), np.float32)
     corners = np.zeros((12, LANES), np.float32)
@@ -124,8 +124,11 @@ def _substep(  # type: ignore[no-untyped-def]
         put_three(x, j, PLACE, plus(three(x, j, PLACE), move))
         put_three(x, j, SPEED, plus(three(x, j, SPEED), times(over, move)))
     if settings[5] > ZERO:
-        touch(x, node, constants, grid, settings, corners, normals)
-        relengthen(x, node, element, segment, normals, line, over)
+        touch(x, node, constants, grid, settings, corners, normals, line[GRIP])
+        relengthen(x, node, element, segment, normals, line, settings)
+        for _ in range(int(settings[6])):
+            brake_again(x, constants, settings, normals, line[GRIP])
+            relengthen(x, node, element, segment, normals, line, settings)
 
 
 @row

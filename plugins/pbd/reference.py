@@ -51,7 +51,7 @@ class Contact:
     """(P,) least distance, metres, of the guides' own points where they are drawn; None: any."""
     rounds: int = 0
     """Rounds of friction under the tension that restores the lengths. Without, taut strands rub too
-    little around bends; with 4 the rope's law holds. Only the reference knows them."""
+    little around bends; with 4 the rope's law holds."""
 
 
 @dataclass(frozen=True, eq=False)

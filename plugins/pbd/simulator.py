@@ -355,4 +355,5 @@ def _contact(
 ) -> Contact:
     """Captured hair that is nearer (S, n) than the clearance keeps its own distance."""
     clearance = np.minimum(options.clearance, near)
-    return Contact(obstacles, clearance, options.rubbing(), options.depenetration, deepest)
+    rub, fastest = options.rubbing(), options.depenetration
+    return Contact(obstacles, clearance, rub, fastest, deepest, options.rounds)
