@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.cli.settings import importer_of, split_settings
 from hairkit.errors import InputError, OptionError
 from hairkit.stored import Float64Array
 
@@ -42,7 +43,13 @@ def register(subparsers: Any) -> None:
     add("--wind", default="0,0,0", metavar="X,Y,Z", help="metres per second (0,0,0)")
     add("--turbulence", type=float, default=0.0, metavar="T", help="gusts over the wind (0)")
     add("--gravity", type=float, metavar="G", help="m/s^2 downwards; the groom's by default")
-    add("--set", action="append", default=[], metavar="X=V", help="option=V of the simulator")
+    add(
+        "--set",
+        action="append",
+        default=[],
+        metavar="X=V",
+        help="option=V of simulator or file format",
+    )
     add("--preset", metavar="NAME", help="options kept by hairkit view beside the groom")
     add("--using", metavar="NAME", help=f"simulator plugin ({SIMULATOR}, or the preset's)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
@@ -60,11 +67,15 @@ def run(args: argparse.Namespace) -> int:
     _check(args)
     manager = Manager.loaded(args.plugin)
     using, kept = _preset(args)
-    options, others = _settings(manager, using, kept, args.set)
+    manager.implementer("make_simulator", using)
+    importer = importer_of(manager, args.groom)
+    others = split_settings(manager, using, importer, args.set)
+    options = manager.options(using, kept | others.pop(using, {}))
+    reading = others.pop(importer, {}) if importer is not None else {}
     exporter = _exporter(manager, args.out)
     _refuse_unknown(others, exporter)
     weather = Weather(_vector("--wind", args.wind), args.turbulence, _gravity(args.gravity))
-    groom = load_groom(manager, args.groom)
+    groom = load_groom(manager, args.groom, reading)
     motion = still() if args.motion is None else read_motion(args.motion)
     motion = shaken(args.shake, groom.head, motion)
     simulator = manager.call("make_simulator", using, options, groom=groom)
@@ -153,21 +164,6 @@ def _exporter(manager: Any, path: Path) -> str | None:
 
 def _animated(manager: Any, exporter: str) -> bool:
     return "cache" in {info.name for info in manager.info(exporter).options}
-
-
-def _settings(
-    manager: Any, simulator: str, kept: dict[str, object], assignments: list[str]
-) -> tuple[Any, dict[str, dict[str, object]]]:
-    """Take `option=value` and `plugin.option=value` apart: the simulator's, and other plugins'."""
-    values: dict[str, dict[str, object]] = {simulator: dict(kept)}
-    for text in assignments:
-        target, equals, value = (part.strip() for part in text.partition("="))
-        plugin, dot, name = target.rpartition(".")
-        if not equals or not name or (dot and not plugin):
-            raise OptionError(f"--set {text}: expected option=value or plugin.option=value")
-        values.setdefault(plugin or simulator, {})[name] = value
-    manager.implementer("make_simulator", simulator)
-    return manager.options(simulator, values.pop(simulator)), values
 
 
 def _refuse_unknown(others: dict[str, dict[str, object]], exporter: str | None) -> None:

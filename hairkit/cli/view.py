@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from hairkit.cli.render import parse_size
-from hairkit.errors import InputError
+from hairkit.errors import InputError, OptionError
 
 MOST_HAIRS = 200_000
 _DESCRIPTION = """\
@@ -27,7 +27,13 @@ def register(subparsers: Any) -> None:
     add("groom", metavar="GROOM", type=Path, help="groom.npz, importable file or folder of results")
     add("--capture", type=Path, metavar="FOLDER", help="the photos, to show them in space")
     add("--simulator", metavar="NAME", help="simulator plugin (pbd), or none")
-    add("--set", action="append", default=[], metavar="X=V", help="option=V of the simulator")
+    add(
+        "--set",
+        action="append",
+        default=[],
+        metavar="X=V",
+        help="option=V of simulator or file format",
+    )
     add("--preset", metavar="NAME", help="the simulator's options kept beside the groom")
     add("--hairs", type=int, metavar="N", help="strands drawn (10000)")
     add("--size", metavar="WxH", help="pixels (1280x720)")
@@ -67,8 +73,6 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError(f"--hairs is {args.hairs}, expected 0 to {MOST_HAIRS}")
     if args.capture is not None and not args.capture.is_dir():
         raise InputError(f"--capture {args.capture}: no such folder")
-    for text in args.set:
-        _assignment(text)
 
 
 def _window(args: argparse.Namespace) -> int:
@@ -112,26 +116,30 @@ def _headless(args: argparse.Namespace) -> int:
 
 
 def _manager(args: argparse.Namespace) -> Any:
-    """Return the plugins, when one of them reads the groom and one moves it."""
-    from hairkit.groom_opening import groom_path, plugin_for
+    """Return the plugins, when one of them reads the groom and `--set` has its form."""
+    from hairkit.cli.settings import importer_of, split_settings
     from hairkit.manager import Manager
+    from hairkit.viewer.simulation import STILL
 
     manager = Manager.loaded(args.plugin)
-    path = groom_path(args.groom)
-    if path.suffix != ".npz":
-        plugin_for(manager, "import_groom", path)
+    split_settings(manager, STILL, importer_of(manager, args.groom), args.set)
     return manager
 
 
 def _session(args: argparse.Namespace, manager: Any, size: tuple[int, int], seed: int = 0) -> Any:
+    from hairkit.cli.settings import importer_of, split_settings
     from hairkit.groom_opening import groom_path
     from hairkit.viewer.actions import perform
     from hairkit.viewer.presets import presets_path, read_preset
     from hairkit.viewer.session import HAIRS, Session
+    from hairkit.viewer.simulation import preferred
 
     simulator = args.simulator
     if args.preset is not None and simulator is None:
         simulator = read_preset(presets_path(groom_path(args.groom)), args.preset).get("simulator")
+    importer = importer_of(manager, args.groom)
+    user = simulator or preferred(manager)
+    settings = split_settings(manager, user, importer, args.set)
     session = Session(
         manager,
         args.groom,
@@ -140,19 +148,16 @@ def _session(args: argparse.Namespace, manager: Any, size: tuple[int, int], seed
         hairs=HAIRS if args.hairs is None else args.hairs,
         capture=args.capture,
         seed=seed,
+        reading=settings.pop(importer, {}) if importer is not None else {},
     )
     if args.preset is not None:
         perform(session, "preset_load", {"name": args.preset})
-    for name, value in map(_assignment, args.set):
-        session.tuned.set(name.removeprefix(f"{session.tuned.plugin}."), value)
+    for name, value in settings.pop(user, {}).items():
+        session.tuned.set(name, value)
+    for plugin, values in settings.items():
+        known = user if importer is None else f"{user} or {importer}"
+        raise OptionError(f"--set {plugin}.{next(iter(values))}: expected options of {known}")
     return session
-
-
-def _assignment(text: str) -> tuple[str, str]:
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not equals:
-        raise InputError(f"--set {text}: expected option=value")
-    return name, value
 
 
 def _size(args: argparse.Namespace) -> tuple[int, int]:

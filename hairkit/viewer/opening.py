@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,8 +21,10 @@ class Opened:
     """The folder that `hairkit reconstruct` wrote, when the groom lies in one."""
 
 
-def open_path(path: Path, manager: Manager) -> Opened:
+def open_path(path: Path, manager: Manager, settings: Mapping[str, object] | None = None) -> Opened:
     """Open a groom.npz, a folder that holds one, or a file that an import plugin reads.
+
+    `settings` are options of that plugin.
 
     Raises
     ------
@@ -29,6 +32,6 @@ def open_path(path: Path, manager: Manager) -> Opened:
         There is no such file, or nothing that reads it.
     """
     path = groom_path(path)
-    groom = load_groom(manager, path)
+    groom = load_groom(manager, path, settings)
     results = path.parent if (path.parent / "work").is_dir() else None
     return Opened(groom, path, results)

@@ -6,6 +6,7 @@ A session knows nothing of OpenGL or windows; `actions` change it, `preview` dra
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -84,11 +85,14 @@ class Session:
         hairs: int = HAIRS,
         capture: Path | None = None,
         seed: int = 0,
+        reading: Mapping[str, object] | None = None,
     ) -> None:
+        """Open `path`; `reading` are options of the plugin that imports it."""
         self.manager = manager
         self.size = size
         self._simulator = simulator
         self._capture = capture
+        self._first, self._reading = path, reading or {}
         self.seed = seed
         self.wind, self.shown = Wind(), Shown(hairs=hairs)
         self.paused = False
@@ -120,15 +124,20 @@ class Session:
 
     def open(self, path: Path) -> None:
         """Show another groom, from its best side."""
-        self._take(open_path(path, self.manager))
+        self._take(open_path(path, self.manager, self._reading_of(path)))
         self.frame()
 
     def reload(self) -> None:
         """Read the file again; view, wind and options stay."""
         values = dict(self.tuned.values)
-        self._take(open_path(self.opened.path, self.manager))
+        path = self.opened.path
+        self._take(open_path(path, self.manager, self._reading_of(path)))
         if self.tuned.infos:
             self.tuned.replace(values)
+
+    def _reading_of(self, path: Path) -> Mapping[str, object]:
+        """Return the import options of a file: those of the first one, no others are known."""
+        return self._reading if path == self._first else {}
 
     def frame(self) -> None:
         """Look at all of it, from the front and a little to the side."""

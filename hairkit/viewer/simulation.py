@@ -69,14 +69,19 @@ class StillHair:
         self._points = moved.astype(np.float32)
 
 
+def preferred(manager: Manager) -> str:
+    """Return the simulator that is taken when none is named."""
+    names = manager.names("make_simulator")
+    return PREFERRED if PREFERRED in names else (names[0] if names else STILL)
+
+
 class Tuned:
     """A simulator with the values of its plugin's options."""
 
     def __init__(self, manager: Manager, groom: Groom, plugin: str | None = None) -> None:
         """Make the simulator `plugin`; by default `pbd`, else the first one, else `none`."""
         names = manager.names("make_simulator")
-        if plugin is None:
-            plugin = PREFERRED if PREFERRED in names else (names[0] if names else STILL)
+        plugin = preferred(manager) if plugin is None else plugin
         if plugin not in (*names, STILL):
             raise InputError(unknown_name("simulator", plugin, [*names, STILL]))
         self._manager = manager

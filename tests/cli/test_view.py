@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 
 from hairkit.cli import main
@@ -63,6 +64,10 @@ def test_a_folder_of_results_is_opened_by_its_name(groom_path: Path, tmp_path: P
         (("--hairs", "-4"), "--hairs is -4"),
         (("--capture", "nowhere"), "--capture nowhere: no such folder"),
         (("--set", "drag"), "--set drag: expected option=value"),
+        (
+            ("--headless", "--script", "S", "--set", "gabor.angles=3"),
+            "--set gabor.angles: expected",
+        ),
         (("--script", "nothing.toml"), "nothing.toml: no such file"),
     ],
 )
@@ -70,10 +75,12 @@ def test_mistakes_give_one_line(
     groom_path: Path, words: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Exit code 2 and one line that says what was wanted."""
-    assert view(groom_path, *words) == 2
+    script = groom_path.with_name("steps.toml")
+    script.write_text("")
+    assert view(groom_path, *(str(script) if word == "S" else word for word in words)) == 2
     said = capsys.readouterr().err.strip()
     assert message in said
-    assert "\n" not in said
+    assert "\n" not in said.replace(f"{renderer_line(said)}\n", "")
 
 
 def test_what_is_no_groom_is_refused(
@@ -90,6 +97,27 @@ def test_what_is_no_groom_is_refused(
         assert message in capsys.readouterr().err
     assert main(["view", str(groom_path), *map(str, common), "--simulator", "magic"]) == 2
     assert "no simulator 'magic'" in capsys.readouterr().err
+
+
+def renderer_line(said: str) -> str:
+    """Return the line that names the renderer, empty where there is none."""
+    return next((line for line in said.splitlines() if "OpenGL" in line), "-")
+
+
+def test_options_of_the_file_are_for_the_plugin_that_reads_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Hair in other units is refused with the cure, and the cure works in the same command."""
+    turns = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    points = [f"v {30 * np.cos(t)} {30 * k} {30 * np.sin(t)}" for t in turns for k in range(3)]
+    lines = [f"l {3 * k + 1} {3 * k + 2} {3 * k + 3}" for k in range(12)]
+    (tmp_path / "hair.obj").write_text("\n".join(points + lines) + "\n")
+    (tmp_path / "s.toml").write_text("size = [64, 48]\n[[steps]]\ndo = 'screenshot'\n")
+    words = [tmp_path / "hair.obj", "--headless", "--script", tmp_path / "s.toml"]
+    assert view(*words, "--out", tmp_path) == 2
+    assert "scale=" in capsys.readouterr().err
+    assert view(*words, "--out", tmp_path, "--set", "scale=0.002") == 0
+    assert (tmp_path / "hairkit.png").is_file()
 
 
 def test_a_file_that_no_plugin_reads_is_refused_before_a_window_opens(
