@@ -76,6 +76,8 @@ def run(args: argparse.Namespace) -> int:
     _refuse_unknown(others, exporter)
     weather = Weather(_vector("--wind", args.wind), args.turbulence, _gravity(args.gravity))
     groom = load_groom(manager, args.groom, reading)
+    if not len(groom.strands):
+        raise InputError(f"{args.groom}: holds no strands, so there is nothing to simulate")
     motion = still() if args.motion is None else read_motion(args.motion)
     motion = shaken(args.shake, groom.head, motion)
     simulator = manager.call("make_simulator", using, options, groom=groom)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from hairkit.errors import InputError
 from hairkit.groom import Groom
 from hairkit.groom_opening import groom_path, load_groom
 from hairkit.manager import Manager
@@ -29,9 +30,11 @@ def open_path(path: Path, manager: Manager, settings: Mapping[str, object] | Non
     Raises
     ------
     InputError
-        There is no such file, or nothing that reads it.
+        There is no such file, nothing that reads it, or no hair in it.
     """
     path = groom_path(path)
     groom = load_groom(manager, path, settings)
+    if not len(groom.strands):
+        raise InputError(f"{path}: holds no strands, so there is nothing to show")
     results = path.parent if (path.parent / "work").is_dir() else None
     return Opened(groom, path, results)

@@ -193,6 +193,27 @@ def test_options_found_in_the_window_are_taken_by_name(groom: Groom, tmp_path: P
     assert simulate(groom, tmp_path, *words, "--preset", "light") == 2
 
 
+def test_a_groom_without_strands_is_refused(
+    groom: Groom, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One line says so, from simulate and from view."""
+    from hairkit.exporting import selected
+
+    bald = selected(groom, np.zeros(len(groom.strands), bool))
+    assert simulate(bald, tmp_path, "-o", str(tmp_path / "c.npz")) == 2
+    assert "holds no strands" in capsys.readouterr().err
+    (tmp_path / "s.toml").write_text("")
+    words = [
+        "view",
+        str(tmp_path / "groom.npz"),
+        "--headless",
+        "--script",
+        str(tmp_path / "s.toml"),
+    ]
+    assert cli.main(words) == 2
+    assert "holds no strands" in capsys.readouterr().err
+
+
 def test_frames_that_no_memory_holds_are_refused_at_once(groom: Groom, tmp_path: Path) -> None:
     """Before the first frame, with the size."""
     many = SimpleNamespace(strands=SimpleNamespace(points=np.zeros((10**7, 3))))
