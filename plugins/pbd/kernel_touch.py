@@ -18,13 +18,13 @@ FURTHER, ROOM = np.float32(1.05), np.float32(1.001)
 
 
 @row
-def touch(x, node, constants, grid, settings, corners, normals, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Bring nodes out of the obstacles; write normals where they touch, else 0.
+def touch(x, node, constants, grid, settings, corners, normals, grips):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Bring nodes out of the obstacles; write normals where they touch, else 0; return if any does.
 
     `grips` are what friction may still change their velocity by.
     A node is looked up again only when it may have gone as far as it was away the last time.
     """
-    shift, h = constants[1], settings[0]
+    shift, h, touching = constants[1], settings[0], False
     for j in range(1, x.shape[0]):
         place, speed = three(x, j, PLACE), three(x, j, SPEED)
         way = plus(times(h, speed), carry(shift, place))
@@ -38,10 +38,12 @@ def touch(x, node, constants, grid, settings, corners, normals, grips) -> None: 
             put(x, (j, SLACK), pick(slack, ZERO, distance - clear, slack))
             depth = pick(slack, ZERO, clear - distance, ZERO)
             if any_below(ZERO - depth, ZERO):
+                touching = True
                 inside = pick(ZERO, depth, ONE + ZERO * depth, ZERO)
                 normal = times(inside, normal)
                 put_three(normals, j, 0, normal)
                 _out(x, j, shift, inside * depth, normal, settings, grips)
+    return touching
 
 
 @row

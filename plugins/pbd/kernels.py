@@ -124,9 +124,10 @@ def _substep(  # type: ignore[no-untyped-def]
         put_three(x, j, PLACE, plus(three(x, j, PLACE), move))
         put_three(x, j, SPEED, plus(three(x, j, SPEED), times(over, move)))
     if settings[5] > ZERO:
-        touch(x, node, constants, grid, settings, corners, normals, line[GRIP])
+        touching = touch(x, node, constants, grid, settings, corners, normals, line[GRIP])
         relengthen(x, node, element, segment, normals, line, settings)
-        for _ in range(int(settings[6])):
+        # where nothing is touched, the second round finds the lengths as they should be
+        for _ in range(int(settings[6] if touching else min(settings[6], ONE))):
             brake_again(x, constants, settings, normals, line[GRIP])
             relengthen(x, node, element, segment, normals, line, settings)
 
