@@ -324,18 +324,23 @@ def speed_of(way: Way, groom: Groom, frames: int, python: str | None) -> float:
     return ours_speed(groom, method.removeprefix("pbd "), substeps, steps)
 
 
-def cheapest(rows: list[Row], stretch: float) -> Row | None:
-    """Return the fastest row that stretches no more."""
-    return max((row for row in rows if row.stretch <= stretch), key=lambda r: r.speed, default=None)
+def cheapest(rows: list[Row], stretch: float, off: float) -> Row | None:
+    """Return the fastest row that stretches no more and is no farther off."""
+    good = (row for row in rows if row.stretch <= stretch and row.off <= off)
+    return max(good, key=lambda row: row.speed, default=None)
 
 
 def verdicts(rows: list[Row]) -> list[str]:
-    """Return, for each peer, how much faster the first row is at equal stretch and below 1 %."""
+    """Return, for each peer, how much faster the first row is at no more of an error."""
     ours, lines = rows[0], []
     for name in dict.fromkeys(row.way[0] for row in rows if row.way[0] in (PLAIN, PYPBD_NAME)):
         peers = [row for row in rows if row.way[0] == name]
-        for words, stretch in (("no more stretch than pbd", ours.stretch), ("below 1 %", 0.01)):
-            best = cheapest(peers, stretch)
+        for words, stretch, off in (
+            ("no more stretch than pbd", ours.stretch, np.inf),
+            ("below 1 %, no farther off than pbd", 0.01, ours.off),
+            ("below 1 %", 0.01, np.inf),
+        ):
+            best = cheapest(peers, stretch, off)
             if best is None:
                 lines.append(f"{name}, {words}: no setting gets there")
             else:

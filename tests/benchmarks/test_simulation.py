@@ -65,10 +65,11 @@ def test_the_cheapest_row_that_is_good_enough_is_compared(simulation: ModuleType
     rows = [
         simulation.Row(("pbd fast", 4, 1), 300.0, 0.002, 0.001),
         simulation.Row((simulation.PLAIN, 4, 4), 50.0, 0.02, 0.001),
-        simulation.Row((simulation.PLAIN, 8, 4), 20.0, 0.008, 0.001),
+        simulation.Row((simulation.PLAIN, 8, 4), 20.0, 0.008, 0.002),
         simulation.Row((simulation.PLAIN, 16, 4), 10.0, 0.007, 0.001),
     ]
-    equal, below = simulation.verdicts(rows)
+    equal, as_near, below = simulation.verdicts(rows)
     assert equal.endswith("no setting gets there")
+    assert "16 x 4" in as_near
     assert "8 x 4" in below
     assert "15.0 times" in below
