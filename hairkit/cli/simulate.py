@@ -58,6 +58,13 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate, write the cache or the animated file, and print its name."""
+    try:
+        return _run(args)
+    except KeyboardInterrupt as error:
+        raise KeyboardInterrupt(f"{args.out} was not written") from error
+
+
+def _run(args: argparse.Namespace) -> int:
     from hairkit.groom_opening import load_groom
     from hairkit.manager import Manager
     from hairkit.progress import progress_for
@@ -81,18 +88,15 @@ def run(args: argparse.Namespace) -> int:
     motion = still() if args.motion is None else read_motion(args.motion)
     motion = shaken(args.shake, groom.head, motion)
     simulator = manager.call("make_simulator", using, options, groom=groom)
-    try:
-        with progress_for(sys.stderr, quiet=args.quiet) as progress:
-            cache = simulated(
-                simulator, motion, args.frames, args.fps,
-                weather=weather, warm_up=args.warm_up, progress=progress,
-            )  # fmt: skip
-        if exporter is None:
-            cache.save(args.out)
-        else:
-            _export(manager, exporter, others.get(exporter, {}), groom, cache, args.out)
-    except KeyboardInterrupt as error:
-        raise KeyboardInterrupt(f"{args.out} was not written") from error
+    with progress_for(sys.stderr, quiet=args.quiet) as progress:
+        cache = simulated(
+            simulator, motion, args.frames, args.fps,
+            weather=weather, warm_up=args.warm_up, progress=progress,
+        )  # fmt: skip
+    if exporter is None:
+        cache.save(args.out)
+    else:
+        _export(manager, exporter, others.get(exporter, {}), groom, cache, args.out)
     stretch = simulator.measure().stretch
     print(
         f"{args.out.name}: {len(cache)} frames of {len(simulator.strands)} guides,"

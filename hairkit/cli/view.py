@@ -61,7 +61,10 @@ class _ListActions(argparse.Action):
 def run(args: argparse.Namespace) -> int:
     """Show the groom until the window is closed, or play the script."""
     _check(args)
-    return _headless(args) if args.headless else _window(args)
+    try:
+        return _headless(args) if args.headless else _window(args)
+    except KeyboardInterrupt as error:
+        raise KeyboardInterrupt("what was written so far is kept") from error
 
 
 def _check(args: argparse.Namespace) -> None:

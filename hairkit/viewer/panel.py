@@ -131,6 +131,7 @@ def _load(window: Any) -> tuple[Any, Any, str]:
         return None, None, f"no panel ({error}); pip install 'hairkit[viewer]' brings it"
     imgui.create_context()
     imgui.get_io().set_ini_filename("")  # leave no file behind
+    imgui.get_io().config_windows_move_from_title_bar_only = True  # a missed slider moves nothing
     return imgui, backends.GlfwRenderer(window, attach_callbacks=False), ""
 
 
