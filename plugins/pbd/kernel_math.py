@@ -125,6 +125,18 @@ def rotate(q, v):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
 
 
 @row
+def mixed(v, share):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the value and its slope between eight corners (trilinear), the last axis fastest."""
+    a, b, c = share
+    d0, d2, d4, d6 = v[1] - v[0], v[3] - v[2], v[5] - v[4], v[7] - v[6]
+    v0, v2, v4, v6 = v[0] + c * d0, v[2] + c * d2, v[4] + c * d4, v[6] + c * d6
+    e0, e4 = v2 - v0, v6 - v4
+    low, high = v0 + b * e0, v4 + b * e4
+    f0, f4 = d0 + b * (d2 - d0), d4 + b * (d6 - d4)
+    return low + a * (high - low), (high - low, e0 + a * (e4 - e0), f0 + a * (f4 - f0))
+
+
+@row
 def absolute(a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     """Return lanes without their sign."""
     return pick(a, ZERO, ZERO - a, a)

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from .kernel_lanes import LANES, number_at
-from .kernel_math import carry, dot, minus, plus, rotate, row, rows_of, times
+from .kernel_math import carry, dot, minus, mixed, plus, rotate, row, rows_of, times
 
 ONE, ZERO = np.float32(1), np.float32(0)
 SLACK = 6
@@ -47,17 +47,24 @@ def ride_points(  # type: ignore[no-untyped-def]
         away = (offset[i, 0], offset[i, 1], offset[i, 2])
         place = plus(place, rotate(turn, away))
         if deepest.shape[0] > 0:
-            near, step = start, 0
-            if number_at(weight, one + 1) <= number_at(weight, one + 2):
-                near, step = after, 1
-            room = number_at(x, near + SLACK * LANES) - deepest[i]
-            room += number_at(clear, (node + step) * LANES + lane)
-            away = minus(place, _vector(x, near))
-            # nothing is to be looked up where the node has been seen to be far away
-            if not (room > ZERO and dot(away, away) < room * room):
-                distance, n0, n1, n2 = distance_to(grid, place, deepest[i])
-                place = plus(place, times(max(deepest[i] - distance, ZERO), (n0, n1, n2)))
+            later = number_at(weight, one + 1) <= number_at(weight, one + 2)
+            near, number = (after, node + 1) if later else (start, node)
+            far = number_at(x, near + SLACK * LANES) + number_at(clear, number * LANES + lane)
+            place = _uncovered(place, _vector(x, near), far, deepest[i], grid)
         out[i, 0], out[i, 1], out[i, 2] = carry(motion, place)
+
+
+@row
+def _uncovered(place, node, far, deepest, grid):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Return the place, brought out where it is deeper than `deepest`.
+
+    Nothing is to be looked up near a node that is known to be `far` away from the obstacles.
+    """
+    away, room = minus(place, node), far - deepest
+    if room > ZERO and dot(away, away) < room * room:
+        return place
+    distance, normal = distance_to(grid, place, deepest)
+    return plus(place, times(max(deepest - distance, ZERO), normal))
 
 
 @row
@@ -107,30 +114,20 @@ def distance_to(grid, p, clear):  # type: ignore[no-untyped-def] # pragma: no co
         and v <= np.float32(s1 - 1)
         and w <= np.float32(s2 - 1)
     ):
-        return clear + place[4], ZERO, ZERO, ZERO
+        return clear + place[4], (ZERO, ZERO, ZERO)
     i, j, k = min(int(u), s0 - 2), min(int(v), s1 - 2), min(int(w), s2 - 2)
     # within a cell the distance changes by at most its diagonal
     first = (i * s1 + j) * s2 + k
     nearest = number_at(values, first)
     least = nearest - np.float32(1.8) / place[3]
     if least > clear:
-        return least, ZERO, ZERO, ZERO
-    a, b, c = u - np.float32(i), v - np.float32(j), w - np.float32(k)
-    d, e, f = ONE - a, ONE - b, ONE - c
-    next_row, next_layer = first + s2, first + s1 * s2
-    v000, v001 = nearest, number_at(values, first + 1)
-    v010, v011 = number_at(values, next_row), number_at(values, next_row + 1)
-    v100, v101 = number_at(values, next_layer), number_at(values, next_layer + 1)
-    v110, v111 = number_at(values, next_layer + s2), number_at(values, next_layer + s2 + 1)
-    l00, l01, l10, l11 = (
-        v000 * f + v001 * c,
-        v010 * f + v011 * c,
-        v100 * f + v101 * c,
-        v110 * f + v111 * c,
-    )
-    low, high = l00 * e + l01 * b, l10 * e + l11 * b
-    g0 = high - low
-    g1 = (l01 - l00) * d + (l11 - l10) * a
-    g2 = ((v001 - v000) * e + (v011 - v010) * b) * d + ((v101 - v100) * e + (v111 - v110) * b) * a
-    size = ONE / max(np.sqrt(g0 * g0 + g1 * g1 + g2 * g2), np.float32(1e-12))
-    return low * d + high * a, g0 * size, g1 * size, g2 * size
+        return least, (ZERO, ZERO, ZERO)
+    line, layer = first + s2, first + s1 * s2
+    corners = (
+        nearest, number_at(values, first + 1), number_at(values, line), number_at(values, line + 1),
+        number_at(values, layer), number_at(values, layer + 1),
+        number_at(values, layer + s2), number_at(values, layer + s2 + 1),
+    )  # fmt: skip
+    distance, slope = mixed(corners, (u - np.float32(i), v - np.float32(j), w - np.float32(k)))
+    size = ONE / max(np.sqrt(dot(slope, slope)), np.float32(1e-12))
+    return distance, times(size, slope)

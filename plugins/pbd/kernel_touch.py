@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .kernel_lanes import LANES, any_below, at, lane_root, number_at, pick, put, whole
-from .kernel_math import absolute, carry, dot, minus, plus, put_three, row, three, times
+from .kernel_math import absolute, carry, dot, minus, mixed, plus, put_three, row, three, times
 
 PLACE, SPEED, SLACK = 0, 3, 6
 LENGTH, CLEAR, EASE = 0, 6, 7
@@ -62,10 +62,19 @@ def _distances(grid, place, slack, corners):  # type: ignore[no-untyped-def] # p
     for lane in range(LANES):
         if corners[11, lane] < ZERO:
             _take_up(values, corners, lane)
-    distance, slope = _mixed(corners, (u - i, v - j, w - k))
+    distance, slope = mixed(_eight(corners), (u - i, v - j, w - k))
     beyond = absolute(u - raw[0]) + absolute(v - raw[1]) + absolute(w - raw[2])
     size = ONE / lane_root(dot(slope, slope) + np.float32(1e-24))
     return pick(ZERO, beyond, frame[4], distance), times(size, slope)
+
+
+@row
+def _eight(corners):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Return what stands at the corners."""
+    return (
+        at(corners, 0), at(corners, 1), at(corners, 2), at(corners, 3),
+        at(corners, 4), at(corners, 5), at(corners, 6), at(corners, 7),
+    )  # fmt: skip
 
 
 @row
@@ -84,24 +93,6 @@ def _take_up(values, corners, lane) -> None:  # type: ignore[no-untyped-def] # p
     for corner in range(8):
         further = (corner >> 2) * layer + (corner >> 1 & 1) * line + (corner & 1)
         corners[corner, lane] = number_at(values, first + further)
-
-
-@row
-def _mixed(corners, share):  # type: ignore[no-untyped-def] # pragma: no cover
-    """Return the value and its slope within cells, at shares of their edges."""
-    a, b, c = share
-    v0, v2, v4, v6 = at(corners, 0), at(corners, 2), at(corners, 4), at(corners, 6)
-    d0, d2, d4, d6 = (
-        at(corners, 1) - v0,
-        at(corners, 3) - v2,
-        at(corners, 5) - v4,
-        at(corners, 7) - v6,
-    )
-    v0, v2, v4, v6 = v0 + c * d0, v2 + c * d2, v4 + c * d4, v6 + c * d6
-    e0, e4 = v2 - v0, v6 - v4
-    low, high = v0 + b * e0, v4 + b * e4
-    f0, f4 = d0 + b * (d2 - d0), d4 + b * (d6 - d4)
-    return low + a * (high - low), (high - low, e0 + a * (e4 - e0), f0 + a * (f4 - f0))
 
 
 @row
