@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd import Options
+from hairkit_plugins.pbd.course import between, course, inverse_motion
 from hairkit_plugins.pbd.crew import Crew
 from hairkit_plugins.pbd.reference import at_rest
 from hairkit_plugins.pbd.simulator import PbdSimulator
@@ -299,3 +300,18 @@ def test_a_crew_does_every_piece_once() -> None:
 
     with pytest.raises(ValueError, match="0"):
         crew.share(fail, 1000, 1)
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_course_goes_evenly_from_start_to_end(groom: Groom, count: int) -> None:
+    """Each step ends on the motion between, and its ride leads there from the one before."""
+    motion = shaken(["yaw:40:1", "pitch:20:2"], groom.head)
+    start, end = motion(0.1), motion(0.15)
+    before = start
+    for k, (after, ride) in enumerate(course(start, end, count)):
+        np.testing.assert_allclose(after, between(start, end, (k + 1) / count), atol=1e-12)
+        np.testing.assert_allclose(after @ ride, before, atol=1e-12)
+        np.testing.assert_allclose(inverse_motion(after) @ before, ride, atol=1e-12)
+        before = after
+    assert (before == end).all()
+    assert all((ride == np.eye(4)).all() for _, ride in course(end, end, 3))
