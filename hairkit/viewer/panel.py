@@ -268,6 +268,7 @@ def _option(imgui: Any, session: Session, info: OptionInfo, perform: Perform) ->
         high = info.high if info.high is not None else max(10 * float(value), 1.0)
         flags = imgui.SliderFlags_.logarithmic if high > 1000 * max(low, 1e-9) > 0 else 0
         changed, value = imgui.slider_float(info.name, float(value), low, high, shape, flags)
+        value = float(f"{value:.6g}")  # sliders are float32
     else:
         imgui.text(f"{info.name}: {value}")
     _hint(imgui, info.doc)

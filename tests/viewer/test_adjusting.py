@@ -146,3 +146,20 @@ def test_a_reconstruction_that_fails_says_why(tmp_path: Path) -> None:
     assert not rerun.running
     with pytest.raises(InputError, match="reconstruction failed: hairkit:"):
         rerun.check()
+
+
+def test_leaving_the_adjustment_shows_what_was_shown_before(
+    session: Session, adjustment: Adjustment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Photos, their opacity, the view and the time are as they were; doing it twice is once."""
+    monkeypatch.setattr(Adjustment, "of", lambda *_: adjustment)
+    monkeypatch.setattr(session.layers, "capture", adjustment.folder)
+    shown = session.shown
+    before = (session.paused, shown.opacity, shown.through, set(shown.layers))
+    perform(session, "adjust")
+    perform(session, "adjust", {"on": True})
+    assert session.paused
+    assert "photos" in shown.layers
+    assert shown.through in session.photo_cameras
+    perform(session, "adjust")
+    assert (session.paused, shown.opacity, shown.through, shown.layers) == before
