@@ -25,6 +25,8 @@ stands."""
 SHORT_HAIR, LONG_HAIR = 0.03, 0.1
 """Ways to the tips in metres below which hair is combed from the crown, and above which by the
 flow."""
+TIP_SLOPE = 0.2
+"""Slope of the growth potential among the tips; 1 before them."""
 FLOW_SMOOTHING = 2.0
 """Standard deviation in cells that makes the chamfer distance's gradient smooth."""
 
@@ -44,7 +46,7 @@ def combing_direction(
     flow = gradient(hull.grid, growth, at)
     flow -= np.sum(flow * outward, axis=1, keepdims=True) * outward
     length = float(np.ptp(growth[hull.dense]))
-    share = np.clip((length - SHORT_HAIR) / (LONG_HAIR - SHORT_HAIR), 0.0, 1.0)
+    share = _long_share(length)
     combed = share * flow + max(1 - share, 0.05) * _from_crown(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
     direction = combed + lift * outward
@@ -125,6 +127,8 @@ def growth_potential(head: Head, hull: Hull, tip_share: float) -> Float32Array:
     to tip.
 
     Tips are the dense cells whose way from the scalp is at least `tip_share` of the hair's length.
+    In long hair the potential grows on among them, slowly, with the way from the scalp: so strands
+    know their sign up to their ends.
     """
     way = scalp_way(head, hull)
     length = hair_length(hull, way)
@@ -132,10 +136,16 @@ def growth_potential(head: Head, hull: Hull, tip_share: float) -> Float32Array:
     left = chamfer_way(hull.loose, tips, hull.grid.spacing)
     known = np.isfinite(left)
     weight = ndimage.gaussian_filter(known.astype(np.float32), FLOW_SMOOTHING)
+    left -= _long_share(length) * TIP_SLOPE * np.maximum(way - tip_share * length, 0)
     total = ndimage.gaussian_filter(np.where(known, left, 0).astype(np.float32), FLOW_SMOOTHING)
     smooth = total / np.maximum(weight, 1e-6)
     growth: Float32Array = np.where(weight > 1e-3, -smooth, -smooth.max()).astype(np.float32)
     return growth
+
+
+def _long_share(length: float) -> float:
+    """Return 0 for short hair, 1 for long hair, of its length in metres."""
+    return float(np.clip((length - SHORT_HAIR) / (LONG_HAIR - SHORT_HAIR), 0.0, 1.0))
 
 
 def hair_length(hull: Hull, way: Float32Array) -> float:

@@ -10,7 +10,7 @@ from numba import njit
 
 from hairkit.camera import Camera
 from hairkit.head import Head
-from hairkit.stored import Float32Array, Float64Array
+from hairkit.stored import Float32Array, Float64Array, Int32Array
 
 PERSPECTIVE, ORTHOGRAPHIC = 0.0, 1.0
 
@@ -50,8 +50,14 @@ def project_row(row, x, y, z):  # type: ignore[no-untyped-def]
 def head_depth(head: Head, camera: Camera) -> Float32Array:
     """Return (H, W) the axial depth of the head's first surface at every pixel, infinity where
     none is."""
+    return mesh_depth(head.vertices, head.faces, camera)
+
+
+def mesh_depth(vertices: Float32Array, faces: Int32Array, camera: Camera) -> Float32Array:
+    """Return (H, W) the axial depth of the first face (F, 3) at every pixel, infinity where none
+    is."""
     depth = np.full((camera.height, camera.width), np.inf, np.float32)
-    _rasterize(pack_cameras([camera])[0], head.vertices.astype(np.float64), head.faces, depth)
+    _rasterize(pack_cameras([camera])[0], vertices.astype(np.float64), faces, depth)
     return depth
 
 

@@ -3,7 +3,8 @@
 `votes` is the thesis's hull (5.2, after Laurentini 1994): a cell is hair when at least `min_views`
 views see hair there, then erosions and dilations. `labels` uses all that a mask says: a view
 empties a cell where it sees background, and where it sees the person *behind* the cell; a surface
-in front of the cell says nothing. Hair that a view shows only as wisps does not fill a volume:
+in front of the cell says nothing. Where the views show clothes, a torso is fitted to their outlines
+and is taken out as the head is. Hair that a view shows only as wisps does not fill a volume:
 `dense` is carved with opened masks, `loose` with the masks as they are. Cells that are empty in at
 most `forgive` views are kept, which survives camera errors.
 """
@@ -23,12 +24,16 @@ from hairkit import Hull, Mask, Scene, VoxelGrid, hookimpl
 from hairkit.errors import InputError
 from hairkit.head_distance import signed_distance
 from hairkit.options import option
-from hairkit.projection import head_depth, pack_cameras, project_row, splat_depth
+from hairkit.projection import head_depth, mesh_depth, pack_cameras, project_row, splat_depth
 from hairkit.stored import BoolArray, Float32Array, UInt8Array
+from hairkit.torso import Torso
+from hairkit.torso_fit import fit_torso
 
 EMPTY, PERSON, HAIR, UNSEEN = 0, 1, 2, 3
 POOR_CAMERAS = 8.0
 """Misfit in pixels of a picture 1080 high above which one empty vote is forgiven."""
+LYING = 0.04
+"""Metres off the body within which hair may lie where a picture's edge cuts it off."""
 REFERENCE_HEIGHT = 1080
 """Pixel options are stated for pictures this high and scaled to others."""
 
@@ -57,11 +62,21 @@ class Options:
         0.006, low=0, high=0.05, doc="A cell this far in front of seen skin is empty.", unit="m"
     )
     body_margin: float = option(
-        0.015, low=0, high=0.2, doc="Assumed depth of clothes behind the person's hull.", unit="m"
+        0.015,
+        low=0,
+        high=0.2,
+        doc="Assumed depth of clothes behind the person's hull, where no torso is fitted.",
+        unit="m",
     )
     erosions: int = option(0, low=0, high=8, doc="Erosions of the voted hull.")
     dilations: int = option(0, low=0, high=8, doc="Dilations after the erosions.")
     cut_head: bool = option(True, doc="Take the head out of the hull.")
+    cut_body: bool = option(
+        True, doc="Fit a torso where clothes are seen, and take it out of the hull."
+    )
+    body_depth: float = option(
+        0.005, low=0, high=0.05, doc="Hair may lie this deep in the fitted torso.", unit="m"
+    )
 
 
 @hookimpl
@@ -72,9 +87,26 @@ def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
     grid = VoxelGrid.around(box[0], box[1], options.voxel_size)
     distance = signed_distance(scene.head, grid)
     outside = distance > 0 if options.cut_head else np.ones(grid.shape, bool)
-    loose, dense = _carve_both(grid, outside, views, options)
+    near = np.ones(grid.shape, bool)
+    torso = _torso(scene, masks, grid, options)
+    if torso is not None:
+        outside &= ~torso.inside(grid, options.body_depth)
+        above = grid.origin[1] + np.arange(grid.shape[1]) * grid.spacing > torso.top
+        near = torso.inside(grid, -LYING) | above[:, None]
+        views = views.before(torso, scene)
+    loose, dense = _carve_both(grid, outside, near, views, options)
     scalp = _scalp_shell(scene, grid, distance) if options.cut_head else np.zeros(grid.shape, bool)
     return Hull(grid, dense, loose | dense | scalp, distance)
+
+
+def _torso(
+    scene: Scene, masks: tuple[Mask, ...], grid: VoxelGrid, options: Options
+) -> Torso | None:
+    """Return the fitted torso, None where nobody wants it or the hair does not reach down to it."""
+    reached = grid.origin[1] < Torso.under(scene.head).top
+    if not (options.cut_body and options.mode == "labels" and reached):
+        return None
+    return fit_torso(scene.head, scene.cameras, masks)
 
 
 @dataclass(frozen=True)
@@ -92,6 +124,8 @@ class _Views:
     open_edges: BoolArray
     """(V, 4) hair touches the picture's left, top, right, bottom edge: nothing is known beyond
     it."""
+    clothed: bool = False
+    """True when `surface` holds the clothes' depth too."""
 
     @classmethod
     def of(cls, scene: Scene, masks: tuple[Mask, ...], options: Options) -> _Views:
@@ -113,6 +147,17 @@ class _Views:
         sizes = np.array([mask.labels.shape[::-1] for mask in masks], np.float64)
         forgive = _forgiven(scene, options)
         return cls(pack_cameras(scene.cameras), sizes, loose, dense, surface, forgive, edges)
+
+    def before(self, torso: Torso, scene: Scene) -> _Views:
+        """Return the views with the torso as the surface of the clothes."""
+        vertices, faces = torso.mesh()
+        surface = self.surface.copy()
+        for i, camera in enumerate(scene.cameras):
+            depth = np.full(surface[i].shape, np.inf, np.float32)
+            depth[: camera.height, : camera.width] = mesh_depth(vertices, faces, camera)
+            clothes = (self.loose[i] == PERSON) & ~np.isfinite(surface[i])
+            surface[i][clothes] = depth[clothes]
+        return replace(self, surface=surface, clothed=True)
 
 
 def _touched_edges(mask: Mask) -> list[bool]:
@@ -161,6 +206,7 @@ def _bounding_box(
     occupied = _carve(
         coarse,
         everywhere,
+        everywhere,
         views,
         views.loose,
         options,
@@ -184,11 +230,11 @@ def _bounding_box(
 
 
 def _carve_both(
-    grid: VoxelGrid, outside: BoolArray, views: _Views, options: Options
+    grid: VoxelGrid, outside: BoolArray, near: BoolArray, views: _Views, options: Options
 ) -> tuple[BoolArray, BoolArray]:
     forgive = views.forgive
     if options.mode == "votes":
-        voted = _carve(grid, outside, views, views.loose, options, len(views.cameras))
+        voted = _carve(grid, outside, near, views, views.loose, options, len(views.cameras))
         voted = (
             ndimage.binary_erosion(voted, iterations=options.erosions)
             if options.erosions
@@ -198,9 +244,9 @@ def _carve_both(
             voted = ndimage.binary_dilation(voted, iterations=options.dilations) & outside
         voted = _largest_part(voted)
         return voted, voted
-    body = _clothes_depth(grid, views, options)
-    loose = _largest_part(_carve(grid, outside, body, views.loose, options, forgive))
-    dense = _carve(grid, loose, body, views.dense, options, forgive)
+    body = views if views.clothed else _clothes_depth(grid, views, options)
+    loose = _largest_part(_carve(grid, outside, near, body, views.loose, options, forgive))
+    dense = _carve(grid, loose, near, body, views.dense, options, forgive)
     dense = _largest_part(dense) if dense.any() else loose
     reach = ndimage.binary_dilation(dense, iterations=options.loose_cells)
     return loose & reach, dense
@@ -219,7 +265,7 @@ def _clothes_depth(grid: VoxelGrid, views: _Views, options: Options) -> _Views:
     `body_margin`."""
     person = np.where(views.loose == EMPTY, EMPTY, np.where(views.loose == UNSEEN, UNSEEN, HAIR))
     everything = np.ones(grid.shape, bool)
-    hull = _carve(grid, everything, views, person.astype(np.uint8), options, 0)
+    hull = _carve(grid, everything, everything, views, person.astype(np.uint8), options, 0)
     points = grid.centres_of(hull & ~ndimage.binary_erosion(hull))
     surface = views.surface.copy()
     for i, row in enumerate(views.cameras):
@@ -237,17 +283,19 @@ def _clothes_depth(grid: VoxelGrid, views: _Views, options: Options) -> _Views:
 def _carve(
     grid: VoxelGrid,
     candidates: BoolArray,
+    near: BoolArray,
     views: _Views,
     labels: UInt8Array,
     options: Options,
     forgive: int,
 ) -> BoolArray:
     """Return the candidate cells (X, Y, Z) with enough hair votes and at most `forgive` empty
-    ones."""
+    ones; beyond a picture only cells `near` the person may hold hair."""
     kept: BoolArray = _carve_cells(
         grid.origin,
         grid.spacing,
         candidates,
+        near,
         views.cameras,
         views.sizes,
         views.open_edges,
@@ -265,6 +313,7 @@ def _carve_cells(  # type: ignore[no-untyped-def]
     origin,
     spacing,
     candidates,
+    near,
     cameras,
     sizes,
     open_edges,
@@ -292,7 +341,7 @@ def _carve_cells(  # type: ignore[no-untyped-def]
                     right, bottom = u >= sizes[view, 0], v >= sizes[view, 1]
                     if u < 0 or v < 0 or right or bottom:
                         edge = open_edges[view]
-                        unknown = (
+                        unknown = near[ix, iy, iz] and (
                             (u < 0 and edge[0])
                             or (v < 0 and edge[1])
                             or (right and edge[2])

@@ -5,29 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from hairkit.head import Head
 from hairkit.head_distance import signed_distance
 from hairkit.stored import Float32Array, Float64Array, Int32Array
+from hairkit.torso import EXPONENT, RINGS, loft, power, profile
 from hairkit.volume import VoxelGrid
 
-# height above the root joint, half breadth, half depth, centre behind the joint; mm, an adult
-_RINGS = np.array(
-    [
-        [62, 46, 46, 0],
-        [52, 60, 58, 0],
-        [32, 72, 66, 1],
-        [10, 108, 76, 3],
-        [-12, 150, 86, 6],
-        [-38, 182, 96, 9],
-        [-75, 203, 106, 11],
-        [-140, 212, 114, 12],
-        [-400, 205, 122, 10],
-    ]
-)
-_EXPONENT = 2.3
 _AROUND, _RINGS_DRAWN = 96, 72
 _CELL = 0.006
 
@@ -49,23 +34,23 @@ class Bust:
     def under(cls, head: Head) -> Bust:
         """Return the torso that belongs under a head."""
         joint = head.joints[0].astype(np.float64)
-        height = np.linspace(float(_RINGS[0, 0]), float(_RINGS[-1, 0]), _RINGS_DRAWN)
-        breadth, depth, back = _profile(height)
+        height = np.linspace(float(RINGS[0, 0]), float(RINGS[-1, 0]), _RINGS_DRAWN)
+        breadth, depth, back = profile(height)
         angle = np.arange(_AROUND) * 2 * np.pi / _AROUND
-        x = _power(np.sin(angle)) * breadth[:, None]
-        z = _power(np.cos(angle)) * depth[:, None] - back[:, None]
+        x = power(np.sin(angle)) * breadth[:, None]
+        z = power(np.cos(angle)) * depth[:, None] - back[:, None]
         rings = np.stack([x, np.broadcast_to(height[:, None], x.shape), z], axis=-1) * 1e-3 + joint
-        faces = _loft(_RINGS_DRAWN, _AROUND)
+        faces = loft(_RINGS_DRAWN, _AROUND)
         vertices = rings.reshape(-1, 3)
         return cls(vertices.astype(np.float32), faces, _smooth_normals(vertices, faces), joint)
 
     def contains(self, points: Float64Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
         """Return (...,) whether points (..., 3) lie inside."""
         local = (points - self.joint) * 1e3
-        low, high = _RINGS[-1, 0], _RINGS[0, 0]
-        breadth, depth, back = _profile(np.clip(local[..., 1], low, high))
-        across = np.abs(local[..., 0] / breadth) ** _EXPONENT
-        along = np.abs((local[..., 2] + back) / depth) ** _EXPONENT
+        low, high = RINGS[-1, 0], RINGS[0, 0]
+        breadth, depth, back = profile(np.clip(local[..., 1], low, high))
+        across = np.abs(local[..., 0] / breadth) ** EXPONENT
+        along = np.abs((local[..., 2] + back) / depth) ** EXPONENT
         return np.asarray((across + along < 1) & (local[..., 1] <= high))
 
 
@@ -95,28 +80,6 @@ class Obstacle:
         """Return distances (N, 1) and gradients (N, 3) at points (N, 3)."""
         values = self.grid.sample(self.field, points)
         return values[:, :1], values[:, 1:]
-
-
-def _profile(height: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
-    """Return half breadth, half depth and backward shift at heights, millimetres."""
-    rings = _RINGS[::-1].astype(np.float64)
-    values = PchipInterpolator(rings[:, 0], rings[:, 1:])(height)
-    return values[..., 0], values[..., 1], values[..., 2]
-
-
-def _power(wave: Float64Array) -> Float64Array:
-    result: Float64Array = np.sign(wave) * np.abs(wave) ** (2 / _EXPONENT)
-    return result
-
-
-def _loft(rings: int, around: int) -> Int32Array:
-    """Return the faces between rings that run downwards."""
-    ring, step = np.meshgrid(np.arange(rings - 1), np.arange(around), indexing="ij")
-    a = ring * around + step
-    b = ring * around + (step + 1) % around
-    c, d = a + around, b + around
-    faces = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)])
-    return faces.reshape(-1, 3).astype(np.int32)
 
 
 def _smooth_normals(vertices: Float64Array, faces: Int32Array) -> Float32Array:
