@@ -27,7 +27,7 @@ from hairkit.errors import HairkitError, InputError
 from hairkit.options import make_options, option
 from hairkit.viewer.actions import checked_values, perform
 from hairkit.viewer.preview import Preview
-from hairkit.viewer.recording import FRAMES_PER_SECOND
+from hairkit.viewer.recording import FRAMES_PER_SECOND, Recorder
 from hairkit.viewer.session import Session
 
 _WRITES = ("screenshot", "record")
@@ -81,8 +81,11 @@ def play(preview: Preview, script: Script, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     session = preview.session
     session.overwrite = True
+    films: list[Recorder] = []
     try:
         for _ in performed(session, script, out):
+            if session.recorder is not None and session.recorder not in films:
+                films.append(session.recorder)
             _let_time_pass(preview)
             _wait_for_rerun(session)
             if session.screenshots:
@@ -94,6 +97,7 @@ def play(preview: Preview, script: Script, out: Path) -> None:
             session.rerun.stop()
         if session.recorder is not None:
             session.recorder.close()
+        preview.written += [film.path for film in films if film.count]
 
 
 def performed(session: Session, script: Script, out: Path) -> Iterator[None]:

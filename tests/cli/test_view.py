@@ -45,6 +45,18 @@ def test_a_script_without_a_window_prints_the_pictures_it_wrote(
     assert picture.shape == (64, 96, 3)
 
 
+def test_films_are_among_the_files_that_are_named(
+    groom_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A recording is printed once, with the pictures; one that holds nothing is not."""
+    script = tmp_path / "steps.toml"
+    steps = ["do = 'record'\nfile = 'film'", "do = 'run'\nseconds = 0.1", "do = 'record'"]
+    script.write_text("size = [64, 48]\n" + "".join(f"[[steps]]\n{step}\n" for step in steps))
+    assert view(groom_path, "--headless", "--script", script, "--out", tmp_path / "out") == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'out' / 'film'}\n"
+    assert len(list((tmp_path / "out" / "film").glob("*.png"))) == 3
+
+
 def test_a_folder_of_results_is_opened_by_its_name(groom_path: Path, tmp_path: Path) -> None:
     """The folder stands for the groom in it."""
     script = tmp_path / "steps.toml"
