@@ -54,7 +54,7 @@ BENDING = 1000.0
 """N/m for each kilogram of a node: the spring between every node and the next but one."""
 SCENE, FEW = 1000, 40
 """Most guides whose error is measured; of the peers', whose strands do not meet, so many."""
-CONVERGED, CONVERGED_PLAIN = 64, (128, 8)
+CONVERGED, CONVERGED_PLAIN = 64, (512, 2)
 """Substeps of pbd's converged motion; substeps and iterations of the others'."""
 SETTINGS = ((4, 20), (16, 5), (16, 20), (32, 2), (32, 8), (64, 1), (64, 4), (128, 1), (128, 4))
 """Substeps and iterations of the peers, of which the cheapest that is as good is taken."""
