@@ -193,3 +193,12 @@ def test_without_hair_on_the_scalp_the_way_is_nothing() -> None:
     apart = replace(hull, dense=below, loose=below)
     np.testing.assert_array_equal(scalp_way(ball_head(), apart), 0)
     assert np.isfinite(growth_potential(ball_head(), apart, 0.6)).all()
+
+
+def test_the_potential_of_long_hair_grows_up_to_its_hem() -> None:
+    """Among the tips, too, the potential leads down the curtain: signs are not left to chance."""
+    hull = curtain()
+    growth = growth_potential(ball_head(), hull, 0.6)
+    height = np.arange(-0.1, -0.27, -0.02)
+    down = np.stack([np.full_like(height, 0.115), height, np.zeros_like(height)], axis=1)
+    assert (np.diff(hull.grid.sample(growth, down)) > 0.1 * 0.02).all()
