@@ -20,6 +20,9 @@ SHORTEST = 1e-4
 LARGEST_TURN = 0.7
 """Radians between segments at rest: beyond, the explicit coupling of bend and twist is stiff."""
 _ROUNDS = 60
+FOLLOWED = 10.0
+"""Bending of curled rods is stable in steps of h up to EI / (rho A) h^2 c^3 / l^4 of 10 to 20, where l
+is a segment's length and c the turn from one to the next: measured on coils of 0.1 to 0.7."""
 
 
 def node_points(strands: Strands, nodes: int) -> Float64Array:
@@ -47,6 +50,18 @@ def node_points(strands: Strands, nodes: int) -> Float64Array:
         along = np.arange(nodes)[None, :, None] * step
         points[bad] = points[bad, :1] + along * rotation.unit(way)[:, None]
     return points
+
+
+def stiffest(points: Float64Array, step: float) -> Float64Array:
+    """Return (S,) the largest EI over mass per length, m^4/s^2, that rods take in steps so long.
+
+    Only short, stiff and sharply curled rods reach it: natural curvature goes with the frames of
+    the step before. Their first tone is well above what hair shows.
+    """
+    length = np.linalg.norm(np.diff(points, axis=1), axis=-1).mean(axis=1)
+    curl = np.maximum(_sharpest(points), 1e-3)
+    result: Float64Array = FOLLOWED * length**4 / (step**2 * curl**3)
+    return result
 
 
 def _sharpest(points: Float64Array) -> Float64Array:

@@ -24,7 +24,7 @@ from .crowd import Crowd, crowd_of
 from .energies import elastic_energy, largest_stretch
 from .engine import Engine, ReferenceEngine
 from .grabbing import Hand
-from .guides import node_points, riders
+from .guides import node_points, riders, stiffest
 from .reference import Contact, Load, at_rest, moved
 from .rods import Rods, loaded, make_rods
 from .system import Rates, System, assemble
@@ -160,7 +160,7 @@ class PbdSimulator:
         resolved = options.resolved(self._groom.physics)
         before: Options | None = getattr(self, "_options", None)
         new = before is None or before.nodes != resolved.nodes
-        stiff = before is None or (before.bend, before.twist) != (resolved.bend, resolved.twist)
+        stiff = before is None or _stiffness(before) != _stiffness(resolved)
         if new:
             self._lay(resolved.nodes)
         if new or stiff:
@@ -192,7 +192,8 @@ class PbdSimulator:
     def _stiffen(self, options: Options) -> None:
         """Make the rods, whose natural shape is what carries them as captured."""
         density = HAIR_DENSITY * np.pi / 4 * self._width[:, None] ** 2
-        bending = density * SINGLE_HAIR * options.firmness()
+        most = stiffest(self._laid, FRAME / options.substeps)[:, None]
+        bending = density * np.minimum(SINGLE_HAIR * options.firmness(), most)
         rods = make_rods(self._laid, density, bending, bending * options.twist)
         down = np.array([0.0, -self._groom.physics.gravity, 0.0])
         self._rods = loaded(rods, rods.mass[..., None] * down)
@@ -267,6 +268,10 @@ class PbdSimulator:
         share = ((at - some[after - 1]) / (some[after] - some[after - 1]))[:, None]
         result: Float64Array = found[:, after - 1] * (1 - share) + found[:, after] * share
         return result
+
+
+def _stiffness(options: Options) -> tuple[object, ...]:
+    return options.bend, options.twist, options.substeps
 
 
 def _engine(name: str, rods: Rods, contact: Contact) -> Engine:

@@ -9,8 +9,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
+from hairkit_plugins.pbd.fast import FastEngine
+from hairkit_plugins.pbd.guides import stiffest
 from hairkit_plugins.pbd.reference import State, at_rest, pulled, substep, swung
-from hairkit_plugins.pbd.rods import make_rods, twist_between
+from hairkit_plugins.pbd.rods import loaded, make_rods, twist_between
 from pbd_bench import (
     DENSITY,
     DOWN,
@@ -238,3 +241,18 @@ def test_inverse_statics_keeps_any_shape(rng: np.random.Generator) -> None:
     for _ in range(240):
         state = substep(rods, system, state, load_of(DOWN))
     assert np.abs(state.position - rods.points).max() < 1e-7
+
+
+@pytest.mark.parametrize("curl", [0.1, 0.3, 0.7])
+@pytest.mark.parametrize("spacing", [1e-3, 6e-3])
+def test_short_stiff_coils_stay_at_rest(curl: float, spacing: float) -> None:
+    """As stiff as `stiffest` lets them be, coils of any size and turn keep their shape."""
+    angle = curl * np.arange(15)
+    edges = spacing * np.stack([np.sin(angle), -np.cos(angle), 0.2 + 0 * angle], axis=1)
+    points = np.concatenate([np.zeros((1, 3)), np.cumsum(edges, axis=0)])[None]
+    bending = stiffest(points, 1 / 240)[:, None] * np.ones((1, 15))
+    plain = make_rods(points, 1.0, bending)
+    rods = loaded(plain, plain.mass[..., None] * DOWN)
+    engine = FastEngine(rods, None)
+    engine.run(system_of(rods, 1 / 240), [load_of(DOWN)] * 240, 1)
+    assert np.abs(engine.state.position - points).max() < 1e-3 * spacing
