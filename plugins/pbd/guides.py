@@ -21,8 +21,8 @@ LARGEST_TURN = 0.7
 """Radians between segments at rest: beyond, the explicit coupling of bend and twist is stiff."""
 _ROUNDS = 60
 FOLLOWED = 10.0
-"""Bending of curled rods is stable in steps of h up to EI / (rho A) h^2 c^3 / l^4 of 10 to 20, where l
-is a segment's length and c the turn from one to the next: measured on coils of 0.1 to 0.7."""
+"""Bending of curled rods is stable in steps of h up to EI / (rho A) h^2 c^3 / l^4 of 10 to 20; here
+l is a segment's length and c the turn from one to the next: measured on coils of 0.1 to 0.7."""
 
 
 def node_points(strands: Strands, nodes: int) -> Float64Array:
