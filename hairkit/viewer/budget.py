@@ -10,6 +10,8 @@ PATIENCE = 6
 """Pictures between two changes."""
 HEADROOM = 0.55
 """More is drawn only when less than this share of the budget is used."""
+CALM, CALMEST = 24, 1500
+"""Pictures before more is drawn; twice as many each time that had to be taken back."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,9 @@ class Budget:
     taken: float = 0.0
     """Running time of drawing a picture, seconds."""
     _wait: int = PATIENCE
+    _calm: int = CALM
+    _rise_in: int = 0
+    _risen: int = CALMEST
 
     @property
     def quality(self) -> Quality:
@@ -57,14 +62,23 @@ class Budget:
         allowed = max(self.seconds - simulated, 0.5 * self.seconds)
         self.taken += SMOOTHING * (seconds - self.taken) if self.taken else seconds
         self._wait -= 1
+        self._rise_in -= 1
+        self._risen += 1
         if self._wait > 0 or self.seconds <= 0:
             return
         if self.taken > allowed and self.level < len(LEVELS) - 1:
-            self._change(1)
-        elif self.taken < HEADROOM * allowed and self.level > 0:
+            self._fall()
+        elif self.taken < HEADROOM * allowed and self.level > 0 and self._rise_in <= 0:
             self._change(-1)
+            self._risen = 0
+
+    def _fall(self) -> None:
+        """Draw less; a rise that did not last makes the next one wait longer: no popping."""
+        hasty = self._risen < CALM
+        self._calm = min(2 * self._calm, CALMEST) if hasty else CALM
+        self._change(1)
 
     def _change(self, step: int) -> None:
         self.level += step
         self.taken = 0.0
-        self._wait = PATIENCE if step > 0 else 4 * PATIENCE  # slow to rise: no flicker
+        self._wait, self._rise_in = PATIENCE, self._calm

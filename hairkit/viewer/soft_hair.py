@@ -42,7 +42,7 @@ class SoftHairPass:
         self._tones = soft_shading.tone_table()
         self._crew = Crew()
         self._chunks = min(self._crew.threads, MOST_CHUNKS)
-        self._sums = np.zeros((self._chunks, 0), np.uint64)
+        self._sums = np.zeros((self._chunks, 0, 4), np.float32)
         self._colours: tuple[object, Float32Array] | None = None
         self._texture: moderngl.Texture | None = None
         lay = gl.program("viewer_screen", "viewer_lay")
@@ -94,7 +94,8 @@ class SoftHairPass:
         depth = scene.solids.read(frame, components=1, attachment=-1, alignment=1, dtype="f4")
         solid = np.frombuffer(depth, np.float32).reshape(height, width)
         if self._sums.shape[1] < width * height:
-            self._sums = np.zeros((self._chunks, view.camera.width * view.camera.height), np.uint64)
+            pixels = view.camera.width * view.camera.height
+            self._sums = np.zeros((self._chunks, pixels, 4), np.float32)
         shading = soft_shading.shading_of(
             view.camera, scene.lights, scene.light.grid, direction=look.by_direction
         )
@@ -106,8 +107,8 @@ class SoftHairPass:
         )  # fmt: skip
         share(
             soft_strokes.draw_hair, self._chunks, 1, self._seen, self._looks, self.body.widths,
-            self._random, solid, self._camera, np.float32(look.times_wider), int(look.smooth),
-            look.hairs, self._frame[0].astype(np.float32), self._sums,
+            solid, self._camera, np.float32(look.times_wider), int(look.smooth), look.hairs,
+            self._frame[0].astype(np.float32), self._sums,
         )  # fmt: skip
         picture = np.empty((height, width, 4), np.uint8)
         share(soft_strokes.resolve, height, 32, self._sums, picture)

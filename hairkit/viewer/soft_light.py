@@ -45,8 +45,8 @@ class SoftLightPass(LightVolume):
         per_metre, layers = np.float32(1 / self.grid.spacing), len(self._solids)
         share(fill_cells, len(self._dense), 1, hair.places(), hairs, origin, per_metre, self._dense)
         taken, rough = self._taken, self._rough
-        per_micrometre = np.float32(per_micrometre)
-        share(sum_cells, layers, 8, self._dense, self._solids, per_micrometre, taken, rough)
+        stops = np.float32(per_micrometre)
+        share(sum_cells, layers, 8, self._dense, self._solids, stops, taken, rough)
         share(smooth_cells, layers, 8, rough, taken)
 
     def _light(self, lights: Lights, turn: int, turns: int) -> None:

@@ -28,6 +28,7 @@ OPACITY_UNIT = np.float32(4096)
 _FAR_BEHIND = np.float32(-1)
 _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
 _QUARTER, _TINY, _CLOSE = np.float32(0.25), np.float32(1e-8), np.float32(1e-4)
+_MIDDLE, _BESIDE = np.float32(0.4 / 4096), np.float32(0.15 / 4096)
 _NEAREST, _PER_TILE, _FAR = np.float32(0.01), np.float32(1 / TILE), np.float32(1e9)
 
 
@@ -187,16 +188,15 @@ def opacity_before(first, last, filled, opacity) -> None:  # type: ignore[no-unt
     for j in range(first, last):
         up, down = max(j - 1, 0), min(j + 1, rows - 1)
         for i in range(columns):
-            left, right = max(i - 1, 0), min(i + 1, columns - 1)
-            total = _ZERO
-            for layer in range(slices):
-                opacity[layer, j, i] = total
-                here = beside = np.uint32(0)
-                for chunk in range(chunks):
-                    cells = filled[chunk, layer]
-                    here += cells[j, i]
-                    beside += cells[j, left] + cells[j, right] + cells[up, i] + cells[down, i]
-                total += (
-                    np.float32(0.4) * np.float32(here) + np.float32(0.15) * np.float32(beside)
-                ) / OPACITY_UNIT
-            opacity[slices, j, i] = total
+            opacity[0, j, i] = _ZERO
+        for layer in range(slices):
+            before, after = opacity[layer, j], opacity[layer + 1, j]
+            for i in range(columns):
+                after[i] = before[i]
+            for chunk in range(chunks):
+                here = filled[chunk, layer, j]
+                above, below = filled[chunk, layer, up], filled[chunk, layer, down]
+                for i in range(columns):
+                    beside = here[max(i - 1, 0)] + here[min(i + 1, columns - 1)]
+                    beside += above[i] + below[i]
+                    after[i] += _MIDDLE * np.float32(here[i]) + _BESIDE * np.float32(beside)

@@ -1,8 +1,8 @@
 """Draws placed hair into sums a pixel: the compiled twin of viewer_stroke.comp.
 
-A sum is one 64-bit word of four 16-bit numbers, red, green, blue and weight, where the weight is
-the coverage of the pixel times the share of light that hair in front lets by. Threads have sums of
-their own, which `resolve` adds up; whole numbers make the order of adding irrelevant.
+A sum is red, green and blue, each times the weight, and the weight: the coverage of the pixel times
+the share of light that hair in front lets by. Threads have sums of their own, which `resolve` adds
+up, so that equal input gives equal pictures.
 """
 
 from __future__ import annotations
@@ -14,22 +14,18 @@ import numpy as np
 from hairkit.viewer.soft_places import inlined, pixels_a_metre, row, shared
 from hairkit.viewer.soft_shading import HIDDEN
 
-SUM_UNIT = np.float32(1024)
-"""As in viewer_sums.glsl."""
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
 _WIDEST = np.float32(64)
 _TINY = np.float32(1e-6)
-_GOLDEN, _PLASTIC = np.float32(0.618034), np.float32(0.7548777)
-_BLUE, _GREEN, _RED = np.uint64(16), np.uint64(32), np.uint64(48)
-_PART = np.uint64(0xFFFF)
+_WHITE = np.float32(255)
 
 
 @shared
 def draw_hair(  # type: ignore[no-untyped-def]
-    first_chunk, last_chunk, seen, looks, widths, random, solid, camera, wider, smooth, count,
+    first_chunk, last_chunk, seen, looks, widths, solid, camera, wider, smooth, count,
     frame, sums,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Draw chunks of `count` hairs into `sums` (chunks, at least H W) of 64-bit words.
+    """Draw chunks of `count` hairs into `sums` (chunks, at least H W, 4).
 
     `seen` is that of `place_hair`, `looks` of `shade_hair`; `frame` holds the lowest x and y of
     the part of the picture that is drawn, and `solid` (H, W) the depth buffer of it.
@@ -38,27 +34,25 @@ def draw_hair(  # type: ignore[no-untyped-def]
     for chunk in range(first_chunk, last_chunk):
         first, last = count * chunk // chunks, count * (chunk + 1) // chunks
         _draw_chunk(
-            seen, looks, widths, random, solid, camera, wider, smooth, first, last, frame,
+            seen, looks, widths, solid, camera, wider, smooth, first, last, frame,
             sums[chunk],
         )  # fmt: skip
 
 
 @row
 def _draw_chunk(  # type: ignore[no-untyped-def]
-    seen, looks, widths, random, solid, camera, wider, smooth, first, last, frame, sums
+    seen, looks, widths, solid, camera, wider, smooth, first, last, frame, sums
 ) -> None:  # pragma: no cover - compiled
     for s in range(first, last):
         for k in range(1, seen.shape[1]):
             if looks[s, k, 3] > HIDDEN and looks[s, k - 1, 3] > HIDDEN:
                 width = widths[s, k] * wider * pixels_a_metre(camera, seen[s, k, 3])
-                dither = random[s] + np.float32(k) * _PLASTIC
-                dither -= np.floor(dither)
-                _stroke(seen, looks, s, k, width, dither, smooth, solid, frame, sums)
+                _stroke(seen, looks, s, k, width, smooth, solid, frame, sums)
 
 
 @row
 def _stroke(  # type: ignore[no-untyped-def]
-    seen, looks, s, k, width, dither, smooth, solid, frame, sums
+    seen, looks, s, k, width, smooth, solid, frame, sums
 ) -> None:  # pragma: no cover - compiled
     """Draw the piece from point k - 1 to k."""
     ax, ay, az = seen[s, k - 1, 0] - frame[0], seen[s, k - 1, 1] - frame[1], seen[s, k - 1, 2]
@@ -84,7 +78,7 @@ def _stroke(  # type: ignore[no-untyped-def]
     last = min(np.int64(np.ceil(bx - _HALF)), limit_x)
     t = (np.float32(x) + _HALF - ax) * pace
     y, slope = ay + t * slope, slope * pace
-    unit = min(across, _ONE) * SUM_UNIT
+    unit = min(across, _ONE)
     near, far = looks[s, begin, 3] * unit, looks[s, end, 3] * unit
     r, g, b = looks[s, begin, 0] * near, looks[s, begin, 1] * near, looks[s, begin, 2] * near
     dr, dg = looks[s, end, 0] * far - r, looks[s, end, 1] * far - g
@@ -93,8 +87,7 @@ def _stroke(  # type: ignore[no-untyped-def]
     half = _HALF * max(across, _ONE)
     thin = smooth == 0 and across <= _ONE
     while x < last:
-        shift = dither + _GOLDEN * np.float32(x)
-        shift -= np.floor(shift)
+        red, green, blue, weight = r + t * dr, g + t * dg, b + t * db, w + t * dw
         reach = _ZERO if thin else half
         low: Any = max(np.int64(np.floor(y - reach)), 0)
         top: Any = min(np.int64(np.floor(y + reach)), limit_y - 1)
@@ -105,12 +98,10 @@ def _stroke(  # type: ignore[no-untyped-def]
             part = _ONE
             if not thin:
                 part = min(y + half, np.float32(line + 1)) - max(y - half, np.float32(line))
-            sums[at] += (
-                np.uint64(np.int64((r + t * dr) * part + shift)) << _RED
-                | np.uint64(np.int64((g + t * dg) * part + shift)) << _GREEN
-                | np.uint64(np.int64((b + t * db) * part + shift)) << _BLUE
-                | np.uint64(np.int64((w + t * dw) * part + shift))
-            )
+            sums[at, 0] += part * red
+            sums[at, 1] += part * green
+            sums[at, 2] += part * blue
+            sums[at, 3] += part * weight
         x += 1
         t += pace
         y += slope
@@ -128,28 +119,20 @@ def _behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no co
 def resolve(first, last, sums, picture) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write rows of (H, W, 4) bytes, colour and opacity, of the sums, and leave these empty."""
     wide = picture.shape[1]
-    chunks = sums.shape[0]
     for y in range(first, last):
         for x in range(wide):
             at = y * wide + x
-            word = np.uint64(0)
-            for chunk in range(chunks):
-                word += sums[chunk, at]
-                sums[chunk, at] = np.uint64(0)
-            weight = np.float32(word & _PART)
-            if word == np.uint64(0):
-                picture[y, x, 3] = 0
-                continue
-            share = np.float32(255) / max(weight, _ONE)
-            cover = weight / SUM_UNIT
-            opaque = min(cover * (_ONE + np.float32(0.8) * cover), _ONE)
-            picture[y, x, 0] = np.uint8(
-                min(np.float32(word >> _RED) * share + _HALF, np.float32(255))
-            )
-            picture[y, x, 1] = np.uint8(
-                min(np.float32((word >> _GREEN) & _PART) * share + _HALF, np.float32(255))
-            )
-            picture[y, x, 2] = np.uint8(
-                min(np.float32((word >> _BLUE) & _PART) * share + _HALF, np.float32(255))
-            )
-            picture[y, x, 3] = np.uint8(opaque * np.float32(255) + _HALF)
+            red = green = blue = weight = _ZERO
+            for chunk in range(sums.shape[0]):
+                red += sums[chunk, at, 0]
+                green += sums[chunk, at, 1]
+                blue += sums[chunk, at, 2]
+                weight += sums[chunk, at, 3]
+                sums[chunk, at, 0] = sums[chunk, at, 1] = _ZERO
+                sums[chunk, at, 2] = sums[chunk, at, 3] = _ZERO
+            share = _WHITE / max(weight, _TINY)
+            picture[y, x, 0] = np.uint8(min(red * share + _HALF, _WHITE))
+            picture[y, x, 1] = np.uint8(min(green * share + _HALF, _WHITE))
+            picture[y, x, 2] = np.uint8(min(blue * share + _HALF, _WHITE))
+            opaque = min(weight * (_ONE + np.float32(0.8) * weight), _ONE)
+            picture[y, x, 3] = np.uint8(opaque * _WHITE + _HALF)

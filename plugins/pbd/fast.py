@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.crew import Crew
 from hairkit.simulate import rotation
 from hairkit.stored import Float32Array, Float64Array
 
 from . import kernels
-from .crew import Crew
 from .crowd import Crowd
 from .guides import Riders
 from .kernel_air import blow_nodes

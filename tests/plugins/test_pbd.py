@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hairkit_plugins.pbd import Options
 from hairkit_plugins.pbd.course import between, course, inverse_motion
-from hairkit_plugins.pbd.crew import Crew
 from hairkit_plugins.pbd.reference import at_rest
 from hairkit_plugins.pbd.simulator import PbdSimulator
 
@@ -280,26 +279,6 @@ def test_compiled_hair_among_hair_is_that_of_the_reference(groom: Groom, copies:
     wanted = crowd.rubbed(state, rods.mass, ride, (5.0, 4.0, 1 / 60)).velocity
     assert np.abs(wanted - state.velocity).max() > 0.05
     np.testing.assert_allclose(engine.state.velocity, wanted, atol=1e-5)
-
-
-def test_a_crew_does_every_piece_once() -> None:
-    """Whatever the counts, each number is in one piece; an error of a thread is passed on."""
-    crew, done = Crew(), np.zeros(1000, int)
-
-    def work(first: int, last: int, step: int) -> None:
-        done[first:last] += step
-
-    for count, worth in ((1000, 1), (1000, 400), (7, 3), (0, 1)):
-        done[:] = 0
-        crew.share(work, count, worth, 2)
-        assert (done[:count] == 2).all()
-        assert (done[count:] == 0).all()
-
-    def fail(first: int, last: int) -> None:
-        raise ValueError(first)
-
-    with pytest.raises(ValueError, match="0"):
-        crew.share(fail, 1000, 1)
 
 
 @pytest.mark.parametrize("count", [1, 4])

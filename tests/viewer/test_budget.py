@@ -58,3 +58,18 @@ def test_a_slow_simulator_does_not_take_all_the_time_from_drawing() -> None:
     for _ in range(300):
         budget.spent(0.02, simulated=1.0)
     assert budget.quality == LEVELS[1]
+
+
+def test_a_busy_machine_does_not_make_pictures_pop() -> None:
+    """Where a rise never lasts, rises become rare."""
+    budget, changes, before = Budget(0.05), [], 1
+    for number in range(6000):
+        # fast for a while, until more is drawn; then the burst that takes it back
+        budget.spent(0.09 if budget.level < 4 else 0.01)
+        if budget.level != before:
+            changes.append(number)
+        before = budget.level
+    assert budget.level >= 3
+    first, second = (sum(n // 3000 == half for n in changes) for half in (0, 1))
+    assert second < 0.5 * first
+    assert second <= 6
