@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
-from scipy.interpolate import PchipInterpolator
 
 from hairkit.head import Head
 from hairkit.stored import BoolArray, Float32Array, Float64Array, Int32Array
@@ -130,6 +129,8 @@ class Torso:
 
 def profile(height: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Return half breadth, half depth and backward shift of an adult at heights, millimetres."""
+    from scipy.interpolate import PchipInterpolator  # as slow to load as NumPy
+
     rings = RINGS[::-1].astype(np.float64)
     values = PchipInterpolator(rings[:, 0], rings[:, 1:])(height)
     return values[..., 0], values[..., 1], values[..., 2]

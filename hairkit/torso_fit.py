@@ -15,7 +15,6 @@ from typing import Any
 import cv2
 import numpy as np
 from scipy.ndimage import map_coordinates
-from scipy.optimize import least_squares
 
 from hairkit.camera import Camera
 from hairkit.head import Head
@@ -68,6 +67,8 @@ def fit_torso(head: Head, cameras: Sequence[Camera], masks: Sequence[Mask]) -> T
     cameras, masks
         One a view, in the same order.
     """
+    from scipy.optimize import least_squares  # slow to load
+
     known = [(c, m) for c, m in zip(cameras, masks, strict=True) if m.person_known]
     usual = Torso.under(head)
     views = [view for view in (_View.of(head, usual, *pair) for pair in known) if view is not None]

@@ -70,7 +70,7 @@ class Options:
         doc="Push out of places that are twice as dense as captured.",
     )
     rounds: int = option(
-        4,
+        2,
         low=0,
         high=8,
         doc="Rounds of friction under the strands' own tension: 0 as if slack, 4 as ropes.",

@@ -40,16 +40,21 @@ def test_hair_on_a_slope_slides_when_the_slope_beats_friction(rounds: int) -> No
     assert moved[1] == pytest.approx(free_fall, rel=0.15)
 
 
+@pytest.mark.parametrize(("rounds", "off"), [(2, 0.2), (4, 0.1)])
 @pytest.mark.parametrize("friction", [0.2, 0.5])
-def test_a_rope_around_a_bollard_holds_by_the_exponential_of_its_wrap(friction: float) -> None:
+def test_a_rope_around_a_bollard_holds_by_the_exponential_of_its_wrap(
+    friction: float, rounds: int, off: float
+) -> None:
     """Capstan: T2 = T1 exp(mu theta), drawn and let go; log(T2 / T1) = mu theta to 10 %.
+
+    With the simulator's own rounds of friction to 20 %.
 
     dT = mu T dtheta where the rope slips. Wraps of 0.5, 1 and 2 rad; a force at the tip, the root
     slips along at a constant speed, and its tension is averaged over the nodes that pass.
     """
     wrap, way = (a.ravel() for a in np.meshgrid([0.5, 1.0, 2.0], [1.0, -1.0]))
-    tension = slipping(wrap, 0.3 * way, friction, rounds=4)
-    np.testing.assert_allclose(way * np.log(tension) / friction / wrap, 1.0, atol=0.1)
+    tension = slipping(wrap, 0.3 * way, friction, rounds)
+    np.testing.assert_allclose(way * np.log(tension) / friction / wrap, 1.0, atol=off)
 
 
 @pytest.mark.parametrize("rounds", [0, 1, 4])
