@@ -1,9 +1,9 @@
 """Make the animated pictures of the README; needs Pillow beside hairkit.
 
-python docs/images/gif.py [pbd] [super_helix] [--every 2] [--colours 64] [--still 12]
+python docs/images/gif.py [pbd] [super_helix] [--every 3] [--colours 160] [--still 6]
 
 grows straight and wavy hair, plays shake.toml and wind.toml headless with each simulator, packs
-every other picture: shake.gif and wind.gif for pbd, shake_super_helix.gif and so on for others.
+every third picture: shake.gif and wind.gif for pbd, shake_super_helix.gif and so on for others.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ def _arguments() -> argparse.Namespace:
     )
     add = parser.add_argument
     add("simulators", nargs="*", metavar="SIMULATOR", help="pbd by default")
-    add("--every", type=int, default=2, metavar="N", help="take one picture of N (default 2)")
-    add("--colours", type=int, default=64, metavar="N", help="of the palette (default 64)")
-    add("--still", type=int, default=12, metavar="D", help="change that is not shown (default 12)")
+    add("--every", type=int, default=3, metavar="N", help="take one picture of N (default 3)")
+    add("--colours", type=int, default=160, metavar="N", help="of the palette (default 160)")
+    add("--still", type=int, default=6, metavar="D", help="change that is not shown (default 6)")
     return parser.parse_args()
 
 
