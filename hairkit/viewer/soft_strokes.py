@@ -85,26 +85,42 @@ def _stroke(  # type: ignore[no-untyped-def]
     db = looks[s, end, 2] * far - b
     w, dw = near, far - near
     half = _HALF * max(across, _ONE)
-    thin = smooth == 0 and across <= _ONE
+    narrow, soft, free = across <= _ONE, smooth != 0, hidden == 0
     while x < last:
         red, green, blue, weight = r + t * dr, g + t * dg, b + t * db, w + t * dw
-        reach = _ZERO if thin else half
-        low: Any = max(np.int64(np.floor(y - reach)), 0)
-        top: Any = min(np.int64(np.floor(y + reach)), limit_y - 1)
-        for line in range(low, top + 1):
-            at = x * stride_x + line * stride_y
-            if hidden > 0 and az + t * (bz - az) > solids[at]:
-                continue
-            part = _ONE
-            if not thin:
+        depth = az + t * (bz - az)
+        if narrow and soft:  # as wide as a pixel: shared by two of them
+            low = np.int64(np.floor(y - _HALF))
+            part = y - _HALF - np.float32(low)
+            at = x * stride_x + low * stride_y
+            if 0 <= low < limit_y and (free or depth <= solids[at]):
+                _add(sums, at, _ONE - part, red, green, blue, weight)
+            if -1 <= low < limit_y - 1 and (free or depth <= solids[at + stride_y]):
+                _add(sums, at + stride_y, part, red, green, blue, weight)
+        elif narrow:
+            low = np.int64(np.floor(y))
+            at = x * stride_x + low * stride_y
+            if 0 <= low < limit_y and (free or depth <= solids[at]):
+                _add(sums, at, _ONE, red, green, blue, weight)
+        else:
+            first: Any = max(np.int64(np.floor(y - half)), 0)
+            top: Any = min(np.int64(np.floor(y + half)), limit_y - 1)
+            for line in range(first, top + 1):
+                at = x * stride_x + line * stride_y
                 part = min(y + half, np.float32(line + 1)) - max(y - half, np.float32(line))
-            sums[at, 0] += part * red
-            sums[at, 1] += part * green
-            sums[at, 2] += part * blue
-            sums[at, 3] += part * weight
+                if free or depth <= solids[at]:
+                    _add(sums, at, part, red, green, blue, weight)
         x += 1
         t += pace
         y += slope
+
+
+@inlined
+def _add(sums, at, part, red, green, blue, weight):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    sums[at, 0] += part * red
+    sums[at, 1] += part * green
+    sums[at, 2] += part * blue
+    sums[at, 3] += part * weight
 
 
 @inlined
