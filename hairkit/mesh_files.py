@@ -296,6 +296,7 @@ def _ply_lists(
     return columns, at
 
 
+@np.errstate(invalid="ignore")  # damaged numbers are found by whoever reads on
 def _ply_mesh(tables: dict[str, dict[str, Any]]) -> FileMesh:
     columns = {key.lower(): value for key, value in tables["vertex"].items()}
     vertices = np.stack([np.asarray(columns.pop(axis), np.float64) for axis in "xyz"], axis=1)

@@ -154,6 +154,7 @@ class Pressed:
     def find_spec(self, name, path, target=None):
         if name == {module!r}:
             signal.raise_signal(signal.SIGINT)
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job's is ignored
 sys.meta_path.insert(0, Pressed())
 sys.argv = ["hairkit", "plugins"]
 from hairkit.__main__ import main

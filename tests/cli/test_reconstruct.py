@@ -34,7 +34,11 @@ def words(tmp_path: Path) -> list[str]:
 
 def start(words: list[str]) -> subprocess.Popen[str]:
     """Start hairkit as a process of its own."""
-    code = "import sys; from hairkit.cli import main; sys.exit(main())"
+    code = (
+        "import signal, sys; from hairkit.cli import main\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # ignored in background jobs
+        "sys.exit(main())"
+    )
     return subprocess.Popen(
         [sys.executable, "-c", code, *words],
         stdout=subprocess.PIPE,
