@@ -2,7 +2,7 @@
 // software renderers fetch them word by word.
 
 const int SLICES = 32;          // of the view's depth, for the hair's opacity
-const int TILE = 16;            // pixels along an edge of a cell of that opacity
+const int TILE = 8;             // pixels along an edge of a cell of that opacity
 const float OPACITY_UNIT = 4096.0;
 
 uniform mat4 u_clip_from_head;

@@ -26,6 +26,7 @@ uniform float u_smooth;         // 1: partial coverage across the stroke; 0: who
 
 const float BOUNCED = 0.1;      // of the sky's light, that comes through hair on all ways
 const float HIDDEN = 0.1;       // a piece of which less arrives is not drawn
+const float DENSE = 0.4;       // of the opacity of a whole tile: locks are denser than the gaps beside them
 const float WIDEST = 64.0;      // pixels
 
 vec3 place_at(int index) { return vec3(places[3 * index], places[3 * index + 1], places[3 * index + 2]); }
@@ -34,7 +35,7 @@ float arriving(Seen s) {
     if (s.depth < 0.0) return 0.0;
     float slice = clamp((s.depth - u_slice_range.x) * u_slice_range.y, 0.0, float(SLICES));
     vec3 at = vec3(s.pixel.xy / (float(TILE) * vec2(u_tiles)), (slice + 0.5) / float(SLICES + 1));
-    return exp(-textureLod(u_opacity, at, 0.0).r);
+    return exp(-DENSE * textureLod(u_opacity, at, 0.0).r);
 }
 
 vec3 seen_colour(vec3 position, vec3 tangent, float share, float random) {

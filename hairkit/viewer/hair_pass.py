@@ -22,7 +22,7 @@ from hairkit.stored import Float32Array
 from hairkit.viewer.hair_body import HairBody
 from hairkit.viewer.hair_look import GuidePlaces, HairLook, HairScene, HairView
 
-SLICES, TILE = 32, 16
+SLICES, TILE = 32, 8
 """As in viewer_hair.glsl."""
 _GROUP = 64
 MOST_GUIDES = 65_535

@@ -22,7 +22,7 @@ shared: Callable[[Any], Any] = njit(nogil=True, **_HOW)
 """The same for what the threads of a crew (`hairkit.crew`) do at once."""
 inlined: Callable[[Any], Any] = njit(fastmath=True, error_model="numpy", inline="always")
 """Puts a function into its caller, so that loops around it run side by side."""
-SLICES, TILE = 32, 16
+SLICES, TILE = 32, 8
 """Of the view's depth; pixels along an edge of a cell: as in viewer_hair.glsl."""
 OPACITY_UNIT = np.float32(4096)
 _FAR_BEHIND = np.float32(-1)

@@ -17,6 +17,8 @@ from hairkit.volume import VoxelGrid
 
 LANES, FIELDS = 64, 14
 """Points that are shaded side by side, and numbers of each."""
+DENSE = np.float32(0.4)
+"""Of the opacity of a whole tile: locks are denser than the gaps beside them."""
 HIDDEN = np.float32(0.1)
 """A point of which less arrives is not drawn."""
 
@@ -284,7 +286,7 @@ def _arriving(seen, s, k, opacity, slices):  # type: ignore[no-untyped-def] # pr
             part = along * (v if b else _ONE - v)
             here, beside = opacity[layer + a, j + b, i], opacity[layer + a, j + b, i + 1]
             total += part * (here + u * (beside - here))
-    return _decay(-total)
+    return _decay(-DENSE * total)
 
 
 @inlined
