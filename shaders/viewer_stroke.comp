@@ -25,7 +25,7 @@ uniform ivec2 u_picture;
 uniform float u_smooth;         // 1: partial coverage across the stroke; 0: whole pixels, faster
 
 const float BOUNCED = 0.1;      // of the sky's light, that comes through hair on all ways
-const float HIDDEN = 0.1;       // a piece of which less arrives is not drawn
+const float HIDDEN = 0.14;      // a piece of which less arrives is not drawn
 const float DENSE = 0.4;       // of the opacity of a whole tile: locks are denser than the gaps beside them
 const float WIDEST = 64.0;      // pixels
 

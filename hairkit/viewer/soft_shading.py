@@ -19,7 +19,7 @@ LANES, FIELDS = 64, 14
 """Points that are shaded side by side, and numbers of each."""
 DENSE = np.float32(0.4)
 """Of the opacity of a whole tile: locks are denser than the gaps beside them."""
-HIDDEN = np.float32(0.1)
+HIDDEN = np.float32(0.14)
 """A point of which less arrives is not drawn."""
 
 TONES, BRIGHTEST = 4096, 7.3
