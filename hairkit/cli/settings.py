@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,12 @@ from hairkit.groom_opening import groom_path, plugin_for
 
 Settings = dict[str, dict[str, object]]
 """Values by option, by plugin."""
+
+
+def add_setting(add: Callable[..., Any]) -> None:
+    """Add `--set` by a parser's `add_argument`."""
+    what = "option=V of simulator or file format"
+    add("--set", action="append", default=[], metavar="X=V", help=what)
 
 
 def importer_of(manager: Any, path: Path) -> str | None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.cli.settings import importer_of, split_settings
+from hairkit.cli.settings import add_setting, importer_of, split_settings
 from hairkit.errors import InputError, OptionError
 from hairkit.stored import Float64Array
 
@@ -43,13 +43,7 @@ def register(subparsers: Any) -> None:
     add("--wind", default="0,0,0", metavar="X,Y,Z", help="metres per second (0,0,0)")
     add("--turbulence", type=float, default=0.0, metavar="T", help="gusts over the wind (0)")
     add("--gravity", type=float, metavar="G", help="m/s^2 downwards; the groom's by default")
-    add(
-        "--set",
-        action="append",
-        default=[],
-        metavar="X=V",
-        help="option=V of simulator or file format",
-    )
+    add_setting(add)
     add("--preset", metavar="NAME", help="options kept by hairkit view beside the groom")
     add("--using", metavar="NAME", help=f"simulator plugin ({SIMULATOR}, or the preset's)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")

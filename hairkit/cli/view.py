@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from hairkit.cli.render import parse_size
+from hairkit.cli.settings import add_setting
 from hairkit.errors import InputError, OptionError
 
 MOST_HAIRS = 200_000
@@ -27,13 +28,7 @@ def register(subparsers: Any) -> None:
     add("groom", metavar="GROOM", type=Path, help="groom.npz, importable file or folder of results")
     add("--capture", type=Path, metavar="FOLDER", help="the photos, to show them in space")
     add("--simulator", metavar="NAME", help="simulator plugin (pbd), or none")
-    add(
-        "--set",
-        action="append",
-        default=[],
-        metavar="X=V",
-        help="option=V of simulator or file format",
-    )
+    add_setting(add)
     add("--preset", metavar="NAME", help="the simulator's options kept beside the groom")
     add("--hairs", type=int, metavar="N", help="strands drawn (10000)")
     add("--size", metavar="WxH", help="pixels (1280x720)")

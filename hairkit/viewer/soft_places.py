@@ -1,8 +1,7 @@
-"""Where hair that follows guides is, and what of it hides what: compiled twins of two shaders.
+"""Where hair that follows guides is, and what of it hides what: compiled twins of three shaders.
 
 `viewer_guide.comp`, `viewer_hair.comp` and `viewer_opacity.comp` do the same on a graphics card;
-the tests hold both together. Everything is float32; sums are whole numbers, so that they do not
-depend on the number of threads.
+the tests hold both together. Everything is float32.
 """
 
 from __future__ import annotations

@@ -78,12 +78,9 @@ def _stroke(  # type: ignore[no-untyped-def]
     last = min(np.int64(np.ceil(bx - _HALF)), limit_x)
     t = (np.float32(x) + _HALF - ax) * pace
     y, slope = ay + t * slope, slope * pace
-    unit = min(across, _ONE)
-    near, far = looks[s, begin, 3] * unit, looks[s, end, 3] * unit
-    r, g, b = looks[s, begin, 0] * near, looks[s, begin, 1] * near, looks[s, begin, 2] * near
-    dr, dg = looks[s, end, 0] * far - r, looks[s, end, 1] * far - g
-    db = looks[s, end, 2] * far - b
-    w, dw = near, far - near
+    r, g, b, w = _weighted(looks, s, begin, min(across, _ONE))
+    red, green, blue, weight = _weighted(looks, s, end, min(across, _ONE))
+    dr, dg, db, dw = red - r, green - g, blue - b, weight - w
     half = _HALF * max(across, _ONE)
     narrow, soft, free = across <= _ONE, smooth != 0, hidden == 0
     while x < last:
@@ -113,6 +110,13 @@ def _stroke(  # type: ignore[no-untyped-def]
         x += 1
         t += pace
         y += slope
+
+
+@inlined
+def _weighted(looks, s, k, cover):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return colour times weight, and weight, of a point."""
+    weight = looks[s, k, 3] * cover
+    return looks[s, k, 0] * weight, looks[s, k, 1] * weight, looks[s, k, 2] * weight, weight
 
 
 @inlined

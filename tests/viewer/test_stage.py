@@ -194,6 +194,19 @@ def test_light_made_in_turns_is_light_made_at_once(stage: Stage) -> None:
     assert np.abs(once.astype(int) - in_turns).max() <= 1
 
 
+@pytest.mark.parametrize("place", [np.nan, np.inf, -np.inf, 1e30, -1e30])
+def test_hair_that_is_nowhere_harms_nothing(place: float) -> None:
+    """Guides without a place leave a picture, and the next one is as if they had never been."""
+    with renderer() as gl:
+        stage = made_stage(gl, soft=True)
+        before = picture(stage, shot())
+        lost = stage.body.guide_rest.copy()
+        lost[::2, 3:] = place
+        assert picture(stage, shot(guide_rows=lost)).shape == before.shape
+        np.testing.assert_array_equal(picture(stage, shot()), before)
+        stage.release()
+
+
 def test_guides_may_stay_on_the_card() -> None:
     """A buffer of guides gives the picture that the same array gives, and a box that holds them."""
     t = np.linspace(0, 1, 64, dtype=np.float32)[None, :, None]
