@@ -29,15 +29,15 @@ from typing import Any
 import numpy as np
 
 from hairkit.cli.export import plugin_for
-from hairkit.default_head import default_head
 from hairkit.errors import InputError
-from hairkit.groom import Groom
-from hairkit.groom_file import read_groom, write_groom
-from hairkit.head import Roots
+from hairkit.head_model.scalp import sample_roots
+from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
-from hairkit.scalp import sample_roots
-from hairkit.stored import write_bytes
-from hairkit.strands import Strands
+from hairkit.storage import write_bytes
+from hairkit.types.groom import Groom
+from hairkit.types.groom_file import read_groom, write_groom
+from hairkit.types.head import Roots
+from hairkit.types.strands import Strands
 
 SETTINGS: dict[str, dict[str, object]] = {
     ".abc": {},

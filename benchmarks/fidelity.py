@@ -20,15 +20,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from hairkit.capture_reader import read_capture
 from hairkit.errors import HairkitError
 from hairkit.evaluate import Evaluation, Truth, evaluate, mask_iou, read_prediction, read_truth
-from hairkit.evaluate.figures import Figure, band_text, figures, mean_figures
 from hairkit.evaluate.report import write_report
+from hairkit.evaluate.scorecard import Figure, band_text, figures, mean_figures
+from hairkit.io.capture_reader import read_capture
 from hairkit.manager import Manager
-from hairkit.mask import HAIR
+from hairkit.types.mask import HAIR
 
-PROJECT = Path(__file__).parents[1]
 MASKS = "hair mask IoU"
 _COMMAND = "import sys; from hairkit.cli import main; sys.exit(main())"
 
@@ -62,12 +61,19 @@ def main() -> int:
 
 def _arguments() -> argparse.Namespace:
     named = os.environ.get("HAIRKIT_CAPTURES")
-    captures = Path(named) if named else PROJECT.parent / "shared" / "captures"
+    captures = Path(named) if named else None
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("--captures", type=Path, default=captures, metavar="DIR", help="folder of captures")
+    add(
+        "--captures",
+        type=Path,
+        default=captures,
+        required=captures is None,
+        metavar="DIR",
+        help="folder of captures with truth (default: $HAIRKIT_CAPTURES)",
+    )
     add("--names", nargs="+", metavar="NAME", help="captures, all with truth by default")
     add("--recipes", nargs="+", default=["default", "thesis"], metavar="R")
     add("--guides", type=int, default=8000, metavar="N", help="strands tracked (default 8000)")

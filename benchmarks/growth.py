@@ -16,12 +16,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from hairkit.capture_reader import read_capture, sample_folder
+from hairkit.head_model.scalp import sample_roots
 from hairkit.hookspecs import hookimpl
+from hairkit.io.capture_reader import read_capture, sample_folder
 from hairkit.manager import Manager
-from hairkit.pipeline import reconstruct
-from hairkit.recipe import load_recipe
-from hairkit.scalp import sample_roots
+from hairkit.pipeline.recipe import load_recipe
+from hairkit.pipeline.reconstruct import reconstruct
 
 TRACKERS = ("hybrid_growth", "certainty_tracker")
 

@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hairkit.default_head import default_head
-from hairkit.geometry import Arcs, adaptive_counts, fit_arcs, patent_counts
-from hairkit.strands import Strands
+from hairkit.head_model.template import default_head
+from hairkit.helices import Arcs, adaptive_counts, fit_arcs, patent_counts
 from hairkit.synth import grow
+from hairkit.types.strands import Strands
 
 COUNT, STEP = 1000, 0.0005
 METHODS: dict[str, Callable[[Strands], Arcs]] = {

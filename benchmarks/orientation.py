@@ -3,8 +3,8 @@
 python benchmarks/orientation.py captures/ --pictures /tmp/orientation
 
 Errors are mean degrees over true hair, the mask eroded by 4 pixels, where the truth is coherent
-(`hairkit.filtering.coherent_truth`); guessing gives 45. `sure half`: the pixels with confidence
-above the view's median. Masks are the true ones; OpenCV runs on one thread.
+(`hairkit.imaging.masked_filters.coherent_truth`); guessing gives 45. `sure half`: the pixels with
+confidence above the view's median. Masks are the true ones; OpenCV runs on one thread.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ import numpy as np
 import numpy.typing as npt
 from hairkit_plugins import gabor, structure_tensor
 
-from hairkit.capture import View
 from hairkit.evaluate.images import truth_angle
-from hairkit.filtering import coherent_truth, fill_beyond, luminance
-from hairkit.mask import HAIR, Mask
-from hairkit.orientation import OrientationMap, angle_between, wrap_angle
+from hairkit.imaging.masked_filters import coherent_truth, fill_beyond, luminance
+from hairkit.types.capture import View
+from hairkit.types.mask import HAIR, Mask
+from hairkit.types.orientation import OrientationMap, angle_between, wrap_angle
 
 EDGE_PX = 4
 Orient = Callable[[View, Mask], OrientationMap]

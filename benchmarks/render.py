@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from hairkit.cli.render import framing_cameras, parse_size
-from hairkit.default_head import default_head
-from hairkit.densify import densify
+from hairkit.grooming.densify import densify
+from hairkit.head_model.template import default_head
 from hairkit.render import Lights, draw, draw_coverage, draw_directions, draw_views
 from hairkit.render.context import renderer
 from hairkit.synth import grow

@@ -14,9 +14,9 @@ from typing import Any
 import cv2
 import numpy as np
 
-from hairkit.capture import View
-from hairkit.mask import BACKGROUND, HAIR, Mask
 from hairkit.options import make_options
+from hairkit.types.capture import View
+from hairkit.types.mask import BACKGROUND, HAIR, Mask
 
 PLUGINS = ("grabcut", "auto_matte")
 SIDES = ("front", "front-left", "left", "back-left", "back", "back-right", "right", "front-right")

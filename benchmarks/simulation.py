@@ -38,13 +38,13 @@ import numpy.typing as npt
 from hairkit_plugins.pbd import Options
 from hairkit_plugins.pbd.simulator import PbdSimulator
 
-from hairkit.default_head import default_head
 from hairkit.errors import RenderError
-from hairkit.exporting import dense_groom
-from hairkit.groom import Groom
+from hairkit.grooming.prepare_export import dense_groom
+from hairkit.head_model.template import default_head
 from hairkit.render.context import renderer
 from hairkit.simulate import Surroundings, shaken
 from hairkit.synth import grow
+from hairkit.types.groom import Groom
 
 Array = npt.NDArray[Any]
 NODES, FRAME = 16, 1 / 60

@@ -22,14 +22,14 @@ import numpy as np
 from hairkit_plugins.super_helix import Options
 from hairkit_plugins.super_helix.simulator import SuperHelices
 
-from hairkit.camera import Camera
-from hairkit.default_head import default_head
-from hairkit.groom import Groom
+from hairkit.head_model.template import default_head
 from hairkit.render import draw
 from hairkit.simulate import Surroundings
 from hairkit.simulate.motion import HeadMotion, shaken, still
-from hairkit.strands import Strands
 from hairkit.synth import grow
+from hairkit.types.camera import Camera
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
 GUIDES, ELEMENTS, FRAMES = 600, 10, 90
 

@@ -18,13 +18,13 @@ import time
 from pathlib import Path
 
 from hairkit.cli.render import parse_size
-from hairkit.default_head import default_head
-from hairkit.groom_file import write_groom
+from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.render.context import Renderer, renderer
 from hairkit.synth import grow
-from hairkit.viewer.actions import perform
-from hairkit.viewer.budget import LEVELS, Budget
+from hairkit.types.groom_file import write_groom
+from hairkit.viewer.actions.actions import perform
+from hairkit.viewer.draw.frame_budget import LEVELS, Budget
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
 

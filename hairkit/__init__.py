@@ -9,17 +9,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from hairkit.camera import Camera
-    from hairkit.capture import Capture, View
     from hairkit.errors import HairkitError
-    from hairkit.groom import Groom, HairMaterial, HairPhysics
-    from hairkit.head import Capsules, Head, Roots
     from hairkit.hookspecs import hookimpl, hookspec
-    from hairkit.mask import Mask
-    from hairkit.orientation import OrientationMap
-    from hairkit.scene import Scene
-    from hairkit.strands import Strands
-    from hairkit.volume import Hull, OrientationField, VoxelGrid
+    from hairkit.types.camera import Camera
+    from hairkit.types.capture import Capture, View
+    from hairkit.types.groom import Groom, HairMaterial, HairPhysics
+    from hairkit.types.head import Capsules, Head, Roots
+    from hairkit.types.mask import Mask
+    from hairkit.types.orientation import OrientationMap
+    from hairkit.types.scene import Scene
+    from hairkit.types.strands import Strands
+    from hairkit.types.volume import Hull, OrientationField, VoxelGrid
 
 __version__ = "0.1.0"
 
@@ -46,17 +46,17 @@ __all__ = [
 ]
 
 _HOMES = {
-    "camera": ("Camera",),
-    "capture": ("Capture", "View"),
+    "types.camera": ("Camera",),
+    "types.capture": ("Capture", "View"),
     "errors": ("HairkitError",),
-    "groom": ("Groom", "HairMaterial", "HairPhysics"),
-    "head": ("Capsules", "Head", "Roots"),
+    "types.groom": ("Groom", "HairMaterial", "HairPhysics"),
+    "types.head": ("Capsules", "Head", "Roots"),
     "hookspecs": ("hookimpl", "hookspec"),
-    "mask": ("Mask",),
-    "orientation": ("OrientationMap",),
-    "scene": ("Scene",),
-    "strands": ("Strands",),
-    "volume": ("Hull", "OrientationField", "VoxelGrid"),
+    "types.mask": ("Mask",),
+    "types.orientation": ("OrientationMap",),
+    "types.scene": ("Scene",),
+    "types.strands": ("Strands",),
+    "types.volume": ("Hull", "OrientationField", "VoxelGrid"),
 }
 
 

@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any
 import pluggy
 
 if TYPE_CHECKING:
-    from hairkit.capture import Capture, View
-    from hairkit.groom import Groom
-    from hairkit.head import Head, Roots
-    from hairkit.mask import Mask
-    from hairkit.orientation import OrientationMap
-    from hairkit.scene import Scene
-    from hairkit.strands import Strands
-    from hairkit.volume import Hull, OrientationField
+    from hairkit.types.capture import Capture, View
+    from hairkit.types.groom import Groom
+    from hairkit.types.head import Head, Roots
+    from hairkit.types.mask import Mask
+    from hairkit.types.orientation import OrientationMap
+    from hairkit.types.scene import Scene
+    from hairkit.types.strands import Strands
+    from hairkit.types.volume import Hull, OrientationField
 
 PROJECT = "hairkit"
 hookspec = pluggy.HookspecMarker(PROJECT)

@@ -23,14 +23,14 @@ import pluggy
 
 from hairkit import hookspecs
 from hairkit.errors import HairkitError, OptionError, PluginError
-from hairkit.file_format import FileFormat
-from hairkit.groom import Groom
-from hairkit.mask import Mask
+from hairkit.io.file_format import FileFormat
 from hairkit.options import OptionInfo, describe, make_options, unknown_name
-from hairkit.orientation import OrientationMap
-from hairkit.scene import Scene
-from hairkit.strands import Strands
-from hairkit.volume import Hull, OrientationField
+from hairkit.types.groom import Groom
+from hairkit.types.mask import Mask
+from hairkit.types.orientation import OrientationMap
+from hairkit.types.scene import Scene
+from hairkit.types.strands import Strands
+from hairkit.types.volume import Hull, OrientationField
 
 ENTRY_POINT_GROUP = "hairkit"
 DISABLE_AUTOLOAD = "HAIRKIT_DISABLE_PLUGIN_AUTOLOAD"
@@ -337,7 +337,7 @@ def _inspect(plugin: object, name: str, distribution: str, version: str) -> Plug
     file = getattr(plugin, "__file__", None)
     form = getattr(plugin, "FORMAT", None)
     if form is not None and not isinstance(form, FileFormat):
-        raise PluginError("its FORMAT is not a hairkit.file_format.FileFormat")
+        raise PluginError("its FORMAT is not a hairkit.io.file_format.FileFormat")
     return PluginInfo(
         name,
         distribution,

@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.camera import Camera
-from hairkit.capture import Capture, View
-from hairkit.capture_reader import TURN
-from hairkit.groom import Groom
-from hairkit.head import Capsules, Head, Roots
-from hairkit.mask import BACKGROUND, HAIR, PERSON, Mask
-from hairkit.orientation import OrientationMap, wrap_angle
-from hairkit.scene import Scene
-from hairkit.stored import BoolArray, Float32Array
-from hairkit.strands import Strands
-from hairkit.volume import Hull, OrientationField, VoxelGrid, outer_products
+from hairkit.io.capture_reader import TURN
+from hairkit.storage import BoolArray, Float32Array
+from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture, View
+from hairkit.types.groom import Groom
+from hairkit.types.head import Capsules, Head, Roots
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.scene import Scene
+from hairkit.types.strands import Strands
+from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_products
 
 VIEW_NAMES = tuple(TURN)
 """Views of the nominal turn, 45 degrees apart, towards the subject's left."""

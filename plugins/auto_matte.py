@@ -3,8 +3,8 @@
 The picture's upper border shows the backdrop, its middle the subject; skin is smooth, bright and of
 skin's hue; hair lies along the upper outline of the subject and is not skin; clothes are at the
 bottom and unlike the hair. From these seeds the labelling goes on as from a user's strokes
-(`hairkit.labelling`, after Rother et al. 2004). No model file is needed; a beard between cheeks and
-neck counts as face. Landmarks, where a view has them, mark the face for certain.
+(`hairkit.imaging.seeded_segmentation`, after Rother et al. 2004). No model file is needed; a beard
+between cheeks and neck counts as face. Landmarks, where a view has them, mark the face for certain.
 """
 
 from __future__ import annotations
@@ -14,10 +14,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hairkit.capture import View
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
-from hairkit.labelling import (
+from hairkit.imaging.seeded_segmentation import (
     UNKNOWN,
     LabelSettings,
     appearance,
@@ -25,9 +24,10 @@ from hairkit.labelling import (
     label_from_seeds,
     reduced_size,
 )
-from hairkit.mask import BACKGROUND, HAIR, PERSON, Mask
 from hairkit.options import option
-from hairkit.stored import BoolArray, Float32Array, Float64Array, UInt8Array
+from hairkit.storage import BoolArray, Float32Array, Float64Array, UInt8Array
+from hairkit.types.capture import View
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 
 _SKIN_HUE_DEG = (15.0, 80.0)
 _SKIN_CHROMA, _SKIN_BRIGHTER = 9.0, 22.0

@@ -15,19 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.byte_reader import ByteReader, finite, read_file
-from hairkit.byte_writer import as_bytes
 from hairkit.errors import InputError
-from hairkit.exporting import ExportOptions, prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.file_space import FileSpace, SpaceOptions
-from hairkit.groom import Groom, HairMaterial
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed, plain_widths, rows_kept
+from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.importing import ImportOptions, adopt, packed, plain_widths, rows_kept
+from hairkit.io.byte_reader import ByteReader, finite, read_file
+from hairkit.io.byte_writer import as_bytes
+from hairkit.io.coordinate_space import FileSpace, SpaceOptions
+from hairkit.io.file_format import Feature, FileFormat
+from hairkit.io.strand_blocks import blocks, colours
 from hairkit.options import option
-from hairkit.point_blocks import blocks, colours
-from hairkit.stored import Float32Array, Int64Array, write_pieces
-from hairkit.strands import Strands
+from hairkit.storage import Float32Array, Int64Array, write_pieces
+from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.strands import Strands
 
 FORMAT = FileFormat(
     "cyHair",

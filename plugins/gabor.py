@@ -22,13 +22,20 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hairkit.capture import View
-from hairkit.filtering import blur, bounding_box, fill_beyond, hair_of, luminance, well_inside
 from hairkit.hookspecs import hookimpl
-from hairkit.mask import Mask
+from hairkit.imaging.masked_filters import (
+    blur,
+    bounding_box,
+    fill_beyond,
+    hair_of,
+    luminance,
+    well_inside,
+)
 from hairkit.options import option
-from hairkit.orientation import OrientationMap, wrap_angle
-from hairkit.stored import BoolArray, Float32Array, Float64Array
+from hairkit.storage import BoolArray, Float32Array, Float64Array
+from hairkit.types.capture import View
+from hairkit.types.mask import Mask
+from hairkit.types.orientation import OrientationMap, wrap_angle
 
 _CHUNK = 4096
 """Pixels handled at a time: their responses fit the cache."""

@@ -14,14 +14,19 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hairkit.capture import View
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
-from hairkit.labelling import UNKNOWN, LabelSettings, label_from_seeds, reduced_size
-from hairkit.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.imaging.seeded_segmentation import (
+    UNKNOWN,
+    LabelSettings,
+    label_from_seeds,
+    reduced_size,
+)
+from hairkit.io.strokes import Stroke, Strokes, rasterise, read_strokes
 from hairkit.options import option
-from hairkit.stored import BoolArray, Float64Array, UInt8Array
-from hairkit.strokes import Stroke, Strokes, rasterise, read_strokes
+from hairkit.storage import BoolArray, Float64Array, UInt8Array
+from hairkit.types.capture import View
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 
 _GAMMA = {"as_is": 1.0, "brighter": 0.7, "much_brighter": 0.5, "darker": 1.4}
 

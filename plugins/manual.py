@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit import Capture, Head, Mask, Scene, hookimpl
+from hairkit.cameras.turntable import Similarity, Turn
 from hairkit.errors import InputError
 from hairkit.options import option
-from hairkit.pose import Similarity, Turn
 
 
 @dataclass(frozen=True)

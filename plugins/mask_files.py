@@ -11,9 +11,9 @@ import numpy as np
 
 from hairkit import Mask, View, hookimpl
 from hairkit.errors import InputError
-from hairkit.mask import BACKGROUND, HAIR, PERSON
-from hairkit.photos import read_drawing
-from hairkit.stored import UInt8Array
+from hairkit.io.photos import read_drawing
+from hairkit.storage import UInt8Array
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 
 @hookimpl

@@ -17,16 +17,16 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.errors import InputError
-from hairkit.exporting import ExportOptions, prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.file_space import SPACES, FileSpace, SpaceOptions
-from hairkit.groom import Groom
+from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.number_text import written_rows
+from hairkit.io.coordinate_space import SPACES, FileSpace, SpaceOptions
+from hairkit.io.file_format import Feature, FileFormat
+from hairkit.io.number_text import written_rows
+from hairkit.io.strand_blocks import blocks
 from hairkit.options import option
-from hairkit.point_blocks import blocks
-from hairkit.stored import BoolArray, Int64Array, write_pieces
-from hairkit.strands import Strands
+from hairkit.storage import BoolArray, Int64Array, write_pieces
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
 FORMAT = FileFormat(
     title="Maya ASCII",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from types import MappingProxyType
 
-from hairkit.exporting import ExportOptions, prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.groom import Groom
-from hairkit.groom_file import read_groom, write_groom
+from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
+from hairkit.io.file_format import Feature, FileFormat
+from hairkit.types.groom import Groom
+from hairkit.types.groom_file import read_groom, write_groom
 
 FORMAT = FileFormat(
     "hairkit",

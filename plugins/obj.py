@@ -12,19 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from hairkit.byte_reader import read_file
 from hairkit.errors import FormatError
-from hairkit.exporting import ExportOptions, prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.file_space import FileSpace, SpaceOptions
-from hairkit.groom import Groom
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
+from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.importing import ImportOptions, adopt, packed
-from hairkit.number_text import read_numbers, stripped, whole_digits, written_rows
-from hairkit.point_blocks import blocks
-from hairkit.polylines import chains
-from hairkit.stored import Float64Array, Int64Array, write_pieces
-from hairkit.strands import Strands
+from hairkit.io.byte_reader import read_file
+from hairkit.io.coordinate_space import FileSpace, SpaceOptions
+from hairkit.io.file_format import Feature, FileFormat
+from hairkit.io.number_text import read_numbers, stripped, whole_digits, written_rows
+from hairkit.io.polylines import chains
+from hairkit.io.strand_blocks import blocks
+from hairkit.storage import Float64Array, Int64Array, write_pieces
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
 FORMAT = FileFormat("OBJ lines", (".obj",), exact=frozenset({Feature.POINTS, Feature.COUNTS}))
 

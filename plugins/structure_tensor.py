@@ -24,8 +24,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hairkit.capture import View
-from hairkit.filtering import (
+from hairkit.hookspecs import hookimpl
+from hairkit.imaging.masked_filters import (
     blur,
     bounding_box,
     hair_of,
@@ -36,11 +36,11 @@ from hairkit.filtering import (
     single_angle,
     well_inside,
 )
-from hairkit.hookspecs import hookimpl
-from hairkit.mask import Mask
 from hairkit.options import option
-from hairkit.orientation import OrientationMap
-from hairkit.stored import Float32Array
+from hairkit.storage import Float32Array
+from hairkit.types.capture import View
+from hairkit.types.mask import Mask
+from hairkit.types.orientation import OrientationMap
 
 _SCHARR_GAIN = 32.0
 """What `cv2.Scharr` makes of a slope of one per pixel."""

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
-from hairkit.combing import ScalpPrior, growth_potential, with_scalp_prior
-from hairkit.diffusion import solve_screened
+from hairkit.field.diffusion import solve_screened
+from hairkit.field.growth_prior import ScalpPrior, growth_potential, with_scalp_prior
+from hairkit.field.view_fusion import FusionOptions, fuse_views
 from hairkit.options import option
-from hairkit.plane_fusion import FusionOptions, fuse_views
 
 HARD_WEIGHT = 1e3
 """Weight against `smoothness` that keeps a cell as it is."""

@@ -14,17 +14,17 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.byte_reader import ByteReader, finite, read_file
-from hairkit.byte_writer import as_bytes
-from hairkit.exporting import ExportOptions, prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.file_space import FileSpace, SpaceOptions
-from hairkit.groom import Groom
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
+from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.importing import ImportOptions, adopt, packed
-from hairkit.point_blocks import blocks
-from hairkit.stored import BoolArray, Int64Array, write_pieces
-from hairkit.strands import Strands
+from hairkit.io.byte_reader import ByteReader, finite, read_file
+from hairkit.io.byte_writer import as_bytes
+from hairkit.io.coordinate_space import FileSpace, SpaceOptions
+from hairkit.io.file_format import Feature, FileFormat
+from hairkit.io.strand_blocks import blocks
+from hairkit.storage import BoolArray, Int64Array, write_pieces
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
 FORMAT = FileFormat(
     "USC-HairSalon, CT2Hair",

@@ -1,7 +1,7 @@
 #version 430
 // The guides' points in the world.
 #include "pbd_layout.glsl"
-#include "pbd_ride.glsl"
+#include "pbd_embedding.glsl"
 layout(std430, binding = 2) writeonly buffer Points { float points[]; }; // x, y, z
 uniform int u_count;
 uniform vec4 u_head[3];  // rows of the motion from the head's axes to the world

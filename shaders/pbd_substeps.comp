@@ -3,9 +3,9 @@
 // Masses are shares of the rod's mean, so that stiffness is in 1/s^2. Loops go over whole arrays, a
 // condition within instead of other bounds: then compilers unroll them.
 #include "pbd_layout.glsl"
-#include "pbd_turns.glsl"
+#include "pbd_quaternion.glsl"
 #include "pbd_constants.glsl"
-#include "pbd_steps.glsl"
+#include "pbd_substep_schedule.glsl"
 
 const float SHARPEST = 0.3, LARGEST_SPIN = 0.3, SOFTEST = 1e-3, SINGULAR = 1e-6;
 
@@ -190,7 +190,7 @@ void go_on() {
     }
 }
 
-#include "pbd_touch.glsl"
+#include "pbd_contact.glsl"
 
 void main() {
     rod = invocation();

@@ -1,5 +1,5 @@
 #version 430
-#include "viewer_sums.glsl"
+#include "viewer_accumulation.glsl"
 // Hair over what stands behind it; the sums are left empty for the next picture.
 
 layout(std430, binding = 7) buffer Sums { uint sums[]; };

@@ -19,8 +19,8 @@ from hairkit.errors import HairkitError, InputError, OptionError, PluginError
 from hairkit.hookspecs import hookimpl
 from hairkit.manager import RESULT_TYPES, STAGES, Manager
 from hairkit.options import option
-from hairkit.orientation import OrientationMap
 from hairkit.testing import combed_orientation, stage_arguments
+from hairkit.types.orientation import OrientationMap
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.cli import main as hairkit
-from hairkit.default_head import default_head
-from hairkit.groom_file import write_groom
+from hairkit.head_model.template import default_head
 from hairkit.synth import StyleName, grow
+from hairkit.types.groom_file import write_groom
 
 HERE = Path(__file__).parent
 MILLISECONDS = 35

@@ -7,7 +7,7 @@ import numpy as np
 
 from hairkit import Mask, OrientationMap, View, hookimpl
 from hairkit.options import option
-from hairkit.orientation import wrap_angle
+from hairkit.types.orientation import wrap_angle
 
 
 @dataclass(frozen=True)

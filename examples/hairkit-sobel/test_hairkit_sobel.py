@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from hairkit.manager import Manager
-from hairkit.orientation import angle_between
 from hairkit.testing import ball_mask, striped_view, turn_scene
+from hairkit.types.orientation import angle_between
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 30.0, 90.0, 135.0])

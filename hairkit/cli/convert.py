@@ -12,11 +12,11 @@ import numpy as np
 
 from hairkit.cli.export import assigned, check_target
 from hairkit.errors import InputError, OptionError
-from hairkit.groom import Groom
-from hairkit.groom_opening import load_groom, plugin_for
-from hairkit.guide_weights import guide_mask
+from hairkit.grooming.decimate import simplified
+from hairkit.grooming.guide_weights import guide_mask
 from hairkit.manager import Manager
-from hairkit.simplify import simplified
+from hairkit.pipeline.open_groom import load_groom, plugin_for
+from hairkit.types.groom import Groom
 
 _DESCRIPTION = """\
 Example: hairkit convert a.tfx b.abc --scale 0.0023 --up y
@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _with_curl(groom: Groom) -> Groom:
     """Return the groom with the median radius and pitch of its strands, or a sample of them."""
-    from hairkit.geometry import measure_curl
+    from hairkit.helices import measure_curl
 
     count = min(len(groom.strands), CURLS)
     some = groom.strands.select(np.linspace(0, len(groom.strands) - 1, count).astype(np.int64))

@@ -97,7 +97,7 @@ def _score_table(evaluation: Evaluation) -> Table:
 def _figure_table(evaluation: Evaluation) -> Table:
     from rich.table import Table
 
-    from hairkit.evaluate.figures import band_text, figures
+    from hairkit.evaluate.scorecard import band_text, figures
 
     table = Table()
     table.add_column("figure")

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.errors import InputError, OptionError
-from hairkit.groom_opening import load_groom, plugin_for
 from hairkit.manager import Manager
+from hairkit.pipeline.open_groom import load_groom, plugin_for
 
 _DESCRIPTION = """\
 Example: hairkit export out/groom.npz -o hair.apx

@@ -12,10 +12,10 @@ import numpy as np
 from hairkit.cli.convert import add_reader_arguments, reader_settings
 from hairkit.cli.export import assigned
 from hairkit.errors import FormatError, InputError
-from hairkit.groom_opening import load_groom, plugin_for
-from hairkit.guide_weights import guide_mask
+from hairkit.grooming.guide_weights import guide_mask
 from hairkit.manager import Manager
-from hairkit.stored import Float32Array
+from hairkit.pipeline.open_groom import load_groom, plugin_for
+from hairkit.storage import Float32Array
 
 _DESCRIPTION = """\
 Example: hairkit info out/groom.npz
@@ -93,7 +93,7 @@ def _groom(path: Path, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _scene(path: Path) -> dict[str, Any]:
-    from hairkit.scene import read_cameras
+    from hairkit.types.scene import read_cameras
 
     names, cameras = read_cameras(path)
     views = {
@@ -111,7 +111,7 @@ def _scene(path: Path) -> dict[str, Any]:
 
 
 def _capture(path: Path) -> dict[str, Any]:
-    from hairkit.capture_reader import read_capture
+    from hairkit.io.capture_reader import read_capture
 
     capture = read_capture(path)
     views = {
@@ -131,7 +131,7 @@ def _capture(path: Path) -> dict[str, Any]:
 
 
 def _head_file(path: Path, units: str) -> dict[str, Any]:
-    from hairkit.head_files import read_head
+    from hairkit.io.head_reader import read_head
 
     return {"kind": "head", **_head(read_head(path, units=units))}
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from hairkit.cli.scaffold import new_plugin
 from hairkit.manager import STAGES
-from hairkit.recipe import HOOKS
-from hairkit.scaffold import new_plugin
+from hairkit.pipeline.recipe import HOOKS
 
 _DESCRIPTION = """\
 Example: hairkit new-plugin orient my_method

@@ -6,7 +6,7 @@ import argparse
 import json
 from typing import Any
 
-from hairkit.format_table import format_table
+from hairkit.cli.format_table import format_table
 from hairkit.manager import STAGES, Manager, PluginInfo
 from hairkit.options import OptionInfo
 

@@ -49,11 +49,11 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Reconstruct, and print what was made."""
-    from hairkit.capture_reader import WORKING_EDGE, read_capture
+    from hairkit.io.capture_reader import WORKING_EDGE, read_capture
     from hairkit.manager import Manager
-    from hairkit.pipeline import SHEET, export_paths, reconstruct
+    from hairkit.pipeline.recipe import load_recipe
+    from hairkit.pipeline.reconstruct import SHEET, export_paths, reconstruct
     from hairkit.progress import Recorder, progress_for
-    from hairkit.recipe import load_recipe
 
     began = time.perf_counter()
     manager = Manager.loaded(args.plugin)
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _photos(args: argparse.Namespace) -> Path:
-    from hairkit.capture_reader import sample_folder
+    from hairkit.io.capture_reader import sample_folder
 
     if args.sample == (args.photos is not None):
         raise InputError("give either a folder of photos or --sample")
@@ -109,7 +109,7 @@ def _max_edge(args: argparse.Namespace, default: int) -> int:
 def _head(args: argparse.Namespace) -> Any:
     if args.head is None:
         return None
-    from hairkit.head_files import read_head
+    from hairkit.io.head_reader import read_head
 
     return read_head(args.head, units=args.head_units, scalp=args.head_scalp, up=args.head_up)
 

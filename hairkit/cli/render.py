@@ -14,16 +14,16 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.camera import Camera
-from hairkit.capture_reader import TURN
-from hairkit.densify import densify
 from hairkit.errors import InputError
-from hairkit.groom_opening import load_groom
+from hairkit.grooming.densify import densify
+from hairkit.io.capture_reader import TURN
 from hairkit.manager import Manager
+from hairkit.pipeline.open_groom import load_groom
 from hairkit.render import Lights, draw_views
-from hairkit.scene import read_cameras
-from hairkit.stored import UInt8Array, write_bytes
-from hairkit.strands import Strands
+from hairkit.storage import UInt8Array, write_bytes
+from hairkit.types.camera import Camera
+from hairkit.types.scene import read_cameras
+from hairkit.types.strands import Strands
 
 _DESCRIPTION = """\
 Example: hairkit render out/groom.npz -o front-left.png --camera front-left

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.errors import OptionError
-from hairkit.groom_opening import groom_path, plugin_for
+from hairkit.pipeline.open_groom import groom_path, plugin_for
 
 Settings = dict[str, dict[str, object]]
 """Values by option, by plugin."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from hairkit.cli.settings import add_setting, importer_of, split_settings
 from hairkit.errors import InputError, OptionError
-from hairkit.stored import Float64Array
+from hairkit.storage import Float64Array
 
 _DESCRIPTION = """\
 Example: hairkit simulate out/groom.npz -o cache.npz --shake yaw:20:1.5 --wind 3,0,1
@@ -59,8 +59,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
-    from hairkit.groom_opening import load_groom
     from hairkit.manager import Manager
+    from hairkit.pipeline.open_groom import load_groom
     from hairkit.progress import progress_for
     from hairkit.simulate import Weather, read_motion, shaken, still
     from hairkit.simulate import run as simulated
@@ -134,8 +134,8 @@ def _gravity(down: float | None) -> Float64Array | None:
 
 def _preset(args: argparse.Namespace) -> tuple[str, dict[str, object]]:
     """Return the simulator, and the options that `hairkit view` has kept for it."""
-    from hairkit.groom_opening import groom_path
-    from hairkit.viewer.presets import presets_path, read_preset
+    from hairkit.pipeline.open_groom import groom_path
+    from hairkit.viewer.actions.presets import presets_path, read_preset
 
     if args.preset is None:
         return args.using or SIMULATOR, {}
@@ -148,7 +148,7 @@ def _preset(args: argparse.Namespace) -> tuple[str, dict[str, object]]:
 
 def _exporter(manager: Any, path: Path) -> str | None:
     """Return the plugin that writes the animated file, None for a point cache."""
-    from hairkit.groom_opening import plugin_for
+    from hairkit.pipeline.open_groom import plugin_for
 
     if path.suffix.lower() == ".npz":
         return None

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.cli.render import parse_size
-from hairkit.default_head import default_head
 from hairkit.errors import InputError
+from hairkit.head_model.template import default_head
 from hairkit.synth import STYLES, grow, photograph
 
 _DESCRIPTION = """\

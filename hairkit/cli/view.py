@@ -44,8 +44,8 @@ class _ListActions(argparse.Action):
     """Prints a line for each action, with its values and their defaults."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
-        from hairkit.viewer.action_table import signature
-        from hairkit.viewer.actions import ACTIONS
+        from hairkit.viewer.actions.actions import ACTIONS
+        from hairkit.viewer.actions.registry import signature
 
         for action in ACTIONS.values():
             print(signature(action))
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _check(args: argparse.Namespace) -> None:
     """Refuse what cannot be shown before a window opens for nothing."""
-    from hairkit.groom_opening import groom_path
+    from hairkit.pipeline.open_groom import groom_path
 
     groom_path(args.groom)
     if args.hairs is not None and not 0 <= args.hairs <= MOST_HAIRS:
@@ -74,9 +74,9 @@ def _check(args: argparse.Namespace) -> None:
 
 
 def _window(args: argparse.Namespace) -> int:
-    from hairkit.viewer.script import read_script
-    from hairkit.viewer.starting import AbandonedError
-    from hairkit.viewer.window import show
+    from hairkit.viewer.actions.script import read_script
+    from hairkit.viewer.window.splash import AbandonedError
+    from hairkit.viewer.window.window import show
 
     if args.out is not None:
         raise InputError("--out is for --headless; in the window pictures go to this folder")
@@ -94,8 +94,8 @@ def _window(args: argparse.Namespace) -> int:
 
 def _headless(args: argparse.Namespace) -> int:
     from hairkit.render.context import renderer
+    from hairkit.viewer.actions.script import play, read_script
     from hairkit.viewer.preview import Preview
-    from hairkit.viewer.script import play, read_script
 
     if args.script is None:
         raise InputError("--headless needs --script steps.toml; docs/viewer.md shows one")
@@ -126,9 +126,9 @@ def _manager(args: argparse.Namespace) -> Any:
 
 def _session(args: argparse.Namespace, manager: Any, size: tuple[int, int], seed: int = 0) -> Any:
     from hairkit.cli.settings import importer_of, split_settings
-    from hairkit.groom_opening import groom_path
-    from hairkit.viewer.actions import perform
-    from hairkit.viewer.presets import presets_path, read_preset
+    from hairkit.pipeline.open_groom import groom_path
+    from hairkit.viewer.actions.actions import perform
+    from hairkit.viewer.actions.presets import presets_path, read_preset
     from hairkit.viewer.session import HAIRS, Session
     from hairkit.viewer.simulation import preferred
 

@@ -14,10 +14,10 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from hairkit.camera import Camera
 from hairkit.errors import InputError
-from hairkit.stored import Float32Array, Float64Array
-from hairkit.strands import Strands
+from hairkit.storage import Float32Array, Float64Array
+from hairkit.types.camera import Camera
+from hairkit.types.strands import Strands
 
 ALIGNMENT_POINTS = 2000
 """How many strand points, and how many head points, the similarity is fitted to at most."""

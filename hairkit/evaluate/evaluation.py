@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.densify import densify
 from hairkit.evaluate.align import (
     CameraError,
     Similarity,
@@ -25,13 +24,6 @@ from hairkit.evaluate.images import (
     mask_iou,
     orientation_error,
 )
-from hairkit.evaluate.measures import (
-    HeadMeasures,
-    LengthMeasures,
-    head_measures,
-    length_measures,
-    strand_consistency,
-)
 from hairkit.evaluate.prediction import Prediction
 from hairkit.evaluate.scores import (
     Hits,
@@ -41,11 +33,19 @@ from hairkit.evaluate.scores import (
     sample_strands,
     scores_of_hits,
 )
+from hairkit.evaluate.strand_statistics import (
+    HeadMeasures,
+    LengthMeasures,
+    head_measures,
+    length_measures,
+    strand_consistency,
+)
 from hairkit.evaluate.truth import Truth
-from hairkit.groom import Groom
-from hairkit.mask import HAIR, PERSON
-from hairkit.stored import BoolArray
-from hairkit.strands import Strands
+from hairkit.grooming.densify import densify
+from hairkit.storage import BoolArray
+from hairkit.types.groom import Groom
+from hairkit.types.mask import HAIR, PERSON
+from hairkit.types.strands import Strands
 
 DENSE_STRANDS = 10_000
 """Hair is densified to this many strands for its silhouette."""

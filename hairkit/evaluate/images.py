@@ -11,15 +11,15 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
-from hairkit.camera import Camera
+from hairkit.cameras.projection_kernels import head_depth, pack_cameras, project_row
 from hairkit.errors import InputError
+from hairkit.evaluate.depth_map import Surface, first_surface, point_depth
 from hairkit.evaluate.scores import Samples
-from hairkit.evaluate.surface import Surface, first_surface, point_depth
-from hairkit.filtering import coherent_truth
-from hairkit.head import Head
-from hairkit.orientation import OrientationMap, angle_between
-from hairkit.projection import head_depth, pack_cameras, project_row
-from hairkit.stored import BoolArray, Float32Array, Float64Array, UInt8Array
+from hairkit.imaging.masked_filters import coherent_truth
+from hairkit.storage import BoolArray, Float32Array, Float64Array, UInt8Array
+from hairkit.types.camera import Camera
+from hairkit.types.head import Head
+from hairkit.types.orientation import OrientationMap, angle_between
 
 DIRECTION_LIMIT_DEG = 20.0
 """A drawn strand is right when its direction is within this of the truth's."""
@@ -41,7 +41,7 @@ class OrientationError:
     """Error of a 2D orientation map over the true hair, its edge left out."""
 
     mean_deg: float
-    """Where the truth is coherent, see `hairkit.filtering.coherent_truth`."""
+    """Where the truth is coherent, see `hairkit.imaging.masked_filters.coherent_truth`."""
     median_deg: float
     mean_everywhere_deg: float
     """Coherent or not."""

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from hairkit.camera import Camera
 from hairkit.errors import InputError
 from hairkit.evaluate.truth import Truth
-from hairkit.groom import Groom
-from hairkit.groom_file import read_groom
-from hairkit.mask import Mask
-from hairkit.orientation import OrientationMap
-from hairkit.scene import read_cameras
-from hairkit.stored import Stored, from_arrays, read_npz
+from hairkit.storage import Stored, from_arrays, read_npz
+from hairkit.types.camera import Camera
+from hairkit.types.groom import Groom
+from hairkit.types.groom_file import read_groom
+from hairkit.types.mask import Mask
+from hairkit.types.orientation import OrientationMap
+from hairkit.types.scene import read_cameras
 
 GROOM, SCENE, WORK = "groom.npz", "scene.json", "work"
 """Names in the folder that `hairkit reconstruct` writes."""

@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.evaluate.error_maps import LEVEL_COLOURS, view_pictures
 from hairkit.evaluate.evaluation import Evaluation
-from hairkit.evaluate.figures import Figure, band_text, figures
-from hairkit.evaluate.pictures import LEVEL_COLOURS, view_pictures
 from hairkit.evaluate.prediction import Prediction
+from hairkit.evaluate.scorecard import Figure, band_text, figures
 from hairkit.evaluate.scores import Score
 from hairkit.evaluate.truth import Truth
-from hairkit.stored import write_text
+from hairkit.storage import write_text
 
 _JPEG_QUALITY = 82
 _STYLE = """

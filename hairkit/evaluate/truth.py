@@ -10,14 +10,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hairkit.camera import Camera
 from hairkit.errors import FormatError, InputError
+from hairkit.evaluate.depth_map import Surface, first_surface
 from hairkit.evaluate.scores import Samples, sample_strands
-from hairkit.evaluate.surface import Surface, first_surface
-from hairkit.head import Capsules, Head
-from hairkit.scene import read_cameras
-from hairkit.stored import UInt8Array, read_npz
-from hairkit.strands import Strands
+from hairkit.storage import UInt8Array, read_npz
+from hairkit.types.camera import Camera
+from hairkit.types.head import Capsules, Head
+from hairkit.types.scene import read_cameras
+from hairkit.types.strands import Strands
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from hairkit.render.head import Solid
 from hairkit.render.light import Lights
-from hairkit.render.measured import (
+from hairkit.render.measurement import (
     Measured,
     draw_coverage,
     draw_depth,

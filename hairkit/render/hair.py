@@ -11,11 +11,11 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.camera import Camera
 from hairkit.render.context import Renderer
-from hairkit.render.projection import DepthRange, set_camera, set_uniforms
-from hairkit.stored import Float32Array
-from hairkit.strands import Strands
+from hairkit.render.gl_camera import DepthRange, set_camera, set_uniforms
+from hairkit.storage import Float32Array
+from hairkit.types.camera import Camera
+from hairkit.types.strands import Strands
 
 _RESTART = 0xFFFFFFFF
 _GROUP = 64  # local_size_x of ribbon_shape.glsl

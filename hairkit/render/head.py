@@ -8,12 +8,12 @@ from typing import Any, Protocol
 import moderngl
 import numpy as np
 
-from hairkit.camera import Camera
-from hairkit.groom import HairMaterial
-from hairkit.head import Head
 from hairkit.render.context import Renderer
-from hairkit.render.projection import DepthRange, set_camera, set_uniforms
-from hairkit.stored import Float32Array, Int32Array
+from hairkit.render.gl_camera import DepthRange, set_camera, set_uniforms
+from hairkit.storage import Float32Array, Int32Array
+from hairkit.types.camera import Camera
+from hairkit.types.groom import HairMaterial
+from hairkit.types.head import Head
 
 SKIN = (0.42, 0.24, 0.17)
 """Linear RGB of skin."""

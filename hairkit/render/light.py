@@ -15,11 +15,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter
 
-from hairkit.camera import Camera
 from hairkit.render.head import Mesh
-from hairkit.stored import Float32Array
-from hairkit.strands import Strands
-from hairkit.volume import VoxelGrid
+from hairkit.storage import Float32Array
+from hairkit.types.camera import Camera
+from hairkit.types.strands import Strands
+from hairkit.types.volume import VoxelGrid
 
 CELL = 0.005
 """Edge of a cell of the light volume, metres."""

@@ -10,18 +10,18 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from hairkit.camera import Camera
 from hairkit.errors import InputError
-from hairkit.groom import Groom, HairMaterial
-from hairkit.head import Head
 from hairkit.render.context import Renderer, renderer
+from hairkit.render.framebuffer import SUPERSAMPLE, averaged, supersampled, target
+from hairkit.render.gl_camera import DepthRange
 from hairkit.render.hair import RibbonBuffers, draw_ribbons, ribbons
 from hairkit.render.head import Solid, draw_solid, head_solid
 from hairkit.render.light import Lights, LightVolume, hair_density, light_volume
-from hairkit.render.projection import DepthRange
-from hairkit.render.target import SUPERSAMPLE, averaged, supersampled, target
-from hairkit.stored import Float32Array, UInt8Array
-from hairkit.strands import Strands
+from hairkit.storage import Float32Array, UInt8Array
+from hairkit.types.camera import Camera
+from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.head import Head
+from hairkit.types.strands import Strands
 
 BACKDROP_TOP, BACKDROP_BOTTOM = (176, 180, 184), (214, 216, 218)
 """sRGB of the neutral backdrop."""

@@ -5,9 +5,9 @@ The methods are plugins: `manager.call("make_simulator", "pbd", groom=groom)` re
 
 from __future__ import annotations
 
-from hairkit.simulate.contract import Grab, Measures, Simulator, Surroundings
 from hairkit.simulate.motion import HeadMotion, Shake, read_motion, shaken, still
 from hairkit.simulate.running import Weather, run
+from hairkit.simulate.simulator import Grab, Measures, Simulator, Surroundings
 
 __all__ = [
     "Grab",

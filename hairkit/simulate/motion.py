@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.errors import FormatError, InputError
-from hairkit.head import Head
-from hairkit.simulate import rotation
-from hairkit.stored import Float64Array, frozen_array
+from hairkit.simulate import quaternion
+from hairkit.storage import Float64Array, frozen_array
+from hairkit.types.head import Head
 
 AXES = {"pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.0), "roll": (0.0, 0.0, 1.0)}
 """Nod, turn and tilt: about +X, +Y and +Z of the head frame."""
@@ -61,7 +61,7 @@ class HeadMotion:
             )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "keys", keys)
-        object.__setattr__(self, "_turns", _continuous(rotation.from_matrix(turn)))
+        object.__setattr__(self, "_turns", _continuous(quaternion.from_matrix(turn)))
         if self.pivot is not None:
             pivot = frozen_array(self.pivot, np.float64, (3,), "motion pivot")
             object.__setattr__(self, "pivot", pivot)
@@ -94,7 +94,7 @@ class HeadMotion:
         slopes = [_slope(self.times, values, k) * span for k in (at, at + 1)]
         mixed = _hermite(values[at], slopes[0], values[at + 1], slopes[1], share)
         motion = np.eye(4)
-        motion[:3, :3] = rotation.to_matrix(rotation.unit(mixed[:4]))
+        motion[:3, :3] = quaternion.to_matrix(quaternion.unit(mixed[:4]))
         motion[:3, 3] = mixed[4:]
         return motion
 
@@ -103,7 +103,7 @@ class HeadMotion:
         for shake in self.shakes:
             angle = np.radians(shake.degrees) * np.sin(2 * np.pi * shake.hertz * time)
             angle *= _eased(time, shake.until)
-            turn = turn @ rotation.to_matrix(rotation.about(AXES[shake.axis], angle))
+            turn = turn @ quaternion.to_matrix(quaternion.about(AXES[shake.axis], angle))
         motion = np.eye(4)
         motion[:3, :3] = turn
         if self.pivot is not None:
@@ -153,7 +153,7 @@ def read_motion(path: Path) -> HeadMotion:
         The file is anything else.
     """
     if path.suffix.lower() in (".glb", ".gltf"):
-        from hairkit.glb_motion import read_head_motion
+        from hairkit.io.glb_motion import read_head_motion
 
         times, keys = read_head_motion(path)
         return HeadMotion(times, keys)
@@ -190,7 +190,7 @@ def _key(frame: dict[str, object]) -> Float64Array:
     key = np.eye(4)
     turns = [("yaw", yaw), ("roll", roll), ("pitch", pitch)]
     for name, angle in turns:
-        key[:3, :3] = key[:3, :3] @ rotation.to_matrix(rotation.about(AXES[name], angle))
+        key[:3, :3] = key[:3, :3] @ quaternion.to_matrix(quaternion.about(AXES[name], angle))
     key[:3, 3] = np.array(frame.get("move", (0, 0, 0)), np.float64)
     return key
 

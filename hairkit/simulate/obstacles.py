@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.head import Capsules, Head
-from hairkit.head_distance import signed_distance
-from hairkit.stored import Float32Array, Float64Array, Stored, frozen_array
-from hairkit.volume import VoxelGrid
+from hairkit.head_model.signed_distance import signed_distance
+from hairkit.storage import Float32Array, Float64Array, Stored, frozen_array
+from hairkit.types.head import Capsules, Head
+from hairkit.types.volume import VoxelGrid
 
 SPACING = 0.005
 """Metres between the grid's values."""

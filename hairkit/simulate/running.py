@@ -9,11 +9,11 @@ from time import perf_counter
 import numpy as np
 
 from hairkit.errors import HairkitError, InputError
-from hairkit.point_cache import PointCache
 from hairkit.progress import Progress, Silent
-from hairkit.simulate.contract import Simulator, Surroundings
 from hairkit.simulate.motion import HeadMotion
-from hairkit.stored import Float32Array, Float64Array
+from hairkit.simulate.simulator import Simulator, Surroundings
+from hairkit.storage import Float32Array, Float64Array
+from hairkit.types.point_cache import PointCache
 
 STAGE = "simulate"
 """Name of the progress bar."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
-from hairkit.head import Head
-from hairkit.head_distance import signed_distance
-from hairkit.stored import Float32Array, Float64Array, Int32Array
-from hairkit.torso import EXPONENT, RINGS, loft, power, profile
-from hairkit.volume import VoxelGrid
+from hairkit.head_model.signed_distance import signed_distance
+from hairkit.head_model.torso import EXPONENT, RINGS, loft, power, profile
+from hairkit.storage import Float32Array, Float64Array, Int32Array
+from hairkit.types.head import Head
+from hairkit.types.volume import VoxelGrid
 
 _AROUND, _RINGS_DRAWN = 96, 72
 _CELL = 0.006

@@ -13,12 +13,12 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from hairkit.errors import InputError
-from hairkit.groom import Groom, HairMaterial
-from hairkit.head import Head, Roots
-from hairkit.scalp import sample_roots
-from hairkit.stored import Float32Array, Int64Array
-from hairkit.strands import Strands
+from hairkit.head_model.scalp import sample_roots
+from hairkit.storage import Float32Array, Int64Array
 from hairkit.synth.bust import Bust, Obstacle
+from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.head import Head, Roots
+from hairkit.types.strands import Strands
 
 StyleName = Literal["straight", "wavy", "curly", "short", "parted"]
 

@@ -15,12 +15,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.camera import Camera
-from hairkit.capture_reader import TURN
 from hairkit.errors import InputError
-from hairkit.groom import Groom
-from hairkit.head import Head
-from hairkit.mask import BACKGROUND, HAIR, PERSON
+from hairkit.io.capture_reader import TURN
 from hairkit.render import (
     Lights,
     Measured,
@@ -31,8 +27,12 @@ from hairkit.render import (
     drawn_width,
     points_at_depth,
 )
-from hairkit.stored import Float64Array, UInt8Array, write_bytes, write_npz, write_text
+from hairkit.storage import Float64Array, UInt8Array, write_bytes, write_npz, write_text
 from hairkit.synth.bust import Bust
+from hairkit.types.camera import Camera
+from hairkit.types.groom import Groom
+from hairkit.types.head import Head
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 DISTANCE = 0.756
 """From the camera to the head, metres."""

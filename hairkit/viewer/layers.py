@@ -12,20 +12,20 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from hairkit.camera import Camera
-from hairkit.capture_reader import read_capture
 from hairkit.errors import HairkitError, InputError
-from hairkit.head import Head
-from hairkit.mask import HAIR, PERSON, Mask
-from hairkit.orientation import OrientationMap
-from hairkit.pipeline import PHOTOS
+from hairkit.field.isosurface import volume_surface
+from hairkit.io.capture_reader import read_capture
+from hairkit.pipeline.reconstruct import PHOTOS
 from hairkit.render.head import Solid
-from hairkit.scene import Scene
-from hairkit.stored import Float32Array, Float64Array, Stored, UInt8Array, from_arrays, read_npz
+from hairkit.storage import Float32Array, Float64Array, Stored, UInt8Array, from_arrays, read_npz
 from hairkit.synth.bust import Bust
-from hairkit.viewer.line_pass import Board, LineSet
-from hairkit.volume import Hull, OrientationField, VoxelGrid
-from hairkit.volume_surface import volume_surface
+from hairkit.types.camera import Camera
+from hairkit.types.head import Head
+from hairkit.types.mask import HAIR, PERSON, Mask
+from hairkit.types.orientation import OrientationMap
+from hairkit.types.scene import Scene
+from hairkit.types.volume import Hull, OrientationField, VoxelGrid
+from hairkit.viewer.draw.lines import Board, LineSet
 
 BOARDS = ("photos", "masks", "orientation")
 """Layers of pictures in space, one a camera."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hairkit.errors import InputError
-from hairkit.groom import Groom
-from hairkit.groom_opening import groom_path, load_groom
 from hairkit.manager import Manager
+from hairkit.pipeline.open_groom import groom_path, load_groom
+from hairkit.types.groom import Groom
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.camera import Camera
-from hairkit.head import Head
-from hairkit.simulate.contract import Grab
-from hairkit.stored import Float32Array, Float64Array, Int64Array
+from hairkit.simulate.simulator import Grab
+from hairkit.storage import Float32Array, Float64Array, Int64Array
+from hairkit.types.camera import Camera
+from hairkit.types.head import Head
 
 REACH = 14.0
 """Pixels from the mouse within which a guide is picked."""

@@ -11,16 +11,16 @@ import numpy as np
 
 from hairkit.render.context import Renderer
 from hairkit.render.head import Solid, head_solid
-from hairkit.stored import UInt8Array
-from hairkit.viewer.budget import LEVELS, Budget
-from hairkit.viewer.colouring import point_values, ramp
-from hairkit.viewer.hair_look import HairLook
-from hairkit.viewer.hud import Readings
+from hairkit.storage import UInt8Array
+from hairkit.viewer.draw.colouring import point_values, ramp
+from hairkit.viewer.draw.frame import Shot, Stage
+from hairkit.viewer.draw.frame_budget import LEVELS, Budget
+from hairkit.viewer.draw.interface import HairLook
+from hairkit.viewer.draw.lines import LineSet
 from hairkit.viewer.layers import BOARDS
-from hairkit.viewer.line_pass import LineSet
 from hairkit.viewer.recording import free_name, write_png
 from hairkit.viewer.session import Session
-from hairkit.viewer.stage import Shot, Stage
+from hairkit.viewer.window.hud import Readings
 
 GUIDE_WIDER = 7.0
 """Guides shown alone are drawn this many times wider than hair."""

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from hairkit.errors import InputError
-from hairkit.stored import UInt8Array, write_bytes
+from hairkit.storage import UInt8Array, write_bytes
 
 FRAMES_PER_SECOND = 30
 

@@ -13,20 +13,20 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.camera import Camera
 from hairkit.errors import InputError
 from hairkit.manager import Manager
-from hairkit.simulate.contract import Measures, Surroundings
-from hairkit.stored import Float32Array, Float64Array
-from hairkit.viewer.adjusting import Adjustment, Rerun
-from hairkit.viewer.hair_body import GuideSampler, HairBody, split_guides
+from hairkit.simulate.simulator import Measures, Surroundings
+from hairkit.storage import Float32Array, Float64Array
+from hairkit.types.camera import Camera
+from hairkit.viewer.draw.hair_data import GuideSampler, HairBody, split_guides
+from hairkit.viewer.head_adjustment import Adjustment, Rerun
+from hairkit.viewer.head_motion import HeadMotion
 from hairkit.viewer.layers import Layers
-from hairkit.viewer.motion import HeadMotion
 from hairkit.viewer.opening import Opened, open_path
+from hairkit.viewer.orbit_camera import OrbitView
 from hairkit.viewer.picking import Hold
 from hairkit.viewer.recording import Recorder
 from hairkit.viewer.simulation import Tuned
-from hairkit.viewer.view import OrbitView
 
 STEP = 1 / 60
 """Seconds of one step of the simulator as the session asks for it."""

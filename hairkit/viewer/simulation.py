@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import InputError
-from hairkit.groom import Groom
 from hairkit.manager import Manager
 from hairkit.options import OptionInfo, unknown_name
-from hairkit.simulate.contract import Measures, Simulator, Surroundings
-from hairkit.stored import Float32Array
-from hairkit.strands import Strands
+from hairkit.simulate.simulator import Measures, Simulator, Surroundings
+from hairkit.storage import Float32Array
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
 PREFERRED = "pbd"
 STILL = "none"

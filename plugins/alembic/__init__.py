@@ -14,10 +14,10 @@ from __future__ import annotations
 from pathlib import Path
 from types import MappingProxyType
 
-from hairkit.exporting import prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.groom import Groom
+from hairkit.grooming.prepare_export import prepared
 from hairkit.hookspecs import hookimpl
+from hairkit.io.file_format import Feature, FileFormat
+from hairkit.types.groom import Groom
 
 from .options import Options
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import FormatError
-from hairkit.stored import Float32Array, Float64Array, Int64Array
+from hairkit.storage import Float32Array, Float64Array, Int64Array
 
 from .archive import Archive, Object, Property, tag
 from .transforms import transformed

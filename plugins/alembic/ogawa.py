@@ -11,8 +11,8 @@ import os
 import struct
 from pathlib import Path
 
-from hairkit.byte_reader import read_file
 from hairkit.errors import FormatError, InputError
+from hairkit.io.byte_reader import read_file
 
 _MAGIC, _HDF5, _FROZEN = b"Ogawa", b"\x89HDF", 0xFF
 _HEADER_BYTES = 16

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hairkit.exporting import AnimationOptions, ExportOptions
-from hairkit.file_space import SpaceOptions
-from hairkit.importing import ImportOptions
+from hairkit.grooming.adopt_strands import ImportOptions
+from hairkit.grooming.prepare_export import AnimationOptions, ExportOptions
+from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.options import option
 
 UNREAL_POINTS = 255

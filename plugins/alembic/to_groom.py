@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from hairkit.errors import FormatError
-from hairkit.file_space import FileSpace
-from hairkit.groom import Groom, HairMaterial
-from hairkit.importing import adopt, packed
-from hairkit.stored import BoolArray, Float32Array
-from hairkit.strands import Strands
+from hairkit.grooming.adopt_strands import adopt, packed
+from hairkit.io.coordinate_space import FileSpace
+from hairkit.storage import BoolArray, Float32Array
+from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.strands import Strands
 
 from .curve_sets import CurveSet, read_curve_sets
 from .options import Options

@@ -14,13 +14,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from hairkit.exporting import ExportOptions, prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.file_space import SPACES, FileSpace, SpaceOptions
-from hairkit.groom import Groom
+from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
+from hairkit.io.coordinate_space import SPACES, FileSpace, SpaceOptions
+from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
-from hairkit.stored import write_pieces
+from hairkit.storage import write_pieces
+from hairkit.types.groom import Groom
 
 FORMAT = FileFormat(
     title="FBX",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.head import Head
-from hairkit.head_skin import JOINT_NAMES, head_weights
-from hairkit.stored import Float32Array, Float64Array, Int32Array
+from hairkit.head_model.skinning import JOINT_NAMES, head_weights
+from hairkit.storage import Float32Array, Float64Array, Int32Array
+from hairkit.types.head import Head
 
 from .records import Record, array, number, record, text
 from .scene import SCENE, Scene, one, properties70

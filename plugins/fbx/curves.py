@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from hairkit.stored import Float64Array
-from hairkit.strands import Strands
+from hairkit.storage import Float64Array
+from hairkit.types.strands import Strands
 
 from .records import Record, array, number, record, text
 from .scene import SCENE, Scene

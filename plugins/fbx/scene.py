@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
 
-from hairkit.file_space import FileSpace
-from hairkit.head import Head
-from hairkit.strands import Strands
+from hairkit.io.coordinate_space import FileSpace
+from hairkit.types.head import Head
+from hairkit.types.strands import Strands
 
 from .records import (
     CREATION_TIME,

@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from hairkit.exporting import AnimationOptions, ExportOptions, prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.groom import Groom
+from hairkit.grooming.adopt_strands import ImportOptions
+from hairkit.grooming.prepare_export import AnimationOptions, ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.importing import ImportOptions
+from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
+from hairkit.types.groom import Groom
 
 FORMAT = FileFormat(
     "glTF",

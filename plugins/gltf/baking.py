@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.point_cache import PointCache
-from hairkit.stored import Float32Array, Float64Array
+from hairkit.storage import Float32Array, Float64Array
+from hairkit.types.point_cache import PointCache
 
 _STILL = 1e-7
 _WORTH_SAYING = 1e-4

@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 import hairkit
-from hairkit.byte_writer import as_bytes
-from hairkit.glb_file import BINARY_CHUNK, JSON_CHUNK
-from hairkit.point_blocks import bounds as bounds_of
-from hairkit.stored import write_pieces
+from hairkit.io.byte_writer import as_bytes
+from hairkit.io.glb_file import BINARY_CHUNK, JSON_CHUNK
+from hairkit.io.strand_blocks import bounds as bounds_of
+from hairkit.storage import write_pieces
 
 from .streamed import Streamed
 

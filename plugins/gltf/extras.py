@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.groom import Groom, HairMaterial, HairPhysics
-from hairkit.head import Capsules, Head
+from hairkit.types.groom import Groom, HairMaterial, HairPhysics
+from hairkit.types.head import Capsules, Head
 
 VERSION = 1
 _PHYSICS = ("stiffness", "bend_stiffness", "damping", "friction", "gravity")

@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import InputError
-from hairkit.exporting import selected
-from hairkit.groom import Groom
-from hairkit.guide_weights import guide_mask
-from hairkit.point_blocks import shares
-from hairkit.stored import Float32Array, Float64Array, UInt8Array
-from hairkit.strands import Strands
+from hairkit.grooming.guide_weights import guide_mask
+from hairkit.grooming.prepare_export import selected
+from hairkit.io.strand_blocks import shares
+from hairkit.storage import Float32Array, Float64Array, UInt8Array
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
 from .document import INDICES, Document, index_type
 from .streamed import Streamed, at_points, repeated, segments

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import FormatError
-from hairkit.glb_file import GlbFile, readable
-from hairkit.groom import Groom
-from hairkit.head import Head
-from hairkit.importing import ImportOptions, adopt, packed
-from hairkit.scalp import bind
-from hairkit.stored import Float32Array, Float64Array, Int64Array
-from hairkit.strands import Strands
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
+from hairkit.head_model.scalp import bind
+from hairkit.io.glb_file import GlbFile, readable
+from hairkit.storage import Float32Array, Float64Array, Int64Array
+from hairkit.types.groom import Groom
+from hairkit.types.head import Head
+from hairkit.types.strands import Strands
 
 from .extras import VERSION, capsules_of, material_of, physics_of, with_landmarks
 from .joining import joined
@@ -57,7 +57,7 @@ def read_gltf_groom(path: str | os.PathLike[str], options: ReaderOptions) -> Gro
 
     The transforms of nodes are applied; a skinned mesh is taken in its bind pose. A file of
     hairkit's brings head, skeleton, capsules, material and physics along, others get what
-    `hairkit.importing.adopt` says.
+    `hairkit.grooming.adopt_strands.adopt` says.
 
     Raises
     ------

@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 
 from hairkit.errors import InputError
-from hairkit.exporting import PreparedGroom
-from hairkit.groom import Groom
-from hairkit.stored import Float32Array, Float64Array
+from hairkit.grooming.prepare_export import PreparedGroom
+from hairkit.storage import Float32Array, Float64Array
+from hairkit.types.groom import Groom
 
 from .baking import Baked, bake
 from .document import Document

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.point_blocks import Block, blocks
-from hairkit.strands import Strands
+from hairkit.io.strand_blocks import Block, blocks
+from hairkit.types.strands import Strands
 
 
 @dataclass(frozen=True)

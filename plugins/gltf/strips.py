@@ -8,11 +8,12 @@ from typing import Protocol
 
 import numpy as np
 
-from hairkit.exporting import bound_roots, dense_groom, selected
-from hairkit.groom import Groom
-from hairkit.guide_weights import follow, guide_mask
-from hairkit.ribbons import Locks, Ribbons, frames, gathered, make_ribbons, outward
-from hairkit.stored import Float32Array
+from hairkit.grooming.guide_weights import follow, guide_mask
+from hairkit.grooming.prepare_export import bound_roots, dense_groom, selected
+from hairkit.storage import Float32Array
+from hairkit.types.groom import Groom
+
+from .ribbons import Locks, Ribbons, frames, gathered, make_ribbons, outward
 
 RIBBONS, CARDS = 4000, 800
 """Strips where the options say 0."""

@@ -13,13 +13,13 @@ from pathlib import Path
 from types import MappingProxyType
 
 from hairkit.errors import FormatError, InputError
-from hairkit.exporting import ExportOptions, prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.groom import Groom
+from hairkit.grooming.adopt_strands import ImportOptions, adopt
+from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.importing import ImportOptions, adopt
+from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
-from hairkit.stored import write_text
+from hairkit.storage import write_text
+from hairkit.types.groom import Groom
 
 from .asset import ApxAsset
 from .from_groom import groom_to_asset

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import FormatError
-from hairkit.stored import Float64Array, Int64Array
+from hairkit.storage import Float64Array, Int64Array
 
 MaterialValue = bool | int | float | str | tuple[float, ...]
 Material = MappingProxyType[str, MaterialValue]

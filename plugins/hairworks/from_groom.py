@@ -8,11 +8,11 @@ from typing import Protocol
 import numpy as np
 
 import hairkit
-from hairkit.groom import Groom
-from hairkit.head import Head, Roots
-from hairkit.scalp import growth_mesh, roots_at
-from hairkit.stored import Float64Array, Int64Array
-from hairkit.strands import Strands
+from hairkit.head_model.scalp import growth_mesh, roots_at
+from hairkit.storage import Float64Array, Int64Array
+from hairkit.types.groom import Groom
+from hairkit.types.head import Head, Roots
+from hairkit.types.strands import Strands
 
 from . import schema
 from .asset import ApxAsset, Material, MaterialValue

@@ -13,8 +13,8 @@ from xml.parsers import expat
 import numpy as np
 
 from hairkit.errors import FormatError
-from hairkit.number_text import read_numbers
-from hairkit.stored import Float64Array, Int64Array
+from hairkit.io.number_text import read_numbers
+from hairkit.storage import Float64Array, Int64Array
 
 from . import schema
 from .asset import ApxAsset, Material, MaterialValue

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from hairkit.errors import FormatError
-from hairkit.groom import Groom, HairMaterial, HairPhysics
-from hairkit.head import Capsules, Head
-from hairkit.stored import Float32Array, Float64Array, Int32Array, Int64Array
-from hairkit.strands import Strands
+from hairkit.storage import Float32Array, Float64Array, Int32Array, Int64Array
+from hairkit.types.groom import Groom, HairMaterial, HairPhysics
+from hairkit.types.head import Capsules, Head
+from hairkit.types.strands import Strands
 
 from .asset import ApxAsset, Material
 from .from_groom import BONES, FILE_FROM_HEAD, STANDARD_GRAVITY

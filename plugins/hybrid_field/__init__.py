@@ -21,12 +21,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
-from hairkit.combing import ScalpPrior, growth_potential, with_scalp_prior
+from hairkit.field.growth_prior import ScalpPrior, growth_potential, with_scalp_prior
+from hairkit.field.view_fusion import FusionOptions, fuse_views
 from hairkit.options import option
-from hairkit.plane_fusion import FusionOptions, fuse_views
 
-from .band import ribbons
-from .fields import (
+from .four_fields import (
     Fields,
     blended,
     growth_direction,
@@ -34,6 +33,7 @@ from .fields import (
     internal_distance,
     surface_structure,
 )
+from .ribbons import ribbons
 from .segments import find_segments
 
 __all__ = ["Options", "blended", "find_segments", "internal_distance", "ribbons"]

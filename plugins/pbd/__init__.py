@@ -17,7 +17,7 @@ from hairkit.hookspecs import hookimpl
 from hairkit.options import option
 
 if TYPE_CHECKING:
-    from hairkit.groom import Groom, HairPhysics
+    from hairkit.types.groom import Groom, HairPhysics
 
 __all__ = ["Options"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernel_lanes import at, lane_root, pick
-from .kernel_math import (
+from .simd import at, lane_root, pick
+from .simd_math import (
     carry,
     cross,
     dot,

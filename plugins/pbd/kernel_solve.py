@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kernel_lanes import at, pick, put
-from .kernel_math import dot, minus, plus, put_three, row, three, times
+from .simd import at, pick, put
+from .simd_math import dot, minus, plus, put_three, row, three, times
 
 LENGTH, FIRST, SECOND, PIVOT = 0, 8, 9, 10
 EDGE, DIRECTION = 0, 3

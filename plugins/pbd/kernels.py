@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from hairkit.stored import Float32Array
+from hairkit.storage import Float32Array
 
-from .kernel_lanes import LANES, at, lane_root, put
-from .kernel_math import dot, four, minus, plus, put_three, row, three, times
+from .kernel_contact import GRIP, LINES, brake_again, relengthen, touch
 from .kernel_rows import bow, constants_of, predict, spin, swing, twist
 from .kernel_solve import banded_solve, excess_of, lengths_solve, pull_back
-from .kernel_touch import GRIP, LINES, brake_again, relengthen, touch
+from .simd import LANES, at, lane_root, put
+from .simd_math import dot, four, minus, plus, put_three, row, three, times
 
 LENGTH, OVER, BEND, TWIST, CURVE, NATURAL, FIRST, SECOND, PIVOT = 0, 1, 2, 3, 4, 7, 8, 9, 10
 """Rows of an element's constants: length, 1/length, stiffnesses, natural turn (3), natural twist,

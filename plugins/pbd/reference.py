@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hairkit.simulate import rotation
+from hairkit.simulate import quaternion
 from hairkit.simulate.obstacles import Obstacles
-from hairkit.stored import Float64Array
+from hairkit.storage import Float64Array
 
+from .linear_system import System
 from .rods import Rods, half_binormal, half_way, shares, shifted, twist_between
-from .system import System
 
 SOFTEST = 1e-3
 """Compliance of lengths between nodes that an obstacle holds, as a share of the free one's."""
@@ -103,7 +103,7 @@ def pulled(
     old = carried(state, load.ride, rods, h)
     predicted = old.position + h * old.velocity
     edge = np.diff(predicted, axis=1)
-    direction = rotation.unit(edge)
+    direction = quaternion.unit(edge)
     frames = swung(old.frames, direction)
     frames = untwisted(rods, frames)
     force = elastic_force(rods, edge, frames)
@@ -123,7 +123,7 @@ def pulled(
     for _ in range(iterations):
         pull = tension(system, edge + _edges(free), direction, rods.length)
         change = free - system.inverse @ _edges_transposed(pull[..., None] * direction)
-        direction = rotation.unit(edge + _edges(change))
+        direction = quaternion.unit(edge + _edges(change))
     position, velocity = predicted.copy(), old.velocity.copy()
     position[:, 1:] += change
     velocity[:, 1:] += change / h
@@ -140,15 +140,15 @@ def carried(state: State, ride: Float64Array, rods: Rods, step: float) -> State:
     """Return the same state in the head axes at the substep's end; roots go with the head."""
     position = moved(ride, state.position)
     velocity = state.velocity @ ride[:3, :3].T
-    frames = rotation.product(rotation.from_matrix(ride[:3, :3]), state.frames)
+    frames = quaternion.product(quaternion.from_matrix(ride[:3, :3]), state.frames)
     velocity[:, 0] = (rods.points[:, 0] - position[:, 0]) / step
     return State(position, velocity, frames)
 
 
 def swung(frames: Float64Array, direction: Float64Array) -> Float64Array:
     """Return frames transported in time on to new directions, without spin about them."""
-    turn = rotation.swing(rotation.third_axis(frames), direction)
-    return rotation.unit(rotation.product(turn, frames))
+    turn = quaternion.swing(quaternion.third_axis(frames), direction)
+    return quaternion.unit(quaternion.product(turn, frames))
 
 
 def untwisted(rods: Rods, frames: Float64Array) -> Float64Array:
@@ -159,9 +159,9 @@ def untwisted(rods: Rods, frames: Float64Array) -> Float64Array:
     """
     before = rods.before(frames)
     torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
-    natural = rotation.rotated(half_way(before, frames), rods.curvature)
-    direction = rotation.third_axis(frames)
-    turn = direction - rotation.third_axis(before)
+    natural = quaternion.rotated(half_way(before, frames), rods.curvature)
+    direction = quaternion.third_axis(frames)
+    turn = direction - quaternion.third_axis(before)
     spun = rods.bend[..., None] * np.cross(natural, turn)
     first, second = shares(before, frames, spun)
     gradient = torque - shifted(torque) - (direction * (second + shifted(first))).sum(axis=-1)
@@ -173,25 +173,25 @@ def untwisted(rods: Rods, frames: Float64Array) -> Float64Array:
     angle = _tridiagonal(np.where(diagonal > 0, diagonal, 1.0), beside, -gradient)
     angle = np.clip(angle, -LARGEST_SPIN, LARGEST_SPIN)
     # half angles by a rational cosine and sine: exact turns, the angle right to third order
-    turn_by = rotation.unit(
+    turn_by = quaternion.unit(
         np.concatenate([np.ones_like(angle)[..., None], 0.5 * angle[..., None] * direction], -1)
     )
-    return rotation.product(turn_by, frames)
+    return quaternion.product(turn_by, frames)
 
 
 def elastic_force(rods: Rods, edge: Float64Array, frames: Float64Array) -> Float64Array:
     """Return the force (S, n, 3) of bending and twist on the nodes, minus the energy's slope."""
     before = rods.before(frames)
     reach = edge / rods.length[..., None]
-    held = rotation.third_axis(rods.root_frame)[:, None]
+    held = quaternion.third_axis(rods.root_frame)[:, None]
     turn = reach - np.concatenate([held, reach[:, :-1]], axis=1)
-    natural = rotation.rotated(half_way(before, frames), rods.curvature)
+    natural = quaternion.rotated(half_way(before, frames), rods.curvature)
     moment = rods.bend[..., None] * (natural - turn)
     spun = rods.bend[..., None] * np.cross(natural, turn)
     torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
     twisting = torque[..., None] * half_binormal(before, frames)
     first, second = shares(before, frames, spun)
-    direction = rotation.third_axis(frames)
+    direction = quaternion.third_axis(frames)
     pull = moment - twisting - shifted(moment + twisting)
     pull += np.cross(second + shifted(first), direction)
     pull /= rods.length[..., None]

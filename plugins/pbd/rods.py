@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import InputError
-from hairkit.simulate import rotation
-from hairkit.stored import Float64Array
+from hairkit.simulate import quaternion
+from hairkit.storage import Float64Array
 
 SHARPEST = 0.3
 """1 + the cosine of a turn is not taken as less: beyond 134 degrees twist no longer follows."""
@@ -105,7 +105,7 @@ def make_rods(
     gj = ei / 1.3 if torsion is None else np.broadcast_to(torsion, length.shape)
     direction = edge / length[..., None]
     held = direction[:, 0] if root_direction is None else np.asarray(root_direction, np.float64)
-    frames = transported(np.broadcast_to(rotation.unit(held), direction[:, 0].shape), direction)
+    frames = transported(np.broadcast_to(quaternion.unit(held), direction[:, 0].shape), direction)
     rods = Rods(
         nodes, mass, length, ei / span, gj / span, frames[:, 0], frames[:, 1:],
         np.zeros_like(nodes[:, 1:]), np.zeros_like(length),
@@ -116,11 +116,11 @@ def make_rods(
 def transported(held: Float64Array, direction: Float64Array) -> Float64Array:
     """Return frames (S, n, 4) without twist: of the root, then of the segments (Bishop 1975)."""
     first = np.broadcast_to([0.0, 0.0, 1.0], held.shape)
-    frames = [rotation.swing(first, held)]
+    frames = [quaternion.swing(first, held)]
     before = held
     for j in range(direction.shape[1]):
-        turn = rotation.swing(before, direction[:, j])
-        frames.append(rotation.unit(rotation.product(turn, frames[-1])))
+        turn = quaternion.swing(before, direction[:, j])
+        frames.append(quaternion.unit(quaternion.product(turn, frames[-1])))
         before = direction[:, j]
     return np.stack(frames, axis=1)
 
@@ -136,9 +136,9 @@ def loaded(rods: Rods, force: npt.ArrayLike) -> Rods:
     beyond = np.cumsum(weight[:, ::-1], axis=1)[:, ::-1][:, 1:]
     load = rods.length[..., None] * beyond
     before = rods.before(rods.frames)
-    direction = rotation.third_axis(rods.frames)
-    turn = direction - rotation.third_axis(before)
-    middle = rotation.third_axis(before) + direction
+    direction = quaternion.third_axis(rods.frames)
+    turn = direction - quaternion.third_axis(before)
+    middle = quaternion.third_axis(before) + direction
     along = (direction * middle).sum(axis=-1, keepdims=True)
     along = np.where(along > 1e-9, along, np.inf)  # a fold straight back has no middle
     binormal = half_binormal(before, rods.frames)
@@ -164,16 +164,16 @@ def loaded(rods: Rods, force: npt.ArrayLike) -> Rods:
 
 def _with_moments(rods: Rods, moment: Float64Array, torque: Float64Array) -> Rods:
     """Choose the natural shape so that the elements carry these moments at the present shape."""
-    direction = rotation.third_axis(rods.frames)
+    direction = quaternion.third_axis(rods.frames)
     before = rods.before(rods.frames)
-    turn = direction - rotation.third_axis(before)
+    turn = direction - quaternion.third_axis(before)
     soft = np.where(rods.bend > 0, rods.bend, np.inf)[..., None]
     natural = turn - moment / soft
     middle = half_way(before, rods.frames)
     twisting = np.where(rods.twist > 0, rods.twist, np.inf)
     return replace(
         rods,
-        curvature=rotation.rotated(rotation.inverse(middle), natural),
+        curvature=quaternion.rotated(quaternion.inverse(middle), natural),
         natural_twist=twist_between(before, rods.frames) - torque / twisting,
     )
 
@@ -181,12 +181,12 @@ def _with_moments(rods: Rods, moment: Float64Array, torque: Float64Array) -> Rod
 def half_way(before: Float64Array, after: Float64Array) -> Float64Array:
     """Return the frames half way between neighbours."""
     sign = np.where((before * after).sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
-    return rotation.unit(before + sign * after)
+    return quaternion.unit(before + sign * after)
 
 
 def twist_between(before: Float64Array, after: Float64Array) -> Float64Array:
     """Return the twist about their direction between neighbouring frames, radians."""
-    step = rotation.product(rotation.inverse(before), after)
+    step = quaternion.product(quaternion.inverse(before), after)
     sign = np.where(step[..., 0] < 0, -1.0, 1.0)
     result: Float64Array = 2.0 * np.arctan2(sign * step[..., 3], sign * step[..., 0])
     return result
@@ -194,7 +194,7 @@ def twist_between(before: Float64Array, after: Float64Array) -> Float64Array:
 
 def half_binormal(before: Float64Array, after: Float64Array) -> Float64Array:
     """Return a x b / (1 + a.b) of directions a, b: how twist follows a change of either."""
-    first, second = rotation.third_axis(before), rotation.third_axis(after)
+    first, second = quaternion.third_axis(before), quaternion.third_axis(after)
     cosine = (first * second).sum(axis=-1, keepdims=True)
     result: Float64Array = np.cross(first, second) / np.maximum(1.0 + cosine, SHARPEST)
     return result
@@ -208,7 +208,7 @@ def shares(
     The frame half way turns by half the sum of both turns, and by the tangent of a quarter of the
     angle between them for their difference.
     """
-    step = rotation.product(after, rotation.inverse(before))
+    step = quaternion.product(after, quaternion.inverse(before))
     sign = np.where(step[..., :1] < 0, -1.0, 1.0)
     quarter = sign * step[..., 1:] / (1.0 + sign * step[..., :1])
     aside = np.cross(quarter, torque)

@@ -9,25 +9,25 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.exporting import selected
-from hairkit.groom import Groom
-from hairkit.guide_weights import guide_mask
+from hairkit.grooming.guide_weights import guide_mask
+from hairkit.grooming.prepare_export import selected
 from hairkit.render.context import on_graphics_card
 from hairkit.simulate import Measures, Surroundings
 from hairkit.simulate.obstacles import Obstacles, head_obstacles
 from hairkit.simulate.wind import air_velocity, gust_waves
-from hairkit.stored import Float32Array, Float64Array
-from hairkit.strands import Strands
+from hairkit.storage import Float32Array, Float64Array
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
-from .course import between, course, inverse_motion
-from .crowd import Crowd, crowd_of
+from .backend import Engine, ReferenceEngine
 from .energies import elastic_energy, largest_stretch
-from .engine import Engine, ReferenceEngine
-from .grabbing import Hand
-from .guides import node_points, riders, stiffest
+from .grab import Hand
+from .hair_grid import Crowd, crowd_of
+from .head_interpolation import between, course, inverse_motion
+from .linear_system import Rates, System, assemble
 from .reference import Contact, Load, at_rest, moved
+from .resampling import node_points, riders, stiffest
 from .rods import Rods, loaded, make_rods
-from .system import Rates, System, assemble
 
 if TYPE_CHECKING:
     from . import Options
@@ -278,10 +278,10 @@ def _engine(name: str, rods: Rods, contact: Contact) -> Engine:
     if name == "reference":
         return ReferenceEngine(rods, contact)
     if name == "compute" or (name == "auto" and on_graphics_card()):
-        from .compute import ComputeEngine
+        from .gl_backend import ComputeEngine
 
         return ComputeEngine(rods, contact)
-    from .fast import FastEngine  # Numba loads where it is used
+    from .numba_backend import FastEngine  # Numba loads where it is used
 
     return FastEngine(rods, contact)
 

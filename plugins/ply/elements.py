@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.byte_reader import ByteReader
 from hairkit.errors import FormatError
-from hairkit.number_text import read_numbers
+from hairkit.io.byte_reader import ByteReader
+from hairkit.io.number_text import read_numbers
 
 Elements = dict[str, dict[str, npt.NDArray[np.generic]]]
 """Values (N,) by element and property."""

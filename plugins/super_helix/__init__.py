@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from hairkit.groom import Groom
 from hairkit.hookspecs import hookimpl
 from hairkit.options import option
+from hairkit.types.groom import Groom
 
 if TYPE_CHECKING:
     from .simulator import SuperHelices

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from hairkit.errors import InputError
-from hairkit.geometry import adaptive_counts, fit_arcs
-from hairkit.geometry.helix_strands import travelling
-from hairkit.geometry.path import Path
-from hairkit.stored import Float64Array, Int64Array
-from hairkit.strands import Strands
+from hairkit.helices import adaptive_counts, fit_arcs
+from hairkit.helices.arc_length import Path
+from hairkit.helices.helix_strands import travelling
+from hairkit.storage import Float64Array, Int64Array
+from hairkit.types.strands import Strands
 
-from .nodes import carried, compiled, node, onward, times, turns
+from .element_kernels import carried, compiled, node, onward, times, turns
 from .rods import Rods
 
 SHAPE, FEWEST, MOST = 0.0015, 8, 32

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from hairkit.stored import Float64Array
+from hairkit.storage import Float64Array
 
-from .nodes import compiled
+from .element_kernels import compiled
 
 
 @compiled

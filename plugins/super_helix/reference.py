@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
-from hairkit.stored import Float64Array
+from hairkit.storage import Float64Array
 
+from .contact import touch
 from .kinematics import Placed, place
 from .rods import NODES, Rods
 from .state import CLOSE, FAR, Loads, Motion, Step
-from .touch import touch
 
 
 def mass_matrix(rod: Rods, placed: Placed) -> Float64Array:

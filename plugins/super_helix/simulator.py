@@ -9,16 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import InputError
-from hairkit.groom import Groom
-from hairkit.simulate import Measures, Surroundings, rotation
+from hairkit.simulate import Measures, Surroundings, quaternion
 from hairkit.simulate.obstacles import Obstacles, head_obstacles
 from hairkit.simulate.wind import air_velocity
-from hairkit.stored import Float32Array, Float64Array
-from hairkit.strands import Strands
+from hairkit.storage import Float32Array, Float64Array
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
 from .binding import draw, rods_of
-from .neighbours import Neighbours
-from .recursion import place_points, step_strands
+from .hair_contact import Neighbours
+from .linear_time_step import place_points, step_strands
 from .reference import step_densely
 from .rods import NODES, Rods
 from .state import Loads, Motion, Step
@@ -109,13 +109,13 @@ class SuperHelices:
             raise InputError(f"cannot advance by {seconds} s, expected seconds above 0")
         count = max(1, int(np.ceil(seconds / FRAME * self._options.substeps - 1e-6)))
         start, end = self._head, surroundings.head_from_rest
-        turns = rotation.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
+        turns = quaternion.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
         air = self._air(surroundings)
         for substep in range(1, count + 1):
             share = substep / count
             head = end.copy()
             if substep < count:
-                head[:3, :3] = rotation.to_matrix(rotation.slerp(turns[0], turns[1], share))
+                head[:3, :3] = quaternion.to_matrix(quaternion.slerp(turns[0], turns[1], share))
                 head[:3, 3] = (1 - share) * start[:3, 3] + share * end[:3, 3]
             self._substep(seconds / count, head, surroundings, air)
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import eigh
 
-from hairkit.stored import Float64Array
+from hairkit.storage import Float64Array
 
-from .nodes import compiled, node, onward, times, turns
+from .element_kernels import compiled, node, onward, times, turns
 from .rods import NODES, SHARES, WEIGHTS, Rods
 from .threads import over_strands
 

@@ -14,16 +14,23 @@ from types import MappingProxyType
 
 import numpy as np
 
-from hairkit.byte_reader import ByteReader, read_file
-from hairkit.exporting import ExportOptions, prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.file_space import SpaceOptions
-from hairkit.groom import Groom, HairMaterial
+from hairkit.grooming.adopt_strands import (
+    ImportOptions,
+    adopt,
+    packed,
+    plain_widths,
+    rows_kept,
+    with_mean_width,
+)
+from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.importing import ImportOptions, adopt, packed, plain_widths, rows_kept, with_mean_width
+from hairkit.io.byte_reader import ByteReader, read_file
+from hairkit.io.coordinate_space import SpaceOptions
+from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
-from hairkit.stored import Float32Array, write_bytes, write_pieces
-from hairkit.strands import Strands
+from hairkit.storage import Float32Array, write_bytes, write_pieces
+from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.strands import Strands
 
 from .binary import TfxHair, read_binary
 from .bones import bone_bytes

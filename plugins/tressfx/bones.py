@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 
-from hairkit.byte_writer import joined
+from hairkit.io.byte_writer import joined
 
 JOINTS = ("root", "neck", "head")
 """Names of the joints of a groom's head, in its order."""

@@ -18,13 +18,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
-from hairkit.exporting import AnimationOptions, ExportOptions, prepared
-from hairkit.file_format import Feature, FileFormat
-from hairkit.file_space import SpaceOptions
-from hairkit.groom import Groom
+from hairkit.grooming.adopt_strands import ImportOptions
+from hairkit.grooming.prepare_export import AnimationOptions, ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.importing import ImportOptions
+from hairkit.io.coordinate_space import SpaceOptions
+from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
+from hairkit.types.groom import Groom
 
 FORMAT = FileFormat(
     title="USD",

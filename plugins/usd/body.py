@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.exporting import PreparedGroom
-from hairkit.file_space import FileSpace
-from hairkit.head import Head
-from hairkit.head_skin import JOINT_NAMES, head_weights
-from hairkit.point_cache import PointCache
-from hairkit.stored import Float64Array
+from hairkit.grooming.prepare_export import PreparedGroom
+from hairkit.head_model.skinning import JOINT_NAMES, head_weights
+from hairkit.io.coordinate_space import FileSpace
+from hairkit.storage import Float64Array
+from hairkit.types.head import Head
+from hairkit.types.point_cache import PointCache
 
 JOINTS = tuple("/".join(JOINT_NAMES[: count + 1]) for count in range(len(JOINT_NAMES)))
 """USD names joints by their paths: root, root/neck, root/neck/head."""

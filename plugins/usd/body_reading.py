@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from hairkit.errors import FormatError, InputError
-from hairkit.file_space import FileSpace
-from hairkit.head import Head
-from hairkit.head_skin import JOINT_NAMES
-from hairkit.stored import Float32Array, Int32Array
+from hairkit.head_model.skinning import JOINT_NAMES
+from hairkit.io.coordinate_space import FileSpace
+from hairkit.storage import Float32Array, Int32Array
+from hairkit.types.head import Head
 
 from .guarded import Contents
 from .settings import capsules_from, numbers

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.exporting import PreparedGroom, point_colours
-from hairkit.file_space import FileSpace
-from hairkit.groom import Groom
-from hairkit.guide_weights import closest_guides
-from hairkit.head_skin import HEAD_JOINT
-from hairkit.stored import Float32Array, Int32Array
+from hairkit.grooming.guide_weights import closest_guides
+from hairkit.grooming.prepare_export import PreparedGroom, point_colours
+from hairkit.head_model.skinning import HEAD_JOINT
+from hairkit.io.coordinate_space import FileSpace
+from hairkit.storage import Float32Array, Int32Array
+from hairkit.types.groom import Groom
 
 
 def add_hair(

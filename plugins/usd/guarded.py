@@ -15,7 +15,7 @@ from typing import Any
 import numpy.typing as npt
 
 from hairkit.errors import FormatError, InputError, MissingExtraError
-from hairkit.stored import read_npz
+from hairkit.storage import read_npz
 
 from .stage import MISSING
 

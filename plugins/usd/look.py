@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from hairkit.groom import Groom
-from hairkit.stored import Float32Array
+from hairkit.storage import Float32Array
+from hairkit.types.groom import Groom
 
 SKIN = (0.5, 0.36, 0.29)
 """Linear RGB of the head mesh, whose colour the photos do not give."""

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import FormatError
-from hairkit.groom import Groom, HairMaterial, HairPhysics
-from hairkit.head import Capsules
+from hairkit.types.groom import Groom, HairMaterial, HairPhysics
+from hairkit.types.head import Capsules
 
 _T = TypeVar("_T", HairMaterial, HairPhysics)
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from hairkit.errors import InputError, MissingExtraError
-from hairkit.exporting import PreparedGroom
-from hairkit.file_space import FileSpace
+from hairkit.grooming.prepare_export import PreparedGroom
+from hairkit.io.coordinate_space import FileSpace
 
 MISSING = "USD files need usd-core, which is not installed: pip install 'hairkit[usd]'"
 DIGITS = 6
@@ -114,7 +114,7 @@ def _export(stage: Any, path: Path) -> None:
     try:
         stage.GetRootLayer().Export(temporary)
         with open(temporary, "rb+") as file:
-            os.fsync(file.fileno())  # as hairkit.stored does: the name is not before the bytes
+            os.fsync(file.fileno())  # as hairkit.storage does: the name is not before the bytes
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, path)
     except BaseException:

@@ -10,11 +10,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from hairkit.errors import FormatError, InputError
-from hairkit.file_space import FileSpace
-from hairkit.groom import Groom, HairMaterial
-from hairkit.importing import ImportOptions, adopt, packed, rows_kept
-from hairkit.stored import Float32Array, Int32Array, Int64Array
-from hairkit.strands import Strands
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed, rows_kept
+from hairkit.io.coordinate_space import FileSpace
+from hairkit.storage import Float32Array, Int32Array, Int64Array
+from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.strands import Strands
 
 from .body_reading import read_head
 from .guarded import Contents, contents

@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from hairkit.exporting import bound_roots
+from hairkit.grooming.prepare_export import bound_roots
 
 
 @pytest.fixture

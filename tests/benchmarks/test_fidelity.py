@@ -9,7 +9,7 @@ from types import ModuleType
 
 import pytest
 
-from hairkit.evaluate.figures import Figure
+from hairkit.evaluate.scorecard import Figure
 
 
 @pytest.fixture

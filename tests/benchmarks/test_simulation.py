@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from hairkit.groom import Groom
+from hairkit.types.groom import Groom
 
 
 @pytest.fixture

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from hairkit.cli import main
-from hairkit.groom_file import read_groom, write_groom
 from hairkit.manager import DISABLE_AUTOLOAD
-from hairkit.strands import Strands
 from hairkit.testing import bristle_groom
+from hairkit.types.groom_file import read_groom, write_groom
+from hairkit.types.strands import Strands
 
 
 @pytest.fixture

@@ -10,8 +10,8 @@ import pytest
 from ball import PLUGIN_FILE, write_capture
 
 from hairkit.cli import main
-from hairkit.groom_file import write_groom
 from hairkit.testing import bristle_groom, turn_scene
+from hairkit.types.groom_file import write_groom
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from hairkit.cli import main
-from hairkit.groom_file import write_groom
 from hairkit.testing import bristle_groom
-from hairkit.viewer.actions import ACTIONS
+from hairkit.types.groom_file import write_groom
+from hairkit.viewer.actions.actions import ACTIONS
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ from blender_session import VARIABLE, BlenderSession, blender_python, z_up
 from client_groom import wandering
 from rich_groom import rich_groom
 
-from hairkit.groom import Groom
-from hairkit.guide_weights import follow
-from hairkit.point_cache import PointCache
+from hairkit.grooming.guide_weights import follow
+from hairkit.types.groom import Groom
+from hairkit.types.point_cache import PointCache
 
 
 @pytest.fixture(scope="session")

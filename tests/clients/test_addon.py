@@ -11,10 +11,10 @@ import pytest
 from blender_session import BlenderSession, blender_python, only, z_up
 from client_groom import read_back, written
 
-from hairkit.capture_reader import sample_folder
-from hairkit.groom import Groom
-from hairkit.groom_file import read_groom, write_groom
+from hairkit.io.capture_reader import sample_folder
 from hairkit.manager import Manager
+from hairkit.types.groom import Groom
+from hairkit.types.groom_file import read_groom, write_groom
 
 ADDON = Path(__file__).parents[2] / "examples" / "hairkit-blender"
 FIND_TOOL = "import bpy; print(bpy.utils.resource_path('LOCAL'))"

@@ -10,11 +10,11 @@ import pytest
 from blender_session import BlenderSession, only, z_up
 from client_groom import moved, nodding, read_back, written
 
-from hairkit.exporting import point_colours
-from hairkit.groom import Groom
-from hairkit.guide_weights import closest_guides
-from hairkit.head_skin import JOINT_NAMES, head_weights
+from hairkit.grooming.guide_weights import closest_guides
+from hairkit.grooming.prepare_export import point_colours
+from hairkit.head_model.skinning import JOINT_NAMES, head_weights
 from hairkit.manager import Manager
+from hairkit.types.groom import Groom
 
 OPERATORS = {".abc": "wm.alembic_import", ".usda": "wm.usd_import", ".usdc": "wm.usd_import"}
 ALL = pytest.mark.parametrize("ending", OPERATORS)

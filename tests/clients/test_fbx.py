@@ -10,9 +10,9 @@ import pytest
 from blender_session import BlenderSession, only, z_up
 from client_groom import written
 
-from hairkit.groom import Groom
-from hairkit.head_skin import JOINT_NAMES, head_weights
+from hairkit.head_model.skinning import JOINT_NAMES, head_weights
 from hairkit.manager import Manager
+from hairkit.types.groom import Groom
 
 IMPORTERS = ["import_scene.fbx", "wm.fbx_import"]
 AXES = ["y_up_centimetres", "z_up_metres", "unreal"]

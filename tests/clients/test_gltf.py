@@ -11,10 +11,10 @@ import pytest
 from blender_session import BlenderSession, only, z_up
 from client_groom import moved, nodding, written
 
-from hairkit.groom import Groom
-from hairkit.head_skin import HEAD_JOINT, JOINT_NAMES
+from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES
 from hairkit.manager import Manager
-from hairkit.strands import Strands
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
 STRIPS, POINTS = 30, 12
 RIBBONS = {"lines": "none", "strips": STRIPS, "strip_points": POINTS}

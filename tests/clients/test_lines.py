@@ -10,10 +10,10 @@ import pytest
 from blender_session import BlenderSession, only, z_up
 from client_groom import read_back, written
 
-from hairkit.exporting import point_colours
-from hairkit.groom import Groom
+from hairkit.grooming.prepare_export import point_colours
 from hairkit.manager import Manager
-from hairkit.strands import Strands
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
 OPERATORS = {".ply": "wm.ply_import", ".obj": "wm.obj_import"}
 AXES = {"forward_axis": "NEGATIVE_Z", "up_axis": "Y"}

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from hairkit.groom import Groom
-from hairkit.groom_file import write_groom
-from hairkit.orientation import OrientationMap, wrap_angle
-from hairkit.scene import Scene
 from hairkit.testing import ball_mask, bristle_groom, turn_scene
+from hairkit.types.groom import Groom
+from hairkit.types.groom_file import write_groom
+from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.scene import Scene
 
 
 @pytest.fixture

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hairkit.camera import Camera
 from hairkit.errors import InputError
 from hairkit.evaluate.align import Similarity, align, alignment_points, camera_errors
-from hairkit.strands import Strands
 from hairkit.testing import VIEW_NAMES, turn_scene
+from hairkit.types.camera import Camera
+from hairkit.types.strands import Strands
 
 POINTS = np.random.default_rng(0).uniform(-0.1, 0.1, (200, 3)).astype(np.float32)
 NOTHING = Similarity(1.0, np.eye(3), np.zeros(3))

@@ -16,9 +16,9 @@ from hairkit.errors import FormatError, InputError
 from hairkit.evaluate import Evaluation, Truth, read_prediction, read_truth
 from hairkit.evaluate import evaluate as evaluate_whole
 from hairkit.evaluate.align import Similarity
-from hairkit.evaluate.figures import Figure, band_text, figures, mean_figures
 from hairkit.evaluate.prediction import Prediction
 from hairkit.evaluate.report import write_report
+from hairkit.evaluate.scorecard import Figure, band_text, figures, mean_figures
 from hairkit.testing import VIEW_NAMES
 
 

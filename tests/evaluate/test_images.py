@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairkit.camera import Camera
 from hairkit.errors import InputError
 from hairkit.evaluate.images import (
     direction_share,
@@ -15,9 +14,10 @@ from hairkit.evaluate.images import (
     orientation_error,
 )
 from hairkit.evaluate.scores import sample_strands
-from hairkit.orientation import OrientationMap, wrap_angle
-from hairkit.strands import Strands
 from hairkit.testing import ball_head
+from hairkit.types.camera import Camera
+from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.strands import Strands
 
 CAMERA = Camera.on_turn(0.0, distance=1.0, focal=400.0, width=120, height=100)
 UPRIGHT = np.full((100, 120), 128, np.uint8)

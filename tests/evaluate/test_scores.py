@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hairkit.camera import Camera
 from hairkit.errors import InputError
-from hairkit.evaluate.matching import HashGrid, first_hits, first_hits_by_hand
+from hairkit.evaluate.depth_map import first_surface
+from hairkit.evaluate.neighbour_search import HashGrid, first_hits, first_hits_by_hand
 from hairkit.evaluate.scores import Score, sample_strands, strand_scores
-from hairkit.evaluate.surface import first_surface
 from hairkit.evaluate.truth import read_truth
-from hairkit.strands import Strands
+from hairkit.types.camera import Camera
+from hairkit.types.strands import Strands
 
 DOWN = np.array([0.0, -1.0, 0.0])
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import cv2
@@ -10,14 +9,11 @@ import numpy as np
 import pytest
 from hairkit_plugins import auto_matte
 
-from hairkit.capture import View
 from hairkit.errors import InputError
-from hairkit.mask import BACKGROUND, HAIR, PERSON
+from hairkit.types.capture import View
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 WIDTH, HEIGHT = 210, 280
-CAPTURES = Path(
-    os.environ.get("HAIRKIT_CAPTURES", Path(__file__).parents[3] / "shared" / "captures")
-)
 
 
 def portrait(bald: bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -96,11 +92,10 @@ def test_no_hair_is_told_in_one_line(kind: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.skipif(not (CAPTURES / "wavy").is_dir(), reason="captures are not beside the checkout")
-def test_hair_is_found_in_a_rendered_capture() -> None:
+def test_hair_is_found_in_a_rendered_capture(captures: Path) -> None:
     """The back of a head with wavy hair is found in a picture of a path tracer."""
-    pixels = cv2.imread(str(CAPTURES / "wavy/photos/4_back.jpg"))
-    truth = cv2.imread(str(CAPTURES / "wavy/masks/4_back.png"), cv2.IMREAD_GRAYSCALE)
+    pixels = cv2.imread(str(captures / "wavy/photos/4_back.jpg"))
+    truth = cv2.imread(str(captures / "wavy/masks/4_back.png"), cv2.IMREAD_GRAYSCALE)
     view = View("back", 180.0, np.ascontiguousarray(pixels[..., ::-1]))
     mask = auto_matte.segment(view=view, options=auto_matte.Options())
     assert overlap(mask.hair, truth == HAIR) > 0.75

@@ -12,9 +12,9 @@ from references import reference
 from rich_groom import rich_groom
 
 from hairkit.errors import FormatError, InputError
-from hairkit.groom import Groom
-from hairkit.strands import Strands
 from hairkit.testing import bristle_groom
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
 
 
 def by_hand(data: bytes) -> tuple[list[int], list[float], list[float]]:

@@ -18,8 +18,8 @@ from fuzzing import CASES, damaged, long_run
 from hypothesis import given
 from rich_groom import rich_groom
 
-from hairkit import importing
 from hairkit.errors import HairkitError, MissingExtraError, PluginError
+from hairkit.grooming import adopt_strands
 from hairkit.manager import Manager, PluginInfo
 from hairkit.testing import ball_head
 
@@ -109,7 +109,7 @@ def quiet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     level = logger.level
     logger.setLevel(logging.CRITICAL)
     small = replace(rich_groom(1), head=ball_head(4), root_triangle=np.zeros(1, np.int32))
-    monkeypatch.setattr(importing, "read_groom", lambda _: small)
+    monkeypatch.setattr(adopt_strands, "read_groom", lambda _: small)
     tracemalloc.start()
     yield
     tracemalloc.stop()

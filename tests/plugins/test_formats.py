@@ -12,11 +12,11 @@ import pytest
 from rich_groom import rich_groom, with_degenerate
 
 from hairkit.errors import MissingExtraError
-from hairkit.exporting import completed, selected
-from hairkit.file_format import Feature
-from hairkit.groom import Groom, HairMaterial, HairPhysics
+from hairkit.grooming.prepare_export import completed, selected
+from hairkit.head_model.scalp import evaluate, roots_at
+from hairkit.io.file_format import Feature
 from hairkit.manager import Manager, PluginInfo
-from hairkit.scalp import evaluate, roots_at
+from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 
 FORMATS = [info for info in Manager.loaded(autoload=False).plugins() if info.format is not None]
 FILES = [(info, suffix) for info in FORMATS for suffix in info.suffixes]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from hairkit_plugins import grabcut
 
-from hairkit.capture import View
 from hairkit.errors import FormatError, InputError
-from hairkit.mask import BACKGROUND, HAIR, PERSON
+from hairkit.types.capture import View
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 WIDTH, HEIGHT = 150, 200
 

@@ -11,14 +11,14 @@ import pytest
 from hairkit_plugins import hybrid_field, hybrid_growth
 from hairkit_plugins.hybrid_growth import Options, grown, track
 
-from hairkit import finishing
-from hairkit.head import Roots
+from hairkit.grooming import postprocess
+from hairkit.imaging.waves import Waves
 from hairkit.options import describe
-from hairkit.stored import Float32Array
-from hairkit.strands import Strands
+from hairkit.storage import Float32Array
 from hairkit.testing import ball_head, combed_field, scalp_roots, shell_hull, turn_scene
-from hairkit.volume import OrientationField, VoxelGrid
-from hairkit.waves import Waves
+from hairkit.types.head import Roots
+from hairkit.types.strands import Strands
+from hairkit.types.volume import OrientationField, VoxelGrid
 
 FREE = Options(slide_sine=0.0, waves=False, clearance=0.0)
 GRID = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.01)
@@ -26,7 +26,7 @@ GRID = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.01)
 
 @pytest.fixture(autouse=True)
 def _straight_hair(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(finishing, "measure_waves", lambda *_: Waves())
+    monkeypatch.setattr(postprocess, "measure_waves", lambda *_: Waves())
 
 
 def constant(way: tuple[float, float, float]) -> OrientationField:

@@ -9,8 +9,8 @@ import pytest
 from hairkit_plugins.manual import Options, estimate_scene
 from turntable import turntable
 
+from hairkit.cameras.turntable import Turn, rotation_matrix
 from hairkit.errors import InputError
-from hairkit.pose import Turn, rotation_matrix
 
 
 def test_the_head_is_seen_where_it_was_put() -> None:

@@ -12,8 +12,8 @@ from ball import write_grey
 from hairkit import Mask
 from hairkit.errors import InputError, PluginError
 from hairkit.manager import Manager
-from hairkit.mask import BACKGROUND, HAIR, PERSON
 from hairkit.testing import ball_mask, striped_view, turn_scene
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 VIEW = striped_view(90.0)
 TRUTH = ball_mask(turn_scene().cameras[0]).labels

@@ -16,10 +16,10 @@ import pytest
 from rich_groom import rich_groom, with_degenerate
 
 from hairkit.errors import InputError, OptionError
-from hairkit.groom import Groom
 from hairkit.manager import Manager
-from hairkit.stored import Float64Array
+from hairkit.storage import Float64Array
 from hairkit.testing import bristle_groom
+from hairkit.types.groom import Groom
 
 METRES = {"centimeter": 0.01, "meter": 1.0, "inch": 0.0254}
 STATEMENT = re.compile(r'createNode (\w+) -n "(\w+)"(?: -p "([\w|]+)")?')

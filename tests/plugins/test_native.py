@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.manager import Manager
-from hairkit.stored import to_arrays
+from hairkit.storage import to_arrays
 from hairkit.testing import bristle_groom
 
 

@@ -9,10 +9,10 @@ from hairkit_plugins.structure_tensor import Options, orient
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hairkit.capture import View
-from hairkit.mask import HAIR, Mask
-from hairkit.orientation import OrientationMap, angle_between
-from hairkit.stored import BoolArray, Float64Array, UInt8Array
+from hairkit.storage import BoolArray, Float64Array, UInt8Array
+from hairkit.types.capture import View
+from hairkit.types.mask import HAIR, Mask
+from hairkit.types.orientation import OrientationMap, angle_between
 
 SIZE = 1080
 """Options are meant for pictures of this height; the hair takes a part of them."""

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from hairkit_plugins.tensor_diffusion import Options, solve_field
 
-from hairkit import plane_fusion
-from hairkit.camera import Camera, CameraModel
-from hairkit.mask import HAIR, Mask
-from hairkit.orientation import OrientationMap, wrap_angle
-from hairkit.plane_fusion import _add_planes
-from hairkit.projection import pack_cameras
-from hairkit.scene import Scene
-from hairkit.stored import BoolArray, Float32Array, Float64Array
+from hairkit.cameras.projection_kernels import pack_cameras
+from hairkit.field import view_fusion
+from hairkit.field.view_fusion import _add_planes
+from hairkit.imaging.waves import Waves, measure_waves
+from hairkit.storage import BoolArray, Float32Array, Float64Array
 from hairkit.testing import ball_head
-from hairkit.volume import Hull, OrientationField, VoxelGrid, symmetric_matrices
-from hairkit.waves import Waves, measure_waves
+from hairkit.types.camera import Camera, CameraModel
+from hairkit.types.mask import HAIR, Mask
+from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.scene import Scene
+from hairkit.types.volume import Hull, OrientationField, VoxelGrid, symmetric_matrices
 
 RADIUS = 0.06
 CENTRE = np.array([0.0, 0.16, 0.0])
@@ -32,7 +32,7 @@ PLAIN = Options(scalp_weight=0.0, pool=0.0, unslant=False, smoothness=1e-3)
 @pytest.fixture(autouse=True)
 def _straight_hair(monkeypatch: pytest.MonkeyPatch) -> None:
     """Measuring waves takes longer than all the rest, and `PLAIN` has no use for them."""
-    monkeypatch.setattr(plane_fusion, "measure_waves", lambda *_: Waves())
+    monkeypatch.setattr(view_fusion, "measure_waves", lambda *_: Waves())
 
 
 def turn(model: CameraModel = "perspective") -> tuple[Camera, ...]:
@@ -129,7 +129,7 @@ def test_exact_angles_give_the_true_direction(along: Float64Array, model: Camera
 
 def test_straight_hair_survives_the_default_options(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pooling, slant and prior leave a straight field away from the scalp as it is."""
-    monkeypatch.setattr(plane_fusion, "measure_waves", measure_waves)
+    monkeypatch.setattr(view_fusion, "measure_waves", measure_waves)
     field = solve(Options())
     far = bun().dense & (bun().head_distance > 0.05)
     assert np.median(off_deg(main_directions(field, far))) < 2
@@ -140,7 +140,7 @@ def test_the_slant_of_waves_is_taken_off_before_views_are_fused(
 ) -> None:
     """Views that all show the same slant beside the truth give the truth; untreated they do not."""
     slant = 0.3
-    monkeypatch.setattr(plane_fusion, "measure_waves", lambda *_: Waves(0.005, 0.03, slant))
+    monkeypatch.setattr(view_fusion, "measure_waves", lambda *_: Waves(0.005, 0.03, slant))
     upright = np.array([0.0, 1.0, 0.0])
     maps = tuple(seen(camera, upright) for camera in turn("orthographic"))
     slanted = tuple(OrientationMap(wrap_angle(m.angle + slant), m.confidence) for m in maps)

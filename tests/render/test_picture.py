@@ -9,15 +9,15 @@ import sys
 import numpy as np
 import pytest
 
-from hairkit.camera import Camera
 from hairkit.errors import InputError, RenderError
-from hairkit.groom import HairMaterial
 from hairkit.render import Lights, draw, draw_views
 from hairkit.render import context as context_module
 from hairkit.render.context import BACKENDS, renderer
 from hairkit.render.light import hair_density, light_volume
-from hairkit.strands import Strands
 from hairkit.testing import bristle_groom
+from hairkit.types.camera import Camera
+from hairkit.types.groom import HairMaterial
+from hairkit.types.strands import Strands
 
 CAMERA = Camera.on_turn(20.0, distance=0.8, focal=140.0, width=80, height=60)
 
@@ -106,7 +106,7 @@ def test_both_backends_draw_the_same() -> None:
     script = (
         "import sys; from hairkit.errors import RenderError\n"
         "from hairkit.render import draw; from hairkit.testing import bristle_groom\n"
-        "from hairkit.camera import Camera\n"
+        "from hairkit.types.camera import Camera\n"
         "camera = Camera.on_turn(20.0, distance=0.8, focal=140.0, width=80, height=60)\n"
         "try: sys.stdout.buffer.write(draw(bristle_groom(), None, camera).tobytes())\n"
         "except RenderError as error: sys.exit(f'unavailable {error}')"

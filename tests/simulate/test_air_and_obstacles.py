@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.head import Capsules
-from hairkit.head_distance import distance_to
+from hairkit.head_model.signed_distance import distance_to
 from hairkit.simulate.obstacles import capsule_distance, head_obstacles
 from hairkit.simulate.wind import air_velocity
 from hairkit.testing import ball_head
+from hairkit.types.head import Capsules
 
 WIND = np.array([3.0, 0.0, 1.0])
 

@@ -11,24 +11,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hairkit.errors import InputError
-from hairkit.simulate import HeadMotion, read_motion, rotation, shaken, still
+from hairkit.simulate import HeadMotion, quaternion, read_motion, shaken, still
 from hairkit.testing import ball_head
 
 
 @given(st.integers(0, 2**32 - 1))
 def test_matrix_and_quaternion_are_each_others_inverse(seed: int) -> None:
     """From a quaternion to its matrix and back is the same turn."""
-    q = rotation.unit(np.random.default_rng(seed).normal(size=(5, 4)))
-    again = rotation.from_matrix(rotation.to_matrix(q))
+    q = quaternion.unit(np.random.default_rng(seed).normal(size=(5, 4)))
+    again = quaternion.from_matrix(quaternion.to_matrix(q))
     np.testing.assert_allclose(np.abs((again * q).sum(axis=1)), 1.0, atol=1e-12)
 
 
 def test_swings_bring_one_vector_to_the_other(rng: np.random.Generator) -> None:
     """The smallest turn maps start to end, for opposite vectors too."""
-    start = rotation.unit(rng.normal(size=(20, 3)))
-    end = rotation.unit(rng.normal(size=(20, 3)))
+    start = quaternion.unit(rng.normal(size=(20, 3)))
+    end = quaternion.unit(rng.normal(size=(20, 3)))
     end[0], end[1] = -start[0], start[1]
-    np.testing.assert_allclose(rotation.rotated(rotation.swing(start, end), start), end, atol=1e-9)
+    np.testing.assert_allclose(
+        quaternion.rotated(quaternion.swing(start, end), start), end, atol=1e-9
+    )
 
 
 def test_a_shake_begins_at_rest_and_keeps_the_neck() -> None:

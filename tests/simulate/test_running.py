@@ -12,12 +12,12 @@ import pytest
 
 from hairkit import cli
 from hairkit.errors import HairkitError, InputError
-from hairkit.groom import Groom
-from hairkit.groom_file import write_groom
 from hairkit.manager import Manager
-from hairkit.point_cache import PointCache, read_cache
 from hairkit.simulate import Weather, run, shaken, still
 from hairkit.testing import bristle_groom
+from hairkit.types.groom import Groom
+from hairkit.types.groom_file import write_groom
+from hairkit.types.point_cache import PointCache, read_cache
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def groom() -> Groom:
     """Return a few bristles."""
     ball = bristle_groom()
     pick = np.arange(0, len(ball.strands), 12)
-    from hairkit.exporting import selected
+    from hairkit.grooming.prepare_export import selected
 
     keep = np.zeros(len(ball.strands), bool)
     keep[pick] = True
@@ -197,7 +197,7 @@ def test_a_groom_without_strands_is_refused(
     groom: Groom, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One line says so, from simulate and from view."""
-    from hairkit.exporting import selected
+    from hairkit.grooming.prepare_export import selected
 
     bald = selected(groom, np.zeros(len(groom.strands), bool))
     assert simulate(bald, tmp_path, "-o", str(tmp_path / "c.npz")) == 2

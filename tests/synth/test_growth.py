@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairkit.default_head import default_head
 from hairkit.errors import InputError
-from hairkit.scalp import evaluate
+from hairkit.head_model.scalp import evaluate
+from hairkit.head_model.template import default_head
 from hairkit.synth import STYLES, StyleName, grow
 from hairkit.synth.bust import Bust, Obstacle
 

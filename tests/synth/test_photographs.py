@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 import pytest
 
-from hairkit.capture_reader import TURN
-from hairkit.default_head import default_head
 from hairkit.errors import InputError
 from hairkit.evaluate.truth import read_truth
-from hairkit.groom import Groom
-from hairkit.orientation import angle_between
+from hairkit.head_model.template import default_head
+from hairkit.io.capture_reader import TURN
 from hairkit.synth import grow, photograph
+from hairkit.types.groom import Groom
+from hairkit.types.orientation import angle_between
 
 SIZE = (90, 120)
 

@@ -13,12 +13,12 @@ from hairkit.errors import InputError, RenderError
 from hairkit.options import describe
 from hairkit.render import context
 from hairkit.render.context import renderer
-from hairkit.viewer.actions import perform
+from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import Recorder, free_name, write_png
 from hairkit.viewer.session import Session
 from hairkit.viewer.simulation import StillHair
-from hairkit.viewer.watching import EVERY, Watch, shader_files
+from hairkit.viewer.window.file_watcher import EVERY, Watch, shader_files
 
 PICTURE = np.full((48, 64, 3), (200, 60, 20), np.uint8)
 
@@ -75,7 +75,7 @@ def test_a_changed_file_is_noticed_once(tmp_path: Path) -> None:
 def test_all_shaders_of_the_viewer_are_watched() -> None:
     """A checkout's shaders are reloaded when they are saved."""
     names = {path.name for path in shader_files()}
-    assert {"viewer_stroke.comp", "marschner.glsl", "skin.frag"} <= names
+    assert {"viewer_raster.comp", "marschner.glsl", "skin.frag"} <= names
 
 
 def test_runaway_hair_is_put_back_to_rest(

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from hairkit.errors import InputError
-from hairkit.groom_file import write_groom
 from hairkit.manager import Manager
 from hairkit.render.context import renderer
-from hairkit.stored import Stored, to_arrays, write_npz
+from hairkit.storage import Stored, to_arrays, write_npz
 from hairkit.testing import (
     ball_mask,
     bristle_groom,
@@ -20,7 +19,8 @@ from hairkit.testing import (
     shell_hull,
     turn_scene,
 )
-from hairkit.viewer.actions import perform
+from hairkit.types.groom_file import write_groom
+from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.layers import BOARDS, Layers
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from hairkit.viewer.actions import ACTIONS
-from hairkit.viewer.colouring import COLOURINGS
-from hairkit.viewer.hud import help_lines, keys_label
-from hairkit.viewer.script import read_script
+from hairkit.viewer.actions.actions import ACTIONS
+from hairkit.viewer.actions.script import read_script
+from hairkit.viewer.draw.colouring import COLOURINGS
+from hairkit.viewer.window.hud import help_lines, keys_label
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,1 @@
+"""Cameras: turntable model, projection, silhouette coherence."""

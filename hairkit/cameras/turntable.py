@@ -1,0 +1,264 @@
+"""Poses from points and a turn of cameras: similarity fit, triangulation, and a turn's parameters.
+
+`Turn` maps a short vector to the cameras of a turn around the head: what all views share (the
+rig's tilt and place, magnification, perspective) and how each one strays from its nominal place.
+Refinement methods solve for that vector.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import InputError
+from hairkit.storage import Float64Array, frozen_array
+from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture
+
+MIN_LANDMARKS = 3
+COLLINEAR = 1e-3
+"""Points whose second spread is below this share of the first lie on a line."""
+
+SHARED, PER_VIEW = 8, 6
+"""Numbers of a turn that all views share, and numbers of each view."""
+LOG_MAGNIFICATION, PERSPECTIVE = 6, 7
+"""Where the shared numbers hold log(pixels per metre at the turn's centre) and 1 / distance."""
+MIN_PERSPECTIVE = 0.01
+"""Cameras are put no farther away than 1 / this, metres: there the picture is orthographic to a
+tenth of a pixel."""
+
+
+@dataclass(frozen=True, eq=False)
+class Similarity:
+    """A similarity `x -> scale * rotation @ x + translation`."""
+
+    scale: float
+    rotation: Float64Array
+    """(3, 3)."""
+    translation: Float64Array
+    """(3,)."""
+
+    def apply(self, points: npt.ArrayLike) -> Float64Array:
+        """Return the moved points (..., 3)."""
+        moved: Float64Array = (
+            self.scale * (np.asarray(points, np.float64) @ self.rotation.T) + self.translation
+        )
+        return moved
+
+    def inverse(self) -> Similarity:
+        """Return the similarity that undoes this one."""
+        scale, rotation = 1.0 / self.scale, self.rotation.T
+        return Similarity(scale, rotation, -scale * rotation @ self.translation)
+
+    def moved_camera(self, camera: Camera) -> Camera:
+        """Return the camera that sees `apply(x)` where `camera` sees `x`.
+
+        The world grows by `scale`; so does the distance, while an orthographic camera's pixels per
+        metre shrink.
+        """
+        matrix = np.eye(4)
+        matrix[:3, :3] = camera.rotation @ self.rotation.T
+        matrix[:3, 3] = self.scale * camera.translation - matrix[:3, :3] @ self.translation
+        orthographic = camera.model == "orthographic"
+        focal = camera.focal / self.scale if orthographic else camera.focal
+        return Camera(matrix, focal, camera.centre, camera.width, camera.height, camera.model)
+
+
+def fit_similarity(
+    source: npt.ArrayLike, target: npt.ArrayLike, weights: npt.ArrayLike | None = None
+) -> Similarity:
+    """Return the similarity that brings `source` (N, 3) to `target` (N, 3) with least weighted
+    squares.
+
+    Umeyama, "Least-squares estimation of transformation parameters between two point patterns"
+    (1991), with weights. Raises `InputError` for fewer than three points, points on one line, or
+    numbers that are not finite.
+    """
+    first = frozen_array(source, np.float64, (None, 3), "points to fit")
+    second = frozen_array(target, np.float64, (len(first), 3), "points to fit to")
+    raw = np.ones(len(first)) if weights is None else np.asarray(weights, np.float64)
+    if np.count_nonzero(raw > 0) < MIN_LANDMARKS:
+        raise InputError(
+            f"a similarity needs at least {MIN_LANDMARKS} points, got {np.count_nonzero(raw > 0)};"
+            " give more landmarks"
+        )
+    weight = (raw / raw.sum())[:, None]
+    mean_first, mean_second = (weight * first).sum(0), (weight * second).sum(0)
+    centred_first, centred_second = first - mean_first, second - mean_second
+    for points in (centred_first, centred_second):
+        _check_spread(points * np.sqrt(weight))
+    u, stretch, vt = np.linalg.svd((weight * centred_second).T @ centred_first)
+    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])
+    rotation = (u * sign) @ vt
+    scale = float((stretch * sign).sum() / (weight * centred_first**2).sum())
+    return Similarity(scale, rotation, mean_second - scale * rotation @ mean_first)
+
+
+def _check_spread(centred: Float64Array) -> None:
+    spread = np.linalg.svd(centred, compute_uv=False)
+    if spread[1] <= COLLINEAR * max(spread[0], 1e-300):
+        raise InputError(
+            "the landmarks lie on one line and fix no pose; give at least three that do not"
+        )
+
+
+def triangulate(
+    cameras: Sequence[Camera], pixels: npt.ArrayLike, weights: npt.ArrayLike | None = None
+) -> Float64Array:
+    """Return the points (N, 3) nearest to the rays through `pixels` (V, N, 2), least squares over
+    views.
+
+    `weights` (V, N) is 0 where a view does not know the point. A point that fewer than two views
+    know is NaN.
+    """
+    seen = np.asarray(pixels, np.float64)
+    weight = np.ones(seen.shape[:2]) if weights is None else np.asarray(weights, np.float64)
+    normal = np.zeros((seen.shape[1], 3, 3))
+    right = np.zeros((seen.shape[1], 3))
+    for camera, view_pixels, view_weight in zip(cameras, seen, weight, strict=True):
+        origin, direction = camera.rays(np.where(view_weight[:, None] > 0, view_pixels, 0.0))
+        across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
+        across *= view_weight[:, None, None]
+        normal += across
+        right += np.einsum("nij,nj->ni", across, origin)
+    points = np.full((seen.shape[1], 3), np.nan)
+    known = np.count_nonzero(weight > 0, axis=0) >= 2
+    if known.any():
+        points[known] = np.linalg.solve(normal[known], right[known][..., None])[..., 0]
+    return points
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """The family of cameras of a turn around the head, over a vector of `SHARED + PER_VIEW * V`
+    numbers.
+
+    Shared: rotation vector of the head in the rig (3, radians), the turn's centre in the head
+    frame (3, metres), log of the pixels per metre there, and 1 / distance (0 is orthographic). Per
+    view: azimuth, elevation and roll off the nominal place (radians), log of the distance over the
+    shared one, shift right and down (metres).
+    """
+
+    azimuths: Float64Array
+    """(V,) nominal azimuths, radians."""
+    sizes: npt.NDArray[np.int64]
+    """(V, 2) width and height in pixels."""
+    focal_ratios: Float64Array
+    """(V,) focal length of each view over the first one's."""
+
+    @classmethod
+    def of(cls, capture: Capture) -> Turn:
+        """Return the turn of a capture: its nominal azimuths and sizes, focal lengths from EXIF or
+        by size."""
+        sizes = np.array([(view.width, view.height) for view in capture.views])
+        focal = np.hypot(*sizes.T)
+        known = [view.focal_px for view in capture.views if view.focal_px is not None]
+        if len(known) == len(sizes):
+            focal = np.array(known, np.float64)
+        azimuths = np.radians([view.azimuth_deg for view in capture.views])
+        return cls(azimuths, sizes, focal / focal[0])
+
+    @property
+    def size(self) -> int:
+        """Length of the vector."""
+        return SHARED + PER_VIEW * len(self.azimuths)
+
+    def unpack(self, vector: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
+        """Return rotations (V, 3, 3), translations (V, 3) and focal lengths (V,) in pixels."""
+        views = vector[SHARED:].reshape(-1, PER_VIEW)
+        far = 1.0 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE)
+        view_rotation = _view_rotations(self.azimuths + views[:, 0], views[:, 1], views[:, 2])
+        rotation = view_rotation @ rotation_matrix(vector[:3])
+        offset = np.stack([views[:, 4], views[:, 5], far * np.exp(views[:, 3])], axis=1)
+        translation = offset - rotation @ vector[3:6]
+        return rotation, translation, np.exp(vector[LOG_MAGNIFICATION]) * far * self.focal_ratios
+
+    def tangents(self, vector: Float64Array) -> Float64Array:
+        """Return (V, 7, size): how camera motions follow the vector's numbers.
+
+        Rows: small rotation w and move t of camera coordinates, `dx = w x x + t`, then log of the
+        focal length.
+        """
+        step = 1e-6
+        result = np.zeros((len(self.azimuths), 7, self.size))
+        for column in range(SHARED):
+            moved = vector.copy()
+            moved[column] += step
+            result[:, :, column] = self._tangent(vector, moved) / step
+        own = np.arange(len(self.azimuths))
+        for column in range(PER_VIEW):
+            moved = vector.copy()
+            moved[SHARED + column :: PER_VIEW] += step
+            places = SHARED + PER_VIEW * own + column
+            result[own, :, places] = self._tangent(vector, moved) / step
+        return result
+
+    def _tangent(self, vector: Float64Array, moved: Float64Array) -> Float64Array:
+        """Return (V, 7) the small motions from the cameras of one vector to those of another close
+        by."""
+        rotation, translation, focal = self.unpack(vector)
+        turned, shifted, zoomed = self.unpack(moved)
+        spin = (turned - rotation) @ rotation.transpose(0, 2, 1)
+        w = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        move = shifted - translation - np.cross(w, translation)
+        return np.concatenate([w, move, np.log(zoomed / focal)[:, None]], axis=1)
+
+    def nominal(self, magnification: float, perspective: float) -> tuple[Camera, ...]:
+        """Return level cameras on the nominal turn about the origin: pixels per metre there, and 1
+        / distance."""
+        vector = np.zeros(self.size)
+        vector[LOG_MAGNIFICATION], vector[PERSPECTIVE] = np.log(magnification), perspective
+        return self.cameras(vector)
+
+    def cameras(self, vector: Float64Array) -> tuple[Camera, ...]:
+        """Return the cameras of a vector; `MIN_PERSPECTIVE` and less gives orthographic ones."""
+        rotation, translation, focal = self.unpack(vector)
+        flat = float(vector[PERSPECTIVE]) <= MIN_PERSPECTIVE
+        cameras = []
+        for r, t, f, (width, height) in zip(rotation, translation, focal, self.sizes, strict=True):
+            matrix = np.eye(4)
+            matrix[:3, :3], matrix[:3, 3] = r, t
+            centre = np.array([width / 2, height / 2])
+            if flat:
+                cameras.append(
+                    Camera(matrix, f / t[2], centre, int(width), int(height), "orthographic")
+                )
+            else:
+                cameras.append(Camera(matrix, float(f), centre, int(width), int(height)))
+        return tuple(cameras)
+
+
+def rotation_matrix(vector: npt.ArrayLike) -> Float64Array:
+    """Return the rotation (3, 3) about `vector` by its length in radians (Rodrigues)."""
+    axis = np.asarray(vector, np.float64)
+    angle = float(np.linalg.norm(axis))
+    if angle < 1e-12:
+        return np.eye(3) + _cross_matrix(axis)
+    cross = _cross_matrix(axis / angle)
+    result: Float64Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return result
+
+
+def _cross_matrix(v: Float64Array) -> Float64Array:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def _view_rotations(
+    azimuth: Float64Array, elevation: Float64Array, roll: Float64Array
+) -> Float64Array:
+    """Return (V, 3, 3), as `Camera.on_turn` sets its axes."""
+    zero = np.zeros_like(azimuth)
+    sin_a, cos_a, sin_e, cos_e = (
+        np.sin(azimuth),
+        np.cos(azimuth),
+        np.sin(elevation),
+        np.cos(elevation),
+    )
+    back = np.stack([sin_a * cos_e, sin_e, cos_a * cos_e], axis=1)
+    right = np.stack([cos_a, zero, -sin_a], axis=1)
+    down = np.stack([sin_a * sin_e, -cos_e, cos_a * sin_e], axis=1)
+    cosine, sine = np.cos(roll)[:, None], np.sin(roll)[:, None]
+    return np.stack([cosine * right - sine * down, sine * right + cosine * down, -back], axis=1)

@@ -1,0 +1,1 @@
+"""Methods on volumes: view fusion, growth prior, diffusion, sampling."""

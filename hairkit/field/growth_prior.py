@@ -1,0 +1,217 @@
+"""How hair flows where photos say little: ways through the hair from the scalp and to its tips.
+
+The way from the scalp and the way to the tips are chamfer distances through the hull (Borgefors
+1986), so hair flows from every root along the shortest way to where it ends: partings and bare
+faces appear by themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+from scipy import ndimage
+
+from hairkit.storage import BoolArray, Float32Array, Float64Array
+from hairkit.types.head import Head
+from hairkit.types.volume import Hull, VoxelGrid, outer_products
+
+WHORL_BEHIND = 0.03
+"""Metres behind the highest point of the head where the vertical axis of the crown's whorl
+stands."""
+SHORT_HAIR, LONG_HAIR = 0.03, 0.1
+"""Ways to the tips in metres below which hair is combed from the crown, and above which by the
+flow."""
+TIP_SLOPE = 0.2
+"""Slope of the growth potential among the tips; 1 before them."""
+FLOW_SMOOTHING = 2.0
+"""Standard deviation in cells that makes the chamfer distance's gradient smooth."""
+
+
+def combing_direction(
+    head: Head, hull: Hull, growth: Float32Array, points: npt.ArrayLike, lift: float
+) -> Float64Array:
+    """Return unit directions (N, 3), root to tip, in which hair leaves the scalp near `points` (N,
+    3).
+
+    Long hair: the tangential part of the growth potential's gradient. Hair shorter than
+    `SHORT_HAIR`, which ends everywhere: "0.7 away from the crown's axis + 1 down". In between a
+    blend; made unit, plus `lift` times the outward normal.
+    """
+    at = np.asarray(points, np.float64)
+    outward = gradient(hull.grid, hull.head_distance, at)
+    flow = gradient(hull.grid, growth, at)
+    flow -= np.sum(flow * outward, axis=1, keepdims=True) * outward
+    length = float(np.ptp(growth[hull.dense]))
+    share = _long_share(length)
+    combed = share * flow + max(1 - share, 0.05) * _from_crown(head, at, outward)
+    combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
+    direction = combed + lift * outward
+    result: Float64Array = direction / np.maximum(
+        np.linalg.norm(direction, axis=1, keepdims=True), 1e-9
+    )
+    return result
+
+
+@dataclass(frozen=True)
+class ScalpPrior:
+    """How strongly, and how far from the scalp, combing speaks for photos that say little."""
+
+    weight: float
+    """Against the certainty of fused cells, which is at most 1 for each view."""
+    reach: float
+    """Metres from the head."""
+    lift: float
+    """Outward part against the tangential one."""
+    normal: bool = False
+    """True: hair stands along the head's normal instead of being combed."""
+
+
+def with_scalp_prior(
+    head: Head,
+    hull: Hull,
+    growth: Float32Array,
+    tensor: Float32Array,
+    certainty: Float32Array,
+    prior: ScalpPrior,
+) -> tuple[Float32Array, Float32Array]:
+    """Return wanted tensors (N, 6) and weights (N,) of the loose cells with the prior added."""
+    distance = hull.head_distance[hull.loose]
+    near = distance < prior.reach
+    if not prior.weight or not near.any():
+        return tensor, certainty
+    points = hull.grid.centres_of(hull.loose)[near]
+    if prior.normal:
+        comb = gradient(hull.grid, hull.head_distance, points)
+    else:
+        comb = combing_direction(head, hull, growth, points, prior.lift)
+    data, weight = tensor.copy(), certainty.copy()
+    weight[near] += prior.weight
+    share = (prior.weight / weight[near])[:, None]
+    data[near] = (1 - share) * tensor[near] + share * outer_products(comb)
+    return data, weight
+
+
+def _from_crown(head: Head, at: Float64Array, outward: Float64Array) -> Float64Array:
+    top = head.vertices[np.argmax(head.vertices[:, 1])].astype(np.float64)
+    away = at - (top - [0, 0, WHORL_BEHIND])
+    away[:, 1] = 0
+    away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
+    combed = 0.7 * away + [0.0, -1.0, 0.0]
+    combed -= np.sum(combed * outward, axis=1, keepdims=True) * outward
+    result: Float64Array = combed / np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
+    return result
+
+
+def gradient(grid: VoxelGrid, values: Float32Array, points: npt.ArrayLike) -> Float64Array:
+    """Return the unit gradient (N, 3) of values (X, Y, Z) at points (N, 3); zero where it
+    vanishes."""
+    at, h = np.asarray(points, np.float64), grid.spacing
+    slope = np.stack(
+        [
+            grid.sample(values, at + h * axis) - grid.sample(values, at - h * axis)
+            for axis in np.eye(3)
+        ],
+        axis=1,
+    ).astype(np.float64)
+    length = np.linalg.norm(slope, axis=1, keepdims=True)
+    result: Float64Array = np.where(length > 1e-9, slope / np.maximum(length, 1e-9), 0.0)
+    return result
+
+
+def growth_potential(head: Head, hull: Hull, tip_share: float) -> Float32Array:
+    """Return (X, Y, Z) minus the way to the tips through the hair, metres, smoothed; it grows root
+    to tip.
+
+    Tips are the dense cells whose way from the scalp is at least `tip_share` of the hair's length.
+    In long hair the potential grows on among them, slowly, with the way from the scalp: so strands
+    know their sign up to their ends.
+    """
+    way = scalp_way(head, hull)
+    length = hair_length(hull, way)
+    tips = hull.dense & (way >= tip_share * length)
+    left = chamfer_way(hull.loose, tips, hull.grid.spacing)
+    known = np.isfinite(left)
+    weight = ndimage.gaussian_filter(known.astype(np.float32), FLOW_SMOOTHING)
+    left -= _long_share(length) * TIP_SLOPE * np.maximum(way - tip_share * length, 0)
+    total = ndimage.gaussian_filter(np.where(known, left, 0).astype(np.float32), FLOW_SMOOTHING)
+    smooth = total / np.maximum(weight, 1e-6)
+    growth: Float32Array = np.where(weight > 1e-3, -smooth, -smooth.max()).astype(np.float32)
+    return growth
+
+
+def _long_share(length: float) -> float:
+    """Return 0 for short hair, 1 for long hair, of its length in metres."""
+    return float(np.clip((length - SHORT_HAIR) / (LONG_HAIR - SHORT_HAIR), 0.0, 1.0))
+
+
+def hair_length(hull: Hull, way: Float32Array) -> float:
+    """Return how long hair can be: nearly the longest way (its 98th percentile) from the scalp,
+    metres."""
+    return float(np.percentile(way[hull.dense], 98))
+
+
+@lru_cache(maxsize=1)
+def scalp_way(head: Head, hull: Hull) -> Float32Array:
+    """Return (X, Y, Z) the shortest way from the scalp through loose cells, metres; 0 where
+    there is none."""
+    start = np.zeros(hull.grid.shape, bool)
+    cells = hull.grid.nearest_cell(head.vertices[head.scalp > 0.5])
+    start[tuple(cells.T)] = True
+    start = ndimage.binary_dilation(start, iterations=2)
+    way = chamfer_way(hull.loose, start & hull.loose, hull.grid.spacing)
+    return np.where(np.isfinite(way), way, 0).astype(np.float32)
+
+
+def chamfer_way(occupied: BoolArray, start: BoolArray, spacing: float) -> Float32Array:
+    """Return (X, Y, Z) the shortest way through occupied cells from the start cells; infinite where
+    none.
+
+    Sweeps in the eight diagonal orders until nothing changes, steps along edges and diagonals of
+    cells.
+    """
+    way: Float32Array = _chamfer(occupied, start, np.float32(spacing))
+    return way
+
+
+@njit(cache=True)
+def _chamfer(occupied, start, spacing):  # type: ignore[no-untyped-def]
+    nx, ny, nz = occupied.shape
+    way = np.full(occupied.shape, np.inf, np.float32)
+    for ix in range(nx):
+        for iy in range(ny):
+            for iz in range(nz):
+                if start[ix, iy, iz]:
+                    way[ix, iy, iz] = 0
+    cost = np.array([0.0, 1.0, np.sqrt(2.0), np.sqrt(3.0)], np.float32) * spacing
+    for _ in range(12):
+        changed = False
+        for turn in range(8):
+            sx = 1 if turn & 1 else -1
+            sy = 1 if turn & 2 else -1
+            sz = 1 if turn & 4 else -1
+            for kx in range(nx):
+                ix = kx if sx > 0 else nx - 1 - kx
+                for ky in range(ny):
+                    iy = ky if sy > 0 else ny - 1 - ky
+                    for kz in range(nz):
+                        iz = kz if sz > 0 else nz - 1 - kz
+                        if not occupied[ix, iy, iz]:
+                            continue
+                        best = way[ix, iy, iz]
+                        for corner in range(1, 8):
+                            a, b, c = corner & 1, corner >> 1 & 1, corner >> 2 & 1
+                            jx, jy, jz = ix - sx * a, iy - sy * b, iz - sz * c
+                            if jx < 0 or jy < 0 or jz < 0 or jx >= nx or jy >= ny or jz >= nz:
+                                continue
+                            if occupied[jx, jy, jz]:
+                                best = min(best, way[jx, jy, jz] + cost[a + b + c])
+                        if best < way[ix, iy, iz] - 1e-7:
+                            way[ix, iy, iz] = best
+                            changed = True
+        if not changed:
+            break
+    return way

@@ -1,0 +1,1 @@
+"""Methods on strands and grooms: densify, decimate, weights, collision."""

@@ -1,0 +1,129 @@
+"""The last step of the pipeline: strands, head and photos put together as a groom."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.imaging.waves import Waves
+from hairkit.storage import Float32Array, Float64Array
+from hairkit.types.capture import View
+from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.head import Head, Roots
+from hairkit.types.mask import Mask
+from hairkit.types.strands import Strands
+
+SHORTEST = 1e-3
+"""Strands shorter than this are no strands, metres."""
+
+ENOUGH = 0.98
+"""Share of roots that should give a strand."""
+
+_EDGE_PX = 4
+_MOST_PIXELS = 20_000
+_log = logging.getLogger("hairkit")
+
+
+def assemble_groom(
+    views: Sequence[View],
+    masks: Sequence[Mask],
+    head: Head,
+    roots: Roots,
+    strands: Strands,
+    waves: Waves | None = None,
+) -> Groom:
+    """Return the groom of tracked strands, bound to the head, with the colour of the photos.
+
+    Parameters
+    ----------
+    views, masks
+        The photos and where hair is on them, in the same order.
+    head
+        The fitted head.
+    roots
+        Where the strands start; strand s belongs to root s.
+    strands
+        What tracking gave; strands shorter than `SHORTEST` are dropped.
+    waves
+        What the photos show of the hair's waves; None means straight hair.
+
+    Raises
+    ------
+    InputError
+        There is not one strand a root, or none is long enough.
+    """
+    if len(strands) != len(roots):
+        raise InputError(
+            f"tracking gave {len(strands)} strands for {len(roots)} roots, expected one each"
+        )
+    long_enough = strands.lengths() >= SHORTEST
+    kept = int(np.count_nonzero(long_enough))
+    if not kept:
+        raise InputError(
+            f"none of {len(roots)} roots gave a strand; check the masks: does hair touch the scalp?"
+        )
+    if kept < ENOUGH * len(roots):
+        _log.warning("%d of %d roots gave no strand", len(roots) - kept, len(roots))
+    curl = waves or Waves()
+    material = replace(measure_colour(views, masks), curl_radius=curl.radius, curl_pitch=curl.pitch)
+    grown = strands.select(long_enough)
+    packed = Strands(
+        grown.points,
+        grown.offsets,
+        np.full(len(grown.points), material.width, np.float32)
+        if grown.widths is None
+        else grown.widths,
+        roots.uv[long_enough],
+        np.zeros(kept, np.int32) if grown.group is None else grown.group,
+        np.ones(kept, np.bool_),
+    )
+    return Groom(
+        packed, head, roots.triangle[long_enough], roots.barycentric[long_enough], material
+    )
+
+
+def measure_colour(views: Sequence[View], masks: Sequence[Mask]) -> HairMaterial:
+    """Return a material with the hair's median colour near the crown and near the tips.
+
+    The crown is the upper third of the hair's pixels of every view, the tips are the lower third.
+    """
+    crowns, tips = [], []
+    for view, mask in zip(views, masks, strict=True):
+        pixels = _hair_pixels(view, mask)
+        third = len(pixels) // 3
+        crowns.append(pixels[: third + 1])
+        tips.append(pixels[-third - 1 :])
+    root, tip = (_median(np.concatenate(part)) for part in (crowns, tips))
+    return HairMaterial(root, tip)
+
+
+def linear_from_srgb(value: Float64Array) -> Float64Array:
+    """Return linear intensities of sRGB values, both in [0, 1] (IEC 61966-2-1).
+
+    >>> linear_from_srgb(np.array([0.0, 0.5, 1.0])).round(3).tolist()
+    [0.0, 0.214, 1.0]
+    """
+    result: Float64Array = np.where(
+        value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4
+    )
+    return result
+
+
+def _hair_pixels(view: View, mask: Mask) -> Float64Array:
+    """Return linear RGB (N, 3) of hair away from its edge, from the picture's top down."""
+    hair = mask.hair.astype(np.uint8)
+    inner = cv2.erode(hair, np.ones((2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1), np.uint8))
+    row, column = np.nonzero(inner if inner.any() else hair)
+    every = -(-len(row) // _MOST_PIXELS)
+    picked = view.image[row[::every], column[::every]]
+    return linear_from_srgb(picked.astype(np.float64) / 255)
+
+
+def _median(colours: Float64Array) -> Float32Array:
+    median: Float32Array = np.median(colours, axis=0).astype(np.float32)
+    return median

@@ -1,0 +1,251 @@
+"""Full hair from guides: every new strand is mixed from the guides around its root.
+
+Shapes are mixed relative to the root at equal share of the arc length, only among guides that agree
+with the nearest one, so that hair does not fill a parting. What is finer than the guides' overall
+course (waves, frizz) is taken from the nearest guide alone: the mean of waves out of phase is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from hairkit.errors import InputError
+from hairkit.head_model.scalp import sample_roots
+from hairkit.storage import Float32Array, Float64Array, Int64Array
+from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.head import Roots
+from hairkit.types.strands import Strands
+
+NEIGHBOURS = 8
+"""Guides considered for a new strand."""
+MIXED = 4
+"""Guides mixed at most, the nearest that agree."""
+CHORDS = 4
+"""Pieces of a guide whose directions are compared."""
+MAX_ANGLE = np.radians(60.0)
+"""Guides whose chords differ by more are not mixed."""
+MAX_TIP_GAP = 0.5
+"""Guides whose tips lie further apart than this share of their length are not mixed."""
+COURSE_SIGMA = 0.06
+"""Width of the smoothing that parts a guide's course from its waves, in shares of its length."""
+MAX_POINTS = 128
+"""Points a strand at most; longer guides are resampled."""
+
+
+def densify(
+    guides: Groom | Strands,
+    count: int,
+    seed: int = 0,
+    *,
+    roots: Roots | npt.ArrayLike | None = None,
+    scatter: float = 0.0012,
+    material: HairMaterial | None = None,
+) -> Strands:
+    """Return `count` strands: the guides first, then hair interpolated between them.
+
+    Parameters
+    ----------
+    guides
+        A groom, whose head gives new roots and whose material gives widths; or bare strands.
+    count
+        Strands wanted; when there are no more than the guides, the guides come back as they are.
+    seed
+        Equal seeds give equal hair.
+    roots
+        Where the new strands start, count - S at least, as `Roots` or positions (N, 3). By
+        default sampled on the groom's scalp, or between neighbouring guides of bare strands.
+    scatter
+        Root mean square wander of a new strand's tip, metres; 0 mixes the guides exactly.
+    material
+        Gives the widths; the groom's by default.
+    """
+    strands = guides.strands if isinstance(guides, Groom) else guides
+    if len(strands) == 0:
+        raise InputError("there are no guides to interpolate hair from")
+    if count <= len(strands):
+        return strands
+    if material is None:
+        material = guides.material if isinstance(guides, Groom) else HairMaterial()
+    generator = np.random.default_rng(seed)
+    even = strands.resampled(int(np.clip(strands.counts.max(), 2, MAX_POINTS)))
+    bundle = _Bundle.of(even)
+    positions, uv = _new_roots(guides, bundle, count - len(strands), roots, generator)
+    mix = _choose_guides(bundle, positions)
+    shapes = _mixed_shapes(bundle, mix)
+    if scatter > 0:
+        shapes += _wander(len(positions), bundle.points, scatter, generator)
+        shapes *= 1 - 0.12 * generator.random((len(positions), 1, 1), dtype=np.float32) ** 3
+    return _joined(even, positions[:, None] + shapes, mix.guides[:, 0], uv, material)
+
+
+@dataclass(frozen=True)
+class _Bundle:
+    """The guides as equal arrays."""
+
+    roots: Float32Array  # (S, 3)
+    course: Float32Array  # (S, m, 3) smooth shape relative to the root
+    waves: Float32Array  # (S, m, 3) what the course lacks
+    lengths: Float64Array  # (S,)
+    tree: cKDTree
+
+    @property
+    def points(self) -> int:
+        return int(self.course.shape[1])
+
+    @classmethod
+    def of(cls, even: Strands) -> _Bundle:
+        m = int(even.counts[0])
+        points = even.points.reshape(-1, m, 3)
+        shape = points - points[:, :1]
+        course = np.einsum("ij,sjk->sik", _smoothing(m), shape, optimize=True)
+        roots = points[:, 0].copy()
+        return cls(roots, course, shape - course, even.lengths(), cKDTree(roots))
+
+
+@dataclass(frozen=True)
+class _Mix:
+    guides: Int64Array  # (N, MIXED), nearest first
+    weights: Float32Array  # (N, MIXED), sum 1
+
+
+def _smoothing(m: int) -> Float32Array:
+    """Return the (m, m) Gaussian smoothing that keeps both ends by mirroring through them."""
+    sigma = COURSE_SIGMA * (m - 1)
+    reach = int(np.ceil(3 * sigma))
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(sigma, 1e-9)) ** 2)
+    kernel /= kernel.sum()
+    matrix = np.zeros((m, m))
+    rows = np.arange(m)
+    for offset, weight in zip(range(-reach, reach + 1), kernel, strict=True):
+        column = rows + offset
+        low, high = column < 0, column >= m
+        mirrored = np.clip(
+            np.where(low, -column, np.where(high, 2 * (m - 1) - column, column)), 0, m - 1
+        )
+        sign = np.where(low | high, -1.0, 1.0)
+        np.add.at(matrix, (rows, mirrored), weight * sign)
+        np.add.at(matrix, (rows[low], np.zeros(low.sum(), int)), 2 * weight)
+        np.add.at(matrix, (rows[high], np.full(high.sum(), m - 1)), 2 * weight)
+    return matrix.astype(np.float32)
+
+
+def _new_roots(
+    guides: Groom | Strands,
+    bundle: _Bundle,
+    count: int,
+    roots: Roots | npt.ArrayLike | None,
+    generator: np.random.Generator,
+) -> tuple[Float32Array, Float32Array | None]:
+    if roots is None and isinstance(guides, Groom):
+        roots = sample_roots(guides.head, count, int(generator.integers(2**31)))
+    if isinstance(roots, Roots):
+        positions, uv = roots.positions, roots.uv
+    elif roots is not None:
+        positions, uv = np.asarray(roots, np.float32).reshape(-1, 3), None
+    else:
+        positions, uv = _between_guides(bundle, count, generator), None
+    if len(positions) < count:
+        raise InputError(f"{len(positions)} roots are given, expected at least {count}")
+    return positions[:count], None if uv is None else uv[:count]
+
+
+def _between_guides(bundle: _Bundle, count: int, generator: np.random.Generator) -> Float32Array:
+    chosen = generator.integers(len(bundle.roots), size=count)
+    near = _neighbours(bundle, bundle.roots[chosen], 4)[1]
+    weights = generator.dirichlet(np.ones(near.shape[1]), size=count).astype(np.float32)
+    mixed: Float32Array = np.einsum("nk,nkc->nc", weights, bundle.roots[near])
+    return mixed
+
+
+def _neighbours(
+    bundle: _Bundle, positions: Float32Array, k: int
+) -> tuple[Float64Array, Int64Array]:
+    distance, index = bundle.tree.query(positions, k=min(k, len(bundle.roots)))
+    return distance.reshape(len(positions), -1), index.reshape(len(positions), -1)
+
+
+def _choose_guides(bundle: _Bundle, positions: Float32Array) -> _Mix:
+    distance, near = _neighbours(bundle, positions, NEIGHBOURS)
+    agrees = _agreement(bundle, near)
+    order = np.argsort(~agrees, axis=1, kind="stable")[:, :MIXED]
+    near, distance = np.take_along_axis(near, order, 1), np.take_along_axis(distance, order, 1)
+    agrees = np.take_along_axis(agrees, order, 1)
+    # far guides weigh little, so that hair changes smoothly from root to root
+    reach = np.where(agrees, distance, 0).max(axis=1, keepdims=True) * 1.05 + 1e-6
+    weight = np.where(agrees, (1 / np.maximum(distance, 5e-4) - 0.5 / reach) ** 2, 0)
+    weight /= weight.sum(axis=1, keepdims=True)
+    return _Mix(near, weight.astype(np.float32))
+
+
+def _agreement(bundle: _Bundle, near: Int64Array) -> npt.NDArray[np.bool_]:
+    """Return (N, K) whether each guide agrees in course with the first, nearest one."""
+    stops = np.linspace(0, bundle.points - 1, CHORDS + 1).astype(int)
+    chords = np.diff(bundle.course[:, stops], axis=1)
+    chords /= np.maximum(np.linalg.norm(chords, axis=2, keepdims=True), 1e-9)
+    first = near[:, :1]
+    cosine = np.einsum("nksc,nksc->nks", chords[near], chords[first]).min(axis=2)
+    gap = np.linalg.norm(bundle.course[near, -1] - bundle.course[first, -1], axis=2)
+    length = np.maximum(bundle.lengths[near], bundle.lengths[first])
+    agrees: npt.NDArray[np.bool_] = (cosine > np.cos(MAX_ANGLE)) & (gap < MAX_TIP_GAP * length)
+    agrees[:, 0] = True
+    return agrees
+
+
+def _mixed_shapes(bundle: _Bundle, mix: _Mix) -> Float32Array:
+    """Return (N, m, 3) shapes relative to the root, as long as the guides they are mixed from."""
+    shape = np.zeros((len(mix.guides), bundle.points, 3), np.float32)
+    for k in range(mix.guides.shape[1]):
+        shape += mix.weights[:, k, None, None] * bundle.course[mix.guides[:, k]]
+    course_length = _shape_lengths(bundle.course)
+    wanted = (mix.weights * course_length[mix.guides]).sum(axis=1)
+    stretch = np.clip(wanted / np.maximum(_shape_lengths(shape), 1e-9), 1.0, 1.3)
+    shape *= stretch[:, None, None].astype(np.float32)
+    shape += bundle.waves[mix.guides[:, 0]]
+    return shape
+
+
+def _shape_lengths(shapes: Float32Array) -> Float64Array:
+    steps = np.diff(shapes, axis=1)
+    result: Float64Array = np.sqrt(np.einsum("sic,sic->si", steps, steps)).sum(axis=1)
+    return result
+
+
+def _wander(
+    count: int, points: int, scatter: float, generator: np.random.Generator
+) -> Float32Array:
+    """Return (N, m, 3) slow random sideways offsets that are 0 at the root."""
+    t = np.linspace(0, 1, points, dtype=np.float32)
+    phase = 2 * np.pi * generator.random((count, 2), dtype=np.float32)
+    turns = 1 + 2 * generator.random((count, 2), dtype=np.float32)
+    drift = generator.standard_normal((count, 3), dtype=np.float32)
+    wave = generator.standard_normal((count, 3), dtype=np.float32)
+    swing = np.sin(phase[:, :1] + 2 * np.pi * turns[:, :1] * t) - np.sin(phase[:, :1])
+    offsets = t[None, :, None] * drift[:, None] + 0.4 * (t * swing)[:, :, None] * wave[:, None]
+    result: Float32Array = np.float32(scatter / np.sqrt(3)) * offsets
+    return result
+
+
+def _joined(
+    even: Strands,
+    new: Float32Array,
+    nearest: Int64Array,
+    uv: Float32Array | None,
+    material: HairMaterial,
+) -> Strands:
+    old, (count, m, _) = len(even), new.shape
+    total = old + count
+    taper = 1 - 0.5 * np.linspace(0, 1, m) ** 3
+    keep_uv = uv is not None and even.root_uv is not None
+    group = None if even.group is None else np.concatenate([even.group, even.group[nearest]])
+    return Strands(
+        np.concatenate([even.points, new.reshape(-1, 3)]),
+        np.arange(total + 1) * m,
+        np.tile(material.width * taper, total).astype(np.float32),
+        np.concatenate([even.root_uv, uv]) if keep_uv else None,
+        group,
+        np.arange(total) < old,
+    )

@@ -1,0 +1,193 @@
+"""What every exporter does first: choose guides or hair, drop degenerate strands, fill in defaults.
+
+Exporters inherit `ExportOptions` and write what `prepared` returns.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.grooming.densify import densify
+from hairkit.grooming.guide_weights import follow, guide_mask
+from hairkit.head_model.scalp import roots_at, sample_roots
+from hairkit.io.strand_blocks import colours
+from hairkit.options import option
+from hairkit.storage import BoolArray, Float32Array
+from hairkit.types.groom import Groom
+from hairkit.types.head import Roots
+from hairkit.types.point_cache import PointCache, read_cache
+from hairkit.types.strands import Strands
+
+SHORTEST = 1e-5
+"""Strands shorter than this, in metres, are degenerate: they have no direction."""
+
+_log = logging.getLogger("hairkit")
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """Options of every exporter: which strands go into the file."""
+
+    strands: str = option(
+        "all", choices=("all", "guides", "hair"), doc="Write guides, hair between them, or both."
+    )
+    hairs: int = option(
+        0,
+        low=0,
+        high=2_000_000,
+        doc="Strands in all, interpolated between the guides; 0 takes those of the groom.",
+    )
+    seed: int = option(0, low=0, doc="Seed of the interpolated hair.")
+
+
+@dataclass(frozen=True)
+class AnimationOptions:
+    """Option of exporters that write animation."""
+
+    cache: Path | None = option(None, doc="Point cache that `hairkit simulate` wrote, to animate.")
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedGroom:
+    """A groom ready to be written."""
+
+    groom: Groom
+    """`widths`, `root_uv`, `group` and `guide` of its strands are all there."""
+    cache: PointCache | None
+    """Frames (T, P, 3) of exactly these strands, or None for a still groom."""
+
+
+def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
+    """Return the chosen strands, complete; strands without length are dropped, and counted aloud.
+
+    Options that also inherit `AnimationOptions` bring the cache along.
+
+    Raises
+    ------
+    InputError
+        Nothing is left to write, or the cache is of another groom.
+    """
+    path = options.cache if isinstance(options, AnimationOptions) else None
+    guides = _guides_of(groom)
+    cache = None if path is None else read_cache(path, guides)
+    if options.hairs > len(groom.strands):
+        groom = dense_groom(groom, options.hairs, options.seed)
+    groom = completed(groom)
+    strands = groom.strands
+    frames = None if cache is None else _frames(strands, guides.strands, cache)
+    keep = _chosen(strands, options.strands) & ~_degenerate(strands)
+    if not keep.any():
+        raise InputError(f"the groom has no strands to write with strands={options.strands}")
+    if frames is not None and cache is not None:
+        frames = frames[:, keep[strands.strand_of_point]]
+        cache = PointCache(frames, cache.times, cache.head_from_rest)
+    return PreparedGroom(selected(groom, keep), cache)
+
+
+def _frames(strands: Strands, guides: Strands, cache: PointCache) -> Float32Array:
+    """Return (T, P, 3) the strands moved with the cached guides, which may have been resampled."""
+    written = strands.select(guide_mask(strands))
+    cached, count = cache.points, int(written.counts[0])
+    if not np.array_equal(written.points, guides.points):
+        cached = guides.moved_and_resampled(cached, count)
+    return follow(strands, cached, cache.head_from_rest)
+
+
+def dense_groom(groom: Groom, count: int, seed: int = 0) -> Groom:
+    """Return the groom with `count` strands: its own, then hair interpolated between the guides.
+
+    Strands of the groom that are not guides are replaced.
+    """
+    guides = _guides_of(groom)
+    if count <= len(guides.strands):
+        return guides
+    roots = sample_roots(guides.head, count - len(guides.strands), seed)
+    strands = densify(guides, count, seed, roots=roots)
+    return replace(
+        guides,
+        strands=strands,
+        root_triangle=np.concatenate([guides.root_triangle, roots.triangle]),
+        root_barycentric=np.concatenate([guides.root_barycentric, roots.barycentric]),
+    )
+
+
+def completed(groom: Groom) -> Groom:
+    """Return the groom with widths, root uv, groups and guide flags on its strands.
+
+    Defaults: the material's width at every point, the bound root's uv, group 0, all guides.
+    """
+    strands = groom.strands
+    if not any(value is None for value in _made_up(strands)):
+        return groom
+    uv = strands.root_uv
+    if uv is None:
+        uv = bound_roots(groom).uv
+    widths = strands.widths
+    if widths is None:
+        widths = np.full(len(strands.points), groom.material.width, np.float32)
+    group = np.zeros(len(strands), np.int32) if strands.group is None else strands.group
+    full = replace(
+        strands, widths=widths, root_uv=uv, group=group, guide=guide_mask(strands).copy()
+    )
+    return replace(groom, strands=full)
+
+
+def _made_up(strands: Strands) -> tuple[object, ...]:
+    return strands.widths, strands.root_uv, strands.group, strands.guide
+
+
+def selected(groom: Groom, keep: BoolArray) -> Groom:
+    """Return the groom with only the strands that the mask (S,) keeps."""
+    if keep.all():
+        return groom
+    return replace(
+        groom,
+        strands=groom.strands.select(keep),
+        root_triangle=groom.root_triangle[keep],
+        root_barycentric=groom.root_barycentric[keep],
+    )
+
+
+def bound_roots(groom: Groom) -> Roots:
+    """Return the places on the head that the strands are bound to."""
+    return roots_at(groom.head, groom.root_triangle, groom.root_barycentric)
+
+
+def point_colours(groom: Groom) -> Float32Array:
+    """Return (P, 3) linear RGB, from the root's colour to the tip's along each strand."""
+    linear: Float32Array = colours(groom.material, groom.strands.counts).at()
+    return linear
+
+
+def shorter_than(strands: Strands, length: float) -> BoolArray:
+    """Return (S,) which strands are shorter, metres; most are known by their first segment."""
+    first = strands.offsets[:-1]
+    step = np.linalg.norm(strands.points[first + 1] - strands.points[first], axis=1)
+    doubtful = np.flatnonzero(step < length)
+    short = np.zeros(len(strands), bool)
+    if len(doubtful):
+        short[doubtful] = strands.select(doubtful).lengths() < length
+    return short
+
+
+def _guides_of(groom: Groom) -> Groom:
+    return selected(groom, guide_mask(groom.strands))
+
+
+def _chosen(strands: Strands, wanted: str) -> BoolArray:
+    guide = guide_mask(strands)
+    if wanted == "all":
+        return np.ones(len(strands), bool)
+    return guide if wanted == "guides" else ~guide
+
+
+def _degenerate(strands: Strands) -> BoolArray:
+    short = shorter_than(strands, SHORTEST)
+    if short.any():
+        _log.warning("%d strands without length are not written", np.count_nonzero(short))
+    return short

@@ -1,0 +1,1 @@
+"""The head: template, scalp, signed distance, torso."""

@@ -1,0 +1,60 @@
+"""Skin weights of a head: how much of its three joints each vertex follows.
+
+The skull moves with the head joint, the lowest part of the neck stays with the root, and what lies
+between is blended by height. The height is measured along an axis that leans forward, because the
+base of the skull falls from the nape to the chin. Where hair grows the head is rigid, so that hair
+bound to the head joint alone never leaves the skin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hairkit.storage import Float32Array, Float64Array
+from hairkit.types.head import Head
+
+JOINT_NAMES = ("root", "neck", "head")
+"""Names of the joints in their order; each is the parent of the next."""
+HEAD_JOINT = 2
+"""The joint that hair is bound to."""
+_LEAN = np.radians(20.0)
+_SKULL = 0.5
+"""Share of the way from the neck joint to the head joint above which all is skull."""
+
+
+def head_weights(head: Head) -> Float32Array:
+    """Return (V, 3) the weights of the root, neck and head joint: not negative, sum 1 a row.
+
+    A vertex with scalp of 0.5 or more follows the head joint alone.
+
+    >>> from hairkit.head_model.template import default_head
+    >>> top = default_head().vertices[:, 1].argmax()
+    >>> head_weights(default_head())[top].tolist()
+    [0.0, 0.0, 1.0]
+    """
+    root, neck, skull = head.joints.astype(np.float64)
+    offset = head.vertices.astype(np.float64) - neck
+    height = offset @ _upward(skull - root)
+    upper = np.linalg.norm(skull - neck)
+    lower = np.linalg.norm(neck - root)
+    raised = _smooth_step(height / max(_SKULL * upper, 1e-6))
+    raised = np.maximum(raised, _smooth_step(2.0 * head.scalp.astype(np.float64)))
+    sunk = _smooth_step(-height / max(lower, 1e-6)) * (1.0 - raised)
+    weights = np.stack([sunk, 1.0 - raised - sunk, raised], axis=1)
+    return np.asarray(weights.clip(0.0, 1.0), np.float32)
+
+
+def _upward(spine: Float64Array) -> Float64Array:
+    """Return the unit direction of the spine, leant towards the face."""
+    length = np.linalg.norm(spine)
+    up = spine / length if length > 1e-6 else np.array([0.0, 1.0, 0.0])
+    ahead = np.array([0.0, 0.0, 1.0]) - up[2] * up
+    ahead /= max(float(np.linalg.norm(ahead)), 1e-6)
+    result: Float64Array = np.cos(_LEAN) * up + np.sin(_LEAN) * ahead
+    return result
+
+
+def _smooth_step(share: Float64Array) -> Float64Array:
+    inside = share.clip(0.0, 1.0)
+    result: Float64Array = inside * inside * (3.0 - 2.0 * inside)
+    return result

@@ -1,0 +1,167 @@
+"""Helix arcs: curves of constant curvature and torsion, and how they move frames along.
+
+An arc starts at a point with a tangent and turns steadily about its Darboux vector w: every
+direction d fixed to it obeys d' = w x d, and w itself stays. A turn by the rotation vector x = s w
+is the matrix exponential `rotation(x)`; the tangent's integral is `mean_rotation(x) t s`. Both are
+power series in [x]_x whose coefficients are smooth at 0, so straight hair is no special case
+(patent, step 5; Bertails et al., "Super-helices for predicting the dynamics of natural hair",
+2006, section 3).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.storage import Float64Array
+
+_TERMS = 9
+SERIES_BELOW = 1.0
+"""Turns below this many radians take the power series, which `_TERMS` terms give to rounding."""
+
+
+def turn_coefficients(squared: npt.ArrayLike) -> tuple[Float64Array, Float64Array, Float64Array]:
+    """Return sin(a)/a, (1 - cos a)/a^2 and (a - sin a)/a^3 from a^2, exact through a = 0."""
+    x = np.asarray(squared, np.float64)
+    large = np.maximum(x, SERIES_BELOW**2)
+    angle = np.sqrt(large)
+    exact = (
+        np.sin(angle) / angle,
+        2 * np.sin(angle / 2) ** 2 / large,
+        (angle - np.sin(angle)) / (large * angle),
+    )
+    small = np.minimum(x, SERIES_BELOW**2)
+    near = x < SERIES_BELOW**2
+    sine, versine, rest = (
+        np.where(near, _series(small, order), value) for order, value in enumerate(exact, 1)
+    )
+    return sine, versine, rest
+
+
+def turn_slopes(squared: npt.ArrayLike) -> tuple[Float64Array, Float64Array]:
+    """Return the derivatives by a^2, doubled, of the second and third `turn_coefficients`.
+
+    With f(a) such a coefficient this is f'(a)/a, the factor in df/dx = (f'(a)/a) x, a = |x|.
+    """
+    x = np.asarray(squared, np.float64)
+    sine, versine, rest = turn_coefficients(x)
+    large = np.maximum(x, SERIES_BELOW**2)
+    small = np.minimum(x, SERIES_BELOW**2)
+    near = x < SERIES_BELOW**2
+    second = np.where(near, _series_slope(small, 2), (sine - 2 * versine) / large)
+    third = np.where(near, _series_slope(small, 3), (versine - 3 * rest) / large)
+    return second, third
+
+
+def cross_matrix(vector: npt.ArrayLike) -> Float64Array:
+    """Return (..., 3, 3) the matrix of v x . for vectors (..., 3)."""
+    v = np.asarray(vector, np.float64)
+    zero = np.zeros(v.shape[:-1])
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    rows = [zero, -z, y, z, zero, -x, -y, x, zero]
+    return np.stack(rows, axis=-1).reshape(*v.shape[:-1], 3, 3)
+
+
+def rotation(vector: npt.ArrayLike) -> Float64Array:
+    """Return (..., 3, 3) the rotation by |v| radians about v (Rodrigues)."""
+    v = np.asarray(vector, np.float64)
+    sine, versine, _ = turn_coefficients(np.einsum("...i,...i->...", v, v))
+    turn = cross_matrix(v)
+    result: Float64Array = (
+        np.eye(3) + sine[..., None, None] * turn + versine[..., None, None] * (turn @ turn)
+    )
+    return result
+
+
+def mean_rotation(vector: npt.ArrayLike) -> Float64Array:
+    """Return (..., 3, 3) the mean of `rotation(u v)` over u in [0, 1].
+
+    It is also the left Jacobian of the rotation group: turning v by dv turns `rotation(v)` by
+    `mean_rotation(v) dv`, in the fixed frame.
+    """
+    v = np.asarray(vector, np.float64)
+    _, versine, rest = turn_coefficients(np.einsum("...i,...i->...", v, v))
+    turn = cross_matrix(v)
+    result: Float64Array = (
+        np.eye(3) + versine[..., None, None] * turn + rest[..., None, None] * (turn @ turn)
+    )
+    return result
+
+
+def mean_rotation_slope(vector: npt.ArrayLike, direction: npt.ArrayLike) -> Float64Array:
+    """Return (..., 3, 3) the derivative of `mean_rotation(v) d` by v: column j is by v_j."""
+    v = np.asarray(vector, np.float64)
+    d = np.broadcast_to(np.asarray(direction, np.float64), v.shape)
+    squared = (v * v).sum(-1)
+    _, versine, rest = turn_coefficients(squared)
+    versine_slope, rest_slope = turn_slopes(squared)
+    once = np.cross(v, d)
+    twice = np.cross(v, once)
+    along = (v * d).sum(-1)[..., None, None] * np.eye(3)
+    mixed = along + v[..., :, None] * d[..., None, :] - 2 * d[..., :, None] * v[..., None, :]
+    radial = versine_slope[..., None] * once + rest_slope[..., None] * twice
+    result: Float64Array = (
+        -versine[..., None, None] * cross_matrix(d)
+        + rest[..., None, None] * mixed
+        + radial[..., :, None] * v[..., None, :]
+    )
+    return result
+
+
+def along_arc(
+    point: npt.ArrayLike, tangent: npt.ArrayLike, darboux: npt.ArrayLike, arc: npt.ArrayLike
+) -> tuple[Float64Array, Float64Array]:
+    """Return points and unit tangents, (..., 3) each, on helix arcs.
+
+    Parameters
+    ----------
+    point, tangent
+        (..., 3) where the arc starts, metres, and its unit direction there.
+    darboux
+        (..., 3) the arc's Darboux vector in the frame of the points, radians per metre.
+    arc
+        (...) arc length from the start, metres.
+    """
+    s = np.asarray(arc, np.float64)[..., None]
+    turn = s * np.asarray(darboux, np.float64)
+    start = np.asarray(tangent, np.float64)[..., None]
+    moved = s * (mean_rotation(turn) @ start)[..., 0]
+    return np.asarray(point, np.float64) + moved, (rotation(turn) @ start)[..., 0]
+
+
+def shape_of(darboux: npt.ArrayLike, tangent: npt.ArrayLike) -> tuple[Float64Array, Float64Array]:
+    """Return curvature |w x t| and torsion <w, t> of arcs, (...) each, per metre."""
+    w, t = np.asarray(darboux, np.float64), np.asarray(tangent, np.float64)
+    return np.linalg.norm(np.cross(w, t), axis=-1), (w * t).sum(-1)
+
+
+def radius_and_pitch(
+    curvature: npt.ArrayLike, torsion: npt.ArrayLike
+) -> tuple[Float64Array, Float64Array]:
+    """Return radius and pitch of helices in metres, the pitch signed: positive turns to the right.
+
+    Straight arcs have radius and pitch 0.
+    """
+    k, t = np.asarray(curvature, np.float64), np.asarray(torsion, np.float64)
+    squared = k * k + t * t
+    safe = np.where(squared > 0, squared, 1.0)
+    straight = k <= 1e-12
+    return np.where(straight, 0.0, k / safe), np.where(straight, 0.0, 2 * np.pi * t / safe)
+
+
+def _series(x: Float64Array, order: int) -> Float64Array:
+    """Return the sum of (-x)^k / (2 k + order)!."""
+    total = np.zeros_like(x)
+    for k in range(_TERMS, -1, -1):
+        total = total * -x + 1 / math.factorial(2 * k + order)
+    return total
+
+
+def _series_slope(x: Float64Array, order: int) -> Float64Array:
+    """Return twice the derivative of `_series` by x."""
+    total = np.zeros_like(x)
+    for k in range(_TERMS, 0, -1):
+        total = total * -x - 2 * k / math.factorial(2 * k + order)
+    return total

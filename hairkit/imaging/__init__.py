@@ -1,0 +1,1 @@
+"""Methods on images: filters, segmentation, matting, waves."""

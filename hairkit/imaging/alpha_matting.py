@@ -1,0 +1,133 @@
+"""Settle the edges of a coarse labelling at full size: pixels there mix the colours beside them.
+
+Near an edge a pixel's colour C is explained as a H + (1 - a) B, with H and B the means of the sure
+hair and the sure background (or person) nearby; a is the share of hair (the alpha of Porter and
+Duff 1984).
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from hairkit.imaging.masked_filters import blur, picture_scale
+from hairkit.storage import BoolArray, Float32Array, UInt8Array
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON
+
+_SIGMAS = (4.0, 12.0, 36.0)
+_FADE = 0.02
+_NOISE = 30.0
+_PER_PIXEL = 0.15
+HAIR_OVER_BACKGROUND, HAIR_OVER_PERSON = 0.3, 0.6
+"""Share of hair from which on a pixel is hair. A wisp before a far backdrop is lit from behind and
+looks thinner than it is; hair on skin throws a shadow and looks thicker."""
+
+
+def refine_labels(
+    image: UInt8Array, labels: UInt8Array, seeds: UInt8Array, hair_allowed: BoolArray
+) -> UInt8Array:
+    """Return labels (H, W) for the full picture from those of a reduced one.
+
+    Parameters
+    ----------
+    image : (H, W, 3)
+        RGB.
+    labels : (h, w)
+        255, 128 and 0, right but for a few pixels at the edges.
+    seeds : (h, w)
+        Labels that are certain; other values elsewhere.
+    hair_allowed : (h, w)
+        False where no hair can be.
+    """
+    height, width = image.shape[:2]
+    lab = cv2.cvtColor(image.astype(np.float32) / np.float32(255), cv2.COLOR_RGB2Lab)
+    lab = blur(np.asarray(lab, np.float32), max(picture_scale(height), 0.3))
+    small = np.asarray(
+        cv2.resize(lab, labels.shape[::-1], interpolation=cv2.INTER_AREA), np.float32
+    )
+    sure = _sure(labels, seeds)
+    unsure = ~np.logical_or.reduce(list(sure.values()))
+    band = _enlarged(unsure, width, height)
+    mean = {
+        label: _upsampled(_local_mean(small, core), band)
+        for label, core in sure.items()
+        if core.any()
+    }
+    away = {label: _upsampled(_distance(sure[label]), band) for label in mean}
+    coarse = np.where(unsure, np.uint8(PERSON), labels)
+    large = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_NEAREST)
+    result: UInt8Array = np.asarray(large, np.uint8)
+    result[band] = _explained(lab[band], mean, away)
+    forbidden = (result == HAIR) & ~_enlarged(hair_allowed, width, height)
+    result[forbidden] = BACKGROUND
+    return result
+
+
+def _sure(labels: UInt8Array, seeds: UInt8Array) -> dict[int, BoolArray]:
+    """Return for each label the (h, w) pixels off any edge; thin bits of person are unsure."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7))
+    wide = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
+    sure = {}
+    for label in (HAIR, PERSON, BACKGROUND):
+        area = (labels == label).astype(np.uint8)
+        if label == PERSON:
+            area = cv2.morphologyEx(area, cv2.MORPH_OPEN, wide)
+        sure[label] = (cv2.erode(area, disc) > 0) | (seeds == label)
+    return sure
+
+
+def _explained(
+    colour: Float32Array, mean: dict[int, Float32Array], away: dict[int, Float32Array]
+) -> UInt8Array:
+    """Return the label (N,) of pixels of `colour` (N, 3) that mix hair with the likelier other."""
+    best = np.full(len(colour), np.inf, np.float32)
+    result = np.full(len(colour), HAIR, np.uint8)
+    limits = {PERSON: HAIR_OVER_PERSON, BACKGROUND: HAIR_OVER_BACKGROUND}
+    for label, limit in limits.items():
+        if label not in mean or HAIR not in mean:
+            continue
+        across = mean[HAIR] - mean[label]
+        offset = colour - mean[label]
+        norm = np.maximum(np.einsum("nc,nc->n", across, across), 1.0)
+        share = np.clip(np.einsum("nc,nc->n", offset, across) / norm, 0, 1)
+        rest = offset - share[:, None] * across
+        misfit = np.einsum("nc,nc->n", rest, rest) / _NOISE + _PER_PIXEL * away[label]
+        better = misfit < best
+        best = np.where(better, misfit, best)
+        result = np.where(better, np.where(share > limit, HAIR, label), result).astype(np.uint8)
+    return result
+
+
+def _local_mean(values: Float32Array, core: BoolArray) -> Float32Array:
+    """Return (h, w, 3) the mean over the core nearby; wider windows fill in where none is near."""
+    height, width = core.shape
+    weight = core.astype(np.float32)
+    total = np.zeros(values.shape, np.float32)
+    share = np.zeros_like(weight)
+    for index, sigma in enumerate(_SIGMAS):
+        step = int(sigma // 4)
+        size = (max(width // step, 1), max(height // step, 1))
+        stack = np.dstack([values * weight[..., None], weight])
+        coarse = cv2.resize(stack, size, interpolation=cv2.INTER_AREA)
+        blurred = cv2.resize(blur(np.asarray(coarse, np.float32), sigma / step), (width, height))
+        total += _FADE**index * blurred[..., :3]
+        share += _FADE**index * blurred[..., 3]
+    lost = share < 1e-9
+    mean = np.asarray(total / np.maximum(share, 1e-9)[..., None], np.float32)
+    mean[lost] = values[core].mean(axis=0)
+    return mean
+
+
+def _distance(core: BoolArray) -> Float32Array:
+    return np.asarray(cv2.distanceTransform((~core).astype(np.uint8), cv2.DIST_L2, 3), np.float32)
+
+
+def _enlarged(mask: BoolArray, width: int, height: int) -> BoolArray:
+    large = cv2.resize(mask.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
+    return np.asarray(large > 0)
+
+
+def _upsampled(values: Float32Array, band: BoolArray) -> Float32Array:
+    """Return `values` of the reduced picture at the band's pixels of the full one."""
+    height, width = band.shape
+    return np.asarray(cv2.resize(values, (width, height))[band], np.float32)

@@ -1,0 +1,239 @@
+"""Waves of the hair: measured in the orientation maps of the photos, and put back on tracked axes.
+
+Strands of wavy hair are helices whose neighbours are out of step. Eight photos cannot resolve them
+one by one, but they show three numbers. Along the average direction the angle swings, so its
+autocorrelation has a trough at half a turn: that is the pitch. The near half of a helix faces the
+camera and slants all one way, in every view alike, by `tan(slant) = 4 radius / pitch` on average
+(the mean of a cosine over its half turn is 2 / pi): where hair turns one way, the slant gives
+radius and handedness, and it must be taken off before views are fused, since it is no direction
+that hair grows in. Where hair turns both ways the slants cancel, and the swing's rms gives the
+radius.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+from scipy.spatial import cKDTree
+
+from hairkit.storage import Float64Array
+from hairkit.types.camera import Camera
+from hairkit.types.mask import Mask
+from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.strands import Strands
+
+HEIGHT = 540
+"""Waves are measured on maps of this height, where they still span tens of pixels."""
+HIGH_PASS = 12.5
+"""Gaussian in pixels of such a map that tells the average direction from the swing."""
+LONGEST_LAG, LINE_LENGTH, LINES = 55, 120, 500
+"""Pixels of the autocorrelation and of the lines it is taken on; lines a view."""
+SHORTEST_LAG = 5
+"""Half turns of fewer pixels are noise."""
+TROUGH = -0.09
+"""Autocorrelation below which there are waves; straight hair has -0.03, noise 0."""
+SWING_LOSS = 1.6
+"""Orientation maps average strands that are out of step; the swing they keep is smaller by about
+this."""
+FULL_HAIR = 0.003
+"""Roots closer than this, metres, carry every strand its own phase; see `add_waves`."""
+SURE_SLANT = 2.5
+"""Standard errors by which the views' mean slant must differ from 0."""
+
+
+@dataclass(frozen=True)
+class Waves:
+    """What the photos show of the hair's waves; radius 0 means straight hair."""
+
+    radius: float = 0.0
+    """Radius of the helix about its axis, metres."""
+    pitch: float = 0.0
+    """Length of one turn along the axis, metres."""
+    slant: float = 0.0
+    """Mean slant of the visible strands in the pictures, radians; 0 when hair turns both ways."""
+
+    @property
+    def handedness(self) -> int:
+        """1 or -1 when all hair turns one way, 0 when it turns both ways or not at all."""
+        return int(np.sign(self.slant))
+
+
+def measure_waves(
+    orientations: Sequence[OrientationMap], masks: Sequence[Mask], cameras: Sequence[Camera]
+) -> Waves:
+    """Measure pitch, radius and slant of the waves in all views together.
+
+    The field, the tracker and the groom's material ask the same; the last answer is kept.
+    """
+    return _measured(tuple(orientations), tuple(masks), tuple(cameras))
+
+
+@lru_cache(maxsize=1)
+def _measured(
+    orientations: tuple[OrientationMap, ...],
+    masks: tuple[Mask, ...],
+    cameras: tuple[Camera, ...],
+) -> Waves:
+    correlation = np.zeros(LONGEST_LAG)
+    squares, slants, metres = [], [], []
+    for found, mask, camera in zip(orientations, masks, cameras, strict=True):
+        swing, total = _swing(found, mask)
+        correlation += total
+        squares.append(swing)
+        slants.append(_mean_slant(found, mask))
+        distance = 1.0 if camera.model == "orthographic" else float(camera.depth(np.zeros(3)))
+        metres.append(found.angle.shape[0] / HEIGHT * distance / camera.focal)
+    if correlation[0] <= 0:
+        return Waves()
+    trough = int(np.argmin(correlation))
+    if (
+        correlation[trough] > TROUGH * correlation[0]
+        or not SHORTEST_LAG <= trough < LONGEST_LAG - 1
+    ):
+        return Waves()
+    pitch = 2 * trough * float(np.median(metres))
+    mean, error = np.mean(slants), np.std(slants) / np.sqrt(len(slants))
+    slant = float(mean) if abs(mean) > SURE_SLANT * error else 0.0
+    swing_rms = SWING_LOSS * float(np.sqrt(np.mean(squares)))
+    from_swing = pitch * np.sqrt(2) * np.tan(min(swing_rms, 0.8)) / (2 * np.pi)
+    from_slant = pitch * np.tan(min(abs(slant), 0.8)) / 4
+    return Waves(float(max(from_swing, from_slant)), pitch, slant)
+
+
+def without_slant(found: OrientationMap, waves: Waves) -> OrientationMap:
+    """Return the map with the slant of the helices' near halves taken off."""
+    if waves.slant == 0:
+        return found
+    return OrientationMap(wrap_angle(found.angle - waves.slant), found.confidence)
+
+
+def add_waves(strands: Strands, waves: Waves, seed: int = 0, ramp: float = 0.03) -> Strands:
+    """Wind strands of equal point counts around their own axes.
+
+    The helix grows in over `ramp` metres from the root. Phases vary smoothly over the scalp, so
+    that guides can be interpolated; strands closer than `FULL_HAIR` are no guides but hair, and are
+    out of step as real ones are. Without a handedness, wisps turn either way.
+    """
+    if waves.radius <= 0 or waves.pitch <= 0 or len(strands) == 0:
+        return strands
+    points = strands.points.reshape(len(strands), -1, 3).astype(np.float64)
+    arc = strands.arc_lengths().reshape(len(strands), -1)
+    first, second = _transported_frames(points)
+    rng = np.random.default_rng(seed)
+    phase = _wisp_phase(points[:, 0], rng) + _disorder(points[:, 0]) * rng.uniform(
+        -np.pi, np.pi, len(strands)
+    )
+    turn = waves.handedness or np.where(np.sin(_wisp_phase(points[:, 0], rng)) > 0, 1, -1)[:, None]
+    angle = phase[:, None] + turn * 2 * np.pi * arc / waves.pitch
+    radius = waves.radius * np.clip(arc / ramp, 0, 1)
+    offset = np.cos(angle)[..., None] * first + np.sin(angle)[..., None] * second
+    wound = points + radius[..., None] * offset
+    return Strands(
+        wound.reshape(-1, 3).astype(np.float32),
+        strands.offsets,
+        strands.widths,
+        strands.root_uv,
+        strands.group,
+        strands.guide,
+    )
+
+
+def _swing(found: OrientationMap, mask: Mask) -> tuple[float, Float64Array]:
+    """Return the mean square of the angle's swing, radians squared, and its autocorrelation
+    (LAGS,)."""
+    size = (round(found.angle.shape[1] * HEIGHT / found.angle.shape[0]), HEIGHT)
+    inside = cv2.resize(mask.hair.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+    inside = cv2.erode(inside, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7)))
+    weight = cv2.resize(found.confidence, size, interpolation=cv2.INTER_AREA) * inside
+    vector = np.stack([np.cos(2 * found.angle), np.sin(2 * found.angle)], axis=-1)
+    vector = cv2.resize(vector, size, interpolation=cv2.INTER_AREA) * weight[..., None]
+    smooth = cv2.GaussianBlur(vector, (0, 0), HIGH_PASS)
+    average = 0.5 * np.arctan2(smooth[..., 1], smooth[..., 0])
+    angle = 0.5 * np.arctan2(vector[..., 1], vector[..., 0])
+    swing = np.mod(angle - average + np.pi / 2, np.pi) - np.pi / 2
+    rows, columns = np.nonzero(weight > 0.3)
+    if not len(rows):
+        return 0.0, np.zeros(LONGEST_LAG)
+    pick = np.linspace(0, len(rows) - 1, LINES).astype(np.int64)
+    starts = np.stack([columns[pick], rows[pick]], axis=1).astype(np.float64)
+    total, count = _autocorrelation(average, swing, weight, starts, LINE_LENGTH, LONGEST_LAG)
+    mean = total / np.maximum(count, 1)
+    return float(mean[0]), np.where(count > LINES, mean, 0)
+
+
+@njit(cache=True)
+def _autocorrelation(average, swing, weight, starts, length, lags):  # type: ignore[no-untyped-def]
+    """Sum swing[i] * swing[i + lag] along lines that follow `average`; and the number of terms."""
+    height, width = swing.shape
+    total, count = np.zeros(lags), np.zeros(lags)
+    line = np.empty(length)
+    for s in range(len(starts)):
+        x, y = starts[s, 0], starts[s, 1]
+        dx, dy = 0.0, 1.0
+        n = 0
+        while n < length:
+            ix, iy = int(x), int(y)
+            if ix < 0 or iy < 0 or ix >= width or iy >= height or weight[iy, ix] <= 0.05:
+                break
+            line[n] = swing[iy, ix]
+            n += 1
+            c, d = np.cos(average[iy, ix]), np.sin(average[iy, ix])
+            if c * dx + d * dy < 0:
+                c, d = -c, -d
+            dx, dy = c, d
+            x += dx
+            y += dy
+        for lag in range(min(lags, n)):
+            for i in range(n - lag):
+                total[lag] += line[i] * line[i + lag]
+            count[lag] += n - lag
+    return total, count
+
+
+def _mean_slant(found: OrientationMap, mask: Mask) -> float:
+    """Return the mean angle of the strands off the vertical, radians, positive from +y towards
+    -x."""
+    weight = found.confidence * mask.hair
+    turned = 2 * (found.angle - np.float32(np.pi / 2))
+    return 0.5 * float(np.arctan2((weight * np.sin(turned)).sum(), (weight * np.cos(turned)).sum()))
+
+
+def _transported_frames(points: Float64Array) -> tuple[Float64Array, Float64Array]:
+    """Return two unit normals (S, M, 3) that do not twist along the strands (Bishop 1975)."""
+    tangent = np.gradient(points, axis=1)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-12)
+    normal = np.empty_like(points)
+    side = np.cross(tangent[:, 0], [0.0, 0.0, 1.0]) + 1e-3 * np.cross(
+        tangent[:, 0], [1.0, 0.0, 0.0]
+    )
+    for k in range(points.shape[1]):
+        side = side - np.sum(side * tangent[:, k], axis=1, keepdims=True) * tangent[:, k]
+        side = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
+        normal[:, k] = side
+    return normal, np.cross(tangent, normal)
+
+
+def _disorder(roots: Float64Array) -> float:
+    """Return 0 for roots further apart than guides' 2 `FULL_HAIR`, 1 for those closer than
+    `FULL_HAIR`."""
+    if len(roots) < 2:
+        return 0.0
+    spacing = float(np.median(cKDTree(roots).query(roots, k=2)[0][:, 1]))
+    return float(np.clip(2 - spacing / FULL_HAIR, 0, 1))
+
+
+def _wisp_phase(roots: npt.NDArray[np.float64], rng: np.random.Generator) -> Float64Array:
+    """Return phases (S,) that vary by about a turn over some centimetres of scalp."""
+    phase = np.full(len(roots), rng.uniform(0, 2 * np.pi))
+    for wavelength in (0.11, 0.07, 0.05):
+        direction = rng.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        shift = rng.uniform(0, 2 * np.pi)
+        phase += 2.5 * np.sin(2 * np.pi * (roots @ direction) / wavelength + shift)
+    return phase

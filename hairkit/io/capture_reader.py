@@ -1,0 +1,283 @@
+"""Reading a capture: a folder of eight photos, with masks, strokes and landmarks where present.
+
+Either the photos lie in the folder itself, or in its `photos/` beside `masks/`, `strokes/` and
+`landmarks.json`; these are matched by name. An optional `capture.toml` says more (`capture_file`).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairkit.errors import FormatError, InputError
+from hairkit.io.capture_toml import CaptureFile, ViewEntry, read_capture_file
+from hairkit.io.photos import PhotoHeader, focal_from_equivalent, read_header, read_photo
+from hairkit.options import unknown_name
+from hairkit.storage import Float64Array, frozen_array
+from hairkit.types.capture import Capture, View
+
+TURN = {
+    "front": 0.0,
+    "front-left": 45.0,
+    "left": 90.0,
+    "back-left": 135.0,
+    "back": 180.0,
+    "back-right": 225.0,
+    "right": 270.0,
+    "front-right": 315.0,
+}
+"""The nominal turn: view names and azimuths in degrees, in the order in which photos are taken."""
+
+WORKING_EDGE = 1440
+"""Long edge in pixels that photos are scaled down to."""
+
+SMALLEST_SHARE = 0.85
+"""The smallest photo's edges may be this share of the largest photo's: a little cropping."""
+
+_PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png")
+_OTHER_SUFFIXES = (".heic", ".heif", ".webp", ".tif", ".tiff", ".bmp", ".gif", ".dng", ".avif")
+_LANDMARKS = 68
+
+
+@dataclass(frozen=True)
+class _Place:
+    """One photo and the view it shows."""
+
+    photo: Path
+    name: str
+    azimuth_deg: float
+    entry: ViewEntry
+
+
+def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> Capture:
+    """Return the capture in a folder.
+
+    Parameters
+    ----------
+    path
+        The capture's folder. Photos without names of views are the nominal turn in file order.
+    max_edge
+        Photos whose long edge has more pixels are scaled down to it.
+
+    Raises
+    ------
+    InputError
+        There are not eight photos, one cannot be read or has another size than the rest, or masks,
+        strokes or landmarks do not belong to the photos.
+    """
+    folder = Path(path)
+    if not folder.is_dir():
+        reason = "not a folder" if folder.exists() else "no such folder"
+        raise InputError(f"{folder}: {reason}, expected a folder with {len(TURN)} photos")
+    photo_folder = folder / "photos" if (folder / "photos").is_dir() else folder
+    settings = read_capture_file(folder / "capture.toml")
+    photos = _photos(photo_folder, folder)
+    places = _places(photos, settings, photo_folder)
+    headers = [read_header(place.photo) for place in places]
+    _check_sizes(places, headers)
+    masks = _beside(folder / "masks", ".png", places)
+    for place, header in zip(places, headers, strict=True):
+        _check_mask(masks.get(place.photo.stem), header)
+    strokes = _beside(photo_folder, ".json", places) | _beside(folder / "strokes", ".json", places)
+    landmarks = _landmarks(folder / "landmarks.json", places)
+
+    def view(place: _Place) -> View:
+        stem = place.photo.stem
+        found = masks.get(stem), strokes.get(stem)
+        return _view(place, settings, max_edge, landmarks.get(stem), *found)
+
+    with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as pool:
+        views = tuple(pool.map(view, places))
+    return Capture(views, settings.orthographic, settings.head_pose)
+
+
+def sample_folder() -> Path:
+    """Return the folder of the capture that ships with hairkit."""
+    return Path(__file__).parents[1] / "sample"
+
+
+def _photos(photo_folder: Path, folder: Path) -> list[Path]:
+    """Return the eight photos in natural file order: `2.jpg` before `10.jpg`."""
+    names = [entry for entry in photo_folder.iterdir() if not entry.name.startswith(".")]
+    pictures = [p for p in names if p.suffix.lower() in _PHOTO_SUFFIXES + _OTHER_SUFFIXES]
+    pictures.sort(key=lambda p: [int(s) if s.isdigit() else s for s in _digits(p.name.lower())])
+    for picture in pictures:
+        if picture.suffix.lower() in _OTHER_SUFFIXES:
+            raise InputError(f"{picture}: expected JPEG or PNG photos; save it as one of these")
+    if len(pictures) != len(TURN):
+        stems = {p.stem for p in pictures}
+        drawn = [*folder.glob("masks/*.png"), *folder.glob("strokes/*.json")]
+        missing = sorted({p.stem for p in drawn} - stems)
+        hint = f"; the photo {missing[0]!r} is missing" if missing else ""
+        raise InputError(
+            f"{photo_folder}: {len(pictures)} photos, expected {len(TURN)}: the whole turn,"
+            f" 45 degrees apart{hint}"
+        )
+    return pictures
+
+
+def _digits(name: str) -> list[str]:
+    # odd places hold the numbers, so that lists of any two names can be compared
+    return re.split(r"(\d+)", name)
+
+
+def _places(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> list[_Place]:
+    """Say which view every photo shows: by capture.toml, by the file's name, or by file order."""
+    if settings.views:
+        return _listed(photos, settings, photo_folder)
+    named = [_view_name(photo) for photo in photos]
+    if not set(named) & set(TURN):
+        named = list(TURN)
+    for photo, name in zip(photos, named, strict=True):
+        if name not in TURN:
+            raise InputError(f"{photo}: {unknown_name('view', name, TURN)}; rename the photo")
+        if named.count(name) > 1:
+            raise InputError(f"{photo}: there are two photos of the view {name!r}; remove one")
+    by_name = dict(zip(named, photos, strict=True))
+    return [_Place(by_name[name], name, azimuth, ViewEntry()) for name, azimuth in TURN.items()]
+
+
+def _listed(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> list[_Place]:
+    """Match the views of capture.toml with photos, by file name, by view name, or in order."""
+    by_name = {key: p for p in photos for key in (_view_name(p), p.stem, p.name)}
+    places = []
+    if len(settings.views) != len(photos):
+        count = len(settings.views)
+        raise InputError(f"{settings.source}: {count} views for {len(photos)} photos")
+    for index, entry in enumerate(settings.views):
+        wanted = entry.photo or entry.name
+        photo = by_name.get(wanted or "", None if entry.photo else photos[index])
+        if photo is None:
+            raise InputError(
+                f"{photo_folder / str(wanted)}: no such photo; {settings.source} names it"
+            )
+        name = entry.name or list(TURN)[index]
+        azimuth = TURN.get(name) if entry.azimuth_deg is None else entry.azimuth_deg
+        if azimuth is None:
+            reason = unknown_name("view", name, TURN)
+            raise InputError(f"{settings.source}: {reason}; or give its azimuth_deg")
+        places.append(_Place(photo, name, azimuth, entry))
+    for thing in ([place.photo.name for place in places], [place.name for place in places]):
+        twice = next((item for item in thing if thing.count(item) > 1), None)
+        if twice is not None:
+            raise InputError(f"{settings.source}: {twice!r} stands for two views")
+    return places
+
+
+def _view_name(photo: Path) -> str:
+    """Return the view that a photo's name tells: `0_Front.jpg` shows `front`."""
+    return re.sub(r"^\d+[-_. ]*", "", photo.stem).lower().replace("_", "-").replace(" ", "-")
+
+
+def _check_sizes(places: list[_Place], headers: list[PhotoHeader]) -> None:
+    """Refuse a photo that cannot be of the same turn; a little cropping is no harm."""
+    largest = max(h.width for h in headers), max(h.height for h in headers)
+    for place, header in zip(places, headers, strict=True):
+        size = header.width, header.height
+        if min(size[0] / largest[0], size[1] / largest[1]) < SMALLEST_SHARE:
+            raise InputError(
+                f"{place.photo}: {size[0]} x {size[1]} pixels, other photos have {largest[0]} x"
+                f" {largest[1]}; take all photos at the same size"
+            )
+
+
+def _beside(folder: Path, suffix: str, places: list[_Place]) -> dict[str, Path]:
+    """Return the files of a folder by the stem of the photo that they belong to."""
+    found: dict[str, Path] = {}
+    by_name = {key: p.photo.stem for p in places for key in (p.name, p.photo.stem)}
+    for file in sorted(folder.glob(f"*{suffix}")):
+        stem = by_name.get(file.stem, by_name.get(_view_name(file)))
+        if stem is None and folder.name in ("masks", "strokes"):
+            stems = [place.photo.stem for place in places]
+            raise InputError(f"{file}: {unknown_name('photo', file.stem, stems)}; rename the file")
+        if stem is not None:
+            found[stem] = file
+    return found
+
+
+def _check_mask(mask: Path | None, photo: PhotoHeader) -> None:
+    if mask is None:
+        return
+    header = read_header(mask)
+    if (header.width, header.height) != (photo.width, photo.height):
+        raise InputError(
+            f"{mask}: {header.width} x {header.height} pixels, its photo has"
+            f" {photo.width} x {photo.height}; draw the mask on the photo"
+        )
+
+
+def _landmarks(path: Path, places: list[_Place]) -> dict[str, Float64Array]:
+    """Return 68 points (68, 2) in pixels of the photo on disk, by the photo's stem."""
+    if not path.exists():
+        return {}
+    try:
+        views = json.loads(path.read_bytes())["views"]
+        items: Iterable[tuple[str, Any]] = views.items()
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise FormatError(
+            f'{path}: expected JSON {{"views": {{NAME: points}}}} ({error})'
+        ) from error
+    by_name = {key: p.photo.stem for p in places for key in (p.name, p.photo.stem)}
+    found = {}
+    for name, points in items:
+        if name not in by_name:
+            stems = [place.photo.stem for place in places]
+            raise InputError(f"{path}: {unknown_name('view', name, stems)}")
+        found[by_name[name]] = _points(points, f"{path}: {name}")
+    return found
+
+
+def _points(points: Any, where: str) -> Float64Array:
+    try:
+        count = len(points)
+        if count != _LANDMARKS:
+            raise InputError(f"{where}: {count} landmarks, expected the {_LANDMARKS} iBUG points")
+        return frozen_array(points, np.float64, (_LANDMARKS, 2), f"{where}: landmarks")
+    except (TypeError, ValueError, OverflowError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{where}: landmarks are no list of pixel pairs ({error})") from error
+
+
+def _view(
+    place: _Place,
+    settings: CaptureFile,
+    max_edge: int,
+    landmarks: Float64Array | None,
+    mask: Path | None,
+    strokes: Path | None,
+) -> View:
+    """Read one photo and bring everything that belongs to it to working size."""
+    image, header = read_photo(place.photo, max_edge)
+    height, width = image.shape[:2]
+    scale = np.array([width / header.width, height / header.height])
+    focal = _focal(place.entry, settings, header)
+    return View(
+        place.name,
+        place.azimuth_deg,
+        image,
+        focal_px=None if focal is None else focal * float(scale[0]),
+        landmarks=None if landmarks is None else landmarks * scale,
+        mask_path=mask,
+        strokes_path=strokes,
+        photo_path=place.photo,
+        photo_size=(header.width, header.height),
+    )
+
+
+def _focal(entry: ViewEntry, settings: CaptureFile, header: PhotoHeader) -> float | None:
+    """Return pixels of the photo on disk, as the view says, or else the capture, or else EXIF."""
+    for said in (entry.focal, settings.focal):
+        if said.px is not None:
+            return said.px
+        if said.mm_equivalent is not None:
+            return focal_from_equivalent(said.mm_equivalent, header.width, header.height)
+    return header.focal_px

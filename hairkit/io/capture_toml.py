@@ -1,0 +1,170 @@
+"""`capture.toml`: what photos alone do not tell. Every entry may be left out.
+
+orthographic = false             # true: no perspective
+focal_mm_equivalent = 47.8       # 35 mm equivalent, by the diagonal; or focal_px, of the photo
+[head]                           # the head placed by hand, for the scene plugin `manual`
+scale = 1.05
+rotation_deg = [0, 5, 0]         # about x, then y, then z
+translation_m = [0, 0.01, 0]
+[[views]]                        # eight of these, in the order of the photos
+name = "front"
+photo = "IMG_0412.jpg"
+azimuth_deg = 0                  # towards the subject's left
+focal_px = 1492
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.options import make_options, option, unknown_name
+from hairkit.storage import Float64Array, write_text
+
+_TABLES = ("head", "views")
+
+
+@dataclass(frozen=True)
+class Focal:
+    """A focal length in one of its two units, or neither."""
+
+    px: float | None = None
+    mm_equivalent: float | None = None
+
+
+@dataclass(frozen=True)
+class ViewEntry:
+    """One `[[views]]` table."""
+
+    name: str | None = option(None, doc="Name of the view.")
+    photo: str | None = option(None, doc="File name of its photo.")
+    azimuth_deg: float | None = option(None, low=-360, high=360, doc="Azimuth.", unit="deg")
+    focal_px: float | None = option(None, low=1, high=1e6, doc="Focal length.", unit="px")
+    focal_mm_equivalent: float | None = option(None, low=8, high=2000, doc="Same.", unit="mm")
+
+    @property
+    def focal(self) -> Focal:
+        """The view's focal length."""
+        return Focal(self.focal_px, self.focal_mm_equivalent)
+
+
+@dataclass(frozen=True)
+class HeadEntry:
+    """The `[head]` table."""
+
+    scale: float = option(1.0, low=0.01, high=100, doc="Size of the head over the model's.")
+    rotation_deg: tuple[float, float, float] = option(
+        (0.0, 0.0, 0.0), low=-360, high=360, doc="Rotation about x, then y, then z.", unit="deg"
+    )
+    translation_m: tuple[float, float, float] = option(
+        (0.0, 0.0, 0.0), low=-10, high=10, doc="Place of the model's origin.", unit="m"
+    )
+
+
+@dataclass(frozen=True)
+class _Top:
+    orthographic: bool = option(False, doc="True when the photos have no perspective.")
+    focal_px: float | None = option(None, low=1, high=1e6, doc="Focal length.", unit="px")
+    focal_mm_equivalent: float | None = option(None, low=8, high=2000, doc="Same.", unit="mm")
+
+
+@dataclass(frozen=True, eq=False)
+class CaptureFile:
+    """What a `capture.toml` says; the defaults stand for a file that does not exist."""
+
+    source: Path
+    orthographic: bool = False
+    focal: Focal = Focal()
+    head_pose: Float64Array | None = None
+    """(4, 4) similarity, scene_from_head."""
+    views: tuple[ViewEntry, ...] = ()
+
+
+def read_capture_file(path: Path) -> CaptureFile:
+    """Read a `capture.toml`; a missing one says nothing. Raises `InputError` or `OptionError`."""
+    if not path.exists():
+        return CaptureFile(path)
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not a TOML file: {error}") from error
+    keys = [field.name for field in fields(_Top)] + list(_TABLES)
+    for key in document:
+        if key not in keys:
+            raise InputError(f"{path}: {unknown_name('entry', key, keys)}")
+    top = make_options(_Top, {k: v for k, v in document.items() if k not in _TABLES}, str(path))
+    return CaptureFile(
+        path,
+        top.orthographic,
+        Focal(top.focal_px, top.focal_mm_equivalent),
+        _head_pose(document["head"], f"{path}: [head]") if "head" in document else None,
+        _views(document.get("views", []), path),
+    )
+
+
+def write_head_entry(path: Path, entry: HeadEntry) -> None:
+    """Put the head's pose into a `capture.toml`, made where there is none; all else in it stays."""
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    kept, inside = [], False
+    for line in text.splitlines():
+        if line.strip().startswith("["):
+            inside = line.split("#")[0].strip() == "[head]"
+        if not inside:
+            kept.append(line)
+    x, y, z = entry.rotation_deg
+    right, up, front = entry.translation_m
+    table = [
+        "[head]",
+        f"scale = {entry.scale!r}",
+        f"rotation_deg = [{x!r}, {y!r}, {z!r}]",
+        f"translation_m = [{right!r}, {up!r}, {front!r}]",
+    ]
+    while kept and not kept[-1].strip():
+        kept.pop()
+    write_text(path, "\n".join([*kept, *([""] if kept else []), *table]) + "\n")
+
+
+def head_entry(pose: Float64Array) -> HeadEntry:
+    """Return the `[head]` table of a similarity (4, 4), to a tenth of a micrometre."""
+    scale = float(np.cbrt(np.linalg.det(pose[:3, :3])))
+    turn = pose[:3, :3] / scale
+    angles = (
+        math.atan2(turn[2, 1], turn[2, 2]),
+        -math.asin(min(max(float(turn[2, 0]), -1.0), 1.0)),
+        math.atan2(turn[1, 0], turn[0, 0]),
+    )
+    x, y, z = (round(math.degrees(angle), 6) for angle in angles)
+    right, up, front = (round(float(value), 7) for value in pose[:3, 3])
+    return HeadEntry(round(scale, 7), (x, y, z), (right, up, front))
+
+
+def _views(tables: Any, path: Path) -> tuple[ViewEntry, ...]:
+    if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
+        raise InputError(f"{path}: views are no tables; begin each with [[views]]")
+    return tuple(
+        make_options(ViewEntry, table, f"{path}: view {index}")
+        for index, table in enumerate(tables)
+    )
+
+
+def _head_pose(table: Any, where: str) -> Float64Array:
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} is no table")
+    entry = make_options(HeadEntry, table, where)
+    pose = np.eye(4)
+    for axis, angle_deg in enumerate(entry.rotation_deg):
+        turn, (i, j) = np.eye(3), ((1, 2), (2, 0), (0, 1))[axis]
+        angle = math.radians(angle_deg)
+        turn[i, i] = turn[j, j] = math.cos(angle)
+        turn[i, j], turn[j, i] = -math.sin(angle), math.sin(angle)
+        pose[:3, :3] = turn @ pose[:3, :3]
+    pose[:3, :3] *= entry.scale
+    pose[:3, 3] = entry.translation_m
+    return pose

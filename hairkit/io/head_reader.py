@@ -1,0 +1,247 @@
+"""Heads that users bring: OBJ, PLY and GLB meshes in any unit, with the scalp marked somehow."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hairkit.errors import FormatError, InputError
+from hairkit.head_model.template import default_head
+from hairkit.io.glb_mesh import read_glb
+from hairkit.io.mesh_text import FileMesh, read_obj, read_ply
+from hairkit.io.photos import read_drawing
+from hairkit.storage import Float32Array, Float64Array, Int32Array, write_text
+from hairkit.types.head import Capsules, Head
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+"""Metres in one unit of a head file."""
+_READERS = {".obj": read_obj, ".ply": read_ply, ".glb": read_glb}
+_DEFAULT_BREADTH = 0.155
+_TOP_OVER_BREADTH = 0.452
+"""Height of the crown over the head's centre, in head breadths."""
+_HOW_TO_MARK = (
+    "mark it by a group, material or vertex property named 'scalp', by vertices painted red (or "
+    "white on black), or by a mask picture NAME.scalp.png over its texture coordinates"
+)
+
+
+def read_head(
+    path: str | os.PathLike[str], units: str = "m", scalp: str | None = None, up: str = "y"
+) -> Head:
+    """Return the head in an OBJ, PLY or GLB file, in metres, +Y up, its middle at the origin.
+
+    The face must look along +Z (along -Y where `up` is z). A head whose origin is more than 2 cm
+    from the middle of its cranium is moved there. Winding is turned outward. Joints and capsules
+    are those of the default head, scaled and moved.
+
+    Parameters
+    ----------
+    path
+        The 68 landmarks may stand beside it in NAME.landmarks.json: a list of vertex numbers from
+        0, or of points [x, y, z] in the file's units and axes.
+    units
+        `m`, `cm`, `mm` or `in`.
+    scalp
+        Name of the group, material or vertex property that is the scalp, or the path of a mask
+        picture (PNG, white is scalp). `None`: a group named scalp, else NAME.scalp.png, else
+        painted colours.
+    up
+        `y` or `z`.
+
+    Raises
+    ------
+    InputError
+        The file is missing, the scalp is not marked, or the size cannot be a head's.
+    FormatError
+        The file is damaged or of another format.
+    """
+    file = Path(path)
+    mesh = _file_mesh(file, units, up)
+    weight = _scalp_weight(mesh, file, scalp)
+    vertices = _in_metres(mesh.vertices, units, up)
+    faces = _wound_outward(vertices, mesh.faces.astype(np.int32))
+    used = np.unique(faces)
+    breadth, middle = _breadth_and_middle(vertices[used], weight[used], file)
+    landmarks = _landmarks(file, vertices, units, up)
+    moved = vertices if np.linalg.norm(middle) <= 0.02 else vertices - middle
+    middle = middle if moved is vertices else np.zeros(3)
+    uv = _azimuthal_uv(moved - middle) if mesh.uv is None else _in_unit_square(mesh.uv)
+    joints, capsules = _skeleton(breadth / _DEFAULT_BREADTH, middle)
+    return Head(
+        moved.astype(np.float32),
+        faces,
+        uv.astype(np.float32),
+        weight.astype(np.float32),
+        landmarks,
+        joints,
+        capsules,
+    )
+
+
+def write_head_obj(path: str | os.PathLike[str], head: Head) -> None:
+    """Write the head as OBJ in metres, its faces in the groups `scalp` and `head`.
+
+    Landmarks go to NAME.landmarks.json beside it. `read_head` gives the same mesh back.
+    """
+    chosen = head.scalp[head.faces].mean(axis=1) > 0.5
+    lines = ["# metres, +Y up, +Z out of the face"]
+    lines += ["v {:.9g} {:.9g} {:.9g}".format(*row) for row in head.vertices.tolist()]
+    lines += ["vt {:.9g} {:.9g}".format(*row) for row in head.uv.tolist()]
+    for name, faces in (("scalp", head.faces[chosen]), ("head", head.faces[~chosen])):
+        lines.append(f"g {name}")
+        lines += ["f {0}/{0} {1}/{1} {2}/{2}".format(*row) for row in (faces + 1).tolist()]
+    write_text(path, "\n".join(lines) + "\n")
+    if head.landmark_vertices is not None:
+        write_text(
+            _beside(Path(path), "landmarks.json"), json.dumps(head.landmark_vertices.tolist())
+        )
+
+
+def _file_mesh(file: Path, units: str, up: str) -> FileMesh:
+    if units not in UNITS:
+        raise InputError(f"head units are {units!r}, expected one of {', '.join(UNITS)}")
+    if up not in ("y", "z"):
+        raise InputError(f"the head's up axis is {up!r}, expected y or z")
+    if file.suffix.lower() not in _READERS:
+        raise FormatError(f"{file}: a head must be an .obj, .ply or .glb file")
+    return _READERS[file.suffix.lower()](file)
+
+
+def _beside(file: Path, ending: str) -> Path:
+    return file.with_name(f"{file.stem}.{ending}")
+
+
+def _scalp_weight(mesh: FileMesh, file: Path, scalp: str | None) -> Float64Array:
+    """(V,) from the first mark that the file or the user gives."""
+    if scalp is not None and scalp.lower() in mesh.groups:
+        weight = mesh.groups[scalp.lower()]
+    elif scalp is not None and Path(scalp).is_file():
+        weight = _picture_weight(mesh, file, Path(scalp))
+    elif scalp is not None:
+        known = ", ".join(sorted(mesh.groups)) or "none"
+        raise InputError(f"{file}: no group or picture {scalp!r} for the scalp; groups: {known}")
+    elif "scalp" in mesh.groups:
+        weight = mesh.groups["scalp"]
+    elif _beside(file, "scalp.png").is_file():
+        weight = _picture_weight(mesh, file, _beside(file, "scalp.png"))
+    elif mesh.colours is not None:
+        weight = _painted_weight(mesh.colours, file)
+    else:
+        raise InputError(f"{file}: the head has no scalp: {_HOW_TO_MARK}")
+    in_use = np.bincount(mesh.faces.ravel(), minlength=len(weight)) > 0
+    weight = np.clip(weight, 0, 1) * in_use
+    if not (weight[mesh.faces].mean(axis=1) > 0.5).any():
+        raise InputError(f"{file}: no face of the head is marked as scalp: {_HOW_TO_MARK}")
+    return weight
+
+
+def _picture_weight(mesh: FileMesh, file: Path, picture: Path) -> Float64Array:
+    """Brightness of the mask picture at each vertex's texture coordinates, v from the bottom."""
+    if mesh.uv is None:
+        raise InputError(f"{file}: has no texture coordinates, which the mask {picture} needs")
+    mask = read_drawing(picture)
+    height, width = mask.shape
+    place = _in_unit_square(mesh.uv)
+    column = np.minimum((place[:, 0] * width).astype(int), width - 1)
+    row = np.minimum(((1 - place[:, 1]) * height).astype(int), height - 1)
+    brightest = max(int(mask.max()), 1)
+    return np.asarray(mask[row, column] / brightest, np.float64)
+
+
+def _painted_weight(colours: Float64Array, file: Path) -> Float64Array:
+    """Red paint if there is any, else white on black; skin colours are neither."""
+    redness = colours[:, 0] - colours[:, 1:].max(axis=1)
+    if redness.max() > 0.5:
+        return np.asarray(redness / redness.max(), np.float64)
+    brightness: Float64Array = colours.mean(axis=1)
+    if brightness.min() > 0.25 or brightness.max() < 0.75 or np.ptp(colours, axis=1).max() > 0.25:
+        raise InputError(f"{file}: its colours mark no scalp: {_HOW_TO_MARK}")
+    return brightness
+
+
+def _in_metres(points: Float64Array, units: str, up: str) -> Float64Array:
+    turned = points if up == "y" else np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1)
+    return np.asarray(turned * UNITS[units], np.float64)
+
+
+def _wound_outward(vertices: Float64Array, faces: Int32Array) -> Int32Array:
+    corners = vertices[faces] - vertices.mean(axis=0)
+    volume = (np.cross(corners[:, 0], corners[:, 1]) * corners[:, 2]).sum()
+    return np.ascontiguousarray(faces[:, ::-1]) if volume < 0 else faces
+
+
+def _breadth_and_middle(
+    vertices: Float64Array, weight: Float64Array, file: Path
+) -> tuple[float, Float64Array]:
+    """Breadth of the scalp and the middle of the cranium, metres, by the default head's shape."""
+    scalp = vertices[weight > 0.5]
+    breadth = float(np.ptp(scalp[:, 0])) if len(scalp) else 0.0
+    if not 0.05 <= breadth <= 0.6:
+        raise InputError(
+            f"{file}: the scalp is {breadth:.4g} m broad, a head's is about 0.155 m: "
+            "give the file's units (m, cm, mm, in)"
+        )
+    height = scalp[:, 1].max() - _TOP_OVER_BREADTH * breadth
+    level = vertices[np.abs(vertices[:, 1] - height) < 0.1 * breadth]
+    depth = level if len(level) else scalp
+    middle = [
+        0.5 * (scalp[:, 0].min() + scalp[:, 0].max()),
+        height,
+        0.5 * (depth[:, 2].min() + depth[:, 2].max()),
+    ]
+    return breadth, np.array(middle, np.float64)
+
+
+def _landmarks(file: Path, vertices: Float64Array, units: str, up: str) -> Int32Array | None:
+    """(68,) vertices named by, or nearest to the points in, NAME.landmarks.json."""
+    path = _beside(file, "landmarks.json")
+    if not path.is_file():
+        return None
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        values = np.array(data["landmarks"] if isinstance(data, dict) else data, np.float64)
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError, OSError) as error:
+        raise FormatError(f"{path}: not a JSON list of 68 landmarks ({error})") from error
+    if values.shape not in ((68,), (68, 3)) or not np.isfinite(values).all():
+        raise FormatError(f"{path}: expected 68 vertex numbers or 68 points, all finite")
+    if values.ndim == 1:
+        if (values % 1 != 0).any() or values.min() < 0 or values.max() >= len(vertices):
+            raise FormatError(f"{path}: a landmark names a vertex the head does not have")
+        return values.astype(np.int32)
+    points = _in_metres(values, units, up)
+    apart, nearest = cKDTree(vertices).query(points)
+    if apart.max() > 0.02:
+        raise InputError(
+            f"{path}: a landmark is {1e3 * apart.max():.0f} mm from the head; same units and axes?"
+        )
+    return np.asarray(nearest, np.int32)
+
+
+def _in_unit_square(uv: Float64Array) -> Float64Array:
+    """Texture coordinates of further tiles brought back into the first."""
+    outside = (uv < 0) | (uv > 1)
+    return np.where(outside, uv - np.floor(uv), uv)
+
+
+def _azimuthal_uv(vertices: Float64Array) -> Float64Array:
+    """(V, 2) projection from the crown about the head's middle, as the default head has it."""
+    length = np.maximum(np.linalg.norm(vertices, axis=1), 1e-9)
+    radius = 0.5 * np.arccos((vertices[:, 1] / length).clip(-1, 1)) / np.pi
+    azimuth = np.arctan2(vertices[:, 0], vertices[:, 2])
+    return np.stack([0.5 + radius * np.sin(azimuth), 0.5 - radius * np.cos(azimuth)], axis=1)
+
+
+def _skeleton(scale: float, middle: Float64Array) -> tuple[Float32Array, Capsules]:
+    """The default head's joints and capsules, scaled about its middle and moved."""
+    model = default_head()
+    first = model.capsules.first * scale + middle
+    second = model.capsules.second * scale + middle
+    radius = model.capsules.radius * scale
+    capsules = Capsules(
+        first.astype(np.float32), second.astype(np.float32), radius.astype(np.float32)
+    )
+    return (model.joints * scale + middle).astype(np.float32), capsules

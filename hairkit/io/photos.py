@@ -1,0 +1,261 @@
+"""Photos read safely: the header is checked before anything is decoded, EXIF is obeyed.
+
+Sizes and focal lengths are those of the upright picture, after EXIF rotation.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import struct
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hairkit.errors import FormatError, InputError
+from hairkit.io.exif import Exif, read_exif
+from hairkit.storage import UInt8Array
+
+MAX_PIXELS = 64_000_000
+"""Pictures with more pixels than this are refused before they are decoded."""
+
+MAX_BYTES = 256 * 2**20
+"""Files larger than this are refused unread."""
+
+FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
+"""Diagonal of the 35 mm film frame, to which equivalent focal lengths refer (CIPA DCG-001)."""
+
+_KINDS = {
+    b"\xff\xd8\xff": "JPEG",
+    b"\x89PNG\r\n\x1a\n": "PNG",
+    b"GIF8": "GIF",
+    b"BM": "BMP",
+    b"II*\0": "TIFF or raw",
+    b"MM\0*": "TIFF or raw",
+    b"%PDF": "PDF",
+}
+_JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+
+
+@dataclass(frozen=True)
+class PhotoHeader:
+    """What a picture's file says about it before it is decoded."""
+
+    kind: str
+    """`JPEG` or `PNG`."""
+    width: int
+    """Width in pixels after EXIF rotation."""
+    height: int
+    """Height in pixels after EXIF rotation."""
+    exif: Exif
+
+    @property
+    def focal_px(self) -> float | None:
+        """Focal length in pixels of the whole picture, or None when EXIF does not tell."""
+        sides = sorted((self.width, self.height))
+        taken = sorted(self.exif.pixels) if self.exif.pixels is not None else sides
+        if abs(taken[0] * sides[1] - taken[1] * sides[0]) > 0.02 * taken[1] * sides[1]:
+            return None  # cropped after it was taken: the lens's field of view is gone
+        if self.exif.focal_35mm is not None:
+            return focal_from_equivalent(self.exif.focal_35mm, self.width, self.height)
+        if self.exif.focal_mm is not None and self.exif.pixels_per_mm is not None:
+            return self.exif.focal_mm * self.exif.pixels_per_mm * sides[1] / taken[1]
+        return None
+
+
+def focal_from_equivalent(focal_mm: float, width: int, height: int) -> float:
+    """Return the focal length in pixels of a 35 mm equivalent one: equal diagonal angle of view.
+
+    >>> round(focal_from_equivalent(47.83, 810, 1080))
+    1492
+    """
+    return focal_mm / FILM_DIAGONAL_MM * math.hypot(width, height)
+
+
+def read_header(path: str | os.PathLike[str]) -> PhotoHeader:
+    """Return what the picture's header says; `InputError` when it is unusable."""
+    return _header(_read_bytes(Path(path)), Path(path))
+
+
+def read_photo(
+    path: str | os.PathLike[str], max_edge: int | None = None
+) -> tuple[UInt8Array, PhotoHeader]:
+    """Return a photo as RGB, upright, and its header.
+
+    Parameters
+    ----------
+    path
+        A JPEG or PNG file.
+    max_edge
+        Larger pictures are scaled down so that their long edge has this many pixels.
+
+    Returns
+    -------
+    image
+        (H, W, 3) uint8 RGB.
+    header
+        Size and focal length of the photo as it is on disk.
+
+    Raises
+    ------
+    InputError
+        The file is missing, no picture, damaged, or has more than `MAX_PIXELS` pixels.
+    """
+    data = _read_bytes(Path(path))
+    header = _header(data, Path(path))
+    scale = min(1.0, (max_edge or math.inf) / max(header.width, header.height))
+    # a JPEG decoder halves pictures almost for free; never below the size that is wanted
+    mode = cv2.IMREAD_REDUCED_COLOR_2 if scale <= 0.5 else cv2.IMREAD_COLOR
+    image = _decode(data, mode, Path(path))[..., ::-1]
+    upright = _upright(image, header.exif.orientation)
+    if scale < 1:
+        size = [max(1, round(edge * scale)) for edge in (header.width, header.height)]
+        upright = cv2.resize(upright, size, interpolation=cv2.INTER_AREA).astype(
+            np.uint8, copy=False
+        )
+    return upright, header
+
+
+def read_drawing(path: str | os.PathLike[str]) -> UInt8Array:
+    """Return the single channel (H, W) of a drawn PNG, such as a mask, its values untouched.
+
+    A drawing with transparency is its alpha channel; a coloured one is refused with `InputError`.
+    """
+    data = _read_bytes(Path(path))
+    if _header(data, Path(path)).kind != "PNG":
+        raise InputError(f"{path}: masks must be PNG files, because JPEG smears their labels")
+    pixels = _decode(data, cv2.IMREAD_UNCHANGED, Path(path))
+    if pixels.dtype != np.uint8:
+        pixels = (pixels >> 8).astype(np.uint8)
+    if pixels.ndim == 2:
+        return pixels
+    if pixels.shape[2] == 4 and (pixels[..., 3] != 255).any():
+        return np.ascontiguousarray(pixels[..., 3])
+    if (pixels[..., :3] != pixels[..., :1]).any():
+        raise InputError(f"{path}: a coloured picture, expected a mask in shades of grey")
+    return np.ascontiguousarray(pixels[..., 0])
+
+
+def _read_bytes(path: Path) -> bytes:
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"{path}: {path.stat().st_size} bytes, more than {MAX_BYTES} allowed")
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: picture cannot be read: {error.strerror}") from error
+
+
+def _header(data: bytes, path: Path) -> PhotoHeader:
+    kind = _kind(data)
+    if kind not in ("JPEG", "PNG"):
+        raise FormatError(f"{path}: {kind}, expected a JPEG or PNG picture; save it as one")
+    try:
+        width, height, exif_block = _scan_jpeg(data) if kind == "JPEG" else _scan_png(data)
+    except (struct.error, IndexError, ValueError) as error:
+        raise FormatError(f"{path}: damaged {kind} file; save it again") from error
+    if width * height > MAX_PIXELS or not width * height:
+        raise InputError(
+            f"{path}: {width} x {height} pixels, expected 1 to {MAX_PIXELS} in all; scale it down"
+        )
+    exif = read_exif(exif_block)
+    if exif.orientation >= 5:
+        width, height = height, width
+    return PhotoHeader(kind, width, height, exif)
+
+
+def _kind(data: bytes) -> str:
+    if not data:
+        return "an empty file"
+    if data[4:8] == b"ftyp":
+        return "HEIC, AVIF or a video"
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        return "WebP"
+    named = (kind for start, kind in _KINDS.items() if data.startswith(start))
+    return next(named, "not a picture")
+
+
+def _scan_jpeg(data: bytes) -> tuple[int, int, bytes]:
+    """Return width, height and the EXIF block of a JPEG file; `ValueError` when it is cut short."""
+    position, exif, size = 2, b"", (0, 0)
+    while True:
+        while data[position + 1] == 0xFF:  # fill bytes
+            position += 1
+        marker, (length,) = data[position + 1], struct.unpack_from(">H", data, position + 2)
+        if data[position] != 0xFF or length < 2:
+            raise ValueError("no marker")
+        block = data[position + 4 : position + 2 + length]
+        if marker in _JPEG_FRAMES:
+            height, width = struct.unpack_from(">HH", block, 1)
+            size = (width, height)
+        elif marker == 0xE1 and block.startswith(b"Exif\0\0"):
+            exif = exif or block[6:]
+        elif marker == 0xDA:
+            break
+        position += 2 + length
+    if data.find(b"\xff\xd9", position) < 0:
+        raise ValueError("no end marker")
+    return (*size, exif)
+
+
+def _scan_png(data: bytes) -> tuple[int, int, bytes]:
+    """Return width, height and the EXIF block of a PNG file; `ValueError` when it is damaged."""
+    if data[12:16] != b"IHDR":
+        raise ValueError("no IHDR")
+    width, height = struct.unpack_from(">II", data, 16)
+    position, exif = 8, b""
+    while True:
+        (length,) = struct.unpack_from(">I", data, position)
+        name, end = data[position + 4 : position + 8], position + 8 + length
+        if struct.unpack_from(">I", data, end) != (zlib.crc32(data[position + 4 : end]),):
+            raise ValueError("a chunk's checksum is wrong")
+        if name == b"eXIf":
+            exif = data[position + 8 : end]
+        if name == b"IEND":
+            return width, height, exif
+        position = end + 4
+
+
+def _decode(data: bytes, mode: int, path: Path) -> UInt8Array:
+    if _kind(data) == "PNG" and _unpacks_to_more(data):
+        raise FormatError(f"{path}: damaged PNG file: it unpacks to more than its picture holds")
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), mode | _AS_STORED)
+    except cv2.error:
+        pixels = None
+    if pixels is None:
+        raise FormatError(f"{path}: damaged picture, it cannot be decoded; save it again")
+    return pixels  # type: ignore[return-value]  # uint8, or uint16 for IMREAD_UNCHANGED
+
+
+def _unpacks_to_more(data: bytes) -> bool:
+    """Tell whether a whole PNG file's packed data is larger than any picture of its size."""
+    width, height = struct.unpack_from(">II", data, 16)
+    left = height * (1 + 8 * width) + 8 * (height + 8)  # 16 bit RGBA, a filter byte a row and pass
+    inflate, position = zlib.decompressobj(), 8
+    while data[position + 4 : position + 8] != b"IEND":
+        (length,) = struct.unpack_from(">I", data, position)
+        if data[position + 4 : position + 8] == b"IDAT":
+            try:
+                left -= len(
+                    inflate.decompress(data[position + 8 : position + 8 + length], left + 1)
+                )
+            except zlib.error:
+                return False  # the decoder says what is wrong
+            if left < 0:
+                return True
+        position += 12 + length
+    return False
+
+
+_AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
+
+
+def _upright(image: UInt8Array, orientation: int) -> UInt8Array:
+    """Undo the camera's rotation; `orientation` is EXIF's 1 to 8."""
+    turned = image.swapaxes(0, 1) if orientation >= 5 else image
+    flips = {2: (1, -1), 3: (-1, -1), 4: (-1, 1), 6: (1, -1), 7: (-1, -1), 8: (-1, 1)}
+    down, across = flips.get(orientation, (1, 1))
+    return np.ascontiguousarray(turned[::down, ::across])

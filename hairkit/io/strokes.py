@@ -1,0 +1,155 @@
+"""Strokes that a user draws on a photo to show where the hair is, read from labelme's JSON."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import cv2
+import numpy as np
+
+from hairkit.errors import FormatError, InputError
+from hairkit.options import unknown_name
+from hairkit.storage import BoolArray, Float64Array, frozen_array
+
+StrokeLabel = Literal["foreground", "background", "person"]
+
+_BOX = "rectangle"
+_LEAST_POINTS = {"linestrip": 2, "line": 2, "polygon": 3, "rectangle": 2, "circle": 2, "point": 1}
+_AREAS = ("polygon", "rectangle", "circle")
+_MAX_BYTES = 64 * 2**20
+_MAX_SAMPLES = 10_000
+_FAR = 30_000
+"""Coordinates beyond this are drawn here: OpenCV counts them in 16 bits and a fraction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """One stroke: a line, or an area with everything in it."""
+
+    label: StrokeLabel
+    """`foreground` is hair, `background` is not, `person` is the person but not hair."""
+    area: bool
+    """True for a closed outline whose inside counts too."""
+    points: Float64Array
+    """(N, 2) pixels (x, y); one point is a dot."""
+
+    def sampled(self, step: float = 2.0) -> Float64Array:
+        """Return points (M, 2) at most `step` pixels apart on the stroke; an area is closed."""
+        path = np.concatenate([self.points, self.points[: int(self.area)]])
+        pieces = [path[:1]]
+        for start, end in itertools.pairwise(path):
+            count = min(int(np.ceil(np.linalg.norm(end - start) / step)), _MAX_SAMPLES)
+            pieces.append(start + (end - start) * np.linspace(0, 1, count + 1)[1:, None])
+        return np.concatenate(pieces)
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """All strokes of one photo."""
+
+    strokes: tuple[Stroke, ...]
+    """Foreground, background and person strokes in the order drawn."""
+    rectangle: Float64Array | None = None
+    """(2, 2) corners (left, top), (right, bottom) in pixels of what holds all hair, or None."""
+    size: tuple[int, int] | None = None
+    """(width, height) of the photo they were drawn on, where the file says so."""
+
+    def labelled(self, label: StrokeLabel) -> tuple[Stroke, ...]:
+        """Return the strokes of one label, in the order drawn."""
+        return tuple(stroke for stroke in self.strokes if stroke.label == label)
+
+    def scaled(self, x: float, y: float) -> Strokes:
+        """Return the strokes for the photo scaled by `x` across and by `y` down."""
+        factor = np.array([x, y])
+        strokes = tuple(Stroke(s.label, s.area, s.points * factor) for s in self.strokes)
+        rectangle = None if self.rectangle is None else self.rectangle * factor
+        return Strokes(strokes, rectangle, None)
+
+
+def read_strokes(path: str | os.PathLike[str]) -> Strokes:
+    """Read labelme-shaped JSON.
+
+    Raises
+    ------
+    FormatError
+        The file is no JSON in labelme's shape.
+    InputError
+        A label or shape type is unknown, or a shape has too few points.
+    """
+    document = _document(Path(path))
+    entries = document.get("shapes")
+    if not isinstance(entries, list):
+        raise FormatError(f"{path}: holds no list 'shapes', expected strokes in labelme's JSON")
+    strokes, rectangle = [], None
+    for index, entry in enumerate(entries):
+        label, kind, points = _shape(entry, f"{path}: shape {index}")
+        if label == _BOX:
+            rectangle = np.stack([points.min(axis=0), points.max(axis=0)])
+        else:
+            strokes.append(Stroke(label, kind in _AREAS, points))
+    width, height = document.get("imageWidth"), document.get("imageHeight")
+    size = (width, height) if isinstance(width, int) and isinstance(height, int) else None
+    return Strokes(tuple(strokes), rectangle, size)
+
+
+def rasterise(stroke: Stroke, width: int, height: int, thickness: float) -> BoolArray:
+    """Return the pixels (height, width) under a stroke: an area, or a line `thickness` px wide."""
+    canvas = np.zeros((height, width), np.uint8)
+    # pixel centres lie at +0.5 here and at whole numbers in OpenCV
+    points = np.rint(np.clip(stroke.points, -_FAR, _FAR) - 0.5).astype(np.int32)
+    if stroke.area:
+        cv2.fillPoly(canvas, [points], 1)
+    else:
+        cv2.polylines(canvas, [points], False, 1, max(1, round(thickness)))
+    return canvas.astype(np.bool_)
+
+
+def _document(path: Path) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise FormatError(f"{path}: is larger than {_MAX_BYTES} bytes, expected strokes")
+        document = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        if isinstance(error, FormatError):
+            raise
+        raise FormatError(f"{path}: no strokes could be read ({error})") from error
+    if not isinstance(document, dict):
+        raise FormatError(f"{path}: holds no JSON object, expected strokes in labelme's JSON")
+    return document
+
+
+def _shape(entry: Any, where: str) -> tuple[Any, str, Float64Array]:
+    """Return label, shape type and the outline (N, 2) of one labelme shape."""
+    if not isinstance(entry, dict):
+        raise FormatError(f"{where} is no JSON object")
+    label, kind = str(entry.get("label")), str(entry.get("shape_type"))
+    if label not in (*get_args(StrokeLabel), _BOX):
+        known = (*get_args(StrokeLabel), _BOX)
+        raise InputError(f"{where}: {unknown_name('label', label, known)}")
+    if kind not in _LEAST_POINTS:
+        raise InputError(f"{where}: {unknown_name('shape_type', kind, _LEAST_POINTS)}")
+    try:
+        points = frozen_array(entry["points"], np.float64, (None, 2), "points")
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{where}: points are no list of pixel pairs ({error})") from error
+    if len(points) < _LEAST_POINTS[kind]:
+        raise InputError(f"{where}: {len(points)} points, a {kind} needs {_LEAST_POINTS[kind]}")
+    return label, kind, _outline(kind, points)
+
+
+def _outline(kind: str, points: Float64Array) -> Float64Array:
+    """Return a rectangle or circle as the polygon it stands for, anything else as it is."""
+    if kind == "rectangle":
+        (left, top), (right, bottom) = points.min(axis=0), points.max(axis=0)
+        return np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+    if kind == "circle":  # labelme: the centre and a point on the circle
+        turn = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+        radius = np.linalg.norm(points[1] - points[0])
+        circle: Float64Array = points[0] + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        return circle
+    return points

@@ -1,0 +1,1 @@
+"""From photos to a groom: recipes, stages, the work folder."""

@@ -1,0 +1,174 @@
+"""One picture that tells how a groom came about: photos, masks, orientation, hull, guides, hair."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import InputError
+from hairkit.field.isosurface import volume_surface
+from hairkit.grooming.densify import densify
+from hairkit.render import Lights, Solid, draw_views
+from hairkit.storage import UInt8Array, write_bytes
+from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture
+from hairkit.types.groom import Groom
+from hairkit.types.mask import HAIR, PERSON, Mask
+from hairkit.types.orientation import OrientationMap
+from hairkit.types.scene import Scene
+from hairkit.types.strands import Strands
+from hairkit.types.volume import Hull
+
+TILE_WIDTH = 160
+"""Width of one picture on the sheet, pixels."""
+GAP = 4
+"""Pixels between pictures."""
+HEADER = 24
+"""Height of the line of view names, pixels."""
+HAIRS = 2500
+"""Strands of the hair in the last row: a pixel of a tile is millimetres wide."""
+GUIDE_POINTS = 20
+"""Points a strand in the pictures."""
+CLAY = (0.16, 0.15, 0.14)
+"""Linear RGB of the hull."""
+EXPOSURE = 1.0
+
+PAPER, INK = 250, 60
+_HAIR_TINT, _PERSON_TINT = (232, 60, 132), (70, 130, 235)
+_ROWS = ("photo", "mask", "orientation", "hull", "guides", "hair")
+
+
+def write_contact_sheet(
+    path: str | os.PathLike[str],
+    capture: Capture,
+    masks: Sequence[Mask],
+    orientations: Sequence[OrientationMap],
+    hull: Hull,
+    groom: Groom,
+    scene: Scene,
+) -> None:
+    """Write the sheet to `path` (PNG): one column a view, one row a stage.
+
+    Masks and orientation maps may have any size; they are shown over the photos of `capture`.
+    """
+    sheet = contact_sheet(capture, masks, orientations, hull, groom, scene)
+    done, data = cv2.imencode(".png", sheet[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    if not done:
+        raise InputError(f"{path}: the contact sheet of {sheet.shape[:2]} pixels cannot be encoded")
+    write_bytes(path, data.tobytes())
+
+
+def contact_sheet(
+    capture: Capture,
+    masks: Sequence[Mask],
+    orientations: Sequence[OrientationMap],
+    hull: Hull,
+    groom: Groom,
+    scene: Scene,
+) -> UInt8Array:
+    """Return the sheet (H, W, 3) RGB that `write_contact_sheet` writes."""
+    size = _tile_size(scene.cameras)
+    photos = [_fit(view.image, size) for view in capture.views]
+    cameras = [camera.resized(*size) for camera in scene.cameras]
+    rows = (
+        photos,
+        [_mask_picture(photo, mask) for photo, mask in zip(photos, masks, strict=True)],
+        [_orientation_picture(map_, size) for map_ in orientations],
+        _hull_pictures(hull, cameras),
+        _guide_pictures(groom, cameras),
+        _hair_pictures(groom, cameras),
+    )
+    return _arranged(rows, [view.name for view in capture.views], size)
+
+
+def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
+    return TILE_WIDTH, round(TILE_WIDTH * cameras[0].height / cameras[0].width)
+
+
+def _fit(image: npt.NDArray[np.uint8], size: tuple[int, int]) -> UInt8Array:
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _mask_picture(photo: UInt8Array, mask: Mask) -> UInt8Array:
+    """Return the photo, hair tinted pink and the rest of the person blue."""
+    size = (photo.shape[1], photo.shape[0])
+    hair = _fit((mask.labels == HAIR) * np.uint8(255), size)[..., None] / 255 * 0.6
+    person = _fit((mask.labels == PERSON) * np.uint8(255), size)[..., None] / 255 * 0.35
+    grey = photo.mean(axis=2, keepdims=True) * (1 - hair - person)
+    return np.asarray(grey + hair * _HAIR_TINT + person * _PERSON_TINT).astype(np.uint8)
+
+
+def _orientation_picture(map_: OrientationMap, size: tuple[int, int]) -> UInt8Array:
+    """Return hue for the angle and brightness for the confidence."""
+    fine = (2 * size[0], 2 * size[1])
+    angle = cv2.resize(map_.angle, fine, interpolation=cv2.INTER_NEAREST)
+    sure = np.sqrt(cv2.resize(map_.confidence, fine, interpolation=cv2.INTER_NEAREST))
+    hsv = np.stack([angle * (180 / np.pi), np.full_like(angle, 200), sure * 255], axis=-1)
+    rgb = cv2.cvtColor(hsv.astype(np.uint8), cv2.COLOR_HSV2RGB)
+    return _fit(np.asarray(rgb, np.uint8), size)
+
+
+def _hull_pictures(hull: Hull, cameras: Sequence[Camera]) -> list[UInt8Array]:
+    """Return the dense cells from each camera, as clay."""
+    vertices, faces, normals = volume_surface(hull.grid, hull.dense, step=2)  # a pixel is two cells
+    clay = Solid(
+        vertices,
+        faces,
+        normals,
+        np.tile(np.array(CLAY, np.float32), (len(vertices), 1)),
+        scatter=0.0,
+    )
+    nothing = Strands(np.empty((0, 3), np.float32), np.zeros(1, np.int64))
+    return draw_views(nothing, None, cameras, solids=[clay], lights=_lights())
+
+
+def _guide_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
+    guides = groom.strands.resampled(GUIDE_POINTS)
+    return draw_views(
+        guides, groom.head, cameras, material=groom.material, lights=_lights(), show_direction=True
+    )
+
+
+def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
+    hair = densify(groom, HAIRS).resampled(GUIDE_POINTS)
+    return draw_views(hair, groom.head, cameras, material=groom.material, lights=_lights())
+
+
+def _lights() -> Lights:
+    """Return lights from front and back alike, bright as a window: the photos go around."""
+    lights = Lights.studio((0.4, 0.8, 0.6), (-0.4, 0.7, -0.6), EXPOSURE)
+    return replace(lights, rim_colour=lights.key_colour)
+
+
+def _arranged(
+    rows: Iterable[Sequence[UInt8Array]], names: Sequence[str], size: tuple[int, int]
+) -> UInt8Array:
+    width, height = size
+    count = len(names)
+    sheet_width = count * (width + GAP) + GAP
+    sheet = np.full((HEADER + len(_ROWS) * (height + GAP), sheet_width, 3), PAPER, np.uint8)
+    for column, name in enumerate(names):
+        _write(sheet, name, (GAP + column * (width + GAP) + 2, HEADER - 8), INK)
+    for index, tiles in enumerate(rows):
+        top = HEADER + index * (height + GAP)
+        for column, tile in enumerate(tiles):
+            left = GAP + column * (width + GAP)
+            sheet[top : top + height, left : left + width] = tile
+        _write(sheet, _ROWS[index], (GAP + 5, top + 15), 255, boxed=True)
+    return sheet
+
+
+def _write(
+    sheet: UInt8Array, text: str, at: tuple[int, int], grey: int, boxed: bool = False
+) -> None:
+    font = cv2.FONT_HERSHEY_SIMPLEX
+    if boxed:
+        (width, height), _ = cv2.getTextSize(text, font, 0.45, 1)
+        low = (at[0] - 4, at[1] + 6)
+        cv2.rectangle(sheet, low, (at[0] + width + 4, at[1] - height - 4), (40, 40, 40), cv2.FILLED)
+    cv2.putText(sheet, text, at, font, 0.45, (grey, grey, grey), 1, cv2.LINE_AA)

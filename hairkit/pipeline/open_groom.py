@@ -1,0 +1,71 @@
+"""Opening what the user names as a groom: any file that a plugin reads, or a folder of results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from hairkit.errors import InputError
+from hairkit.manager import Manager
+from hairkit.types.groom import Groom
+from hairkit.types.groom_file import read_groom
+
+
+def load_groom(
+    manager: Manager,
+    path: Path,
+    settings: Mapping[str, object] | None = None,
+    plugin: str | None = None,
+) -> Groom:
+    """Return the groom in a file.
+
+    Parameters
+    ----------
+    manager
+        The plugins.
+    path
+        A groom.npz, a folder that holds one, or a file of any format that a plugin imports.
+    settings
+        Options of the import plugin by name.
+    plugin
+        The import plugin; by default the one of the file's ending.
+
+    Raises
+    ------
+    InputError
+        There is no such file, or nothing that reads it.
+    """
+    path = groom_path(path)
+    if plugin is None and path.suffix == ".npz" and not settings:
+        return read_groom(path)
+    name = plugin or plugin_for(manager, "import_groom", path)
+    options = manager.options(name, settings or {})
+    groom = manager.call("import_groom", name, options, path=path)
+    if not isinstance(groom, Groom):  # the manager has checked it; this tells the type
+        raise InputError(f"{path}: {name} made no groom of it")
+    return groom
+
+
+def groom_path(path: Path) -> Path:
+    """Return the file, or the groom.npz in the folder; raises `InputError` when it is missing."""
+    if path.is_dir():
+        if not (path / "groom.npz").is_file():
+            raise InputError(f"{path}: no groom.npz in this folder; run hairkit reconstruct first")
+        return path / "groom.npz"
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    return path
+
+
+def plugin_for(manager: Manager, stage: str, path: Path) -> str:
+    """Return the plugin of the longest ending that fits the file's name."""
+    fitting = [
+        (len(suffix), name)
+        for name in manager.names(stage)
+        for suffix in manager.info(name).suffixes
+        if path.name.lower().endswith(suffix)
+    ]
+    if not fitting:
+        known = sorted({s for name in manager.names(stage) for s in manager.info(name).suffixes})
+        raise InputError(f"{path}: no plugin for files of this name; known: {', '.join(known)}")
+    return str(max(fitting)[1])

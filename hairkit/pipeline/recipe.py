@@ -1,0 +1,237 @@
+"""Recipes: which plugin does each stage, with which options, written as TOML.
+
+[segment]
+plugin = ["mask_files", "grabcut"]   # the first that has an answer wins
+[segment.grabcut]                    # options of one plugin of several
+scale = 0.5
+[orient]
+plugin = "gabor"
+angles = 64                          # options of the only plugin
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import importlib.resources
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from hairkit.errors import HairkitError, InputError, OptionError
+from hairkit.manager import Manager
+from hairkit.options import unknown_name
+
+HOOKS = {
+    "segment": "segment",
+    "scene": "estimate_scene",
+    "head": "fit_head",
+    "orient": "orient",
+    "hull": "build_hull",
+    "field": "solve_field",
+    "track": "track",
+    "export": "export_groom",
+}
+"""Table of the recipe -> stage hook, in the order in which they run."""
+
+SEVERAL = ("segment", "export")
+"""Tables that may name several plugins."""
+
+NEEDED = ("segment", "scene", "orient", "hull", "field", "track")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One plugin with the option values that the recipe gives it."""
+
+    plugin: str
+    options: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of a recipe."""
+
+    table: str
+    """Name of the recipe's table: `scene`."""
+    choices: tuple[Choice, ...]
+    """One plugin; for `segment` and `export` any number, in order."""
+
+    @property
+    def hook(self) -> str:
+        """Name of the stage hook: `estimate_scene`."""
+        return HOOKS[self.table]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """The stages from photos to files, in order."""
+
+    name: str
+    source: str
+    """Where the recipe comes from, for error messages."""
+    description: str
+    stages: tuple[Stage, ...]
+
+    def stage(self, table: str) -> Stage | None:
+        """Return the stage of a table, or None when the recipe leaves it out."""
+        return next((stage for stage in self.stages if stage.table == table), None)
+
+    def with_set(self, assignments: Sequence[str]) -> Recipe:
+        """Return the recipe changed by `plugin.option=value` or `stage=plugin` texts.
+
+        `head=none` and `export=none` leave the stage out.
+
+        >>> recipe = load_recipe("default").with_set(["orient=gabor", "gabor.angles=64"])
+        >>> recipe.stage("orient").choices[0].options["angles"]
+        '64'
+        """
+        recipe = self
+        for text in assignments:
+            target, equals, value = (part.strip() for part in text.partition("="))
+            plugin, _, name = target.partition(".")
+            if not equals or not plugin or ("." in target and not name):
+                raise OptionError(f"--set {text}: expected plugin.option=value or stage=plugin")
+            change = recipe._with_option if name else recipe._with_plugins
+            recipe = change(plugin, name or value, value, text)
+        return replace(recipe, source=f"{self.source} with --set") if assignments else self
+
+    def check(self, manager: Manager) -> None:
+        """Check every plugin and option; raises `PluginError` or `OptionError` naming the place."""
+        for stage in self.stages:
+            for choice in stage.choices:
+                where = f"{self.source}: [{stage.table}]"
+                try:
+                    manager.implementer(stage.hook, choice.plugin)
+                except HairkitError as error:
+                    raise type(error)(f"{where}: {error}") from error
+                manager.options(choice.plugin, choice.options, f"{where} {choice.plugin}")
+
+    def _with_option(self, plugin: str, name: str, value: str, text: str) -> Recipe:
+        used = [choice.plugin for stage in self.stages for choice in stage.choices]
+        if plugin not in used:
+            reason = unknown_name("plugin", plugin, used)
+            raise OptionError(f"--set {text}: recipe {self.name} uses {reason}")
+        return self._map(
+            lambda choice: (
+                Choice(plugin, MappingProxyType({**choice.options, name: value}))
+                if choice.plugin == plugin
+                else choice
+            )
+        )
+
+    def _with_plugins(self, table: str, value: str, _: str, text: str) -> Recipe:
+        if table not in HOOKS:
+            raise OptionError(f"--set {text}: {unknown_name('stage', table, HOOKS)}")
+        names = [name.strip() for name in value.split(",") if name.strip()]
+        kept = {stage.table: stage for stage in self.stages}
+        if names == ["none"] and table not in NEEDED:
+            kept.pop(table, None)
+        else:
+            kept[table] = _stage(table, {"plugin": names}, f"--set {text}")
+        return replace(self, stages=tuple(kept[name] for name in HOOKS if name in kept))
+
+    def _map(self, change: Any) -> Recipe:
+        stages = tuple(
+            replace(stage, choices=tuple(change(choice) for choice in stage.choices))
+            for stage in self.stages
+        )
+        return replace(self, stages=stages)
+
+
+def load_recipe(name: str | os.PathLike[str]) -> Recipe:
+    """Read a shipped recipe by name, or a `.toml` file by path; `InputError` says what is wrong."""
+    text = os.fspath(name)
+    if text in recipe_names():
+        data = (importlib.resources.files("hairkit") / "recipes" / f"{text}.toml").read_bytes()
+        return parse_recipe(data, text, f"recipe {text}")
+    path = Path(text)
+    if path.suffix != ".toml" and not path.is_file():
+        reason = unknown_name("recipe", text, recipe_names())
+        raise InputError(f"{reason}, or the path of a .toml file")
+    try:
+        return parse_recipe(path.read_bytes(), path.stem, text)
+    except OSError as error:
+        raise InputError(f"{text}: recipe cannot be read: {error.strerror}") from error
+
+
+def recipe_names() -> tuple[str, ...]:
+    """Return the names of the recipes that ship with hairkit."""
+    folder = importlib.resources.files("hairkit") / "recipes"
+    names = (entry.name for entry in folder.iterdir())
+    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
+
+
+def parse_recipe(data: bytes, name: str, source: str) -> Recipe:
+    """Read a recipe from TOML; plugins and options are checked later, by `Recipe.check`."""
+    try:
+        document = tomllib.loads(data.decode())
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{source}: not a TOML file: {error}") from error
+    description = document.pop("description", "")
+    for key in document:
+        if key not in HOOKS:
+            raise InputError(f"{source}: {key}: {unknown_name('stage', key, HOOKS)}")
+    for key in NEEDED:
+        if key not in document:
+            raise InputError(f'{source}: no [{key}] table; add one with plugin = "..."')
+    stages = tuple(_stage(key, document[key], source) for key in HOOKS if key in document)
+    return Recipe(name, source, str(description), stages)
+
+
+def stage_digest(manager: Manager, stage: Stage) -> str:
+    """Return a hex digest of plugins, versions and options: equal digests, equal behaviour.
+
+    Options are taken with their defaults filled in; a file that an option names counts with its
+    content, and so do hairkit's modules that plugins build on.
+    """
+    digest = hashlib.sha256(f"{stage.hook} {_ground_digest()}".encode())
+    for choice in stage.choices:
+        options = manager.options(choice.plugin, choice.options)
+        digest.update(f"\n{choice.plugin} {manager.fingerprint(choice.plugin)}".encode())
+        for field in dataclasses.fields(options) if options is not None else ():
+            value = getattr(options, field.name)
+            digest.update(f"\n{field.name}={value!r}".encode())
+            if isinstance(value, Path) and value.is_file():
+                digest.update(hashlib.sha256(value.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+@functools.cache
+def _ground_digest() -> str:
+    files = sorted(Path(__file__).parents[1].rglob("*.py"))
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+def _stage(table: str, content: object, source: str) -> Stage:
+    if not isinstance(content, dict) or "plugin" not in content:
+        raise InputError(f'{source}: [{table}]: expected a table with plugin = "..."')
+    named = content["plugin"]
+    names = [named] if isinstance(named, str) else named
+    if not isinstance(names, list) or not all(isinstance(n, str) and n for n in names):
+        raise InputError(f"{source}: {table}.plugin is {named!r}, expected a plugin's name")
+    if len(set(names)) != len(names):
+        raise InputError(f"{source}: {table}.plugin names a plugin twice")
+    if not names or (len(names) > 1 and table not in SEVERAL):
+        raise InputError(f"{source}: {table}.plugin names {len(names)} plugins, expected one")
+    options = {key: value for key, value in content.items() if key != "plugin"}
+    choices = tuple(_choice(name, options, len(names) == 1) for name in names)
+    if options:
+        key = next(iter(options))
+        reason = f"options of several plugins stand in [{table}.PLUGIN]; PLUGIN is one of"
+        raise InputError(f"{source}: {table}.{key}: {reason}: {', '.join(names)}")
+    return Stage(table, choices)
+
+
+def _choice(name: str, options: dict[str, Any], alone: bool) -> Choice:
+    """Take the options of one plugin out of the stage's table."""
+    values: dict[str, Any] = options.pop(name) if isinstance(options.get(name), dict) else {}
+    if alone:
+        values |= options
+        options.clear()
+    return Choice(name, MappingProxyType(values))

@@ -1,0 +1,203 @@
+"""The whole road from photos to a groom: one function that runs a recipe, stage after stage."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from hairkit.errors import InputError, RenderError
+from hairkit.grooming.assemble import assemble_groom
+from hairkit.head_model.scalp import sample_roots
+from hairkit.head_model.template import default_head
+from hairkit.imaging.waves import measure_waves
+from hairkit.manager import Manager
+from hairkit.pipeline.recipe import Recipe
+from hairkit.pipeline.run_log import RunLog
+from hairkit.pipeline.stage_runner import Argument, Given, StageRunner
+from hairkit.pipeline.work_folder import WorkFolder
+from hairkit.progress import Progress, Silent
+from hairkit.types.capture import Capture
+from hairkit.types.groom import Groom
+from hairkit.types.groom_file import write_groom
+from hairkit.types.head import Head
+from hairkit.types.mask import Mask
+from hairkit.types.orientation import OrientationMap
+from hairkit.types.scene import Scene
+from hairkit.types.strands import Strands
+from hairkit.types.volume import Hull, OrientationField
+
+MAX_GUIDES = 100_000
+PHOTOS = "photos in "
+"""Begins the line of `hairkit.log` that names their folder."""
+SHEET = "contact_sheet.png"
+"""Name of the picture that shows what every stage has found."""
+
+
+def reconstruct(
+    capture: Capture,
+    out: str | os.PathLike[str],
+    recipe: Recipe,
+    manager: Manager,
+    *,
+    head: Head | None = None,
+    guides: int = 600,
+    seed: int = 0,
+    progress: Progress | None = None,
+    reuse: bool = True,
+    sheet: bool = True,
+) -> Groom:
+    """Run a recipe on a capture and return the groom.
+
+    Parameters
+    ----------
+    capture
+        The photos, see `hairkit.io.capture_reader`.
+    out
+        Folder for `groom.npz`, `scene.json`, the recipe's exports, `contact_sheet.png` and
+        `hairkit.log`; its `work/` keeps what the stages found, so that unchanged stages are not
+        run again.
+    recipe, manager
+        Which plugin does each stage, and the plugins.
+    head
+        The head to fit, the default head when None.
+    guides
+        Number of roots, each of which grows a strand.
+    seed
+        Seed of the roots' places.
+    progress
+        Is told how the run goes on.
+    reuse
+        False runs every stage again.
+    sheet
+        Draw the contact sheet; where there is no OpenGL one line of progress says so.
+
+    Raises
+    ------
+    HairkitError
+        The recipe, the photos or a plugin is at fault; its text is one line.
+    OSError
+        A file cannot be written. Files are written whole or not at all.
+    """
+    recipe.check(manager)
+    if not 1 <= guides <= MAX_GUIDES:
+        raise InputError(f"{guides} guides, expected 1 to {MAX_GUIDES}")
+    log = RunLog(progress or Silent())
+    folder = Path(out)
+    work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(_waiting(folder)))
+    with work, ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool:
+        _sweep(folder)
+        run = StageRunner(recipe, manager, work, log, pool)
+        try:
+            made = _grow(run, capture, head or default_head(), guides, seed)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+        work.flush()
+        _write(folder, run, capture, made, export_paths(folder, recipe, manager))
+        if sheet:
+            _draw_sheet(folder / SHEET, capture, made, log)
+        manager.notify("groom_ready", groom=made.groom)
+        _note_photos(log, capture)
+        log.write(folder / "hairkit.log", recipe, manager)
+    return made.groom
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """What the stages of one run have made."""
+
+    masks: tuple[Mask, ...]
+    orientations: tuple[OrientationMap, ...]
+    hull: Hull
+    scene: Scene
+    groom: Groom
+
+
+def export_paths(
+    out: str | os.PathLike[str], recipe: Recipe, manager: Manager
+) -> tuple[tuple[str, Path], ...]:
+    """Return plugin and path of every file that the recipe exports into a folder."""
+    stage = recipe.stage("export")
+    names = [choice.plugin for choice in stage.choices] if stage is not None else []
+    suffixes = [(manager.info(name).suffixes or (f".{name}",))[0] for name in names]
+    return tuple(
+        (name, Path(out) / f"groom{suffix}") for name, suffix in zip(names, suffixes, strict=True)
+    )
+
+
+def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int) -> _Made:
+    """Run the stages; views are worked on side by side while later stages wait for them."""
+    photos, views = Given.of(capture), [Given.of(view) for view in capture.views]
+    masks = run.every_view("segment", Mask, views)
+    orientations = run.every_view("orient", OrientationMap, views, mask=masks)
+    scene = run.once("scene", Scene, capture=photos, masks=masks, head=Given.of(head))
+    if run.has("head"):
+        scene = run.once("head", Scene, capture=photos, masks=masks, scene=scene)
+    hull = run.once("hull", Hull, scene=scene, masks=masks)
+    seen: dict[str, Argument] = {"scene": scene, "masks": masks, "orientations": orientations}
+    field = run.once("field", OrientationField, **seen, hull=hull)
+    roots = Given.of(sample_roots(scene.value.head, guides, seed))
+    strands = run.once("track", Strands, **seen, hull=hull, field=field, roots=roots)
+    labels = tuple(mask.result().value for mask in masks)
+    angles = tuple(orientation.result().value for orientation in orientations)
+    waves = measure_waves(angles, labels, scene.value.cameras)
+    groom = assemble_groom(
+        capture.views, labels, scene.value.head, roots.value, strands.value, waves
+    )
+    return _Made(labels, angles, hull.value, scene.value, groom)
+
+
+def _write(
+    folder: Path,
+    run: StageRunner,
+    capture: Capture,
+    made: _Made,
+    exports: Sequence[tuple[str, Path]],
+) -> None:
+    """Write the groom, the scene and the exports; away with the sheet of another groom."""
+    write_groom(folder / "groom.npz", made.groom)
+    _in_photo_pixels(made.scene, capture).write_json(folder / "scene.json")
+    for plugin, path in exports:
+        run.export(plugin, made.groom, path)
+    (folder / SHEET).unlink(missing_ok=True)
+
+
+def _draw_sheet(path: Path, capture: Capture, made: _Made, log: RunLog) -> None:
+    from hairkit.pipeline.contact_sheet import write_contact_sheet  # loads OpenGL
+
+    began = time.perf_counter()
+    log.started("sheet", 1)
+    try:
+        write_contact_sheet(
+            path, capture, made.masks, made.orientations, made.hull, made.groom, made.scene
+        )
+    except RenderError as error:
+        log.message(f"no contact sheet: {error}")
+    log.finished("sheet", time.perf_counter() - began, False)
+
+
+def _note_photos(log: RunLog, capture: Capture) -> None:
+    photo = capture.views[0].photo_path
+    if photo is not None:
+        log.noted(f"{PHOTOS}{photo.resolve().parent}")
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a run that was killed had not finished writing."""
+    for name in ("groom", "scene.json", "hairkit.log", SHEET):
+        for leftover in folder.glob(f".{name}*.part"):
+            leftover.unlink(missing_ok=True)
+
+
+def _in_photo_pixels(scene: Scene, capture: Capture) -> Scene:
+    """Return the scene with its cameras for the photos as they are on disk."""
+    pairs = zip(scene.cameras, capture.views, strict=True)
+    return replace(scene, cameras=tuple(c.resized(*view.photo_size) for c, view in pairs))
+
+
+def _waiting(folder: Path) -> str:
+    return f"{folder}: another run is working here; waiting for it to end"

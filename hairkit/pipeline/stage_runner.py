@@ -1,0 +1,201 @@
+"""Runs the stages of a recipe, each once or once a view, and keeps what they give."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Generic, Self, TypeVar
+
+import cv2
+import numpy as np
+
+import hairkit
+from hairkit.errors import PluginError
+from hairkit.manager import Manager
+from hairkit.pipeline.recipe import Recipe, Stage, stage_digest
+from hairkit.pipeline.run_log import RunLog
+from hairkit.pipeline.work_folder import WorkFolder, digest_of
+from hairkit.storage import Stored
+from hairkit.types.capture import View
+from hairkit.types.groom import Groom
+from hairkit.types.mask import Mask
+from hairkit.types.orientation import OrientationMap
+
+_Value = TypeVar("_Value")
+_Result = TypeVar("_Result", bound=Stored)
+
+
+@dataclass(frozen=True)
+class Given(Generic[_Value]):
+    """A value with the digest of everything it was made from."""
+
+    value: _Value
+    digest: str
+
+    @classmethod
+    def of(cls, value: _Value) -> Self:
+        """Return a value that comes from outside, with the digest of its content."""
+        return cls(value, digest_of(value))
+
+
+Argument = Given[Any] | Sequence[Future[Given[Any]]]
+"""One value, or one a view that may still be in the making."""
+
+
+class StageRunner:
+    """Calls the recipe's plugins; a result that is in the work folder already is not made again."""
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        manager: Manager,
+        work: WorkFolder,
+        log: RunLog,
+        pool: Executor,
+    ) -> None:
+        self._recipe = recipe
+        self._manager = manager
+        self._work = work
+        self._log = log
+        self._pool = pool
+
+    def has(self, table: str) -> bool:
+        """Tell whether the recipe has the stage."""
+        return self._recipe.stage(table) is not None
+
+    def once(self, table: str, kind: type[_Result], **arguments: Argument) -> Given[_Result]:
+        """Return the result of a stage that sees all views; waits for its arguments."""
+        ready = {name: _ready(argument) for name, argument in arguments.items()}
+        stage = self._stage(table)
+        step = _Steps(self, stage, 1)
+        digest = self._digest(stage, [given.digest for given in ready.values()])
+        values = {name: given.value for name, given in ready.items()}
+        return step.run(0, kind, digest, "", values)
+
+    def every_view(
+        self,
+        table: str,
+        kind: type[_Result],
+        views: Sequence[Given[View]],
+        **arguments: Sequence[Future[Given[Any]]],
+    ) -> list[Future[Given[_Result]]]:
+        """Start a stage on every view; a view's step waits only for that view's arguments."""
+        stage = self._stage(table)
+        steps = _Steps(self, stage, len(views))
+
+        def run(index: int, view: Given[View]) -> Given[_Result]:
+            # tasks start in the order of submission, so what is waited for is already running
+            own = {name: futures[index].result() for name, futures in arguments.items()}
+            digest = self._digest(stage, [view.digest, *(given.digest for given in own.values())])
+            values = {"view": view.value} | {name: given.value for name, given in own.items()}
+            return steps.run(index, kind, digest, view.value.name, values)
+
+        return [self._pool.submit(run, index, view) for index, view in enumerate(views)]
+
+    def export(self, plugin: str, groom: Groom, path: Path) -> None:
+        """Write one of the recipe's files."""
+        stage = self._stage("export")
+        options = next(choice.options for choice in stage.choices if choice.plugin == plugin)
+        started = time.perf_counter()
+        self._log.started(plugin, 1)
+        try:
+            self._manager.call("export_groom", plugin, options, groom=groom, path=path)
+        except PluginError as error:
+            if isinstance(error.__cause__, OSError):  # the disk is at fault, not the plugin
+                raise error.__cause__ from None
+            raise
+        self._log.finished(plugin, time.perf_counter() - started, False)
+
+    def call(self, stage: Stage, values: dict[str, Any]) -> Any:
+        """Call the plugin of a stage, the first of several that has an answer."""
+        choices = [(choice.plugin, choice.options) for choice in stage.choices]
+        if len(choices) == 1:
+            plugin, result = choices[0][0], self._manager.call(stage.hook, *choices[0], **values)
+        else:
+            plugin, result = self._manager.call_first(stage.hook, choices, **values)
+        if isinstance(result, (Mask, OrientationMap)):
+            _check_size(plugin, values["view"], result)
+        return result
+
+    def _stage(self, table: str) -> Stage:
+        stage = self._recipe.stage(table)
+        if stage is None:
+            raise PluginError(f"recipe {self._recipe.name} has no stage {table!r}")
+        return stage
+
+    def _digest(self, stage: Stage, inputs: list[str]) -> str:
+        return digest_of(_own_digest(), stage_digest(self._manager, stage), inputs)
+
+
+class _Steps:
+    """The steps of one stage: runs them, counts them, and tells when the last has ended."""
+
+    def __init__(self, runner: StageRunner, stage: Stage, count: int) -> None:
+        self._runner = runner
+        self._stage = stage
+        self._results: list[Any] = [None] * count
+        self._left = count
+        self._reused = True
+        self._began: float | None = None
+        self._guard = threading.Lock()
+        runner._log.started(stage.table, count)
+
+    def run(
+        self, index: int, kind: type[_Result], digest: str, view: str, values: dict[str, Any]
+    ) -> Given[_Result]:
+        """Return the step's result, from the work folder or from its plugin."""
+        runner, table = self._runner, self._stage.table
+        with self._guard:
+            self._began = self._began or time.perf_counter()
+        result = runner._work.get(kind, digest, table, view)
+        reused = result is not None
+        if result is None:
+            made: _Result = runner.call(self._stage, values)
+            runner._work.put(made, digest, table, view)
+            result = made
+        self._ended(index, result, reused)
+        return Given(result, digest)
+
+    def _ended(self, index: int, result: Any, reused: bool) -> None:
+        with self._guard:
+            self._results[index] = result
+            self._reused &= reused
+            self._left -= 1
+            last = not self._left
+        runner, table = self._runner, self._stage.table
+        runner._log.stepped(table)
+        if last:
+            seconds = time.perf_counter() - (self._began or 0.0)
+            runner._log.finished(table, seconds, self._reused)
+            whole = tuple(self._results) if len(self._results) > 1 else self._results[0]
+            runner._manager.notify(
+                "stage_finished", stage=self._stage.hook, seconds=seconds, result=whole
+            )
+
+
+def _ready(argument: Argument) -> Given[Any]:
+    """Return the argument as one value, waiting for what is still in the making."""
+    if isinstance(argument, Given):
+        return argument
+    parts = [future.result() for future in argument]
+    return Given(tuple(part.value for part in parts), digest_of([part.digest for part in parts]))
+
+
+def _check_size(plugin: str, view: View, result: Mask | OrientationMap) -> None:
+    array = result.labels if isinstance(result, Mask) else result.angle
+    if array.shape != (view.height, view.width):
+        raise PluginError(
+            f"plugin {plugin!r} returned {array.shape[1]} x {array.shape[0]} pixels for view"
+            f" {view.name!r}, expected {view.width} x {view.height}"
+        )
+
+
+@cache
+def _own_digest() -> str:
+    """Return a digest of the versions of hairkit and of the libraries that change results."""
+    return digest_of(hairkit.__version__, np.__version__, cv2.__version__)

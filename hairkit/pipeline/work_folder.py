@@ -1,0 +1,179 @@
+"""The work folder: what every stage found, kept under a digest of all that it was made from.
+
+A stage file is `STAGE.npz` or `STAGE-VIEW.npz`. It is used again only when its digest is the one
+wanted, so a run that was interrupted goes on where it stopped, with the same result.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import os
+import threading
+import time
+import zipfile
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import numpy as np
+
+from hairkit.errors import HairkitError, InputError
+from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
+
+_Found = TypeVar("_Found", bound=Stored)
+_DIGEST = "work_digest"
+_LOCK_POLL_S = 0.2
+
+
+def digest_of(*values: Any) -> str:
+    """Return a hex digest of the values: equal content, equal digest, on every run.
+
+    Takes numbers, strings, None, arrays, tuples and dataclasses of these; a path counts with the
+    content of its file, not with its name.
+    """
+    state = hashlib.blake2b(digest_size=20)
+    for value in values:
+        _feed(state, value)
+    return state.hexdigest()
+
+
+def _feed(state: hashlib.blake2b, value: Any) -> None:
+    state.update(f"\0{type(value).__name__}:".encode())
+    if isinstance(value, np.ndarray):
+        state.update(f"{value.dtype.str}{value.shape}".encode())
+        state.update(np.ascontiguousarray(value).data)
+    elif isinstance(value, Path):
+        state.update(value.read_bytes() if value.is_file() else b"")
+    elif dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            state.update(field.name.encode())
+            _feed(state, getattr(value, field.name))
+    elif isinstance(value, (tuple, list)):
+        state.update(str(len(value)).encode())
+        for item in value:
+            _feed(state, item)
+    elif value is None or isinstance(value, (bool, int, float, str)):
+        state.update(repr(value).encode())
+    else:
+        raise TypeError(f"no digest of a {type(value).__name__}")
+
+
+class WorkFolder:
+    """The stage files of one output folder, for one run at a time; used as a context manager."""
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        reuse: bool = True,
+        waiting: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Name the folder; it is made and locked on entering.
+
+        Parameters
+        ----------
+        path
+            The work folder.
+        reuse
+            False ignores what an earlier run has left.
+        waiting
+            Called once when another run holds the folder and this one has to wait.
+        """
+        self.path = Path(path)
+        self._reuse = reuse
+        self._waiting = waiting
+        self._lock: int | None = None
+        self._writer = ThreadPoolExecutor(1, thread_name_prefix="hairkit-work")
+        self._writes: list[Future[None]] = []
+        self._guard = threading.Lock()
+
+    def __enter__(self) -> Self:
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError) as error:
+            raise InputError(f"{self.path}: not a folder; choose another for the output") from error
+        self._lock = _lock(self.path / ".lock", self._waiting)
+        for leftover in self.path.glob(".*.part"):  # of a run that was killed
+            leftover.unlink(missing_ok=True)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._writer.shutdown(wait=True)  # what is done stays done, whatever ended the run
+        if self._lock is not None:
+            os.close(self._lock)
+        if kind is None:
+            self.flush()
+
+    def get(self, kind: type[_Found], digest: str, stage: str, view: str = "") -> _Found | None:
+        """Return what is kept under this digest, or None; a damaged file counts as none."""
+        path = self._file(stage, view)
+        if not self._reuse or _kept_digest(path) != digest:
+            return None
+        try:
+            arrays = read_npz(path)
+            del arrays[_DIGEST]
+            return from_arrays(kind, arrays, str(path))
+        except HairkitError:
+            return None
+
+    def put(self, value: Stored, digest: str, stage: str, view: str = "") -> None:
+        """Keep a stage's result; it is written in the background, `flush` waits for it."""
+        path = self._file(stage, view)
+        with self._guard:
+            self._writes.append(self._writer.submit(_write, path, value, digest))
+
+    def flush(self) -> None:
+        """Wait until everything is written; raises the first `OSError` of writing."""
+        with self._guard:
+            writes, self._writes = self._writes, []
+        for write in writes:
+            write.result()
+
+    def _file(self, stage: str, view: str) -> Path:
+        name = "".join(c if c.isalnum() or c in "-_" else "_" for c in view)
+        return self.path / (f"{stage}-{name}.npz" if view else f"{stage}.npz")
+
+
+def _write(path: Path, value: Stored, digest: str) -> None:
+    arrays = to_arrays(value) | {_DIGEST: np.asarray(digest)}
+    write_npz(path, arrays, packed=False, durable=False)
+
+
+def _kept_digest(path: Path) -> str | None:
+    """Return the digest that a stage file was kept under, without reading the rest of it."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+            return str(data[_DIGEST])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def _lock(path: Path, waiting: Callable[[], None]) -> int | None:
+    """Wait for the lock and return its open file; the system frees it when the process dies."""
+    try:
+        import fcntl
+    except ImportError:  # no such locks on this system: the files are atomic all the same
+        return None
+    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    told = False
+    try:
+        while True:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return handle
+            except BlockingIOError:
+                if not told:
+                    waiting()
+                told = True
+                time.sleep(_LOCK_POLL_S)
+    except BaseException:
+        os.close(handle)
+        raise

@@ -1,0 +1,80 @@
+"""From a `Camera` to OpenGL matrices, such that drawing lands where `Camera.project` says.
+
+The picture's first row is OpenGL's lowest row (y in clip space runs down the picture), so that a
+target read back from the first byte on is already an array [row, column].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.storage import Float64Array
+from hairkit.types.camera import Camera
+
+Program = moderngl.Program | moderngl.ComputeShader
+
+
+@dataclass(frozen=True)
+class DepthRange:
+    """Axial depths between which something is drawn, metres."""
+
+    near: float
+    far: float
+
+    @classmethod
+    def around(cls, camera: Camera, *point_sets: npt.ArrayLike) -> DepthRange:
+        """Return a range that holds all point sets (N, 3), in front of a perspective camera."""
+        depths = [camera.depth(points) for points in point_sets if len(np.asarray(points))]
+        low = min((float(depth.min()) for depth in depths), default=0.1)
+        high = max((float(depth.max()) for depth in depths), default=1.0)
+        margin = 0.01 + 0.01 * (high - low)
+        near = low - margin
+        if camera.model == "perspective":
+            near = max(near, 0.01)
+        return cls(near, max(high + margin, near + 0.01))
+
+
+def clip_from_camera(camera: Camera, depth: DepthRange) -> Float64Array:
+    """Return the (4, 4) projection of camera coordinates to OpenGL clip space."""
+    near, far = depth.near, depth.far
+    scale = 2 * camera.focal / np.array([camera.width, camera.height])
+    shift = 2 * camera.centre / np.array([camera.width, camera.height]) - 1
+    matrix = np.zeros((4, 4))
+    matrix[0, 0], matrix[1, 1] = scale
+    if camera.model == "orthographic":
+        matrix[0, 3], matrix[1, 3] = shift
+        matrix[2, 2], matrix[2, 3] = 2 / (far - near), -(far + near) / (far - near)
+        matrix[3, 3] = 1
+        return matrix
+    matrix[0, 2], matrix[1, 2] = shift
+    matrix[2, 2], matrix[2, 3] = (far + near) / (far - near), -2 * far * near / (far - near)
+    matrix[3, 2] = 1
+    return matrix
+
+
+def set_camera(program: Program, camera: Camera, depth: DepthRange) -> None:
+    """Set those of the camera uniforms that a program has."""
+    set_uniforms(
+        program,
+        u_clip_from_head=_columns(clip_from_camera(camera, depth) @ camera.camera_from_head),
+        u_forward=tuple(camera.forward.tolist()),
+        u_depth_offset=float(camera.translation[2]),
+        u_size_px=(camera.width, camera.height),
+        u_focal_px=camera.focal,
+        u_perspective=float(camera.model == "perspective"),
+    )
+
+
+def set_uniforms(program: Program, **values: object) -> None:
+    """Set uniforms by name, passing over those the compiler dropped because nothing reads them."""
+    for name, value in values.items():
+        if name in program:
+            program[name] = value
+
+
+def _columns(matrix: Float64Array) -> tuple[float, ...]:
+    return tuple(matrix.T.ravel().tolist())

@@ -1,0 +1,128 @@
+"""Unit quaternions (w, x, y, z) as arrays (..., 4): what motion and orientation-carrying rods need.
+
+A quaternion turns the axes of a frame into the world: `rotated(q, e)` are its directors.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.storage import Float64Array
+
+
+def product(a: Float64Array, b: Float64Array) -> Float64Array:
+    """Return the Hamilton product: first turn by `b`, then by `a`."""
+    w, x, y, z = np.moveaxis(a, -1, 0)
+    s, u, v, t = np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            w * s - x * u - y * v - z * t,
+            w * u + x * s + y * t - z * v,
+            w * v - x * t + y * s + z * u,
+            w * t + x * v - y * u + z * s,
+        ],
+        axis=-1,
+    )
+
+
+def inverse(q: Float64Array) -> Float64Array:
+    """Return the turn back."""
+    back: Float64Array = q * np.array([1.0, -1.0, -1.0, -1.0])
+    return back
+
+
+def unit(q: Float64Array) -> Float64Array:
+    """Return quaternions or vectors of length 1; zero stays zero."""
+    length = np.linalg.norm(q, axis=-1, keepdims=True)
+    result: Float64Array = q / np.maximum(length, 1e-300)
+    return result
+
+
+def rotated(q: Float64Array, vector: npt.ArrayLike) -> Float64Array:
+    """Return vectors (..., 3) turned by unit quaternions."""
+    v = np.asarray(vector, np.float64)
+    along = 2.0 * np.cross(q[..., 1:], v)
+    result: Float64Array = v + q[..., :1] * along + np.cross(q[..., 1:], along)
+    return result
+
+
+def third_axis(q: Float64Array) -> Float64Array:
+    """Return the third director: the direction of a rod's segment."""
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
+
+
+def swing(start: Float64Array, end: Float64Array) -> Float64Array:
+    """Return the smallest turns that bring unit vectors `start` to `end`; half turns pick an axis.
+
+    This is parallel transport along the great circle between the two.
+    """
+    cosine = (start * end).sum(axis=-1)
+    axis = np.cross(start, end)
+    turn = np.concatenate([(1.0 + cosine)[..., None], axis], axis=-1)
+    opposite = cosine < -1.0 + 1e-12
+    if opposite.any():
+        other = np.where(np.abs(start[..., :1]) < 0.6, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+        half = np.concatenate([np.zeros_like(cosine)[..., None], np.cross(start, other)], axis=-1)
+        turn = np.where(opposite[..., None], half, turn)
+    return unit(turn)
+
+
+def about(axis: npt.ArrayLike, angle: npt.ArrayLike) -> Float64Array:
+    """Return turns by `angle` (...) radians about unit axes (..., 3)."""
+    half = np.asarray(angle, np.float64)[..., None] / 2
+    return np.concatenate([np.cos(half), np.sin(half) * np.asarray(axis, np.float64)], axis=-1)
+
+
+def from_matrix(matrix: npt.ArrayLike) -> Float64Array:
+    """Return the quaternions (..., 4) of rotation matrices (..., 3, 3), w not negative."""
+    m = np.asarray(matrix, np.float64)
+    if m.ndim == 2 and m[0, 0] + m[1, 1] + m[2, 2] > 0:  # one turn of less than 120 degrees
+        w = 0.5 * float(np.sqrt(1.0 + m[0, 0] + m[1, 1] + m[2, 2]))
+        x, y, z = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
+        return np.array([w, x / (4 * w), y / (4 * w), z / (4 * w)])
+    xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
+    # Four candidates, each exact where its own component is the largest (Shepperd 1978).
+    squares = np.stack([xx + yy + zz, xx - yy - zz, yy - xx - zz, zz - xx - yy], axis=-1) + 1.0
+    a, b, c = (
+        m[..., 2, 1] - m[..., 1, 2],
+        m[..., 0, 2] - m[..., 2, 0],
+        m[..., 1, 0] - m[..., 0, 1],
+    )
+    d, e, f = (
+        m[..., 1, 0] + m[..., 0, 1],
+        m[..., 2, 0] + m[..., 0, 2],
+        m[..., 2, 1] + m[..., 1, 2],
+    )
+    rows = np.stack(
+        [
+            np.stack([squares[..., 0], a, b, c], axis=-1),
+            np.stack([a, squares[..., 1], d, e], axis=-1),
+            np.stack([b, d, squares[..., 2], f], axis=-1),
+            np.stack([c, e, f, squares[..., 3]], axis=-1),
+        ],
+        axis=-2,
+    )
+    best = np.argmax(squares, axis=-1)
+    q = unit(np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :])
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+def to_matrix(q: npt.ArrayLike) -> Float64Array:
+    """Return the rotation matrices (..., 3, 3) of unit quaternions."""
+    quaternion = np.asarray(q, np.float64)
+    axes = np.eye(3)
+    return np.stack([rotated(quaternion, axes[k]) for k in range(3)], axis=-1)
+
+
+def slerp(start: Float64Array, end: Float64Array, share: float) -> Float64Array:
+    """Return the turn a share of the way from `start` to `end`, along the shorter way."""
+    if (start == end).all():
+        return start
+    step = product(end, inverse(start))
+    step = np.where(step[..., :1] < 0, -step, step)
+    sine = np.linalg.norm(step[..., 1:], axis=-1)
+    angle = 2.0 * np.arctan2(sine, step[..., 0])
+    axis = step[..., 1:] / np.maximum(sine, 1e-300)[..., None]
+    return product(about(axis, share * angle), start)

@@ -1,0 +1,1 @@
+"""Frozen types that travel between stages; see each module."""

@@ -1,0 +1,85 @@
+"""A capture: the photos taken around a head and what is known about each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.storage import Float64Array, UInt8Array, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One photo of the turn, upright, at working size."""
+
+    name: str
+    """`front`, `front-left`, `left`, `back-left`, `back`, `back-right`, `right`, `front-right`,
+    or as `capture.toml` says."""
+    azimuth_deg: float
+    """Nominal azimuth: 0 in front, positive towards the subject's left."""
+    image: UInt8Array
+    """(H, W, 3) RGB."""
+    focal_px: float | None = None
+    """Focal length in pixels of `image`, from EXIF or capture.toml; None when unknown."""
+    landmarks: Float64Array | None = None
+    """(68, 2) iBUG points in pixels of `image`, NaN-free, or None."""
+    mask_path: Path | None = None
+    strokes_path: Path | None = None
+    photo_path: Path | None = None
+    photo_size: tuple[int, int] = (0, 0)
+    """(width, height) of the photo on disk after EXIF rotation: the pixels of masks and strokes."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "image", frozen_array(self.image, np.uint8, (None, None, 3), f"photo {self.name}")
+        )
+        if self.photo_size == (0, 0):
+            object.__setattr__(self, "photo_size", (self.image.shape[1], self.image.shape[0]))
+        if self.landmarks is not None:
+            object.__setattr__(
+                self,
+                "landmarks",
+                frozen_array(self.landmarks, np.float64, (68, 2), f"landmarks of {self.name}"),
+            )
+
+    @property
+    def width(self) -> int:
+        """Width of `image` in pixels."""
+        return int(self.image.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Height of `image` in pixels."""
+        return int(self.image.shape[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """The views of one head, in the order of the turn."""
+
+    views: tuple[View, ...]
+    orthographic: bool = False
+    """True when capture.toml says that the pictures are orthographic."""
+    head_pose: Float64Array | None = None
+    """(4, 4) similarity that places the head by hand, `scene_from_head`, metres, or None."""
+
+    def __post_init__(self) -> None:
+        if not self.views:
+            raise InputError("a capture needs at least one view")
+        if self.head_pose is not None:
+            pose = frozen_array(self.head_pose, np.float64, (4, 4), "head_pose")
+            object.__setattr__(self, "head_pose", _similarity(pose))
+
+
+def _similarity(matrix: Float64Array) -> Float64Array:
+    """Return a rotation, one scale and a shift as it is; `InputError` for anything else."""
+    square = matrix[:3, :3] @ matrix[:3, :3].T
+    scale = float(np.trace(square)) / 3
+    alike = np.allclose(square, scale * np.eye(3), atol=1e-6 * scale, rtol=0)
+    upright = np.linalg.det(matrix[:3, :3]) > 0 and np.array_equal(matrix[3], [0, 0, 0, 1])
+    if not (alike and upright):
+        raise InputError("head_pose is no similarity, expected rotation, one scale and a shift")
+    return matrix

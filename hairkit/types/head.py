@@ -1,0 +1,118 @@
+"""The head: a triangle mesh, closed or open, with scalp, uv, landmarks, skeleton and capsules."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.storage import Float32Array, Float64Array, Int32Array, Stored, frozen_array
+
+
+@dataclass(frozen=True, eq=False)
+class Capsules(Stored):
+    """Collision capsules: two spheres and what lies between them."""
+
+    first: Float32Array
+    """(C, 3) centres of the first spheres, metres."""
+    second: Float32Array
+    """(C, 3) centres of the second spheres."""
+    radius: Float32Array
+    """(C, 2) radii of the two spheres, metres."""
+
+    def __post_init__(self) -> None:
+        first = frozen_array(self.first, np.float32, (None, 3), "capsule first")
+        object.__setattr__(self, "first", first)
+        object.__setattr__(
+            self, "second", frozen_array(self.second, np.float32, first.shape, "capsule second")
+        )
+        object.__setattr__(
+            self, "radius", frozen_array(self.radius, np.float32, (len(first), 2), "capsule radius")
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Head(Stored):
+    """A head mesh in the head frame, faces counter-clockwise seen from outside."""
+
+    vertices: Float32Array
+    """(V, 3) metres."""
+    faces: Int32Array
+    """(F, 3) vertex indices."""
+    uv: Float32Array
+    """(V, 2) texture coordinates in [0, 1], injective over the scalp."""
+    scalp: Float32Array
+    """(V,) 1 where hair grows, 0 elsewhere, in between at the hairline."""
+    landmark_vertices: Int32Array | None
+    """(68,) vertices of the iBUG landmarks, or None on a head that has none."""
+    joints: Float32Array
+    """(3, 3) root, neck and head joint positions, metres."""
+    capsules: Capsules
+
+    def __post_init__(self) -> None:
+        vertices = frozen_array(self.vertices, np.float32, (None, 3), "head vertices")
+        faces = frozen_array(self.faces, np.int32, (None, 3), "head faces")
+        if not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
+            raise InputError("head faces are missing or name vertices that do not exist")
+        scalp = frozen_array(self.scalp, np.float32, (len(vertices),), "head scalp")
+        if not (scalp > 0.5).any():
+            raise InputError(
+                "the head has no scalp: mark it by a vertex group, a mask texture or vertex colours"
+            )
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
+        object.__setattr__(self, "scalp", scalp)
+        object.__setattr__(
+            self, "uv", frozen_array(self.uv, np.float32, (len(vertices), 2), "head uv")
+        )
+        object.__setattr__(
+            self, "joints", frozen_array(self.joints, np.float32, (3, 3), "head joints")
+        )
+        if self.landmark_vertices is not None:
+            index = frozen_array(self.landmark_vertices, np.int32, (68,), "head landmark_vertices")
+            object.__setattr__(self, "landmark_vertices", index)
+
+    def normals(self) -> Float64Array:
+        """Return (V, 3) unit vertex normals, outward, weighted by face area."""
+        corners = self.vertices.astype(np.float64)[self.faces]
+        face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        total = np.zeros((len(self.vertices), 3))
+        for corner in range(3):
+            np.add.at(total, self.faces[:, corner], face_normals)
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        result: Float64Array = total / np.maximum(length, 1e-20)
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Roots(Stored):
+    """Points on the scalp where strands start, and how they are bound to the head."""
+
+    positions: Float32Array
+    """(N, 3) metres."""
+    normals: Float32Array
+    """(N, 3) outward unit normals."""
+    uv: Float32Array
+    """(N, 2) texture coordinates."""
+    triangle: Int32Array
+    """(N,) face of the head that carries the root."""
+    barycentric: Float32Array
+    """(N, 3) weights of that face's corners, sum 1."""
+
+    def __post_init__(self) -> None:
+        positions = frozen_array(self.positions, np.float32, (None, 3), "root positions")
+        count = len(positions)
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(
+            self, "normals", frozen_array(self.normals, np.float32, (count, 3), "root normals")
+        )
+        object.__setattr__(self, "uv", frozen_array(self.uv, np.float32, (count, 2), "root uv"))
+        object.__setattr__(
+            self, "triangle", frozen_array(self.triangle, np.int32, (count,), "root triangle")
+        )
+        barycentric = frozen_array(self.barycentric, np.float32, (count, 3), "root barycentric")
+        object.__setattr__(self, "barycentric", barycentric)
+
+    def __len__(self) -> int:
+        return len(self.positions)

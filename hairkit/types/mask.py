@@ -1,0 +1,41 @@
+"""Label images: hair, the rest of the person, background."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.storage import BoolArray, Stored, UInt8Array, frozen_array
+
+HAIR, PERSON, BACKGROUND = 255, 128, 0
+
+
+@dataclass(frozen=True, eq=False)
+class Mask(Stored):
+    """Labels of one view: 255 hair, 128 the rest of the person, 0 background."""
+
+    labels: UInt8Array
+    """(H, W), only the three label values."""
+    person_known: bool
+    """False when nobody said where the person is: then 0 means only "not hair"."""
+
+    def __post_init__(self) -> None:
+        labels = frozen_array(self.labels, np.uint8, (None, None), "mask labels")
+        stray = np.setdiff1d(np.unique(labels), [BACKGROUND, PERSON, HAIR])
+        if stray.size:
+            raise InputError(f"mask holds the value {stray[0]}, expected only 0, 128 and 255")
+        if not (labels == HAIR).any():
+            raise InputError("mask is empty: no pixel is marked as hair (255)")
+        object.__setattr__(self, "labels", labels)
+
+    @property
+    def hair(self) -> BoolArray:
+        """(H, W) true where hair is."""
+        return np.asarray(self.labels == HAIR)
+
+    @property
+    def person(self) -> BoolArray:
+        """(H, W) true where the person is, hair included."""
+        return np.asarray(self.labels != BACKGROUND)

@@ -1,0 +1,56 @@
+"""A simulation's result: where every point of the guides is at every frame."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.storage import Float32Array, Float64Array, Stored, frozen_array
+from hairkit.types.groom import Groom
+
+
+@dataclass(frozen=True, eq=False)
+class PointCache(Stored):
+    """Frames of points on a moving head, in the world: the head frame of the first frame."""
+
+    points: Float32Array
+    """(T, P, 3) metres; P points in the order of the simulated groom's strands."""
+    times: Float64Array
+    """(T,) ascending, seconds."""
+    head_from_rest: Float64Array
+    """(T, 4, 4) rigid motion of the head since rest, acting on column vectors."""
+
+    def __post_init__(self) -> None:
+        points = frozen_array(self.points, np.float32, (None, None, 3), "cache points")
+        frames = len(points)
+        times = frozen_array(self.times, np.float64, (frames,), "cache times")
+        if not frames or (np.diff(times) <= 0).any():
+            raise InputError("a point cache needs at least one frame, at ascending times")
+        motion = frozen_array(self.head_from_rest, np.float64, (frames, 4, 4), "head_from_rest")
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "head_from_rest", motion)
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def frames_per_second(self) -> float:
+        """Frames per second of a uniform cache; 24 for a single frame."""
+        if len(self.times) < 2:
+            return 24.0
+        return float((len(self.times) - 1) / (self.times[-1] - self.times[0]))
+
+
+def read_cache(path: str | os.PathLike[str], groom: Groom) -> PointCache:
+    """Return the cache in an npz file; raises `InputError` when it is of another groom."""
+    cache = PointCache.load(path)
+    have, want = cache.points.shape[1], len(groom.strands.points)
+    if have != want:
+        raise InputError(
+            f"{path}: a cache of {have} points, the groom has {want}; simulate this groom again"
+        )
+    return cache

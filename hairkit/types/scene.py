@@ -1,0 +1,61 @@
+"""The solved set-up of a capture: one camera a view and the head fitted to the photos."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from hairkit.errors import FormatError, InputError
+from hairkit.storage import Stored, write_text
+from hairkit.types.camera import Camera
+from hairkit.types.head import Head
+
+
+@dataclass(frozen=True, eq=False)
+class Scene(Stored):
+    """Cameras in view order and the fitted head, all in the head frame."""
+
+    names: tuple[str, ...]
+    cameras: tuple[Camera, ...]
+    head: Head
+    residual_px: float | None = None
+    """Root mean square misfit of the cameras in working pixels; None when never measured."""
+
+    def __post_init__(self) -> None:
+        if len(self.names) != len(self.cameras) or not self.cameras:
+            raise InputError(
+                f"scene has {len(self.cameras)} cameras for {len(self.names)} view names"
+            )
+
+    def write_json(self, path: str | os.PathLike[str]) -> None:
+        """Write cameras and head joints as JSON, cameras in the form of `truth.json`."""
+        views = [
+            camera.to_json(name) for name, camera in zip(self.names, self.cameras, strict=True)
+        ]
+        joints = dict(zip(("root", "neck", "head"), self.head.joints.tolist(), strict=True))
+        document = {
+            "units": "metres",
+            "views": views,
+            "head": {"joints": joints},
+            "residual_px": self.residual_px,
+        }
+        write_text(path, json.dumps(document, indent=1) + "\n")
+
+
+def read_cameras(path: str | os.PathLike[str]) -> tuple[tuple[str, ...], tuple[Camera, ...]]:
+    """Read view names and cameras from a `scene.json` or a capture's `truth.json`."""
+    try:
+        views = json.loads(Path(path).read_text())["views"]
+        names = tuple(str(view.get("name", index)) for index, view in enumerate(views))
+        return names, tuple(Camera.from_json(view) for view in views)
+    except (
+        OSError,
+        UnicodeDecodeError,
+        json.JSONDecodeError,
+        KeyError,
+        TypeError,
+        AttributeError,
+    ) as error:
+        raise FormatError(f"{path}: no cameras could be read ({error})") from error

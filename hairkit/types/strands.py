@@ -1,0 +1,190 @@
+"""Packed strands: every point of every strand in one array, with offsets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import InputError
+from hairkit.storage import (
+    BoolArray,
+    Float32Array,
+    Float64Array,
+    Int32Array,
+    Int64Array,
+    Stored,
+    frozen_array,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Strands(Stored):
+    """Polylines, root first, packed: strand s is `points[offsets[s]:offsets[s + 1]]`."""
+
+    points: Float32Array
+    """(P, 3) metres, head frame."""
+    offsets: Int64Array
+    """(S + 1,) ascending, first 0, last P; every strand has at least two points."""
+    widths: Float32Array | None = None
+    """(P,) diameters in metres."""
+    root_uv: Float32Array | None = None
+    """(S, 2) texture coordinates of the root on the head."""
+    group: Int32Array | None = None
+    """(S,) group number, for engines that shade or simulate groups apart."""
+    guide: BoolArray | None = None
+    """(S,) true for guides, false for interpolated hair."""
+
+    def __post_init__(self) -> None:
+        points = frozen_array(self.points, np.float32, (None, 3), "strand points")
+        offsets = frozen_array(self.offsets, np.int64, (None,), "strand offsets")
+        if not len(offsets) or offsets[0] != 0 or offsets[-1] != len(points):
+            raise InputError(f"strand offsets must run from 0 to {len(points)}")
+        if (np.diff(offsets) < 2).any():
+            raise InputError(
+                f"{np.count_nonzero(np.diff(offsets) < 2)} strands have fewer than two points"
+            )
+        count, total = len(offsets) - 1, len(points)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "offsets", offsets)
+        extras: dict[str, tuple[npt.DTypeLike, tuple[int, ...]]] = {
+            "widths": (np.float32, (total,)),
+            "root_uv": (np.float32, (count, 2)),
+            "group": (np.int32, (count,)),
+            "guide": (np.bool_, (count,)),
+        }
+        for name, (dtype, shape) in extras.items():
+            if getattr(self, name) is not None:
+                object.__setattr__(
+                    self, name, frozen_array(getattr(self, name), dtype, shape, name)
+                )
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    @property
+    def counts(self) -> Int64Array:
+        """(S,) points of each strand."""
+        return np.diff(self.offsets)
+
+    @property
+    def roots(self) -> Float32Array:
+        """(S, 3) first points."""
+        return self.points[self.offsets[:-1]]
+
+    @property
+    def tips(self) -> Float32Array:
+        """(S, 3) last points."""
+        return self.points[self.offsets[1:] - 1]
+
+    @property
+    def strand_of_point(self) -> Int64Array:
+        """(P,) number of the strand that each point belongs to."""
+        return np.repeat(np.arange(len(self)), self.counts)
+
+    def segments(self) -> tuple[Float32Array, Int64Array]:
+        """Return segment vectors (P - S, 3) and the index (P - S,) of each one's first point."""
+        first = np.delete(np.arange(len(self.points)), self.offsets[1:] - 1)
+        return self.points[first + 1] - self.points[first], first
+
+    def arc_lengths(self) -> Float64Array:
+        """Return (P,) the distance of every point from its root along the strand, metres."""
+        step = np.zeros(len(self.points))
+        step[1:] = np.linalg.norm(np.diff(self.points.astype(np.float64), axis=0), axis=1)
+        step[self.offsets[:-1]] = 0
+        total = np.cumsum(step)
+        result: Float64Array = total - np.repeat(total[self.offsets[:-1]], self.counts)
+        return result
+
+    def lengths(self) -> Float64Array:
+        """Return (S,) strand lengths, metres."""
+        result: Float64Array = self.arc_lengths()[self.offsets[1:] - 1]
+        return result
+
+    def tangents(self) -> Float32Array:
+        """Return (P, 3) unit directions root to tip: forward differences, repeated at the tip."""
+        difference = np.zeros((len(self.points), 3))
+        difference[:-1] = np.diff(self.points.astype(np.float64), axis=0)
+        last = self.offsets[1:] - 1
+        difference[last] = difference[last - 1]
+        length = np.linalg.norm(difference, axis=1, keepdims=True)
+        result: Float32Array = (difference / np.maximum(length, 1e-12)).astype(np.float32)
+        return result
+
+    def select(self, keep: npt.ArrayLike) -> Strands:
+        """Return the strands that a mask (S,) or an index array picks, in that order."""
+        index = np.asarray(keep)
+        index = np.flatnonzero(index) if index.dtype == bool else index.astype(np.int64)
+        counts = self.counts[index]
+        offsets = np.concatenate([[0], np.cumsum(counts)])
+        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[:-1][index] - offsets[:-1], counts)
+        return Strands(
+            self.points[rows],
+            offsets,
+            None if self.widths is None else self.widths[rows],
+            None if self.root_uv is None else self.root_uv[index],
+            None if self.group is None else self.group[index],
+            None if self.guide is None else self.guide[index],
+        )
+
+    def resampled(self, count: int) -> Strands:
+        """Return strands of `count` points at equal arc length; ends stay, widths are mixed."""
+        if count < 2:
+            raise InputError(f"a strand needs at least 2 points, got {count}")
+        return self._at(np.full(len(self), count))
+
+    def resampled_by_length(self, step: float) -> Strands:
+        """Return strands with points about `step` metres apart, equal in a strand; ends stay."""
+        if not step > 0:
+            raise InputError(f"resampling step is {step}, expected metres above 0")
+        return self._at(np.maximum(np.ceil(self.lengths() / step - 1e-9).astype(np.int64), 1) + 1)
+
+    def _at(self, counts: Int64Array) -> Strands:
+        offsets = np.concatenate([[0], np.cumsum(counts)])
+        after, t = self._places(counts)
+        points = _mix(self.points, after, t[:, None])
+        widths = None if self.widths is None else _mix(self.widths, after, t)
+        return replace(self, points=points, offsets=offsets, widths=widths)
+
+    def moved_and_resampled(self, frames: Float32Array, count: int) -> Float32Array:
+        """Return frames (T, P, 3) of these strands at the points (T, S count, 3) of `resampled`.
+
+        The points are the same matter in every frame, wherever it has moved.
+        """
+        after, t = self._places(np.full(len(self), count))
+        return _mix(frames.swapaxes(0, 1), after, t[:, None, None]).swapaxes(0, 1)
+
+    def _places(self, counts: Int64Array) -> tuple[Int64Array, Float64Array]:
+        """Return the point after each new one, and how far on the new one lies between both."""
+        offsets = np.concatenate([[0], np.cumsum(counts)])
+        arc = self.arc_lengths()
+        length = arc[self.offsets[1:] - 1]
+        rank = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
+        wanted = rank / np.repeat(counts - 1, counts) * np.repeat(length, counts)
+        base = np.concatenate([[0.0], np.cumsum(length + 1.0)])[
+            :-1
+        ]  # a strictly ascending key over all strands
+        key = arc + np.repeat(base, self.counts)
+        target = wanted + np.repeat(base, counts)
+        after = np.clip(
+            np.searchsorted(key, target, side="right"),
+            np.repeat(self.offsets[:-1], counts) + 1,
+            np.repeat(self.offsets[1:], counts) - 1,
+        )
+        span = np.maximum(key[after] - key[after - 1], 1e-12)
+        return after, np.clip((target - key[after - 1]) / span, 0, 1)
+
+    @staticmethod
+    def from_list(strands: Sequence[npt.ArrayLike]) -> Strands:
+        """Pack arrays of shape (n, 3), one a strand, root first."""
+        arrays = [np.asarray(strand, np.float32).reshape(-1, 3) for strand in strands]
+        offsets = np.concatenate([[0], np.cumsum([len(array) for array in arrays])])
+        points = np.concatenate(arrays) if arrays else np.zeros((0, 3), np.float32)
+        return Strands(points, offsets)
+
+
+def _mix(values: npt.NDArray[np.float32], after: Int64Array, t: Float64Array) -> Float32Array:
+    mixed: Float32Array = (values[after - 1] * (1 - t) + values[after] * t).astype(np.float32)
+    return mixed

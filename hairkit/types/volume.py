@@ -1,0 +1,179 @@
+"""Volumes in the head frame: the grid, the hull that hair fills, the orientations in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.errors import InputError
+from hairkit.storage import BoolArray, Float32Array, Float64Array, Stored, frozen_array
+
+MAX_CELLS = 256**3
+"""Largest number of cells a grid may have."""
+
+
+@dataclass(frozen=True, eq=False)
+class VoxelGrid(Stored):
+    """A box of cubic cells, indexed [x, y, z]; values sit at cell centres."""
+
+    origin: Float64Array
+    """(3,) lowest corner of cell (0, 0, 0), metres."""
+    spacing: float
+    """Edge length of a cell, metres."""
+    shape: tuple[int, ...]
+    """Number of cells along x, y, z."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "origin", frozen_array(self.origin, np.float64, (3,), "grid origin")
+        )
+        object.__setattr__(self, "shape", tuple(int(n) for n in self.shape))
+        if not (self.spacing > 0 and len(self.shape) == 3 and min(self.shape) > 0):
+            raise InputError(
+                f"grid needs spacing and three sizes above 0, got {self.spacing}, {self.shape}"
+            )
+        if int(np.prod(np.array(self.shape, dtype=np.float64))) > MAX_CELLS:
+            raise InputError(
+                f"grid {self.shape} has more than {MAX_CELLS} cells; use a larger voxel size"
+            )
+
+    @classmethod
+    def around(cls, low: npt.ArrayLike, high: npt.ArrayLike, spacing: float) -> VoxelGrid:
+        """Return the smallest grid of `spacing` over the box from `low` (3,) to `high` (3,)."""
+        lowest, highest = np.asarray(low, np.float64), np.asarray(high, np.float64)
+        shape = np.maximum(np.ceil((highest - lowest) / spacing), 1).astype(int)
+        return cls(lowest, spacing, tuple(shape.tolist()))
+
+    def centres(self) -> Float32Array:
+        """Return the cell centres, (X, Y, Z, 3) float32, metres."""
+        axes = [self.origin[i] + (np.arange(self.shape[i]) + 0.5) * self.spacing for i in range(3)]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).astype(np.float32)
+
+    def centres_of(self, cells: BoolArray) -> Float32Array:
+        """Return the centres (N, 3) of the cells that a mask (X, Y, Z) marks, in C order."""
+        index = np.stack(np.nonzero(cells), axis=1)
+        return (self.origin + (index + 0.5) * self.spacing).astype(np.float32)
+
+    def index_from_head(self, points: npt.ArrayLike) -> Float64Array:
+        """Return continuous indices (..., 3) of points: whole numbers fall on cell centres."""
+        result: Float64Array = (np.asarray(points, np.float64) - self.origin) / self.spacing - 0.5
+        return result
+
+    def nearest_cell(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """Return the cell (..., 3) that holds each point, clamped to the grid."""
+        index = np.rint(self.index_from_head(points)).astype(np.int64)
+        return np.clip(index, 0, np.array(self.shape) - 1)
+
+    def sample(self, values: npt.NDArray[np.float32], points: npt.ArrayLike) -> Float32Array:
+        """Interpolate `values` (X, Y, Z) or (X, Y, Z, C) trilinearly at points (N, 3).
+
+        Outside the grid the nearest border value holds.
+        """
+        index = np.clip(self.index_from_head(points), 0, np.array(self.shape) - 1)
+        low = np.minimum(index.astype(np.int64), np.maximum(np.array(self.shape) - 2, 0))
+        t = (index - low).astype(np.float32)
+        high = np.minimum(low + 1, np.array(self.shape) - 1)
+        result = np.zeros((len(index), *values.shape[3:]), np.float32)
+        for corner in range(8):
+            pick = [high[:, i] if corner >> i & 1 else low[:, i] for i in range(3)]
+            weight = np.prod(
+                [t[:, i] if corner >> i & 1 else 1 - t[:, i] for i in range(3)], axis=0
+            )
+            result += (
+                weight.reshape(-1, *[1] * (values.ndim - 3)) * values[pick[0], pick[1], pick[2]]
+            )
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Hull(Stored):
+    """Where hair is: its dense body, the looser volume that may hold strands, and the head."""
+
+    grid: VoxelGrid
+    dense: BoolArray
+    """(X, Y, Z) cells that are full of hair."""
+    loose: BoolArray
+    """(X, Y, Z) cells that may hold hair; contains `dense`."""
+    head_distance: Float32Array
+    """(X, Y, Z) signed distance to the head in metres, negative inside."""
+
+    def __post_init__(self) -> None:
+        shape = self.grid.shape
+        dense = frozen_array(self.dense, np.bool_, shape, "hull dense")
+        loose = frozen_array(self.loose, np.bool_, shape, "hull loose")
+        if not dense.any():
+            raise InputError(
+                "the hull is empty: the masks of the views do not overlap in space;"
+                " check masks and cameras"
+            )
+        if (dense & ~loose).any():
+            raise InputError("hull: every dense cell must be a loose cell")
+        object.__setattr__(self, "dense", dense)
+        object.__setattr__(self, "loose", loose)
+        distance = frozen_array(self.head_distance, np.float32, shape, "hull head_distance")
+        object.__setattr__(self, "head_distance", distance)
+
+
+TENSOR_INDICES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Order of the six stored components of a symmetric 3x3 tensor: xx, yy, zz, xy, xz, yz."""
+
+
+@dataclass(frozen=True, eq=False)
+class OrientationField(Stored):
+    """Undirected 3D orientation in the hull as a symmetric tensor per cell, with confidence."""
+
+    grid: VoxelGrid
+    tensor: Float32Array
+    """(X, Y, Z, 6) xx, yy, zz, xy, xz, yz; the strand runs along the main eigenvector."""
+    confidence: Float32Array
+    """(X, Y, Z) in [0, 1]; 0 where nothing is known."""
+    growth: Float32Array
+    """(X, Y, Z) potential, growing with the distance from the scalp through the hair: the sign."""
+    direction: Float32Array | None = None
+    """(X, Y, Z, 3) root to tip, where the method finds signs of its own; lengths mean nothing."""
+    internal_distance: Float32Array | None = None
+    """(X, Y, Z) 0 in the head, 1 at the hair's surface, beyond it 1 more than metres away over
+    the cell's edge; None where the method has none."""
+
+    def __post_init__(self) -> None:
+        shape = self.grid.shape
+        if self.direction is not None:
+            direction = frozen_array(self.direction, np.float32, (*shape, 3), "field direction")
+            object.__setattr__(self, "direction", direction)
+        if self.internal_distance is not None:
+            inner = frozen_array(
+                self.internal_distance, np.float32, shape, "field internal_distance"
+            )
+            object.__setattr__(self, "internal_distance", inner)
+        object.__setattr__(
+            self, "tensor", frozen_array(self.tensor, np.float32, (*shape, 6), "field tensor")
+        )
+        confidence = frozen_array(self.confidence, np.float32, shape, "field confidence")
+        object.__setattr__(self, "confidence", confidence)
+        object.__setattr__(
+            self, "growth", frozen_array(self.growth, np.float32, shape, "field growth")
+        )
+
+
+def symmetric_matrices(components: npt.ArrayLike) -> Float64Array:
+    """Return the (..., 3, 3) matrices of (..., 6) components in the order of `TENSOR_INDICES`."""
+    six = np.asarray(components, np.float64)
+    matrices = np.empty((*six.shape[:-1], 3, 3))
+    for k, (i, j) in enumerate(TENSOR_INDICES):
+        matrices[..., i, j] = matrices[..., j, i] = six[..., k]
+    return matrices
+
+
+def outer_products(directions: npt.ArrayLike) -> Float64Array:
+    """Return the (..., 6) components of d d^T for directions (..., 3)."""
+    d = np.asarray(directions, np.float64)
+    return np.stack([d[..., i] * d[..., j] for i, j in TENSOR_INDICES], axis=-1)
+
+
+def cell_slopes(values: npt.NDArray[np.float32]) -> Float32Array:
+    """Return (X, Y, Z, 3) central differences of values (X, Y, Z), per cell."""
+    parts: Any = np.gradient(values)
+    return np.stack(list(parts), axis=-1).astype(np.float32)

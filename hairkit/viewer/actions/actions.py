@@ -1,0 +1,393 @@
+"""Everything a user can do, in one table: keys, mouse, panel and scripts all go through it.
+
+>>> sorted(ACTIONS)[:3]
+['adjust', 'colours', 'drag']
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.options import unknown_name
+from hairkit.viewer.actions import pose  # adds its own to the table
+from hairkit.viewer.actions.presets import presets_path, read_preset, write_preset
+from hairkit.viewer.actions.registry import ACTIONS, action, bindings, checked_values, perform
+from hairkit.viewer.draw.colouring import COLOURINGS
+from hairkit.viewer.draw.hair_data import MAX_HAIRS
+from hairkit.viewer.head_motion import AXES, Shake
+from hairkit.viewer.picking import grab_lock, nearest_point, surface_point
+from hairkit.viewer.recording import Recorder, free_name
+from hairkit.viewer.session import Session
+
+__all__ = ["ACTIONS", "LOOKS", "bindings", "checked_values", "perform", "pose"]
+
+LOOKS = {"front": (0.0, 0.0), "side": (90.0, 0.0), "back": (180.0, 0.0), "top": (0.0, 89.0)}
+"""Named views: azimuth and elevation, degrees."""
+MAX_SECONDS = 3600.0
+
+
+@action()
+def orbit(session: Session, right: float = 0.0, up: float = 0.0) -> None:
+    """Turn the camera around the hair, by degrees to its right and up."""
+    session.shown.through = None
+    session.view = session.view.orbited(right, up)
+
+
+@action()
+def pan(session: Session, right: float = 0.0, down: float = 0.0) -> None:
+    """Slide the picture, in shares of its height."""
+    session.shown.through = None
+    session.view = session.view.panned(right, down)
+
+
+@action(PAGE_UP={"factor": 1.15}, PAGE_DOWN={"factor": 1 / 1.15})
+def zoom(session: Session, factor: float) -> None:
+    """Go nearer, or away."""
+    if not factor > 0:
+        raise InputError(f"zoom: factor is {factor}, expected a number above 0")
+    session.shown.through = None
+    session.view = session.view.zoomed(factor)
+
+
+@action()
+def recentre(session: Session, x: float, y: float) -> None:
+    """Look at what is under a pixel."""
+    camera = session.camera()
+    points = session.tuned.simulator.points
+    picked = nearest_point(camera, points, (x, y))
+    point = points[picked] if picked is not None else None
+    if point is None:
+        point = surface_point(camera, session.opened.groom.head, (x, y))
+    if point is not None:
+        session.shown.through = None
+        session.view = session.view.centred(point)
+
+
+@action(N1={"name": "front"}, N3={"name": "side"}, N7={"name": "top"}, N9={"name": "back"})
+def look(session: Session, name: str) -> None:
+    """Look from the front, side, top or back."""
+    if name not in LOOKS:
+        raise InputError(unknown_name("view", name, LOOKS))
+    azimuth, elevation = LOOKS[name]
+    session.shown.through = None
+    session.view = dataclasses.replace(session.view, azimuth=azimuth, elevation=elevation)
+
+
+@action(HOME={})
+def frame(session: Session) -> None:
+    """Show all of the hair again."""
+    session.frame()
+
+
+@action(N={"step": 1}, B={"step": -1})
+def through(session: Session, name: str = "", step: int = 0) -> None:
+    """Look through the camera of the next photo, of the one before, or by name."""
+    names = list(session.photo_cameras)
+    if not names:
+        raise InputError("there are no photos' cameras here; open the folder of a reconstruction")
+    if name and name not in names:
+        raise InputError(unknown_name("view", name, names))
+    if step:
+        now = session.shown.through
+        name = names[(names.index(now) + step) % len(names)] if now in names else names[0]
+    session.shown.through = name or None
+
+
+@action(SPACE={})
+def pause(session: Session, on: bool | None = None) -> None:
+    """Stop time, or let it go on."""
+    session.paused = not session.paused if on is None else on
+
+
+@action(PERIOD={})
+def step(session: Session) -> None:
+    """Stop time and let one sixtieth of a second pass."""
+    session.paused = True
+    session.step()
+
+
+@action(R={})
+def reset(session: Session) -> None:
+    """Put head and hair back to rest."""
+    session.reset()
+
+
+@action()
+def run(session: Session, seconds: float) -> None:
+    """Let a script wait while time passes and pictures are recorded."""
+    if not 0 <= seconds <= MAX_SECONDS:
+        raise InputError(f"run: {seconds} seconds, expected 0 to {MAX_SECONDS:g}")
+    session.pending += seconds
+
+
+@action(W={})
+def wind(
+    session: Session,
+    on: bool | None = None,
+    speed: float | None = None,
+    azimuth: float | None = None,
+    turbulence: float | None = None,
+) -> None:
+    """Let the wind blow or not."""
+    air = session.wind
+    air.blowing = not air.blowing if on is None else on
+    air.speed = air.speed if speed is None else float(np.clip(speed, 0, 60))
+    air.azimuth = air.azimuth if azimuth is None else azimuth
+    air.turbulence = air.turbulence if turbulence is None else float(np.clip(turbulence, 0, 5))
+
+
+@action(
+    LEFT={"degrees": -15.0},
+    RIGHT={"degrees": 15.0},
+    UP={"faster": 1.0},
+    DOWN={"faster": -1.0},
+    U={"gustier": 0.1},
+    SHIFT_U={"gustier": -0.1},
+)
+def wind_change(
+    session: Session, degrees: float = 0.0, faster: float = 0.0, gustier: float = 0.0
+) -> None:
+    """Turn the wind by degrees, make it faster by m/s, more or less turbulent."""
+    air = session.wind
+    azimuth = (air.azimuth + degrees + 180.0) % 360.0 - 180.0
+    gusts = round(air.turbulence + gustier, 6)
+    wind(session, on=True, speed=air.speed + faster, azimuth=azimuth, turbulence=gusts)
+
+
+@action(S={}, SHIFT_S={"axis": "pitch", "degrees": 15.0}, X={"axis": "roll", "degrees": 15.0})
+def shake(
+    session: Session,
+    axis: str = "yaw",
+    degrees: float = 20.0,
+    hertz: float = 1.5,
+    seconds: float = 2.0,
+) -> None:
+    """Shake the head about yaw, pitch or roll."""
+    if axis not in AXES:
+        raise InputError(unknown_name("axis", axis, AXES))
+    session.motion.shakes.append(Shake(axis, float(np.radians(degrees)), hertz, seconds))
+
+
+@action(
+    J={"yaw": -20.0}, L={"yaw": 20.0}, I={"pitch": -10.0}, K={"pitch": 10.0}, Y={"straight": True}
+)
+def turn(
+    session: Session,
+    yaw: float = 0.0,
+    pitch: float = 0.0,
+    roll: float = 0.0,
+    straight: bool = False,
+) -> None:
+    """Turn the head to its right, its left, up, down, or set it straight."""
+    for axis, degrees in (("yaw", yaw), ("pitch", pitch), ("roll", roll)):
+        now = 0.0 if straight else session.motion.turn[axis]
+        session.motion.turn[axis] = float(np.clip(now + np.radians(degrees), -2.0, 2.0))
+
+
+@action()
+def grab(session: Session, x: float, y: float) -> None:
+    """Take the lock under a pixel into the hand."""
+    simulator = session.tuned.simulator
+    offsets = simulator.strands.offsets
+    session.hold = grab_lock(session.camera(), simulator.points, offsets, (x, y))
+    if session.hold is None:
+        session.message = "no hair there to grab"
+
+
+@action()
+def drag(session: Session, x: float, y: float) -> None:
+    """Move the hand that holds hair to a pixel."""
+    if session.hold is not None:
+        session.hold = session.hold.moved(session.camera(), (x, y))
+
+
+@action()
+def release(session: Session) -> None:
+    """Let go of the hair."""
+    session.hold = None
+
+
+@action()
+def pick(session: Session, x: float, y: float) -> None:
+    """Tell the numbers of the guide under a pixel; beside hair: of none."""
+    simulator = session.tuned.simulator
+    picked = nearest_point(session.camera(), simulator.points, (x, y))
+    session.picked = None if picked is None else int(simulator.strands.strand_of_point[picked])
+
+
+@action(LEFT_BRACKET={"times": 0.8}, RIGHT_BRACKET={"times": 1.25})
+def hairs(session: Session, count: int = 0, times: float = 1.0) -> None:
+    """Draw fewer or more hairs."""
+    wanted = count or round(session.shown.hairs * times)
+    session.set_hairs(int(np.clip(wanted, len(session.body.guides), MAX_HAIRS)))
+    session.message = f"{session.shown.hairs} hairs"
+
+
+@action(G={})
+def guides(session: Session, only: bool | None = None) -> None:
+    """Show the guides alone."""
+    session.shown.guides_only = not session.shown.guides_only if only is None else only
+
+
+@action(D={})
+def colours(session: Session, by: str = "") -> None:
+    """Colour by hair, direction, length, stretch, curvature, confidence."""
+    if by and by not in COLOURINGS:
+        raise InputError(unknown_name("colouring", by, COLOURINGS))
+    known = COLOURINGS if session.layers.has_confidence else COLOURINGS[:-1]
+    if by and by not in known:
+        raise InputError("no confidence is here; open the folder that hairkit reconstruct wrote")
+    now = known.index(session.shown.colours) if session.shown.colours in known else -1
+    session.shown.colours = by or known[(now + 1) % len(known)]
+    session.message = f"coloured by {session.shown.colours}"
+
+
+@action(
+    F2={"name": "photos"},
+    F3={"name": "masks"},
+    F4={"name": "orientation"},
+    F6={"name": "cameras"},
+    F7={"name": "hull"},
+    F8={"name": "field"},
+    F9={"name": "head"},
+    F10={"name": "torso"},
+)
+def layer(session: Session, name: str, on: bool | None = None) -> None:
+    """Show or hide photos, masks, orientation, cameras, hull, field, head, torso."""
+    session.layers.check(name)
+    layers = session.shown.layers
+    shown = name not in layers if on is None else on
+    layers.add(name) if shown else layers.discard(name)
+
+
+@action(E={"times": 1.15}, SHIFT_E={"times": 1 / 1.15})
+def exposure(session: Session, value: float | None = None, times: float = 1.0) -> None:
+    """Make the light brighter or darker."""
+    wanted = times * (session.shown.exposure if value is None else value)
+    session.shown.exposure = float(np.clip(wanted, 0.05, 8.0))
+
+
+@action(O={"more": 0.1}, SHIFT_O={"more": -0.1})
+def opacity(session: Session, value: float | None = None, more: float = 0.0) -> None:
+    """Make photos in space more or less opaque, 0 to 1."""
+    wanted = more + (session.shown.opacity if value is None else value)
+    session.shown.opacity = float(np.clip(wanted, 0.0, 1.0))
+
+
+@action()
+def option(session: Session, name: str, value: object) -> None:
+    """Change an option of the simulator."""
+    session.tuned.set(name, value)
+
+
+@action(TAB={"by": 1}, SHIFT_TAB={"by": -1})
+def option_next(session: Session, by: int = 1) -> None:
+    """Choose the option that + and - change."""
+    infos = session.tuned.infos
+    if not infos:
+        raise InputError(f"the simulator {session.tuned.plugin!r} has no options")
+    session.shown.option = (session.shown.option + by) % len(infos)
+    _tell_option(session)
+
+
+@action(EQUAL={"steps": 1}, MINUS={"steps": -1}, KP_ADD={"steps": 1}, KP_SUBTRACT={"steps": -1})
+def option_change(session: Session, steps: int = 1) -> None:
+    """Change the chosen option by steps."""
+    infos = session.tuned.infos
+    if not infos:
+        raise InputError(f"the simulator {session.tuned.plugin!r} has no options")
+    name = infos[session.shown.option % len(infos)].name
+    session.tuned.set(name, session.tuned.nudged(name, steps))
+    _tell_option(session)
+
+
+@action(CTRL_S={})
+def preset_save(session: Session, name: str = "preset") -> None:
+    """Keep the simulator's options under a name, beside the groom."""
+    path = presets_path(session.opened.path)
+    values = {k: v for k, v in session.tuned.values.items() if v is not None}
+    write_preset(path, name, {"simulator": session.tuned.plugin, "options": values})
+    session.message = f"kept in {path}"
+
+
+@action(CTRL_L={})
+def preset_load(session: Session, name: str = "preset") -> None:
+    """Take the options that were kept under a name."""
+    preset = read_preset(presets_path(session.opened.path), name)
+    plugin = preset.get("simulator", session.tuned.plugin)
+    if plugin != session.tuned.plugin:
+        raise InputError(f"preset {name!r} is of {plugin!r}; run view with --simulator {plugin}")
+    session.tuned.replace(dict(preset.get("options", {})))
+    session.message = f"preset {name}"
+
+
+@action(CTRL_D={})
+def option_defaults(session: Session) -> None:
+    """Take the default of every option of the simulator."""
+    session.tuned.replace({})
+    session.message = f"{session.tuned.plugin} as it is by default"
+
+
+@action(P={})
+def screenshot(session: Session, file: str = "hairkit.png") -> None:
+    """Write the picture to hairkit.png, or the next free number."""
+    session.screenshots.append(Path(file))
+
+
+@action(V={})
+def record(session: Session, on: bool | None = None, file: str = "hairkit.mp4") -> None:
+    """Record into an .mp4 file (or a folder of PNG files), or stop."""
+    wanted = session.recorder is None if on is None else on
+    if session.recorder is not None:
+        session.recorder.close()
+        session.message = f"{session.recorder.count} pictures in {session.recorder.path}"
+        session.recorder = None
+    if wanted:
+        path = Path(file)
+        session.recorder = Recorder(path if session.overwrite else free_name(path))
+
+
+@action(H={})
+def help_sheet(session: Session, on: bool | None = None) -> None:
+    """Show the keys."""
+    session.shown.help = not session.shown.help if on is None else on
+
+
+@action(F1={})
+def panel(session: Session, on: bool | None = None) -> None:
+    """Show the panel of options."""
+    session.shown.panel = not session.shown.panel if on is None else on
+
+
+@action(T={})
+def numbers(session: Session, on: bool | None = None) -> None:
+    """Show the read-outs."""
+    session.shown.numbers = not session.shown.numbers if on is None else on
+
+
+@action()
+def open_file(session: Session, file: str) -> None:
+    """Show another groom, also when its file is dropped on the window."""
+    session.open(Path(file))
+
+
+@action(F5={})
+def reload(session: Session) -> None:
+    """Read the groom again."""
+    session.reload()
+
+
+@action(ESCAPE={})
+def leave(session: Session) -> None:
+    """Close the viewer."""
+    session.finished = True
+
+
+def _tell_option(session: Session) -> None:
+    infos = session.tuned.infos
+    info = infos[session.shown.option % len(infos)]
+    session.message = f"{info.name} = {session.tuned.value(info.name)}   {info.doc}"

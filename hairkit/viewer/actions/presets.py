@@ -1,0 +1,81 @@
+"""Settings under a name, beside the groom: `groom.presets.toml`, which people can edit.
+
+A table a preset, in it the simulator's plugin and its options that differ from the defaults.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from hairkit.errors import InputError
+from hairkit.options import unknown_name
+from hairkit.storage import write_text
+
+Preset = dict[str, Any]
+
+
+def presets_path(groom: Path) -> Path:
+    """Return where the presets of a groom are kept."""
+    return groom.with_name(f"{groom.stem}.presets.toml")
+
+
+def read_presets(path: Path) -> dict[str, Preset]:
+    """Return presets by name; none when there is no file."""
+    if not path.exists():
+        return {}
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not a TOML file: {error}") from error
+    for name, table in document.items():
+        if not isinstance(table, Mapping):
+            raise InputError(f"{path}: {name} is no table; begin it with [{name}]")
+    return document
+
+
+def preset_names(path: Path) -> tuple[str, ...]:
+    """Return the names of the presets, none where the file cannot be read; cheap to ask again."""
+    try:
+        return _names(path, path.stat().st_mtime_ns)
+    except (OSError, InputError):  # told of when one of them is taken
+        return ()
+
+
+@lru_cache(maxsize=1)
+def _names(path: Path, changed: int) -> tuple[str, ...]:
+    return tuple(read_presets(path))
+
+
+def read_preset(path: Path, name: str) -> Preset:
+    """Return one preset; `InputError` when there is none of that name."""
+    presets = read_presets(path)
+    if name not in presets:
+        raise InputError(f"{path}: {unknown_name('preset', name, presets)}")
+    return presets[name]
+
+
+def write_preset(path: Path, name: str, preset: Mapping[str, Any]) -> None:
+    """Keep a preset, among those that are there."""
+    presets = read_presets(path) | {name: dict(preset)}
+    lines = []
+    for title, table in presets.items():
+        lines += [f"[{json.dumps(title)}]"]
+        lines += [f"{json.dumps(key)} = {_toml(value)}" for key, value in table.items()]
+        lines += [""]
+    write_text(path, "\n".join(lines))
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_toml(item) for item in value)}]"
+    if isinstance(value, Mapping):
+        pairs = ", ".join(f"{json.dumps(key)} = {_toml(item)}" for key, item in value.items())
+        return f"{{{pairs}}}"
+    if isinstance(value, float):
+        return repr(value)
+    return json.dumps(value if isinstance(value, (bool, int)) else str(value))

@@ -1,0 +1,1 @@
+"""What the viewer draws, on the GPU or the processor."""

@@ -1,0 +1,156 @@
+"""Draws hair that follows guides on the processor, and lays the result over the picture.
+
+Without a graphics card OpenGL's shaders run on the processor too, but in lockstep and without its
+cache in mind: this pass, made of compiled loops, draws the same hair about three times as fast.
+What it draws is what `HairPass` draws; the tests hold both together.
+"""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+
+from hairkit.parallel import Crew
+from hairkit.render.context import Renderer
+from hairkit.render.gl_camera import clip_from_camera, set_uniforms
+from hairkit.render.hair import strand_numbers
+from hairkit.storage import Float32Array
+from hairkit.viewer.draw import place_kernels, raster_kernels, shade_kernels
+from hairkit.viewer.draw.hair_data import HairBody
+from hairkit.viewer.draw.interface import GuidePlaces, HairLook, HairScene, HairView
+
+MOST_CHUNKS = 8
+"""Each thread draws into sums of its own, which are added up for every picture."""
+PIECE = 256
+"""Hairs that a thread shades at a time, at least."""
+FARTHEST = 100.0
+"""Metres from the head's origin beyond which no guide is drawn."""
+EDGE = 3
+"""Pixels around the outermost points that strokes may reach."""
+
+
+class SoftHairPass:
+    """The hair's arrays and the compiled passes that draw it (see `hair_pass.HairPass`)."""
+
+    def __init__(self, gl: Renderer, body: HairBody) -> None:
+        self._gl = gl
+        self.body = body
+        count, points = len(body), body.points_each
+        self._places = np.empty((count, points, 3), np.float32)
+        self._seen = np.empty((count, points, 4), np.float32)
+        self._looks = np.zeros((count, points, 4), np.float32)
+        self._random = np.asarray(strand_numbers(count), np.float32)
+        self._rest = np.ascontiguousarray(body.guide_rest, np.float32)
+        self._tones = shade_kernels.tone_table()
+        self._crew = Crew()
+        self._chunks = min(self._crew.threads, MOST_CHUNKS)
+        self._sums = np.zeros((self._chunks, 0, 4), np.float32)
+        self._colours: tuple[object, Float32Array] | None = None
+        self._texture: moderngl.Texture | None = None
+        lay = gl.program("viewer_screen", "viewer_lay")
+        self._lay = gl.context.vertex_array(lay, [])
+
+    def release(self) -> None:
+        """Free what is held by OpenGL."""
+        self._lay.release()
+        if self._texture is not None:
+            self._texture.release()
+
+    def places(self) -> Float32Array:
+        """Return (S, m, 3) where the hair was last placed, metres."""
+        return self._places
+
+    def move_guides(self, rows: GuidePlaces) -> Float32Array:
+        """Put the guides at `rows` (G, m, 3), head frame, metres; return them as points (N, 3)."""
+        # compiled loops do not check bounds: what a runaway simulation left must become a place
+        tame = np.nan_to_num(np.clip(rows, -FARTHEST, FARTHEST))
+        self._now = np.ascontiguousarray(tame, np.float32)
+        self._turns = place_kernels.guide_turns(self._rest, self._now)
+        return self._now.reshape(-1, 3)
+
+    def place(self, view: HairView, look: HairLook) -> None:
+        """Place the hair and find what of it hides what."""
+        body, camera = self.body, view.camera
+        self._camera = packed_camera(view)
+        near, far = view.hair_depth.near, view.hair_depth.far
+        self._slices = np.array([near, place_kernels.SLICES / (far - near)], np.float32)
+        tiles = (-(-camera.height // place_kernels.TILE), -(-camera.width // place_kernels.TILE))
+        filled = np.empty((self._chunks, place_kernels.SLICES, *tiles), np.uint32)
+        corners = np.empty((self._chunks, 4), np.float32)
+        share, chunks = self._crew.share, self._chunks
+        share(
+            place_kernels.place_hair, chunks, 1, self._now, self._turns, body.followed,
+            body.weights, body.offsets, body.widths, self._camera, self._slices,
+            np.float32(look.times_wider), look.hairs, self._places, self._seen, filled, corners,
+        )  # fmt: skip
+        self._opacity = np.empty((place_kernels.SLICES + 1, *tiles), np.float32)
+        share(place_kernels.opacity_before, tiles[0], 8, filled, self._opacity)
+        size = np.array([camera.width, camera.height])
+        low = np.clip(np.floor(corners[:, :2].min(axis=0)) - EDGE, 0, size - 1)
+        high = np.clip(np.ceil(corners[:, 2:].max(axis=0)) + EDGE, low + 1, size)
+        self._frame = low.astype(np.int64), (high - low).astype(np.int64)
+
+    def draw(self, scene: HairScene) -> None:
+        """Draw the placed hair over the picture, hidden by the solids of the set."""
+        view, look = scene.view, scene.look
+        (x, y), (width, height) = self._frame[0].tolist(), self._frame[1].tolist()
+        frame = (x, y, width, height)
+        depth = scene.solids.read(frame, components=1, attachment=-1, alignment=1, dtype="f4")
+        solid = np.frombuffer(depth, np.float32).reshape(height, width)
+        if self._sums.shape[1] < width * height:
+            pixels = view.camera.width * view.camera.height
+            self._sums = np.zeros((self._chunks, pixels, 4), np.float32)
+        shading = shade_kernels.shading_of(
+            view.camera, scene.lights, scene.light.grid, direction=look.by_direction
+        )
+        share = self._crew.share
+        share(
+            shade_kernels.shade_hair, look.hairs, PIECE, self._seen, self._places,
+            self._fibres(look), self._random, self._opacity, self._slices, shading,
+            scene.light.array, self._tones, self._looks,
+        )  # fmt: skip
+        share(
+            raster_kernels.draw_hair, self._chunks, 1, self._seen, self._looks, self.body.widths,
+            solid, self._camera, np.float32(look.times_wider), int(look.smooth), look.hairs,
+            self._frame[0].astype(np.float32), self._sums,
+        )  # fmt: skip
+        picture = np.empty((height, width, 4), np.uint8)
+        share(raster_kernels.resolve, height, 32, self._sums, picture)
+        self._lay_over(scene.target, picture, frame)
+
+    def _lay_over(
+        self, target: moderngl.Framebuffer, picture: object, frame: tuple[int, int, int, int]
+    ) -> None:
+        context, size = self._gl.context, target.size
+        if self._texture is None or self._texture.size != size:
+            if self._texture is not None:
+                self._texture.release()
+            self._texture = context.texture(size, 4)
+            self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._texture.write(picture, viewport=frame)
+        target.use()
+        target.scissor = frame
+        context.enable_only(moderngl.BLEND)
+        context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+        self._texture.use(5)
+        set_uniforms(self._gl.program("viewer_screen", "viewer_lay"), u_hair=5)
+        self._lay.render(moderngl.TRIANGLES, vertices=3)
+        target.scissor = (0, 0, *size)
+
+    def _fibres(self, look: HairLook) -> Float32Array:
+        key = (look.root_colour, look.tip_colour)
+        if self._colours is None or self._colours[0] != key:
+            made = shade_kernels.fibre_colours(*key, self._random, self.body.points_each)
+            self._colours = (key, made)
+        return self._colours[1]
+
+
+def packed_camera(view: HairView) -> Float32Array:
+    """Return (24,): clip from head, row by row; forward and offset; size, focal, perspective."""
+    camera = view.camera
+    matrix = clip_from_camera(camera, view.depth) @ camera.camera_from_head
+    rest = [
+        *camera.forward, camera.translation[2], camera.width, camera.height, camera.focal,
+        float(camera.model == "perspective"),
+    ]  # fmt: skip
+    return np.concatenate([matrix.ravel(), rest]).astype(np.float32)

@@ -1,0 +1,244 @@
+"""Draws hair that follows guides by compute shaders; without a card `soft_hair` is faster.
+
+Passes: guides turned since rest; hair placed, projected and counted in cells of the view; cells
+summed to what hides what; hair shaded and drawn.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.render.context import Renderer
+from hairkit.render.gl_camera import set_camera, set_uniforms
+from hairkit.render.hair import strand_numbers
+from hairkit.storage import Float32Array
+from hairkit.types.camera import Camera
+from hairkit.viewer.draw.hair_data import HairBody
+from hairkit.viewer.draw.interface import GuidePlaces, HairLook, HairScene, HairView
+
+SLICES, TILE = 32, 8
+"""As in viewer_hair.glsl."""
+_GROUP = 64
+MOST_GUIDES = 65_535
+LATE = 0.05
+"""Metres that a box of the picture before is made larger by."""
+_NOTHING = np.array([2**31 - 1] * 3 + [-(2**31)] * 3, np.int32).tobytes()
+NEAR_HAIR, OFF_GUIDES = 0.05, 0.06
+"""Metres: hair nearer than the first may be anywhere in the picture; hair keeps within the second
+of the guides."""
+
+
+class HairPass:
+    """The hair's buffers on the GPU and the passes that draw it."""
+
+    def __init__(self, gl: Renderer, body: HairBody) -> None:
+        self._gl = gl
+        self.body = body
+        if len(body.guides) > MOST_GUIDES:
+            raise InputError(f"{len(body.guides)} guides, the viewer draws at most {MOST_GUIDES}")
+        count, points = len(body), body.points_each
+        context = gl.context
+        self._rest = context.buffer(np.ascontiguousarray(body.guide_rest, np.float32))
+        self._now = context.buffer(np.ascontiguousarray(body.guide_rest, np.float32))
+        self._guides = context.buffer(reserve=20 * len(body.guides) * points)
+        self._hairs = context.buffer(_hair_records(body))
+        self._offsets = context.buffer(_offset_records(body))
+        self._places = context.buffer(reserve=12 * count * points)
+        self._bounds = context.buffer(_NOTHING)
+        self._box = False
+        self._view: _ViewBuffers | None = None
+        self._resolve = context.vertex_array(gl.program("viewer_screen", "viewer_resolve"), [])
+
+    def release(self) -> None:
+        """Free the buffers."""
+        buffers = (self._rest, self._now, self._guides, self._hairs, self._offsets, self._places)
+        for buffer in (*buffers, self._bounds):
+            buffer.release()
+        self._resolve.release()
+        if self._view is not None:
+            self._view.release()
+
+    def places(self) -> moderngl.Buffer:
+        """Return (S, m, 3) float32 where the hair was last placed, metres."""
+        return self._places
+
+    def move_guides(self, rows: GuidePlaces) -> Float32Array:
+        """Put the guides at `rows` (G, m, 3), head frame, metres; return points around them.
+
+        Guides in a buffer are not read back, only the box around them, and that of the picture
+        before, which the card has finished; hair moves less than `LATE` meanwhile.
+        """
+        given = isinstance(rows, moderngl.Buffer)
+        if not given:
+            self._now.write(np.ascontiguousarray(rows, np.float32))
+        self._rest.bind_to_storage_buffer(0)
+        (rows if given else self._now).bind_to_storage_buffer(1)
+        self._guides.bind_to_storage_buffer(2)
+        before = self._box
+        self._bounds.bind_to_storage_buffer(3)
+        late = self._read_box() if given and before else None
+        self._bounds.write(_NOTHING)
+        self._run("viewer_guide", len(self.body.guides) * self.body.points_each)
+        self._box = given
+        if not given:
+            self._cloud = np.asarray(rows, np.float32).reshape(-1, 3)
+            return self._cloud
+        low, high = self._read_box() if late is None else late
+        box = np.stack([low - LATE, high + LATE])
+        corners = np.array(list(itertools.product((0, 1), repeat=3)))
+        self._cloud = box[corners, np.arange(3)].astype(np.float32)
+        return self._cloud
+
+    def _read_box(self) -> tuple[Float32Array, Float32Array]:
+        """Return the lowest and the highest coordinates (3,) of the guides."""
+        code = np.frombuffer(self._bounds.read(), np.int32)
+        # the bits of negative numbers are turned over in the shader so that they can be compared
+        values = np.where(code < 0, code ^ 0x7FFFFFFF, code).astype(np.int32).view(np.float32)
+        return values[:3], values[3:]
+
+    def place(self, view: HairView, look: HairLook) -> None:
+        """Place the hair and find what of it hides what."""
+        buffers = self._sized(view.camera)
+        near, far = view.hair_depth.near, view.hair_depth.far
+        self._shared: dict[str, Any] = {
+            "u_tiles": buffers.tiles,
+            "u_slice_range": (near, SLICES / (far - near)),
+            "u_wider": look.times_wider,
+        }
+        buffers.filled.clear()
+        self._guides.bind_to_storage_buffer(0)
+        self._hairs.bind_to_storage_buffer(1)
+        self._offsets.bind_to_storage_buffer(2)
+        self._places.bind_to_storage_buffer(3)
+        buffers.filled.bind_to_storage_buffer(4)
+        self._run("viewer_hair", look.hairs, view, **self._shared)
+        buffers.opacity.bind_to_image(0, read=False, write=True)
+        self._run("viewer_opacity", buffers.tiles[0] * buffers.tiles[1], **self._shared)
+
+    def draw(self, scene: HairScene) -> None:
+        """Draw the placed hair over the picture, hidden by the solids."""
+        view, look = scene.view, scene.look
+        buffers = self._sized(view.camera)
+        scene.solid_depth.use(1)
+        buffers.opacity.use(2)
+        self._hairs.bind_to_storage_buffer(1)
+        self._offsets.bind_to_storage_buffer(2)
+        self._places.bind_to_storage_buffer(3)
+        buffers.sums.bind_to_storage_buffer(7)
+        self._run(
+            "viewer_stroke",
+            look.hairs,
+            view,
+            u_eye=tuple(view.camera.position.tolist()),
+            u_root_colour=look.root_colour,
+            u_tip_colour=look.tip_colour,
+            u_show_direction=float(look.by_direction),
+            u_solid_depth=1,
+            u_opacity=2,
+            u_picture=buffers.size,
+            u_smooth=float(look.smooth),
+            **self._shared,
+            **scene.lights.uniforms(),
+            **scene.light.uniforms(),
+        )
+        self._lay_over(scene.target, buffers, _frame_of(view.camera, self._cloud))
+
+    def _lay_over(
+        self,
+        target: moderngl.Framebuffer,
+        buffers: _ViewBuffers,
+        frame: tuple[int, int, int, int],
+    ) -> None:
+        """Resolve the sums inside a frame, which takes them all."""
+        context = self._gl.context
+        target.use()
+        target.scissor = frame
+        context.enable_only(moderngl.BLEND)
+        context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
+        set_uniforms(self._gl.program("viewer_screen", "viewer_resolve"), u_picture=buffers.size)
+        buffers.sums.bind_to_storage_buffer(7)
+        self._resolve.render(moderngl.TRIANGLES, vertices=3)
+        target.scissor = (0, 0, *buffers.size)
+
+    def _run(self, shader: str, count: int, view: HairView | None = None, **uniforms: Any) -> None:
+        program = self._gl.compute(shader)
+        if view is not None:
+            set_camera(program, view.camera, view.depth)
+        set_uniforms(program, u_points=self.body.points_each, u_count=count, **uniforms)
+        program.run(max(-(-count // _GROUP), 1))
+        self._gl.context.memory_barrier()
+
+    def _sized(self, camera: Camera) -> _ViewBuffers:
+        size = (camera.width, camera.height)
+        if self._view is None or self._view.size != size:
+            if self._view is not None:
+                self._view.release()
+            self._view = _ViewBuffers.of(self._gl.context, size)
+        return self._view
+
+
+@dataclass(frozen=True)
+class _ViewBuffers:
+    """What depends on the picture's size."""
+
+    size: tuple[int, int]
+    tiles: tuple[int, int]
+    filled: moderngl.Buffer
+    opacity: moderngl.Texture3D
+    sums: moderngl.Buffer
+
+    @classmethod
+    def of(cls, context: moderngl.Context, size: tuple[int, int]) -> _ViewBuffers:
+        tiles = (-(-size[0] // TILE), -(-size[1] // TILE))
+        opacity = context.texture3d((*tiles, SLICES + 1), 1, dtype="f4")
+        opacity.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        opacity.repeat_x = opacity.repeat_y = opacity.repeat_z = False
+        # whole blocks of 2 x 4 pixels, see viewer_accumulation.glsl
+        blocks = -(-size[0] // 2) * -(-size[1] // 4)
+        sums = context.buffer(reserve=64 * blocks)
+        sums.clear()
+        filled = context.buffer(reserve=4 * tiles[0] * tiles[1] * SLICES)
+        return cls(size, tiles, filled, opacity, sums)
+
+    def release(self) -> None:
+        for part in (self.filled, self.opacity, self.sums):
+            part.release()
+
+
+def _frame_of(camera: Camera, cloud: Float32Array) -> tuple[int, int, int, int]:
+    """Return x, y, width and height in pixels of where hair that follows guides can be."""
+    size = np.array([camera.width, camera.height])
+    depth = camera.depth(cloud)
+    if depth.min() < NEAR_HAIR:
+        return 0, 0, camera.width, camera.height
+    pixels = camera.project(cloud)
+    margin = 8 + OFF_GUIDES * camera.focal / float(depth.min())
+    low = np.clip(np.floor(pixels.min(axis=0) - margin), 0, size)
+    high = np.clip(np.ceil(pixels.max(axis=0) + margin), low + 1, size + 1)
+    x, y, width, height = np.concatenate([low, high - low]).astype(int).tolist()
+    return x, y, width, height
+
+
+def _hair_records(body: HairBody) -> bytes:
+    """Return three words a hair: guides, last guide and random number, weights of two guides."""
+    guides = body.followed.astype(np.uint32)
+    random = np.rint(strand_numbers(len(body)) * 65535).astype(np.uint32)
+    weights = np.rint(np.clip(body.weights, 0, 1) * 65535).astype(np.uint32)
+    words = [
+        guides[:, 0] | guides[:, 1] << 16,
+        guides[:, 2] | random << 16,
+        weights[:, 0] | weights[:, 1] << 16,
+    ]
+    return np.stack(words, axis=1).astype(np.uint32).tobytes()
+
+
+def _offset_records(body: HairBody) -> bytes:
+    """Return two words a point: offset and diameter in millimetres, as half floats."""
+    values = np.concatenate([body.offsets, body.widths[..., None]], axis=2) * 1e3
+    return np.clip(values, -6e4, 6e4).astype(np.float16).tobytes()

@@ -1,0 +1,63 @@
+"""Meshes that stay on the GPU: the head with its skin, the hull as clay."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from hairkit.render.context import Renderer
+from hairkit.render.gl_camera import DepthRange, set_camera, set_uniforms
+from hairkit.render.head import Solid
+from hairkit.storage import Float64Array
+from hairkit.types.camera import Camera
+
+
+class SolidPass:
+    """One shaded mesh on the GPU, lit at its pixels or, for software renderers, at its vertices."""
+
+    def __init__(self, gl: Renderer, solid: Solid, *, by_vertex: bool = False) -> None:
+        self._gl = gl
+        self.solid = solid
+        self._program = gl.program("viewer_skin", "hair") if by_vertex else gl.program("skin")
+        values = np.concatenate([solid.vertices, solid.normals, solid.colours], axis=1)
+        self._values = np.ascontiguousarray(values, np.float32)
+        self._placed = np.eye(4)
+        self._vertices = gl.context.buffer(self._values)
+        self._faces = gl.context.buffer(np.ascontiguousarray(solid.faces, np.uint32))
+        self._array = gl.context.vertex_array(
+            self._program,
+            [(self._vertices, "3f 3f 3f", "in_position", "in_normal", "in_colour")],
+            index_buffer=self._faces,
+        )
+
+    def place(self, matrix: Float64Array) -> None:
+        """Put the mesh elsewhere by a rigid motion (4, 4), from where it was made."""
+        if np.array_equal(matrix, self._placed):
+            return
+        self._placed = matrix
+        moved = self._values.copy()
+        turn = matrix[:3, :3].T.astype(np.float32)
+        moved[:, :3] = self._values[:, :3] @ turn + matrix[:3, 3].astype(np.float32)
+        moved[:, 3:6] = self._values[:, 3:6] @ turn
+        self._vertices.write(moved)
+
+    def draw(
+        self, camera: Camera, depth: DepthRange, push: float, lighting: dict[str, Any]
+    ) -> None:
+        """Draw the mesh, its depth `push` metres behind its surface."""
+        set_camera(self._program, camera, depth)
+        set_uniforms(
+            self._program,
+            u_push_m=push,
+            u_eye=tuple(camera.position.tolist()),
+            u_scatter=self.solid.scatter,
+            **lighting,
+        )
+        self._array.render(moderngl.TRIANGLES)
+
+    def release(self) -> None:
+        """Free the buffers."""
+        for part in (self._array, self._vertices, self._faces):
+            part.release()

@@ -1,0 +1,158 @@
+"""Draws placed hair into sums a pixel: the compiled twin of viewer_raster.comp.
+
+A sum is red, green and blue, each times the weight, and the weight: the coverage of the pixel times
+the share of light that hair in front lets by. Threads have sums of their own, which `resolve` adds
+up, so that equal input gives equal pictures.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hairkit.viewer.draw.place_kernels import inlined, pixels_a_metre, row, shared
+from hairkit.viewer.draw.shade_kernels import HIDDEN
+
+_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
+_WIDEST = np.float32(64)
+_TINY = np.float32(1e-6)
+_WHITE = np.float32(255)
+
+
+@shared
+def draw_hair(  # type: ignore[no-untyped-def]
+    first_chunk, last_chunk, seen, looks, widths, solid, camera, wider, smooth, count,
+    frame, sums,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Draw chunks of `count` hairs into `sums` (chunks, at least H W, 4).
+
+    `seen` is that of `place_hair`, `looks` of `shade_hair`; `frame` holds the lowest x and y of
+    the part of the picture that is drawn, and `solid` (H, W) the depth buffer of it.
+    """
+    chunks = sums.shape[0]
+    for chunk in range(first_chunk, last_chunk):
+        first, last = count * chunk // chunks, count * (chunk + 1) // chunks
+        _draw_chunk(
+            seen, looks, widths, solid, camera, wider, smooth, first, last, frame,
+            sums[chunk],
+        )  # fmt: skip
+
+
+@row
+def _draw_chunk(  # type: ignore[no-untyped-def]
+    seen, looks, widths, solid, camera, wider, smooth, first, last, frame, sums
+) -> None:  # pragma: no cover - compiled
+    for s in range(first, last):
+        for k in range(1, seen.shape[1]):
+            if looks[s, k, 3] > HIDDEN and looks[s, k - 1, 3] > HIDDEN:
+                width = widths[s, k] * wider * pixels_a_metre(camera, seen[s, k, 3])
+                _stroke(seen, looks, s, k, width, smooth, solid, frame, sums)
+
+
+@row
+def _stroke(  # type: ignore[no-untyped-def]
+    seen, looks, s, k, width, smooth, solid, frame, sums
+) -> None:  # pragma: no cover - compiled
+    """Draw the piece from point k - 1 to k."""
+    ax, ay, az = seen[s, k - 1, 0] - frame[0], seen[s, k - 1, 1] - frame[1], seen[s, k - 1, 2]
+    bx, by, bz = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
+    hidden = _behind(ax, ay, az, solid) + _behind(bx, by, bz, solid)
+    hidden += _behind(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid)
+    if hidden == 3:
+        return
+    steep = abs(by - ay) > abs(bx - ax)
+    if steep:
+        ax, ay, bx, by = ay, ax, by, bx
+    begin, end = k - 1, k
+    if bx < ax:
+        ax, ay, az, bx, by, bz = bx, by, bz, ax, ay, az
+        begin, end = k, k - 1
+    high, wide = solid.shape
+    solids = solid.reshape(high * wide)
+    stride_x, stride_y, limit_x, limit_y = (wide, 1, high, wide) if steep else (1, wide, wide, high)
+    along, slope = bx - ax, by - ay
+    across = min(width * np.sqrt(along * along + slope * slope) / max(along, _TINY), _WIDEST)
+    pace = _ONE / max(along, _TINY)
+    x: Any = max(np.int64(np.ceil(ax - _HALF)), 0)
+    last = min(np.int64(np.ceil(bx - _HALF)), limit_x)
+    t = (np.float32(x) + _HALF - ax) * pace
+    y, slope = ay + t * slope, slope * pace
+    r, g, b, w = _weighted(looks, s, begin, min(across, _ONE))
+    red, green, blue, weight = _weighted(looks, s, end, min(across, _ONE))
+    dr, dg, db, dw = red - r, green - g, blue - b, weight - w
+    half = _HALF * max(across, _ONE)
+    narrow, soft, free = across <= _ONE, smooth != 0, hidden == 0
+    while x < last:
+        red, green, blue, weight = r + t * dr, g + t * dg, b + t * db, w + t * dw
+        depth = az + t * (bz - az)
+        if narrow and soft:  # as wide as a pixel: shared by two of them
+            low = np.int64(np.floor(y - _HALF))
+            part = y - _HALF - np.float32(low)
+            at = x * stride_x + low * stride_y
+            if 0 <= low < limit_y and (free or depth <= solids[at]):
+                _add(sums, at, _ONE - part, red, green, blue, weight)
+            if -1 <= low < limit_y - 1 and (free or depth <= solids[at + stride_y]):
+                _add(sums, at + stride_y, part, red, green, blue, weight)
+        elif narrow:
+            low = np.int64(np.floor(y))
+            at = x * stride_x + low * stride_y
+            if 0 <= low < limit_y and (free or depth <= solids[at]):
+                _add(sums, at, _ONE, red, green, blue, weight)
+        else:
+            first: Any = max(np.int64(np.floor(y - half)), 0)
+            top: Any = min(np.int64(np.floor(y + half)), limit_y - 1)
+            for line in range(first, top + 1):
+                at = x * stride_x + line * stride_y
+                part = min(y + half, np.float32(line + 1)) - max(y - half, np.float32(line))
+                if free or depth <= solids[at]:
+                    _add(sums, at, part, red, green, blue, weight)
+        x += 1
+        t += pace
+        y += slope
+
+
+@inlined
+def _weighted(looks, s, k, cover):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return colour times weight, and weight, of a point."""
+    weight = looks[s, k, 3] * cover
+    return looks[s, k, 0] * weight, looks[s, k, 1] * weight, looks[s, k, 2] * weight, weight
+
+
+@inlined
+def _add(sums, at, part, red, green, blue, weight):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    sums[at, 0] += part * red
+    sums[at, 1] += part * green
+    sums[at, 2] += part * blue
+    sums[at, 3] += part * weight
+
+
+@inlined
+def _behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return 1 where a solid is nearer than a point, in pixels of the frame."""
+    column = min(max(np.int64(x), 0), solid.shape[1] - 1)
+    row = min(max(np.int64(y), 0), solid.shape[0] - 1)
+    return 1 if depth > solid[row, column] else 0
+
+
+@shared
+def resolve(first, last, sums, picture) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Write rows of (H, W, 4) bytes, colour and opacity, of the sums, and leave these empty."""
+    wide = picture.shape[1]
+    for y in range(first, last):
+        for x in range(wide):
+            at = y * wide + x
+            red = green = blue = weight = _ZERO
+            for chunk in range(sums.shape[0]):
+                red += sums[chunk, at, 0]
+                green += sums[chunk, at, 1]
+                blue += sums[chunk, at, 2]
+                weight += sums[chunk, at, 3]
+                sums[chunk, at, 0] = sums[chunk, at, 1] = _ZERO
+                sums[chunk, at, 2] = sums[chunk, at, 3] = _ZERO
+            share = _WHITE / max(weight, _TINY)
+            picture[y, x, 0] = np.uint8(min(red * share + _HALF, _WHITE))
+            picture[y, x, 1] = np.uint8(min(green * share + _HALF, _WHITE))
+            picture[y, x, 2] = np.uint8(min(blue * share + _HALF, _WHITE))
+            opaque = min(weight * (_ONE + np.float32(0.8) * weight), _ONE)
+            picture[y, x, 3] = np.uint8(opaque * _WHITE + _HALF)

@@ -1,0 +1,198 @@
+"""The head placed by hand against the photos, and the reconstruction that starts from there.
+
+The photos' cameras stand exactly on the nominal turn, as the scene plugin `manual` puts them; what
+is moved is the head. Its pose is kept in the capture's `capture.toml`.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from hairkit.cameras.turntable import fit_similarity
+from hairkit.errors import InputError
+from hairkit.io.capture_reader import read_capture
+from hairkit.io.capture_toml import head_entry, write_head_entry
+from hairkit.manager import Manager
+from hairkit.storage import Float32Array, Float64Array
+from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture
+from hairkit.types.head import Head
+from hairkit.viewer.head_motion import AXES, rotation_about
+
+PLUGIN = "manual"
+"""The scene plugin that takes the pose."""
+EDGE = 640
+"""Pixels of the photos' long edge here."""
+
+
+@dataclass(frozen=True)
+class Before:
+    """How a session was before the head is placed."""
+
+    paused: bool
+    photos: bool
+    opacity: float
+    through: str | None
+
+
+@dataclass
+class Adjustment:
+    """A capture whose head is being placed."""
+
+    manager: Manager
+    folder: Path
+    """The capture."""
+    capture: Capture
+    head: Head
+    pose: Float64Array
+    """(4, 4) similarity, scene_from_head, metres."""
+    before: Before | None = None
+    """What was shown before it began, to be shown again after it."""
+
+    @classmethod
+    def of(
+        cls, manager: Manager, folder: Path, head: Head, cameras: dict[str, Camera]
+    ) -> Adjustment:
+        """Return the adjustment as capture.toml has it, or, without it, as `cameras` suggest."""
+        capture = read_capture(folder, EDGE)
+        if capture.head_pose is not None:
+            return cls(manager, folder, capture, head, capture.head_pose)
+        start = cls(manager, folder, capture, head, np.eye(4))
+        nominal = start.cameras()
+        names = [name for name in nominal if name in cameras]
+        if len(names) >= 3:
+            found = [cameras[n].resized(nominal[n].width, nominal[n].height) for n in names]
+            start.pose = _fitted_pose(found, [nominal[n] for n in names], head.vertices)
+        return start
+
+    def cameras(self) -> dict[str, Camera]:
+        """Return the photos' cameras in the head frame, with the head as it is placed."""
+        capture = replace(self.capture, head_pose=self.pose)
+        scene = self.manager.call(
+            "estimate_scene", PLUGIN, None, capture=capture, masks=(), head=self.head
+        )
+        return dict(zip(scene.names, scene.cameras, strict=True))
+
+    def move(self, camera: Camera, right: float, up: float, back: float) -> None:
+        """Move the head by metres along the axes of a photo's camera."""
+        steps = np.array([right, -up, -back])
+        self.pose = self.pose.copy()
+        self.pose[:3, 3] += self._scene_from_head(camera.rotation.T @ steps)
+
+    def turn(self, axis: str, degrees: float) -> None:
+        """Turn the head about one of its own axes, through its middle."""
+        middle = self.head.vertices.mean(axis=0).astype(np.float64)
+        self.pose = self.pose @ rotation_about(AXES[axis], float(np.radians(degrees)), middle)
+
+    def grow(self, factor: float) -> None:
+        """Make the head larger, its middle where it was."""
+        middle = self.head.vertices.mean(axis=0).astype(np.float64)
+        matrix = np.eye(4)
+        matrix[:3, :3] *= factor
+        matrix[:3, 3] = (1 - factor) * middle
+        self.pose = self.pose @ matrix
+
+    def save(self) -> Path:
+        """Keep the pose in capture.toml and return its path."""
+        path = self.folder / "capture.toml"
+        write_head_entry(path, head_entry(self.pose))
+        return path
+
+    def _scene_from_head(self, way: Float64Array) -> Float64Array:
+        """Return a way (3,) of the head frame, in metres of the scene."""
+        linear = self.pose[:3, :3]
+        result: Float64Array = linear @ way / np.cbrt(np.linalg.det(linear))
+        return result
+
+
+def _fitted_pose(
+    found: list[Camera], nominal: list[Camera], vertices: Float32Array
+) -> Float64Array:
+    """Return the pose (4, 4) with which nominal cameras see the head where `found` ones do."""
+    points = vertices[np.linspace(0, len(vertices) - 1, 40).astype(int)].astype(np.float64)
+    wanted = np.stack([camera.project(points) for camera in found])
+    rough = fit_similarity([c.position for c in found], [c.position for c in nominal])
+    turn = Rotation.from_matrix(rough.rotation).as_rotvec()
+    start = np.concatenate([[np.log(rough.scale)], turn, rough.translation])
+
+    def pose(values: Float64Array) -> Float64Array:
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.exp(values[0]) * Rotation.from_rotvec(values[1:4]).as_matrix()
+        matrix[:3, 3] = values[4:]
+        return matrix
+
+    def misfit(values: Float64Array) -> Float64Array:
+        matrix = pose(values)
+        moved = points @ matrix[:3, :3].T + matrix[:3, 3]
+        seen = np.stack([camera.project(moved) for camera in nominal])
+        return np.nan_to_num((seen - wanted).ravel(), nan=1e4)
+
+    return pose(least_squares(misfit, start).x)
+
+
+@dataclass
+class Rerun:
+    """A reconstruction in a process of its own, which tells how it goes on."""
+
+    process: subprocess.Popen[str]
+    lines: list[str] = field(default_factory=list)
+    """What it has said: a line for each stage when that is done."""
+    began: float = field(default_factory=time.monotonic)
+    """Seconds of the monotonic clock."""
+    _listener: threading.Thread | None = None
+
+    @classmethod
+    def start(cls, capture: Path, results: Path, settings: tuple[str, ...]) -> Rerun:
+        """Reconstruct a capture into the folder of results, with `stage=plugin` settings."""
+        command = [sys.executable, "-m", "hairkit", "reconstruct", str(capture), "-o", str(results)]
+        for setting in settings:
+            command += ["--set", setting]
+        process = subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace"
+        )
+        rerun = cls(process)
+        rerun._listener = threading.Thread(target=rerun._listen, daemon=True)
+        rerun._listener.start()
+        return rerun
+
+    @property
+    def running(self) -> bool:
+        """True until it has ended."""
+        return self.process.poll() is None
+
+    @property
+    def progress(self) -> str:
+        """How long it runs, and the last thing it said."""
+        said = " ".join(self.lines[-1].split()) if self.lines else "starting"
+        return f"{time.monotonic() - self.began:.0f} s; {said}"
+
+    def wait(self) -> None:
+        """Wait for its end and all that it says."""
+        self.process.wait()
+        if self._listener is not None:
+            self._listener.join()
+
+    def check(self) -> None:
+        """Raise `InputError` when it has failed."""
+        if self.process.poll() not in (None, 0):
+            raise InputError(f"reconstruction failed: {self.lines[-1] if self.lines else ''}")
+
+    def stop(self) -> None:
+        """End it, what is done stays done."""
+        if self.running:
+            self.process.terminate()
+            self.process.wait(timeout=10)
+
+    def _listen(self) -> None:
+        assert self.process.stderr is not None
+        with self.process.stderr as said:
+            self.lines.extend(line.strip() for line in said if line.strip())

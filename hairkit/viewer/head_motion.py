@@ -1,0 +1,91 @@
+"""How the user moves the head: shakes that fade out, turns that glide to where they are asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hairkit.storage import Float64Array
+
+AXES = {"yaw": (0.0, 1.0, 0.0), "pitch": (1.0, 0.0, 0.0), "roll": (0.0, 0.0, 1.0)}
+"""Yaw turns to the subject's left, pitch nods down, roll tilts to the right shoulder."""
+GLIDE = 0.18
+"""Seconds in which a turn goes most of its way."""
+FADE = 0.25
+"""Seconds in which a shake swells and dies."""
+
+
+@dataclass
+class Shake:
+    """A swing about one axis."""
+
+    axis: str
+    amplitude: float
+    """Radians."""
+    hertz: float
+    seconds: float
+    age: float = 0.0
+
+    def angle(self) -> float:
+        """Return the present angle, radians."""
+        swell = np.clip(min(self.age, self.seconds - self.age) / FADE, 0.0, 1.0)
+        smooth = swell * swell * (3 - 2 * swell)
+        return float(self.amplitude * smooth * np.sin(2 * np.pi * self.hertz * self.age))
+
+
+@dataclass
+class HeadMotion:
+    """The head's pose about a pivot since rest."""
+
+    pivot: Float64Array
+    """(3,) the neck, metres."""
+    shakes: list[Shake] = field(default_factory=list)
+    turn: dict[str, float] = field(default_factory=lambda: dict.fromkeys(AXES, 0.0))
+    """Where the head glides to, radians an axis."""
+    _turned: dict[str, float] = field(default_factory=lambda: dict.fromkeys(AXES, 0.0))
+    _speed: dict[str, float] = field(default_factory=lambda: dict.fromkeys(AXES, 0.0))
+
+    def advance(self, seconds: float) -> None:
+        """Go on in time."""
+        for shake in self.shakes:
+            shake.age += seconds
+        self.shakes = [shake for shake in self.shakes if shake.age < shake.seconds]
+        rate = 2.0 / GLIDE  # a critically damped spring, solved exactly
+        for axis, goal in self.turn.items():
+            gap, speed = self._turned[axis] - goal, self._speed[axis]
+            decay = np.exp(-rate * seconds)
+            drift = speed + rate * gap
+            self._turned[axis] = float(goal + (gap + drift * seconds) * decay)
+            self._speed[axis] = float((speed - rate * drift * seconds) * decay)
+
+    def stop(self) -> None:
+        """Put the head back to rest at once."""
+        self.shakes = []
+        self.turn = dict.fromkeys(AXES, 0.0)
+        self._turned, self._speed = dict(self.turn), dict(self.turn)
+
+    @property
+    def still(self) -> bool:
+        """True while the head does not move."""
+        return not self.shakes and all(abs(speed) < 1e-4 for speed in self._speed.values())
+
+    def matrix(self) -> Float64Array:
+        """Return head_from_rest (4, 4): yaw last."""
+        result = np.eye(4)
+        for axis in ("roll", "pitch", "yaw"):
+            angle = self._turned[axis] + sum(s.angle() for s in self.shakes if s.axis == axis)
+            result = rotation_about(AXES[axis], angle, self.pivot) @ result
+        return result
+
+
+def rotation_about(
+    axis: tuple[float, float, float], angle: float, pivot: Float64Array
+) -> Float64Array:
+    """Return the (4, 4) rotation by `angle` radians about a unit `axis` through `pivot` (3,)."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    matrix = np.eye(4)
+    matrix[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    matrix[:3, 3] = pivot - matrix[:3, :3] @ pivot
+    return matrix

@@ -1,0 +1,75 @@
+"""Where the user looks from: a camera on a sphere about a point, changed by what the mouse does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.types.camera import Camera
+
+VERTICAL_ANGLE = np.radians(28.0)
+"""Field of view over the picture's height."""
+MARGIN = 1.12
+NEAREST, FARTHEST = 0.05, 20.0
+"""Metres from camera to target."""
+STEEPEST = 89.0
+
+
+@dataclass(frozen=True)
+class OrbitView:
+    """A view from (azimuth, elevation), in degrees, at `distance` metres from `target`, world."""
+
+    azimuth: float = 20.0
+    elevation: float = 5.0
+    distance: float = 1.0
+    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @classmethod
+    def around(cls, points: npt.ArrayLike, aspect: float) -> OrbitView:
+        """Return the view that shows points (N, 3) from anywhere; `aspect` is width by height."""
+        cloud = np.asarray(points, np.float64)
+        low, high = cloud.min(axis=0), cloud.max(axis=0)
+        middle = (low + high) / 2
+        radius = float(np.hypot(*(high - low)[[0, 2]])) / 2
+        half = np.tan(VERTICAL_ANGLE / 2)
+        up = (high[1] - low[1]) / 2 / half + radius
+        across = radius / np.sin(np.arctan(half * aspect))
+        x, y, z = middle.tolist()
+        return cls(distance=float(MARGIN * max(up, across)), target=(x, y, z))
+
+    def camera(self, width: int, height: int) -> Camera:
+        """Return the camera of this view for a picture of `width` x `height` pixels."""
+        return Camera.on_turn(
+            self.azimuth,
+            elevation_deg=self.elevation,
+            distance=self.distance,
+            target=self.target,
+            focal=height / 2 / float(np.tan(VERTICAL_ANGLE / 2)),
+            width=width,
+            height=height,
+        )
+
+    def orbited(self, right: float, up: float) -> OrbitView:
+        """Return the view turned by degrees: the camera goes to its right and up."""
+        elevation = float(np.clip(self.elevation + up, -STEEPEST, STEEPEST))
+        azimuth = (self.azimuth + right + 180.0) % 360.0 - 180.0
+        return replace(self, azimuth=azimuth, elevation=elevation)
+
+    def panned(self, right: float, down: float) -> OrbitView:
+        """Return the view whose picture slid by shares of its height."""
+        rotation = self.camera(1, 1).rotation
+        whole = 2 * self.distance * np.tan(VERTICAL_ANGLE / 2)
+        slid = np.array(self.target) - whole * (right * rotation[0] + down * rotation[1])
+        x, y, z = slid.tolist()
+        return replace(self, target=(x, y, z))
+
+    def zoomed(self, factor: float) -> OrbitView:
+        """Return the view `factor` times nearer."""
+        return replace(self, distance=float(np.clip(self.distance / factor, NEAREST, FARTHEST)))
+
+    def centred(self, point: npt.ArrayLike) -> OrbitView:
+        """Return the view that looks at a point (3,), from as far as before."""
+        x, y, z = np.asarray(point, np.float64).tolist()
+        return replace(self, target=(x, y, z))

@@ -1,0 +1,78 @@
+"""From mouse events to actions: which button with which key drags, zooms, grabs or picks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from hairkit.viewer.window.keyboard import CONTROL, SHIFT
+
+LEFT, RIGHT, MIDDLE = 0, 1, 2
+"""GLFW's numbers of the buttons."""
+ORBIT_DEGREES = 220.0
+"""Degrees that a drag over the picture's height turns."""
+WHEEL = 1.12
+"""Times nearer a notch of the wheel."""
+DOUBLE_SECONDS = 0.3
+STILL_PIXELS = 4.0
+"""A button released so near to where it was pressed has clicked."""
+
+Perform = Callable[[str, Mapping[str, object]], None]
+
+
+@dataclass
+class Mouse:
+    """The state of the mouse; positions are pixels of the picture."""
+
+    perform: Perform
+    height: float
+    """Of the picture, pixels."""
+    x: float = 0.0
+    y: float = 0.0
+    _drags: str | None = None
+    _start: tuple[float, float] = (0.0, 0.0)
+    _clicked: float = -1e9
+
+    def press(self, button: int, mods: int) -> None:
+        """A button went down."""
+        self._start = (self.x, self.y)
+        if button == LEFT and mods & CONTROL:
+            self._drags = "grab"
+            self.perform("grab", {"x": self.x, "y": self.y})
+        elif button == MIDDLE or (button == LEFT and mods & SHIFT):
+            self._drags = "pan"
+        elif button == RIGHT:
+            self._drags = "zoom"
+        elif button == LEFT:
+            self._drags = "orbit"
+
+    def release(self, now: float) -> None:
+        """The button went up, at `now` seconds."""
+        drags, self._drags = self._drags, None
+        if drags == "grab":
+            self.perform("release", {})
+        away = max(abs(self.x - self._start[0]), abs(self.y - self._start[1]))
+        if drags != "orbit" or away > STILL_PIXELS:
+            return
+        if now - self._clicked < DOUBLE_SECONDS:
+            self.perform("recentre", {"x": self.x, "y": self.y})
+        else:
+            self.perform("pick", {"x": self.x, "y": self.y})
+        self._clicked = now
+
+    def move(self, x: float, y: float) -> None:
+        """The mouse is at a pixel now."""
+        right, down = (x - self.x) / self.height, (y - self.y) / self.height
+        self.x, self.y = x, y
+        if self._drags == "orbit":
+            self.perform("orbit", {"right": -ORBIT_DEGREES * right, "up": ORBIT_DEGREES * down})
+        elif self._drags == "pan":
+            self.perform("pan", {"right": right, "down": down})
+        elif self._drags == "zoom":
+            self.perform("zoom", {"factor": WHEEL ** (-20 * down)})
+        elif self._drags == "grab":
+            self.perform("drag", {"x": x, "y": y})
+
+    def scroll(self, notches: float) -> None:
+        """The wheel turned."""
+        self.perform("zoom", {"factor": WHEEL**notches})

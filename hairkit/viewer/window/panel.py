@@ -1,0 +1,282 @@
+"""The panel of options, by imgui-bundle where it is installed; without it nothing is missing.
+
+imgui-bundle brings a GLFW of its own and makes the module `glfw` use it, if it is imported first:
+`load_windowing` is the only place that imports either.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import textwrap
+import typing
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from hairkit.errors import RenderError
+from hairkit.options import OptionInfo
+from hairkit.viewer.actions.actions import LOOKS
+from hairkit.viewer.actions.presets import preset_names, presets_path
+from hairkit.viewer.draw.colouring import COLOURINGS
+from hairkit.viewer.head_motion import AXES
+from hairkit.viewer.layers import BOARDS
+from hairkit.viewer.preview import Preview
+from hairkit.viewer.session import Session
+
+WIDTH = 340
+"""Pixels."""
+LABELS = 116.0
+"""Of them for names beside sliders."""
+HINT = 48
+"""Letters in a line of a hint."""
+
+Perform = Callable[[str, Mapping[str, object]], None]
+
+
+def load_windowing() -> Any:
+    """Return the module glfw, imgui-bundle imported before it where there is one."""
+    with contextlib.suppress(ImportError):
+        importlib.import_module("imgui_bundle")
+    try:
+        return importlib.import_module("glfw")
+    except ImportError as error:
+        raise RenderError(f"no window: {error}; pip install glfw") from error
+
+
+class Panel:
+    """Sliders and buttons over the picture; does nothing without imgui-bundle."""
+
+    missing: str
+    """Why there is no panel and what to do, empty where there is one."""
+
+    def __init__(self, window: Any) -> None:
+        self._imgui, self._backend, self.missing = _load(window)
+        self._shown = False
+        self._size: tuple[int, int] | None = None
+        self._preset = "preset"
+
+    @property
+    def wants_mouse(self) -> bool:
+        """True while the mouse is over the panel."""
+        return self._shown and bool(self._imgui.get_io().want_capture_mouse)
+
+    @property
+    def wants_keys(self) -> bool:
+        """True while a text is typed."""
+        return self._shown and bool(self._imgui.get_io().want_text_input)
+
+    def listen(self) -> None:
+        """Hear of characters, which the window does not use."""
+        if self._backend is not None:
+            import glfw
+
+            glfw.set_char_callback(self._backend.window, self._backend.char_callback)
+
+    def on_key(self, key: int, event: int, mods: int) -> None:
+        """Pass a key on."""
+        if self._backend is not None:
+            self._backend.keyboard_callback(self._backend.window, key, 0, event, mods)
+
+    def on_button(self, button: int, event: int) -> None:
+        """Pass a button of the mouse on."""
+        if self._backend is not None:
+            self._backend.mouse_button_callback(self._backend.window, button, event, 0)
+
+    def on_move(self, x: float, y: float) -> None:
+        """Pass the mouse's place on."""
+        if self._backend is not None:
+            self._backend.mouse_callback(self._backend.window, x, y)
+
+    def on_scroll(self, right: float, up: float) -> None:
+        """Pass the wheel on."""
+        if self._backend is not None:
+            self._backend.scroll_callback(self._backend.window, right, up)
+
+    def draw(self, session: Session, preview: Preview, perform: Perform) -> None:
+        """Draw the panel and do what was asked for in it."""
+        imgui = self._imgui
+        self._shown = imgui is not None and session.shown.panel and not session.shown.help
+        if not self._shown:
+            return
+        self._backend.process_inputs()
+        imgui.new_frame()
+        when = imgui.Cond_.first_use_ever if session.size == self._size else imgui.Cond_.always
+        self._size = session.size
+        imgui.set_next_window_pos((session.size[0] - WIDTH - 8, 8), when)
+        imgui.set_next_window_size((WIDTH, session.size[1] - 16), when)
+        imgui.begin("hairkit")
+        imgui.push_item_width(-LABELS)
+        if imgui.collapsing_header("View", imgui.TreeNodeFlags_.default_open):
+            _view(imgui, session, perform)
+        if imgui.collapsing_header("Air and head", imgui.TreeNodeFlags_.default_open):
+            _air(imgui, session, perform)
+        title = f"Simulator {session.tuned.plugin}"
+        if imgui.collapsing_header(title, imgui.TreeNodeFlags_.default_open):
+            for info in session.tuned.infos:
+                _option(imgui, session, info, perform)
+            self._preset = _presets(imgui, session, self._preset, perform)
+        if session.layers.capture is not None and imgui.collapsing_header("Head in the photos"):
+            _pose(imgui, session, perform)
+        imgui.pop_item_width()
+        imgui.end()
+        imgui.render()
+        self._backend.render(imgui.get_draw_data())
+
+
+def _load(window: Any) -> tuple[Any, Any, str]:
+    try:
+        imgui = importlib.import_module("imgui_bundle").imgui
+        backends = importlib.import_module("imgui_bundle.python_backends.glfw_backend")
+    except ImportError as error:
+        return None, None, f"no panel ({error}); pip install 'hairkit[viewer]' brings it"
+    imgui.create_context()
+    imgui.get_io().set_ini_filename("")  # leave no file behind
+    imgui.get_io().config_windows_move_from_title_bar_only = True  # a missed slider moves nothing
+    return imgui, backends.GlfwRenderer(window, attach_callbacks=False), ""
+
+
+def _view(imgui: Any, session: Session, perform: Perform) -> None:
+    for name in LOOKS:
+        if imgui.button(name):
+            perform("look", {"name": name})
+        imgui.same_line()
+    if imgui.button("all"):
+        perform("frame", {})
+    shown = session.shown
+    place = COLOURINGS.index(shown.colours)
+    changed, place = imgui.combo("colours", place, list(COLOURINGS))
+    if changed:
+        perform("colours", {"by": COLOURINGS[place]})
+    changed, only = imgui.checkbox("guides only", shown.guides_only)
+    if changed:
+        perform("guides", {"only": only})
+    changed, count = imgui.slider_int("hairs", shown.hairs, 100, 50_000)
+    _hint(imgui, "Strands drawn, guides among them; fewer while the machine is too slow.")
+    if changed:
+        perform("hairs", {"count": count})
+    changed, value = imgui.slider_float("exposure", shown.exposure, 0.1, 3.0)
+    if changed:
+        perform("exposure", {"value": value})
+    if shown.layers & set(BOARDS):
+        changed, value = imgui.slider_float("opacity", shown.opacity, 0.0, 1.0)
+        _hint(imgui, "Of the photos in space.")
+        if changed:
+            perform("opacity", {"value": value})
+    for name in session.layers.available:
+        changed, on = imgui.checkbox(name, name in shown.layers)
+        if changed:
+            perform("layer", {"name": name, "on": on})
+
+
+def _presets(imgui: Any, session: Session, name: str, perform: Perform) -> str:
+    """Draw what keeps options and takes them again; return the name that is typed."""
+    imgui.separator()
+    imgui.set_next_item_width(0.4 * WIDTH)
+    _, name = imgui.input_text("##name", name)
+    imgui.same_line()
+    if imgui.button("keep as preset") and name.strip():
+        perform("preset_save", {"name": name.strip()})
+    for found in preset_names(presets_path(session.opened.path)):
+        if imgui.button(f"take {found}"):
+            perform("preset_load", {"name": found})
+    if imgui.button("defaults"):
+        perform("option_defaults", {})
+    return str(name)
+
+
+def _air(imgui: Any, session: Session, perform: Perform) -> None:
+    air = session.wind
+    changed, on = imgui.checkbox("wind", air.blowing)
+    if changed:
+        perform("wind", {"on": on})
+    ranges = (
+        ("speed", 0.0, 20.0, "%.1f m/s", "Of the wind."),
+        ("azimuth", -180.0, 180.0, "%.0f deg", "From where: 0 in front, 90 the subject's left."),
+        ("turbulence", 0.0, 2.0, "%.2f", "Gusts as a share of the wind."),
+    )
+    for name, low, high, shape, hint in ranges:
+        changed, value = imgui.slider_float(name, float(getattr(air, name)), low, high, shape)
+        _hint(imgui, hint)
+        if changed:
+            perform("wind", {"on": air.blowing, name: value})
+    if imgui.button("shake"):
+        perform("shake", {})
+    for label, values in (("nod", {"axis": "pitch"}), ("tilt", {"axis": "roll"})):
+        imgui.same_line()
+        if imgui.button(label):
+            perform("shake", {"degrees": 15.0, **values})
+    imgui.same_line()
+    if imgui.button("reset"):
+        perform("reset", {})
+    imgui.same_line()
+    if imgui.button("go on" if session.paused else "pause"):
+        perform("pause", {})
+
+
+def _pose(imgui: Any, session: Session, perform: Perform) -> None:
+    changed, on = imgui.checkbox("place the head", session.adjustment is not None)
+    if changed:
+        perform("adjust", {"on": on})
+    if session.adjustment is None:
+        return
+    moves = {"left": -0.002, "right": 0.002, "up": 0.002, "down": -0.002}
+    for label, metres in moves.items():
+        if imgui.button(label):
+            axis = "right" if label in ("left", "right") else "up"
+            perform("head_move", {axis: metres})
+        imgui.same_line()
+    for label, factor in (("larger", 1.01), ("smaller", 1 / 1.01)):
+        if imgui.button(label):
+            perform("head_scale", {"factor": factor})
+        imgui.same_line()
+    imgui.new_line()
+    for axis in AXES:
+        for label, degrees in ((f"{axis} -", -1.0), (f"{axis} +", 1.0)):
+            if imgui.button(label):
+                perform("head_turn", {"axis": axis, "degrees": degrees})
+            imgui.same_line()
+    imgui.new_line()
+    for label, values in (("next photo", {"step": 1}), ("photo before", {"step": -1})):
+        if imgui.button(label):
+            perform("through", values)
+        imgui.same_line()
+    if imgui.button("save"):
+        perform("head_save", {})
+    if imgui.button("reconstruct from here") and session.rerun is None:
+        perform("reconstruct", {})
+    if session.rerun is not None:
+        imgui.text(session.rerun.progress)
+
+
+def _option(imgui: Any, session: Session, info: OptionInfo, perform: Perform) -> None:
+    """Draw the slider, box or list of one option."""
+    value = session.tuned.value(info.name)
+    kind = typing.get_args(info.type) or (info.type,)
+    shape = f"%.4g {info.unit}" if info.unit and "%" not in info.unit else "%.4g"
+    changed = False
+    if info.choices:
+        names = [str(choice) for choice in info.choices]
+        changed, place = imgui.combo(info.name, info.choices.index(value), names)
+        value = info.choices[place]
+    elif bool in kind:
+        changed, value = imgui.checkbox(info.name, bool(value))
+    elif int in kind and value is not None:
+        first, last = int(info.low or 0), min(int(info.high or 1000), 10_000)
+        changed, value = imgui.slider_int(info.name, int(value), first, last)
+    elif float in kind and value is not None:
+        low = info.low if info.low is not None else 0.0
+        high = info.high if info.high is not None else max(10 * float(value), 1.0)
+        flags = imgui.SliderFlags_.logarithmic if high > 1000 * max(low, 1e-9) > 0 else 0
+        changed, value = imgui.slider_float(info.name, float(value), low, high, shape, flags)
+        value = float(f"{value:.6g}")  # sliders are float32
+    else:
+        imgui.text(f"{info.name}: {value}")
+    _hint(imgui, info.doc)
+    if changed:
+        perform("option", {"name": info.name, "value": value})
+
+
+def _hint(imgui: Any, text: str) -> None:
+    """Tell about the last item while the mouse is over it, in lines that the window holds."""
+    if imgui.is_item_hovered():
+        imgui.set_tooltip("\n".join(textwrap.wrap(text, HINT)))

@@ -1,0 +1,344 @@
+"""The window: passes events on to the actions and shows what the preview draws. Nothing else.
+
+The window's OpenGL context becomes the one that all of hairkit draws with in this process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from hairkit.errors import HairkitError, RenderError
+from hairkit.render.context import REQUIRED_VERSION, install, renderer
+from hairkit.render.gl_camera import set_uniforms
+from hairkit.viewer.actions.actions import bindings, perform
+from hairkit.viewer.actions.script import Script, performed
+from hairkit.viewer.draw.frame_budget import Budget
+from hairkit.viewer.preview import Preview
+from hairkit.viewer.recording import FRAMES_PER_SECOND
+from hairkit.viewer.session import Session
+from hairkit.viewer.window.file_watcher import Watch, shader_files
+from hairkit.viewer.window.gl_context import WindowContext
+from hairkit.viewer.window.hud import overlay
+from hairkit.viewer.window.keyboard import key_name
+from hairkit.viewer.window.mouse import Mouse
+from hairkit.viewer.window.panel import Panel
+from hairkit.viewer.window.splash import AbandonedError, Waiting, warm_up
+
+TEXT_EVERY = 0.25
+"""Seconds between two redraws of numbers; what the user has asked for is told at once."""
+IDLE = 0.1
+"""Seconds between pictures that nobody has asked for, while time stands still."""
+LONGEST_PAUSE = 0.1
+"""Seconds that pass at most between two pictures, as far as the hair is told."""
+
+
+def show(
+    make_session: Callable[[tuple[int, int]], Session],
+    size: tuple[int, int],
+    *,
+    script: Script | None = None,
+    budget: float = 1 / 20,
+) -> None:
+    """Open the window and stay until it is closed, or interrupted.
+
+    Parameters
+    ----------
+    make_session
+        Makes the session for a picture size; called when OpenGL is there, which simulators use.
+    size
+        Pixels.
+    script
+        Actions to do first.
+    budget
+        Seconds that a picture may take before less is drawn.
+
+    Raises
+    ------
+    RenderError
+        No window can be opened, or it has no OpenGL 4.3; the text says what to install.
+    AbandonedError
+        The window was closed before its first picture; a thread may still be at work.
+    """
+    with opened(make_session, size, budget) as window, contextlib.suppress(KeyboardInterrupt):
+        window.loop(None if script is None else performed(window.session, script, Path()))
+
+
+@contextlib.contextmanager
+def opened(
+    make_session: Callable[[tuple[int, int]], Session], size: tuple[int, int], budget: float
+) -> Iterator[Window]:
+    """Open a window for a block; see `show`."""
+    context = WindowContext(size)
+    try:
+        install(moderngl.create_context(REQUIRED_VERSION, **context.settings), "window")
+        window = _started(context, make_session, size, budget)
+    except AbandonedError:  # what a thread still draws with must stay until the process ends
+        context.glfw.hide_window(context.window)
+        raise
+    except BaseException:
+        context.close()
+        raise
+    try:
+        yield window
+    finally:
+        window.leave()
+        context.close()
+
+
+def _started(
+    context: WindowContext,
+    make_session: Callable[[tuple[int, int]], Session],
+    size: tuple[int, int],
+    budget: float,
+) -> Window:
+    """Return the window with its first picture drawn, though not shown."""
+    waiting = Waiting(context.glfw, context.window)
+    session = waiting.until("opening the groom", lambda: make_session(size))
+    waiting.until("making the hair move", lambda: warm_up(session))
+    window = Window(context, session, budget)
+    waiting.until("drawing the first picture", window.draw_aside, draws=True)
+    return window
+
+
+class Window:
+    """Events in, pictures out."""
+
+    def __init__(self, context: WindowContext, session: Session, budget: float) -> None:
+        self._glfw, self._window = context.glfw, context.window
+        self.session = session
+        self._most_seconds = 0.4 * budget if budget > 0 else None
+        self._keys = bindings()
+        self.mouse = Mouse(self.perform, session.size[1])
+        self._watched = session.opened.path
+        self._watch_groom = Watch([self._watched])
+        self._watch_shaders = Watch(shader_files())
+        self._pace = 0.0
+        """Seconds that a picture takes until it is on the screen, over the last few."""
+        self._told: object = None
+        self._told_at = 0.0
+        with renderer() as gl:
+            self._gl = gl
+            self.preview = Preview(gl, session, Budget(budget))
+            program = gl.program("viewer_screen", "viewer_blit")
+            self._blit = gl.context.vertex_array(program, [])
+            self._text = gl.context.texture((1, 1), 4, b"\0\0\0\0")
+            self._screen = gl.context.detect_framebuffer(0)
+            self._panel = Panel(self._window)
+        self._warnings = _Warnings(session)
+        logging.getLogger("hairkit").addHandler(self._warnings)
+        self._listen()
+        session.message = session.message or "H shows the keys"
+
+    def perform(self, name: str, values: Mapping[str, object]) -> None:
+        """Do an action; what goes wrong is told in the picture."""
+        self.session.message = ""
+        try:
+            with renderer():
+                perform(self.session, name, values)
+        except (HairkitError, OSError) as error:
+            self.session.message = " ".join(str(error).split())
+        if name == "panel" and self.session.shown.panel:
+            self.session.message = self._panel.missing
+
+    def loop(self, steps: Iterator[None] | None = None) -> None:
+        """Draw until the window is closed; `steps` does an action of a script at each `next`."""
+        before = time.perf_counter()
+        while not (self.session.finished or self._glfw.window_should_close(self._window)):
+            self._listen_for_events()
+            steps = self._next(steps)
+            passed = time.perf_counter() - before
+            if self.session.recorder is not None:  # a film has its own time, slower or not
+                wait, passed = 1 / FRAMES_PER_SECOND - passed, 1 / FRAMES_PER_SECOND
+                time.sleep(max(wait, 0.0))
+            before = time.perf_counter()
+            passed = min(passed, LONGEST_PAUSE)
+            self.picture(passed)
+            self.session.pending = max(self.session.pending - passed, 0.0)
+
+    def _listen_for_events(self) -> None:
+        """Take note of mouse and keys; where nothing moves, wait for them a little."""
+        still = self.session.paused and not self.session.pending
+        if self.session.recorder is None and (still or self.session.rerun is not None):
+            self._glfw.wait_events_timeout(IDLE)
+        self._glfw.poll_events()
+
+    def leave(self) -> None:
+        """Finish what is being written and end what runs aside."""
+        logging.getLogger("hairkit").removeHandler(self._warnings)
+        if self.session.recorder is not None:
+            self.session.recorder.close()
+        if self.session.rerun is not None:
+            self.session.rerun.stop()
+
+    def draw_aside(self) -> None:
+        """Draw a picture that nobody sees, so that shaders are compiled."""
+        with renderer():
+            self.preview.draw()
+
+    def picture(self, seconds: float) -> None:
+        """Let time pass and show a picture."""
+        began = time.perf_counter()
+        self._fit()
+        self._reload_changed()
+        filmed = self.session.recorder is not None
+        self.session.most_seconds = None if filmed else self._most_seconds
+        with renderer() as gl:
+            try:
+                self.preview.frame(seconds, still=filmed or bool(self.session.screenshots))
+            except (HairkitError, OSError) as error:  # a full disk, a simulator at its end
+                self.session.message = " ".join(str(error).split())
+                self.session.paused, self.session.recorder = True, None
+                self.session.screenshots = []
+            self._show(gl)
+            self._panel.draw(self.session, self.preview, self.perform)
+            self._glfw.swap_buffers(self._window)
+            gl.home.use()
+        taken = time.perf_counter() - began
+        self._pace += 0.2 * (taken - self._pace) if self._pace else taken
+
+    def _next(self, steps: Iterator[None] | None) -> Iterator[None] | None:
+        """Do the next action of a script when the last one has had its time."""
+        session = self.session
+        if steps is None or session.pending > 1e-9 or session.rerun is not None:
+            return steps
+        try:
+            with renderer():
+                next(steps)
+        except StopIteration:
+            return None
+        except (HairkitError, OSError) as error:
+            session.message = " ".join(str(error).split())
+            return None
+        return steps
+
+    def _show(self, gl: Any) -> None:
+        """Bring the picture and the text onto the screen."""
+        if self._text_is_old():
+            self._write_text()
+        size = self._glfw.get_framebuffer_size(self._window)
+        self._screen.use()
+        gl.context.viewport = (0, 0, *size)
+        gl.context.enable_only(moderngl.NOTHING)
+        self.preview.stage.texture.use(5)
+        self._text.use(6)
+        program = gl.program("viewer_screen", "viewer_blit")
+        set_uniforms(program, u_picture=5, u_text=6, u_size=size)
+        self._blit.render(moderngl.TRIANGLES, vertices=3)
+
+    def _text_is_old(self) -> bool:
+        session, now = self.session, time.monotonic()
+        told = (session.message, session.shown.help, session.shown.numbers, session.size)
+        if told == self._told and now - self._told_at < TEXT_EVERY:
+            return False
+        self._told, self._told_at = told, now
+        return True
+
+    def _write_text(self) -> None:
+        readings = replace(self.preview.readings, fps=1 / max(self._pace, 1e-6))
+        image = overlay(self.session.size, self.session, readings)
+        if image is None:
+            image = np.zeros((1, 1, 4), np.uint8)
+        size = (image.shape[1], image.shape[0])
+        if self._text.size != size:
+            self._text.release()
+            self._text = self._gl.context.texture(size, 4)
+        self._text.write(image.tobytes())
+
+    def _fit(self) -> None:
+        width, height = self._glfw.get_framebuffer_size(self._window)
+        if width > 0 and height > 0:
+            self.session.size = (width, height)
+            self.mouse.height = height
+
+    def _reload_changed(self) -> None:
+        now = time.monotonic()
+        if self.session.rerun is not None:
+            try:
+                with renderer():
+                    self.session.look_after_rerun()
+            except (HairkitError, OSError) as error:
+                self.session.message = " ".join(str(error).split())
+            if self.session.rerun is None:  # what it has written is shown already
+                self._watch_groom = Watch([self.session.opened.path])
+        elif self._watched != self.session.opened.path:
+            self._watched = self.session.opened.path
+            self._watch_groom = Watch([self._watched])
+        elif self._watch_groom.changed(now):
+            self.perform("reload", {})
+        if self._watch_shaders.changed(now):
+            try:
+                with renderer() as gl:
+                    self.preview.restart()
+                    program = gl.program("viewer_screen", "viewer_blit")
+                    self._blit = gl.context.vertex_array(program, [])
+                    self.preview.draw()
+            except RenderError as error:  # a shader that is being written: wait for the next save
+                self.session.message = " ".join(str(error).split())
+
+    def _listen(self) -> None:
+        glfw, window = self._glfw, self._window
+        glfw.set_key_callback(window, self.on_key)
+        glfw.set_mouse_button_callback(window, self.on_button)
+        glfw.set_cursor_pos_callback(window, self.on_move)
+        glfw.set_scroll_callback(window, self.on_scroll)
+        glfw.set_drop_callback(window, self.on_drop)
+        self._panel.listen()
+
+    def on_key(self, window: Any, key: int, scancode: int, event: int, mods: int) -> None:
+        """A key was pressed, released or repeated."""
+        self._panel.on_key(key, event, mods)
+        name = key_name(self._glfw, key, mods)
+        if name is not None and name not in self._keys:
+            name = name.removeprefix("SHIFT_")  # capital letters do what small ones do
+        if event == self._glfw.RELEASE or name not in self._keys or self._panel.wants_keys:
+            return
+        self.perform(*self._keys[name])
+
+    def on_button(self, window: Any, button: int, event: int, mods: int) -> None:
+        """A button of the mouse was pressed or released."""
+        self._panel.on_button(button, event)
+        if event == self._glfw.RELEASE:
+            self.mouse.release(time.monotonic())
+        elif not self._panel.wants_mouse:
+            self.mouse.press(button, mods)
+
+    def on_move(self, window: Any, x: float, y: float) -> None:
+        """The mouse moved; `x`, `y` in screen units."""
+        width, height = self._glfw.get_window_size(self._window)
+        self._panel.on_move(x, y)
+        scale = self.session.size[0] / max(width, 1), self.session.size[1] / max(height, 1)
+        self.mouse.move(x * scale[0], y * scale[1])
+
+    def on_scroll(self, window: Any, right: float, up: float) -> None:
+        """The wheel turned."""
+        self._panel.on_scroll(right, up)
+        if not self._panel.wants_mouse:
+            self.mouse.scroll(up)
+
+    def on_drop(self, window: Any, paths: list[str]) -> None:
+        """Files were dropped; the first one is opened."""
+        if paths:
+            self.session.message = f"opening {paths[0]}"
+            self.picture(0.0)
+            self.perform("open_file", {"file": str(paths[0])})
+
+
+class _Warnings(logging.Handler):
+    """Tells in the picture what is warned of."""
+
+    def __init__(self, session: Session) -> None:
+        super().__init__(logging.WARNING)
+        self._session = session
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show it until the next action."""
+        self._session.message = " ".join(record.getMessage().split())

@@ -1,0 +1,171 @@
+"""The four fields and their blend, all on the hull's grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy import ndimage
+
+from hairkit import Head, Hull, Strands
+from hairkit.field.diffusion import solve_screened
+from hairkit.field.growth_prior import combing_direction
+from hairkit.field.symmetric_eigen import smallest_eigenvectors
+from hairkit.storage import BoolArray, Float32Array, Float64Array
+from hairkit.types.volume import cell_slopes, outer_products
+
+from .ribbons import Band
+
+FIXED = 1e3
+"""Weight against a smoothness of 1 that keeps a cell as it is (Dirichlet)."""
+UNIT = 0.01
+"""Metres in one unit of the internal distance, of which the patent says nothing: centimetres."""
+COARSE = 2
+"""The internal distance is solved on cells this many times as large, then interpolated."""
+
+
+class FieldOptions(Protocol):
+    """What the fields ask of the plugin's options."""
+
+    @property
+    def smoothness(self) -> float: ...
+    @property
+    def strand_weight(self) -> float: ...
+    @property
+    def scalp_reach(self) -> float: ...
+    @property
+    def scalp_lift(self) -> float: ...
+    @property
+    def surface(self) -> float: ...
+    @property
+    def surface_reach(self) -> float: ...
+    @property
+    def outward(self) -> float: ...
+    @property
+    def signed(self) -> float: ...
+    @property
+    def tolerance(self) -> float: ...
+
+
+def surface_structure(hull: Hull, band: Band, tolerance: float) -> Float32Array:
+    """Return S (N, 3) of the loose cells: the ribbons' tangents, spread by heat diffusion."""
+    weight = np.where(band.cells[hull.loose], FIXED, 0).astype(np.float32)
+    data = band.direction[hull.loose].copy()
+    if not weight.any():
+        return data
+    return solve_screened(hull.loose, data, weight, 1.0, tolerance=tolerance)
+
+
+def growth_direction(
+    head: Head, hull: Hull, growth: Float32Array, band: Band, options: FieldOptions
+) -> Float32Array:
+    """Return O (N, 3) of the loose cells: ribbons and the scalp's combing, diffused with signs."""
+    data = band.direction[hull.loose].copy()
+    weight = np.where(band.cells[hull.loose], FIXED, 0).astype(np.float32)
+    near = (hull.head_distance[hull.loose] < options.scalp_reach) & (weight == 0)
+    at = hull.grid.centres_of(hull.loose)[near]
+    if len(at):
+        data[near] = combing_direction(head, hull, growth, at, options.scalp_lift)
+        weight[near] = 1.0
+    if not (weight > 0).any():
+        return data
+    return solve_screened(hull.loose, data, weight, 1.0, tolerance=options.tolerance)
+
+
+def internal_direction(
+    hull: Hull, wanted: Float32Array, weight: Float32Array, band: Band, options: FieldOptions
+) -> Float32Array:
+    """Return V (N, 6) of the loose cells: `wanted` by `weight`, and ribbons, diffused."""
+    on = band.cells[hull.loose]
+    tangent = band.direction[hull.loose][on].astype(np.float64)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
+    data, total = wanted.copy(), weight.copy()
+    total[on] += options.strand_weight
+    share = (options.strand_weight / np.maximum(total[on], 1e-9))[:, None]
+    data[on] = (1 - share) * wanted[on] + share * outer_products(tangent)
+    return solve_screened(hull.loose, data, total, options.smoothness, tolerance=options.tolerance)
+
+
+def internal_distance(hull: Hull, segments: Strands, tolerance: float) -> Float32Array:
+    """Return I (X, Y, Z): 0 in the head, 1 on strands, harmonic up to the grid's border.
+
+    The border's value is 1 plus the distance to the nearest strand in `UNIT`. Solved on cells
+    `COARSE` times as large.
+    """
+    shape = tuple(-(-n // COARSE) for n in hull.grid.shape)
+    strand = np.zeros(shape, bool)
+    if len(segments):
+        cells = hull.grid.nearest_cell(segments.points) // COARSE
+        strand[tuple(cells.T)] = True
+    if not strand.any():
+        strand = _pooled(hull.dense & ~ndimage.binary_erosion(hull.dense), shape)
+    away = ndimage.distance_transform_edt(~strand) * (COARSE * hull.grid.spacing / UNIT)
+    border = np.ones(shape, bool)
+    border[1:-1, 1:-1, 1:-1] = False
+    inside = _pooled(hull.head_distance < 0, shape) & ~strand
+    value = np.where(strand, 1.0, np.where(border, 1 + away, 0.0)).astype(np.float32)
+    known = (strand | border | inside).ravel()
+    weight = np.where(known, FIXED, 0).astype(np.float32)
+    solved = solve_screened(
+        np.ones(shape, bool), value.reshape(-1, 1), weight, 1.0, tolerance=tolerance
+    ).reshape(shape)
+    fine = ndimage.zoom(solved, COARSE, order=1, grid_mode=True, mode="nearest")
+    result: Float32Array = fine[tuple(slice(n) for n in hull.grid.shape)].astype(np.float32)
+    return result
+
+
+def _pooled(cells: BoolArray, shape: tuple[int, ...]) -> BoolArray:
+    """Return which coarse cells hold at least one of `cells`."""
+    padded = np.zeros(tuple(COARSE * n for n in shape), bool)
+    padded[tuple(slice(n) for n in cells.shape)] = cells
+    blocks = padded.reshape(shape[0], COARSE, shape[1], COARSE, shape[2], COARSE)
+    result: BoolArray = np.asarray(blocks.any(axis=(1, 3, 5)))
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """The four fields of the patent, but for the distance one row for each loose cell."""
+
+    surface: Float32Array
+    """S, (N, 3)."""
+    inner: Float32Array
+    """V, (N, 6)."""
+    distance: Float32Array
+    """I, (X, Y, Z)."""
+    growth: Float32Array
+    """O, (N, 3)."""
+
+
+def blended(
+    hull: Hull, band: Band, fields: Fields, options: FieldOptions
+) -> tuple[Float32Array, Float32Array]:
+    """Return H (X, Y, Z, 3) and its tensor (X, Y, Z, 6), both 0 outside the loose hull.
+
+    The weights differ from cell to cell: S speaks on strands, V the more the farther they are,
+    grad(I) at the scalp, O a little everywhere; V takes its sign from O.
+    """
+    spacing = hull.grid.spacing
+    off = ndimage.distance_transform_edt(~band.cells)[hull.loose] * spacing
+    main = smallest_eigenvectors(-fields.inner.astype(np.float64))[0]  # the largest of V
+    main *= np.where((main * fields.growth).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    slope = cell_slopes(fields.distance)[hull.loose]
+    slope /= np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
+    near_scalp = np.exp(-np.maximum(hull.head_distance[hull.loose], 0) / (2 * spacing))
+    a_s = options.surface * np.exp(-off / options.surface_reach)
+    a_v = 1 - np.minimum(a_s, 1)
+    a_i = options.outward * near_scalp
+    mixed = a_s[:, None] * _unit(fields.surface) + a_v[:, None] * main
+    mixed += a_i[:, None] * slope + options.signed * _unit(fields.growth)
+    direction = np.zeros((*hull.grid.shape, 3), np.float32)
+    direction[hull.loose] = _unit(mixed)
+    tensor = np.zeros((*hull.grid.shape, 6), np.float32)
+    tensor[hull.loose] = outer_products(direction[hull.loose])
+    return direction, tensor
+
+
+def _unit(vectors: Float32Array | Float64Array) -> Float64Array:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    result: Float64Array = vectors / np.maximum(length, 1e-9)
+    return result

@@ -1,0 +1,40 @@
+"""The obstacles as the compute backend's shaders look them up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hairkit.storage import Float32Array
+
+from .reference import Contact
+
+ROOM = 0.02
+"""Metres around the grid of distances in which nothing is looked up."""
+
+
+def contact_uniforms(contact: Contact | None) -> dict[str, Any]:
+    """Return the uniforms of contacts."""
+    if contact is None:
+        return {"u_obstacles": False}
+    grid = contact.obstacles.grid
+    return {
+        "u_obstacles": True,
+        "u_friction": contact.friction,
+        "u_fastest": contact.fastest,
+        "u_rounds": contact.rounds,
+        "u_cells": grid.shape,
+        "u_grid": (*(grid.origin + 0.5 * grid.spacing), 1 / grid.spacing),
+        "u_room": ROOM,
+    }
+
+
+def faces(contact: Contact | None) -> Float32Array:
+    """Return (X, Y, Z, 4) distances of the corners (y, z), (y, z + 1), (y + 1, z), both + 1."""
+    if contact is None:
+        return np.zeros((1, 1, 1, 4), np.float32)
+    distance = contact.obstacles.distance
+    full = np.pad(distance, ((0, 0), (0, 1), (0, 1)), mode="edge")
+    parts = [full[:, :-1, :-1], full[:, :-1, 1:], full[:, 1:, :-1], full[:, 1:, 1:]]
+    return np.stack(parts, axis=-1)

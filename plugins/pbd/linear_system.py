@@ -1,0 +1,77 @@
+"""The linear system of one substep: constant as long as the substep's length is.
+
+Implicit Euler of nodes with mass, drag, bending and shape springs asks for `A delta = force`, with
+
+    A = M / h^2 + C / h + K_bend + K_shape,
+
+one banded matrix for all three coordinates since bending is quadratic. Lengths are constraints on
+top: with multipliers along the directions d the Schur complement is (D A^-1 D^T) * (d d^T), element
+by element, so that only the directions change from substep to substep.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit.storage import Float64Array
+
+from .rods import Rods
+
+COMPLIANCE = 1e-6
+"""Share of itself added to the diagonal of the length system: keeps it definite in float32."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """What pulls on nodes besides the rods' own stiffness."""
+
+    drag: Float64Array
+    """(S, n) 1/s, at which air takes a node along."""
+    damping: float
+    """1/s, at which motion relative to the head dies."""
+    shape: Float64Array
+    """(S, n) 1/s^2, squared frequency of the pull to the captured place."""
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Matrices of one substep for every rod."""
+
+    step: float
+    """Seconds."""
+    banded: Float64Array
+    """(S, n - 1, 3) diagonal and the two below it of A, kg/s^2, rows of the free nodes 1 to n."""
+    inverse: Float64Array
+    """(S, n - 1, n - 1) of A."""
+    metric: Float64Array
+    """(S, n - 1, n - 1) D A^-1 D^T of the segments' vectors, with the compliance."""
+    rates: Rates
+
+
+def assemble(rods: Rods, rates: Rates, step: float) -> System:
+    """Return the system of substeps of `step` seconds."""
+    count = rods.nodes - 1
+    difference = np.eye(count) - np.eye(count, k=-1)
+    turns = (np.eye(count) - np.eye(count, k=-1))[None] / rods.length[:, None, :]
+    bending = turns @ difference
+    mass = rods.mass[:, 1:]
+    diagonal = mass * (
+        1 / step**2 + (rates.drag[:, 1:] + rates.damping) / step + rates.shape[:, 1:]
+    )
+    matrix = np.einsum("sij,si,sik->sjk", bending, rods.bend, bending)
+    matrix[:, np.arange(count), np.arange(count)] += diagonal
+    inverse = np.linalg.inv(matrix)
+    metric = difference @ inverse @ difference.T
+    metric[:, np.arange(count), np.arange(count)] *= 1 + COMPLIANCE
+    return System(step, _bands(matrix), inverse, metric, rates)
+
+
+def _bands(matrix: Float64Array) -> Float64Array:
+    count = matrix.shape[1]
+    bands = np.zeros((*matrix.shape[:2], 3))
+    for below in range(min(3, count)):
+        rows = np.arange(below, count)
+        bands[:, rows, below] = matrix[:, rows, rows - below]
+    return bands

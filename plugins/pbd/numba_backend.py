@@ -1,0 +1,241 @@
+"""The fast backend: packs rods for the kernels and runs them on all cores, float32."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.parallel import Crew
+from hairkit.simulate import quaternion
+from hairkit.storage import Float32Array, Float64Array
+
+from . import kernels
+from .factor_layout import banded_factor
+from .hair_grid import Crowd
+from .kernel_embedding import ride_points
+from .kernel_hair_grid import draw_nodes, settle_cells, spread_nodes
+from .kernel_wind import blow_nodes
+from .linear_system import System
+from .reference import Contact, Load, State, at_rest
+from .resampling import Riders
+from .rods import Rods
+from .simd import LANES
+
+Array = npt.NDArray[Any]
+AirWaves = tuple[Float64Array, Float64Array, Float64Array]
+NOWHERE = np.zeros(0, np.float32)
+WORTH = 64 // LANES
+"""Blocks that are worth another thread's while."""
+FEW, GRIDS = 2000, 4
+"""Of fewer rods the nodes are spread to one grid, of more to so many at a time."""
+
+
+class FastEngine:
+    """Rods in blocks of lanes."""
+
+    def __init__(self, rods: Rods, contact: Contact | None) -> None:
+        kernels.tell_of_compiling()
+        self._rods = rods
+        self._count = len(rods.points)
+        self._unit = rods.mass.mean(axis=1)
+        self._contact = contact
+        held = quaternion.third_axis(rods.root_frame)
+        self._root = kernels.padded(np.concatenate([rods.root_frame, held], axis=1)[:, None])
+        self._packed: tuple[System, Float32Array, Float32Array, Float32Array] | None = None
+        self._grid = _grid(contact)
+        deepest = None if contact is None else contact.deepest
+        self._deepest = NOWHERE if deepest is None else deepest.astype(np.float32)
+        clear = np.zeros(rods.mass.shape) if contact is None else contact.clearance
+        self._clear = kernels.padded(clear.astype(np.float32))
+        self._mass = kernels.padded(rods.mass.astype(np.float32))
+        self._mass[-1, :, (self._count - 1) % LANES + 1 :] = 0.0
+        self._cells = np.zeros((1, 0, 4), np.float32)
+        self._usual = np.zeros(0, np.float32)
+        self._crew = Crew()
+        self._blown: Float32Array | None = None
+        self._air_work = kernels.padded(np.zeros(rods.points.shape, np.float32))
+        self._riding: tuple[Riders, tuple[Array, ...]] | None = None
+        self.state = at_rest(rods)
+
+    @property
+    def state(self) -> State:
+        """The present state as float64; setting it moves the rods."""
+        nodes = self._unpacked(self._x)
+        return State(nodes[..., :3], nodes[..., 3:6], quaternion.unit(self._unpacked(self._q)))
+
+    @state.setter
+    def state(self, value: State) -> None:
+        slack = np.zeros_like(value.position[..., :1])
+        nodes = np.concatenate([value.position, value.velocity, slack], axis=-1)
+        self._x = kernels.padded(nodes.astype(np.float32))
+        self._q = kernels.padded(value.frames.astype(np.float32))
+
+    def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
+        """Do one substep for each load."""
+        if self._packed is None or self._packed[0] is not system:
+            self._packed = (system, *_constants(self._rods, system, self._contact, self._unit))
+        _, node, element, metric = self._packed
+        contact = self._contact
+        settings = np.array([system.step, system.rates.damping, 0, 0, iterations, 0, 0], "f4")
+        if contact is not None:
+            settings[2:4] = contact.friction, contact.fastest
+            settings[5:] = 1, contact.rounds
+        self._crew.share(
+            kernels.run_substeps, len(self._x), WORTH,
+            self._x, self._q, self._root, node, element, metric,
+            *_motions(loads), loads[0].gravity.astype(np.float32), self._air(loads[0].air),
+            self._force(loads[0].force), self._grid, settings,
+        )  # fmt: skip
+
+    def rub(self, crowd: Crowd, ride: Float64Array, rates: tuple[float, float, float]) -> None:
+        """Let hair act on hair."""
+        size = int(np.prod(crowd.shape))
+        if self._cells.shape[1] != size:
+            grids = 1 if self._count < FEW else GRIDS
+            self._cells = np.zeros((grids, size, 4), np.float32)
+            self._usual = crowd.usual.astype(np.float32).reshape(-1)
+        shift, origin = (ride - np.eye(4))[:3].astype(np.float32), crowd.origin.astype(np.float32)
+        self._crew.share(
+            spread_nodes, len(self._cells), 1, self._x, self._mass, shift, origin, crowd.shape,
+            np.float32(rates[2]), self._cells,
+        )  # fmt: skip
+        settle_cells(0, size, self._cells, self._usual)
+        self._crew.share(
+            draw_nodes, len(self._x), 4 * WORTH, self._x, shift, origin, crowd.shape,
+            np.array(rates, np.float32), self._cells[0],
+        )  # fmt: skip
+
+    def blow(self, waves: AirWaves | None, wind: Float64Array, head: Float64Array) -> None:
+        """Take gusts (see `wind.gust_waves`) for the substeps to come; None: the wind alone."""
+        self._blown = None
+        if waves is None:
+            return
+        vectors, amplitudes, phases = waves
+        phases = np.remainder((phases + vectors @ head[:3, 3]) / (2 * np.pi), 1.0)
+        turns = np.column_stack([vectors @ head[:3, :3] / (2 * np.pi), phases])
+        self._crew.share(
+            blow_nodes, len(self._x), 4 * WORTH, self._x, turns.astype(np.float32),
+            amplitudes.astype(np.float32), wind.astype(np.float32), self._air_work,
+        )  # fmt: skip
+        self._blown = self._air_work
+
+    def air(self) -> Float64Array:
+        """Return the air's velocity (S, n, 3) at the nodes, world, as gusts were last taken."""
+        return self._unpacked(self._air_work)
+
+    def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
+        """Return places and velocities (n, 3) of one rod, head axes."""
+        block, lane = divmod(rod, LANES)
+        nodes = self._x[block, :, :, lane].astype(np.float64)
+        return nodes[:, :3], nodes[:, 3:6]
+
+    def points(self, riders: Riders, head: Float64Array) -> Float32Array:
+        """Return the guides' points (P, 3) in the world."""
+        if self._riding is None or self._riding[0] is not riders:
+            self._riding = (riders, _riding(riders, self._count, self._x.shape[1]))
+        out = np.empty((len(self._riding[1][0]), 3), np.float32)
+        deepest = NOWHERE if riders.identity else self._deepest
+        motion = head[:3].astype(np.float32)
+        rod, segment, weight, offset = self._riding[1]
+        self._crew.share(
+            ride_points, len(out), 4096, self._x, self._q, self._clear, rod, segment, weight,
+            offset, deepest, motion, self._grid, out,
+        )  # fmt: skip
+        return out
+
+    def _unpacked(self, values: Float32Array) -> Float64Array:
+        spread = np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:-1])
+        return spread[: self._count].astype(np.float64)
+
+    def _air(self, air: Float64Array) -> Float32Array:
+        if self._blown is not None:
+            return self._blown
+        if air.ndim == 1:
+            return np.repeat(air.astype(np.float32)[None, None, :, None], LANES, axis=3)
+        return kernels.padded(air.astype(np.float32))
+
+    def _force(self, force: Float64Array | None) -> Float32Array:
+        if force is None:
+            return np.zeros((1, 1, 3, LANES), np.float32)
+        return kernels.padded((force / self._unit[:, None, None]).astype(np.float32))
+
+
+def _constants(
+    rods: Rods, system: System, contact: Contact | None, unit: Float64Array
+) -> tuple[Float32Array, Float32Array, Float32Array]:
+    """Pack what nodes, elements and lengths need, masses as shares of the rod's mean."""
+    count, nodes = rods.mass.shape
+    node = np.zeros((count, nodes, kernels.NODE))
+    node[..., kernels.REST : kernels.REST + 3] = rods.points
+    node[..., kernels.MASS] = rods.mass / unit[:, None]
+    node[..., kernels.DRAG] = system.rates.drag
+    node[..., kernels.SHAPE] = system.rates.shape
+    node[..., kernels.CLEAR] = -1.0 if contact is None else contact.clearance
+    node[:, 1:, kernels.EASE] = 1.0 / node[:, 1:, kernels.MASS]
+    element = np.zeros((count, nodes - 1, kernels.ELEMENT))
+    element[..., kernels.LENGTH], element[..., kernels.OVER] = rods.length, 1.0 / rods.length
+    element[..., kernels.BEND] = rods.bend / unit[:, None]
+    element[..., kernels.TWIST] = rods.twist / unit[:, None]
+    element[..., kernels.CURVE : kernels.CURVE + 3] = rods.curvature
+    element[..., kernels.NATURAL] = rods.natural_twist
+    element[..., kernels.FIRST :] = banded_factor(system.banded / unit[:, None, None])
+    row, column = np.tril_indices(nodes - 1)
+    metric = system.metric[:, row, column] * unit[:, None]
+    packed = [kernels.padded(part.astype(np.float32)) for part in (node, element, metric)]
+    return packed[0], packed[1], packed[2]
+
+
+def _motions(loads: Sequence[Load]) -> tuple[Float32Array, Float32Array]:
+    """Pack rides and turns as `kernels.run_substeps` takes them."""
+    rides, turns = np.zeros((len(loads), 3, 12)), np.zeros((len(loads), 3, 4))
+    for k, load in enumerate(loads):
+        rides[k, :, :4] = load.ride[:3]
+        rides[k, :, 4:8] = load.ride[:3] - np.eye(
+            3, 4
+        )  # in float64: hardly moved heads keep digits
+        rides[k, 0, 8:] = quaternion.from_matrix(load.ride[:3, :3])
+        turns[k, :, :3] = load.turn
+    return rides.astype(np.float32), turns.astype(np.float32)
+
+
+def _riding(riders: Riders, rods: int, nodes: int) -> tuple[Array, ...]:
+    """Return rod, segment, weights (P, 6) of four nodes and two frames, and offset of points."""
+    if riders.identity:
+        rod = np.repeat(np.arange(rods, dtype=np.int32), nodes)
+        segment = np.tile(np.minimum(np.arange(nodes, dtype=np.int32), nodes - 2), rods)
+        weight = np.zeros((len(rod), 6), np.float32)
+        weight[:, 1] = np.tile(np.arange(nodes) < nodes - 1, rods)
+        weight[:, 2] = 1.0 - weight[:, 1]
+        return rod, segment, weight, np.zeros((len(rod), 3), np.float32)
+    t, last = riders.share, nodes - 2
+    one, two = t * t * (3 - 2 * t), t * (1 - t)
+    start, end = two * (1 - t), -two * t  # of the slopes, per segment
+    first, final = riders.segment == 0, riders.segment == last
+    weight = np.stack(
+        [
+            np.where(first, 0.0, -0.5 * start),
+            1 - one - np.where(first, start, 0.0) - np.where(final, end, 0.5 * end),
+            one + np.where(first, start, 0.5 * start) + np.where(final, end, 0.0),
+            np.where(final, 0.0, 0.5 * end),
+            np.where(t < 0.5, 0.5 - t, 0.0),
+            np.where(t < 0.5, 0.0, t - 0.5),
+        ],
+        axis=1,
+    )
+    return (
+        riders.rod.astype(np.int32), riders.segment.astype(np.int32), weight.astype(np.float32),
+        riders.offset.astype(np.float32),
+    )  # fmt: skip
+
+
+def _grid(contact: Contact | None) -> tuple[Float32Array, Float32Array]:
+    if contact is None:
+        return np.zeros((2, 2, 2), np.float32), np.ones(5, np.float32)
+    grid = contact.obstacles.grid
+    first = grid.origin + 0.5 * grid.spacing
+    # outside the grid nothing is nearer than its room; a node looks again after that way
+    place = np.array([*first, 1.0 / grid.spacing, 0.02], np.float32)
+    return contact.obstacles.distance.copy(), place

@@ -1,0 +1,148 @@
+"""Between guides of any number of points and rods of one number of nodes.
+
+Rods have equally many nodes, so that they can be solved side by side. Finer points of a guide ride
+on the rod: each keeps its offset in the frame of the rod at its own place, so that curls finer than
+the rod's nodes are carried along, turned, and kept exactly at rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit.simulate import quaternion
+from hairkit.storage import Float32Array, Float64Array, Int64Array
+from hairkit.types.strands import Strands
+
+SHORTEST = 1e-4
+"""Metres: shorter guides are simulated as if they were this long, along their root's direction."""
+LARGEST_TURN = 0.7
+"""Radians between segments at rest: beyond, the explicit coupling of bend and twist is stiff."""
+_ROUNDS = 60
+FOLLOWED = 10.0
+"""Bending of curled rods is stable in steps of h up to EI / (rho A) h^2 c^3 / l^4 of 10 to 20; here
+l is a segment's length and c the turn from one to the next: measured on coils of 0.1 to 0.7."""
+
+
+def node_points(strands: Strands, nodes: int) -> Float64Array:
+    """Return (S, n, 3) nodes at equal distances along the guides.
+
+    Where nodes would turn more than rods can (a fold, or curls finer than the nodes), they go along
+    the guide's smoothed middle; roots stay.
+    """
+    points = strands.resampled(nodes).points.reshape(len(strands), nodes, 3).astype(np.float64)
+    for _ in range(_ROUNDS):
+        sharp = _sharpest(points) > LARGEST_TURN
+        if not sharp.any():
+            break
+        some = points[sharp]
+        some[:, 1:-1] = 0.25 * some[:, :-2] + 0.5 * some[:, 1:-1] + 0.25 * some[:, 2:]
+        offsets = np.arange(len(some) + 1) * nodes
+        even = Strands(some.reshape(-1, 3).astype(np.float32), offsets).resampled(nodes)
+        points[sharp] = even.points.reshape(some.shape)
+    length = np.linalg.norm(np.diff(points, axis=1), axis=-1)
+    bad = (length.min(axis=1) < SHORTEST / nodes) | (_sharpest(points) > LARGEST_TURN)
+    if bad.any():
+        step = np.maximum(length.mean(axis=1), SHORTEST / nodes)[bad, None, None]
+        way = points[bad, -1] - points[bad, 0]
+        way[np.linalg.norm(way, axis=1) < 1e-9] = [0.0, 1.0, 0.0]
+        along = np.arange(nodes)[None, :, None] * step
+        points[bad] = points[bad, :1] + along * quaternion.unit(way)[:, None]
+    return points
+
+
+def stiffest(points: Float64Array, step: float) -> Float64Array:
+    """Return (S,) the largest EI over mass per length, m^4/s^2, that rods take in steps so long.
+
+    Only short, stiff and sharply curled rods reach it: natural curvature goes with the frames of
+    the step before. Their first tone is well above what hair shows.
+    """
+    length = np.linalg.norm(np.diff(points, axis=1), axis=-1).mean(axis=1)
+    curl = np.maximum(_sharpest(points), 1e-3)
+    result: Float64Array = FOLLOWED * length**4 / (step**2 * curl**3)
+    return result
+
+
+def _sharpest(points: Float64Array) -> Float64Array:
+    """Largest turn (S,) at a node, radians."""
+    direction = quaternion.unit(np.diff(points, axis=1))
+    cosine = (direction[:, 1:] * direction[:, :-1]).sum(axis=-1)
+    result: Float64Array = np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1)
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Riders:
+    """Points of guides on rods."""
+
+    identity: bool
+    """True where the guides' points are the nodes themselves."""
+    rod: Int64Array
+    """(P,) which rod."""
+    segment: Int64Array
+    """(P,) which segment of it."""
+    share: Float64Array
+    """(P,) how far along the segment."""
+    offset: Float64Array
+    """(P, 3) from the place on the rod, in the frame there."""
+    _cast: tuple[Int64Array, Int64Array, Float32Array, Float32Array] | None = None
+
+    def packed(self) -> tuple[Int64Array, Int64Array, Float32Array, Float32Array]:
+        """Return rod, segment, share and offset for the kernels, cast once."""
+        if self._cast is None:
+            cast = (self.rod, self.segment, self.share.astype("f4"), self.offset.astype("f4"))
+            object.__setattr__(self, "_cast", cast)
+        assert self._cast is not None
+        return self._cast
+
+    def points(self, position: Float64Array, frames: Float64Array) -> Float32Array:
+        """Return (P, 3) where the points are, of rods at `position` (S, n, 3)."""
+        if self.identity:
+            return position.reshape(-1, 3).astype(np.float32)
+        place, frame = _places(position, frames, self.rod, self.segment, self.share)
+        moved: Float32Array = (place + quaternion.rotated(frame, self.offset)).astype(np.float32)
+        return moved
+
+
+def riders(strands: Strands, position: Float64Array, frames: Float64Array) -> Riders:
+    """Bind the guides' points to rods at rest, (S, n, 3) with segment frames (S, n - 1, 4)."""
+    segments = position.shape[1] - 1
+    rod = strands.strand_of_point
+    arc = strands.arc_lengths()
+    total = np.maximum(arc[strands.offsets[1:] - 1], 1e-12)[rod]
+    along = arc / total * segments
+    segment = np.minimum(along.astype(np.int64), segments - 1)
+    share = along - segment
+    place, frame = _places(position, frames, rod, segment, share)
+    apart = strands.points - place
+    same = (strands.counts == segments + 1).all() and float(np.abs(apart).max(initial=0)) < 1e-7
+    return Riders(same, rod, segment, share, quaternion.rotated(quaternion.inverse(frame), apart))
+
+
+def _places(
+    position: Float64Array,
+    frames: Float64Array,
+    rod: Int64Array,
+    segment: Int64Array,
+    share: Float64Array,
+) -> tuple[Float64Array, Float64Array]:
+    """Places on a smooth curve through the nodes (Catmull-Rom), and frames mixed along the rod."""
+    last = position.shape[1] - 1
+    t = share[:, None]
+    a, b = position[rod, segment], position[rod, segment + 1]
+    before, after = (
+        position[rod, np.maximum(segment - 1, 0)],
+        position[rod, np.minimum(segment + 2, last)],
+    )
+    slope_a = np.where((segment == 0)[:, None], b - a, (b - before) / 2)
+    slope_b = np.where((segment == last - 1)[:, None], b - a, (after - a) / 2)
+    one, two = t * t * (3 - 2 * t), t * (1 - t)
+    place = a + (b - a) * one + two * ((1 - t) * slope_a - t * slope_b)
+    # a segment's frame is at its middle
+    towards = np.where(share < 0.5, -1, 1)
+    other = np.clip(segment + towards, 0, last - 1)
+    part = np.abs(share - 0.5)[:, None]
+    here, there = frames[rod, segment], frames[rod, other]
+    sign = np.where((here * there).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    return place, quaternion.unit((1 - part) * here + part * sign * there)

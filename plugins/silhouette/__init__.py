@@ -1,0 +1,327 @@
+"""Cameras refined from the nominal turn by landmarks and by the consistency of the silhouettes.
+
+Unknown are the turn's shared place, tilt, magnification and perspective, and six numbers a view
+(`hairkit.cameras.turntable.Turn`). Levenberg-Marquardt with soft-L1 weights on
+
+* landmarks, marginalised over the unknown shape of the head (`.landmark_equations`), those that
+  patches of skin carry to the neighbours (`.landmark_transfer`), and the face's midline on the
+  outline of views from the side;
+* silhouette coherence (`hairkit.cameras.silhouette_coherence`; Hernandez, Schmitt and Cipolla
+  2007): the viewing ray of every contour point touches all other silhouettes;
+* a prior that keeps to the nominal turn.
+
+Perspective and orthographic cameras are both tried unless the capture or the options say which.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hairkit import Capture, Head, Mask, Scene, hookimpl
+from hairkit.cameras.silhouette_coherence import Outlines, coherence
+from hairkit.cameras.turntable import LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, Turn
+from hairkit.errors import InputError
+from hairkit.options import option
+from hairkit.storage import Float64Array
+
+from .landmark_equations import (
+    COUNT,
+    CameraArrays,
+    LandmarkEquations,
+    LandmarkFit,
+    Sights,
+    shape_precision,
+    soft_l1_weight,
+)
+from .landmark_transfer import PatchSettings, carry_landmarks
+
+REFERENCE_HEIGHT = 1080
+USUAL_DISTANCE = 0.7
+"""Distance of head portraits, metres."""
+SHARED_SPREAD = (0.05, 0.01, 0.01, 0.1, 0.2, 0.1, 0.5, 0.5)
+"""Prior of what views share: tilt of the head in the turn (radians), the turn's centre (metres),
+log of the magnification, 1 / distance."""
+SHARED_SPREAD_BY_MASKS = (0.05, 0.01, 0.01, 0.01, 0.01, 0.01, 0.05, 0.5)
+"""The same where no landmark ties the turn to the head: silhouettes fit any place and size."""
+WIDEST, HAIR_THICKNESS = 0.6, 0.012
+"""Without landmarks: depth below the crown over the width there, and how far hair stands off the
+head, metres."""
+SETTLED, WORSE = 1e-3, 1e-9
+"""Stop when the cost falls by less than this share; a step that costs more by the second share
+is taken back."""
+TRIAL = 8
+"""Rounds that orthographic cameras get to show that they fit better."""
+SOFT = 0.3
+"""A contour ray counts as missing gradually, over this many times the outline's noise."""
+FROM_THE_SIDE = 0.35
+"""Views this near (radians) to 90 degrees show the face's midline on the outline."""
+PROFILE_PX = 3.0
+FOCAL_SPREAD = 0.03
+"""Of the logarithm of a known focal length: lenses breathe and cameras crop."""
+MIN_SIGHTS = 6
+"""Fewer landmarks than this place no head."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of the refinement; the spreads are of the prior."""
+
+    azimuth: float = option(3.0, low=0.01, high=30, doc="Spread off the nominal turn.", unit="deg")
+    elevation: float = option(2.0, low=0.01, high=30, doc="Spread of elevations.", unit="deg")
+    roll: float = option(1.5, low=0.01, high=30, doc="Spread of camera rolls.", unit="deg")
+    distance: float = option(0.04, low=0.001, high=0.5, doc="Relative spread of distances.")
+    shift: float = option(0.008, low=0.0001, high=0.2, doc="Spread of the aim.", unit="m")
+    landmark_px: float = option(
+        1.5, low=0.1, high=50, doc="Noise of landmarks, pictures 1080 high.", unit="px"
+    )
+    silhouette_px: float = option(
+        3.0, low=0.1, high=50, doc="Noise of outlines, pictures 1080 high.", unit="px"
+    )
+    contour_points: int = option(100, low=20, high=1000, doc="Contour points used in each view.")
+    model: str = option(
+        "auto",
+        choices=("auto", "perspective", "orthographic"),
+        doc="Kind of cameras; auto takes what fits better.",
+    )
+    carries: int = option(
+        2, low=0, high=9, doc="Rounds that carry landmarks to neighbours by patches of skin."
+    )
+    iterations: int = option(20, low=1, high=100, doc="Most rounds of Gauss-Newton.")
+
+
+@hookimpl
+def estimate_scene(
+    capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
+) -> Scene:
+    """Solve for all cameras; the head keeps its shape and gives the world its frame and scale."""
+    problem = _Problem.of(capture, masks, head, options)
+    wanted = "orthographic" if capture.orthographic else "perspective"
+    if options.model != "auto":
+        wanted = options.model
+    fits = [_solve(problem, problem.start(wanted == "orthographic"), options.iterations)]
+    if options.model == "auto" and not capture.orthographic:
+        fits.append(_solve(problem, problem.start(True), min(options.iterations, TRIAL)))
+    best = min(fits, key=lambda fit: fit.cost)
+    for _ in range(options.carries if problem.landmarks is not None else 0):
+        best = _solve(problem.with_carried(capture, best), best, options.iterations)
+    names = tuple(view.name for view in capture.views)
+    return Scene(names, problem.turn.cameras(best.vector), head, problem.residual_px(best))
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Where the solution stands."""
+
+    vector: Float64Array
+    """Numbers of the turn."""
+    offset: Float64Array
+    """(68, 3) landmarks off the given head's, metres."""
+    flat: bool
+    """True for orthographic cameras: the perspective is held."""
+    prior_mean: Float64Array
+    """The vector of the nominal turn, from which the solution started."""
+    cost: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """The problem made linear at one place."""
+
+    cost: float
+    normal: Float64Array
+    right: Float64Array
+    landmarks: LandmarkEquations | None
+
+    def move(self, damping: float, flat: bool) -> Float64Array:
+        """Return the damped step; the perspective stays when `flat`."""
+        normal = self.normal + damping * np.diag(np.diag(self.normal))
+        free = np.arange(len(self.right))
+        if flat:
+            free = np.delete(free, PERSPECTIVE)
+        result = np.zeros(len(self.right))
+        result[free] = np.linalg.solve(normal[np.ix_(free, free)], self.right[free])
+        return result
+
+
+def _solve(problem: _Problem, start: _Fit, iterations: int) -> _Fit:
+    """Return the best place reached from `start` (Levenberg-Marquardt)."""
+    fit, damping = start, 1e-3
+    here = problem.linearised(fit)
+    for _ in range(iterations):
+        move = here.move(damping, fit.flat)
+        vector = fit.vector + move
+        vector[PERSPECTIVE] = max(vector[PERSPECTIVE], MIN_PERSPECTIVE)
+        offset = fit.offset if here.landmarks is None else here.landmarks.offsets(move)
+        trial = replace(fit, vector=vector, offset=offset)
+        there = problem.linearised(trial)
+        if there.cost > here.cost * (1 + WORSE):
+            damping *= 10
+            if damping > 1e3:
+                break
+            continue
+        settled = here.cost - there.cost < SETTLED * here.cost
+        fit, here, damping = trial, there, damping / 5
+        if settled:
+            break
+    return replace(fit, cost=here.cost)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """All evidence about the cameras, and the prior."""
+
+    turn: Turn
+    outlines: Outlines
+    head: Head
+    landmarks: LandmarkFit | None
+    noise: float
+    """Of outlines, pixels."""
+    prior_spread: Float64Array
+    focal: float | None
+    """Focal length of the first view in pixels, where all views tell theirs."""
+
+    @classmethod
+    def of(
+        cls, capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
+    ) -> _Problem:
+        pixel = capture.views[0].height / REFERENCE_HEIGHT
+        turn = Turn.of(capture)
+        outlines = Outlines.of(masks, options.contour_points)
+        angles = np.radians([options.azimuth, options.elevation, options.roll])
+        each = [*angles, options.distance, options.shift, options.shift]
+        sights = Sights.of(capture, masks, options.landmark_px * pixel)
+        landmarks = None
+        if head.landmark_vertices is not None and len(sights) >= MIN_SIGHTS:
+            places = head.vertices[head.landmark_vertices].astype(np.float64)
+            side = np.nonzero(np.abs(np.cos(turn.azimuths)) < np.sin(FROM_THE_SIDE))[0]
+            fields, scale = outlines.fields, outlines.scale
+            if not all(mask.person_known for mask in masks):
+                side = side[:0]
+            landmarks = LandmarkFit(
+                places, shape_precision(places), sights, fields, scale, side, PROFILE_PX * pixel
+            )
+        shared = SHARED_SPREAD if landmarks is not None else SHARED_SPREAD_BY_MASKS
+        spread = np.concatenate([shared, np.tile(each, len(capture.views))])
+        noise = options.silhouette_px * pixel
+        focals = [view.focal_px for view in capture.views]
+        focal = None if None in focals else focals[0]
+        return cls(turn, outlines, head, landmarks, noise, spread, focal)
+
+    def with_carried(self, capture: Capture, fit: _Fit) -> _Problem:
+        """Return the problem with the landmarks that patches carry to other views, given a
+        solution."""
+        assert self.landmarks is not None
+        places = self.landmarks.landmarks + fit.offset
+        cameras = self.turn.cameras(fit.vector)
+        more = carry_landmarks(capture, cameras, self.head, places, PatchSettings())
+        sights = self.landmarks.sights.joined(more)
+        return replace(self, landmarks=replace(self.landmarks, sights=sights))
+
+    def start(self, flat: bool) -> _Fit:
+        """Return the nominal turn, its place and magnification as landmarks or masks suggest."""
+        vector = np.zeros(self.turn.size)
+        vector[PERSPECTIVE] = 1 / USUAL_DISTANCE
+        magnification, place = (
+            self._place_by_landmarks(self.landmarks)
+            if self.landmarks is not None
+            else self._place_by_masks()
+        )
+        vector[LOG_MAGNIFICATION], vector[3:6] = np.log(magnification), place
+        if self.focal is not None:
+            vector[PERSPECTIVE] = max(magnification / self.focal, MIN_PERSPECTIVE)
+        if flat:
+            vector[PERSPECTIVE] = MIN_PERSPECTIVE
+        return _Fit(vector, np.zeros((COUNT, 3)), flat, vector)
+
+    def cameras(self, vector: Float64Array) -> CameraArrays:
+        """Return the cameras as arrays."""
+        return (*self.turn.unpack(vector), self.turn.sizes / 2.0)
+
+    def _place_by_landmarks(self, landmarks: LandmarkFit) -> tuple[float, Float64Array]:
+        """Return magnification and the turn's centre: exact for cameras far away, so linear."""
+        sights = landmarks.sights
+        axes = self.turn.unpack(np.zeros(self.turn.size))[0][sights.view, :2]
+        seen = sights.pixel - self.turn.sizes[sights.view] / 2.0
+        weight = np.repeat(1 / sights.noise, 2)
+        left = np.concatenate([seen.reshape(-1, 1), axes.reshape(-1, 3)], axis=1)
+        right = np.einsum("nij,nj->ni", axes, landmarks.landmarks[sights.point]).ravel()
+        solution = np.linalg.lstsq(left * weight[:, None], right * weight, rcond=None)[0]
+        if not solution[0] > 0:
+            raise InputError(
+                "the landmarks do not fit a head seen from the views' azimuths; check their order"
+            )
+        return 1 / float(solution[0]), solution[1:]
+
+    def _place_by_masks(self) -> tuple[float, Float64Array]:
+        """Return magnification and the turn's centre from the silhouettes' tops and widths.
+
+        A silhouette is as wide as the head with a little hair where it lies `WIDEST` of its width
+        below its top.
+        """
+        top, middle, width = self.outlines.crowns(WIDEST)
+        scalp = self.head.vertices[self.head.scalp > 0.5].astype(np.float64)
+        breadth = np.ptp(scalp[:, [0, 2]], axis=0).mean() + 2 * HAIR_THICKNESS
+        magnification = float(np.median(width)) / breadth
+        depth = (scalp[:, 2].max() + scalp[:, 2].min()) / 2
+        crown = np.array([0.0, scalp[:, 1].max() + HAIR_THICKNESS, depth])
+        seen = (np.stack([middle, top], axis=1) - self.turn.sizes / 2.0) / magnification
+        axes = self.turn.unpack(np.zeros(self.turn.size))[0][:, :2].reshape(-1, 3)
+        place = np.linalg.lstsq(axes, axes @ crown - seen.ravel(), rcond=None)[0]
+        return magnification, place
+
+    def linearised(self, fit: _Fit) -> _Round:
+        """Return the normal equations, and the cost, at a place."""
+        vector = fit.vector
+        cameras, tangents = self.cameras(vector), self.turn.tangents(vector)
+        prior = (fit.prior_mean - vector) / self.prior_spread
+        normal, right = np.diag(self.prior_spread**-2.0), prior / self.prior_spread
+        cost = float(prior @ prior)
+        rows, residual = self._coherence_rows(vector, cameras, tangents)
+        normal, right = normal + rows.T @ rows, right + rows.T @ residual
+        cost += float(residual @ residual)
+        if self.focal is not None and not fit.flat:
+            row, off = self._focal_row(vector, self.focal)
+            normal, right = normal + np.outer(row, row), right + row * off
+            cost += off**2
+        if self.landmarks is None:
+            return _Round(cost, normal, right, None)
+        seen = self.landmarks.equations(fit.offset, cameras, tangents)
+        return _Round(cost + seen.cost, normal + seen.normal, right + seen.right, seen)
+
+    def _focal_row(self, vector: Float64Array, focal: float) -> tuple[Float64Array, float]:
+        """Return the row that keeps magnification over perspective near the known focal length."""
+        perspective = float(vector[PERSPECTIVE])
+        row = np.zeros(len(vector))
+        row[LOG_MAGNIFICATION], row[PERSPECTIVE] = 1, -1 / perspective
+        found = vector[LOG_MAGNIFICATION] - np.log(perspective)
+        return row / FOCAL_SPREAD, float(np.log(focal) - found) / FOCAL_SPREAD
+
+    def _coherence_rows(
+        self, vector: Float64Array, cameras: CameraArrays, tangents: Float64Array
+    ) -> tuple[Float64Array, Float64Array]:
+        """Return rows that bring contour rays into the silhouettes they miss, or nearly miss."""
+        value, slope = self._coherence(vector, cameras)
+        near = np.nonzero(value < 6 * self.noise)[0]
+        soft = SOFT * self.noise
+        missed = np.logaddexp(0, -value[near] / soft) * soft / self.noise
+        share = 1 / (1 + np.exp(value[near] / soft))
+        weight = np.sqrt(soft_l1_weight(missed))
+        rows = np.einsum("nvk,vkp->np", slope[near], tangents)
+        return rows * (share * weight / self.noise)[:, None], missed * weight
+
+    def _coherence(
+        self, vector: Float64Array, cameras: CameraArrays
+    ) -> tuple[Float64Array, Float64Array]:
+        middle = 1 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE)
+        return coherence(self.outlines, *cameras, middle)
+
+    def residual_px(self, fit: _Fit) -> float:
+        """Return the root mean square misfit of landmarks and missed contour rays, pixels."""
+        cameras = self.cameras(fit.vector)
+        value, _ = self._coherence(fit.vector, cameras)
+        misfit = value[value < 0]
+        if self.landmarks is not None:
+            misfit = np.append(misfit, self.landmarks.misfit(fit.offset, cameras))
+        return float(np.sqrt(np.mean(misfit**2))) if len(misfit) else 0.0

@@ -1,0 +1,248 @@
+"""Landmarks as evidence about cameras when the head's exact shape is not known.
+
+The landmarks of a person differ from a given head's by offsets that are smooth over the face: a
+Gaussian process. They are marginalised in closed form (the Schur complement of bundle adjustment:
+Triggs et al., "Bundle adjustment - a modern synthesis", 2000, with the process's covariance as
+prior), so that only the cameras remain unknown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit.storage import BoolArray, Float32Array, Float64Array, Int64Array
+from hairkit.types.capture import Capture
+from hairkit.types.mask import HAIR, Mask
+
+COUNT = 68
+JAW = 17
+"""The first landmarks trace the jaw, which detectors place less surely."""
+MIDLINE = np.array([27, 28, 29, 30, 33, 51, 57, 8])
+"""Nose, lips and chin: they lie on the outline of a view from the side."""
+AFFINE_SPREAD, SMOOTH_SPREAD, SMOOTH_LENGTH = 0.004, 0.004, 0.04
+PLACE_SPREAD, LOOSE_SPREAD = 0.004, 0.0015
+"""How heads differ, metres: stretch per 0.1 m, smooth bends and their reach, place of the face,
+single points."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sights:
+    """Landmarks seen in the views, one row each, with how far to trust them."""
+
+    view: Int64Array
+    """(N,) index of the view."""
+    point: Int64Array
+    """(N,) index of the landmark."""
+    pixel: Float64Array
+    """(N, 2)."""
+    noise: Float64Array
+    """(N,) standard deviation in pixels."""
+
+    @classmethod
+    def of(cls, capture: Capture, masks: tuple[Mask, ...], noise: float) -> Sights:
+        """Collect the landmarks; those of the jaw, or under hair, are only guesses of the
+        detector."""
+        rows = []
+        for index, (view, mask) in enumerate(zip(capture.views, masks, strict=True)):
+            if view.landmarks is None:
+                continue
+            for point, (x, y) in enumerate(view.landmarks):
+                inside = 0 <= x < view.width and 0 <= y < view.height
+                covered = inside and mask.labels[int(y), int(x)] == HAIR
+                trust = (2.0 if point < JAW else 1.0) * (3.0 if covered else 1.0)
+                rows.append((index, point, x, y, noise * trust))
+        return cls.of_rows(rows)
+
+    @classmethod
+    def of_rows(cls, rows: list[tuple[int, int, float, float, float]]) -> Sights:
+        """Return sights from rows of view, landmark, x, y and noise."""
+        table = np.array(rows, np.float64).reshape(-1, 5)
+        whole = table[:, :2].astype(np.int64)
+        return cls(whole[:, 0], whole[:, 1], table[:, 2:4], table[:, 4])
+
+    def __len__(self) -> int:
+        return len(self.view)
+
+    def joined(self, other: Sights) -> Sights:
+        """Return these sights and the others."""
+        return Sights(
+            np.concatenate([self.view, other.view]),
+            np.concatenate([self.point, other.point]),
+            np.concatenate([self.pixel, other.pixel]),
+            np.concatenate([self.noise, other.noise]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LandmarkEquations:
+    """What landmarks say about P numbers of the cameras, after the shape of the head is
+    marginalised."""
+
+    normal: Float64Array
+    """(P, P)."""
+    right: Float64Array
+    """(P,)."""
+    cost: float
+    _pull: Float64Array
+    _coupling: Float64Array
+    _shape: Float64Array
+
+    def offsets(self, move: Float64Array) -> Float64Array:
+        """Return the landmarks' offsets (68, 3) from the head's that go best with a step of the
+        cameras, metres."""
+        best = np.linalg.solve(self._shape, self._pull - self._coupling @ move)
+        return np.asarray(best.reshape(COUNT, 3), np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class LandmarkFit:
+    """The landmarks of a head, how those of people differ, and what is seen of them."""
+
+    landmarks: Float64Array
+    """(68, 3) in the head frame."""
+    precision: Float64Array
+    """(204, 204) inverse covariance of the offsets."""
+    sights: Sights
+    fields: Float32Array
+    """(V, H, W) signed distance to the silhouettes in pixels, see `Outlines`."""
+    scale: float
+    """Field pixels per pixel."""
+    profiles: Int64Array
+    """Views from the side, where the midline of the face lies on the outline."""
+    profile_noise: float
+    """Standard deviation of that, pixels."""
+
+    def project(
+        self, point: Int64Array, view: Int64Array, offset: Float64Array, cameras: CameraArrays
+    ) -> tuple[Float64Array, Float64Array, Float64Array]:
+        """Return pixels (N, 2), their slopes by camera motion (N, 2, 7) and by the point (N, 2,
+        3)."""
+        rotation, translation, focal, centre = cameras
+        place = (self.landmarks + offset)[point]
+        local = np.einsum("nij,nj->ni", rotation[view], place) + translation[view]
+        x, y, z = local.T
+        f, zero = focal[view], np.zeros_like(x)
+        zoom = np.stack([f * x / z, f * y / z], axis=1)
+        by_local = np.stack([f / z, zero, -zoom[:, 0] / z, zero, f / z, -zoom[:, 1] / z], axis=1)
+        by_local = by_local.reshape(-1, 2, 3)
+        by_camera = np.concatenate(
+            [np.cross(local[:, None, :], by_local), by_local, zoom[:, :, None]], axis=2
+        )
+        return zoom + centre[view], by_camera, by_local @ rotation[view]
+
+    def misfit(self, offset: Float64Array, cameras: CameraArrays) -> Float64Array:
+        """Return each sight's distance from where it should be (N,), pixels."""
+        sights = self.sights
+        pixels, _, _ = self.project(sights.point, sights.view, offset, cameras)
+        result: Float64Array = np.linalg.norm(sights.pixel - pixels, axis=1)
+        return result
+
+    def equations(
+        self, offset: Float64Array, cameras: CameraArrays, tangents: Float64Array
+    ) -> LandmarkEquations:
+        """Return the cameras' normal equations; `tangents` (V, 7, P) says how cameras follow the
+        unknowns."""
+        sights = self.sights
+        pixels, by_camera, by_point = self.project(sights.point, sights.view, offset, cameras)
+        residual = (sights.pixel - pixels) / sights.noise[:, None]
+        weight = np.sqrt(soft_l1_weight(np.linalg.norm(residual, axis=1))) / sights.noise
+        rows = np.einsum("nik,nkp->nip", by_camera, tangents[sights.view])
+        seen = (
+            (rows * weight[:, None, None]).reshape(-1, rows.shape[2]),
+            (by_point * weight[:, None, None]).reshape(-1, 3),
+            (residual * (weight * sights.noise)[:, None]).ravel(),
+            np.repeat(sights.point, 2),
+        )
+        outline = self._outline_rows(offset, cameras, tangents)
+        rows, by_shape, residual, point = (
+            np.concatenate(pair) for pair in zip(seen, outline, strict=True)
+        )
+        return self._marginalised(rows, by_shape, residual, point, offset)
+
+    def _outline_rows(
+        self, offset: Float64Array, cameras: CameraArrays, tangents: Float64Array
+    ) -> tuple[Float64Array, Float64Array, Float64Array, Int64Array]:
+        """Return rows that bring the midline of the face on to the outline of views from the
+        side."""
+        view = np.repeat(self.profiles, len(MIDLINE))
+        point = np.tile(MIDLINE, len(self.profiles))
+        pixels, by_camera, by_point = self.project(point, view, offset, cameras)
+        value, slope = _sampled(self.fields, self.scale, view, pixels)
+        residual = -value / self.profile_noise
+        weight = np.sqrt(soft_l1_weight(residual)) / self.profile_noise
+        weight = np.where(np.abs(residual) < GATE, weight, 0.0)
+        along = np.einsum("ni,nik->nk", slope, by_camera)
+        rows = np.einsum("nk,nkp->np", along, tangents[view]) * weight[:, None]
+        by_shape = np.einsum("ni,nik->nk", slope, by_point) * weight[:, None]
+        return rows, by_shape, -value * weight, point
+
+    def _marginalised(
+        self,
+        rows: Float64Array,
+        by_shape: Float64Array,
+        residual: Float64Array,
+        point: Int64Array,
+        offset: Float64Array,
+    ) -> LandmarkEquations:
+        """Eliminate the offsets: the Schur complement of their block."""
+        unknowns = rows.shape[1]
+        residual = residual + (by_shape * offset[point]).sum(1)
+        blocks = np.zeros((COUNT, 3, 3))
+        np.add.at(blocks, point, by_shape[:, :, None] * by_shape[:, None, :])
+        coupling = np.zeros((COUNT, 3, unknowns))
+        np.add.at(coupling, point, by_shape[:, :, None] * rows[:, None, :])
+        pull = np.zeros((COUNT, 3))
+        np.add.at(pull, point, by_shape * residual[:, None])
+        shape = self.precision.copy()
+        diagonal = np.arange(COUNT)
+        shape.reshape(COUNT, 3, COUNT, 3)[diagonal, :, diagonal] += blocks
+        flat = coupling.reshape(3 * COUNT, unknowns)
+        solved = np.linalg.solve(shape, np.column_stack([flat, pull.ravel()]))
+        normal = rows.T @ rows - flat.T @ solved[:, :-1]
+        right = rows.T @ residual - flat.T @ solved[:, -1]
+        cost = float(residual @ residual - pull.ravel() @ solved[:, -1])
+        return LandmarkEquations((normal + normal.T) / 2, right, cost, pull.ravel(), flat, shape)
+
+
+CameraArrays = tuple[Float64Array, Float64Array, Float64Array, Float64Array]
+"""Rotations (V, 3, 3), translations (V, 3), focal lengths (V,) and principal points (V, 2)."""
+GATE = 8.0
+"""Outlines farther off than this many spreads are of something else."""
+
+
+def shape_precision(landmarks: Float64Array) -> Float64Array:
+    """Return (204, 204), per metre squared: the inverse covariance of people's landmarks about
+    these."""
+    squared = ((landmarks[:, None] - landmarks[None]) ** 2).sum(2)
+    kernel = AFFINE_SPREAD**2 * (landmarks @ landmarks.T) / 0.1**2
+    kernel += SMOOTH_SPREAD**2 * np.exp(-squared / (2 * SMOOTH_LENGTH**2))
+    kernel += PLACE_SPREAD**2 + LOOSE_SPREAD**2 * np.eye(len(landmarks))
+    precision: Float64Array = np.kron(np.linalg.inv(kernel), np.eye(3))
+    return precision
+
+
+def soft_l1_weight(scaled: Float64Array) -> Float64Array:
+    """Return the weights of soft-L1 for residuals over their noise, with the bend at 2."""
+    weights: Float64Array = 1 / np.sqrt(1 + (scaled / 2) ** 2)
+    return weights
+
+
+def _sampled(
+    fields: Float32Array, scale: float, view: Int64Array, pixels: Float64Array
+) -> tuple[Float64Array, Float64Array]:
+    """Return signed distances (N,) and their slopes by the pixel (N, 2); far outside where off the
+    picture."""
+    height, width = fields.shape[1:]
+    place = pixels * scale - 0.5
+    below = place < np.array([width - 1, height - 1])
+    inside: BoolArray = np.asarray(((place >= 0) & below).all(1))
+    place = np.where(inside[:, None], place, 0.0)
+    j, i = place.astype(np.int64).T
+    x, y = (place - np.stack([j, i], axis=1)).T
+    a, b = fields[view, i, j], fields[view, i, j + 1]
+    c, d = fields[view, i + 1, j], fields[view, i + 1, j + 1]
+    value = (a * (1 - x) + b * x) * (1 - y) + (c * (1 - x) + d * x) * y
+    slope = np.stack([(b - a) * (1 - y) + (d - c) * y, (c - a) * (1 - x) + (d - b) * x], axis=1)
+    return np.where(inside, value, 1e6), slope * scale * inside[:, None]

@@ -1,0 +1,134 @@
+"""Contact between strands: friction with the hair around and a push out of crowded places.
+
+Hair's own points are spread on a grid as density and velocity (after Hadap and Magnenat-Thalmann,
+"Modeling dynamic hair as a continuum", 2001, and McAdams et al., "Detail preserving continuum
+simulation of straight hair", 2009). A point is drawn to the velocity of the hair in its cell, which
+is implicit like air drag, and pushed down the slope of density where it is denser than at rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hairkit.storage import Float64Array
+
+from .element_kernels import compiled
+
+CELL = 0.01
+"""Metres; a lock's width."""
+WIDEST = 256
+"""Cells along an edge of the grid at most; hair beyond is taken at its border."""
+
+
+class Neighbours:
+    """The hair around every point, compared with rest."""
+
+    def __init__(self, rest: Float64Array, masses: Float64Array) -> None:
+        """Keep the density at rest: `rest` (E, NODES, 3) in the head frame."""
+        self._masses = np.ascontiguousarray(masses.ravel())
+        points = np.ascontiguousarray(rest.reshape(-1, 3))
+        found = _around(points, np.zeros_like(points), self._masses)
+        self._rest = found[:, 0]
+        self._floor = float(np.median(self._rest)) if len(found) else 1.0
+
+    def act(
+        self,
+        points: Float64Array,
+        velocity: Float64Array,
+        drag: Float64Array,
+        air: Float64Array,
+        friction: float,
+        push: float,
+    ) -> tuple[Float64Array, Float64Array]:
+        """Return a drag (E, NODES) and the velocity (E, NODES, 3) it pulls to, the hair's included.
+
+        Parameters
+        ----------
+        points, velocity
+            (E, NODES, 3) of the Gauss points now.
+        drag, air
+            (E, NODES) kilograms per second and (E, NODES, 3) metres per second, of the air.
+        friction
+            Rate, per second, at which a point in hair as dense as the median at rest takes on the
+            speed of its neighbours.
+        push
+            Acceleration, metres per second squared, at twice the density of rest.
+        """
+        flat = points.reshape(-1, 3)
+        found = _around(flat, velocity.reshape(-1, 3), self._masses)
+        density, around, away = found[:, 0], found[:, 1:4], found[:, 4:]
+        rate = friction * np.minimum(density / self._floor, 1.0) * self._masses
+        crowded = np.clip(density / np.maximum(self._rest, self._floor) - 1.0, 0.0, 1.0)
+        force = (push * crowded * self._masses)[:, None] * away
+        total = drag + rate.reshape(drag.shape)
+        pulled = (rate[:, None] * around + force).reshape(air.shape) + drag[..., None] * air
+        return total, pulled / np.maximum(total, 1e-30)[..., None]
+
+
+def _around(points: Float64Array, velocity: Float64Array, masses: Float64Array) -> Float64Array:
+    """Return (P, 7) density, mean velocity, and unit direction down the slope of density."""
+    if not len(points):
+        return np.zeros((0, 7))
+    low = points.min(axis=0)
+    size = np.minimum((points.max(axis=0) - low) / CELL, WIDEST - 3).astype(np.int64) + 3
+    corners = np.zeros((*size, 4))
+    spread(points, low, velocity, masses, corners)
+    result = np.empty((len(points), 7))
+    gather(points, low, corners, result)
+    return result
+
+
+@compiled
+def spread(
+    points: Float64Array,
+    low: Float64Array,
+    velocity: Float64Array,
+    masses: Float64Array,
+    corners: Float64Array,
+) -> None:
+    """Add masses and momenta to the corners (X, Y, Z, 4) of the points' cells, trilinear."""
+    for p in range(len(points)):
+        x, y, z = (points[p] - low) / CELL
+        i, j, k = (
+            min(int(x), corners.shape[0] - 2),
+            min(int(y), corners.shape[1] - 2),
+            min(int(z), corners.shape[2] - 2),
+        )
+        u, v, w = min(x - i, 1.0), min(y - j, 1.0), min(z - k, 1.0)
+        for bit in range(8):
+            a, b, c = bit >> 2, bit >> 1 & 1, bit & 1
+            part = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w) * masses[p]
+            corners[i + a, j + b, k + c, 0] += part
+            for axis in range(3):
+                corners[i + a, j + b, k + c, 1 + axis] += part * velocity[p, axis]
+
+
+@compiled
+def gather(
+    points: Float64Array, low: Float64Array, corners: Float64Array, result: Float64Array
+) -> None:
+    """Write density, mean velocity and the direction of falling density at the points."""
+    value, slope = np.empty(4), np.empty(3)
+    for p in range(len(points)):
+        x, y, z = (points[p] - low) / CELL
+        i, j, k = (
+            min(int(x), corners.shape[0] - 2),
+            min(int(y), corners.shape[1] - 2),
+            min(int(z), corners.shape[2] - 2),
+        )
+        u, v, w = min(x - i, 1.0), min(y - j, 1.0), min(z - k, 1.0)
+        value[:], slope[:] = 0.0, 0.0
+        for bit in range(8):
+            a, b, c = bit >> 2, bit >> 1 & 1, bit & 1
+            f, g, h = (u if a else 1 - u), (v if b else 1 - v), (w if c else 1 - w)
+            for axis in range(4):
+                value[axis] += f * g * h * corners[i + a, j + b, k + c, axis]
+            density = corners[i + a, j + b, k + c, 0]
+            slope[0] += (2 * a - 1) * g * h * density
+            slope[1] += (2 * b - 1) * f * h * density
+            slope[2] += (2 * c - 1) * f * g * density
+        size = np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
+        result[p, 0] = value[0]
+        for axis in range(3):
+            result[p, 1 + axis] = value[1 + axis] / max(value[0], 1e-30)
+            result[p, 4 + axis] = -slope[axis] / max(size, 1e-30)

@@ -1,0 +1,211 @@
+"""The torso that photos show below a head, found by the outlines of the clothes.
+
+Where a body turns away from a view, its picture lies on the silhouette's edge. Where that edge is
+clothes or skin, the body ends right there; where it is hair, the body ends at least the hair's
+thickness further in. A few numbers are fitted to all views by robust least squares, with a weak
+pull to an adult's torso.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from hairkit.cameras.projection_kernels import head_depth, mesh_depth
+from hairkit.head_model.torso import Torso
+from hairkit.storage import BoolArray, Float32Array, Float64Array
+from hairkit.types.camera import Camera
+from hairkit.types.head import Head
+from hairkit.types.mask import HAIR, PERSON, Mask
+
+FIELD_HEIGHT = 240
+"""Rows of the pictures in which outlines are looked up."""
+THICKNESS = 0.010
+"""Metres of hair between the body and an outline that is hair, on a head of an adult's size."""
+SOFT = 0.010
+"""Metres beyond which a misfit counts less than squared."""
+HEIGHTS = np.array([32, 20, 10, 0, -12, -25, -38, -55, -75, -105, -140, -200, -270, -340]) * 1e-3
+"""Of the sections whose outlines are compared, metres above the root joint."""
+AROUND = 48
+"""Points of a section."""
+USUAL = {
+    "breadth": 0.2,
+    "depth": 0.2,
+    "drop": 0.03,
+    "slope": 0.3,
+    "forward": 0.03,
+    "lean": 0.2,
+    "sideways": 0.02,
+    "roll": 0.1,
+    "yaw": 0.15,
+}
+"""How much people differ: standard deviations of ratios' logarithms, metres and radians."""
+RATIOS = ("breadth", "depth", "slope")
+PULL = 0.002
+"""Metres of misfit of every outline point that weigh as much as one standard deviation."""
+FEWEST_VIEWS, LEAST_CLOTHES = 3, 0.01
+"""Views that must show clothes below the head, and on which share of their pixels."""
+COVERED, STRAY = 0.75, 0.1
+"""Share of the clothes that the torso must cover, and of the torso that may lie on background."""
+
+
+def fit_torso(head: Head, cameras: Sequence[Camera], masks: Sequence[Mask]) -> Torso | None:
+    """Return the torso that fits the masks of all views, or None where they show none.
+
+    None comes where fewer than `FEWEST_VIEWS` views show clothes below the head (cropped photos,
+    masks that know hair alone), and where what they show is not shaped like a torso.
+
+    Parameters
+    ----------
+    head
+        Fitted to the photos; its joints place the torso.
+    cameras, masks
+        One a view, in the same order.
+    """
+    from scipy.optimize import least_squares  # slow to load
+
+    known = [(c, m) for c, m in zip(cameras, masks, strict=True) if m.person_known]
+    usual = Torso.under(head)
+    views = [view for view in (_View.of(head, usual, *pair) for pair in known) if view is not None]
+    if len(views) < FEWEST_VIEWS:
+        return None
+    solved = least_squares(
+        lambda numbers: _misfits(_torso(usual, numbers), numbers, views),
+        np.zeros(len(USUAL)),
+        loss="soft_l1",
+        f_scale=SOFT,
+        diff_step=1e-3,
+        xtol=1e-4,
+        ftol=1e-4,
+        max_nfev=40,
+    )
+    found = _torso(usual, solved.x)
+    return found if _agrees(found, views) else None
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A small picture of one view."""
+
+    camera: Camera
+    misfit: Float32Array
+    """(H, W) metres by which an outline of the body at a pixel is wrong."""
+    clothes: BoolArray
+    """(H, W) the person below the head, neither hair nor head."""
+    bare: BoolArray
+    """(H, W) neither person nor hair."""
+
+    @classmethod
+    def of(cls, head: Head, usual: Torso, camera: Camera, mask: Mask) -> _View | None:
+        """Return the view, or None where it shows no clothes."""
+        height, width = mask.labels.shape
+        size = (max(round(width * FIELD_HEIGHT / height), 8), FIELD_HEIGHT)
+        camera = camera.resized(*size)
+        hair, person = (_share(mask, label, size) for label in (HAIR, PERSON))
+        clothes = (person > 0.5) & ~np.isfinite(head_depth(head, camera))
+        below = camera.project(usual.joint)[1]
+        clothes[: min(max(int(np.nan_to_num(below)), 0), FIELD_HEIGHT)] = False
+        if clothes.mean() < LEAST_CLOTHES:
+            return None
+        away = float(camera.depth(usual.joint)) if camera.model == "perspective" else 1.0
+        pixels_per_metre = camera.focal / away
+        thickness = THICKNESS * usual.scale * pixels_per_metre
+        misfit = _misfit_field(hair, person, thickness) / np.float32(pixels_per_metre)
+        return cls(camera, misfit, clothes, hair + person < 0.5)
+
+
+def _share(mask: Mask, label: int, size: tuple[int, int]) -> Float32Array:
+    wanted = (mask.labels == label).astype(np.float32)
+    return np.asarray(cv2.resize(wanted, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _misfit_field(hair: Float32Array, person: Float32Array, thickness: float) -> Float32Array:
+    """Return pixels (H, W) by which a body's outline misses the silhouette's, outside positive.
+
+    An outline that is hair hides how far in the body ends: only `thickness` is asked for.
+    """
+    hairs, whole = (cv2.GaussianBlur(part, (0, 0), 1.0) for part in (hair, hair + person))
+    within = whole > 0.5
+    rim = within & (cv2.dilate((~within).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
+    hairy = hairs > 0.5 * whole
+    to_hair, to_body = _way_to(rim & hairy), _way_to(rim & ~hairy)
+    if not rim.any():
+        return np.zeros(hair.shape, np.float32)
+    by_hair = to_hair < to_body
+    inner = np.where(by_hair, np.maximum(thickness - to_hair, 0), -to_body)
+    outer = np.minimum(to_hair, to_body) + np.where(by_hair, thickness, 0)
+    field = np.where(within, inner, outer).astype(np.float32)
+    return np.asarray(cv2.GaussianBlur(field, (0, 0), 1.0), np.float32)
+
+
+def _way_to(pixels: BoolArray) -> Float32Array:
+    """Return the distance (H, W) to the nearest of the pixels, very far where there is none."""
+    if not pixels.any():
+        return np.full(pixels.shape, 1e4, np.float32)
+    others = (~pixels).astype(np.uint8)
+    return np.asarray(cv2.distanceTransform(others, cv2.DIST_L2, 5), np.float32)
+
+
+def _torso(usual: Torso, numbers: Float64Array) -> Torso:
+    """Return the torso that differs from the usual one by so many standard deviations (9,)."""
+    values: dict[str, Any] = {}
+    for (name, deviation), number in zip(USUAL.items(), numbers, strict=True):
+        change = float(deviation * number)
+        values[name] = float(np.exp(change)) if name in RATIOS else change
+    return replace(usual, **values)
+
+
+def _misfits(torso: Torso, numbers: Float64Array, views: Sequence[_View]) -> Float64Array:
+    """Return metres by which the outline misses that of every view, then the pull to an adult."""
+    surface = torso.surface(HEIGHTS, AROUND)
+    around = np.roll(surface, -1, axis=1) - np.roll(surface, 1, axis=1)
+    normal = np.cross(np.gradient(surface, axis=0), around)
+    parts = [_looked_up(view, *_outline(surface, normal, view.camera)) for view in views]
+    weight = PULL * np.sqrt(sum(len(part) for part in parts))
+    return np.concatenate([*parts, weight * numbers])
+
+
+def _outline(
+    surface: Float64Array, normal: Float64Array, camera: Camera
+) -> tuple[Float64Array, BoolArray]:
+    """Return points (2 R, 3) where the sections (R, A, 3) turn away on either side, and which of
+    them there are (2 R,)."""
+    facing = (normal * camera.view_direction(surface)).sum(axis=-1)
+    after = np.roll(facing, -1, axis=1)
+    rows = np.arange(len(surface))
+    points, there = [], []
+    for turns in ((facing <= 0) & (after > 0), (facing > 0) & (after <= 0)):
+        at = turns.argmax(axis=1)
+        there.append(turns.any(axis=1))
+        change = facing[rows, at] - after[rows, at]
+        share = np.clip(facing[rows, at] / np.where(change == 0, 1, change), 0, 1)[:, None]
+        following = surface[rows, (at + 1) % AROUND]
+        points.append((1 - share) * surface[rows, at] + share * following)
+    return np.concatenate(points), np.concatenate(there)
+
+
+def _looked_up(view: _View, points: Float64Array, there: BoolArray) -> Float64Array:
+    """Return the misfits (N,) of outline points (N, 3), 0 beyond the picture's edge."""
+    pixels = np.nan_to_num(view.camera.project(points), nan=-1.0)
+    size = np.array([view.camera.width, view.camera.height])
+    inside = there & (pixels > 0).all(axis=1) & (pixels < size).all(axis=1)
+    values = map_coordinates(view.misfit, pixels[:, ::-1].T - 0.5, order=1, mode="nearest")
+    return np.where(inside, values, 0.0)
+
+
+def _agrees(torso: Torso, views: Sequence[_View]) -> bool:
+    """Tell whether the torso covers the clothes and little else."""
+    vertices, faces = torso.mesh()
+    clothes = covered = shown = stray = 0
+    for view in views:
+        body = np.isfinite(mesh_depth(vertices, faces, view.camera))
+        clothes += int(view.clothes.sum())
+        covered += int((view.clothes & body).sum())
+        shown += int(body.sum())
+        stray += int((view.bare & body).sum())
+    return covered >= COVERED * clothes and stray <= STRAY * shown

@@ -1,0 +1,19 @@
+#version 430
+// Places between the guides' points, head axes: what is drawn of a guide at shares of its length.
+#include "pbd_layout.glsl"
+#include "pbd_embedding.glsl"
+layout(std430, binding = 2) writeonly buffer Rows { float rows[]; };  // x, y, z
+layout(std430, binding = 3) readonly buffer Between { ivec2 between[]; };  // point before; part of the way
+uniform int u_count;
+
+void main() {
+    int i = invocation();
+    if (i >= u_count) return;
+    int before = between[i].x;
+    float part = intBitsToFloat(between[i].y);
+    vec3 at = guide_point(before);
+    if (part > 0.0) at = mix(at, guide_point(before + 1), part);
+    rows[3 * i] = at.x;
+    rows[3 * i + 1] = at.y;
+    rows[3 * i + 2] = at.z;
+}

@@ -1,0 +1,138 @@
+#version 430
+// Shades hair at its points and draws the pieces between them into sums a pixel, in any order: colour
+// times weight, and weight, where the weight is the coverage of the pixel times the share of light
+// that hair in front lets by. Compute shaders run on all cores of a software renderer; triangle
+// set-up runs on one.
+#include "viewer_hair.glsl"
+#include "viewer_accumulation.glsl"
+#include "lighting.glsl"
+#include "marschner.glsl"
+#include "tone.glsl"
+
+layout(local_size_x = 64) in;
+layout(std430, binding = 1) readonly buffer Hairs { uint hairs[]; };
+layout(std430, binding = 2) readonly buffer Offsets { uint offsets[]; };
+layout(std430, binding = 3) readonly buffer Places { float places[]; };
+layout(std430, binding = 7) buffer Sums { uint sums[]; };   // two a pixel, two 16-bit numbers each
+
+uniform vec3 u_eye;
+uniform vec3 u_root_colour;
+uniform vec3 u_tip_colour;
+uniform float u_show_direction;
+uniform sampler2D u_solid_depth;
+uniform sampler3D u_opacity;
+uniform ivec2 u_picture;
+uniform float u_smooth;         // 1: partial coverage across the stroke; 0: whole pixels, faster
+
+const float BOUNCED = 0.1;      // of the sky's light, that comes through hair on all ways
+const float HIDDEN = 0.14;      // a piece of which less arrives is not drawn
+const float DENSE = 0.4;       // of the opacity of a whole tile: locks are denser than the gaps beside them
+const float WIDEST = 64.0;      // pixels
+
+vec3 place_at(int index) { return vec3(places[3 * index], places[3 * index + 1], places[3 * index + 2]); }
+
+float arriving(Seen s) {
+    if (s.depth < 0.0) return 0.0;
+    float slice = clamp((s.depth - u_slice_range.x) * u_slice_range.y, 0.0, float(SLICES));
+    vec3 at = vec3(s.pixel.xy / (float(TILE) * vec2(u_tiles)), (slice + 0.5) / float(SLICES + 1));
+    return exp(-DENSE * textureLod(u_opacity, at, 0.0).r);
+}
+
+vec3 seen_colour(vec3 position, vec3 tangent, float share, float random) {
+    vec3 to_eye = u_perspective > 0.5 ? normalize(u_eye - position) : -u_forward;
+    float other = fract(random * 61.8034);
+    vec3 colour = mix(u_root_colour, u_tip_colour, share);
+    colour = pow(colour, vec3(0.85 + 0.3 * random)) * (0.8 + 0.4 * other);
+    vec3 reached = light_at(position);
+    if (u_show_direction > 0.5)
+        return (0.2 + 0.8 * abs(tangent.xzy)) * (0.5 + 0.5 * reached.b) * (0.8 + 0.2 * other);
+    vec3 key = fibre(tangent, u_key_direction, to_eye, colour, random) * u_key_colour * reached.r;
+    vec3 rim = fibre(tangent, u_rim_direction, to_eye, colour, other) * u_rim_colour * reached.g;
+    vec3 sky = colour * ambient(0.3) * mix(BOUNCED, 1.0, reached.b);
+    return tone(key + rim + sky);
+}
+
+bool hidden_by_solid(vec3 pixel) {
+    ivec2 at = clamp(ivec2(pixel.xy), ivec2(0), u_picture - 1);
+    return pixel.z > texelFetch(u_solid_depth, at, 0).r;
+}
+
+void add(ivec2 pixel, vec4 colour_weight, float dither) {
+    uvec4 whole = uvec4(colour_weight * SUM_UNIT + dither);
+    uint index = sum_index(pixel, u_picture.x);
+    atomicAdd(sums[index], whole.r << 16 | whole.g);
+    atomicAdd(sums[index + 1], whole.b << 16 | whole.a);
+}
+
+void stroke(vec3 a, vec3 b, vec4 from, vec4 to, float width, float dither) {
+    vec3 middle = mix(a, b, 0.5);
+    int hidden = int(hidden_by_solid(a)) + int(hidden_by_solid(middle)) + int(hidden_by_solid(b));
+    if (hidden == 3) return;
+    bool test = hidden > 0;     // pixel by pixel only where a solid's outline is crossed
+
+    vec2 along = b.xy - a.xy;
+    bool steep = abs(along.y) > abs(along.x);
+    if (steep) { a.xy = a.yx; b.xy = b.yx; along = along.yx; }
+    if (along.x < 0.0) {
+        vec3 end = a; a = b; b = end;
+        vec4 colour = from; from = to; to = colour;
+        along = -along;
+    }
+    ivec2 limit = steep ? u_picture.yx : u_picture;
+    int first = max(int(ceil(a.x - 0.5)), 0), last = min(int(ceil(b.x - 0.5)), limit.x);
+    float across = min(width * length(along) / max(along.x, 1e-6), WIDEST);   // along the minor axis
+    float half_width = 0.5 * max(across, 1.0);
+    bool whole = u_smooth < 0.5 && across <= 1.0;
+    float pace = 1.0 / max(along.x, 1e-6);
+    float t = (float(first) + 0.5 - a.x) * pace;
+    vec4 start = vec4(from.rgb * from.a, from.a) * min(across, 1.0);
+    vec4 change = vec4(to.rgb * to.a, to.a) * min(across, 1.0) - start;
+    float y = a.y + t * along.y, slope = along.y * pace;
+    if (whole) {
+        for (int x = first; x < last; x++, t += pace, y += slope) {
+            int row = int(y);
+            if (y < 0.0 || row >= limit.y) continue;
+            ivec2 pixel = steep ? ivec2(row, x) : ivec2(x, row);
+            if (test && mix(a.z, b.z, t) > texelFetch(u_solid_depth, pixel, 0).r) continue;
+            add(pixel, start + t * change, fract(dither + 0.618034 * float(x)));
+        }
+        return;
+    }
+    for (int x = first; x < last; x++, t += pace, y += slope) {
+        int low = max(int(floor(y - half_width)), 0);
+        int high = min(int(floor(y + half_width)), limit.y - 1);
+        for (int row = low; row <= high; row++) {
+            ivec2 pixel = steep ? ivec2(row, x) : ivec2(x, row);
+            if (test && mix(a.z, b.z, t) > texelFetch(u_solid_depth, pixel, 0).r) continue;
+            float part = min(y + half_width, float(row + 1)) - max(y - half_width, float(row));
+            add(pixel, (start + t * change) * part, fract(dither + 0.618034 * float(x)));
+        }
+    }
+}
+
+void main() {
+    int strand = int(gl_GlobalInvocationID.x);
+    if (strand >= u_count) return;
+    float random = float(hairs[3 * strand + 1] >> 16) / 65535.0;
+    int start = strand * u_points;
+    vec3 before = place_at(start), here = before, after;
+    Seen last;
+    vec4 last_look;
+    for (int k = 0; k < u_points; k++) {
+        after = k < u_points - 1 ? place_at(start + k + 1) : here;
+        Seen s = seen_from(here);
+        vec4 look = vec4(0.0, 0.0, 0.0, arriving(s));
+        if (look.a > HIDDEN) {
+            vec3 tangent = normalize(after - before + vec3(0.0, 1e-12, 0.0));
+            look.rgb = seen_colour(here, tangent, float(k) / float(u_points - 1), random);
+            if (k > 0 && last_look.a > HIDDEN) {
+                float width = 0.001 * unpackHalf2x16(offsets[2 * (start + k) + 1]).y * u_wider * s.scale;
+                stroke(last.pixel, s.pixel, last_look, look, width, fract(random + float(k) * 0.7548777));
+            }
+        }
+        last = s;
+        last_look = look;
+        before = here;
+        here = after;
+    }
+}

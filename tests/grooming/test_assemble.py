@@ -1,0 +1,89 @@
+"""Strands, head and photos make a groom: bound, coloured, without what is no strand."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairkit.errors import InputError
+from hairkit.grooming.assemble import assemble_groom, linear_from_srgb, measure_colour
+from hairkit.testing import ball_head, ball_mask, scalp_roots, striped_view, turn_scene
+from hairkit.types.head import Roots
+from hairkit.types.mask import Mask
+from hairkit.types.strands import Strands
+
+HEAD, ROOTS = ball_head(), scalp_roots(ball_head())
+VIEW, MASK = striped_view(90.0), ball_mask(turn_scene().cameras[0])
+
+
+def bristles(lengths: np.ndarray) -> Strands:
+    """Two-point strands of the lengths (N,) along the normals of the first N roots."""
+    tips = ROOTS.positions[: len(lengths)] + lengths[:, None] * ROOTS.normals[: len(lengths)]
+    points = np.stack([ROOTS.positions[: len(lengths)], tips], axis=1)
+    return Strands(points.reshape(-1, 3), 2 * np.arange(len(lengths) + 1))
+
+
+def test_every_strand_stays_bound_to_its_root(caplog: pytest.LogCaptureFixture) -> None:
+    """Strands without length go, with their binding; the rest starts where its root is bound."""
+    lengths = np.full(len(ROOTS), 0.05)
+    lengths[::7] = 0.0
+    with caplog.at_level(logging.WARNING, "hairkit"):
+        groom = assemble_groom([VIEW], [MASK], HEAD, ROOTS, bristles(lengths))
+    gone = np.count_nonzero(lengths == 0)
+    assert len(groom.strands) == len(ROOTS) - gone
+    assert f"{gone} of {len(ROOTS)} roots gave no strand" in caplog.text
+    corners = HEAD.vertices[HEAD.faces[groom.root_triangle]]
+    bound = np.einsum("sc,sck->sk", groom.root_barycentric, corners)
+    assert bound == pytest.approx(groom.strands.roots, abs=1e-6)
+    assert np.array_equal(groom.strands.root_uv, ROOTS.uv[lengths > 0])
+    assert groom.strands.guide.all()
+    assert groom.strands.widths == pytest.approx(groom.material.width)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "reason"),
+    [
+        (np.zeros(len(ROOTS)), "none of .* roots gave a strand"),
+        (np.full(len(ROOTS) - 1, 0.1), "expected one each"),
+    ],
+)
+def test_no_strands_are_no_groom(lengths: np.ndarray, reason: str) -> None:
+    """A tracker that gives nothing, or not one strand a root, is an error of one line."""
+    with pytest.raises(InputError, match=reason):
+        assemble_groom([VIEW], [MASK], HEAD, ROOTS, bristles(lengths))
+
+
+def test_colour_is_the_hairs_own() -> None:
+    """The colours come from hair only, linear: the upper is the root's, the lower the tip's."""
+    image = np.full((90, 60, 3), 255, np.uint8)
+    labels = np.zeros((90, 60), np.uint8)
+    labels[20:80, 15:45] = 255
+    image[20:50, 15:45], image[50:80, 15:45] = (120, 80, 60), (180, 140, 90)
+    material = measure_colour(
+        [replace(VIEW, image=image, photo_size=(60, 90))], [Mask(labels, True)]
+    )
+    assert material.root_colour == pytest.approx(linear_from_srgb(np.array([120, 80, 60]) / 255))
+    assert material.tip_colour == pytest.approx(linear_from_srgb(np.array([180, 140, 90]) / 255))
+
+
+def test_a_single_hair_pixel_has_a_colour() -> None:
+    """Hair thinner than the edge that is left out still gives a colour."""
+    labels = np.zeros(VIEW.image.shape[:2], np.uint8)
+    labels[5, 5] = 255
+    material = measure_colour([VIEW], [Mask(labels, True)])
+    assert material.tip_colour == pytest.approx(linear_from_srgb(VIEW.image[5, 5] / 255))
+
+
+def test_roots_and_strands_have_one_order() -> None:
+    """Reordering roots and strands alike reorders the groom and changes nothing else."""
+    order = np.random.default_rng(0).permutation(len(ROOTS))
+    strands = bristles(np.linspace(0.01, 0.1, len(ROOTS)))
+    names = ("positions", "normals", "uv", "triangle", "barycentric")
+    shuffled = Roots(*(getattr(ROOTS, name)[order] for name in names))
+    first = assemble_groom([VIEW], [MASK], HEAD, ROOTS, strands)
+    second = assemble_groom([VIEW], [MASK], HEAD, shuffled, strands.select(order))
+    assert np.array_equal(second.strands.points, first.strands.select(order).points)
+    assert np.array_equal(second.root_triangle, first.root_triangle[order])

@@ -1,0 +1,46 @@
+"""Laws of the last steps that trackers share."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairkit.grooming import postprocess
+from hairkit.grooming.postprocess import FinishOptions, finished
+from hairkit.imaging.waves import Waves
+from hairkit.testing import ball_head, scalp_roots, shell_hull, turn_scene
+from hairkit.types.strands import Strands
+
+PLAIN = FinishOptions(waves=False, clearance=0.0)
+
+
+def bristles() -> Strands:
+    """Straight strands out of the ball, 5 cm long, with root coordinates."""
+    roots = scalp_roots(ball_head())
+    course = np.linspace(0, 0.05, 30)[None, :, None]
+    points = roots.positions[:, None] + course * roots.normals[:, None]
+    count = len(roots)
+    flat = points.reshape(-1, 3).astype(np.float32)
+    return Strands(flat, np.arange(count + 1) * 30, root_uv=roots.uv)
+
+
+def test_strands_that_need_nothing_stay_as_they_are() -> None:
+    """Outside of the head, without waves and smoothing: the same points and coordinates."""
+    strands = bristles()
+    result = finished(strands, turn_scene(), (), (), shell_hull(), PLAIN)
+    np.testing.assert_allclose(result.points, strands.points, atol=1e-7)
+    np.testing.assert_array_equal(result.root_uv, strands.root_uv)
+
+
+def test_wound_strands_keep_the_clearance_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Waves are wound before strands are kept out of the head, so none dips into it."""
+    monkeypatch.setattr(postprocess, "measure_waves", lambda *_: Waves(0.01, 0.03, 0.3))
+    strands, hull = bristles(), shell_hull()
+    options = replace(PLAIN, waves=True, clearance=0.003)
+    result = finished(strands, turn_scene(), (), (), hull, options)
+    assert result.lengths().mean() > 1.2 * strands.lengths().mean()
+    free = np.ones(len(result.points), bool)
+    free[result.offsets[:-1]] = False
+    assert hull.grid.sample(hull.head_distance, result.points[free]).min() > 0.003 - 1e-4

@@ -1,0 +1,151 @@
+"""Laws of the house: floors, packaging, sizes, light start."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PROJECT = Path(__file__).parents[2]
+SOURCES = sorted((PROJECT / "hairkit").rglob("*.py"))
+PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins" / "__init__.py"})
+
+FLOORS = (
+    ("errors", "options", "storage", "progress", "parallel"),
+    ("types",),
+    ("cameras", "imaging", "helices", "head_model", "render", "hookspecs"),
+    ("field", "io"),
+    ("simulate", "grooming", "synth"),
+    ("manager", "testing"),
+    ("pipeline", "evaluate"),
+    ("viewer",),
+    ("cli", "__main__"),
+)
+"""Rooms of hairkit, lowest floor first. A room may use its own floor and those below."""
+
+FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
+
+
+def imported(path: Path) -> list[str]:
+    """Return the full names of everything a file imports, inside functions too."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            names += [f"{node.module}.{alias.name}" for alias in node.names]
+    return names
+
+
+def pyproject() -> dict[str, Any]:
+    """Return the project's pyproject.toml."""
+    return tomllib.loads((PROJECT / "pyproject.toml").read_text())
+
+
+def room(name: str) -> str:
+    """Return the room of a module: `render` for hairkit.render.hair, "" outside hairkit."""
+    first, *rest = name.split(".")
+    return rest[0] if first == "hairkit" and rest else ""
+
+
+def test_every_room_has_its_floor() -> None:
+    """A module or package at the top of hairkit stands in `FLOORS`, and nothing else does."""
+    found = {path.stem for path in (PROJECT / "hairkit").glob("*.py")}
+    found |= {path.parent.name for path in (PROJECT / "hairkit").glob("*/__init__.py")}
+    assert found - {"__init__"} == set(FLOOR_OF)
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PROJECT)))
+def test_no_room_uses_a_floor_above(path: Path) -> None:
+    """A room imports from its own floor and the floors below."""
+    module = ".".join(path.relative_to(PROJECT).with_suffix("").parts)
+    if module == "hairkit.__init__":
+        return  # the front door shows names of several floors
+    own = FLOOR_OF[room(module)]
+    used = {name for name in imported(path) if room(name) in FLOOR_OF}
+    above = sorted(name for name in used if FLOOR_OF[room(name)] > own)
+    assert not above, f"{module} on floor {own} uses {above}"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PROJECT)))
+def test_hairkit_names_no_plugin_module(path: Path) -> None:
+    """Plugins are found by entry point; the SDK does not know them."""
+    assert "hairkit_plugins" not in path.read_text()
+
+
+@pytest.mark.parametrize("path", PLUGINS, ids=lambda p: str(p.relative_to(PROJECT)))
+def test_a_plugin_stands_alone_on_public_names(path: Path) -> None:
+    """A plugin uses no other plugin, nothing private, and nothing of the floors that run it."""
+    folder = path.relative_to(PROJECT / "plugins").parts[0]
+    for name in imported(path):
+        own = name.startswith(f"hairkit_plugins.{folder}.")
+        assert own or not name.startswith("hairkit_plugins"), f"{path.name} uses {name}"
+        if name.startswith("hairkit."):
+            assert not any(part.startswith("_") for part in name.split(".")), name
+            assert FLOOR_OF.get(room(name), 0) < FLOOR_OF["manager"], name
+
+
+@pytest.mark.parametrize("path", SOURCES + PLUGINS, ids=lambda p: str(p.relative_to(PROJECT)))
+def test_a_file_tells_one_story(path: Path) -> None:
+    """Files stay under 400 lines, begin with a docstring and have no name that says nothing."""
+    text = path.read_text()
+    assert len(text.splitlines()) < 400
+    assert path.stem not in ("utils", "helpers", "common", "misc")
+    assert not text.strip() or ast.get_docstring(ast.parse(text))
+
+
+def test_every_package_is_in_the_wheel() -> None:
+    """The list of packages in pyproject.toml is the list of packages there are."""
+    found = {
+        ".".join(path.parent.relative_to(PROJECT).parts)
+        for path in (PROJECT / "hairkit").rglob("__init__.py")
+    }
+    found |= {"hairkit.shaders", "hairkit_plugins"}
+    found |= {f"hairkit_plugins.{p.parent.name}" for p in PROJECT.glob("plugins/*/__init__.py")}
+    assert set(pyproject()["tool"]["setuptools"]["packages"]) == found
+
+
+def test_every_plugin_has_its_entry_point() -> None:
+    """A file in plugins/ is registered under its own name, and nothing else is."""
+    found = {path.stem for path in PROJECT.glob("plugins/*.py")} - {"__init__"}
+    found |= {path.parent.name for path in PROJECT.glob("plugins/*/__init__.py")}
+    entries = pyproject()["project"]["entry-points"]["hairkit"]
+    assert entries == {name: f"hairkit_plugins.{name}" for name in found}
+
+
+def test_data_files_are_in_the_wheel() -> None:
+    """Every file beside the sources that is not Python is covered by a package-data pattern."""
+    patterns = pyproject()["tool"]["setuptools"]["package-data"]
+    for package, folder in (("hairkit", "hairkit"), ("hairkit.shaders", "shaders")):
+        base = PROJECT / folder
+        covered = {path for pattern in patterns[package] for path in base.glob(pattern)}
+        for path in base.rglob("*"):
+            inside = path.is_file() and "__pycache__" not in path.parts and path.suffix != ".py"
+            assert not inside or path in covered, f"{path} would not be installed"
+
+
+def test_versions_agree() -> None:
+    """The version in pyproject.toml is the one in the package."""
+    import hairkit
+
+    assert pyproject()["project"]["version"] == hairkit.__version__
+
+
+def test_importing_hairkit_is_light() -> None:
+    """OpenGL, OpenCV, Numba and other heavy libraries load where they are used."""
+    heavy = ["cv2", "numba", "moderngl", "glfw", "trimesh", "rich", "scipy", "rtree"]
+    code = f"import hairkit, sys; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_every_public_name_is_there() -> None:
+    """`__all__` of the front door names what exists, sorted out by ruff."""
+    import hairkit
+
+    assert all(hasattr(hairkit, name) for name in hairkit.__all__)

@@ -1,0 +1,237 @@
+"""Laws of the waves: measured on made-up orientation maps, wound on straight strands."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hairkit.imaging.waves import Waves, add_waves, measure_waves, without_slant
+from hairkit.storage import Float64Array
+from hairkit.types.camera import Camera
+from hairkit.types.mask import HAIR, Mask
+from hairkit.types.orientation import OrientationMap, angle_between, wrap_angle
+from hairkit.types.strands import Strands
+
+HEIGHT, WIDTH = 540, 360
+METRES_PER_PIXEL = 0.001
+BORDER = 20
+VIEWS = 4
+
+
+def orthographic(azimuth: float = 0.0, height: int = HEIGHT) -> Camera:
+    """A camera whose pixels are a millimetre large at a height of 540."""
+    scale = height / HEIGHT
+    return Camera.on_turn(
+        azimuth,
+        focal=scale / METRES_PER_PIXEL,
+        width=round(WIDTH * scale),
+        height=height,
+        model="orthographic",
+    )
+
+
+def swinging(
+    pitch: float, swing: float, slant: float = 0.0, noise: float = 0.03, seed: int = 0,
+    height: int = HEIGHT,
+) -> tuple[list[OrientationMap], list[Mask], list[Camera]]:  # fmt: skip
+    """Views of hair that hangs down; its angle swings by `swing` radians, once in `pitch` metres.
+
+    Wisps beside each other are out of step.
+    """
+    rng = np.random.default_rng(seed)
+    scale = height / HEIGHT
+    width = round(WIDTH * scale)
+    y = np.arange(height)[:, None] * METRES_PER_PIXEL / scale
+    maps, cameras = [], []
+    for view in range(VIEWS):
+        phase = np.repeat(rng.uniform(0, 2 * np.pi, -(-width // 12)), 12)[:width]
+        angle = np.pi / 2 + slant + swing * np.sin(2 * np.pi * y / pitch + phase)
+        angle = angle + rng.normal(0, noise, angle.shape)
+        maps.append(OrientationMap(wrap_angle(angle), np.ones(angle.shape, np.float32)))
+        cameras.append(orthographic(90.0 * view, height))
+    labels = np.zeros((height, width), np.uint8)
+    labels[BORDER:-BORDER, BORDER:-BORDER] = HAIR
+    return maps, [Mask(labels, True)] * VIEWS, cameras
+
+
+@pytest.mark.parametrize("pitch", [0.02, 0.035, 0.06])
+def test_the_pitch_is_the_period_of_the_swing(pitch: float) -> None:
+    """Within 15 percent, for tight and for wide waves."""
+    waves = measure_waves(*swinging(pitch, 0.3))
+    assert waves.pitch == pytest.approx(pitch, rel=0.15)
+    assert waves.radius > 0
+
+
+def test_the_pitch_is_in_metres_whatever_the_size_of_the_pictures() -> None:
+    """Photos of half the size show the same waves."""
+    small, large = (measure_waves(*swinging(0.04, 0.3, height=h)) for h in (HEIGHT, 2 * HEIGHT))
+    assert small.pitch == pytest.approx(large.pitch, rel=0.1)
+
+
+def test_more_swing_is_a_larger_radius() -> None:
+    """Without slant the radius grows in proportion to the swing, while that is small."""
+    small, large = (measure_waves(*swinging(0.035, swing, noise=0.0)) for swing in (0.1, 0.2))
+    assert large.radius == pytest.approx(2 * small.radius, rel=0.15)
+
+
+@pytest.mark.parametrize("slant_deg", [-20.0, 8.0, 25.0])
+def test_the_slant_of_all_views_is_found_with_its_sign(slant_deg: float) -> None:
+    """Within 2 degrees; the sign is the handedness; radius is at least `pitch tan(slant) / 4`."""
+    waves = measure_waves(*swinging(0.035, 0.15, slant=np.radians(slant_deg)))
+    assert np.degrees(waves.slant) == pytest.approx(slant_deg, abs=2)
+    assert waves.handedness == np.sign(slant_deg)
+    assert waves.radius >= waves.pitch * np.tan(abs(waves.slant)) / 4 - 1e-9
+
+
+def test_slants_that_cancel_between_views_are_no_slant() -> None:
+    """Hair that falls to the left in one view falls to the right in the opposite one."""
+    right, masks, cameras = swinging(0.035, 0.3, slant=0.3)
+    left, _, _ = swinging(0.035, 0.3, slant=-0.3, seed=1)
+    waves = measure_waves([right[0], left[1], right[2], left[3]], masks, cameras)
+    assert waves.slant == 0
+    assert waves.handedness == 0
+    assert waves.pitch == pytest.approx(0.035, rel=0.15)
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.15, 0.5])
+@pytest.mark.parametrize("slant", [0.0, 0.2])
+def test_straight_hair_has_no_waves(noise: float, slant: float) -> None:
+    """Whatever its noise, and even where all of it hangs askew."""
+    assert measure_waves(*swinging(1.0, 0.0, slant=slant, noise=noise)) == Waves()
+
+
+def test_maps_without_confidence_have_no_waves() -> None:
+    """Nothing known is nothing measured, without a warning."""
+    maps, masks, cameras = swinging(0.035, 0.3)
+    unsure = [OrientationMap(found.angle, 0 * found.confidence) for found in maps]
+    assert measure_waves(unsure, masks, cameras) == Waves()
+
+
+@given(st.floats(-1.5, 1.5))
+@settings(max_examples=20)
+def test_taking_off_the_slant_turns_every_angle_by_it(slant: float) -> None:
+    """Putting it back gives the map again; confidence stays, and 0 changes nothing."""
+    angle = wrap_angle(np.linspace(0, 3.1, 35).reshape(5, 7))
+    found = OrientationMap(angle, np.linspace(0, 1, 35, dtype=np.float32).reshape(5, 7))
+    without = without_slant(found, Waves(0.01, 0.03, slant))
+    np.testing.assert_allclose(angle_between(without.angle, angle - slant), 0, atol=1e-5)
+    again = without_slant(without, Waves(0.01, 0.03, -slant))
+    np.testing.assert_allclose(angle_between(again.angle, angle), 0, atol=1e-5)
+    np.testing.assert_array_equal(without.confidence, found.confidence)
+    assert without_slant(found, Waves(0.01, 0.03, 0.0)) is found
+
+
+def hanging(
+    spacing: float = 0.02, rows: int = 4, length: float = 0.3, points: int = 200
+) -> Strands:
+    """Straight strands that hang from a square of roots, `spacing` metres apart."""
+    x, z = np.meshgrid(*[spacing * np.arange(rows)] * 2)
+    roots = np.stack([x.ravel(), 0 * x.ravel(), z.ravel()], axis=-1)[:, None]
+    axis = np.linspace(0, length, points)[None, :, None] * np.array([0.0, -1.0, 0.0])
+    wound = (roots + axis).astype(np.float32)
+    offsets = np.arange(rows**2 + 1) * points
+    return Strands(wound.reshape(-1, 3), offsets, root_uv=roots[:, 0, [0, 2]].astype(np.float32))
+
+
+def about_axes(strands: Strands) -> tuple[Float64Array, Float64Array]:
+    """Distance from the vertical axis and unwrapped azimuth, (S, M) each, of all points."""
+    points = strands.points.reshape(len(strands), -1, 3).astype(np.float64)
+    offset = points - points[:, :1]
+    azimuth = np.unwrap(np.arctan2(offset[..., 0], offset[..., 2])[:, 1:], axis=1)
+    return np.hypot(offset[..., 0], offset[..., 2]), azimuth
+
+
+@pytest.mark.parametrize("slant", [0.4, -0.4, 0.0])
+def test_wound_strands_keep_roots_and_run_at_the_radius(slant: float) -> None:
+    """Root, offsets and uv stay; beyond the ramp the axis is `radius` away, before it less."""
+    straight, waves = hanging(), Waves(0.005, 0.04, slant)
+    wound = add_waves(straight, waves)
+    np.testing.assert_allclose(wound.roots, straight.roots, atol=1e-7)
+    np.testing.assert_array_equal(wound.offsets, straight.offsets)
+    np.testing.assert_array_equal(wound.root_uv, straight.root_uv)
+    distance, _ = about_axes(wound)
+    arc = straight.arc_lengths().reshape(len(straight), -1)
+    np.testing.assert_allclose(distance, 0.005 * np.clip(arc / 0.03, 0, 1), atol=1e-5)
+
+
+@pytest.mark.parametrize("pitch", [0.02, 0.06])
+def test_wound_strands_turn_once_in_a_pitch(pitch: float) -> None:
+    """Over 30 cm a strand turns 0.3 / pitch times, at an even pace."""
+    _, azimuth = about_axes(add_waves(hanging(), Waves(0.005, pitch, 0.3)))
+    pace = np.abs(np.diff(azimuth, axis=1)) / (2 * np.pi) / (0.3 / 199)
+    np.testing.assert_allclose(pace[:, 5:], 1 / pitch, rtol=0.02)
+
+
+def test_the_other_handedness_is_the_mirror_image() -> None:
+    """From the same start every strand turns as far to the other side."""
+    first, second = (
+        about_axes(add_waves(hanging(), Waves(0.005, 0.04, s)))[1] for s in (0.3, -0.3)
+    )
+    turned, back = (turn - turn[:, 10:11] for turn in (first, second))
+    np.testing.assert_allclose(turned[:, 10:], -back[:, 10:], atol=0.01)
+    assert np.unique(np.sign(turned[:, -1])).size == 1
+
+
+def test_without_a_handedness_wisps_turn_either_way() -> None:
+    """Some of many strands turn left, some right."""
+    _, azimuth = about_axes(add_waves(hanging(rows=12), Waves(0.005, 0.04, 0.0)))
+    assert set(np.sign(azimuth[:, -1] - azimuth[:, 10])) == {-1.0, 1.0}
+
+
+@pytest.mark.parametrize("azimuth_deg", [0.0, 100.0, 230.0])
+@pytest.mark.parametrize("slant_deg", [25.0, -25.0])
+def test_a_camera_sees_wound_strands_slant_as_measured(
+    azimuth_deg: float, slant_deg: float
+) -> None:
+    """The near halves of helices of radius `pitch tan(slant) / 4` slant by that, with its sign."""
+    pitch = 0.04
+    slant = np.radians(slant_deg)
+    straight = hanging(rows=8, points=600)
+    wound = add_waves(straight, Waves(pitch * np.tan(abs(slant)) / 4, pitch, slant))
+    camera = orthographic(azimuth_deg)
+    near = camera.to_camera(wound.points)[:, 2] < camera.to_camera(straight.points)[:, 2]
+    near &= straight.arc_lengths() > 0.04
+    run = np.diff(camera.project(wound.points), axis=0)[near[:-1]]
+    run = run[run[:, 1] > 0]  # not from a tip to the next root
+    assert np.degrees(np.arctan(-run[:, 0].mean() / run[:, 1].mean())) == pytest.approx(
+        slant_deg, abs=2
+    )
+
+
+def test_hair_is_out_of_step_and_guides_are_not() -> None:
+    """Neighbours 1 mm apart have phases of their own, those 2 cm apart vary smoothly with place."""
+
+    def spread(spacing: float) -> float:
+        _, azimuth = about_axes(add_waves(hanging(spacing, rows=10), Waves(0.005, 0.04, 0.3)))
+        phase = np.exp(1j * azimuth[:, 100]).reshape(10, 10)
+        return float(np.abs(np.diff(phase, axis=1)).mean())
+
+    assert spread(0.001) > 1.0
+    jump = spread(0.0061)
+    assert 0.05 < jump < 0.75 * spread(0.001)
+
+
+def test_the_seed_alone_decides() -> None:
+    """The same seed winds byte for byte the same; another one does not."""
+    straight, waves = hanging(), Waves(0.005, 0.04, 0.3)
+    first, second, other = (add_waves(straight, waves, seed).points for seed in (3, 3, 4))
+    assert first.tobytes() == second.tobytes()
+    assert np.abs(first - other).max() > 1e-3
+
+
+def test_no_radius_no_pitch_or_no_strands_is_no_change() -> None:
+    """Straight hair stays the very same object."""
+    straight = hanging()
+    none = Strands(np.zeros((0, 3), np.float32), np.zeros(1, np.int64))
+    assert add_waves(straight, Waves()) is straight
+    assert add_waves(straight, Waves(0.0, 0.04, 0.3)) is straight
+    assert add_waves(straight, Waves(0.004, 0.0, 0.3)) is straight
+    assert add_waves(none, Waves(0.004, 0.04, 0.3)) is none
+
+
+def test_a_single_strand_is_wound_too() -> None:
+    """There is no neighbour to ask for the spacing of roots."""
+    distance, _ = about_axes(add_waves(hanging(rows=1), Waves(0.005, 0.04, 0.3)))
+    assert distance[0, -1] == pytest.approx(0.005, abs=1e-5)

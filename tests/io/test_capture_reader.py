@@ -1,0 +1,192 @@
+"""A folder becomes a capture, or one line says why it cannot."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from ball import write_capture, write_grey
+
+from hairkit.errors import InputError
+from hairkit.io.capture_reader import TURN, read_capture, sample_folder
+from hairkit.io.photos import focal_from_equivalent
+from hairkit.testing import striped_view
+from hairkit.types.capture import Capture
+
+POINTS = np.stack([np.linspace(5, 90, 68), np.linspace(9, 120, 68)], axis=1)
+
+
+def write_landmarks(folder: Path, points: object, name: str = "0_front") -> None:
+    """Write `landmarks.json` for one view."""
+    (folder / "landmarks.json").write_text(json.dumps({"views": {name: points}}))
+
+
+def test_eight_photos_in_file_order_are_the_turn(tmp_path: Path) -> None:
+    """Photos without names of views are front, front-left, ... in natural order: 9 before 10."""
+    for number in range(8):
+        write_grey(tmp_path / f"IMG_{number + 5}.png", np.full((20, 20), 10 * number, np.uint8))
+    capture = read_capture(tmp_path)
+    assert [view.name for view in capture.views] == list(TURN)
+    assert [view.azimuth_deg for view in capture.views] == [45.0 * i for i in range(8)]
+    assert [int(view.image[0, 0, 0]) for view in capture.views] == [10 * i for i in range(8)]
+
+
+def test_names_of_views_come_before_file_order(tmp_path: Path) -> None:
+    """Photos named like the views are put in the order of the turn."""
+    for index, name in enumerate(TURN):
+        write_grey(tmp_path / f"{name.replace('-', '_')}.png", np.full((20, 20), index, np.uint8))
+    capture = read_capture(tmp_path)
+    assert [int(view.image[0, 0, 0]) for view in capture.views] == list(range(8))
+
+
+def test_what_lies_beside_the_photos_is_found_by_name(tmp_path: Path) -> None:
+    """Masks, strokes and landmarks go to the view whose photo has their name."""
+    folder = write_capture(tmp_path / "c", masks=True)
+    (folder / "strokes").mkdir()
+    (folder / "strokes" / "2_left.json").write_text("{}")
+    write_landmarks(folder, POINTS.tolist(), "0_front")
+    views = read_capture(folder).views
+    assert all(
+        v.mask_path == folder / "masks" / v.photo_path.with_suffix(".png").name for v in views
+    )
+    assert [v.name for v in views if v.strokes_path is not None] == ["left"]
+    assert [v.name for v in views if v.landmarks is not None] == ["front"]
+    assert np.array_equal(views[0].landmarks, POINTS)
+
+
+def test_everything_scales_with_the_photo(tmp_path: Path) -> None:
+    """At half the size landmarks and focal length are half as large; the photo's size is kept."""
+    folder = write_capture(tmp_path / "c")
+    write_landmarks(folder, POINTS.tolist())
+    (folder / "capture.toml").write_text("focal_px = 200\n")
+    view = read_capture(folder, max_edge=64).views[0]
+    assert (view.width, view.height) == (48, 64)
+    assert view.photo_size == (96, 128)
+    assert view.focal_px == pytest.approx(100)
+    assert view.landmarks == pytest.approx(POINTS / 2)
+
+
+def test_capture_toml_says_what_photos_do_not(tmp_path: Path) -> None:
+    """Names, azimuths, focal lengths, projection and the head's pose come from the file."""
+    folder = write_capture(tmp_path / "c")
+    photos = sorted((folder / "photos").iterdir())
+    views = [
+        f'[[views]]\nname = "v{i}"\nphoto = "{photos[7 - i].name}"\nazimuth_deg = {10 * i}'
+        for i in range(8)
+    ]
+    views[3] += "\nfocal_px = 321"
+    (folder / "capture.toml").write_text(
+        "orthographic = true\nfocal_mm_equivalent = 50\n[head]\nscale = 2\n"
+        "rotation_deg = [0, 90, 0]\ntranslation_m = [1, 2, 3]\n" + "\n".join(views)
+    )
+    capture = read_capture(folder)
+    assert [v.name for v in capture.views] == [f"v{i}" for i in range(8)]
+    assert [v.azimuth_deg for v in capture.views] == [10.0 * i for i in range(8)]
+    assert [v.photo_path for v in capture.views] == photos[::-1]
+    assert capture.orthographic
+    assert capture.views[0].focal_px == pytest.approx(focal_from_equivalent(50, 96, 128))
+    assert capture.views[3].focal_px == pytest.approx(321)
+    assert capture.head_pose @ [0, 0, 0.1, 1] == pytest.approx([1.2, 2, 3, 1])
+
+
+def test_a_little_cropping_is_no_harm(tmp_path: Path) -> None:
+    """Photos may differ by some pixels; every view has its own size."""
+    folder = write_capture(tmp_path / "c")
+    write_grey(folder / "photos" / "3_back-left.png", np.zeros((120, 90), np.uint8))
+    assert read_capture(folder).views[3].photo_size == (90, 120)
+
+
+def test_the_sample_ships_complete() -> None:
+    """The sample has eight photos with masks and strokes, and three views with landmarks."""
+    views = read_capture(sample_folder()).views
+    assert [view.name for view in views] == list(TURN)
+    assert all(view.mask_path and view.strokes_path for view in views)
+    assert sum(view.landmarks is not None for view in views) == 3
+    assert "Mitsuba 3" in (sample_folder() / "ORIGIN.md").read_text()
+
+
+def spoil_photo(folder: Path, content: bytes) -> None:
+    (folder / "photos" / "4_back.png").write_bytes(content)
+
+
+WRONG = {
+    "no such folder": lambda f: shutil.rmtree(f),
+    "7 photos, expected 8.*the photo '4_back' is missing": lambda f: (
+        f / "photos" / "4_back.png"
+    ).unlink(),
+    "9 photos, expected 8": lambda f: write_grey(
+        f / "photos" / "9.png", np.zeros((128, 96), np.uint8)
+    ),
+    "4_back.png: not a picture, expected a JPEG or PNG": lambda f: spoil_photo(f, b"hello"),
+    "4_back.png: an empty file": lambda f: spoil_photo(f, b""),
+    "4_back.png: 60 x 40 pixels, other photos have 96 x 128": lambda f: write_grey(
+        f / "photos" / "4_back.png", np.zeros((40, 60), np.uint8)
+    ),
+    "no view 'frnt' .did you mean 'front'": lambda f: (f / "photos" / "0_front.png").rename(
+        f / "photos" / "0_frnt.png"
+    ),
+    "two photos of the view 'front'": lambda f: (f / "photos" / "1_front-left.png").rename(
+        f / "photos" / "1_front.png"
+    ),
+    "x.heic: expected JPEG or PNG": lambda f: (f / "photos" / "x.heic").write_bytes(b""),
+    "4_back.png: 95 x 128 pixels, its photo has 96 x 128": lambda f: write_grey(
+        f / "masks" / "4_back.png", np.zeros((128, 95), np.uint8)
+    ),
+    "no photo '4_bakc' .did you mean '4_back'": lambda f: (f / "masks" / "4_back.png").rename(
+        f / "masks" / "4_bakc.png"
+    ),
+    "landmarks holds 1 values that are not finite": lambda f: write_landmarks(
+        f, [[float("nan"), 1], *POINTS[1:].tolist()]
+    ),
+    "5 landmarks, expected the 68 iBUG points": lambda f: write_landmarks(f, POINTS[:5].tolist()),
+    "landmarks are no list": lambda f: write_landmarks(f, 7),
+    "landmarks are no list of pixel pairs": lambda f: write_landmarks(f, ["a"] * 68),
+    "no view '0_bak'": lambda f: write_landmarks(f, POINTS.tolist(), "0_bak"),
+    'landmarks.json: expected JSON {"views"': lambda f: (f / "landmarks.json").write_text("{"),
+    "capture.toml: not a TOML file": lambda f: (f / "capture.toml").write_text("="),
+    "capture.toml: no entry 'focal'": lambda f: (f / "capture.toml").write_text("focal = 3"),
+    "focal_px is -3.0, expected": lambda f: (f / "capture.toml").write_text("focal_px = -3.0"),
+    "views are no tables": lambda f: (f / "capture.toml").write_text("views = 3"),
+    "1 views for 8 photos": lambda f: (f / "capture.toml").write_text('[[views]]\nname="a"'),
+    "b.png: no such photo": lambda f: (f / "capture.toml").write_text(
+        "[[views]]\n" * 7 + '[[views]]\nphoto="b.png"'
+    ),
+    "no view 'xx'.*or give its azimuth_deg": lambda f: (f / "capture.toml").write_text(
+        '[[views]]\nname="xx"\n' + "[[views]]\n" * 7
+    ),
+    "'0_front.png' stands for two views": lambda f: (f / "capture.toml").write_text(
+        "[[views]]\n" * 7 + '[[views]]\nphoto="0_front.png"'
+    ),
+}
+
+
+@pytest.mark.parametrize("reason", WRONG)
+def test_wrong_input_gets_one_line(tmp_path: Path, reason: str) -> None:
+    """Whatever is wrong with a capture, one line says what and where."""
+    folder = write_capture(tmp_path / "c", masks=True)
+    WRONG[reason](folder)
+    with pytest.raises(InputError, match=reason) as caught:
+        read_capture(folder)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_head_pose_is_a_similarity() -> None:
+    """A matrix that bends or mirrors the head is refused."""
+    for matrix in (np.ones((4, 4)), np.diag([1.0, 1.0, -1.0, 1.0]), np.diag([1.0, 2.0, 1.0, 1.0])):
+        with pytest.raises(InputError, match="no similarity"):
+            Capture((striped_view(0.0),), head_pose=matrix)
+
+
+def test_an_image_bomb_is_refused(tmp_path: Path) -> None:
+    """A photo of 30,000 pixels is not decoded, however small its file is."""
+    folder = write_capture(tmp_path / "c")
+    data = bytearray(cv2.imencode(".jpg", np.zeros((16, 16), np.uint8))[1].tobytes())
+    frame = data.index(b"\xff\xc0")
+    data[frame + 5 : frame + 9] = (30_000).to_bytes(2, "big") * 2
+    spoil_photo(folder, bytes(data))
+    with pytest.raises(InputError, match="30000 x 30000 pixels"):
+        read_capture(folder)

@@ -1,0 +1,63 @@
+"""Laws of the contact sheet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hairkit.pipeline.contact_sheet import (
+    GAP,
+    HEADER,
+    TILE_WIDTH,
+    contact_sheet,
+    write_contact_sheet,
+)
+from hairkit.testing import (
+    ball_mask,
+    bristle_groom,
+    combed_orientation,
+    shell_hull,
+    turn_capture,
+    turn_scene,
+)
+from hairkit.types.orientation import OrientationMap
+
+
+def test_the_sheet_shows_every_stage_of_every_view(tmp_path: Path) -> None:
+    """Eight columns and six rows, none of them blank; the file holds the same picture."""
+    scene, capture = turn_scene(), turn_capture()
+    masks = [ball_mask(camera) for camera in scene.cameras]
+    maps = [combed_orientation(mask) for mask in masks]
+    sheet = contact_sheet(capture, masks, maps, shell_hull(), bristle_groom(), scene)
+    height = round(TILE_WIDTH * scene.cameras[0].height / scene.cameras[0].width)
+    assert sheet.shape == (HEADER + 6 * (height + GAP), 8 * (TILE_WIDTH + GAP) + GAP, 3)
+    for row in range(6):
+        for column in range(8):
+            top, left = HEADER + row * (height + GAP), GAP + column * (TILE_WIDTH + GAP)
+            tile = sheet[top + 20 : top + height, left : left + TILE_WIDTH]
+            assert tile.std() > 3, (row, column)
+    path = tmp_path / "sheet.png"
+    write_contact_sheet(path, capture, masks, maps, shell_hull(), bristle_groom(), scene)
+    stored = cv2.imread(str(path))
+    assert stored is not None
+    assert (np.asarray(stored)[..., ::-1] == sheet).all()
+
+
+def test_the_hue_tells_the_angle() -> None:
+    """Strands at a right angle to each other have opposite hues, uncertain ones are dark."""
+    scene, capture = turn_scene(), turn_capture()
+    masks = [ball_mask(camera) for camera in scene.cameras]
+    shape = masks[0].labels.shape
+
+    def row_of(angle: float, confidence: float) -> np.ndarray:
+        map_ = OrientationMap(np.full(shape, angle), np.full(shape, confidence))
+        sheet = contact_sheet(capture, masks, [map_] * 8, shell_hull(), bristle_groom(), scene)
+        tall = (sheet.shape[0] - HEADER) // 6
+        return np.asarray(sheet[HEADER + 2 * tall + tall // 2, GAP + TILE_WIDTH // 2])
+
+    level, upright, unsure = row_of(0.0, 1.0), row_of(np.pi / 2, 1.0), row_of(0.0, 0.0)
+    assert level.argmax() != upright.argmax()
+    assert level.max() > 240
+    assert unsure.max() == 0

@@ -1,0 +1,233 @@
+"""Laws of the patent's four fields, of the segments they stand on, and of their blend."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hairkit_plugins.hybrid_field import Options, solve_field
+from hairkit_plugins.hybrid_field.four_fields import internal_distance, surface_structure
+from hairkit_plugins.hybrid_field.photo_lines import SMOOTHING, agreeing, lifted
+from hairkit_plugins.hybrid_field.ribbons import Band, ribbons
+from hairkit_plugins.hybrid_field.segments import directed, find_segments
+
+from hairkit.field import view_fusion
+from hairkit.field.growth_prior import growth_potential
+from hairkit.field.view_fusion import fuse_views
+from hairkit.imaging.waves import Waves
+from hairkit.storage import Float64Array
+from hairkit.testing import ball_head
+from hairkit.types.camera import Camera
+from hairkit.types.mask import HAIR, Mask
+from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.scene import Scene
+from hairkit.types.strands import Strands
+from hairkit.types.volume import Hull, VoxelGrid, outer_products
+
+CENTRE = np.array([0.0, 0.16, 0.0])
+ALONG = np.array([0.5, -0.75, 0.433])
+SPACING = 0.006
+PLAIN = Options(scalp_weight=0.0, pool=0.0, unslant=False, outward=0.0)
+
+
+@pytest.fixture(autouse=True)
+def _straight_hair(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measuring waves takes longer than all the rest, and these heads have none."""
+    monkeypatch.setattr(view_fusion, "measure_waves", lambda *_: Waves())
+
+
+def cameras() -> tuple[Camera, ...]:
+    """Eight cameras around a bun on top of the head, on two levels."""
+    return tuple(
+        Camera.on_turn(
+            45.0 * i,
+            elevation_deg=12.0 * (i % 2),
+            distance=0.6,
+            target=CENTRE,
+            focal=540.0,
+            width=120,
+            height=120,
+        )
+        for i in range(8)
+    )
+
+
+def bun() -> Hull:
+    """A ball of hair of 6 cm radius above the head."""
+    low, high = CENTRE - 0.08, CENTRE + 0.08
+    low[1] -= 0.04
+    grid = VoxelGrid.around(low, high, SPACING)
+    centres = grid.centres().astype(np.float64)
+    distance = np.linalg.norm(centres, axis=-1) - 0.1
+    hair = (np.linalg.norm(centres - CENTRE, axis=-1) < 0.06) & (distance > 0)
+    return Hull(grid, hair, hair, distance.astype(np.float32))
+
+
+def seen(camera: Camera) -> OrientationMap:
+    """The exact image angle of strands along `ALONG`."""
+    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    dx, dy, dz = camera.rotation @ ALONG
+    dx = dx - dz * (x - camera.centre[0]) / camera.focal
+    dy = dy - dz * (y - camera.centre[1]) / camera.focal
+    return OrientationMap(wrap_angle(np.arctan2(dy, dx)), np.ones(x.shape, np.float32))
+
+
+def photos() -> tuple[tuple[Camera, ...], tuple[Mask, ...], tuple[OrientationMap, ...]]:
+    views = cameras()
+    labels = np.full((views[0].height, views[0].width), HAIR, np.uint8)
+    return views, tuple(Mask(labels, True) for _ in views), tuple(map(seen, views))
+
+
+def off_deg(directions: Float64Array) -> Float64Array:
+    """Angles in degrees between directions and `ALONG`, signs ignored."""
+    length = np.linalg.norm(directions, axis=-1) * np.linalg.norm(ALONG)
+    return np.degrees(np.arccos(np.clip(np.abs(directions @ ALONG) / length, 0, 1)))
+
+
+def segments(options: Options = PLAIN) -> tuple[Strands, Hull]:
+    views, masks, maps = photos()
+    hull = bun()
+    growth = growth_potential(ball_head(), hull, 0.6)
+    fused = fuse_views(views, masks, maps, hull, options)
+    return find_segments(views, masks, fused, hull, growth, options), hull
+
+
+def test_segments_run_along_the_hair_they_were_seen_on() -> None:
+    """Lines lifted from photos and lines through cells follow the true direction."""
+    found, hull = segments()
+    chords = (found.tips - found.roots).astype(np.float64)
+    assert len(found) > 200
+    assert np.median(off_deg(chords)) < 5
+    assert hull.grid.sample(hull.dense.astype(np.float32), found.points).mean() > 0.4
+
+
+def test_segments_are_no_longer_than_allowed() -> None:
+    """`longest` bounds them, but for half the rounding of both halves."""
+    found, _ = segments(replace(PLAIN, longest=0.02))
+    assert found.lengths().max() < 0.02 + 0.012
+
+
+def test_a_line_is_lifted_and_smoothed_the_same_wherever_it_stands_in_the_pack() -> None:
+    """The compiled lift of many lines is, line by line, a truncated Gaussian along points that
+    the camera sees where the line was followed."""
+    camera = cameras()[0]
+    rng = np.random.default_rng(3)
+    lines = rng.uniform(40, 80, (5, 30, 3)).astype(np.float32)
+    lines[..., 2] = rng.uniform(0.4, 0.6, (5, 30))
+    counts = np.array([30, 2, 5, 12, 30])
+    points, kept = lifted(camera, lines, counts)
+    np.testing.assert_array_equal(kept, [30, 5, 12, 30])
+    ends = np.cumsum(kept)
+    for line, last, count in zip(lines[[0, 2, 3, 4]], ends, kept, strict=True):
+        pixel = line[:count].astype(np.float64)
+        local = np.ones((count, 3))
+        local[:, :2] = (pixel[:, :2] - camera.centre) / camera.focal
+        local = local * pixel[:, 2:] - camera.translation
+        away = np.subtract.outer(np.arange(count), np.arange(count))
+        weight = np.exp(-0.5 * (away / SMOOTHING) ** 2) * (np.abs(away) <= 3 * SMOOTHING)
+        smooth = weight @ (local @ camera.rotation) / weight.sum(axis=1, keepdims=True)
+        np.testing.assert_allclose(points[last - count : last], smooth, atol=1e-6)
+
+
+def test_lines_agree_with_the_tensors_along_them_only() -> None:
+    """A line along the field stays; one square to it, and one where nothing is known, go."""
+    hull = bun()
+    volume = np.zeros((*hull.grid.shape, 6), np.float32)
+    volume[hull.loose] = outer_products([0.0, 1.0, 0.0])
+    course = np.linspace(-0.02, 0.02, 9)[:, None]
+    lines = [CENTRE + course * [0, 1.0, 0], CENTRE + course * [1.0, 0, 0], [[9, 9, 9], [9, 8, 9]]]
+    kept = agreeing(Strands.from_list(lines), hull, volume, 35.0)
+    np.testing.assert_allclose(kept.points, lines[0], atol=1e-6)
+
+
+def test_segments_agree_on_which_end_is_the_root() -> None:
+    """Parallel segments of mixed signs come out with one sign, that of the growth."""
+    hull = bun()
+    rng = np.random.default_rng(1)
+    roots = (CENTRE + rng.uniform(-0.03, 0.03, (60, 3))).astype(np.float32)
+    course = np.linspace(0, 0.02, 8)[:, None] * np.array([0.0, 1.0, 0.0])
+    points = roots[:, None] + course
+    points[::3] = points[::3, ::-1]
+    growth = hull.grid.centres()[..., 1]
+    growth = growth + 0.004 * rng.standard_normal(growth.shape).astype(np.float32)
+    mixed = Strands(points.reshape(-1, 3).astype(np.float32), np.arange(61) * 8)
+    result = directed(mixed, hull, growth.astype(np.float32))
+    assert ((result.tips - result.roots)[:, 1] > 0).all()
+    np.testing.assert_array_equal(np.sort(result.points[:, 1]), np.sort(mixed.points[:, 1]))
+
+
+def test_ribbons_widen_segments_along_the_surface() -> None:
+    """A wider ribbon covers more cells, all directions unit where one segment runs alone."""
+    hull = bun()
+    course = CENTRE + [0, 0, 0.055] + np.linspace(-0.02, 0.02, 21)[:, None] * [0, 1.0, 0]
+    lone = Strands.from_list([course])
+    thin, wide = (ribbons(lone, hull, reach) for reach in (0.0, 0.012))
+    assert wide.cells.sum() > 1.5 * thin.cells.sum()
+    length = np.linalg.norm(thin.direction[thin.cells], axis=1)
+    np.testing.assert_allclose(length, 1, atol=1e-5)
+    assert (thin.direction[thin.cells][:, 1] > 0.99).all()
+
+
+def test_surface_structure_keeps_ribbons_and_spreads_them() -> None:
+    """Dirichlet on ribbons; everywhere else of the bun the one direction there is."""
+    hull = bun()
+    course = CENTRE + [0, 0, 0.05] + np.linspace(-0.02, 0.02, 21)[:, None] * [0, 1.0, 0]
+    band = ribbons(Strands.from_list([course]), hull, 0.0)
+    field = surface_structure(hull, band, 1e-4)
+    on = band.cells[hull.loose]
+    np.testing.assert_allclose(field[on], band.direction[hull.loose][on], atol=0.02)
+    np.testing.assert_allclose(field, np.broadcast_to([0, 1, 0], field.shape), atol=0.03)
+
+
+def test_internal_distance_is_0_in_the_head_1_on_strands_and_grows_outward() -> None:
+    """Harmonic between: within the bounds of its Dirichlet values."""
+    grid = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.005)
+    away = np.linalg.norm(grid.centres(), axis=-1)
+    hair = (away > 0.1) & (away < 0.14)
+    hull = Hull(grid, hair, hair, (away - 0.1).astype(np.float32))
+    rng = np.random.default_rng(0)
+    spots = rng.standard_normal((4000, 3))
+    spots *= 0.135 / np.linalg.norm(spots, axis=1, keepdims=True)
+    strands = Strands(np.repeat(spots, 2, axis=0).astype(np.float32), np.arange(4001) * 2)
+    value = internal_distance(hull, strands, 1e-4)
+    assert abs(float(np.median(value[away < 0.08]))) < 0.02
+    on = grid.sample(value, spots.astype(np.float32))
+    assert abs(float(np.median(on)) - 1) < 0.15
+    assert (value[(away > 0.17) & (away < 0.19)] > 1.2).all()
+    between = (away > 0.108) & (away < 0.122)
+    assert 0.1 < float(np.median(value[between])) < 0.9
+
+
+def test_one_direction_everywhere_comes_back_signed() -> None:
+    """Exact angles: the blend lies along the hair, with one sign over nearly all of the bun."""
+    views, masks, maps = photos()
+    scene = Scene(tuple("abcdefgh"), views, ball_head())
+    hull = bun()
+    field = solve_field(scene, masks, maps, hull, PLAIN)
+    assert field.direction is not None
+    direction = field.direction[hull.dense].astype(np.float64)
+    assert np.median(off_deg(direction)) < 4
+    np.testing.assert_allclose(np.linalg.norm(direction, axis=1), 1, atol=1e-4)
+    majority = np.abs(np.sign(direction @ ALONG).mean())
+    assert majority > 0.8
+
+
+def test_without_segments_the_inner_field_alone_speaks() -> None:
+    """Photos without any sure pixel still give a field: that of the scalp's combing."""
+    views, masks, maps = photos()
+    blank = tuple(OrientationMap(found.angle, 0 * found.confidence) for found in maps)
+    scene = Scene(tuple("abcdefgh"), views, ball_head())
+    field = solve_field(scene, masks, blank, bun(), Options(pool=0.0, unslant=False))
+    assert field.direction is not None
+    assert np.isfinite(field.direction).all()
+    assert field.internal_distance is not None
+
+
+def test_an_empty_band_has_no_direction() -> None:
+    """No segments, no ribbons."""
+    hull = bun()
+    band = ribbons(Strands(np.zeros((0, 3), np.float32), np.zeros(1, np.int64)), hull, 0.004)
+    assert isinstance(band, Band)
+    assert not band.cells.any()
+    assert not band.direction.any()

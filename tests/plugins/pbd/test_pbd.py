@@ -1,0 +1,296 @@
+"""The pbd plugin: grooms at rest, shaken, blown and held; backends against each other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hairkit_plugins.pbd import Options
+from hairkit_plugins.pbd.head_interpolation import between, course, inverse_motion
+from hairkit_plugins.pbd.reference import at_rest
+from hairkit_plugins.pbd.simulator import PbdSimulator
+
+from hairkit.head_model.signed_distance import distance_to
+from hairkit.manager import Manager
+from hairkit.simulate import Grab, Simulator, Surroundings, quaternion, run, shaken, still
+from hairkit.simulate.wind import air_velocity, gust_waves
+from hairkit.testing import bristle_groom
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
+
+
+@pytest.fixture(scope="module")
+def groom() -> Groom:
+    """Return 40 waved strands of 9 to 18 cm, of 20 to 39 points, on the ball head."""
+    ball = bristle_groom()
+    pick = np.linspace(0, len(ball.strands) - 1, 40).astype(int)
+    roots = ball.strands.roots[pick].astype(np.float64)
+    out = roots / np.linalg.norm(roots, axis=1, keepdims=True)
+    strands = []
+    for k, (root, way) in enumerate(zip(roots, out, strict=True)):
+        s = np.linspace(0, 0.09 + 0.0023 * k, 20 + k // 2)[:, None]
+        side = np.cross(way, [0.3, 0.2, 0.9])
+        fall = np.array([0.0, -1.0, 0.0]) * s**2 * 3 + way * s
+        strands.append(root + fall + 0.004 * np.sin(60 * s) * side)
+    return replace(
+        ball,
+        strands=Strands.from_list(strands),
+        root_triangle=ball.root_triangle[pick],
+        root_barycentric=ball.root_barycentric[pick],
+    )
+
+
+@pytest.mark.parametrize("backend", ["reference", "fast"])
+def test_captured_hair_does_not_sag(groom: Groom, backend: str) -> None:
+    """Two seconds under gravity move no point by 0.1 mm."""
+    simulator = PbdSimulator(groom, Options(backend=backend))
+    for _ in range(20):
+        simulator.advance(0.1, Surroundings())
+    assert np.abs(simulator.points - groom.strands.points).max() < 1e-4
+
+
+def test_backends_agree(groom: Groom) -> None:
+    """Shaken, in gusts, for half a second: no point differs by 0.02 mm."""
+    motion = shaken(["yaw:25:2", "pitch:10:1.3"], groom.head)
+    wind = np.array([2.0, 0.0, 1.0])
+    both = [PbdSimulator(groom, Options(backend=name)) for name in ("reference", "fast")]
+    for frame in range(1, 31):
+        around = Surroundings(motion(frame / 60), wind, 0.4)
+        for simulator in both:
+            simulator.advance(1 / 60, around)
+    assert np.abs(both[0].points - groom.strands.points).max() > 0.01
+    assert np.abs(both[0].points - both[1].points).max() < 2e-5
+
+
+def test_shaken_hair_keeps_its_length_and_stays_out_of_the_head(groom: Groom) -> None:
+    """Stretch below 1 % at every frame; no node more than 2 mm inside."""
+    simulator = PbdSimulator(groom, Options())
+    motion, deepest, stretch = shaken(["yaw:30:2"], groom.head), 0.0, 0.0
+    rest = distance_to(groom.head, groom.strands.points)
+    for frame in range(1, 61):
+        head = motion(frame / 60)
+        simulator.advance(1 / 60, Surroundings(head))
+        stretch = max(stretch, simulator.measure().stretch)
+        local = (simulator.points - head[:3, 3]) @ head[:3, :3]
+        inside = np.minimum(rest, 0.0) - distance_to(groom.head, local)
+        deepest = max(deepest, float(inside.max()))
+    assert stretch < 0.01
+    assert deepest < 0.002
+
+
+@pytest.mark.parametrize("backend", ["reference", "fast"])
+def test_fine_points_do_not_cut_through_the_head(groom: Groom, backend: str) -> None:
+    """Four nodes a guide, pressed on the head by wind: its points are at most 2 mm inside."""
+    wind, deepest = Surroundings(wind=np.array([0.0, -14.0, 0.0])), 0.0
+    simulator = PbdSimulator(groom, Options(backend=backend, nodes=4, bend=0.0, stiffness=0.0))
+    rest = np.minimum(distance_to(groom.head, groom.strands.points), 0.0)
+    np.testing.assert_allclose(simulator.points, groom.strands.points, atol=1e-6)
+    for _ in range(40):
+        simulator.advance(1 / 60, wind)
+        inside = rest - distance_to(groom.head, simulator.points)
+        deepest = max(deepest, float(inside.max()))
+    assert deepest < 0.002
+
+
+def test_shaken_hair_comes_back_to_rest(groom: Groom) -> None:
+    """Three seconds after a short shake the hair is within 2 mm of where it was."""
+    motion = shaken(["roll:20:2:0.5"], groom.head)
+    cache = run(PbdSimulator(groom, Options(friction=0.0)), motion, 210)
+    away = np.linalg.norm(cache.points - groom.strands.points, axis=2).max(axis=1)
+    assert away[20] > 0.01
+    assert away[-1] < 0.002
+
+
+def test_roots_ride_on_the_head(groom: Groom) -> None:
+    """Whatever happens, a root is where the head carries it."""
+    simulator = PbdSimulator(groom, Options())
+    head = shaken(["yaw:40:1"], groom.head)(0.3)
+    simulator.advance(0.05, Surroundings(head, np.array([5.0, 0, 0])))
+    roots = simulator.points[groom.strands.offsets[:-1]]
+    wanted = groom.strands.roots @ head[:3, :3].T + head[:3, 3]
+    np.testing.assert_allclose(roots, wanted, atol=1e-6)
+
+
+def test_a_carried_head_carries_hair_at_rest(groom: Groom) -> None:
+    """Reset on a turned and moved head: the captured shape, turned and moved, without motion."""
+    simulator = PbdSimulator(groom, Options())
+    head = shaken(["yaw:90:1"], groom.head)(0.25)
+    head[:3, 3] += [10.0, 0.0, -3.0]
+    simulator.reset(head)
+    for _ in range(10):
+        simulator.advance(1 / 60, Surroundings(head))
+    wanted = groom.strands.points @ head[:3, :3].T + head[:3, 3]
+    np.testing.assert_allclose(simulator.points, wanted, atol=1e-4)
+
+
+@pytest.mark.parametrize("backend", ["reference", "fast"])
+def test_motion_does_not_depend_on_how_frames_are_cut(groom: Groom, backend: str) -> None:
+    """In steady wind, one call of a tenth of a second equals six of a sixtieth."""
+    around = Surroundings(wind=np.array([3.0, 0.0, 0.0]))
+    one, six = (PbdSimulator(groom, Options(backend=backend)) for _ in range(2))
+    one.advance(0.1, around)
+    for _ in range(6):
+        six.advance(1 / 60, around)
+    np.testing.assert_allclose(one.points, six.points, atol=1e-6)
+
+
+@pytest.mark.parametrize("backend", ["reference", "fast"])
+@pytest.mark.parametrize("share", [0.97, 0.8])
+def test_a_grabbed_point_is_at_the_hand(groom: Groom, backend: str, share: float) -> None:
+    """Half a second on, a held tip is within 1 mm of a target 5 cm off; the length is kept."""
+    simulator = PbdSimulator(groom, Options(backend=backend))
+    tip = int(groom.strands.offsets[39]) - 1
+    root = groom.strands.roots[38].astype(np.float64)
+    turn = quaternion.to_matrix(quaternion.about([0.0, 1.0, 0.0], 0.3))
+    target = root + share * turn @ (groom.strands.points[tip] - root)
+    assert np.linalg.norm(groom.strands.points[tip] - target) > 0.05
+    grab = Grab(tip, (target[0], target[1], target[2]))
+    for _ in range(30):
+        simulator.advance(1 / 60, Surroundings(grabs=(grab,)))
+    assert np.linalg.norm(simulator.points[tip] - target) < 1e-3
+    assert simulator.measure().stretch < 0.01
+
+
+def test_a_hand_out_of_reach_stretches_nothing(groom: Groom) -> None:
+    """A tip drawn a metre away ends on a taut strand of its own length."""
+    simulator = PbdSimulator(groom, Options(backend="reference"))
+    tip = int(groom.strands.offsets[9]) - 1
+    for _ in range(60):
+        simulator.advance(1 / 60, Surroundings(grabs=(Grab(tip, (1.0, 0.5, 0.3)),)))
+    assert simulator.measure().stretch < 0.01
+
+
+def test_more_stiffness_moves_less(groom: Groom) -> None:
+    """Wind blows hair less far the stiffer it is, by either option."""
+    around = Surroundings(wind=np.array([4.0, 0.0, 0.0]))
+
+    def blown(**options: float) -> float:
+        simulator = PbdSimulator(groom, Options(**options))
+        for _ in range(30):
+            simulator.advance(1 / 60, around)
+        return float(np.linalg.norm(simulator.points - groom.strands.points, axis=1).mean())
+
+    assert blown(stiffness=0.9) < blown(stiffness=0.4) < blown(stiffness=0.0)
+    assert blown(bend=0.9) < blown(bend=0.2)
+
+
+@pytest.mark.parametrize("bend", [0.0, 1.0])
+def test_the_stiffest_torsion_is_stable(groom: Groom, bend: float) -> None:
+    """At the upper bound of twist, shaken hair calms down in a second and a half."""
+    simulator = PbdSimulator(groom, Options(backend="reference", twist=1.0, bend=bend))
+    motion, energy = shaken(["yaw:30:2:0.5", "roll:25:3:0.5"], groom.head), []
+    for frame in range(1, 121):
+        simulator.advance(1 / 60, Surroundings(motion(frame / 60)))
+        energy.append(simulator.measure().kinetic_energy)
+    assert energy[-1] < 0.01 * max(energy)
+    assert simulator.measure().stretch < 0.01
+
+
+def test_retuning_keeps_the_positions(groom: Groom) -> None:
+    """New options move nothing by themselves, and None is resolved by the groom."""
+    simulator = PbdSimulator(groom, Options())
+    simulator.advance(0.1, Surroundings(wind=np.array([4.0, 0.0, 0.0])))
+    before = simulator.points.copy()
+    simulator.retune(Options(stiffness=0.9))
+    np.testing.assert_allclose(simulator.points, before, atol=1e-6)
+    assert simulator.options.stiffness == 0.9
+    assert simulator.options.damping == groom.physics.damping
+
+
+def test_equal_input_gives_equal_frames(groom: Groom) -> None:
+    """Two runs with gusts are the same to the last bit."""
+    around = Surroundings(wind=np.array([3.0, 0.0, 0.0]), turbulence=0.5)
+    frames = []
+    for _ in range(2):
+        simulator = PbdSimulator(groom, Options())
+        simulator.advance(0.2, around)
+        frames.append(simulator.points)
+    assert (frames[0] == frames[1]).all()
+
+
+def test_folded_and_tiny_strands_stay_finite(groom: Groom) -> None:
+    """Strands that fold back, lie in one point or hold two points are simulated all the same."""
+    root = groom.strands.roots[0].astype(np.float64)
+    fold = root + np.array([[0, 0, 0], [0, 0.05, 0], [0, 0, 0], [0, 0.05, 0]])
+    odd = Strands.from_list(
+        [fold, np.repeat(root[None], 3, axis=0), root + np.array([[0, 0, 0], [0, 0.1, 0]])]
+    )
+    few = replace(
+        groom,
+        strands=odd,
+        root_triangle=groom.root_triangle[:3],
+        root_barycentric=groom.root_barycentric[:3],
+    )
+    cache = run(PbdSimulator(few, Options()), shaken(["yaw:30:3"], few.head), 40)
+    assert np.abs(cache.points).max() < 0.5
+
+
+def test_the_plugin_makes_a_simulator(manager: Manager, groom: Groom) -> None:
+    """By name it gives what the contract asks for; only guides are simulated."""
+    guide = np.arange(len(groom.strands)) % 2 == 0
+    mixed = replace(groom, strands=replace(groom.strands, guide=guide))
+    simulator = manager.call("make_simulator", "pbd", {"nodes": 8}, groom=mixed)
+    assert isinstance(simulator, Simulator)
+    assert len(simulator.strands) == guide.sum()
+    cache = run(simulator, still(), 2)
+    assert cache.points.shape == (2, len(simulator.strands.points), 3)
+
+
+def test_compiled_gusts_are_the_law_of_the_wind(groom: Groom) -> None:
+    """At every fourth node and the last the air is `air_velocity`, between them it is straight."""
+    from hairkit_plugins.pbd.numba_backend import FastEngine
+
+    wind, time, head = np.array([3.0, -1.0, 2.0]), 7.3, shaken(["yaw:40:1"], groom.head)(0.2)
+    head[:3, 3] += [4.0, 1.0, -2.0]
+    rods = PbdSimulator(groom, Options(backend="reference")).rods
+    engine = FastEngine(rods, None)
+    engine.blow(gust_waves(time, wind, 0.4), wind, head)
+    found = engine.air()
+    points = rods.points[:, [0, 4, 8, 12, 15]] @ head[:3, :3].T + head[:3, 3]
+    wanted = air_velocity(points.reshape(-1, 3), time, wind, 0.4).reshape(points.shape)
+    np.testing.assert_allclose(found[:, [0, 4, 8, 12, 15]], wanted, atol=1e-5)
+    np.testing.assert_allclose(found[:, 2], 0.5 * (found[:, 0] + found[:, 4]), atol=1e-6)
+    assert np.abs(wanted - wind).max() > 0.5
+
+
+@pytest.mark.parametrize("copies", [1, 60])
+def test_compiled_hair_among_hair_is_that_of_the_reference(groom: Groom, copies: int) -> None:
+    """Crowded and moving, on a moving head: velocities of metres a second agree to 0.01 mm/s."""
+    from hairkit_plugins.pbd.hair_grid import crowd_of
+    from hairkit_plugins.pbd.numba_backend import FastEngine
+
+    rods = PbdSimulator(groom, Options(backend="reference")).rods
+    pick = np.tile(np.arange(len(rods.points)), copies)
+    arrays = {name: values for name, values in vars(rods).items() if isinstance(values, np.ndarray)}
+    rods = replace(rods, **{name: values[pick] for name, values in arrays.items()})
+    rng = np.random.default_rng(3)
+    state = at_rest(rods)
+    state = replace(
+        state,
+        position=0.7 * state.position + rng.normal(0, 1e-3, state.position.shape),
+        velocity=rng.normal(0, 1, state.position.shape),
+    )
+    ride = shaken(["yaw:40:1"], groom.head)(0.01)
+    crowd = crowd_of(rods.points.reshape(-1, 3), rods.mass.reshape(-1))
+    engine = FastEngine(rods, None)
+    engine.state = state
+    engine.rub(crowd, ride, (5.0, 4.0, 1 / 60))
+    wanted = crowd.rubbed(state, rods.mass, ride, (5.0, 4.0, 1 / 60)).velocity
+    assert np.abs(wanted - state.velocity).max() > 0.05
+    np.testing.assert_allclose(engine.state.velocity, wanted, atol=1e-5)
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_course_goes_evenly_from_start_to_end(groom: Groom, count: int) -> None:
+    """Each step ends on the motion between, and its ride leads there from the one before."""
+    motion = shaken(["yaw:40:1", "pitch:20:2"], groom.head)
+    start, end = motion(0.1), motion(0.15)
+    before = start
+    for k, (after, ride) in enumerate(course(start, end, count)):
+        np.testing.assert_allclose(after, between(start, end, (k + 1) / count), atol=1e-12)
+        np.testing.assert_allclose(after @ ride, before, atol=1e-12)
+        np.testing.assert_allclose(inverse_motion(after) @ before, ride, atol=1e-12)
+        before = after
+    assert (before == end).all()
+    assert all((ride == np.eye(4)).all() for _, ride in course(end, end, 3))

@@ -1,0 +1,98 @@
+"""Laws of landmarks as evidence: marginalising the shape equals solving for it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hairkit_plugins.silhouette.landmark_equations import LandmarkFit, Sights, shape_precision
+from turntable import Turntable, turntable
+
+from hairkit import Mask
+from hairkit.cameras.silhouette_coherence import Outlines
+from hairkit.cameras.turntable import Turn
+from hairkit.storage import Float64Array
+
+
+@pytest.fixture(scope="module")
+def bust() -> Turntable:
+    """A head seen by cameras off the turn."""
+    return turntable(np.random.default_rng(4))
+
+
+@pytest.fixture(scope="module")
+def fit(bust: Turntable) -> LandmarkFit:
+    """Its landmarks."""
+    places = bust.head.vertices[bust.head.landmark_vertices].astype(np.float64)
+    outlines = Outlines.of(bust.masks, 10)
+    sights = Sights.of(bust.capture, bust.masks, 1.0)
+    side = np.array([2, 6])
+    return LandmarkFit(
+        places, shape_precision(places), sights, outlines.fields, outlines.scale, side, 3.0
+    )
+
+
+def _start(bust: Turntable) -> tuple[Turn, Float64Array]:
+    turn = Turn.of(bust.capture)
+    vector = np.zeros(turn.size)
+    vector[4], vector[6], vector[7] = -0.06, np.log(800), 1 / 0.7
+    return turn, vector
+
+
+def test_landmarks_under_hair_and_of_the_jaw_count_less(bust: Turntable) -> None:
+    """A covered landmark is trusted a third as much as an open one, a jaw point half as much."""
+    sights = Sights.of(bust.capture, bust.masks, 1.0)
+    bald = tuple(
+        Mask(np.where(np.arange(mask.labels.size) == 0, 255, 128).reshape(mask.labels.shape), True)
+        for mask in bust.masks
+    )
+    open_air = Sights.of(bust.capture, bald, 1.0)
+    assert set(open_air.noise[open_air.point < 17]) == {2.0}
+    assert set(open_air.noise[open_air.point >= 17]) == {1.0}
+    assert set(sights.noise / open_air.noise) <= {1.0, 3.0}
+
+
+def test_the_pull_of_the_true_cameras_is_weak(bust: Turntable, fit: LandmarkFit) -> None:
+    """With a head of the true shape, landmarks fit the true cameras to their noise."""
+    arrays = (
+        np.stack([camera.rotation for camera in bust.cameras]),
+        np.stack([camera.translation for camera in bust.cameras]),
+        np.array([camera.focal for camera in bust.cameras]),
+        np.stack([camera.centre for camera in bust.cameras]),
+    )
+    assert fit.misfit(np.zeros((68, 3)), arrays).mean() < 0.5
+
+
+def test_marginalising_equals_solving_for_the_shape(fit: LandmarkFit) -> None:
+    """Step, shape and cost are those of the linear system with the shape among the unknowns."""
+    rng = np.random.default_rng(1)
+    count, unknowns = 400, 9
+    rows, by_shape = rng.normal(size=(count, unknowns)), 1e3 * rng.normal(size=(count, 3))
+    residual, point = rng.normal(size=count), rng.integers(0, 68, count)
+    found = fit._marginalised(rows, by_shape, residual, point, np.zeros((68, 3)))
+    wide = np.zeros((count, 68, 3))
+    wide[np.arange(count), point] = by_shape
+    whole = np.hstack([rows, wide.reshape(count, -1)])
+    normal = whole.T @ whole
+    normal[unknowns:, unknowns:] += fit.precision
+    solution = np.linalg.solve(normal, whole.T @ residual)
+    move = np.linalg.solve(found.normal, found.right)
+    assert np.allclose(move, solution[:unknowns], rtol=1e-6, atol=1e-9)
+    assert np.allclose(found.offsets(move).ravel(), solution[unknowns:], rtol=1e-6, atol=1e-9)
+    bend = np.linalg.solve(normal[unknowns:, unknowns:], whole[:, unknowns:].T @ residual)
+    left = residual - whole[:, unknowns:] @ bend
+    assert found.cost == pytest.approx(left @ left + bend @ fit.precision @ bend)
+
+
+def test_rows_are_derivatives(bust: Turntable, fit: LandmarkFit) -> None:
+    """A small step of the cameras changes the projections as `project` says."""
+    turn, vector = _start(bust)
+    cameras, tangents = (*turn.unpack(vector), turn.sizes / 2.0), turn.tangents(vector)
+    point, view, offset = fit.sights.point, fit.sights.view, np.zeros((68, 3))
+    pixels, by_camera, by_point = fit.project(point, view, offset, cameras)
+    rng = np.random.default_rng(2)
+    step, bend = rng.normal(0, 1e-6, turn.size), rng.normal(0, 1e-6, (68, 3))
+    moved = (*turn.unpack(vector + step), turn.sizes / 2.0)
+    got = fit.project(point, view, bend, moved)[0] - pixels
+    want = np.einsum("nik,nk->ni", by_camera, tangents[view] @ step)
+    want += np.einsum("nik,nk->ni", by_point, bend[point])
+    assert np.allclose(got, want, atol=0.01 * np.abs(want).max())

@@ -1,0 +1,92 @@
+"""A plugin for tests that does every stage on the made-up head of `hairkit.testing`."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairkit import Groom, Mask, OrientationMap, Roots, Scene, Strands, View, hookimpl
+from hairkit.options import option
+from hairkit.storage import write_bytes
+from hairkit.testing import (
+    VIEW_NAMES,
+    ball_mask,
+    combed_field,
+    combed_orientation,
+    shell_hull,
+    turn_scene,
+)
+
+SUFFIXES = (".ball",)
+
+CALLS: list[str] = []
+"""Every stage that was run, `stage` or `stage view`, in this process."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of the test plugin."""
+
+    delay: float = option(0.0, low=0.0, high=60.0, doc="Time that every stage takes.", unit="s")
+    length: float = option(0.03, low=0.0, high=1.0, doc="Length of the strands.", unit="m")
+
+
+def _begin(stage: str, options: Options, view: str = "") -> None:
+    CALLS.append(f"{stage} {view}".strip())
+    time.sleep(options.delay)
+
+
+@hookimpl
+def segment(view: View, options: Options) -> Mask:
+    _begin("segment", options, view.name)
+    return ball_mask(turn_scene().cameras[VIEW_NAMES.index(view.name)])
+
+
+@hookimpl
+def estimate_scene(options: Options) -> Scene:
+    _begin("scene", options)
+    return turn_scene()
+
+
+@hookimpl
+def fit_head(scene: Scene, options: Options) -> Scene:
+    _begin("head", options)
+    return scene
+
+
+@hookimpl
+def orient(view: View, mask: Mask, options: Options) -> OrientationMap:
+    _begin("orient", options, view.name)
+    return combed_orientation(mask)
+
+
+@hookimpl
+def build_hull(options: Options) -> Any:
+    _begin("hull", options)
+    return shell_hull()
+
+
+@hookimpl
+def solve_field(options: Options) -> Any:
+    _begin("field", options)
+    return combed_field()
+
+
+@hookimpl
+def track(roots: Roots, options: Options) -> Strands:
+    """Straight strands along the scalp's normals."""
+    _begin("track", options)
+    along = np.linspace(0.0, options.length, 5, dtype=np.float32)[None, :, None]
+    points = roots.positions[:, None] + along * roots.normals[:, None]
+    return Strands(points.reshape(-1, 3), np.arange(len(roots) + 1) * 5)
+
+
+@hookimpl
+def export_groom(groom: Groom, path: Path, options: Options) -> bool:
+    _begin("export", options)
+    write_bytes(path, groom.strands.points.tobytes())
+    return True

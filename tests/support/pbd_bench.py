@@ -1,0 +1,143 @@
+"""Rods of pbd set up, loaded and left to settle, for the physics tests of the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from hairkit_plugins.pbd.linear_system import Rates, System, assemble
+from hairkit_plugins.pbd.reference import Load, State, at_rest, substep, swung, untwisted
+from hairkit_plugins.pbd.rods import Rods, loaded, make_rods
+
+from hairkit.simulate import quaternion
+from hairkit.storage import Float64Array
+
+LENGTH, DENSITY, G = 0.15, 6.5e-6, 9.81
+WEIGHT = DENSITY * G
+DOWN = np.array([0.0, -G, 0.0])
+NOTHING = np.zeros(3)
+
+
+def straight(count: int, nodes: int, direction: Sequence[float] = (1, 0, 0)) -> Float64Array:
+    """Return points of `count` straight rods."""
+    along = np.linspace(0, LENGTH, nodes)[None, :, None]
+    return np.repeat(along * np.array(direction, float), count, axis=0)
+
+
+def cantilevers(gamma: Float64Array, nodes: int) -> Rods:
+    """Return horizontal rods of these Gamma = weight per length L^3 / EI."""
+    bending = WEIGHT * LENGTH**3 / gamma[:, None]
+    return make_rods(straight(len(gamma), nodes), DENSITY, bending, straight=True)
+
+
+def system_of(rods: Rods, step: float, drag: float = 0.0, pinned_tip: bool = False) -> System:
+    """Return the system of rods in air, their tips tied to where they are if asked."""
+    shape = np.zeros_like(rods.mass)
+    shape[:, -1] = 1e7 if pinned_tip else 0.0
+    return assemble(rods, Rates(np.full_like(rods.mass, drag), 0.0, shape), step)
+
+
+def load_of(
+    gravity: Float64Array = NOTHING,
+    air: Float64Array = NOTHING,
+    force: Float64Array | None = None,
+    ride: Float64Array | None = None,
+) -> Load:
+    """Return what acts on rods; the head stands still unless it rides."""
+    return Load(np.eye(4) if ride is None else ride, np.eye(3), gravity, air, force)
+
+
+def settled(
+    rods: Rods,
+    gravity: Float64Array,
+    *,
+    force: Float64Array | None = None,
+    air: Float64Array = NOTHING,
+    step: float = 1 / 100,
+    drag: float = 3.0,
+    steps: int = 450,
+    iterations: int = 2,
+    pinned_tip: bool = False,
+    start: State | None = None,
+) -> State:
+    """Return the state after so long that thick air has stopped all motion."""
+    system = system_of(rods, step, drag, pinned_tip)
+    state = at_rest(rods) if start is None else start
+    load = load_of(gravity, air, force)
+    for _ in range(steps):
+        state = substep(rods, system, state, load, None, iterations)
+    return state
+
+
+def displaced(rods: Rods, shift: Float64Array) -> State:
+    """Return rods at rest with their nodes shifted a little."""
+    position = rods.points + shift
+    frames = swung(rods.frames, quaternion.unit(np.diff(position, axis=1)))
+    return State(position, np.zeros_like(position), frames)
+
+
+def tangled(rng: np.random.Generator) -> tuple[Rods, State]:
+    """Return a curled rod that carries its weight, and a disturbed state of it."""
+    s = np.linspace(0, 1, 12)
+    points = 0.2 * np.stack([s, 0.3 * np.sin(5 * s), 0.3 * np.cos(4 * s)], axis=-1)[None]
+    rods = make_rods(points, DENSITY, DENSITY * 0.05)
+    rods = loaded(rods, rods.mass[..., None] * DOWN)
+    way = quaternion.unit(np.diff(points, axis=1) + 0.003 * rng.normal(size=(1, 11, 3)))
+    moved = points[:, :1] + np.cumsum(way * rods.length[..., None], axis=1)
+    position = np.concatenate([points[:, :1], moved], axis=1)
+    frames = balanced(rods, swung(rods.frames, way))
+    return rods, State(position, np.zeros_like(position), frames)
+
+
+def balanced(rods: Rods, frames: Float64Array) -> Float64Array:
+    """Return frames spun until torsion is in balance."""
+    for _ in range(200):
+        before, frames = frames, untwisted(rods, frames)
+        if np.abs(frames - before).max() < 1e-14:
+            break
+    return frames
+
+
+def spun(frames: Float64Array, angle: Float64Array) -> Float64Array:
+    """Return frames turned about their segments by angles, radians."""
+    return quaternion.product(quaternion.about(quaternion.third_axis(frames), angle), frames)
+
+
+def clamped(rods: Rods) -> Rods:
+    """Return rods whose first and last segments do not spin; something else holds their nodes."""
+    firm = np.ones_like(rods.twist)
+    firm[:, 0] = 1e6
+    return replace(rods, twist=firm * rods.twist, tip_held=True)
+
+
+def naturally_bent(rods: Rods, angle: Float64Array) -> Rods:
+    """Return straight rods along X whose natural shapes are arcs of these angles towards Y."""
+    # an element turns by its share of the arc; the chord of the turn is 2 sin(half of it)
+    span = np.append(0.5, np.ones(rods.nodes - 2)) / (rods.nodes - 1)
+    side = quaternion.rotated(quaternion.inverse(rods.frames[:, :1]), np.array([0.0, 1.0, 0.0]))
+    return replace(rods, curvature=side * 2 * np.sin(angle[:, None, None] * span[:, None] / 2))
+
+
+def chain(beads: int) -> Rods:
+    """Return a chain without stiffness that hangs: beads alike, the first node is the hook."""
+    rods = make_rods(straight(1, beads + 1, (0, -1, 0)), DENSITY, 1e-18, straight=True)
+    return replace(rods, mass=np.full_like(rods.mass, DENSITY * LENGTH / beads))
+
+
+def mode_of_chain(beads: int, number: int = 0) -> Float64Array:
+    """Return a mode (beads + 1,), the slowest first, of a chain hanging from its first node."""
+    tension = np.arange(beads, 0, -1.0)
+    stiffness = np.diag(tension + np.append(tension[1:], 0)) - np.diag(tension[1:], 1)
+    values, vectors = np.linalg.eigh(stiffness - np.diag(tension[1:], -1))
+    mode = vectors[:, np.argsort(values)[number]]
+    return np.concatenate([[0.0], mode / mode[-1]])
+
+
+def modal_amplitude(state: State, shape: Float64Array, omega: float, rate: float = 0.0) -> float:
+    """Return the amplitude of a mode along X from its place and speed; `rate` damps it, 1/s."""
+    place = float(shape @ state.position[0, :, 0]) / float(shape @ shape)
+    speed = float(shape @ state.velocity[0, :, 0]) / float(shape @ shape)
+    # x = exp(-c t / 2) cos(w t), so that x' + c x / 2 is a quarter period apart from it
+    around = np.sqrt(omega**2 - rate**2 / 4)
+    return float(np.hypot(place, (speed + rate * place / 2) / around))

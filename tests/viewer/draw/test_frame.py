@@ -1,0 +1,249 @@
+"""Laws of the drawn picture, on whatever OpenGL there is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairkit.render.context import Renderer, renderer
+from hairkit.render.head import head_solid
+from hairkit.storage import Float32Array, UInt8Array
+from hairkit.testing import bristle_groom
+from hairkit.types.camera import Camera
+from hairkit.viewer.draw.frame import Shot, Stage
+from hairkit.viewer.draw.hair_data import HairBody
+from hairkit.viewer.draw.interface import HairLook
+from hairkit.viewer.draw.light_gpu import TURNS
+from hairkit.viewer.draw.lines import LineSet
+from hairkit.viewer.head_motion import rotation_about
+
+GROOM = bristle_groom()
+CAMERA = Camera.on_turn(20.0, distance=0.6, focal=260.0, width=160, height=120)
+LOOK = HairLook(3000, True, (0.4, 0.05, 0.05), (0.4, 0.05, 0.05))
+
+
+@pytest.fixture(scope="module", params=[True, False], ids=["processor", "shaders"])
+def stage(request: pytest.FixtureRequest) -> Iterator[Stage]:
+    """A stage with the ball head and 3000 bristles, drawn either way."""
+    with renderer() as gl:
+        stage = made_stage(gl, soft=request.param)
+        yield stage
+        stage.release()
+
+
+def made_stage(gl: Renderer, *, soft: bool) -> Stage:
+    """Return a stage with the ball head and 3000 bristles."""
+    body = HairBody.of(GROOM.strands, GROOM.head, GROOM.material, 3000)
+    return Stage(gl, head_solid(GROOM.head, GROOM.material), body, soft)
+
+
+def shot(**changes: object) -> Shot:
+    """Return a still shot of the groom at rest."""
+    plain = Shot(CAMERA, np.eye(4), None, LOOK, whole_light=True)
+    return replace(plain, **changes)  # type: ignore[arg-type]
+
+
+def picture(stage: Stage, wanted: Shot) -> UInt8Array:
+    """Return the picture of a shot."""
+    rows = stage.body.guide_rest if wanted.guide_rows is None else wanted.guide_rows
+    stage.draw(replace(wanted, guide_rows=rows))
+    return stage.read().copy()
+
+
+def changed(first: UInt8Array, second: UInt8Array) -> np.ndarray:
+    """Return (H, W) where two pictures differ visibly."""
+    result: np.ndarray = np.abs(first.astype(int) - second).max(axis=2) > 12
+    return result
+
+
+def test_hair_is_drawn_where_the_camera_sees_it_and_nowhere_else(stage: Stage) -> None:
+    """Pixels that change with the hair lie at projected hair; the front tips are covered."""
+    with renderer():
+        plain = shot(show_head=False)
+        hair = changed(picture(stage, plain), picture(stage, replace(plain, hair=None)))
+    pixels = CAMERA.project(twin(stage.body, stage.body.guide_rest).reshape(-1, 3))
+    low, high = pixels.min(axis=0) - 4, pixels.max(axis=0) + 4
+    rows, columns = np.nonzero(hair)
+    assert len(rows) > 1000
+    assert (columns >= low[0]).all()
+    assert (columns <= high[0]).all()
+    assert (rows >= low[1]).all()
+    assert (rows <= high[1]).all()
+    upper = CAMERA.project(np.array([0.0, 0.11, 0.0]))
+    assert hair[int(upper[1]), int(upper[0])]
+
+
+def test_the_head_hides_hair_behind_it(stage: Stage) -> None:
+    """Hair whose every point lies behind the head leaves the picture as it is."""
+    behind = stage.body.guide_rest * 0.2 + CAMERA.forward.astype(np.float32) * 0.3
+    with renderer():
+        bare = picture(stage, shot(hair=None))
+        hidden = picture(stage, shot(guide_rows=behind, hair=replace(LOOK, hairs=80)))
+        seen = picture(
+            stage, shot(guide_rows=behind, hair=replace(LOOK, hairs=80), show_head=False)
+        )
+        stage.draw(shot(guide_rows=stage.body.guide_rest))
+    centre = np.s_[55:66, 75:86]
+    assert not changed(hidden, bare)[centre].any()
+    assert changed(seen, hidden)[centre].any()
+
+
+def test_the_head_is_drawn_in_the_first_picture_and_in_later_ones(stage: Stage) -> None:
+    """Skin stands before the studio from the first picture on."""
+    with renderer() as gl:
+        fresh = made_stage(gl, soft=bool(stage.soft))
+        first, without = (picture(fresh, shot(hair=None, show_head=s)) for s in (True, False))
+        again = picture(fresh, shot(hair=None))
+        fresh.release()
+    assert changed(first, without)[60, 80]
+    assert (first == again).all()
+
+
+def test_colour_is_the_materials(stage: Stage) -> None:
+    """Red hair is red, green hair green."""
+    green = replace(LOOK, root_colour=(0.05, 0.4, 0.05), tip_colour=(0.05, 0.4, 0.05))
+    with renderer():
+        pictures = [picture(stage, shot(hair=look)) for look in (LOOK, green)]
+        bare = picture(stage, shot(hair=None))
+    where = changed(pictures[0], bare) & changed(pictures[1], bare)
+    means = [image[where].mean(axis=0) for image in pictures]
+    assert means[0][0] > means[0][1] + 20
+    assert means[1][1] > means[1][0] + 20
+
+
+def test_a_head_and_its_camera_that_move_together_show_the_same_hair(stage: Stage) -> None:
+    """Only their relation matters, studio apart: what moves with the head is drawn in its frame."""
+    motion = rotation_about((0.0, 1.0, 0.0), 0.7, np.zeros(3))
+    with_head = replace(CAMERA, camera_from_head=CAMERA.camera_from_head @ np.linalg.inv(motion))
+    with renderer():
+        still, moved = (
+            picture(stage, s) for s in (shot(), shot(camera=with_head, world_from_head=motion))
+        )
+        bare = picture(stage, shot(hair=None, show_head=False))
+    here = changed(still, bare)
+    assert np.abs(still.astype(int) - moved)[here].mean() < 2
+
+
+def test_two_pictures_of_the_same_are_the_same(stage: Stage) -> None:
+    """Sums are whole numbers: the order in which cores add them does not show."""
+    with renderer():
+        assert (picture(stage, shot()) == picture(stage, shot())).all()
+
+
+def test_thin_strands_are_calm(stage: Stage) -> None:
+    """What hair darkens in all does not change when the picture slides by parts of a pixel."""
+    few = replace(LOOK, hairs=150)
+    sums = []
+    with renderer():
+        for slide in np.linspace(0, 1, 5):
+            camera = replace(CAMERA, centre=CAMERA.centre + slide)
+            bare = picture(stage, shot(camera=camera, hair=None)).astype(float)
+            sums.append(np.abs(picture(stage, shot(camera=camera, hair=few)) - bare).sum())
+    assert np.ptp(sums) < 0.05 * np.mean(sums)
+
+
+def twin(body: HairBody, rows: Float32Array) -> Float32Array:
+    """Return where hair goes with guides (G, m, 3): the slow twin of `viewer_place.comp`."""
+    before = np.maximum(np.arange(rows.shape[1]) - 1, 0)
+    after = np.minimum(np.arange(rows.shape[1]) + 1, rows.shape[1] - 1)
+    was = body.guide_rest[:, after] - body.guide_rest[:, before]
+    now = rows[:, after] - rows[:, before]
+    was, now = (v / np.linalg.norm(v, axis=2, keepdims=True) for v in (was, now))
+    axis, cosine = np.cross(was, now), (was * now).sum(axis=2, keepdims=True)
+    course = np.einsum("sk,skmc->smc", body.weights, rows[body.followed])
+    nearest = body.followed[:, 0]
+    o, a, c = body.offsets, axis[nearest], cosine[nearest]
+    turned = c * o + np.cross(a, o) + a * (a * o).sum(axis=2, keepdims=True) / (1 + c)
+    return course + turned
+
+
+def test_hair_is_placed_as_its_twin_says(stage: Stage) -> None:
+    """Hair keeps its offset from the guides' mix, turned as the nearest guide turns."""
+    t = np.linspace(0, 1, stage.body.points_each, dtype=np.float32)[None, :, None]
+    rows = stage.body.guide_rest + np.float32([0.02, -0.01, 0.0]) * t**2
+    with renderer():
+        picture(stage, shot(guide_rows=rows))
+        places = stage.hair.places()
+        if not stage.soft:
+            places = np.frombuffer(places.read(), np.float32).reshape(3000, -1, 3)
+        placed = places.copy()
+        picture(stage, shot())
+    np.testing.assert_allclose(placed, twin(stage.body, rows), atol=2e-5)
+
+
+def test_lines_are_drawn_in_their_colour(stage: Stage) -> None:
+    """A line across the picture before the head shows its colour at its middle."""
+    ends = CAMERA.unproject(np.array([[20.0, 60.5], [140.0, 60.5]]), np.array([0.3, 0.3]))
+    colours = np.tile(np.float32([0, 1, 0, 1]), (2, 1))
+    line = LineSet(ends.astype(np.float32), np.array([0, 2]), colours)
+    with renderer():
+        drawn = picture(stage, shot(hair=None, lines=((line, False),)))
+    assert (np.abs(drawn[59:62, 80].astype(int) - [0, 255, 0]).max(axis=1) < 30).any()
+
+
+def test_light_made_in_turns_is_light_made_at_once(stage: Stage) -> None:
+    """After enough pictures of the same, a picture is that of a still."""
+    with renderer():
+        once = picture(stage, shot())
+        picture(stage, shot(hair=None))  # other light
+        for _ in range(2 * TURNS + 1):
+            in_turns = picture(stage, shot(whole_light=False))
+    assert np.abs(once.astype(int) - in_turns).max() <= 1
+
+
+@pytest.mark.parametrize("place", [np.nan, np.inf, -np.inf, 1e30, -1e30])
+def test_hair_that_is_nowhere_harms_nothing(place: float) -> None:
+    """Guides without a place leave a picture, and the next one is as if they had never been."""
+    with renderer() as gl:
+        stage = made_stage(gl, soft=True)
+        before = picture(stage, shot())
+        lost = stage.body.guide_rest.copy()
+        lost[::2, 3:] = place
+        assert picture(stage, shot(guide_rows=lost)).shape == before.shape
+        np.testing.assert_array_equal(picture(stage, shot()), before)
+        stage.release()
+
+
+def test_guides_may_stay_on_the_card() -> None:
+    """A buffer of guides gives the picture that the same array gives, and a box that holds them."""
+    t = np.linspace(0, 1, 64, dtype=np.float32)[None, :, None]
+    with renderer() as gl:
+        stage = made_stage(gl, soft=False)
+        rest = stage.body.guide_rest
+        rows = rest + np.float32([0.02, -0.01, 0.0]) * t[:, : rest.shape[1]] ** 2
+        buffer = gl.context.buffer(np.ascontiguousarray(rows, np.float32))
+        by_array = picture(stage, shot(guide_rows=rows))
+        for _ in range(2):  # the box of the second picture is that of the first
+            by_buffer = picture(stage, shot(guide_rows=buffer))
+            low, high = stage.cloud.min(axis=0), stage.cloud.max(axis=0)
+            assert (low <= rows.min(axis=(0, 1))).all()
+            assert (high >= rows.max(axis=(0, 1))).all()
+            assert (high - low).max() < 2 * np.ptp(rows, axis=(0, 1)).max()
+        stage.release()
+        buffer.release()
+    off = np.abs(by_array.astype(int) - by_buffer)
+    assert off.mean() < 1
+    assert np.quantile(off, 0.99) < 16
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+@pytest.mark.parametrize("direction", [True, False])
+def test_processor_and_shaders_draw_the_same(smooth: bool, direction: bool) -> None:
+    """Both ways to draw differ by roundings, and by how finely skin and shadows are sampled."""
+    look = replace(LOOK, smooth=smooth, by_direction=direction, wider=2.0)
+    wanted = shot(hair=look)
+    with renderer() as gl:
+        stages = [made_stage(gl, soft=soft) for soft in (True, False)]
+        first, second = (picture(stage, wanted).astype(int) for stage in stages)
+        bare = picture(stages[0], shot(hair=None))
+        for stage in stages:
+            stage.release()
+    off = np.abs(first - second)
+    hair = changed(first, bare)
+    assert hair.sum() > 1000
+    assert off[hair].mean() < 3
+    assert np.quantile(off[hair], 0.99) < 16
+    assert abs((first - second)[hair].mean()) < 2

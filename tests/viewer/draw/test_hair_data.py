@@ -1,0 +1,101 @@
+"""Laws of hair that follows guides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairkit.errors import InputError
+from hairkit.testing import bristle_groom
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
+from hairkit.viewer.draw.hair_data import (
+    COUNTS,
+    GuideSampler,
+    HairBody,
+    shares_needed,
+    split_guides,
+)
+
+
+def test_hair_lies_at_rest_where_it_was_made() -> None:
+    """The guides' mix with the offsets gives a hair of about the guides' length on the scalp."""
+    groom = bristle_groom()
+    body = HairBody.of(groom.strands, groom.head, groom.material, 500)
+    course = np.einsum("sk,skmc->smc", body.weights, body.guide_rest[body.followed])
+    hair = course + body.offsets
+    radius = np.linalg.norm(hair[:, 0], axis=1)
+    assert (np.abs(radius - 0.1) < 0.004).all()  # the roots, on the ball of 10 cm
+    length = np.linalg.norm(np.diff(hair, axis=1), axis=2).sum(axis=1)
+    assert (np.abs(length - 0.03) < 0.008).all()
+
+
+def test_the_guides_come_first_and_follow_themselves() -> None:
+    """A guide's own hair is the guide."""
+    groom = bristle_groom()
+    body = HairBody.of(groom.strands, groom.head, groom.material, 400)
+    count = len(groom.strands)
+    assert (body.followed[:count, 0] == np.arange(count)).all()
+    assert (body.weights[:count, 0] == 1).all()
+    assert not body.offsets[:count].any()
+    assert len(body) == 400
+
+
+def test_fewer_hairs_are_a_first_part_of_more_hairs_of_the_same_spread() -> None:
+    """The hairs after the guides are in random order: a tenth of them covers the head like all."""
+    groom = bristle_groom()
+    body = HairBody.of(groom.strands, groom.head, groom.material, 3000)
+    course = np.einsum("sk,skc->sc", body.weights, body.guide_rest[body.followed][:, :, 0])
+    roots = (course + body.offsets[:, 0])[len(groom.strands) :]
+    some = roots[: len(roots) // 10]
+    np.testing.assert_allclose(some.mean(axis=0), roots.mean(axis=0), atol=0.03)
+    np.testing.assert_allclose(some.std(axis=0), roots.std(axis=0), atol=0.03)
+
+
+def test_sampling_keeps_roots_and_tips() -> None:
+    """Whatever the number of points, ends stay."""
+    groom = bristle_groom()
+    rows = GuideSampler(groom.strands, np.linspace(0, 1, 9) ** 1.5)(groom.strands.points)
+    np.testing.assert_allclose(rows[:, 0], groom.strands.roots, atol=1e-7)
+    np.testing.assert_allclose(rows[:, -1], groom.strands.tips, atol=1e-7)
+
+
+def test_straight_hair_needs_the_fewest_points_and_curls_more() -> None:
+    """The number of points goes with the bends."""
+    t = np.linspace(0, 1, 200)
+    straight = Strands.from_list([np.stack([0 * t, -0.3 * t, 0 * t], axis=1)])
+    angle = 2 * np.pi * 6 * t
+    curl = np.stack([0.01 * np.cos(angle), -0.3 * t, 0.01 * np.sin(angle)], axis=1)
+    assert len(shares_needed(straight)) == COUNTS[0]
+    assert len(shares_needed(Strands.from_list([curl]))) > 4 * COUNTS[0]
+
+
+def test_marked_guides_are_the_guides_and_the_rest_follows() -> None:
+    """A groom with hair of its own is drawn with that hair."""
+    groom = bristle_groom()
+    strands = groom.strands
+    guide = np.arange(len(strands)) % 5 == 0
+    marked = Strands(strands.points, strands.offsets, guide=guide)
+    whole = Groom(marked, groom.head, groom.root_triangle, groom.root_barycentric)
+    alone, own = split_guides(whole)
+    assert own is not None
+    assert len(alone.strands) == guide.sum()
+    assert len(own) == (~guide).sum()
+    body = HairBody.of(alone.strands, groom.head, groom.material, 10_000, own)
+    assert len(body) == len(strands)
+
+
+def test_many_unmarked_strands_give_some_guides() -> None:
+    """A file of hair without guides is simulated by a part of it."""
+    alone, own = split_guides(bristle_groom(), most=20)
+    assert len(alone.strands) == 20
+    assert own is not None
+    assert len(own) + 20 == len(bristle_groom().strands)
+
+
+def test_a_groom_without_strands_is_refused() -> None:
+    """One line says what is missing."""
+    groom = bristle_groom()
+    nothing = groom.strands.select(np.zeros(0, int))
+    with pytest.raises(InputError, match="no strands"):
+        HairBody.of(nothing, groom.head, groom.material, 10)
