@@ -20,15 +20,14 @@ from typing import Any
 import cv2
 import numpy as np
 
+from hairkit.arrays import UInt8Array
 from hairkit.cli.render import framing_cameras, parse_size, write_picture
 from hairkit.grooming.prepare_export import dense_groom
 from hairkit.manager import Manager
 from hairkit.render import Lights, draw
 from hairkit.render.picture import backdrop, drawn_width
-from hairkit.storage import UInt8Array
 from hairkit.types.camera import Camera
-from hairkit.types.groom import Groom
-from hairkit.types.groom_file import read_groom, write_groom
+from hairkit.types.groom import Groom, read_groom, write_groom
 
 MADE = Path(__file__).parents[1] / ".clients" / "bpy" / "bin" / "python"
 SUN = np.pi

@@ -34,8 +34,7 @@ from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.storage import write_bytes
-from hairkit.types.groom import Groom
-from hairkit.types.groom_file import read_groom, write_groom
+from hairkit.types.groom import Groom, read_groom, write_groom
 from hairkit.types.head import Roots
 from hairkit.types.strands import Strands
 

@@ -22,7 +22,7 @@ from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.render.context import Renderer, renderer
 from hairkit.synth import grow
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import write_groom
 from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.draw.frame_budget import LEVELS, Budget
 from hairkit.viewer.preview import Preview

@@ -20,13 +20,6 @@ import numpy.typing as npt
 
 from hairkit.errors import FormatError, InputError
 
-Float32Array = npt.NDArray[np.float32]
-Float64Array = npt.NDArray[np.float64]
-Int32Array = npt.NDArray[np.int32]
-Int64Array = npt.NDArray[np.int64]
-UInt8Array = npt.NDArray[np.uint8]
-BoolArray = npt.NDArray[np.bool_]
-
 MAX_UNPACKED_BYTES = 4 * 2**30
 """Refuse archives that claim to unpack to more than this many bytes."""
 
@@ -45,36 +38,6 @@ _UNREADABLE = (
 )
 """What zipfile and NumPy raise on damaged archives, encrypted members and wild headers included."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-
-
-def frozen_array(
-    value: npt.ArrayLike, dtype: npt.DTypeLike, shape: tuple[int | None, ...], name: str
-) -> npt.NDArray[Any]:
-    """Return `value` as a read-only contiguous array; `None` in `shape` matches any size.
-
-    An array that is read-only and owns its memory is shared, any other one copied. Raises
-    `InputError` naming the array when the shape differs or a float is not finite.
-    """
-    array = np.ascontiguousarray(value, dtype=dtype)
-    if array.ndim != len(shape) or any(
-        want is not None and want != have for want, have in zip(shape, array.shape, strict=True)
-    ):
-        wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
-        raise InputError(f"{name} has shape {array.shape}, expected {wanted}")
-    if array.dtype.kind == "f" and not _all_finite(array):
-        raise InputError(
-            f"{name} holds {np.count_nonzero(~np.isfinite(array))} values that are not finite"
-        )
-    if array.base is not None or (array is value and array.flags.writeable):
-        array = array.copy()
-    array.setflags(write=False)
-    return array
-
-
-def _all_finite(array: npt.NDArray[np.floating[Any]]) -> bool:
-    """Return whether all numbers are finite; their sum tells without a mask, if it is finite."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return bool(np.isfinite(array.sum()) or np.isfinite(array).all())
 
 
 class Stored:

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float32Array
 from hairkit.io.capture_reader import TURN
-from hairkit.storage import BoolArray, Float32Array
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.groom import Groom

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
 from hairkit.imaging.seeded_segmentation import (
@@ -25,7 +26,6 @@ from hairkit.imaging.seeded_segmentation import (
     reduced_size,
 )
 from hairkit.options import option
-from hairkit.storage import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.types.capture import View
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 

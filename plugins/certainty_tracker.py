@@ -18,11 +18,11 @@ from numba import njit, prange
 from scipy import ndimage
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, Strands, hookimpl
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.field.growth_prior import combing_direction, hair_length, scalp_way
 from hairkit.field.sampling_kernels import gradient_at, make_unit, principal_direction, sample_at
 from hairkit.grooming.postprocess import FinishOptions, finished
 from hairkit.options import option
-from hairkit.storage import BoolArray, Float32Array, Float64Array, Int64Array
 
 ROOT_STEPS, ROOT_INERTIA = 4, 0.7
 """Near the scalp the field is weak: the first steps keep more of their direction."""

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed, plain_widths, rows_kept
 from hairkit.grooming.prepare_export import ExportOptions, prepared
@@ -25,7 +26,7 @@ from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.strand_blocks import blocks, colours
 from hairkit.options import option
-from hairkit.storage import Float32Array, Int64Array, write_pieces
+from hairkit.storage import write_pieces
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
 

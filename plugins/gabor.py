@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.hookspecs import hookimpl
 from hairkit.imaging.masked_filters import (
     blur,
@@ -32,7 +33,6 @@ from hairkit.imaging.masked_filters import (
     well_inside,
 )
 from hairkit.options import option
-from hairkit.storage import BoolArray, Float32Array, Float64Array
 from hairkit.types.capture import View
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
 from hairkit.imaging.seeded_segmentation import (
@@ -24,7 +25,6 @@ from hairkit.imaging.seeded_segmentation import (
 )
 from hairkit.io.strokes import Stroke, Strokes, rasterise, read_strokes
 from hairkit.options import option
-from hairkit.storage import BoolArray, Float64Array, UInt8Array
 from hairkit.types.capture import View
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 

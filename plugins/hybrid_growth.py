@@ -14,11 +14,11 @@ from numba import njit, prange
 from scipy import ndimage
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, Strands, hookimpl
+from hairkit.arrays import Float32Array
 from hairkit.field.growth_prior import hair_length, scalp_way
 from hairkit.field.sampling_kernels import gradient_at, make_unit, sample_at
 from hairkit.grooming.postprocess import FinishOptions, finished
 from hairkit.options import option
-from hairkit.storage import Float32Array
 from hairkit.types.volume import cell_slopes, symmetric_matrices
 
 NEAR = 4

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
-from hairkit.cameras.turntable import Turn, fit_similarity, triangulate
+from hairkit.arrays import Float64Array
+from hairkit.cameras.similarity import fit_similarity, triangulate
+from hairkit.cameras.turntable import Turn
 from hairkit.errors import InputError
 from hairkit.options import option
-from hairkit.storage import Float64Array
 
 JAW = 17
 """The first landmarks trace the jaw."""

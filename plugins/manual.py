@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit import Capture, Head, Mask, Scene, hookimpl
-from hairkit.cameras.turntable import Similarity, Turn
+from hairkit.cameras.similarity import Similarity
+from hairkit.cameras.turntable import Turn
 from hairkit.errors import InputError
 from hairkit.options import option
 

@@ -10,9 +10,9 @@ import cv2
 import numpy as np
 
 from hairkit import Mask, View, hookimpl
+from hairkit.arrays import UInt8Array
 from hairkit.errors import InputError
 from hairkit.io.photos import read_drawing
-from hairkit.storage import UInt8Array
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hairkit.arrays import BoolArray, Int64Array
 from hairkit.errors import InputError
 from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
@@ -24,7 +25,7 @@ from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.number_text import written_rows
 from hairkit.io.strand_blocks import blocks
 from hairkit.options import option
-from hairkit.storage import BoolArray, Int64Array, write_pieces
+from hairkit.storage import write_pieces
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

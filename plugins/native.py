@@ -8,8 +8,7 @@ from types import MappingProxyType
 from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.types.groom import Groom
-from hairkit.types.groom_file import read_groom, write_groom
+from hairkit.types.groom import Groom, read_groom, write_groom
 
 FORMAT = FileFormat(
     "hairkit",

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import FormatError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
 from hairkit.grooming.prepare_export import ExportOptions, prepared
@@ -22,7 +23,7 @@ from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.number_text import read_numbers, stripped, whole_digits, written_rows
 from hairkit.io.polylines import chains
 from hairkit.io.strand_blocks import blocks
-from hairkit.storage import Float64Array, Int64Array, write_pieces
+from hairkit.storage import write_pieces
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from hairkit.arrays import Float32Array
 from hairkit.hookspecs import hookimpl
 from hairkit.imaging.masked_filters import (
     blur,
@@ -37,7 +38,6 @@ from hairkit.imaging.masked_filters import (
     well_inside,
 )
 from hairkit.options import option
-from hairkit.storage import Float32Array
 from hairkit.types.capture import View
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap

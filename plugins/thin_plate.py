@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.cameras.silhouette_coherence import Outlines
-from hairkit.cameras.turntable import triangulate
+from hairkit.cameras.similarity import triangulate
 from hairkit.options import option
-from hairkit.storage import Float32Array, Float64Array, Int64Array
 
 JAW = 17
 """The first landmarks trace the jaw, which detectors place less surely."""

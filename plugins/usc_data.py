@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import BoolArray, Int64Array
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
 from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
@@ -22,7 +23,7 @@ from hairkit.io.byte_writer import as_bytes
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.strand_blocks import blocks
-from hairkit.storage import BoolArray, Int64Array, write_pieces
+from hairkit.storage import write_pieces
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from hairkit import storage, testing
+from hairkit.arrays import frozen_array
 from hairkit.errors import FormatError, InputError
-from hairkit.storage import Stored, frozen_array, read_npz, write_bytes, write_npz
+from hairkit.storage import Stored, read_npz, write_bytes, write_npz
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

@@ -19,7 +19,7 @@ import numpy as np
 from hairkit.cli import main as hairkit
 from hairkit.head_model.template import default_head
 from hairkit.synth import StyleName, grow
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import write_groom
 
 HERE = Path(__file__).parent
 MILLISECONDS = 35

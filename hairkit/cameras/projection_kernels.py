@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from hairkit.storage import Float32Array, Float64Array, Int32Array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 

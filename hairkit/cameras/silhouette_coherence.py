@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
-from hairkit.storage import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.types.mask import Mask
 
 FIELD_HEIGHT = 540

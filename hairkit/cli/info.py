@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float32Array
 from hairkit.cli.convert import add_reader_arguments, reader_settings
 from hairkit.cli.export import assigned
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
-from hairkit.storage import Float32Array
 
 _DESCRIPTION = """\
 Example: hairkit info out/groom.npz

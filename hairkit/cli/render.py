@@ -14,13 +14,14 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import UInt8Array
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.io.capture_reader import TURN
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom
 from hairkit.render import Lights, draw_views
-from hairkit.storage import UInt8Array, write_bytes
+from hairkit.storage import write_bytes
 from hairkit.types.camera import Camera
 from hairkit.types.scene import read_cameras
 from hairkit.types.strands import Strands

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float64Array
 from hairkit.cli.settings import add_setting, importer_of, split_settings
 from hairkit.errors import InputError, OptionError
-from hairkit.storage import Float64Array
 
 _DESCRIPTION = """\
 Example: hairkit simulate out/groom.npz -o cache.npz --shake yaw:20:1.5 --wind 3,0,1

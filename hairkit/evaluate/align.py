@@ -14,8 +14,8 @@ import numpy.typing as npt
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
-from hairkit.storage import Float32Array, Float64Array
 from hairkit.types.camera import Camera
 from hairkit.types.strands import Strands
 

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.cameras.projection_kernels import head_depth, pack_cameras, project_row
-from hairkit.storage import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import UInt8Array
 from hairkit.errors import HairkitError
 from hairkit.evaluate.depth_map import front_values
 from hairkit.evaluate.evaluation import Evaluation
@@ -13,7 +14,6 @@ from hairkit.evaluate.images import RIGHT, WRONG, orientation_gap
 from hairkit.evaluate.scores import Hits
 from hairkit.evaluate.truth import Truth
 from hairkit.io.photos import read_photo
-from hairkit.storage import UInt8Array
 from hairkit.types.mask import HAIR
 from hairkit.types.orientation import OrientationMap
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import BoolArray
 from hairkit.evaluate.align import (
     CameraError,
     Similarity,
@@ -42,7 +43,6 @@ from hairkit.evaluate.strand_statistics import (
 )
 from hairkit.evaluate.truth import Truth
 from hairkit.grooming.densify import densify
-from hairkit.storage import BoolArray
 from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR, PERSON
 from hairkit.types.strands import Strands

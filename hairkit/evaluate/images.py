@@ -11,12 +11,12 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.cameras.projection_kernels import head_depth, pack_cameras, project_row
 from hairkit.errors import InputError
 from hairkit.evaluate.depth_map import Surface, first_surface, point_depth
 from hairkit.evaluate.scores import Samples
 from hairkit.imaging.masked_filters import coherent_truth
-from hairkit.storage import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 from hairkit.types.orientation import OrientationMap, angle_between

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
-from hairkit.storage import Float32Array, Float64Array, Int64Array, UInt8Array
+from hairkit.arrays import Float32Array, Float64Array, Int64Array, UInt8Array
 
 FIRST_HIT_NONE = 255
 """Marks a sample that has a partner at no threshold."""

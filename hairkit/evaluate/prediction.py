@@ -12,8 +12,7 @@ from hairkit.errors import InputError
 from hairkit.evaluate.truth import Truth
 from hairkit.storage import Stored, from_arrays, read_npz
 from hairkit.types.camera import Camera
-from hairkit.types.groom import Groom
-from hairkit.types.groom_file import read_groom
+from hairkit.types.groom import Groom, read_groom
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import read_cameras

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import BoolArray, Float32Array, Int64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.evaluate.depth_map import Surface, near_some_surface
 from hairkit.evaluate.neighbour_search import HashGrid, first_hits
-from hairkit.storage import BoolArray, Float32Array, Int64Array, UInt8Array
 from hairkit.types.strands import Strands
 
 THRESHOLDS = ((0.002, 20.0), (0.003, 30.0), (0.004, 40.0))

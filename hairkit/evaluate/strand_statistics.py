@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from hairkit.arrays import BoolArray
 from hairkit.evaluate.neighbour_search import HashGrid, most_followed
 from hairkit.evaluate.scores import THRESHOLDS, Samples, sample_strands
 from hairkit.head_model.signed_distance import distance_to
-from hairkit.storage import BoolArray
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
 

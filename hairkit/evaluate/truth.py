@@ -10,10 +10,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
 from hairkit.evaluate.depth_map import Surface, first_surface
 from hairkit.evaluate.scores import Samples, sample_strands
-from hairkit.storage import UInt8Array, read_npz
+from hairkit.storage import read_npz
 from hairkit.types.camera import Camera
 from hairkit.types.head import Capsules, Head
 from hairkit.types.scene import read_cameras

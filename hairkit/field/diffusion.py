@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
+from hairkit.arrays import BoolArray, Float32Array, Int32Array
 from hairkit.errors import InputError
-from hairkit.storage import BoolArray, Float32Array, Int32Array
 
 CHUNKS = 64
 """Sums are taken over this many parts of the cells, whatever the number of threads."""

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from numba import njit
 from scipy import ndimage
 
-from hairkit.storage import BoolArray, Float32Array, Float64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.types.head import Head
 from hairkit.types.volume import Hull, VoxelGrid, outer_products
 

@@ -13,7 +13,7 @@ import itertools
 import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from hairkit.storage import BoolArray, Float32Array, Float64Array, Int32Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
 from hairkit.types.volume import VoxelGrid
 
 BLUR = 1.0

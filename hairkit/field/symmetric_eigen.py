@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 ROUND_OFF = 1e-24
 """Squares of cross products below this share of the fourth power of the tensor are round-off."""

@@ -15,11 +15,11 @@ import numpy as np
 from numba import njit, prange
 from scipy import ndimage
 
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.cameras.projection_kernels import pack_cameras, project_row, splat_depth
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
 from hairkit.imaging.waves import Waves, measure_waves, without_slant
 from hairkit.options import option
-from hairkit.storage import Float32Array, Float64Array, Int64Array
 from hairkit.types.camera import Camera
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap

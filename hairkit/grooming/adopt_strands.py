@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from hairkit.arrays import BoolArray, Float32Array, Int64Array
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.prepare_export import shorter_than
 from hairkit.head_model.placement import find_place, placed
@@ -24,9 +25,7 @@ from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.io.head_reader import read_head
 from hairkit.io.strand_blocks import bounds
 from hairkit.options import option
-from hairkit.storage import BoolArray, Float32Array, Int64Array
-from hairkit.types.groom import Groom, HairMaterial
-from hairkit.types.groom_file import read_groom
+from hairkit.types.groom import Groom, HairMaterial, read_groom
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
 

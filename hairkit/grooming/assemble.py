@@ -9,9 +9,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.imaging.waves import Waves
-from hairkit.storage import Float32Array, Float64Array
 from hairkit.types.capture import View
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head, Roots

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import InputError
-from hairkit.storage import Float64Array, Int64Array
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

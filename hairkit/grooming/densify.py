@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.head_model.scalp import sample_roots
-from hairkit.storage import Float32Array, Float64Array, Int64Array
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Roots
 from hairkit.types.strands import Strands

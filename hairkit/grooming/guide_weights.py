@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
-from hairkit.storage import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.types.strands import Strands
 
 CLOSEST = 3

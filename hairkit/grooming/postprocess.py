@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hairkit.grooming.head_collision import kept_outside
+from hairkit.grooming.wind_waves import add_waves
 from hairkit.helices import smoothed
-from hairkit.imaging.waves import add_waves, measure_waves
+from hairkit.imaging.waves import measure_waves
 from hairkit.options import option
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap

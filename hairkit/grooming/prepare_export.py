@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float32Array
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.grooming.guide_weights import follow, guide_mask
 from hairkit.head_model.scalp import roots_at, sample_roots
 from hairkit.io.strand_blocks import colours
 from hairkit.options import option
-from hairkit.storage import BoolArray, Float32Array
 from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
 from hairkit.types.point_cache import PointCache, read_cache

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from hairkit.storage import Float64Array, Int32Array, Int64Array
+from hairkit.arrays import Float64Array, Int32Array, Int64Array
 
 _LEAF = 4
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 from hairkit.types.head import Capsules, Head
 from hairkit.types.strands import Strands
 

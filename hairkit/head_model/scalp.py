@@ -7,9 +7,9 @@ import numpy.typing as npt
 from numba import njit
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
-from hairkit.storage import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.types.head import Head, Roots
 
 MAX_ROOTS = 200_000

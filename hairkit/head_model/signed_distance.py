@@ -15,6 +15,7 @@ from numba import njit
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.head_model.bvh import (
     TriangleTree,
     build_tree,
@@ -23,7 +24,6 @@ from hairkit.head_model.bvh import (
     nearest_on_surface,
     triangle_distance,
 )
-from hairkit.storage import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.types.head import Head
 from hairkit.types.volume import VoxelGrid
 

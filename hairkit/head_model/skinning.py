@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.storage import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.types.head import Head
 
 JOINT_NAMES = ("root", "neck", "head")

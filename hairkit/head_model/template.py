@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
+from hairkit.arrays import Float64Array, Int32Array
 from hairkit.head_model.template_shape import head_surface, scalp_weight
-from hairkit.storage import Float64Array, Int32Array
 from hairkit.types.head import Capsules, Head
 
 FREQUENCY = 34

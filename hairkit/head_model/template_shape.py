@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 # Polar angle, front (y, z), side (x, y, z), back (y, z), exponents of the front and back quarters.
 _LEVELS = np.array(

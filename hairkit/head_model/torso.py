@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
-from hairkit.storage import BoolArray, Float32Array, Float64Array, Int32Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
 from hairkit.types.head import Head
 from hairkit.types.volume import VoxelGrid
 

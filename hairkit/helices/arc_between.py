@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import BoolArray, Float64Array
 from hairkit.helices.arc_length import dot, unit
-from hairkit.storage import BoolArray, Float64Array
 
 COINCIDENT = 1e-12
 """Tangents closer than this, radians, count as equal: a straight arc if the chord is parallel."""

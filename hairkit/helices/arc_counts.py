@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.helices.arc_length import Path, dot
 from hairkit.helices.floating_tangents import Arcs, cuts, even, fit_arcs
-from hairkit.storage import Float64Array, Int64Array
 from hairkit.types.strands import Strands
 
 FEWEST, MOST = 3, 25

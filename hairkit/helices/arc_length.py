@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.storage import Float64Array, Int64Array
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.types.strands import Strands
 
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.helices.helix_strands import smoothed
-from hairkit.storage import Float64Array, Int64Array
 from hairkit.types.groom import HairMaterial
 from hairkit.types.strands import Strands
 

@@ -23,10 +23,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solveh_banded
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.helices.arc_between import helix_through
 from hairkit.helices.arc_length import Path, dot, unit
 from hairkit.helices.helix import along_arc
-from hairkit.storage import Float64Array, Int64Array
 from hairkit.types.strands import Strands
 
 TANGENT_STEPS = 3

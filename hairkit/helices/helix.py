@@ -15,7 +15,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 _TERMS = 9
 SERIES_BELOW = 1.0

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array, Int64Array, frozen_array
 from hairkit.errors import InputError
 from hairkit.helices.arc_counts import TOLERANCE, adaptive_counts
 from hairkit.helices.arc_length import Path, unit
 from hairkit.helices.floating_tangents import Arcs, fit_arcs
 from hairkit.helices.helix import mean_rotation, rotation
-from hairkit.storage import Float32Array, Float64Array, Int64Array, Stored, frozen_array
+from hairkit.storage import Stored
 from hairkit.types.strands import Strands
 
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float32Array, UInt8Array
 from hairkit.imaging.masked_filters import blur, picture_scale
-from hairkit.storage import BoolArray, Float32Array, UInt8Array
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 _SIGMAS = (4.0, 12.0, 36.0)

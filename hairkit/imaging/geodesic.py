@@ -7,7 +7,7 @@ from numba import njit
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from hairkit.storage import BoolArray, Float32Array, Float64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 
 FAR = np.float32(1e6)
 """Distance of pixels that no seed reaches."""

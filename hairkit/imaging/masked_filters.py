@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import BoolArray, Float32Array, UInt8Array
 from hairkit.errors import InputError
-from hairkit.storage import BoolArray, Float32Array, UInt8Array
 from hairkit.types.capture import View
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import wrap_angle

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.imaging.alpha_matting import refine_labels
 from hairkit.imaging.geodesic import edge_costs, seed_distance
 from hairkit.imaging.masked_filters import blur
-from hairkit.storage import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 UNKNOWN = 64

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float64Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.io.capture_toml import CaptureFile, ViewEntry, read_capture_file
 from hairkit.io.photos import PhotoHeader, focal_from_equivalent, read_header, read_photo
 from hairkit.options import unknown_name
-from hairkit.storage import Float64Array, frozen_array
 from hairkit.types.capture import Capture, View
 
 TURN = {

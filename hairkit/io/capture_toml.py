@@ -24,9 +24,10 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
 from hairkit.options import make_options, option, unknown_name
-from hairkit.storage import Float64Array, write_text
+from hairkit.storage import write_text
 
 _TABLES = ("head", "views")
 

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float64Array
 from hairkit.errors import FormatError, HairkitError
 from hairkit.io.byte_reader import MAX_FILE_BYTES, read_file
-from hairkit.storage import Float64Array
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """NumPy types by the numbers that glTF gives them."""

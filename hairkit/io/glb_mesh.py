@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float64Array
 from hairkit.io.glb_file import GlbFile, readable
 from hairkit.io.mesh_text import MAX_FACES, MAX_FILE_BYTES, MAX_VERTICES, FileMesh, checked_mesh
-from hairkit.storage import Float64Array
 
 
 def read_glb(path: str | os.PathLike[str]) -> FileMesh:

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.io.glb_file import GlbFile, node_matrix, readable, rotations
-from hairkit.storage import Float64Array, Int64Array
 
 RATE = 60.0
 """Samples a second."""

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from hairkit.arrays import Float32Array, Float64Array, Int32Array
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.template import default_head
 from hairkit.io.glb_mesh import read_glb
 from hairkit.io.mesh_text import FileMesh, read_obj, read_ply
 from hairkit.io.photos import read_drawing
-from hairkit.storage import Float32Array, Float64Array, Int32Array, write_text
+from hairkit.storage import write_text
 from hairkit.types.head import Capsules, Head
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import FormatError, InputError
-from hairkit.storage import Float64Array, Int64Array
 
 MAX_FILE_BYTES = 512 * 2**20
 MAX_VERTICES = 2_000_000

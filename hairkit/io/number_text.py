@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array, UInt8Array
 from hairkit.errors import FormatError
-from hairkit.storage import BoolArray, Float32Array, Float64Array, Int64Array, UInt8Array
 
 _LARGEST = float(np.finfo(np.float32).max) * (1 + 1e-8)
 """Nine digits of the largest float32 lie just above it, and are rounded to it."""

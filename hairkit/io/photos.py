@@ -15,9 +15,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
 from hairkit.io.exif import Exif, read_exif
-from hairkit.storage import UInt8Array
 
 MAX_PIXELS = 64_000_000
 """Pictures with more pixels than this are refused before they are decoded."""

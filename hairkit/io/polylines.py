@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hairkit.arrays import BoolArray, Int64Array
 from hairkit.errors import FormatError
-from hairkit.storage import BoolArray, Int64Array
 
 
 def chains(edges: Int64Array, vertices: int) -> tuple[Int64Array, Int64Array]:

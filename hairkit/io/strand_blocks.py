@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.storage import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.types.groom import HairMaterial
 from hairkit.types.strands import Strands
 

@@ -12,9 +12,9 @@ from typing import Any, Literal, get_args
 import cv2
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float64Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.options import unknown_name
-from hairkit.storage import BoolArray, Float64Array, frozen_array
 
 StrokeLabel = Literal["foreground", "background", "person"]
 

@@ -10,11 +10,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import UInt8Array
 from hairkit.errors import InputError
 from hairkit.field.isosurface import volume_surface
 from hairkit.grooming.densify import densify
 from hairkit.render import Lights, Solid, draw_views
-from hairkit.storage import UInt8Array, write_bytes
+from hairkit.storage import write_bytes
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.groom import Groom

@@ -7,8 +7,7 @@ from pathlib import Path
 
 from hairkit.errors import InputError
 from hairkit.manager import Manager
-from hairkit.types.groom import Groom
-from hairkit.types.groom_file import read_groom
+from hairkit.types.groom import Groom, read_groom
 
 
 def load_groom(

@@ -21,8 +21,7 @@ from hairkit.pipeline.stage_runner import Argument, Given, StageRunner
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
 from hairkit.types.capture import Capture
-from hairkit.types.groom import Groom
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import Groom, write_groom
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap

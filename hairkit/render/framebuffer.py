@@ -11,9 +11,9 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array
 from hairkit.errors import RenderError
 from hairkit.render.context import Renderer
-from hairkit.storage import Float32Array
 from hairkit.types.camera import Camera
 
 Sample = TypeVar("Sample", np.uint8, np.float32)

@@ -12,7 +12,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 from hairkit.types.camera import Camera
 
 Program = moderngl.Program | moderngl.ComputeShader

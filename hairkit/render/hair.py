@@ -11,9 +11,9 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array
 from hairkit.render.context import Renderer
 from hairkit.render.gl_camera import DepthRange, set_camera, set_uniforms
-from hairkit.storage import Float32Array
 from hairkit.types.camera import Camera
 from hairkit.types.strands import Strands
 

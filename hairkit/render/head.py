@@ -8,9 +8,9 @@ from typing import Any, Protocol
 import moderngl
 import numpy as np
 
+from hairkit.arrays import Float32Array, Int32Array
 from hairkit.render.context import Renderer
 from hairkit.render.gl_camera import DepthRange, set_camera, set_uniforms
-from hairkit.storage import Float32Array, Int32Array
 from hairkit.types.camera import Camera
 from hairkit.types.groom import HairMaterial
 from hairkit.types.head import Head

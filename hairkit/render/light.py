@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import uniform_filter
 
+from hairkit.arrays import Float32Array
 from hairkit.render.head import Mesh
-from hairkit.storage import Float32Array
 from hairkit.types.camera import Camera
 from hairkit.types.strands import Strands
 from hairkit.types.volume import VoxelGrid

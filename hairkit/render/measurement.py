@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float32Array
 from hairkit.render.context import Renderer, renderer
 from hairkit.render.framebuffer import SUPERSAMPLE, averaged, supersampled, target
 from hairkit.render.gl_camera import DepthRange
 from hairkit.render.hair import draw_ribbons, ribbons
 from hairkit.render.head import Mesh, draw_solid
-from hairkit.storage import BoolArray, Float32Array
 from hairkit.types.camera import Camera
 from hairkit.types.orientation import wrap_angle
 from hairkit.types.strands import Strands

@@ -10,6 +10,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from hairkit.arrays import Float32Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.render.context import Renderer, renderer
 from hairkit.render.framebuffer import SUPERSAMPLE, averaged, supersampled, target
@@ -17,7 +18,6 @@ from hairkit.render.gl_camera import DepthRange
 from hairkit.render.hair import RibbonBuffers, draw_ribbons, ribbons
 from hairkit.render.head import Solid, draw_solid, head_solid
 from hairkit.render.light import Lights, LightVolume, hair_density, light_volume
-from hairkit.storage import Float32Array, UInt8Array
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from hairkit.arrays import Float64Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.simulate import quaternion
-from hairkit.storage import Float64Array, frozen_array
 from hairkit.types.head import Head
 
 AXES = {"pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.0), "roll": (0.0, 0.0, 1.0)}

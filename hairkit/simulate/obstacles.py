@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, Float64Array, frozen_array
 from hairkit.head_model.signed_distance import signed_distance
-from hairkit.storage import Float32Array, Float64Array, Stored, frozen_array
+from hairkit.storage import Stored
 from hairkit.types.head import Capsules, Head
 from hairkit.types.volume import VoxelGrid
 

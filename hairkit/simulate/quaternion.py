@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 
 def product(a: Float64Array, b: Float64Array) -> Float64Array:

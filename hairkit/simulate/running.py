@@ -8,11 +8,11 @@ from time import perf_counter
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import HairkitError, InputError
 from hairkit.progress import Progress, Silent
 from hairkit.simulate.motion import HeadMotion
 from hairkit.simulate.simulator import Simulator, Surroundings
-from hairkit.storage import Float32Array, Float64Array
 from hairkit.types.point_cache import PointCache
 
 STAGE = "simulate"

@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.storage import Float32Array, Float64Array, frozen_array
+from hairkit.arrays import Float32Array, Float64Array, frozen_array
 from hairkit.types.strands import Strands
 
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 MODES = 16
 """Waves that the gusts are made of."""

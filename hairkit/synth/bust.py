@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
+from hairkit.arrays import Float32Array, Float64Array, Int32Array
 from hairkit.head_model.signed_distance import signed_distance
 from hairkit.head_model.torso import EXPONENT, RINGS, loft, power, profile
-from hairkit.storage import Float32Array, Float64Array, Int32Array
 from hairkit.types.head import Head
 from hairkit.types.volume import VoxelGrid
 

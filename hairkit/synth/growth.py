@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from hairkit.arrays import Float32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.head_model.scalp import sample_roots
-from hairkit.storage import Float32Array, Int64Array
 from hairkit.synth.bust import Bust, Obstacle
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head, Roots

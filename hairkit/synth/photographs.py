@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.io.capture_reader import TURN
 from hairkit.render import (
@@ -27,7 +28,7 @@ from hairkit.render import (
     drawn_width,
     points_at_depth,
 )
-from hairkit.storage import Float64Array, UInt8Array, write_bytes, write_npz, write_text
+from hairkit.storage import write_bytes, write_npz, write_text
 from hairkit.synth.bust import Bust
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom

@@ -8,8 +8,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float64Array, frozen_array
 from hairkit.errors import InputError
-from hairkit.storage import Float64Array, Stored, frozen_array
+from hairkit.storage import Stored
 
 CameraModel = Literal["perspective", "orthographic"]
 

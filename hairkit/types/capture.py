@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from hairkit.arrays import Float64Array, UInt8Array, frozen_array
 from hairkit.errors import InputError
-from hairkit.storage import Float64Array, UInt8Array, frozen_array
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from dataclasses import dataclass, field
 from typing import Self
 
 import numpy as np
 
-from hairkit.errors import InputError
-from hairkit.storage import Float32Array, Int32Array, Stored, frozen_array
+from hairkit.arrays import Float32Array, Int32Array, frozen_array
+from hairkit.errors import FormatError, InputError
+from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
+
+_VERSION, _NEWEST = "hairkit_groom", 1
+_STRANDS = "strands."
+_AT_TOP = ("points", "offsets", "widths", "root_uv", "group", "guide")
 
 
 def _grey() -> Float32Array:
@@ -83,15 +87,33 @@ class Groom(Stored):
         object.__setattr__(self, "root_barycentric", barycentric)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the groom as hairkit's own file (see `hairkit.types.groom_file`), atomically."""
-        from hairkit.types.groom_file import write_groom  # it builds on this module
+        """Write the groom as hairkit's own file, atomically; equal grooms give equal files.
 
-        write_groom(path, self)
+        `points` (P, 3) and `offsets` (S + 1,) stand at the top of the npz, with `widths`,
+        `root_uv`, `group`, `guide`, `root_triangle` and `root_barycentric`; the rest is named
+        `head.vertices`, `material.width` and so on.
+        """
+        arrays = {name.removeprefix(_STRANDS): array for name, array in to_arrays(self).items()}
+        write_npz(path, arrays | {_VERSION: np.asarray(_NEWEST)})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Read what `save` and `reconstruct` wrote; raises `FormatError` for anything else."""
-        from hairkit.types.groom_file import read_groom
+        arrays = read_npz(path)
+        version = arrays.pop(_VERSION, None)
+        if version is None or not {"points", "offsets"} <= set(arrays):
+            raise FormatError(f"{path}: not a groom of hairkit; expected what `reconstruct` wrote")
+        if version.shape != () or version != _NEWEST:
+            raise FormatError(f"{path}: a groom of version {version}, this hairkit reads {_NEWEST}")
+        named = {_STRANDS + name if name in _AT_TOP else name: arrays[name] for name in arrays}
+        return from_arrays(cls, named, str(path))
 
-        groom = read_groom(path)
-        return cls(**{f.name: getattr(groom, f.name) for f in dataclasses.fields(cls)})
+
+def write_groom(path: str | os.PathLike[str], groom: Groom) -> None:
+    """Write the groom to hairkit's own file; see `Groom.save`."""
+    groom.save(path)
+
+
+def read_groom(path: str | os.PathLike[str]) -> Groom:
+    """Read a groom from hairkit's own file; see `Groom.load`."""
+    return Groom.load(path)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, frozen_array
 from hairkit.errors import InputError
-from hairkit.storage import Float32Array, Float64Array, Int32Array, Stored, frozen_array
+from hairkit.storage import Stored
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hairkit.arrays import BoolArray, UInt8Array, frozen_array
 from hairkit.errors import InputError
-from hairkit.storage import BoolArray, Stored, UInt8Array, frozen_array
+from hairkit.storage import Stored
 
 HAIR, PERSON, BACKGROUND = 255, 128, 0
 

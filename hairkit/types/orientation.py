@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, frozen_array
 from hairkit.errors import InputError
-from hairkit.storage import Float32Array, Stored, frozen_array
+from hairkit.storage import Stored
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array, frozen_array
 from hairkit.errors import InputError
-from hairkit.storage import Float32Array, Float64Array, Stored, frozen_array
+from hairkit.storage import Stored
 from hairkit.types.groom import Groom
 
 

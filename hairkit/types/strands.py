@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.errors import InputError
-from hairkit.storage import (
+from hairkit.arrays import (
     BoolArray,
     Float32Array,
     Float64Array,
     Int32Array,
     Int64Array,
-    Stored,
     frozen_array,
 )
+from hairkit.errors import InputError
+from hairkit.storage import Stored
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, frozen_array
 from hairkit.errors import InputError
-from hairkit.storage import BoolArray, Float32Array, Float64Array, Stored, frozen_array
+from hairkit.storage import Stored
 
 MAX_CELLS = 256**3
 """Largest number of cells a grid may have."""

@@ -17,12 +17,12 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from hairkit.cameras.turntable import fit_similarity
+from hairkit.arrays import Float32Array, Float64Array
+from hairkit.cameras.similarity import fit_similarity
 from hairkit.errors import InputError
 from hairkit.io.capture_reader import read_capture
 from hairkit.io.capture_toml import head_entry, write_head_entry
 from hairkit.manager import Manager
-from hairkit.storage import Float32Array, Float64Array
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.head import Head

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 AXES = {"yaw": (0.0, 1.0, 0.0), "pitch": (1.0, 0.0, 0.0), "roll": (0.0, 0.0, 1.0)}
 """Yaw turns to the subject's left, pitch nods down, roll tilts to the right shoulder."""

@@ -12,12 +12,13 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.errors import HairkitError, InputError
 from hairkit.field.isosurface import volume_surface
 from hairkit.io.capture_reader import read_capture
 from hairkit.pipeline.reconstruct import PHOTOS
 from hairkit.render.head import Solid
-from hairkit.storage import Float32Array, Float64Array, Stored, UInt8Array, from_arrays, read_npz
+from hairkit.storage import Stored, from_arrays, read_npz
 from hairkit.synth.bust import Bust
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head

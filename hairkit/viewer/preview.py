@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import UInt8Array
 from hairkit.render.context import Renderer
 from hairkit.render.head import Solid, head_solid
-from hairkit.storage import UInt8Array
 from hairkit.viewer.draw.colouring import point_values, ramp
 from hairkit.viewer.draw.frame import Shot, Stage
 from hairkit.viewer.draw.frame_budget import LEVELS, Budget

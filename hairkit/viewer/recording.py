@@ -7,8 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from hairkit.arrays import UInt8Array
 from hairkit.errors import InputError
-from hairkit.storage import UInt8Array, write_bytes
+from hairkit.storage import write_bytes
 
 FRAMES_PER_SECOND = 30
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array
 from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.options import OptionInfo, unknown_name
 from hairkit.simulate.simulator import Measures, Simulator, Surroundings
-from hairkit.storage import Float32Array
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

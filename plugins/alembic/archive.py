@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.io.byte_reader import finite
-from hairkit.storage import Float32Array, Float64Array, Int64Array
 
 from .ogawa import Headers, Ogawa
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import FormatError
-from hairkit.storage import Float32Array, Float64Array, Int64Array
 
 from .archive import Archive, Object, Property, tag
 from .transforms import transformed

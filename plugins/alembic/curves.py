@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float32Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import GuideWeights, closest_guides, guide_mask
 from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.io.strand_blocks import Profile, colours
-from hairkit.storage import BoolArray, Float32Array, Int32Array, Int64Array
 from hairkit.types.point_cache import PointCache
 from hairkit.types.strands import Strands
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import BoolArray, Float32Array
 from hairkit.errors import FormatError
 from hairkit.grooming.adopt_strands import adopt, packed
 from hairkit.io.coordinate_space import FileSpace
-from hairkit.storage import BoolArray, Float32Array
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.storage import Float64Array, Int64Array
+from hairkit.arrays import Float64Array, Int64Array
 
 from .archive import Object
 from .ogawa import Ogawa

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array, Int32Array
 from hairkit.head_model.skinning import JOINT_NAMES, head_weights
-from hairkit.storage import Float32Array, Float64Array, Int32Array
 from hairkit.types.head import Head
 
 from .records import Record, array, number, record, text

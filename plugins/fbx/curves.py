@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 from hairkit.types.strands import Strands
 
 from .records import Record, array, number, record, text

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.storage import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.types.point_cache import PointCache
 
 _STILL = 1e-7

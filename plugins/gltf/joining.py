@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.storage import BoolArray, Int64Array
+from hairkit.arrays import BoolArray, Int64Array
 
 
 def joined(segments: Int64Array, vertices: int) -> tuple[Int64Array, Int64Array]:

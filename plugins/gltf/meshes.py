@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import selected
 from hairkit.io.strand_blocks import shares
-from hairkit.storage import Float32Array, Float64Array, UInt8Array
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

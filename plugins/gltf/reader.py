@@ -10,11 +10,11 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import FormatError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
 from hairkit.head_model.scalp import bind
 from hairkit.io.glb_file import GlbFile, readable
-from hairkit.storage import Float32Array, Float64Array, Int64Array
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands

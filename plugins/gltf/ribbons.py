@@ -13,8 +13,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
-from hairkit.storage import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
 

@@ -7,9 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.grooming.prepare_export import PreparedGroom
-from hairkit.storage import Float32Array, Float64Array
 from hairkit.types.groom import Groom
 
 from .baking import Baked, bake

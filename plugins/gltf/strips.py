@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
+from hairkit.arrays import Float32Array
 from hairkit.grooming.guide_weights import follow, guide_mask
 from hairkit.grooming.prepare_export import bound_roots, dense_groom, selected
-from hairkit.storage import Float32Array
 from hairkit.types.groom import Groom
 
 from .ribbons import Locks, Ribbons, frames, gathered, make_ribbons, outward

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from hairkit.storage import Float64Array, UInt8Array
+from hairkit.arrays import Float64Array, UInt8Array
 
 _SHORTEST = 0.72
 """Share of the strip's length that the shortest strand reaches."""

@@ -8,8 +8,8 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import FormatError
-from hairkit.storage import Float64Array, Int64Array
 
 MaterialValue = bool | int | float | str | tuple[float, ...]
 Material = MappingProxyType[str, MaterialValue]

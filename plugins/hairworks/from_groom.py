@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 
 import hairkit
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.head_model.scalp import growth_mesh, roots_at
-from hairkit.storage import Float64Array, Int64Array
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import Strands

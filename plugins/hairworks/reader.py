@@ -12,9 +12,9 @@ from xml.parsers import expat
 
 import numpy as np
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import FormatError
 from hairkit.io.number_text import read_numbers
-from hairkit.storage import Float64Array, Int64Array
 
 from . import schema
 from .asset import ApxAsset, Material, MaterialValue

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import FormatError
-from hairkit.storage import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Capsules, Head
 from hairkit.types.strands import Strands

@@ -9,10 +9,10 @@ import numpy as np
 from scipy import ndimage
 
 from hairkit import Head, Hull, Strands
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.field.diffusion import solve_screened
 from hairkit.field.growth_prior import combing_direction
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
-from hairkit.storage import BoolArray, Float32Array, Float64Array
 from hairkit.types.volume import cell_slopes, outer_products
 
 from .ribbons import Band

@@ -9,10 +9,10 @@ import numpy as np
 from numba import njit, prange
 
 from hairkit import Camera, Hull, Mask, OrientationMap, Strands
+from hairkit.arrays import Float32Array, Int64Array
 from hairkit.cameras.projection_kernels import pack_cameras
 from hairkit.field.sampling_kernels import sample_at
 from hairkit.field.view_fusion import DEPTH_SHRINK, front_depths
-from hairkit.storage import Float32Array, Int64Array
 
 PIXELS = 2.0
 """Step along a line in a photo."""

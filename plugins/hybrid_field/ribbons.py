@@ -9,8 +9,8 @@ from numba import njit
 from scipy import ndimage
 
 from hairkit import Hull, Strands
+from hairkit.arrays import BoolArray, Float32Array
 from hairkit.field.sampling_kernels import sample_at
-from hairkit.storage import BoolArray, Float32Array
 from hairkit.types.volume import cell_slopes
 
 SURFACE = 2.0

@@ -11,9 +11,9 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from hairkit import Camera, Hull, Mask, Strands
+from hairkit.arrays import Float32Array
 from hairkit.field.sampling_kernels import make_unit, principal_direction, sample_at
 from hairkit.field.view_fusion import FusedViews
-from hairkit.storage import Float32Array
 
 from .photo_lines import CONFIDENT, FEWEST, STEP, LineOptions, agreeing, join, lifted_lines
 

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hairkit.storage import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array
 
 from .hair_grid import Crowd
 from .linear_system import System

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 
 def banded_factor(bands: Float64Array) -> Float64Array:

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.render.context import renderer
 from hairkit.simulate import Grab, quaternion
-from hairkit.storage import Float32Array, Float64Array
 
 from .gl_buffers import Store
 from .gl_constants import constant_rows, offset_words, rider_words, share_words

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.storage import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array
 
 from .factor_layout import banded_factor
 from .linear_system import System

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.simulate import Grab
-from hairkit.storage import Float64Array, Int64Array
 
 from .gl_buffers import Store
 from .grab import KEPT, LEARNT, MOST, SOFTEST, STRONGEST, TAUT

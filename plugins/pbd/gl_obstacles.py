@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.storage import Float32Array
+from hairkit.arrays import Float32Array
 
 from .reference import Contact
 

@@ -8,10 +8,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import RenderError
 from hairkit.render.context import on_graphics_card
 from hairkit.simulate import quaternion
-from hairkit.storage import Float32Array, Float64Array
 
 from .hair_grid import SPACING, Crowd
 from .reference import Load

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hairkit.arrays import Float64Array
 from hairkit.simulate import Grab, quaternion
-from hairkit.storage import Float64Array
 
 from .backend import Engine
 from .linear_system import System

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hairkit.storage import Float64Array, Int64Array
+from hairkit.arrays import Float64Array, Int64Array
 
 from .reference import State, moved
 

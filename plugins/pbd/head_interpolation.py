@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from hairkit.arrays import Float64Array
 from hairkit.simulate import quaternion
-from hairkit.storage import Float64Array
 
 _IDENTITY = np.eye(4)
 

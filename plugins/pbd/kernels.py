@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from hairkit.storage import Float32Array
+from hairkit.arrays import Float32Array
 
 from .kernel_contact import GRIP, LINES, brake_again, relengthen, touch
 from .kernel_rows import bow, constants_of, predict, spin, swing, twist

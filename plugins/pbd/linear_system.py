@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 from .rods import Rods
 

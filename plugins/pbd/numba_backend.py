@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.parallel import Crew
 from hairkit.simulate import quaternion
-from hairkit.storage import Float32Array, Float64Array
 
 from . import kernels
 from .factor_layout import banded_factor

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
 from hairkit.simulate import quaternion
-from hairkit.storage import Float64Array
 
 SHARPEST = 0.3
 """1 + the cosine of a turn is not taken as less: beyond 134 degrees twist no longer follows."""

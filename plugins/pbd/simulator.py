@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import selected
 from hairkit.render.context import on_graphics_card
 from hairkit.simulate import Measures, Surroundings
 from hairkit.simulate.obstacles import Obstacles, head_obstacles
 from hairkit.simulate.wind import air_velocity, gust_waves
-from hairkit.storage import Float32Array, Float64Array
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

@@ -16,6 +16,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, Int64Array
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
@@ -33,7 +34,7 @@ from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.polylines import chains
 from hairkit.io.strand_blocks import blocks, colours
-from hairkit.storage import Float32Array, Int64Array, write_pieces
+from hairkit.storage import write_pieces
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
 

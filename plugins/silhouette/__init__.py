@@ -20,11 +20,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hairkit import Capture, Head, Mask, Scene, hookimpl
+from hairkit.arrays import Float64Array
 from hairkit.cameras.silhouette_coherence import Outlines, coherence
 from hairkit.cameras.turntable import LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, Turn
 from hairkit.errors import InputError
 from hairkit.options import option
-from hairkit.storage import Float64Array
 
 from .landmark_equations import (
     COUNT,

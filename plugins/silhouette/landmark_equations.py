@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.storage import BoolArray, Float32Array, Float64Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.types.capture import Capture
 from hairkit.types.mask import HAIR, Mask
 

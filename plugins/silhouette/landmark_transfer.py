@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hairkit.storage import Float32Array, Float64Array, UInt8Array
+from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.head import Head

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.helices import adaptive_counts, fit_arcs
 from hairkit.helices.arc_length import Path
 from hairkit.helices.helix_strands import travelling
-from hairkit.storage import Float64Array, Int64Array
 from hairkit.types.strands import Strands
 
 from .element_kernels import carried, compiled, node, onward, times, turns

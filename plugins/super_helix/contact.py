@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 from .element_kernels import compiled
 

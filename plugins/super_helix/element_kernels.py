@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _TERMS = 10

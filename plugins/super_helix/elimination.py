@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 from .element_kernels import compiled
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 from .element_kernels import compiled
 

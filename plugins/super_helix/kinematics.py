@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hairkit.arrays import Float64Array
 from hairkit.helices.helix import mean_rotation, mean_rotation_slope, rotation
-from hairkit.storage import Float64Array
 
 from .rods import SHARES, Rods
 

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 from .contact import touch
 from .element_kernels import carried, compiled, node, onward, product, times, turns

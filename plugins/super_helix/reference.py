@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 from .contact import touch
 from .kinematics import Placed, place

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hairkit.storage import Float64Array, Int64Array
+from hairkit.arrays import Float64Array, Int64Array
 
 NODES = 3
 """Gauss points of an element, at which its mass sits."""

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.simulate import Measures, Surroundings, quaternion
 from hairkit.simulate.obstacles import Obstacles, head_obstacles
 from hairkit.simulate.wind import air_velocity
-from hairkit.storage import Float32Array, Float64Array
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

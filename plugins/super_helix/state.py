@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 CLOSE = 0.03
 """Radians by which an iteration turns no element more once a strand's step is solved."""

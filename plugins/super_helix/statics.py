@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import eigh
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 from .element_kernels import compiled, node, onward, times, turns
 from .rods import NODES, SHARES, WEIGHTS, Rods

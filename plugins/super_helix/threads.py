@@ -14,7 +14,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from hairkit.storage import Int64Array
+from hairkit.arrays import Int64Array
 
 SHARES_A_THREAD = 4
 """Shares are smaller than threads need, so that a busy core does not hold up the rest."""

@@ -14,6 +14,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from hairkit.arrays import Float32Array
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
@@ -28,7 +29,7 @@ from hairkit.io.byte_reader import ByteReader, read_file
 from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
-from hairkit.storage import Float32Array, write_bytes, write_pieces
+from hairkit.storage import write_bytes, write_pieces
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
 

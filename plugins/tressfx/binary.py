@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Int64Array
 from hairkit.io.byte_reader import ByteReader, finite
-from hairkit.storage import Float32Array, Int64Array
 
 HEADER = np.dtype(
     [

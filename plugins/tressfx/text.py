@@ -14,9 +14,9 @@ import os
 
 import numpy as np
 
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import FormatError
 from hairkit.io.number_text import read_numbers
-from hairkit.storage import Float64Array, Int64Array
 
 from .binary import TfxHair
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hairkit.arrays import Float32Array
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.io.strand_blocks import blocks, colours
-from hairkit.storage import Float32Array
 from hairkit.types.groom import Groom
 
 from .binary import HEADER, VERSION

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float64Array
 from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.head_model.skinning import JOINT_NAMES, head_weights
 from hairkit.io.coordinate_space import FileSpace
-from hairkit.storage import Float64Array
 from hairkit.types.head import Head
 from hairkit.types.point_cache import PointCache
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Int32Array
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.skinning import JOINT_NAMES
 from hairkit.io.coordinate_space import FileSpace
-from hairkit.storage import Float32Array, Int32Array
 from hairkit.types.head import Head
 
 from .guarded import Contents

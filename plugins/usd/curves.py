@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Int32Array
 from hairkit.grooming.guide_weights import closest_guides
 from hairkit.grooming.prepare_export import PreparedGroom, point_colours
 from hairkit.head_model.skinning import HEAD_JOINT
 from hairkit.io.coordinate_space import FileSpace
-from hairkit.storage import Float32Array, Int32Array
 from hairkit.types.groom import Groom
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from hairkit.storage import Float32Array
+from hairkit.arrays import Float32Array
 from hairkit.types.groom import Groom
 
 SKIN = (0.5, 0.36, 0.29)

@@ -9,10 +9,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Int32Array, Int64Array
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed, rows_kept
 from hairkit.io.coordinate_space import FileSpace
-from hairkit.storage import Float32Array, Int32Array, Int64Array
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
 

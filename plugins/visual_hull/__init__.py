@@ -21,6 +21,7 @@ from numba import njit, prange
 from scipy import ndimage
 
 from hairkit import Hull, Mask, Scene, VoxelGrid, hookimpl
+from hairkit.arrays import BoolArray, Float32Array, UInt8Array
 from hairkit.cameras.projection_kernels import (
     head_depth,
     mesh_depth,
@@ -32,7 +33,6 @@ from hairkit.errors import InputError
 from hairkit.head_model.signed_distance import signed_distance
 from hairkit.head_model.torso import Torso
 from hairkit.options import option
-from hairkit.storage import BoolArray, Float32Array, UInt8Array
 
 from .torso_fit import fit_torso
 

@@ -16,9 +16,9 @@ import cv2
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.cameras.projection_kernels import head_depth, mesh_depth
 from hairkit.head_model.torso import Torso
-from hairkit.storage import BoolArray, Float32Array, Float64Array
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 from hairkit.types.mask import HAIR, PERSON, Mask

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.cameras.projection_kernels import head_depth, pack_cameras, project_row, splat_depth
-from hairkit.storage import Float32Array, Float64Array
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera, CameraModel
 from hairkit.types.head import Capsules, Head

@@ -9,9 +9,9 @@ from scipy.ndimage import map_coordinates
 from turntable import Turntable, turntable
 
 from hairkit import Mask
+from hairkit.arrays import Float64Array
 from hairkit.cameras.silhouette_coherence import CAP, REACH, Outlines, coherence
 from hairkit.cameras.turntable import rotation_matrix
-from hairkit.storage import Float64Array
 
 MIDDLE = 0.7
 

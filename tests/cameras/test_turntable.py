@@ -8,17 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hairkit import Camera
-from hairkit.cameras.turntable import (
-    MIN_PERSPECTIVE,
-    PERSPECTIVE,
-    Similarity,
-    Turn,
-    fit_similarity,
-    rotation_matrix,
-    triangulate,
-)
+from hairkit.arrays import Float64Array
+from hairkit.cameras.similarity import Similarity, fit_similarity, triangulate
+from hairkit.cameras.turntable import MIN_PERSPECTIVE, PERSPECTIVE, Turn, rotation_matrix
 from hairkit.errors import InputError
-from hairkit.storage import Float64Array
 
 numbers = st.floats(-3, 3)
 

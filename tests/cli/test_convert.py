@@ -12,7 +12,7 @@ import pytest
 from hairkit.cli import main
 from hairkit.manager import DISABLE_AUTOLOAD
 from hairkit.testing import bristle_groom
-from hairkit.types.groom_file import read_groom, write_groom
+from hairkit.types.groom import read_groom, write_groom
 from hairkit.types.strands import Strands
 
 

@@ -11,7 +11,7 @@ from ball import PLUGIN_FILE, write_capture
 
 from hairkit.cli import main
 from hairkit.testing import bristle_groom, turn_scene
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import write_groom
 
 
 @pytest.fixture

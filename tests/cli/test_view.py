@@ -12,7 +12,7 @@ import pytest
 
 from hairkit.cli import main
 from hairkit.testing import bristle_groom
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import write_groom
 from hairkit.viewer.actions.actions import ACTIONS
 
 

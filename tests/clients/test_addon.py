@@ -13,8 +13,7 @@ from client_groom import read_back, written
 
 from hairkit.io.capture_reader import sample_folder
 from hairkit.manager import Manager
-from hairkit.types.groom import Groom
-from hairkit.types.groom_file import read_groom, write_groom
+from hairkit.types.groom import Groom, read_groom, write_groom
 
 ADDON = Path(__file__).parents[2] / "examples" / "hairkit-blender"
 FIND_TOOL = "import bpy; print(bpy.utils.resource_path('LOCAL'))"

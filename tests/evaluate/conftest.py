@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from hairkit.testing import ball_mask, bristle_groom, turn_scene
-from hairkit.types.groom import Groom
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import Groom, write_groom
 from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.scene import Scene
 

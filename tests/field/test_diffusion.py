@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hairkit.arrays import BoolArray, Float32Array
 from hairkit.errors import InputError
 from hairkit.field.diffusion import apply_operator, cell_neighbours, solve_screened
-from hairkit.storage import BoolArray, Float32Array
 
 ALL_THREADS = numba.config.NUMBA_NUM_THREADS
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from hairkit.arrays import BoolArray, Float64Array
 from hairkit.field.growth_prior import (
     chamfer_way,
     combing_direction,
@@ -19,7 +20,6 @@ from hairkit.field.growth_prior import (
     hair_length,
     scalp_way,
 )
-from hairkit.storage import BoolArray, Float64Array
 from hairkit.testing import ball_head, scalp_roots
 from hairkit.types.volume import Hull, VoxelGrid
 

@@ -23,8 +23,7 @@ from hairkit.head_model.scalp import evaluate, sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.testing import bristle_groom
-from hairkit.types.groom import HairMaterial
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import HairMaterial, write_groom
 from hairkit.types.strands import Strands
 
 

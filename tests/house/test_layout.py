@@ -16,7 +16,7 @@ SOURCES = sorted((PROJECT / "hairkit").rglob("*.py"))
 PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins" / "__init__.py"})
 
 FLOORS = (
-    ("errors", "options", "storage", "progress", "parallel"),
+    ("errors", "arrays", "options", "storage", "progress", "parallel"),
     ("types",),
     ("cameras", "imaging", "helices", "head_model", "render", "hookspecs"),
     ("field", "io"),

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hairkit.arrays import BoolArray, Float32Array
 from hairkit.errors import InputError
 from hairkit.imaging.masked_filters import (
     blur,
@@ -24,7 +25,6 @@ from hairkit.imaging.masked_filters import (
     smooth_angles,
     well_inside,
 )
-from hairkit.storage import BoolArray, Float32Array
 from hairkit.types.capture import View
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import angle_between

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hairkit.imaging.waves import Waves, add_waves, measure_waves, without_slant
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
+from hairkit.grooming.wind_waves import add_waves
+from hairkit.imaging.waves import Waves, measure_waves, without_slant
 from hairkit.types.camera import Camera
 from hairkit.types.mask import HAIR, Mask
 from hairkit.types.orientation import OrientationMap, angle_between, wrap_angle

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hairkit.arrays import Float32Array
 from hairkit.errors import FormatError
 from hairkit.io.number_text import read_numbers, stripped, whole_digits, written_rows
-from hairkit.storage import Float32Array
 
 floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
 

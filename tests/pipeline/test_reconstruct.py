@@ -20,7 +20,7 @@ from hairkit.pipeline.reconstruct import export_paths, reconstruct
 from hairkit.progress import Recorder, Silent
 from hairkit.storage import to_arrays
 from hairkit.testing import ball_head, turn_capture, turn_scene
-from hairkit.types.groom_file import read_groom
+from hairkit.types.groom import read_groom
 from hairkit.types.scene import read_cameras
 
 STAGES = ["segment", "scene", "head", "orient", "hull", "field", "track"]

@@ -9,8 +9,8 @@ from hairkit_plugins.gabor import Options, angle_and_confidence, gabor_kernels, 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hairkit.arrays import BoolArray, Float64Array
 from hairkit.imaging.masked_filters import fill_beyond, luminance, well_inside
-from hairkit.storage import BoolArray, Float64Array
 from hairkit.types.capture import View
 from hairkit.types.mask import HAIR, Mask
 from hairkit.types.orientation import OrientationMap, angle_between

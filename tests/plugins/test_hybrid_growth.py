@@ -11,10 +11,10 @@ import pytest
 from hairkit_plugins import hybrid_field, hybrid_growth
 from hairkit_plugins.hybrid_growth import Options, grown, track
 
+from hairkit.arrays import Float32Array
 from hairkit.grooming import postprocess
 from hairkit.imaging.waves import Waves
 from hairkit.options import describe
-from hairkit.storage import Float32Array
 from hairkit.testing import ball_head, combed_field, scalp_roots, shell_hull, turn_scene
 from hairkit.types.head import Roots
 from hairkit.types.strands import Strands

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from rich_groom import rich_groom, with_degenerate
 
+from hairkit.arrays import Float64Array
 from hairkit.errors import InputError, OptionError
 from hairkit.manager import Manager
-from hairkit.storage import Float64Array
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 

@@ -9,7 +9,7 @@ from hairkit_plugins.structure_tensor import Options, orient
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hairkit.storage import BoolArray, Float64Array, UInt8Array
+from hairkit.arrays import BoolArray, Float64Array, UInt8Array
 from hairkit.types.capture import View
 from hairkit.types.mask import HAIR, Mask
 from hairkit.types.orientation import OrientationMap, angle_between

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hairkit_plugins.tensor_diffusion import Options, solve_field
 
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.cameras.projection_kernels import pack_cameras
 from hairkit.field import view_fusion
 from hairkit.field.view_fusion import _add_planes
 from hairkit.imaging.waves import Waves, measure_waves
-from hairkit.storage import BoolArray, Float32Array, Float64Array
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera, CameraModel
 from hairkit.types.mask import HAIR, Mask

@@ -15,8 +15,7 @@ from hairkit.errors import HairkitError, InputError
 from hairkit.manager import Manager
 from hairkit.simulate import Weather, run, shaken, still
 from hairkit.testing import bristle_groom
-from hairkit.types.groom import Groom
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import Groom, write_groom
 from hairkit.types.point_cache import PointCache, read_cache
 
 

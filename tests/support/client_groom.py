@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import plugin_for
-from hairkit.storage import Float32Array, Float64Array
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache
 

@@ -10,8 +10,8 @@ from hairkit_plugins.pbd.linear_system import Rates, System, assemble
 from hairkit_plugins.pbd.reference import Load, State, at_rest, substep, swung, untwisted
 from hairkit_plugins.pbd.rods import Rods, loaded, make_rods
 
+from hairkit.arrays import Float64Array
 from hairkit.simulate import quaternion
-from hairkit.storage import Float64Array
 
 LENGTH, DENSITY, G = 0.15, 6.5e-6, 9.81
 WEIGHT = DENSITY * G

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from hairkit_plugins.certainty_tracker import Options, track
 
-from hairkit.storage import BoolArray, Float64Array
+from hairkit.arrays import BoolArray, Float64Array
 from hairkit.testing import scalp_roots, turn_scene
 from hairkit.types.head import Roots
 from hairkit.types.strands import Strands

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 
 from hairkit import Camera, Capture, Head, Mask, View
+from hairkit.arrays import Float64Array
 from hairkit.cameras.projection_kernels import head_depth
 from hairkit.head_model.template import default_head
-from hairkit.storage import Float64Array
 
 WIDTH, HEIGHT = 300, 400
 NAMES = (

@@ -10,7 +10,7 @@ import pytest
 from hairkit.errors import FormatError, InputError
 from hairkit.storage import read_npz, to_arrays, write_npz
 from hairkit.testing import bristle_groom
-from hairkit.types.groom_file import read_groom, write_groom
+from hairkit.types.groom import read_groom, write_groom
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:

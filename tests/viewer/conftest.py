@@ -9,7 +9,7 @@ import swaying
 
 from hairkit.manager import Manager
 from hairkit.testing import bristle_groom
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import write_groom
 from hairkit.viewer.session import Session
 
 

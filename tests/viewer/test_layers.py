@@ -19,7 +19,7 @@ from hairkit.testing import (
     shell_hull,
     turn_scene,
 )
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import write_groom
 from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.layers import BOARDS, Layers
 from hairkit.viewer.preview import Preview

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.storage import Float32Array
+from hairkit.arrays import Float32Array
 
 COLOURINGS = ("hair", "direction", "length", "stretch", "curvature", "confidence")
 """`hair` and `direction` colour all hair; the others the guides."""

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.grooming.guide_weights import closest_guides, guide_mask
 from hairkit.head_model.scalp import sample_roots
-from hairkit.storage import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands

@@ -13,11 +13,11 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from hairkit.arrays import Float32Array
 from hairkit.errors import InputError
 from hairkit.render.context import Renderer
 from hairkit.render.gl_camera import set_camera, set_uniforms
 from hairkit.render.hair import strand_numbers
-from hairkit.storage import Float32Array
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import GuidePlaces, HairLook, HairScene, HairView

@@ -8,11 +8,11 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from hairkit.arrays import Float32Array
 from hairkit.render.context import Renderer
 from hairkit.render.gl_camera import set_uniforms
 from hairkit.render.head import Mesh
 from hairkit.render.light import FULL_HEAD, HAIR_WIDTH, STOPPED, Lights, hair_density
-from hairkit.storage import Float32Array
 from hairkit.types.strands import Strands
 from hairkit.types.volume import VoxelGrid
 from hairkit.viewer.draw.interface import HairDrawer

@@ -7,10 +7,10 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from hairkit.arrays import Float64Array
 from hairkit.render.context import Renderer
 from hairkit.render.gl_camera import DepthRange, set_camera, set_uniforms
 from hairkit.render.head import Solid
-from hairkit.storage import Float64Array
 from hairkit.types.camera import Camera
 
 

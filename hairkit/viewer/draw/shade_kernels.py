@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from hairkit.arrays import Float32Array
 from hairkit.render.light import Lights
-from hairkit.storage import Float32Array
 from hairkit.types.camera import Camera
 from hairkit.types.volume import VoxelGrid
 from hairkit.viewer.draw.place_kernels import TILE, inlined, row

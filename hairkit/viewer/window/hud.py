@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hairkit.storage import Float32Array, UInt8Array
+from hairkit.arrays import Float32Array, UInt8Array
 from hairkit.viewer.actions.actions import ACTIONS
 from hairkit.viewer.draw.colouring import legend
 from hairkit.viewer.session import Session

@@ -21,7 +21,7 @@ from references import reference
 from hairkit.errors import FormatError, HairkitError, InputError
 from hairkit.grooming.prepare_export import selected
 from hairkit.testing import bristle_groom
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import write_groom
 
 CONSTANT = AbcGeom.GeometryScope.kConstantScope
 UNIFORM = AbcGeom.GeometryScope.kUniformScope

@@ -28,8 +28,8 @@ from tracked_ball import (
     run,
 )
 
+from hairkit.arrays import Float64Array
 from hairkit.options import describe
-from hairkit.storage import Float64Array
 from hairkit.testing import scalp_roots, turn_scene
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull

@@ -24,9 +24,9 @@ from tracked_ball import (
     with_normals,
 )
 
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.grooming import postprocess
 from hairkit.imaging.waves import Waves
-from hairkit.storage import Float32Array, Float64Array
 from hairkit.testing import scalp_roots, turn_scene
 
 

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
 from hairkit.grooming.prepare_export import dense_groom
 from hairkit.head_model.skinning import JOINT_NAMES, head_weights
 from hairkit.head_model.template import default_head
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.manager import Manager
-from hairkit.storage import Float64Array
 from hairkit.testing import ball_head, bristle_groom
 from hairkit.types.groom import Groom
 

@@ -12,11 +12,11 @@ from hairkit_plugins.hybrid_field.photo_lines import SMOOTHING, agreeing, lifted
 from hairkit_plugins.hybrid_field.ribbons import Band, ribbons
 from hairkit_plugins.hybrid_field.segments import directed, find_segments
 
+from hairkit.arrays import Float64Array
 from hairkit.field import view_fusion
 from hairkit.field.growth_prior import growth_potential
 from hairkit.field.view_fusion import fuse_views
 from hairkit.imaging.waves import Waves
-from hairkit.storage import Float64Array
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera
 from hairkit.types.mask import HAIR, Mask

@@ -35,8 +35,8 @@ from pbd_bench import (
 )
 from scipy.special import roots_laguerre
 
+from hairkit.arrays import Float64Array
 from hairkit.simulate import quaternion
-from hairkit.storage import Float64Array
 
 ACROSS, ASIDE = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 

@@ -35,8 +35,8 @@ from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import jv
 
+from hairkit.arrays import Float64Array
 from hairkit.simulate import quaternion
-from hairkit.storage import Float64Array
 
 EI, GJ = 1e-8, 0.77e-8
 

@@ -11,7 +11,7 @@ from pbd_bench import DENSITY, DOWN, LENGTH, G, straight
 from pbd_modes import linearised
 from scipy.special import jn_zeros
 
-from hairkit.storage import Float64Array
+from hairkit.arrays import Float64Array
 
 NODES = 41
 

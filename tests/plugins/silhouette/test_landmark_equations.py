@@ -8,9 +8,9 @@ from hairkit_plugins.silhouette.landmark_equations import LandmarkFit, Sights, s
 from turntable import Turntable, turntable
 
 from hairkit import Mask
+from hairkit.arrays import Float64Array
 from hairkit.cameras.silhouette_coherence import Outlines
 from hairkit.cameras.turntable import Turn
-from hairkit.storage import Float64Array
 
 
 @pytest.fixture(scope="module")

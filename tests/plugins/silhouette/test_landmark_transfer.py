@@ -9,8 +9,8 @@ from hairkit_plugins.silhouette.landmark_transfer import PatchSettings, carry_la
 from turntable import turntable
 
 from hairkit import Camera, Capture, Head, View
+from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.head_model.template import default_head
-from hairkit.storage import Float64Array, UInt8Array
 
 SIZE = (810, 1080)
 

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hairkit.arrays import Float64Array
 from hairkit.errors import InputError, MissingExtraError
 from hairkit.grooming.prepare_export import completed, dense_groom, selected
 from hairkit.head_model.skinning import head_weights
 from hairkit.manager import Manager
-from hairkit.storage import Float64Array, to_arrays
+from hairkit.storage import to_arrays
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.point_cache import PointCache

@@ -12,8 +12,8 @@ import pytest
 from hairkit_plugins.visual_hull import Options, build_hull
 from scipy import ndimage
 
+from hairkit.arrays import BoolArray, Float64Array
 from hairkit.errors import InputError
-from hairkit.storage import BoolArray, Float64Array
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera, CameraModel
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask

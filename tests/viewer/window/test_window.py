@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from hairkit.testing import bristle_groom
-from hairkit.types.groom_file import write_groom
+from hairkit.types.groom import write_groom
 from hairkit.viewer.window.mouse import LEFT, MIDDLE, RIGHT, Mouse
 
 HERE = Path(__file__).parent
