@@ -311,7 +311,7 @@ return Strands(points.reshape(-1, 3), offsets, root_uv=roots.uv)""",
         "Sharpen by an unsharp mask.",
         (
             "import cv2",
-            "from hairkit.storage import UInt8Array",
+            "from hairkit.arrays import UInt8Array",
             _NUMPY,
         ),
         'amount: float = option(0.5, low=0.0, high=3.0, doc="Share of the detail added.")',

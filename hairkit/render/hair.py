@@ -60,7 +60,7 @@ def draw_ribbons(
     camera: Camera,
     depth: DepthRange,
     *,
-    shader: str = "ribbon",
+    shader: str = "ribbon_flat",
     min_width_px: float = 1.0,
     **uniforms: Any,
 ) -> None:

@@ -200,7 +200,14 @@ def _shoot(
             skin = uniforms | {"u_scatter": solid.scatter}
             draw_solid(gl, solid, gl.program("skin"), camera, depth, HEAD_PUSH, **skin)
         draw_ribbons(
-            gl, buffers, gl.program("hair"), camera, depth, shader="hair", **uniforms, **look
+            gl,
+            buffers,
+            gl.program("hair"),
+            camera,
+            depth,
+            shader="hair_ribbon_shade",
+            **uniforms,
+            **look,
         )
         return np.asarray(picture.read(), np.uint8)
 

@@ -121,11 +121,11 @@ class ComputeEngine:
                 self._units = self._put_crowd(crowd)
             uniforms = self._units.uniforms(ride, rates)
             self._store.read_by("filled")
-            self._store.dispatch("pbd_crowd_fill", self._count * self._nodes, uniforms)
+            self._store.dispatch("pbd_hair_grid_splat", self._count * self._nodes, uniforms)
             self._store.written_by("u_means")
-            self._store.dispatch("pbd_crowd_mean", int(np.prod(crowd.shape)), uniforms)
+            self._store.dispatch("pbd_hair_grid_average", int(np.prod(crowd.shape)), uniforms)
             self._store.written_by("u_state")
-            self._store.dispatch("pbd_crowd_draw", self._count * (self._nodes - 1), uniforms)
+            self._store.dispatch("pbd_hair_grid_apply", self._count * (self._nodes - 1), uniforms)
 
     def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
         """Return places and velocities (n, 3) of one rod, head axes."""
@@ -133,7 +133,7 @@ class ComputeEngine:
         with renderer():
             self._store.make_words("one", 4 * rows)
             self._store.read_by("one")
-            self._store.dispatch("pbd_rod", rows, {"u_rod": rod})
+            self._store.dispatch("pbd_read_rod", rows, {"u_rod": rod})
             found = self._store.words("one").reshape(-1, 4)[:ends, :3].astype(np.float64)
         return found[0::2], found[1::2]
 
@@ -147,7 +147,7 @@ class ComputeEngine:
         with renderer():
             self._store.make_words("sums", 4 * int(np.prod(self._store.groups(self._count))))
             self._store.read_by("sums")
-            self._store.dispatch("pbd_measure", self._count, {"u_gravity": tuple(gravity)})
+            self._store.dispatch("pbd_energies", self._count, {"u_gravity": tuple(gravity)})
             sums = self._store.words("sums").reshape(-1, 4).astype(np.float64)
         kinetic, weight, elastic = sums[:, 1:].sum(axis=0).tolist()
         return float(sums[:, 0].max()), kinetic, weight, elastic
@@ -191,7 +191,9 @@ class ComputeEngine:
                 self._store.make_words("rows", 3 * before.size)
                 self._before = before
             self._store.read_by("riders", "offsets", "rows", "between")
-            self._store.dispatch("pbd_rows", before.size, uniforms | {"u_count": before.size})
+            self._store.dispatch(
+                "pbd_guide_samples", before.size, uniforms | {"u_count": before.size}
+            )
             return self._store["rows"]
 
     def _settings(self, system: System, load: Load, iterations: int) -> dict[str, Any]:

@@ -71,7 +71,7 @@ class Held:
             "u_strongest": STRONGEST,
             "u_taut": TAUT,
         }
-        self._store.dispatch("pbd_hand", len(self._points), uniforms)
+        self._store.dispatch("pbd_grab", len(self._points), uniforms)
 
     def _change(self, points: tuple[int, ...], riders: Riders) -> None:
         """Hold other points; those that were held before keep what they have learnt."""

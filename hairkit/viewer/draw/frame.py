@@ -90,7 +90,7 @@ class Stage:
         self._fresh = True
         self._spread, self._backdrop = (
             self.gl.context.vertex_array(self.gl.program("viewer_screen", fragment), [])
-            for fragment in ("viewer_set", "viewer_studio")
+            for fragment in ("viewer_backdrop", "viewer_studio")
         )
         self._sketch_texture = self.gl.context.texture(STUDIO_SIZE, 4, dtype="f2")
         self._sketch_texture.repeat_x = self._sketch_texture.repeat_y = False
@@ -223,7 +223,7 @@ class Stage:
         self._backdrop.render(moderngl.TRIANGLES, vertices=3)
         self._studio.use()
         self._sketch_texture.use(4)
-        spread = self.gl.program("viewer_screen", "viewer_set")
+        spread = self.gl.program("viewer_screen", "viewer_backdrop")
         set_uniforms(spread, u_studio=4, u_size=self._size)
         self._spread.render(moderngl.TRIANGLES, vertices=3)
 

@@ -47,7 +47,7 @@ class SoftHairPass:
         self._sums = np.zeros((self._chunks, 0, 4), np.float32)
         self._colours: tuple[object, Float32Array] | None = None
         self._texture: moderngl.Texture | None = None
-        lay = gl.program("viewer_screen", "viewer_lay")
+        lay = gl.program("viewer_screen", "viewer_composite")
         self._lay = gl.context.vertex_array(lay, [])
 
     def release(self) -> None:
@@ -133,7 +133,7 @@ class SoftHairPass:
         context.enable_only(moderngl.BLEND)
         context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
         self._texture.use(5)
-        set_uniforms(self._gl.program("viewer_screen", "viewer_lay"), u_hair=5)
+        set_uniforms(self._gl.program("viewer_screen", "viewer_composite"), u_hair=5)
         self._lay.render(moderngl.TRIANGLES, vertices=3)
         target.scissor = (0, 0, *size)
 

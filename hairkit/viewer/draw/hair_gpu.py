@@ -84,7 +84,7 @@ class HairPass:
         self._bounds.bind_to_storage_buffer(3)
         late = self._read_box() if given and before else None
         self._bounds.write(_NOTHING)
-        self._run("viewer_guide", len(self.body.guides) * self.body.points_each)
+        self._run("viewer_guides", len(self.body.guides) * self.body.points_each)
         self._box = given
         if not given:
             self._cloud = np.asarray(rows, np.float32).reshape(-1, 3)
@@ -117,7 +117,7 @@ class HairPass:
         self._offsets.bind_to_storage_buffer(2)
         self._places.bind_to_storage_buffer(3)
         buffers.filled.bind_to_storage_buffer(4)
-        self._run("viewer_hair", look.hairs, view, **self._shared)
+        self._run("viewer_place", look.hairs, view, **self._shared)
         buffers.opacity.bind_to_image(0, read=False, write=True)
         self._run("viewer_opacity", buffers.tiles[0] * buffers.tiles[1], **self._shared)
 
@@ -132,7 +132,7 @@ class HairPass:
         self._places.bind_to_storage_buffer(3)
         buffers.sums.bind_to_storage_buffer(7)
         self._run(
-            "viewer_stroke",
+            "viewer_raster",
             look.hairs,
             view,
             u_eye=tuple(view.camera.position.tolist()),

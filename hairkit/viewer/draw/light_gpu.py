@@ -118,7 +118,7 @@ class LightPass(LightVolume):
         set_uniforms(fill, u_points=points, u_count=hairs, u_cells=self._cells, **self.uniforms())
         fill.run(max(-(-hairs // 64), 1))
         self._gl.context.memory_barrier()
-        taken = self._gl.compute("viewer_taken")
+        taken = self._gl.compute("viewer_extinction")
         set_uniforms(taken, u_cells=self._cells, u_taken_by_hair=per_micrometre)
         self._solids.bind_to_storage_buffer(1)
         self._taken.bind_to_image(0, read=False, write=True)

@@ -60,7 +60,7 @@ class BoardPass:
 
     def __init__(self, gl: Renderer, board: Board) -> None:
         self._gl = gl
-        self._program = gl.program("viewer_picture")
+        self._program = gl.program("viewer_billboard")
         height, width = board.image.shape[:2]
         image = np.ascontiguousarray(board.image)
         self._texture = gl.context.texture((width, height), 4, image.tobytes())

@@ -226,7 +226,7 @@ def leaving(gamma: float, natural: float, ratio: float) -> float:
     guess = np.stack([natural * s - gamma / 6 * s * (2 - s), natural + 0 * s])
     plane = solve_bvp(
         lambda s, y: np.array([y[1], gamma * (1 - s) * np.cos(y[0])]),
-        lambda a, b: np.array([a[0], b[1] - natural]), s, guess, tol=1e-6, max_nodes=10000,
+        lambda a, b: np.array([a[0], b[1] - natural]), s, guess, tol=1e-6, max_nodes=100_000,
     )  # fmt: skip
     assert plane.success
 
