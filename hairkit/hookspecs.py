@@ -28,6 +28,10 @@ PROJECT = "hairkit"
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
 
+HOOKSPEC_VERSION = (1, 0)
+"""Version of this contract. The second number grows when hooks or arguments are added, the first
+when one is removed or changes; a plugin may check it when it is imported."""
+
 
 @hookspec(firstresult=True)
 def segment(view: View, options: Any) -> Mask | None:
