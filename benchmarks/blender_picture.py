@@ -24,8 +24,8 @@ from hairkit.arrays import UInt8Array
 from hairkit.cli.render import framing_cameras, parse_size, write_picture
 from hairkit.grooming.prepare_export import dense_groom
 from hairkit.manager import Manager
-from hairkit.render import Lights, draw
-from hairkit.render.picture import backdrop, drawn_width
+from hairkit.rendering import Lights, draw
+from hairkit.rendering.picture import backdrop, drawn_width
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom, read_groom, write_groom
 

@@ -18,8 +18,8 @@ import numpy as np
 from hairkit_plugins import mask_files, thin_plate
 
 from hairkit import Capture, Head, Mask, Scene
-from hairkit.evaluate import Truth, read_truth
-from hairkit.evaluate.align import align, camera_errors
+from hairkit.evaluation import Truth, read_truth
+from hairkit.evaluation.align import align, camera_errors
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import read_capture

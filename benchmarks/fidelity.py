@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hairkit.errors import HairkitError
-from hairkit.evaluate import Evaluation, Truth, evaluate, mask_iou, read_prediction, read_truth
-from hairkit.evaluate.report import write_report
-from hairkit.evaluate.scorecard import Figure, band_text, figures, mean_figures
+from hairkit.evaluation import Evaluation, Truth, evaluate, mask_iou, read_prediction, read_truth
+from hairkit.evaluation.report import write_report
+from hairkit.evaluation.scorecard import Figure, band_text, figures, mean_figures
 from hairkit.io.capture_reader import read_capture
 from hairkit.manager import Manager
 from hairkit.types.mask import HAIR

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from hairkit_plugins import gabor, structure_tensor
 
-from hairkit.evaluate.images import truth_angle
+from hairkit.evaluation.images import truth_angle
 from hairkit.imaging.masked_filters import coherent_truth, fill_beyond, luminance
 from hairkit.types.capture import View
 from hairkit.types.mask import HAIR, Mask

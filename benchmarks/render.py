@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from hairkit.cli.render import framing_cameras, parse_size
 from hairkit.grooming.densify import densify
 from hairkit.head_model.template import default_head
-from hairkit.render import Lights, draw, draw_coverage, draw_directions, draw_views
-from hairkit.render.context import renderer
+from hairkit.rendering import Lights, draw, draw_coverage, draw_directions, draw_views
+from hairkit.rendering.context import renderer
 from hairkit.synth import grow
 
 GUIDES = 600

@@ -41,8 +41,8 @@ from hairkit_plugins.pbd.simulator import PbdSimulator
 from hairkit.errors import RenderError
 from hairkit.grooming.prepare_export import dense_groom
 from hairkit.head_model.template import default_head
-from hairkit.render.context import renderer
-from hairkit.simulate import Surroundings, shaken
+from hairkit.rendering.context import renderer
+from hairkit.simulation import Surroundings, shaken
 from hairkit.synth import grow
 from hairkit.types.groom import Groom
 

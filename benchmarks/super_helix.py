@@ -23,9 +23,9 @@ from hairkit_plugins.super_helix import Options
 from hairkit_plugins.super_helix.simulator import SuperHelices
 
 from hairkit.head_model.template import default_head
-from hairkit.render import draw
-from hairkit.simulate import Surroundings
-from hairkit.simulate.motion import HeadMotion, shaken, still
+from hairkit.rendering import draw
+from hairkit.simulation import Surroundings
+from hairkit.simulation.motion import HeadMotion, shaken, still
 from hairkit.synth import grow
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom

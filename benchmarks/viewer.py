@@ -20,7 +20,7 @@ from pathlib import Path
 from hairkit.cli.render import parse_size
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
-from hairkit.render.context import Renderer, renderer
+from hairkit.rendering.context import Renderer, renderer
 from hairkit.synth import grow
 from hairkit.types.groom import write_groom
 from hairkit.viewer.actions.actions import perform

@@ -91,7 +91,7 @@ def enhance_texture(texture: Any, options: Any) -> Any:
 
 @hookspec(firstresult=True)
 def make_simulator(groom: Groom, options: Any) -> Any:
-    """Return a simulator of the groom's guides (see `hairkit.simulate`)."""
+    """Return a simulator of the groom's guides (see `hairkit.simulation`)."""
 
 
 @hookspec(firstresult=True)

@@ -1,5 +1,5 @@
 #version 430
-// Velocity of gusty air at the nodes, world: the mean and plane waves (see hairkit/simulate/wind.py),
+// Velocity of gusty air at the nodes, world: the mean and plane waves (see hairkit/simulation/wind.py),
 // found at every fourth node and mixed between.
 #include "pbd_layout.glsl"
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_wind;

@@ -1,6 +1,6 @@
 #version 430
 // What reaches each cell of the light volume: transmittance towards key and rim light, share of the
-// sky; hairkit/render/light.py is the slow twin. A call does every `u_turns`-th layer, and of it only
+// sky; hairkit/rendering/light.py is the slow twin. A call does every `u_turns`-th layer, and of it only
 // cells at hair or solids: nothing is lit elsewhere.
 
 layout(local_size_x = 8, local_size_y = 8) in;

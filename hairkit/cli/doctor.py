@@ -33,7 +33,7 @@ _GL_CURE = "on Debian: apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6
 
 # Each backend gets a process of its own: only one can be loaded in a process, and drivers crash.
 _TRY_GL = """
-from hairkit.render.context import renderer
+from hairkit.rendering.context import renderer
 with renderer() as found:
     print(found.description)
 """

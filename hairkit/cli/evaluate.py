@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from hairkit.evaluate import Evaluation
+    from hairkit.evaluation import Evaluation
 
 _DESCRIPTION = """\
 Example: hairkit evaluate out/ --truth captures/wavy/truth
@@ -48,8 +48,8 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the figures and write the report."""
-    from hairkit.evaluate import evaluate, read_prediction, read_truth
-    from hairkit.evaluate.report import to_text, write_report
+    from hairkit.evaluation import evaluate, read_prediction, read_truth
+    from hairkit.evaluation.report import to_text, write_report
 
     prediction, truth = read_prediction(args.groom, args.scene), read_truth(args.truth)
     evaluation = evaluate(prediction, truth, consistency=args.consistency)
@@ -78,7 +78,7 @@ def _print(evaluation: Evaluation) -> None:
 def _score_table(evaluation: Evaluation) -> Table:
     from rich.table import Table
 
-    from hairkit.evaluate.report import score_rows
+    from hairkit.evaluation.report import score_rows
 
     counts = f"{evaluation.scores.predicted_strands} strands, {evaluation.scores.true_strands} true"
     table = Table(title=f"precision / recall / F, per cent ({counts})", title_justify="left")
@@ -97,7 +97,7 @@ def _score_table(evaluation: Evaluation) -> Table:
 def _figure_table(evaluation: Evaluation) -> Table:
     from rich.table import Table
 
-    from hairkit.evaluate.scorecard import band_text, figures
+    from hairkit.evaluation.scorecard import band_text, figures
 
     table = Table()
     table.add_column("figure")

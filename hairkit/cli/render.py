@@ -20,7 +20,7 @@ from hairkit.grooming.densify import densify
 from hairkit.io.capture_reader import TURN
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom
-from hairkit.render import Lights, draw_views
+from hairkit.rendering import Lights, draw_views
 from hairkit.storage import write_bytes
 from hairkit.types.camera import Camera
 from hairkit.types.scene import read_cameras

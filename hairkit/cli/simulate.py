@@ -62,8 +62,8 @@ def _run(args: argparse.Namespace) -> int:
     from hairkit.manager import Manager
     from hairkit.pipeline.open_groom import load_groom
     from hairkit.progress import progress_for
-    from hairkit.simulate import Weather, read_motion, shaken, still
-    from hairkit.simulate import run as simulated
+    from hairkit.simulation import Weather, read_motion, shaken, still
+    from hairkit.simulation import run as simulated
 
     _check(args)
     manager = Manager.loaded(args.plugin)

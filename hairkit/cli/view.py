@@ -93,7 +93,7 @@ def _window(args: argparse.Namespace) -> int:
 
 
 def _headless(args: argparse.Namespace) -> int:
-    from hairkit.render.context import renderer
+    from hairkit.rendering.context import renderer
     from hairkit.viewer.actions.script import play, read_script
     from hairkit.viewer.preview import Preview
 

@@ -14,7 +14,7 @@ from hairkit.arrays import UInt8Array
 from hairkit.errors import InputError
 from hairkit.field.isosurface import volume_surface
 from hairkit.grooming.densify import densify
-from hairkit.render import Lights, Solid, draw_views
+from hairkit.rendering import Lights, Solid, draw_views
 from hairkit.storage import write_bytes
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.io.capture_reader import TURN
-from hairkit.render import (
+from hairkit.rendering import (
     Lights,
     Measured,
     Solid,

@@ -17,7 +17,7 @@ from hairkit.errors import HairkitError, InputError
 from hairkit.field.isosurface import volume_surface
 from hairkit.io.capture_reader import read_capture
 from hairkit.pipeline.reconstruct import PHOTOS
-from hairkit.render.head import Solid
+from hairkit.rendering.head import Solid
 from hairkit.storage import Stored, from_arrays, read_npz
 from hairkit.synth.bust import Bust
 from hairkit.types.camera import Camera

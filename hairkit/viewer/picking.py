@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
-from hairkit.simulate.simulator import Grab
+from hairkit.simulation.simulator import Grab
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import UInt8Array
-from hairkit.render.context import Renderer
-from hairkit.render.head import Solid, head_solid
+from hairkit.rendering.context import Renderer
+from hairkit.rendering.head import Solid, head_solid
 from hairkit.viewer.draw.colouring import point_values, ramp
 from hairkit.viewer.draw.frame import Shot, Stage
 from hairkit.viewer.draw.frame_budget import LEVELS, Budget

@@ -16,7 +16,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.manager import Manager
-from hairkit.simulate.simulator import Measures, Surroundings
+from hairkit.simulation.simulator import Measures, Surroundings
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw.hair_data import GuideSampler, HairBody, split_guides
 from hairkit.viewer.head_adjustment import Adjustment, Rerun

@@ -11,7 +11,7 @@ from hairkit.arrays import Float32Array
 from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.options import OptionInfo, unknown_name
-from hairkit.simulate.simulator import Measures, Simulator, Surroundings
+from hairkit.simulation.simulator import Measures, Simulator, Surroundings
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

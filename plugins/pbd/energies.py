@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.simulate import quaternion
+from hairkit.simulation import quaternion
 
 from .reference import State, swung
 from .rods import Rods, half_way, twist_between

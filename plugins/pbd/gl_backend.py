@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.render.context import renderer
-from hairkit.simulate import Grab, quaternion
+from hairkit.rendering.context import renderer
+from hairkit.simulation import Grab, quaternion
 
 from .gl_buffers import Store
 from .gl_constants import constant_rows, offset_words, rider_words, share_words
@@ -74,7 +74,7 @@ class ComputeEngine:
     def blow(self, waves: AirWaves | None, wind: Float64Array, head: Float64Array) -> None:
         """Find the gusty air at the nodes, of rods on a head at `head`, for the following runs.
 
-        `waves` are those of `hairkit.simulate.wind.gust_waves`; None: loads tell of the air.
+        `waves` are those of `hairkit.simulation.wind.gust_waves`; None: loads tell of the air.
         """
         self._gusty = waves is not None
         if waves is None:

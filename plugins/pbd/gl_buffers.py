@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import RenderError
-from hairkit.render.context import Renderer, renderer
-from hairkit.render.gl_camera import set_uniforms
+from hairkit.rendering.context import Renderer, renderer
+from hairkit.rendering.gl_camera import set_uniforms
 
 WIDTH = 4096
 """Rods side by side in a texture; more of them stand below."""

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, Int64Array
-from hairkit.simulate import Grab
+from hairkit.simulation import Grab
 
 from .gl_buffers import Store
 from .grab import KEPT, LEARNT, MOST, SOFTEST, STRONGEST, TAUT

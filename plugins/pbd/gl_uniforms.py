@@ -10,8 +10,8 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import RenderError
-from hairkit.render.context import on_graphics_card
-from hairkit.simulate import quaternion
+from hairkit.rendering.context import on_graphics_card
+from hairkit.simulation import quaternion
 
 from .hair_grid import SPACING, Crowd
 from .reference import Load
@@ -28,7 +28,7 @@ FULLEST, FASTEST = 32.0, 10.0
 """A cell holds the momentum of the densest captured cell's mass so many times, at so many m/s."""
 
 AirWaves: TypeAlias = tuple[Float64Array, Float64Array, Float64Array]
-"""Wave vectors (M, 3), amplitudes (M, 3) and phases (M,) of `hairkit.simulate.wind.gust_waves`."""
+"""Vectors (M, 3), amplitudes (M, 3) and phases (M,) of `hairkit.simulation.wind.gust_waves`."""
 
 
 def step_words(loads: Sequence[Load], step: float) -> Float32Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.simulate import Grab, quaternion
+from hairkit.simulation import Grab, quaternion
 
 from .backend import Engine
 from .linear_system import System

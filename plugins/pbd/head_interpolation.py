@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.simulate import quaternion
+from hairkit.simulation import quaternion
 
 _IDENTITY = np.eye(4)
 

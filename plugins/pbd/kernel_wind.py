@@ -1,4 +1,4 @@
-"""Gusts in the kernels: what `hairkit.simulate.wind.air_velocity` does, float32."""
+"""Gusts in the kernels: what `hairkit.simulation.wind.air_velocity` does, float32."""
 
 from __future__ import annotations
 

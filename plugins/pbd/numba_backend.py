@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.parallel import Crew
-from hairkit.simulate import quaternion
+from hairkit.simulation import quaternion
 
 from . import kernels
 from .factor_layout import banded_factor

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.simulate import quaternion
-from hairkit.simulate.obstacles import Obstacles
+from hairkit.simulation import quaternion
+from hairkit.simulation.obstacles import Obstacles
 
 from .linear_system import System
 from .rods import Rods, half_binormal, half_way, shares, shifted, twist_between

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
-from hairkit.simulate import quaternion
+from hairkit.simulation import quaternion
 from hairkit.types.strands import Strands
 
 SHORTEST = 1e-4

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
-from hairkit.simulate import quaternion
+from hairkit.simulation import quaternion
 
 SHARPEST = 0.3
 """1 + the cosine of a turn is not taken as less: beyond 134 degrees twist no longer follows."""

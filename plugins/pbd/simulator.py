@@ -12,10 +12,10 @@ import numpy.typing as npt
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import selected
-from hairkit.render.context import on_graphics_card
-from hairkit.simulate import Measures, Surroundings
-from hairkit.simulate.obstacles import Obstacles, head_obstacles
-from hairkit.simulate.wind import air_velocity, gust_waves
+from hairkit.rendering.context import on_graphics_card
+from hairkit.simulation import Measures, Surroundings
+from hairkit.simulation.obstacles import Obstacles, head_obstacles
+from hairkit.simulation.wind import air_velocity, gust_waves
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -42,7 +42,7 @@ _KEPT_SYSTEMS = 4
 
 
 class PbdSimulator:
-    """Simulated guides of a groom (see `hairkit.simulate.Simulator`)."""
+    """Simulated guides of a groom (see `hairkit.simulation.Simulator`)."""
 
     def __init__(self, groom: Groom, options: Options) -> None:
         guides = selected(groom, guide_mask(groom.strands))

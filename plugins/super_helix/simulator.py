@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
-from hairkit.simulate import Measures, Surroundings, quaternion
-from hairkit.simulate.obstacles import Obstacles, head_obstacles
-from hairkit.simulate.wind import air_velocity
+from hairkit.simulation import Measures, Surroundings, quaternion
+from hairkit.simulation.obstacles import Obstacles, head_obstacles
+from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 

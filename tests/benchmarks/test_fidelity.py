@@ -9,7 +9,7 @@ from types import ModuleType
 
 import pytest
 
-from hairkit.evaluate.scorecard import Figure
+from hairkit.evaluation.scorecard import Figure
 
 
 @pytest.fixture

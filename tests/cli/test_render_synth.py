@@ -10,7 +10,7 @@ import pytest
 
 from hairkit.cli import main
 from hairkit.cli.render import framing_cameras
-from hairkit.evaluate.truth import read_truth
+from hairkit.evaluation.truth import read_truth
 from hairkit.testing import bristle_groom, turn_scene
 
 

@@ -18,11 +18,11 @@ PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins"
 FLOORS = (
     ("errors", "arrays", "options", "storage", "progress", "parallel"),
     ("types",),
-    ("cameras", "imaging", "helices", "head_model", "render", "hookspecs"),
+    ("cameras", "imaging", "helices", "head_model", "rendering", "hookspecs"),
     ("field", "io"),
-    ("simulate", "grooming", "synth"),
+    ("simulation", "grooming", "synth"),
     ("manager", "testing"),
-    ("pipeline", "evaluate"),
+    ("pipeline", "evaluation"),
     ("viewer",),
     ("cli", "__main__"),
 )
@@ -48,7 +48,7 @@ def pyproject() -> dict[str, Any]:
 
 
 def room(name: str) -> str:
-    """Return the room of a module: `render` for hairkit.render.hair, "" outside hairkit."""
+    """Return the room of a module: `rendering` for hairkit.rendering.hair, "" outside hairkit."""
     first, *rest = name.split(".")
     return rest[0] if first == "hairkit" and rest else ""
 

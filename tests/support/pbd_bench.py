@@ -11,7 +11,7 @@ from hairkit_plugins.pbd.reference import Load, State, at_rest, substep, swung, 
 from hairkit_plugins.pbd.rods import Rods, loaded, make_rods
 
 from hairkit.arrays import Float64Array
-from hairkit.simulate import quaternion
+from hairkit.simulation import quaternion
 
 LENGTH, DENSITY, G = 0.15, 6.5e-6, 9.81
 WEIGHT = DENSITY * G

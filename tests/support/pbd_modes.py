@@ -16,7 +16,7 @@ from pbd_bench import balanced
 from scipy.linalg import eigh, null_space
 
 from hairkit.arrays import Float64Array
-from hairkit.simulate import quaternion
+from hairkit.simulation import quaternion
 
 _STEP = 1e-6
 """Share of a segment by which nodes are moved for the forces' slope."""

@@ -10,7 +10,7 @@ from hairkit_plugins.pbd import Options
 from hairkit_plugins.pbd.simulator import PbdSimulator
 
 from hairkit.errors import RenderError
-from hairkit.render.context import renderer
+from hairkit.rendering.context import renderer
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands

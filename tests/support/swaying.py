@@ -9,7 +9,7 @@ import numpy as np
 
 from hairkit import hookimpl
 from hairkit.options import option
-from hairkit.simulate.simulator import Measures
+from hairkit.simulation.simulator import Measures
 
 
 @dataclass(frozen=True)

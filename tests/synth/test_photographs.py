@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hairkit.errors import InputError
-from hairkit.evaluate.truth import read_truth
+from hairkit.evaluation.truth import read_truth
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import TURN
 from hairkit.synth import grow, photograph

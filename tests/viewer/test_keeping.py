@@ -11,8 +11,8 @@ import pytest
 
 from hairkit.errors import InputError, RenderError
 from hairkit.options import describe
-from hairkit.render import context
-from hairkit.render.context import renderer
+from hairkit.rendering import context
+from hairkit.rendering.context import renderer
 from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import Recorder, free_name, write_png

@@ -9,7 +9,7 @@ import pytest
 
 from hairkit.errors import InputError
 from hairkit.manager import Manager
-from hairkit.render.context import renderer
+from hairkit.rendering.context import renderer
 from hairkit.storage import Stored, to_arrays, write_npz
 from hairkit.testing import (
     ball_mask,

@@ -9,11 +9,11 @@ import moderngl
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
-from hairkit.render.context import Renderer
-from hairkit.render.gl_camera import DepthRange, set_uniforms
-from hairkit.render.head import Solid
-from hairkit.render.light import Lights
-from hairkit.render.picture import BACKDROP_BOTTOM, BACKDROP_TOP, HEAD_PUSH
+from hairkit.rendering.context import Renderer
+from hairkit.rendering.gl_camera import DepthRange, set_uniforms
+from hairkit.rendering.head import Solid
+from hairkit.rendering.light import Lights
+from hairkit.rendering.picture import BACKDROP_BOTTOM, BACKDROP_TOP, HEAD_PUSH
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw.hair_cpu import SoftHairPass
 from hairkit.viewer.draw.hair_data import HairBody

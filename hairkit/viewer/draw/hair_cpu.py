@@ -12,9 +12,9 @@ import numpy as np
 
 from hairkit.arrays import Float32Array
 from hairkit.parallel import Crew
-from hairkit.render.context import Renderer
-from hairkit.render.gl_camera import clip_from_camera, set_uniforms
-from hairkit.render.hair import strand_numbers
+from hairkit.rendering.context import Renderer
+from hairkit.rendering.gl_camera import clip_from_camera, set_uniforms
+from hairkit.rendering.hair import strand_numbers
 from hairkit.viewer.draw import place_kernels, raster_kernels, shade_kernels
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import GuidePlaces, HairLook, HairScene, HairView

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from hairkit.arrays import Float32Array
-from hairkit.render.gl_camera import DepthRange
-from hairkit.render.light import Lights
+from hairkit.rendering.gl_camera import DepthRange
+from hairkit.rendering.light import Lights
 from hairkit.types.camera import Camera
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Int32Array
 from hairkit.parallel import Crew
-from hairkit.render.context import Renderer
-from hairkit.render.head import Mesh
-from hairkit.render.light import Lights
+from hairkit.rendering.context import Renderer
+from hairkit.rendering.head import Mesh
+from hairkit.rendering.light import Lights
 from hairkit.types.strands import Strands
 from hairkit.viewer.draw.interface import HairDrawer
 from hairkit.viewer.draw.light_gpu import LightVolume, solid_depth

@@ -9,10 +9,10 @@ import moderngl
 import numpy as np
 
 from hairkit.arrays import Float32Array
-from hairkit.render.context import Renderer
-from hairkit.render.gl_camera import set_uniforms
-from hairkit.render.head import Mesh
-from hairkit.render.light import FULL_HEAD, HAIR_WIDTH, STOPPED, Lights, hair_density
+from hairkit.rendering.context import Renderer
+from hairkit.rendering.gl_camera import set_uniforms
+from hairkit.rendering.head import Mesh
+from hairkit.rendering.light import FULL_HEAD, HAIR_WIDTH, STOPPED, Lights, hair_density
 from hairkit.types.strands import Strands
 from hairkit.types.volume import VoxelGrid
 from hairkit.viewer.draw.interface import HairDrawer

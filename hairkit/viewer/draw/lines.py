@@ -8,8 +8,8 @@ import moderngl
 import numpy as np
 
 from hairkit.arrays import Float32Array, Int64Array, UInt8Array
-from hairkit.render.context import Renderer
-from hairkit.render.gl_camera import DepthRange, set_camera, set_uniforms
+from hairkit.rendering.context import Renderer
+from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
 from hairkit.types.camera import Camera
 
 _RESTART = 0xFFFFFFFF

@@ -8,9 +8,9 @@ import moderngl
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.render.context import Renderer
-from hairkit.render.gl_camera import DepthRange, set_camera, set_uniforms
-from hairkit.render.head import Solid
+from hairkit.rendering.context import Renderer
+from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
+from hairkit.rendering.head import Solid
 from hairkit.types.camera import Camera
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from hairkit.arrays import Float32Array
-from hairkit.render.light import Lights
+from hairkit.rendering.light import Lights
 from hairkit.types.camera import Camera
 from hairkit.types.volume import VoxelGrid
 from hairkit.viewer.draw.place_kernels import TILE, inlined, row

@@ -14,8 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hairkit.errors import HairkitError
-from hairkit.render.context import renderer
-from hairkit.simulate.simulator import Grab, Surroundings
+from hairkit.rendering.context import renderer
+from hairkit.simulation.simulator import Grab, Surroundings
 from hairkit.viewer.session import STEP, Session
 from hairkit.viewer.window.hud import paper
 

@@ -17,8 +17,8 @@ import moderngl
 import numpy as np
 
 from hairkit.errors import HairkitError, RenderError
-from hairkit.render.context import REQUIRED_VERSION, install, renderer
-from hairkit.render.gl_camera import set_uniforms
+from hairkit.rendering.context import REQUIRED_VERSION, install, renderer
+from hairkit.rendering.gl_camera import set_uniforms
 from hairkit.viewer.actions.actions import bindings, perform
 from hairkit.viewer.actions.script import Script, performed
 from hairkit.viewer.draw.frame_budget import Budget

@@ -20,9 +20,9 @@ from shader_rods import AGREE, SHAKE, STILL_AIR, WIND, apart, bent_groom, both, 
 
 from hairkit.errors import HairkitError, RenderError
 from hairkit.manager import Manager
-from hairkit.render import context
-from hairkit.render.context import renderer
-from hairkit.simulate import Grab, Surroundings, quaternion, shaken
+from hairkit.rendering import context
+from hairkit.rendering.context import renderer
+from hairkit.simulation import Grab, Surroundings, quaternion, shaken
 from hairkit.types.groom import Groom
 from hairkit.types.head import Capsules
 
@@ -241,8 +241,8 @@ _BY_OSMESA = """
 import numpy as np
 from hairkit_plugins.pbd import Options
 from hairkit_plugins.pbd.simulator import PbdSimulator
-from hairkit.render.context import renderer
-from hairkit.simulate import Surroundings
+from hairkit.rendering.context import renderer
+from hairkit.simulation import Surroundings
 from hairkit.testing import bristle_groom
 groom, ends = bristle_groom(), []
 for backend in ("reference", "compute"):

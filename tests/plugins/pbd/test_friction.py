@@ -13,8 +13,8 @@ from hairkit_plugins.pbd.rods import make_rods
 from pbd_bench import DENSITY, LENGTH, G, load_of, straight, system_of
 
 from hairkit.arrays import Float64Array
-from hairkit.simulate import quaternion
-from hairkit.simulate.obstacles import Obstacles
+from hairkit.simulation import quaternion
+from hairkit.simulation.obstacles import Obstacles
 from hairkit.types.volume import VoxelGrid
 
 RADIUS, LEAD = 0.02, 0.04

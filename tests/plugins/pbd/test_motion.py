@@ -36,7 +36,7 @@ from pbd_bench import (
 from scipy.special import roots_laguerre
 
 from hairkit.arrays import Float64Array
-from hairkit.simulate import quaternion
+from hairkit.simulation import quaternion
 
 ACROSS, ASIDE = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
 

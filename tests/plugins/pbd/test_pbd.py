@@ -13,8 +13,8 @@ from hairkit_plugins.pbd.simulator import PbdSimulator
 
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.manager import Manager
-from hairkit.simulate import Grab, Simulator, Surroundings, quaternion, run, shaken, still
-from hairkit.simulate.wind import air_velocity, gust_waves
+from hairkit.simulation import Grab, Simulator, Surroundings, quaternion, run, shaken, still
+from hairkit.simulation.wind import air_velocity, gust_waves
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands

@@ -13,8 +13,8 @@ from shader_rods import AGREE, SHAKE, WIND, apart, bent_groom, both, skip_withou
 
 from hairkit.errors import RenderError
 from hairkit.head_model.signed_distance import distance_to
-from hairkit.render.context import on_graphics_card, renderer
-from hairkit.simulate import Grab, Surroundings, shaken
+from hairkit.rendering.context import on_graphics_card, renderer
+from hairkit.simulation import Grab, Surroundings, shaken
 from hairkit.types.groom import Groom
 
 

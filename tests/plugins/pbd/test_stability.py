@@ -36,7 +36,7 @@ from scipy.optimize import brentq
 from scipy.special import jv
 
 from hairkit.arrays import Float64Array
-from hairkit.simulate import quaternion
+from hairkit.simulation import quaternion
 
 EI, GJ = 1e-8, 0.77e-8
 

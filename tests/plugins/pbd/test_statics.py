@@ -34,7 +34,7 @@ from pbd_bench import (
 from pbd_modes import linearised
 
 from hairkit.arrays import Float64Array
-from hairkit.simulate import quaternion
+from hairkit.simulation import quaternion
 
 ELASTICA = {
     0.1: (0.99991, 0.01250), 1: (0.99125, 0.12347), 2: (0.96689, 0.23851), 5: (0.84666, 0.49590),

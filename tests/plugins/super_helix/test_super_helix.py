@@ -13,8 +13,8 @@ from hairkit_plugins.super_helix.simulator import SuperHelices
 
 from hairkit.errors import InputError
 from hairkit.manager import Manager
-from hairkit.simulate import Grab, Simulator, Surroundings, quaternion
-from hairkit.simulate.obstacles import head_obstacles
+from hairkit.simulation import Grab, Simulator, Surroundings, quaternion
+from hairkit.simulation.obstacles import head_obstacles
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands

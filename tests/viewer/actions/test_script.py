@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hairkit.errors import HairkitError, InputError, OptionError
-from hairkit.render.context import renderer
+from hairkit.rendering.context import renderer
 from hairkit.viewer.actions.script import play, read_script
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session

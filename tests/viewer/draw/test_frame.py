@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hairkit.arrays import Float32Array, UInt8Array
-from hairkit.render.context import Renderer, renderer
-from hairkit.render.head import head_solid
+from hairkit.rendering.context import Renderer, renderer
+from hairkit.rendering.head import head_solid
 from hairkit.testing import bristle_groom
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw.frame import Shot, Stage

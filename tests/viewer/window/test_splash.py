@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hairkit.errors import InputError
-from hairkit.simulate.simulator import Surroundings
+from hairkit.simulation.simulator import Surroundings
 from hairkit.viewer.actions.actions import bindings, perform
 from hairkit.viewer.draw.colouring import COLOURINGS, legend, point_values
 from hairkit.viewer.session import Session

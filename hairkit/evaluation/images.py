@@ -1,0 +1,221 @@
+"""Measures in the input views: drawn direction, silhouette, 2D orientation error, mask overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from numba import njit, prange
+
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
+from hairkit.cameras.projection_kernels import head_depth, pack_cameras, project_row
+from hairkit.errors import InputError
+from hairkit.evaluation.depth_map import Surface, first_surface, point_depth
+from hairkit.evaluation.scores import Samples
+from hairkit.imaging.masked_filters import coherent_truth
+from hairkit.types.camera import Camera
+from hairkit.types.head import Head
+from hairkit.types.orientation import OrientationMap, angle_between
+
+DIRECTION_LIMIT_DEG = 20.0
+"""A drawn strand is right when its direction is within this of the truth's."""
+VISIBLE_DEPTH = 0.003
+"""A drawn sample is visible at most this far behind the first surface, metres."""
+DRAWN_FOOTPRINT_PX = 9
+"""Edge of the square a drawn sample hides: guides are few, and must hide those of the far side."""
+HAIR_WIDTH = 0.0015
+"""Width at which hair is drawn into silhouettes, metres."""
+EDGE_PX = 4
+"""The mask is eroded by this many pixels before orientation errors are taken."""
+
+HIDDEN, RIGHT, WRONG = 0, 1, 2
+"""Verdicts on a drawn sample; hidden also where the truth has no hair."""
+
+
+@dataclass(frozen=True)
+class OrientationError:
+    """Error of a 2D orientation map over the true hair, its edge left out."""
+
+    mean_deg: float
+    """Where the truth is coherent, see `hairkit.imaging.masked_filters.coherent_truth`."""
+    median_deg: float
+    mean_everywhere_deg: float
+    """Coherent or not."""
+    confident_mean_deg: float
+    """Over the half of the coherent pixels that the map is most confident of."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnDirections:
+    """Verdicts on the strands drawn into one view."""
+
+    verdict: UInt8Array
+    """(N,) per sample: hidden, right or wrong."""
+
+    @property
+    def right(self) -> int:
+        """Number of visible samples within 20 degrees of the truth."""
+        return int((self.verdict == RIGHT).sum())
+
+    @property
+    def drawn(self) -> int:
+        """Number of visible samples over true hair."""
+        return int((self.verdict != HIDDEN).sum())
+
+
+def orientation_error(
+    orientation: OrientationMap, truth: npt.NDArray[np.uint8], hair: npt.NDArray[np.bool_]
+) -> OrientationError:
+    """Compare a 2D orientation map with the true picture.
+
+    Parameters
+    ----------
+    orientation : OrientationMap
+        Of any size; it is brought to the truth's by its nearest pixels.
+    truth : (H, W) uint8
+        1..255 for angles in [0, pi) from +x towards +y, 0 where there is no hair.
+    hair : (H, W) bool
+        True hair mask; eroded by 4 pixels here.
+    """
+    if truth.shape != hair.shape:
+        raise InputError(f"true orientation has shape {truth.shape}, the hair mask {hair.shape}")
+    edge = np.ones((2 * EDGE_PX + 1, 2 * EDGE_PX + 1), np.uint8)
+    inner = (cv2.erode(hair.astype(np.uint8), edge) > 0) & (truth > 0)
+    coherent = inner & coherent_truth(truth_angle(truth).astype(np.float32), truth > 0)
+    if not coherent.any():
+        raise InputError("no pixel of true hair is left to take the orientation error over")
+    error = orientation_gap(orientation, truth)
+    confidence = _sized(orientation.confidence, truth)
+    sure = coherent & (confidence >= np.median(confidence[coherent]))
+    return OrientationError(
+        mean_deg=float(error[coherent].mean()),
+        median_deg=float(np.median(error[coherent])),
+        mean_everywhere_deg=float(error[inner].mean()),
+        confident_mean_deg=float(error[sure].mean()),
+    )
+
+
+def orientation_gap(
+    orientation: OrientationMap, truth: npt.NDArray[np.uint8]
+) -> npt.NDArray[np.float64]:
+    """Return (H, W) degrees in [0, 90] between a map and the true picture, hair or not."""
+    return np.degrees(angle_between(_sized(orientation.angle, truth), truth_angle(truth)))
+
+
+def truth_angle(truth: npt.NDArray[np.uint8]) -> Float64Array:
+    """Return (H, W) radians in [0, pi): the middle of the bin that each value 1..255 stands for."""
+    return (truth.astype(np.float64) - 0.5) / 255 * np.pi
+
+
+def mask_iou(first: npt.NDArray[np.bool_], second: npt.NDArray[np.bool_]) -> float:
+    """Return intersection over union of two masks (H, W); the first may have another size."""
+    resized = _sized(first.astype(np.uint8), second) > 0
+    union = int((resized | second).sum())
+    return int((resized & second).sum()) / union if union else 1.0
+
+
+def hair_silhouette(
+    camera: Camera,
+    samples: Samples,
+    head: Head,
+    *,
+    clothes: npt.NDArray[np.bool_] | None = None,
+    width: float = HAIR_WIDTH,
+) -> BoolArray:
+    """Return (H, W) where hair drawn `width` metres wide stands before the head.
+
+    `clothes` (H, W) are pixels of the person. A truth has no mesh of the body below the neck; where
+    a pixel of `clothes` misses the head, hair farther away than the neck's middle is hidden.
+    """
+    depth = point_depth(camera, samples.points, width / 2)
+    hidden = head_depth(head, camera)
+    if clothes is not None:
+        hidden = np.where(clothes, np.minimum(hidden, camera.depth(_neck(head))), hidden)
+    covered: BoolArray = np.isfinite(depth) & (depth <= hidden)
+    return covered
+
+
+def _neck(head: Head) -> Float64Array:
+    """Return the middle (3,) of the lowest two centimetres of the head's mesh."""
+    height = head.vertices[:, 1]
+    lowest = head.vertices[height < height.min() + 0.02].astype(np.float64)
+    middle: Float64Array = lowest.mean(axis=0)
+    return middle
+
+
+def drawn_directions(
+    camera: Camera, samples: Samples, head: Head | None, truth: npt.NDArray[np.uint8]
+) -> DrawnDirections:
+    """Judge the visible samples of strands drawn into a view by the true orientation there.
+
+    A sample is visible at most 3 mm behind the first surface of the strands themselves and `head`;
+    it is judged where the truth has hair.
+    """
+    surface = first_surface(camera, samples.points, head, footprint=DRAWN_FOOTPRINT_PX)
+    return judge_directions(surface, samples, truth)
+
+
+def judge_directions(
+    surface: Surface, samples: Samples, truth: npt.NDArray[np.uint8]
+) -> DrawnDirections:
+    """Judge samples against a true orientation picture of the surface's size."""
+    camera = surface.camera
+    if truth.shape != surface.depth.shape:
+        raise InputError(
+            f"true orientation has shape {truth.shape}, its camera {surface.depth.shape}"
+        )
+    limit = np.radians(DIRECTION_LIMIT_DEG)
+    verdict = _judge(
+        pack_cameras([camera])[0], surface.depth, truth, samples.points, samples.directions, limit
+    )
+    return DrawnDirections(verdict)
+
+
+def direction_share(views: Sequence[DrawnDirections]) -> float:
+    """Return the share of visible samples over all views whose direction is right."""
+    drawn = sum(view.drawn for view in views)
+    return sum(view.right for view in views) / drawn if drawn else 0.0
+
+
+def _sized(
+    image: npt.NDArray[Any], like: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]
+) -> npt.NDArray[Any]:
+    if image.shape == like.shape:
+        return image
+    size = (like.shape[1], like.shape[0])
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST_EXACT))
+
+
+@njit(cache=True, parallel=True)
+def _judge(
+    row: Float64Array,
+    depth: Float32Array,
+    truth: UInt8Array,
+    points: Float32Array,
+    directions: Float32Array,
+    limit: float,
+) -> UInt8Array:  # pragma: no cover - compiled
+    height, width = depth.shape
+    verdict = np.zeros(len(points), np.uint8)
+    for i in prange(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        u, v, d = project_row(row, x, y, z)
+        if not (u >= 0 and v >= 0 and u < width and v < height):
+            continue
+        value = truth[int(v), int(u)]
+        if value == 0 or d - depth[int(v), int(u)] > 0.003:
+            continue
+        step = 1e-3
+        u2, v2, _ = project_row(
+            row,
+            x + step * directions[i, 0],
+            y + step * directions[i, 1],
+            z + step * directions[i, 2],
+        )
+        gap = ((value - 0.5) / 255 * np.pi - np.arctan2(v2 - v, u2 - u)) % np.pi
+        verdict[i] = 1 if min(gap, np.pi - gap) <= limit else 2
+    return verdict

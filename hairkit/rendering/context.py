@@ -1,0 +1,196 @@
+"""The one place that makes OpenGL contexts: offscreen, EGL first, OSMesa second, one a process."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from collections.abc import Callable, Iterator
+from importlib import resources
+from pathlib import Path
+from typing import Any, TypeVar
+
+import moderngl
+
+from hairkit.errors import RenderError
+from hairkit.rendering.osmesa import OSMesaContext
+
+REQUIRED_VERSION = 430
+"""OpenGL 4.3, for buffers read by vertex shaders."""
+
+_CARDS = ("dri/renderD*", "nvidia[0-9]*")
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr")
+"""Words in the names of renderers that run on the processor."""
+
+Compiled = TypeVar("Compiled")
+
+BACKENDS = ("egl", "osmesa")
+"""Tried in this order; `HAIRKIT_GL` picks one."""
+
+_CURE = (
+    "install a software renderer with: apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6"
+)
+
+
+class Renderer:
+    """An offscreen context with its compiled programs; use it through `renderer()`."""
+
+    def __init__(self, context: moderngl.Context, backend: str) -> None:
+        self.context = context
+        self.backend = backend
+        """Which of `BACKENDS` made the context."""
+        self.home = context.simple_framebuffer((1, 1))
+        """Bound between pictures: moderngl goes back to the last bound one, released or not."""
+        self.home.use()
+        self._programs: dict[str, moderngl.Program] = {}
+        self._computes: dict[str, moderngl.ComputeShader] = {}
+
+    @property
+    def description(self) -> str:
+        """Backend, renderer and version in one line."""
+        info = self.context.info
+        return f"{self.backend}: {info['GL_RENDERER']}, OpenGL {info['GL_VERSION']}"
+
+    @property
+    def software(self) -> bool:
+        """Whether the renderer runs on the processor."""
+        name = str(self.context.info["GL_RENDERER"]).lower()
+        return any(word in name for word in _SOFTWARE)
+
+    def program(self, name: str, fragment: str | None = None) -> moderngl.Program:
+        """Return the program of `name.vert` and `fragment.frag` (None: `name.frag`)."""
+        key = f"{name}/{fragment or name}"
+        if key not in self._programs:
+            self._programs[key] = _compiled(
+                key,
+                lambda: self.context.program(
+                    vertex_shader=shader_source(f"{name}.vert"),
+                    fragment_shader=shader_source(f"{fragment or name}.frag"),
+                ),
+            )
+        return self._programs[key]
+
+    def renew_programs(self) -> None:
+        """Compile every shader in use anew, as its file now is.
+
+        Raises `RenderError` when one does not compile; all stay as they are then. Old ones are not
+        released: others may still draw with them.
+        """
+        programs, computes = self._programs, self._computes
+        self._programs, self._computes = {}, {}
+        try:
+            for key in programs:
+                self.program(*key.split("/"))
+            for key in computes:
+                name, *definitions = key.split()
+                pairs = (text.split("=") for text in definitions)
+                self.compute(name, **{word: int(value) for word, value in pairs})
+        except BaseException:
+            self._programs, self._computes = programs, computes
+            raise
+
+    def compute(self, name: str, **definitions: int) -> moderngl.ComputeShader:
+        """Return the compute shader `name.comp`, with numbers that its text leaves open."""
+        key = " ".join([name, *(f"{word}={value}" for word, value in definitions.items())])
+        if key not in self._computes:
+            source = shader_source(f"{name}.comp")
+            lines = [f"#define {word} {value}\n" for word, value in definitions.items()]
+            version, text = source.split("\n", 1)
+            full = "\n".join([version, "".join(lines) + text])
+            self._computes[key] = _compiled(key, lambda: self.context.compute_shader(full))
+        return self._computes[key]
+
+
+@contextlib.contextmanager
+def renderer() -> Iterator[Renderer]:
+    """Give the process's renderer to the calling thread until the block ends.
+
+    A block may stand in another one of the same thread.
+
+    Raises `RenderError` when no context can be made, or when the block left an OpenGL error.
+    """
+    global _renderer, _depth
+    with _lock:
+        if _renderer is None or _owner != os.getpid():
+            _renderer, _depth = _create(), 0
+        _depth += 1
+        try:
+            # an inner block would leave no context behind for the outer one
+            with _renderer.context if _depth == 1 else contextlib.nullcontext():
+                yield _renderer
+                error = _renderer.context.error
+        finally:
+            _depth -= 1
+        if error != "GL_NO_ERROR":
+            raise RenderError(f"drawing failed: OpenGL reports {error} ({_renderer.backend})")
+
+
+def on_graphics_card() -> bool:
+    """Return whether this process draws with a graphics card, or could; false for software."""
+    made = _renderer is not None and _owner == os.getpid()
+    if not made and not any(found for pattern in _CARDS for found in Path("/dev").glob(pattern)):
+        return False
+    try:
+        with renderer() as gl:
+            return not gl.software
+    except RenderError:
+        return False
+
+
+def install(context: moderngl.Context, backend: str) -> Renderer:
+    """Make a context, such as a window's, the one that this process draws with.
+
+    Raises `RenderError` when the process draws with another one already.
+    """
+    global _renderer, _owner
+    with _lock:
+        if _renderer is not None and _owner == os.getpid():
+            raise RenderError(f"this process draws by {_renderer.backend} already; open a new one")
+        _renderer, _owner = Renderer(context, backend), os.getpid()
+        return _renderer
+
+
+def shader_source(name: str) -> str:
+    """Return the text of a shader; lines `#include "other.glsl"` are replaced by that file."""
+    text = resources.files("hairkit.shaders").joinpath(name).read_text()
+    lines = [
+        shader_source(line.split('"')[1]) if line.startswith("#include") else line
+        for line in text.splitlines()
+    ]
+    return "\n".join(lines)
+
+
+def _compiled(name: str, compile_: Callable[[], Compiled]) -> Compiled:
+    try:
+        return compile_()
+    except moderngl.Error as error:
+        raise RenderError(f"shader {name} does not compile: {error}") from error
+
+
+_lock = threading.RLock()
+_renderer: Renderer | None = None
+_owner = 0
+_depth = 0
+
+
+def _create() -> Renderer:
+    global _owner
+    asked = os.environ.get("HAIRKIT_GL")
+    if asked is not None and asked not in BACKENDS:
+        raise RenderError(f"HAIRKIT_GL is {asked!r}, expected one of {', '.join(BACKENDS)}")
+    failures = []
+    for backend in BACKENDS if asked is None else (asked,):
+        try:
+            context = _open(backend)
+        except Exception as error:  # any failure of a driver: the next backend may work
+            failures.append(f"{backend}: {' '.join(str(error).split())}")
+        else:
+            _owner = os.getpid()
+            return Renderer(context, backend)
+    raise RenderError(f"no OpenGL 4.3 context ({'; '.join(failures)}); {_CURE}")
+
+
+def _open(backend: str) -> moderngl.Context:
+    # moderngl's stubs type its free keyword settings as one dict
+    settings: Any = {"backend": "egl"} if backend == "egl" else {"context": OSMesaContext()}
+    return moderngl.create_context(REQUIRED_VERSION, standalone=True, **settings)

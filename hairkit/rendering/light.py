@@ -1,0 +1,189 @@
+"""Lights, and how much of each reaches every place: hair and head dim it, summed up in a volume.
+
+Optical depth is summed through a grid of hair density along each light's direction, a coarse form
+of opacity shadow maps (Kim and Neumann 2001) that needs no pass on the GPU.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import uniform_filter
+
+from hairkit.arrays import Float32Array
+from hairkit.rendering.head import Mesh
+from hairkit.types.camera import Camera
+from hairkit.types.strands import Strands
+from hairkit.types.volume import VoxelGrid
+
+CELL = 0.005
+"""Edge of a cell of the light volume, metres."""
+MAX_EDGE = 128
+"""Cells along the longest side at most; hair that is longer gets larger cells."""
+FULL_HEAD = 100_000
+"""Hairs on a head: fewer strands stand for as many."""
+HAIR_WIDTH = 8e-5
+"""Diameter of a hair for the shadows, metres."""
+STOPPED = 0.3
+"""Share of the light that meets a hair and goes no further: the rest scatters on (dark hair)."""
+STEPS = 28
+"""Samples on the way to a light."""
+SOLID = 250.0
+"""Optical depth of the head, per metre."""
+
+
+@dataclass(frozen=True)
+class Lights:
+    """Key light, rim light and sky; directions point towards the light, head frame, unit."""
+
+    key_direction: tuple[float, float, float]
+    rim_direction: tuple[float, float, float]
+    key_colour: tuple[float, float, float] = (2.3, 2.2, 2.05)
+    rim_colour: tuple[float, float, float] = (1.5, 1.55, 1.65)
+    sky_colour: tuple[float, float, float] = (0.75, 0.78, 0.85)
+    ground_colour: tuple[float, float, float] = (0.35, 0.33, 0.32)
+    exposure: float = 0.7
+
+    @classmethod
+    def at_camera(cls, camera: Camera) -> Lights:
+        """Return lights that go with the camera: key above its left, rim behind on the right."""
+        key, rim = np.array([-0.45, -0.6, -0.75]), np.array([0.55, -0.6, 0.55])
+        return cls.studio(key @ camera.rotation, rim @ camera.rotation)
+
+    @classmethod
+    def studio(cls, key: npt.ArrayLike, rim: npt.ArrayLike, exposure: float = 0.7) -> Lights:
+        """Return warm key and cool rim light from directions (3,), towards the light, and a sky."""
+        return cls(_unit(key), _unit(rim), exposure=exposure)
+
+    def uniforms(self) -> dict[str, Any]:
+        """Return the values of `lighting.glsl` and `tone.glsl`."""
+        return {f"u_{field.name}": getattr(self, field.name) for field in fields(self)}
+
+
+@dataclass(frozen=True)
+class Density:
+    """What hair and solids take from light per metre of way."""
+
+    grid: VoxelGrid
+    taken: Float32Array
+    """(X, Y, Z) optical depth per metre."""
+
+
+@dataclass(frozen=True)
+class LightVolume:
+    """What reaches each cell."""
+
+    grid: VoxelGrid
+    reached: Float32Array
+    """(X, Y, Z, 3): transmittance towards key and rim light, share of the sky seen."""
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        """Number of cells along x, y, z."""
+        x, y, z = self.grid.shape
+        return x, y, z
+
+    def texels(self) -> bytes:
+        """Return the values in OpenGL's order, x fastest."""
+        return self.reached.transpose(2, 1, 0, 3).tobytes()
+
+    def uniforms(self) -> dict[str, Any]:
+        """Return the values of `lighting.glsl` that place the volume."""
+        size = np.array(self.grid.shape) * self.grid.spacing
+        return {
+            "u_volume_origin": tuple(self.grid.origin.tolist()),
+            "u_volume_size": tuple(size.tolist()),
+        }
+
+
+def hair_density(strands: Strands, solids: Sequence[Mesh]) -> Density:
+    """Return how dense hair and solids are around them."""
+    points = [strands.points, *[solid.vertices for solid in solids]]
+    low = np.min([p.min(axis=0) for p in points if len(p)], axis=0) - 3 * CELL
+    high = np.max([p.max(axis=0) for p in points if len(p)], axis=0) + 3 * CELL
+    grid = VoxelGrid.around(low, high, max(CELL, float((high - low).max()) / MAX_EDGE))
+    taken = _taken_by_hair(grid, strands)
+    under = np.zeros(grid.shape, np.float32)
+    for solid in solids:
+        _mark_under(under, grid, solid)
+    taken += SOLID * uniform_filter(under, 3)
+    return Density(grid, taken)
+
+
+def light_volume(density: Density, lights: Lights) -> LightVolume:
+    """Return how much light reaches each place."""
+    grid, taken = density.grid, density.taken
+    reached = np.ones((*grid.shape, 3), np.float32)
+    inside = uniform_filter(taken, 3, mode="constant") > 0
+    for channel, direction in enumerate((lights.key_direction, lights.rim_direction)):
+        depth = _depth_towards(taken, grid, inside, np.array(direction))
+        reached[inside, channel] = np.exp(-depth)
+    reached[..., :2] = uniform_filter(reached[..., :2], (3, 3, 3, 1))
+    reached[..., 2] = _sky_seen(taken, grid.spacing)
+    return LightVolume(grid, reached)
+
+
+def _taken_by_hair(grid: VoxelGrid, strands: Strands) -> Float32Array:
+    if not len(strands):
+        return np.zeros(grid.shape, np.float32)
+    vectors, first = strands.segments()
+    middle = strands.points[first] + 0.5 * vectors
+    cell = np.ravel_multi_index(tuple(grid.nearest_cell(middle).T), grid.shape)
+    cells = int(np.prod(grid.shape))
+    length = np.bincount(cell, np.linalg.norm(vectors, axis=1), cells).reshape(grid.shape)
+    # strands cross the light at all angles: their shadow is pi / 4 of length times width on average
+    stands_for = max(FULL_HEAD / len(strands), 1.0) * HAIR_WIDTH * np.pi / 4
+    taken = length * stands_for * STOPPED / grid.spacing**3
+    return np.asarray(uniform_filter(taken.astype(np.float32), 3), np.float32)
+
+
+def _mark_under(marks: Float32Array, grid: VoxelGrid, solid: Mesh) -> None:
+    """Set the cells just under a mesh to 1."""
+    corners = solid.vertices[solid.faces].astype(np.float64)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
+    weights = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]], np.float64)
+    weights /= weights.sum(axis=1, keepdims=True)
+    for weight in weights:
+        under = np.einsum("k,fkc->fc", weight, corners) - 2.0 * grid.spacing * normal
+        marks[tuple(grid.nearest_cell(under).T)] = 1
+
+
+def _depth_towards(
+    taken: Float32Array,
+    grid: VoxelGrid,
+    inside: npt.NDArray[np.bool_],
+    direction: npt.NDArray[np.float64],
+) -> Float32Array:
+    """Return (N,) the optical depth from each cell of `inside` on, in growing steps."""
+    start = np.argwhere(inside).astype(np.float32)
+    edges = np.cumsum(1.08 ** np.arange(STEPS + 1)) * 0.9
+    limit = np.array(grid.shape)
+    total = np.zeros(len(start), np.float32)
+    padded = np.pad(taken, 1)
+    for near, far in pairwise(edges):
+        at = np.rint(start + (0.5 * (near + far) * direction).astype(np.float32)).astype(np.int32)
+        at = np.clip(at, -1, limit) + 1
+        total += padded[at[:, 0], at[:, 1], at[:, 2]] * np.float32((far - near) * grid.spacing)
+    return total
+
+
+def _sky_seen(taken: Float32Array, spacing: float) -> Float32Array:
+    """Return (X, Y, Z) the mean transmittance along the six axes, upward counting double."""
+    total = np.zeros_like(taken)
+    for axis, weight_up in ((0, 1.0), (1, 2.0), (2, 1.0)):
+        before = np.cumsum(taken, axis=axis) * spacing
+        after = before.take([-1], axis=axis) - before
+        total += np.exp(-(before - taken * spacing)) + weight_up * np.exp(-after)
+    return total / np.float32(7.0)
+
+
+def _unit(direction: npt.ArrayLike) -> tuple[float, float, float]:
+    vector = np.asarray(direction, np.float64)
+    x, y, z = (vector / np.linalg.norm(vector)).tolist()
+    return (x, y, z)

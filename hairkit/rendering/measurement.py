@@ -1,0 +1,167 @@
+"""Pictures to measure with: what hair covers, which way the visible hair runs, what is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit.arrays import BoolArray, Float32Array
+from hairkit.rendering.context import Renderer, renderer
+from hairkit.rendering.framebuffer import SUPERSAMPLE, averaged, supersampled, target
+from hairkit.rendering.gl_camera import DepthRange
+from hairkit.rendering.hair import draw_ribbons, ribbons
+from hairkit.rendering.head import Mesh, draw_solid
+from hairkit.types.camera import Camera
+from hairkit.types.orientation import wrap_angle
+from hairkit.types.strands import Strands
+
+Solids = Mesh | Sequence[Mesh] | None
+"""What hides hair behind it: a head, several meshes, or nothing."""
+
+HEAD_PUSH = 0.002
+"""Solids are drawn this much behind their surface, metres, so that they never hide roots."""
+SEEN_TOLERANCE = 0.001
+"""A point this far behind the first strand at its pixel still counts as seen, metres."""
+
+_NOTHING, _HAIR, _SOLID = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)
+
+
+def draw_layers(
+    strands: Strands,
+    solids: Solids,
+    camera: Camera,
+    *,
+    width: float | Float32Array = 5e-4,
+    min_width_px: float = 1.0,
+    supersample: int = SUPERSAMPLE,
+) -> tuple[Float32Array, Float32Array]:
+    """Return the shares (H, W) in [0, 1] of each pixel that visible hair and bare solids cover.
+
+    `width` is the drawn diameter in metres, one for all or (P,) one a point; `min_width_px` its
+    least in pixels.
+    """
+    fine = supersampled(camera, supersample)
+    meshes = _meshes(solids)
+    depth = DepthRange.around(fine, strands.points, *[mesh.vertices for mesh in meshes])
+    with renderer() as gl, target(gl, fine) as picture:
+        _draw_solids(gl, meshes, fine, depth, _SOLID)
+        least = min_width_px * supersample
+        program = gl.program("hair_flat", "flat")
+        with ribbons(gl, strands, width) as buffers:
+            draw_ribbons(gl, buffers, program, fine, depth, min_width_px=least, u_colour=_HAIR)
+        samples = np.asarray(picture.read()[..., :2], np.float32)
+    shares = averaged(samples, camera) / np.float32(255)
+    return shares[..., 0], shares[..., 1]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What is known at every pixel's centre about the strand seen there."""
+
+    angle: Float32Array
+    """(H, W) radians in [0, pi), as in `OrientationMap`; 0 without hair."""
+    depth: Float32Array
+    """(H, W) axial depth in metres, infinity without hair."""
+    seen: BoolArray
+    """(H, W) true where hair is the first thing seen."""
+
+
+def draw_measured(
+    strands: Strands,
+    solids: Solids,
+    camera: Camera,
+    *,
+    width: float | Float32Array = 2e-4,
+    min_width_px: float = 1.0,
+) -> Measured:
+    """Return direction and depth of the strand seen at each pixel, in one drawing."""
+    meshes = _meshes(solids)
+    depth = DepthRange.around(camera, strands.points, *[mesh.vertices for mesh in meshes])
+    with renderer() as gl, target(gl, camera, "f4") as picture:
+        _draw_solids(gl, meshes, camera, depth, _NOTHING)
+        program = gl.program("hair_direction")
+        with ribbons(gl, strands, width) as buffers:
+            draw_ribbons(gl, buffers, program, camera, depth, min_width_px=min_width_px)
+        values: Float32Array = np.asarray(picture.read(), np.float32)
+    seen: BoolArray = values[..., 3] > 0.5
+    angle = wrap_angle(np.arctan2(values[..., 1], values[..., 0]))
+    return Measured(
+        np.where(seen, angle, np.float32(0)),
+        np.where(seen, values[..., 2], np.float32(np.inf)),
+        seen,
+    )
+
+
+def draw_coverage(
+    strands: Strands,
+    head: Solids,
+    camera: Camera,
+    *,
+    width: float | Float32Array = 5e-4,
+    min_width_px: float = 1.0,
+) -> Float32Array:
+    """Return the share (H, W) in [0, 1] of each pixel that hair in front of the head covers."""
+    return draw_layers(strands, head, camera, width=width, min_width_px=min_width_px)[0]
+
+
+def draw_directions(
+    strands: Strands,
+    head: Solids,
+    camera: Camera,
+    *,
+    width: float | Float32Array = 2e-4,
+    min_width_px: float = 1.0,
+) -> tuple[Float32Array, BoolArray]:
+    """Return the 2D angle (H, W) of the strand seen at each pixel, and where one is seen.
+
+    Angles are undirected, in [0, pi), from +x towards +y, as in `OrientationMap`; 0 without hair.
+    """
+    measured = draw_measured(strands, head, camera, width=width, min_width_px=min_width_px)
+    return measured.angle, measured.seen
+
+
+def draw_depth(
+    strands: Strands,
+    head: Solids,
+    camera: Camera,
+    *,
+    width: float | Float32Array = 2e-4,
+    min_width_px: float = 1.0,
+) -> Float32Array:
+    """Return the axial depth (H, W) in metres of the strand seen at each pixel, else infinity."""
+    return draw_measured(strands, head, camera, width=width, min_width_px=min_width_px).depth
+
+
+def visible_points(strands: Strands, head: Solids, camera: Camera) -> BoolArray:
+    """Return (P,) which points of the strands the camera sees before other hair and the head."""
+    return points_at_depth(strands, draw_depth(strands, head, camera), camera)
+
+
+def points_at_depth(strands: Strands, depth: Float32Array, camera: Camera) -> BoolArray:
+    """Return (P,) which points lie no further than the `depth` (H, W) that `draw_depth` gave."""
+    pixels = camera.project(strands.points)
+    inside = np.all((pixels >= 0) & (pixels < [camera.width, camera.height]), axis=1)
+    column, row = np.where(inside[:, None], pixels, 0).astype(np.int64).T
+    front = np.where(inside & np.isfinite(depth[row, column]), depth[row, column], -np.inf)
+    seen: BoolArray = camera.depth(strands.points) <= front + SEEN_TOLERANCE
+    return seen
+
+
+def _meshes(solids: Solids) -> Sequence[Mesh]:
+    if solids is None:
+        return ()
+    return solids if isinstance(solids, Sequence) else (solids,)
+
+
+def _draw_solids(
+    gl: Renderer,
+    meshes: Sequence[Mesh],
+    camera: Camera,
+    depth: DepthRange,
+    colour: tuple[float, float, float, float],
+) -> None:
+    program = gl.program("solid", "flat")
+    for mesh in meshes:
+        draw_solid(gl, mesh, program, camera, depth, HEAD_PUSH, u_colour=colour)

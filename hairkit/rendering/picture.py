@@ -1,0 +1,222 @@
+"""Shaded pictures of hair on a head."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from hairkit.arrays import Float32Array, UInt8Array
+from hairkit.errors import InputError
+from hairkit.rendering.context import Renderer, renderer
+from hairkit.rendering.framebuffer import SUPERSAMPLE, averaged, supersampled, target
+from hairkit.rendering.gl_camera import DepthRange
+from hairkit.rendering.hair import RibbonBuffers, draw_ribbons, ribbons
+from hairkit.rendering.head import Solid, draw_solid, head_solid
+from hairkit.rendering.light import Lights, LightVolume, hair_density, light_volume
+from hairkit.types.camera import Camera
+from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.head import Head
+from hairkit.types.strands import Strands
+
+BACKDROP_TOP, BACKDROP_BOTTOM = (176, 180, 184), (214, 216, 218)
+"""sRGB of the neutral backdrop."""
+HEAD_PUSH = 0.0015
+"""Solids are drawn this much behind their surface, metres, so that they do not hide roots."""
+SHOWN_HAIRS = 50_000
+"""Fewer strands are drawn wider, so that they cover the head as this many would."""
+WIDEST = 4.0
+"""Strands are drawn at most this many times wider than they are."""
+
+
+def draw(
+    hair: Groom | Strands,
+    head: Head | None,
+    camera: Camera,
+    *,
+    width: int | None = None,
+    height: int | None = None,
+    material: HairMaterial | None = None,
+    lights: Lights | None = None,
+    background: UInt8Array | None = None,
+    solids: Sequence[Solid] = (),
+    supersample: int = SUPERSAMPLE,
+) -> UInt8Array:
+    """Return a picture (H, W, 3) uint8 RGB of hair on a head, antialiased.
+
+    Parameters
+    ----------
+    hair
+        A groom or strands, drawn as they are: `densify` guides first.
+    head
+        Hides what is behind it; None: a groom's own head, no head for bare strands.
+    camera
+        Where from. A drawn point lands where `camera.project` says.
+    width, height
+        Size of the picture; the camera is scaled to it. By default the camera's own.
+    material
+        Colour and width of the hair; None: the groom's, or the default.
+    lights
+        None: lights that go with the camera.
+    background
+        (H, W, 3) picture behind; None: a neutral grey.
+    solids
+        Other shaded things, such as shoulders.
+    supersample
+        Samples along each edge of a pixel.
+    """
+    sized = _sized(camera, width, height)
+    return draw_views(
+        hair,
+        head,
+        [sized],
+        material=material,
+        lights=lights,
+        backgrounds=None if background is None else [background],
+        solids=solids,
+        supersample=supersample,
+    )[0]
+
+
+def draw_views(
+    hair: Groom | Strands,
+    head: Head | None,
+    cameras: Sequence[Camera],
+    *,
+    material: HairMaterial | None = None,
+    lights: Lights | None = None,
+    backgrounds: Sequence[UInt8Array] | None = None,
+    solids: Sequence[Solid] = (),
+    supersample: int = SUPERSAMPLE,
+    show_direction: bool = False,
+) -> list[UInt8Array]:
+    """Return one picture a camera, as `draw` makes them, preparing hair and head only once.
+
+    With `show_direction` strands are coloured by their direction as in tractography: red runs left
+    and right, green front and back, blue up and down.
+    """
+    strands = hair.strands if isinstance(hair, Groom) else hair
+    if isinstance(hair, Groom):
+        head = hair.head if head is None else head
+        material = material or hair.material
+    material = material or HairMaterial()
+    shown = (*([head_solid(head, material)] if head is not None else []), *solids)
+    density = hair_density(strands, shown)
+    look = {
+        "u_root_colour": tuple(material.root_colour.tolist()),
+        "u_tip_colour": tuple(material.tip_colour.tolist()),
+        "u_show_direction": float(show_direction),
+    }
+    pictures = []
+    with (
+        renderer() as gl,
+        ribbons(gl, strands, drawn_width(strands, material)) as buffers,
+        contextlib.ExitStack() as kept,
+    ):
+        volume: LightVolume | None = None
+        for index, camera in enumerate(cameras):
+            shot = _Shot(supersampled(camera, supersample), lights or Lights.at_camera(camera))
+            if volume is None or lights is None:
+                kept.close()
+                volume = light_volume(density, shot.lights)
+                kept.enter_context(_light_texture(gl, volume))
+            samples = _shoot(gl, shot, strands, buffers, look, shown, volume)
+            background = backgrounds[index] if backgrounds is not None else backdrop(camera)
+            pictures.append(_over(averaged(samples, camera), background))
+    return pictures
+
+
+def backdrop(camera: Camera) -> UInt8Array:
+    """Return the neutral background (H, W, 3): grey, lighter towards the floor."""
+    t = np.linspace(0, 1, camera.height)[:, None, None]
+    column = (1 - t) * np.array(BACKDROP_TOP) + t * np.array(BACKDROP_BOTTOM)
+    result: UInt8Array = np.repeat(np.rint(column).astype(np.uint8), camera.width, axis=1)
+    return result
+
+
+@dataclass(frozen=True)
+class _Shot:
+    camera: Camera
+    lights: Lights
+
+
+def _sized(camera: Camera, width: int | None, height: int | None) -> Camera:
+    if width is None and height is None:
+        return camera
+    if width is None:
+        width = round(camera.width * (height or camera.height) / camera.height)
+    if height is None:
+        height = round(camera.height * width / camera.width)
+    if abs(width * camera.height - height * camera.width) > max(camera.width, camera.height):
+        raise InputError(
+            f"a picture of {width} x {height} has not the camera's aspect"
+            f" ({camera.width} x {camera.height}); give one of width and height"
+        )
+    return camera.resized(width, height)
+
+
+def drawn_width(strands: Strands, material: HairMaterial) -> float | Float32Array:
+    """Return the width in metres, or (P,) widths, that strands have in pictures."""
+    wider = float(np.clip(np.sqrt(SHOWN_HAIRS / max(len(strands), 1)), 1.0, WIDEST))
+    return wider * (material.width if strands.widths is None else strands.widths)
+
+
+@contextlib.contextmanager
+def _light_texture(gl: Renderer, light: LightVolume) -> Iterator[None]:
+    texture = gl.context.texture3d(light.size, 3, light.texels(), dtype="f4", alignment=1)
+    texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+    texture.repeat_x = texture.repeat_y = texture.repeat_z = False
+    texture.use(0)
+    try:
+        yield
+    finally:
+        texture.release()
+
+
+def _shoot(
+    gl: Renderer,
+    shot: _Shot,
+    strands: Strands,
+    buffers: RibbonBuffers | None,
+    look: dict[str, Any],
+    solids: Sequence[Solid],
+    light: LightVolume,
+) -> UInt8Array:
+    """Return the samples (k H, k W, 4), alpha 255 where something was drawn."""
+    camera = shot.camera
+    depth = DepthRange.around(camera, strands.points, *[solid.vertices for solid in solids])
+    uniforms: dict[str, Any] = {
+        **shot.lights.uniforms(),
+        **light.uniforms(),
+        "u_light": 0,
+        "u_eye": tuple(camera.position.tolist()),
+    }
+    with target(gl, camera) as picture:
+        for solid in solids:
+            skin = uniforms | {"u_scatter": solid.scatter}
+            draw_solid(gl, solid, gl.program("skin"), camera, depth, HEAD_PUSH, **skin)
+        draw_ribbons(
+            gl,
+            buffers,
+            gl.program("hair"),
+            camera,
+            depth,
+            shader="hair_ribbon_shade",
+            **uniforms,
+            **look,
+        )
+        return np.asarray(picture.read(), np.uint8)
+
+
+def _over(picture: UInt8Array, background: UInt8Array) -> UInt8Array:
+    if background.shape[:2] != picture.shape[:2]:
+        raise InputError(
+            f"background has shape {background.shape}, expected {(*picture.shape[:2], 3)}"
+        )
+    clear = 255 - picture[..., 3:].astype(np.uint16)
+    mixed = picture[..., :3] + (background * clear + 127) // 255
+    return np.minimum(mixed, 255).astype(np.uint8)

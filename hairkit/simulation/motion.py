@@ -1,0 +1,238 @@
+"""How the head moves: keyframes and shakes, as one rigid motion at any time."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hairkit.arrays import Float64Array, frozen_array
+from hairkit.errors import FormatError, InputError
+from hairkit.simulation import quaternion
+from hairkit.types.head import Head
+
+AXES = {"pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.0), "roll": (0.0, 0.0, 1.0)}
+"""Nod, turn and tilt: about +X, +Y and +Z of the head frame."""
+EASE = 0.25
+"""A shake grows to its full swing over this many seconds, so that nothing jerks at its start."""
+_LARGEST_FILE = 64 * 2**20
+
+
+@dataclass(frozen=True)
+class Shake:
+    """One swinging of the head about its pivot."""
+
+    axis: str
+    """A name of `AXES`."""
+    degrees: float
+    """How far to each side."""
+    hertz: float
+    """Swings per second."""
+    until: float | None = None
+    """Seconds after which it stops, eased out likewise; None never."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeadMotion:
+    """The head's rigid motion since rest, at any time: keyframes with shakes on top."""
+
+    times: Float64Array
+    """(K,) ascending seconds of the keyframes."""
+    keys: Float64Array
+    """(K, 4, 4) `head_from_rest` at these times."""
+    shakes: tuple[Shake, ...] = ()
+    pivot: Float64Array | None = None
+    """(3,) about what the shakes turn, head frame; None the origin."""
+
+    def __post_init__(self) -> None:
+        times = frozen_array(self.times, np.float64, (None,), "motion times")
+        if not len(times) or (np.diff(times) <= 0).any():
+            raise InputError("a head motion needs at least one key, at ascending times")
+        keys = frozen_array(self.keys, np.float64, (len(times), 4, 4), "motion keys")
+        turn = keys[:, :3, :3]
+        off = np.abs(np.einsum("kij,klj->kil", turn, turn) - np.eye(3)).max(initial=0.0)
+        if off > 1e-3 or (np.linalg.det(turn) < 0).any() or (keys[:, 3] != [0, 0, 0, 1]).any():
+            raise InputError(
+                f"head motion keys are not rigid (off by {off:.3g}); bake scale and shear away"
+            )
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "keys", keys)
+        object.__setattr__(self, "_turns", _continuous(quaternion.from_matrix(turn)))
+        if self.pivot is not None:
+            pivot = frozen_array(self.pivot, np.float64, (3,), "motion pivot")
+            object.__setattr__(self, "pivot", pivot)
+
+    def __call__(self, time: float) -> Float64Array:
+        """Return (4, 4) `head_from_rest` at `time`; before and after the keys the head is still."""
+        motion = self._keyed(time)
+        if not self.shakes:
+            return motion
+        both: Float64Array = motion @ self._shaken(time)
+        return both
+
+    @property
+    def end(self) -> float:
+        """Time of the last key, seconds."""
+        return float(self.times[-1])
+
+    def _keyed(self, time: float) -> Float64Array:
+        """Cubic through the keys (Catmull-Rom with the keys' own times), turns and places alike."""
+        count = len(self.times)
+        if count == 1 or time <= self.times[0]:
+            return np.array(self.keys[0])
+        if time >= self.times[-1]:
+            return np.array(self.keys[-1])
+        at = int(np.searchsorted(self.times, time, side="right")) - 1
+        span = self.times[at + 1] - self.times[at]
+        share = (time - self.times[at]) / span
+        turns: Float64Array = self.__dict__["_turns"]
+        values = np.concatenate([turns, self.keys[:, :3, 3]], axis=1)
+        slopes = [_slope(self.times, values, k) * span for k in (at, at + 1)]
+        mixed = _hermite(values[at], slopes[0], values[at + 1], slopes[1], share)
+        motion = np.eye(4)
+        motion[:3, :3] = quaternion.to_matrix(quaternion.unit(mixed[:4]))
+        motion[:3, 3] = mixed[4:]
+        return motion
+
+    def _shaken(self, time: float) -> Float64Array:
+        turn = np.eye(3)
+        for shake in self.shakes:
+            angle = np.radians(shake.degrees) * np.sin(2 * np.pi * shake.hertz * time)
+            angle *= _eased(time, shake.until)
+            turn = turn @ quaternion.to_matrix(quaternion.about(AXES[shake.axis], angle))
+        motion = np.eye(4)
+        motion[:3, :3] = turn
+        if self.pivot is not None:
+            motion[:3, 3] = self.pivot - turn @ self.pivot
+        return motion
+
+
+def still() -> HeadMotion:
+    """Return the motion of a head that does not move."""
+    return HeadMotion(np.zeros(1), np.eye(4)[None])
+
+
+def shaken(
+    texts: Sequence[str], head: Head | None = None, base: HeadMotion | None = None
+) -> HeadMotion:
+    """Return a motion with shakes.
+
+    Parameters
+    ----------
+    texts
+        `yaw:20:1.5` is yaw (or pitch, roll) by 20 degrees to each side, 1.5 times a second;
+        `yaw:20:1.5:2` stops after 2 seconds.
+    head
+        Its neck joint is what the shakes turn about.
+    base
+        Motion that the shakes come on top of.
+
+    Raises
+    ------
+    InputError
+        A text is none of that form.
+    """
+    start = base if base is not None else still()
+    pivot = None if head is None else head.joints[1].astype(np.float64)
+    return HeadMotion(start.times, start.keys, tuple(_shake(text) for text in texts), pivot)
+
+
+def read_motion(path: Path) -> HeadMotion:
+    """Read a head motion: a `.json` file, or a `.glb` or `.gltf` file with an animated head.
+
+    JSON: `{"times": [0, 0.5], "head_from_rest": [[16 numbers, row by row], ...]}`, or keys
+    `{"frames": [{"time": 0, "turn_deg": [pitch, yaw, roll], "move": [x, y, z]}, ...]}`.
+
+    Raises
+    ------
+    FormatError
+        The file is anything else.
+    """
+    if path.suffix.lower() in (".glb", ".gltf"):
+        from hairkit.io.glb_motion import read_head_motion
+
+        times, keys = read_head_motion(path)
+        return HeadMotion(times, keys)
+    if path.suffix.lower() != ".json":
+        raise InputError(f"{path}: a head motion is a .json, .glb or .gltf file")
+    return _read_json(path)
+
+
+def _read_json(path: Path) -> HeadMotion:
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    if path.stat().st_size > _LARGEST_FILE:
+        raise FormatError(f"{path}: larger than {_LARGEST_FILE} bytes, which no head motion is")
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if "frames" in found:
+            frames = found["frames"]
+            times = np.array([float(frame["time"]) for frame in frames])
+            keys = np.stack([_key(frame) for frame in frames])
+        else:
+            times = np.array(found["times"], np.float64)
+            keys = np.array(found["head_from_rest"], np.float64).reshape(len(times), 4, 4)
+        return HeadMotion(times, keys)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise FormatError(f"{path}: {error}") from error
+        what = f"no {error}" if isinstance(error, KeyError) else str(error)
+        raise FormatError(f"{path}: not a head motion ({what})") from error
+
+
+def _key(frame: dict[str, object]) -> Float64Array:
+    """Turn by pitch, then roll, then yaw, then move."""
+    pitch, yaw, roll = np.radians(np.array(frame.get("turn_deg", (0, 0, 0)), np.float64))
+    key = np.eye(4)
+    turns = [("yaw", yaw), ("roll", roll), ("pitch", pitch)]
+    for name, angle in turns:
+        key[:3, :3] = key[:3, :3] @ quaternion.to_matrix(quaternion.about(AXES[name], angle))
+    key[:3, 3] = np.array(frame.get("move", (0, 0, 0)), np.float64)
+    return key
+
+
+def _shake(text: str) -> Shake:
+    names = "|".join(AXES)
+    number = r"[-+]?\d*\.?\d+"
+    match = re.fullmatch(rf"({names}):({number}):({number})(?::({number}))?", text.strip())
+    if not match or not 0 <= float(match[3]) <= 100:
+        raise InputError(
+            f"shake {text!r}, expected AXIS:DEGREES:HERTZ[:SECONDS] with {', '.join(AXES)},"
+            " as yaw:20:1.5"
+        )
+    until = None if match[4] is None else float(match[4])
+    return Shake(match[1], float(match[2]), float(match[3]), until)
+
+
+def _eased(time: float, until: float | None) -> float:
+    def ramp(share: float) -> float:
+        t = min(max(share, 0.0), 1.0)
+        return t * t * (3 - 2 * t)
+
+    return ramp(time / EASE) * (1.0 if until is None else ramp((until - time) / EASE))
+
+
+def _continuous(turns: Float64Array) -> Float64Array:
+    """Choose the quaternions' signs so that neighbours are near each other."""
+    sign = np.sign((turns[1:] * turns[:-1]).sum(axis=1))
+    sign[sign == 0] = 1.0
+    near: Float64Array = turns * np.concatenate([[1.0], np.cumprod(sign)])[:, None]
+    return near
+
+
+def _slope(times: Float64Array, values: Float64Array, k: int) -> Float64Array:
+    low, high = max(k - 1, 0), min(k + 1, len(times) - 1)
+    result: Float64Array = (values[high] - values[low]) / (times[high] - times[low])
+    return result
+
+
+def _hermite(
+    a: Float64Array, slope_a: Float64Array, b: Float64Array, slope_b: Float64Array, t: float
+) -> Float64Array:
+    one, two = t * t * (3 - 2 * t), t * (1 - t)
+    result: Float64Array = a + (b - a) * one + two * ((1 - t) * slope_a - t * slope_b)
+    return result
