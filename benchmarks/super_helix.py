@@ -17,12 +17,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import cv2
-import numba
 import numpy as np
 from hairkit_plugins.super_helix import Options
 from hairkit_plugins.super_helix.simulator import SuperHelices
 
 from hairkit.head_model.template import default_head
+from hairkit.parallel import thread_count
 from hairkit.rendering import draw
 from hairkit.simulation import Surroundings
 from hairkit.simulation.motion import HeadMotion, shaken, still
@@ -40,7 +40,7 @@ def main() -> None:
     parser.add_argument("--pictures", type=Path, help="folder for frames of the two scenes")
     folder = parser.parse_args().pictures
     straight, wavy = (grow(style, default_head(), GUIDES) for style in ("straight", "wavy"))
-    print(f"{GUIDES} guides, {numba.get_num_threads()} threads")
+    print(f"{GUIDES} guides, {thread_count()} threads")
     print("| scene | elements | ms a frame | cpu ms | frames a second | worst ms | max stretch % |")
     print("|---|---|---|---|---|---|---|")
     shake = shaken(["yaw:25:1.5"], straight.head)

@@ -1,53 +1,79 @@
-"""Threads that do pieces of a loop together.
+"""Compiled functions, and the one way to run a compiled loop over index ranges on threads.
 
-Compiled functions run without Python's lock, so that plain threads do; waiting for each other they
-sleep. Numba's own `prange` waits busily, which beside other work, such as a viewer's drawing on the
-same cores, costs many times what the pieces do, and takes longer to compile.
+A loop is written as a compiled function of a range, `kernel(first, last, *arguments)`, and shared
+by `parallel_for(kernel, count, *arguments)`. Compiled functions run without Python's lock, so plain
+threads run them side by side. Numba's `prange` is not used: it waits busily, which costs processor
+time beside other work on the same cores, compiles slowly, and misreads NamedTuples of arrays.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar, cast
 
-from numba import config as numba_config
+from numba import config, njit
 
-config: Any = numba_config
+TASKS_PER_THREAD = 3
+"""Ranges for each thread: what one that is held up leaves is taken by the others."""
 
-EACH = 3
-"""Pieces a thread, so that one which is held up leaves its share to the others."""
-
-
-class Crew:
-    """As many threads as Numba would take."""
-
-    def __init__(self) -> None:
-        self.threads = int(config.NUMBA_NUM_THREADS)
-        """How many."""
-        self._pool: ThreadPoolExecutor | None = None
-
-    def share(self, work: Callable[..., None], count: int, worth: int, *args: Any) -> None:
-        """Call work(first, last, *args) on pieces of range(count), none of less than `worth`."""
-        pieces = min(count // worth, self.threads * EACH)
-        if pieces < 2 or self.threads < 2:
-            work(0, count, *args)
-            return
-        cuts = [count * k // pieces for k in range(pieces + 1)]
-        spans = iter([*pairwise(cuts)])
-        if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.threads - 1)
-        others = min(self.threads, pieces) - 1
-        asked = [self._pool.submit(_drain, spans, work, args) for _ in range(others)]
-        _drain(spans, work, args)
-        for other in asked:
-            other.result()
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
-def _drain(
-    spans: Iterator[tuple[int, int]], work: Callable[..., None], args: tuple[Any, ...]
+def compiled(function: _Function) -> _Function:
+    """Compile a function that releases Python's lock and divides as NumPy does."""
+    made: Any = njit(cache=True, nogil=True, error_model="numpy")(function)
+    return cast(_Function, made)
+
+
+def thread_count() -> int:
+    """Return the number of threads that share a loop: Numba's, which `NUMBA_NUM_THREADS` sets."""
+    settings: Any = config
+    return int(settings.NUMBA_NUM_THREADS)
+
+
+def parallel_for(
+    kernel: Callable[..., None], count: int, *arguments: Any, min_chunk: int = 1
 ) -> None:
-    """Do one span after the other until none is left; a list's iterator hands out each once."""
-    for first, last in spans:
-        work(first, last, *args)
+    """Call `kernel(first, last, *arguments)` on ranges that together are `range(count)`.
+
+    Parameters
+    ----------
+    kernel
+        A compiled function that writes only what belongs to the indices `first` to `last`, so that
+        the result does not depend on the number of threads.
+    min_chunk
+        Least number of indices that are worth a call on another thread.
+
+    Raises what `kernel` raises on any thread.
+    """
+    threads = thread_count()
+    tasks = min(count // min_chunk, threads * TASKS_PER_THREAD)
+    if tasks < 2 or threads < 2:
+        kernel(0, count, *arguments)
+        return
+    bounds = [count * k // tasks for k in range(tasks + 1)]
+    ranges = iter([*pairwise(bounds)])
+    helpers = [
+        _pool(threads).submit(_run_ranges, ranges, kernel, arguments)
+        for _ in range(min(threads, tasks) - 1)
+    ]
+    _run_ranges(ranges, kernel, arguments)
+    for helper in helpers:
+        if not helper.cancel():
+            helper.result()
+
+
+def _run_ranges(
+    ranges: Iterator[tuple[int, int]], kernel: Callable[..., None], arguments: tuple[Any, ...]
+) -> None:
+    """Run ranges until none is left; a list's iterator gives each to one thread only."""
+    for first, last in ranges:
+        kernel(first, last, *arguments)
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads - 1, "parallel_for")

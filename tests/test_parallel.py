@@ -1,28 +1,55 @@
-"""Laws of threads that share a loop."""
+"""Laws of loops over index ranges on threads."""
 
 from __future__ import annotations
+
+import threading
 
 import numpy as np
 import pytest
 
-from hairkit.parallel import Crew
+from hairkit import parallel
+from hairkit.parallel import parallel_for
 
 
-def test_a_crew_does_every_piece_once() -> None:
-    """Whatever the counts, each number is in one piece; an error of a thread is passed on."""
-    crew, done = Crew(), np.zeros(1000, int)
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_every_index_is_run_once(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
+    """Whatever the counts and the number of threads, each index is in one range."""
+    monkeypatch.setattr(parallel, "thread_count", lambda: threads)
+    done = np.zeros(1000, int)
 
-    def work(first: int, last: int, step: int) -> None:
+    def add(first: int, last: int, step: int) -> None:
         done[first:last] += step
 
-    for count, worth in ((1000, 1), (1000, 400), (7, 3), (0, 1)):
+    for count, min_chunk in ((1000, 1), (1000, 400), (7, 3), (0, 1)):
         done[:] = 0
-        crew.share(work, count, worth, 2)
+        parallel_for(add, count, 2, min_chunk=min_chunk)
         assert (done[:count] == 2).all()
         assert (done[count:] == 0).all()
+
+
+def test_ranges_run_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two threads meet at a barrier that one alone would wait at for ever."""
+    monkeypatch.setattr(parallel, "thread_count", lambda: 2)
+    monkeypatch.setattr(parallel, "TASKS_PER_THREAD", 1)
+    barrier = threading.Barrier(2, timeout=20)
+    parallel_for(lambda first, last: barrier.wait() and None, 2)
+
+
+def test_no_range_is_smaller_than_the_least_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loops too short to share run as one call on the caller's thread."""
+    monkeypatch.setattr(parallel, "thread_count", lambda: 2)
+    ranges: list[tuple[int, int]] = []
+    parallel_for(lambda first, last: ranges.append((first, last)), 99, min_chunk=50)
+    assert ranges == [(0, 99)]
+    parallel_for(lambda first, last: ranges.append((first, last)), 100, min_chunk=50)
+    assert all(last - first >= 50 for first, last in ranges)
+
+
+def test_an_error_on_any_thread_is_raised() -> None:
+    """The caller sees what the kernel raised."""
 
     def fail(first: int, last: int) -> None:
         raise ValueError(first)
 
-    with pytest.raises(ValueError, match="0"):
-        crew.share(fail, 1000, 1)
+    with pytest.raises(ValueError, match=r"\d"):
+        parallel_for(fail, 1000)

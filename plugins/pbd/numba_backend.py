@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.parallel import Crew
+from hairkit.parallel import parallel_for
 from hairkit.simulation import quaternion
 
 from . import kernels
@@ -54,7 +54,6 @@ class FastEngine:
         self._mass[-1, :, (self._count - 1) % LANES + 1 :] = 0.0
         self._cells = np.zeros((1, 0, 4), np.float32)
         self._usual = np.zeros(0, np.float32)
-        self._crew = Crew()
         self._blown: Float32Array | None = None
         self._air_work = kernels.padded(np.zeros(rods.points.shape, np.float32))
         self._riding: tuple[Riders, tuple[Array, ...]] | None = None
@@ -83,12 +82,23 @@ class FastEngine:
         if contact is not None:
             settings[2:4] = contact.friction, contact.fastest
             settings[5:] = 1, contact.rounds
-        self._crew.share(
-            kernels.run_substeps, len(self._x), WORTH,
-            self._x, self._q, self._root, node, element, metric,
-            *_motions(loads), loads[0].gravity.astype(np.float32), self._air(loads[0].air),
-            self._force(loads[0].force), self._grid, settings,
-        )  # fmt: skip
+        parallel_for(
+            kernels.run_substeps,
+            len(self._x),
+            self._x,
+            self._q,
+            self._root,
+            node,
+            element,
+            metric,
+            *_motions(loads),
+            loads[0].gravity.astype(np.float32),
+            self._air(loads[0].air),
+            self._force(loads[0].force),
+            self._grid,
+            settings,
+            min_chunk=WORTH,
+        )
 
     def rub(self, crowd: Crowd, ride: Float64Array, rates: tuple[float, float, float]) -> None:
         """Let hair act on hair."""
@@ -98,15 +108,29 @@ class FastEngine:
             self._cells = np.zeros((grids, size, 4), np.float32)
             self._usual = crowd.usual.astype(np.float32).reshape(-1)
         shift, origin = (ride - np.eye(4))[:3].astype(np.float32), crowd.origin.astype(np.float32)
-        self._crew.share(
-            spread_nodes, len(self._cells), 1, self._x, self._mass, shift, origin, crowd.shape,
-            np.float32(rates[2]), self._cells,
-        )  # fmt: skip
+        parallel_for(
+            spread_nodes,
+            len(self._cells),
+            self._x,
+            self._mass,
+            shift,
+            origin,
+            crowd.shape,
+            np.float32(rates[2]),
+            self._cells,
+        )
         settle_cells(0, size, self._cells, self._usual)
-        self._crew.share(
-            draw_nodes, len(self._x), 4 * WORTH, self._x, shift, origin, crowd.shape,
-            np.array(rates, np.float32), self._cells[0],
-        )  # fmt: skip
+        parallel_for(
+            draw_nodes,
+            len(self._x),
+            self._x,
+            shift,
+            origin,
+            crowd.shape,
+            np.array(rates, np.float32),
+            self._cells[0],
+            min_chunk=4 * WORTH,
+        )
 
     def blow(self, waves: AirWaves | None, wind: Float64Array, head: Float64Array) -> None:
         """Take gusts (see `wind.gust_waves`) for the substeps to come; None: the wind alone."""
@@ -116,10 +140,16 @@ class FastEngine:
         vectors, amplitudes, phases = waves
         phases = np.remainder((phases + vectors @ head[:3, 3]) / (2 * np.pi), 1.0)
         turns = np.column_stack([vectors @ head[:3, :3] / (2 * np.pi), phases])
-        self._crew.share(
-            blow_nodes, len(self._x), 4 * WORTH, self._x, turns.astype(np.float32),
-            amplitudes.astype(np.float32), wind.astype(np.float32), self._air_work,
-        )  # fmt: skip
+        parallel_for(
+            blow_nodes,
+            len(self._x),
+            self._x,
+            turns.astype(np.float32),
+            amplitudes.astype(np.float32),
+            wind.astype(np.float32),
+            self._air_work,
+            min_chunk=4 * WORTH,
+        )
         self._blown = self._air_work
 
     def air(self) -> Float64Array:
@@ -140,10 +170,22 @@ class FastEngine:
         deepest = NOWHERE if riders.identity else self._deepest
         motion = head[:3].astype(np.float32)
         rod, segment, weight, offset = self._riding[1]
-        self._crew.share(
-            ride_points, len(out), 4096, self._x, self._q, self._clear, rod, segment, weight,
-            offset, deepest, motion, self._grid, out,
-        )  # fmt: skip
+        parallel_for(
+            ride_points,
+            len(out),
+            self._x,
+            self._q,
+            self._clear,
+            rod,
+            segment,
+            weight,
+            offset,
+            deepest,
+            motion,
+            self._grid,
+            out,
+            min_chunk=4096,
+        )
         return out
 
     def _unpacked(self, values: Float32Array) -> Float64Array:

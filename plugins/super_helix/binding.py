@@ -12,9 +12,10 @@ from hairkit.errors import InputError
 from hairkit.helices import adaptive_counts, fit_arcs
 from hairkit.helices.arc_length import Path
 from hairkit.helices.helix_strands import travelling
+from hairkit.parallel import compiled
 from hairkit.types.strands import Strands
 
-from .element_kernels import carried, compiled, node, onward, times, turns
+from .element_kernels import carried, node, onward, times, turns
 from .rods import Rods
 
 SHAPE, FEWEST, MOST = 0.0015, 8, 32
@@ -83,12 +84,14 @@ def rods_of(strands: Strands, elements: int) -> tuple[Rods, Binding]:
 
 def _offsets(rods: Rods, binding: Binding, wanted: Float64Array) -> Float64Array:
     bare, frames = np.empty_like(wanted), np.empty((len(wanted), 3, 3))
-    draw(rods, rods.captured, np.eye(4), binding, bare, frames, False, 0, len(rods.offsets) - 1)
+    draw(0, len(rods.roots), rods, rods.captured, np.eye(4), binding, bare, frames, False)
     return np.ascontiguousarray(np.einsum("pji,pj->pi", frames, wanted - bare))
 
 
 @compiled
 def draw(
+    begin: int,
+    stop: int,
     rods: Rods,
     q: Float64Array,
     head: Float64Array,
@@ -96,8 +99,6 @@ def draw(
     points: Float64Array,
     frames: Float64Array,
     keep: bool,
-    begin: int,
-    stop: int,
 ) -> None:
     """Write the points (P, 3) and frames (P, 3, 3) of strands `begin` to `stop`, world.
 

@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
-
-from .element_kernels import compiled
+from hairkit.parallel import compiled
 
 _SLOW = 1e-3
 """Sliding speeds below this, metres per second, are held by friction without slipping."""

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from hairkit.arrays import Float64Array
+from hairkit.parallel import compiled
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
 _TERMS = 10
 _SINE, _VERSINE, _REST = (
     np.array([(-1) ** k / math.factorial(2 * k + order) for k in range(_TERMS)])
@@ -22,12 +19,6 @@ _VERSINE_SLOPE, _REST_SLOPE = (
     np.array([2 * (k + 1) * series[k + 1] for k in range(_TERMS - 1)])
     for series in (_VERSINE, _REST)
 )
-
-
-def compiled(function: _Function) -> _Function:
-    """Compile a function that runs beside others and divides as NumPy does."""
-    made: Any = njit(cache=True, nogil=True, error_model="numpy")(function)
-    return cast(_Function, made)
 
 
 @compiled

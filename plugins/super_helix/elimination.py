@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from hairkit.arrays import Float64Array
-
-from .element_kernels import compiled
+from hairkit.parallel import compiled
 
 
 @compiled

@@ -11,8 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from hairkit.arrays import Float64Array
-
-from .element_kernels import compiled
+from hairkit.parallel import compiled
 
 CELL = 0.01
 """Metres; a lock's width."""

@@ -15,9 +15,10 @@ import math
 import numpy as np
 
 from hairkit.arrays import Float64Array
+from hairkit.parallel import compiled
 
 from .contact import touch
-from .element_kernels import carried, compiled, node, onward, product, times, turns
+from .element_kernels import carried, node, onward, product, times, turns
 from .elimination import eliminate
 from .rods import NODES, SHARES, WEIGHTS, Rods
 from .state import CLOSE, FAR, Loads, Motion, Step
@@ -25,7 +26,7 @@ from .state import CLOSE, FAR, Loads, Motion, Step
 
 @compiled
 def step_strands(
-    rods: Rods, motion: Motion, loads: Loads, step: Step, begin: int, stop: int
+    begin: int, stop: int, rods: Rods, motion: Motion, loads: Loads, step: Step
 ) -> None:
     """Advance strands `begin` to `stop` by one step."""
     for strand in range(begin, stop):
@@ -306,7 +307,7 @@ def _keep(
 
 @compiled
 def place_points(
-    rods: Rods, q: Float64Array, head: Float64Array, points: Float64Array, begin: int, stop: int
+    begin: int, stop: int, rods: Rods, q: Float64Array, head: Float64Array, points: Float64Array
 ) -> None:
     """Write the Gauss points (E, NODES, 3) of strands `begin` to `stop`, world."""
     local, slope, arm = np.empty(3), np.empty((3, 3)), np.empty(3)

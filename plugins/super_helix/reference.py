@@ -78,7 +78,7 @@ def change(matrix: Float64Array, gradient: Float64Array) -> Float64Array:
 
 
 def step_densely(rods: Rods, motion: Motion, loads: Loads, step: Step) -> None:
-    """Advance all strands by one step as `recursion.step_strands` does, slowly."""
+    """Advance all strands by one step as `linear_time_step.step_strands` does, slowly."""
     for strand in range(len(rods.offsets) - 1):
         own = slice(rods.offsets[strand], rods.offsets[strand + 1])
         rod = rods.one(strand)

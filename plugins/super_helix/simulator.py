@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
+from hairkit.parallel import parallel_for
 from hairkit.simulation import Measures, Surroundings, quaternion
 from hairkit.simulation.obstacles import Obstacles, head_obstacles
 from hairkit.simulation.wind import air_velocity
@@ -23,7 +24,6 @@ from .reference import step_densely
 from .rods import NODES, Rods
 from .state import Loads, Motion, Step
 from .statics import at_rest
-from .threads import over_strands
 
 if TYPE_CHECKING:
     from . import Options
@@ -92,7 +92,9 @@ class SuperHelices:
         self._head, self._time, self._before = head, 0.0, 0.0
         shape = (len(self._rods.lengths), NODES)
         rest = np.empty((*shape, 3))
-        over_strands(place_points, self._rods.offsets, self._rods, self._rods.captured, head, rest)
+        parallel_for(
+            place_points, len(self._rods.roots), self._rods, self._rods.captured, head, rest
+        )
         q, still = self._rods.captured, np.zeros((*shape, 3))
         self._motion = Motion(q.copy(), q.copy(), rest, rest.copy(), still, still.copy())
         own = (rest - head[:3, 3]) @ head[:3, :3]
@@ -153,7 +155,7 @@ class SuperHelices:
         )
         loads = self._loads(around, air)
         if options.solver == "recursion":
-            over_strands(step_strands, self._rods.offsets, self._rods, self._motion, loads, step)
+            parallel_for(step_strands, len(self._rods.roots), self._rods, self._motion, loads, step)
         else:
             step_densely(self._rods, self._motion, loads, step)
         self._head, self._before = step.head, seconds
@@ -210,9 +212,9 @@ class SuperHelices:
     def _drawn(self) -> Float64Array:
         total = len(self._binding.arc)
         points, frames = np.empty((total, 3)), np.empty((total, 3, 3))
-        over_strands(
+        parallel_for(
             draw,
-            self._rods.offsets,
+            len(self._rods.roots),
             self._rods,
             self._motion.q,
             self._head,

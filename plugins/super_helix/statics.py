@@ -12,10 +12,10 @@ import numpy as np
 from scipy.linalg import eigh
 
 from hairkit.arrays import Float64Array
+from hairkit.parallel import compiled, parallel_for
 
-from .element_kernels import compiled, node, onward, times, turns
+from .element_kernels import node, onward, times, turns
 from .rods import NODES, SHARES, WEIGHTS, Rods
-from .threads import over_strands
 
 MARGIN = 0.6
 """A rest is soft when gravity takes off more than this share of the stiffness in some direction."""
@@ -50,7 +50,7 @@ def stiffened(rods: Rods, gravity: Float64Array) -> Rods:
 def gravity_forces(rods: Rods, q: Float64Array, gravity: Float64Array) -> Float64Array:
     """Return (E, 3) the generalised forces of gravity on rods at rest on the head, joule metres."""
     result = np.zeros_like(q)
-    over_strands(_forces_of_all, rods.offsets, rods, q, gravity, result)
+    parallel_for(_forces_of_all, len(rods.roots), rods, q, gravity, result)
     return result
 
 
@@ -61,7 +61,7 @@ def gravity_slopes(rods: Rods, gravity: Float64Array) -> Float64Array:
     """
     most = int(np.diff(rods.offsets).max(initial=0))
     result = np.zeros((len(rods.lengths), 3, most, 3))
-    over_strands(_slopes_of_all, rods.offsets, rods, rods.captured, gravity, result)
+    parallel_for(_slopes_of_all, len(rods.roots), rods, rods.captured, gravity, result)
     return result
 
 
@@ -76,7 +76,7 @@ def _below(matrix: Float64Array, bound: float) -> bool:
 
 @compiled
 def _forces_of_all(
-    rods: Rods, q: Float64Array, gravity: Float64Array, result: Float64Array, begin: int, stop: int
+    begin: int, stop: int, rods: Rods, q: Float64Array, gravity: Float64Array, result: Float64Array
 ) -> None:
     for strand in range(begin, stop):
         first, last = rods.offsets[strand], rods.offsets[strand + 1]
@@ -85,7 +85,7 @@ def _forces_of_all(
 
 @compiled
 def _slopes_of_all(
-    rods: Rods, q: Float64Array, gravity: Float64Array, result: Float64Array, begin: int, stop: int
+    begin: int, stop: int, rods: Rods, q: Float64Array, gravity: Float64Array, result: Float64Array
 ) -> None:
     for strand in range(begin, stop):
         first, last = rods.offsets[strand], rods.offsets[strand + 1]

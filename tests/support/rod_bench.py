@@ -110,7 +110,7 @@ def run(rods: Rods, motion: Motion, loads: Loads, step: Step, steps: int) -> Non
     """Advance by a number of steps; the first is Euler's."""
     for k in range(steps):
         now = step if k else step._replace(two_step=False)
-        step_strands(rods, motion, loads, now, 0, len(rods.offsets) - 1)
+        step_strands(0, len(rods.roots), rods, motion, loads, now)
 
 
 def settled(rods: Rods, loads: Loads | None = None, seconds: float = 4.0) -> Array:

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from hairkit.arrays import Float32Array
-from hairkit.parallel import Crew
+from hairkit.parallel import parallel_for, thread_count
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import clip_from_camera, set_uniforms
 from hairkit.rendering.hair import strand_numbers
@@ -42,8 +42,7 @@ class SoftHairPass:
         self._random = np.asarray(strand_numbers(count), np.float32)
         self._rest = np.ascontiguousarray(body.guide_rest, np.float32)
         self._tones = shade_kernels.tone_table()
-        self._crew = Crew()
-        self._chunks = min(self._crew.threads, MOST_CHUNKS)
+        self._chunks = min(thread_count(), MOST_CHUNKS)
         self._sums = np.zeros((self._chunks, 0, 4), np.float32)
         self._colours: tuple[object, Float32Array] | None = None
         self._texture: moderngl.Texture | None = None
@@ -77,14 +76,27 @@ class SoftHairPass:
         tiles = (-(-camera.height // place_kernels.TILE), -(-camera.width // place_kernels.TILE))
         filled = np.empty((self._chunks, place_kernels.SLICES, *tiles), np.uint32)
         corners = np.empty((self._chunks, 4), np.float32)
-        share, chunks = self._crew.share, self._chunks
-        share(
-            place_kernels.place_hair, chunks, 1, self._now, self._turns, body.followed,
-            body.weights, body.offsets, body.widths, self._camera, self._slices,
-            np.float32(look.times_wider), look.hairs, self._places, self._seen, filled, corners,
-        )  # fmt: skip
+        chunks = self._chunks
+        parallel_for(
+            place_kernels.place_hair,
+            chunks,
+            self._now,
+            self._turns,
+            body.followed,
+            body.weights,
+            body.offsets,
+            body.widths,
+            self._camera,
+            self._slices,
+            np.float32(look.times_wider),
+            look.hairs,
+            self._places,
+            self._seen,
+            filled,
+            corners,
+        )
         self._opacity = np.empty((place_kernels.SLICES + 1, *tiles), np.float32)
-        share(place_kernels.opacity_before, tiles[0], 8, filled, self._opacity)
+        parallel_for(place_kernels.opacity_before, tiles[0], filled, self._opacity, min_chunk=8)
         size = np.array([camera.width, camera.height])
         low = np.clip(np.floor(corners[:, :2].min(axis=0)) - EDGE, 0, size - 1)
         high = np.clip(np.ceil(corners[:, 2:].max(axis=0)) + EDGE, low + 1, size)
@@ -103,19 +115,37 @@ class SoftHairPass:
         shading = shade_kernels.shading_of(
             view.camera, scene.lights, scene.light.grid, direction=look.by_direction
         )
-        share = self._crew.share
-        share(
-            shade_kernels.shade_hair, look.hairs, PIECE, self._seen, self._places,
-            self._fibres(look), self._random, self._opacity, self._slices, shading,
-            scene.light.array, self._tones, self._looks,
-        )  # fmt: skip
-        share(
-            raster_kernels.draw_hair, self._chunks, 1, self._seen, self._looks, self.body.widths,
-            solid, self._camera, np.float32(look.times_wider), int(look.smooth), look.hairs,
-            self._frame[0].astype(np.float32), self._sums,
-        )  # fmt: skip
+        parallel_for(
+            shade_kernels.shade_hair,
+            look.hairs,
+            self._seen,
+            self._places,
+            self._fibres(look),
+            self._random,
+            self._opacity,
+            self._slices,
+            shading,
+            scene.light.array,
+            self._tones,
+            self._looks,
+            min_chunk=PIECE,
+        )
+        parallel_for(
+            raster_kernels.draw_hair,
+            self._chunks,
+            self._seen,
+            self._looks,
+            self.body.widths,
+            solid,
+            self._camera,
+            np.float32(look.times_wider),
+            int(look.smooth),
+            look.hairs,
+            self._frame[0].astype(np.float32),
+            self._sums,
+        )
         picture = np.empty((height, width, 4), np.uint8)
-        share(raster_kernels.resolve, height, 32, self._sums, picture)
+        parallel_for(raster_kernels.resolve, height, self._sums, picture, min_chunk=32)
         self._lay_over(scene.target, picture, frame)
 
     def _lay_over(

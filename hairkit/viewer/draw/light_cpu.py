@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Int32Array
-from hairkit.parallel import Crew
+from hairkit.parallel import parallel_for, thread_count
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.head import Mesh
 from hairkit.rendering.light import Lights
@@ -34,20 +34,21 @@ class SoftLightPass(LightVolume):
         super().__init__(gl, guides, solids)
         self._solids = np.ascontiguousarray(solid_depth(self.grid, solids).transpose(2, 1, 0))
         self._taken, self._rough = np.zeros_like(self._solids), np.zeros_like(self._solids)
-        self._crew = Crew()
-        self._dense = np.zeros((self._crew.threads, *self._solids.shape), np.uint32)
+        self._dense = np.zeros((thread_count(), *self._solids.shape), np.uint32)
         self._coming = np.ones((*self._solids.shape, 4), np.float32)
         self.array = self._coming.copy()
         """(Z, Y, X, 4) what is seen of key light, rim light and sky."""
 
     def _fill(self, hair: HairDrawer, hairs: int, per_micrometre: float) -> None:
-        origin, share = self.grid.origin.astype(np.float32), self._crew.share
+        origin = self.grid.origin.astype(np.float32)
         per_metre, layers = np.float32(1 / self.grid.spacing), len(self._solids)
-        share(fill_cells, len(self._dense), 1, hair.places(), hairs, origin, per_metre, self._dense)
+        parallel_for(
+            fill_cells, len(self._dense), hair.places(), hairs, origin, per_metre, self._dense
+        )
         taken, rough = self._taken, self._rough
         stops = np.float32(per_micrometre)
-        share(sum_cells, layers, 8, self._dense, self._solids, stops, taken, rough)
-        share(smooth_cells, layers, 8, rough, taken)
+        parallel_for(sum_cells, layers, self._dense, self._solids, stops, taken, rough, min_chunk=8)
+        parallel_for(smooth_cells, layers, rough, taken, min_chunk=8)
 
     def _light(self, lights: Lights, turn: int, turns: int) -> None:
         spacing = self.grid.spacing
@@ -55,10 +56,19 @@ class SoftLightPass(LightVolume):
         way_of_rim, _ = _way(lights.rim_direction, STEPS, GROWTH, spacing)
         ways = [_way(direction, SKY_STEPS, SKY_GROWTH, spacing) for direction in _SKY]
         layers = -(-(len(self._taken) - turn) // turns)
-        self._crew.share(
-            light_cells, layers, 2, self._taken, np.stack([way_of_key, way_of_rim]), depth,
-            np.stack([way for way, _ in ways]), ways[0][1], turn, turns, self._coming,
-        )  # fmt: skip
+        parallel_for(
+            light_cells,
+            layers,
+            self._taken,
+            np.stack([way_of_key, way_of_rim]),
+            depth,
+            np.stack([way for way, _ in ways]),
+            ways[0][1],
+            turn,
+            turns,
+            self._coming,
+            min_chunk=2,
+        )
 
     def _show(self) -> None:
         self.array, self._coming = self._coming, self.array

@@ -18,7 +18,7 @@ _HOW: dict[str, Any] = {
 row: Callable[[Any], Any] = njit(**_HOW)
 """Compiles a function that allocates nothing: views are then not counted."""
 shared: Callable[[Any], Any] = njit(nogil=True, **_HOW)
-"""The same for what the threads of a crew (`hairkit.parallel`) do at once."""
+"""The same for what threads do at once (see `hairkit.parallel`)."""
 inlined: Callable[[Any], Any] = njit(fastmath=True, error_model="numpy", inline="always")
 """Puts a function into its caller, so that loops around it run side by side."""
 SLICES, TILE = 32, 8

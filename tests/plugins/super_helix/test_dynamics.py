@@ -161,7 +161,7 @@ def test_both_solvers_keep_the_same_state(rng: np.random.Generator) -> None:
     fast, loads, step = busy(rng, rods)
     slow = Motion(*(array.copy() for array in fast))
     for _ in range(3):
-        step_strands(rods, fast, loads, step, 0, 2)
+        step_strands(0, 2, rods, fast, loads, step)
         reference.step_densely(rods, slow, loads, step)
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-6 * np.abs(other).max())
@@ -208,9 +208,9 @@ def test_energy_is_never_gained(two_step: bool, slack: float) -> None:
     motion = rest(one)
     start, scale = energy(one, motion), 9.81 * one.masses.sum() * 0.075
     step = step_of(1 / 500, two_step=two_step, iterations=6)
-    step_strands(one, motion, free(one), step._replace(two_step=False), 0, 1)
+    step_strands(0, 1, one, motion, free(one), step._replace(two_step=False))
     for _ in range(400):
-        step_strands(one, motion, free(one), step, 0, 1)
+        step_strands(0, 1, one, motion, free(one), step)
         assert energy(one, motion) <= start + slack * scale
 
 
@@ -222,9 +222,9 @@ def test_wild_hair_gains_no_energy(rate: int, rng: np.random.Generator) -> None:
         motion = rest(rods)
         start = energy(rods, motion)
         step = step_of(1 / rate, iterations=6)
-        step_strands(rods, motion, free(rods), step._replace(two_step=False), 0, 1)
+        step_strands(0, 1, rods, motion, free(rods), step._replace(two_step=False))
         for _ in range(rate // 3):
-            step_strands(rods, motion, free(rods), step, 0, 1)
+            step_strands(0, 1, rods, motion, free(rods), step)
             assert energy(rods, motion) <= start + 0.01 * abs(start)
 
 

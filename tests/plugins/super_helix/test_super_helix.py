@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 
-import numba
 import numpy as np
 import pytest
 from hairkit_plugins.super_helix import Options
 from hairkit_plugins.super_helix.hair_contact import Neighbours
 from hairkit_plugins.super_helix.simulator import SuperHelices
 
+from hairkit import parallel
 from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.simulation import Grab, Simulator, Surroundings, quaternion
@@ -153,18 +153,14 @@ def test_a_grabbed_point_comes_to_the_hand() -> None:
         simulator.advance(1 / 60, Surroundings(grabs=(Grab(10**9, (0, 0, 0)),)))
 
 
-def test_frames_do_not_depend_on_threads() -> None:
+def test_frames_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     """One thread or two: the same bits."""
     results = []
     for threads in (1, 2):
-        before = numba.get_num_threads()
-        numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
-        try:
-            simulator = SuperHelices(hanging(), Options(elements=3))
-            for frame in range(5):
-                simulator.advance(1 / 60, Surroundings(turned(0.05 * frame)))
-        finally:
-            numba.set_num_threads(before)
+        monkeypatch.setattr(parallel, "thread_count", lambda threads=threads: threads)
+        simulator = SuperHelices(hanging(), Options(elements=3))
+        for frame in range(5):
+            simulator.advance(1 / 60, Surroundings(turned(0.05 * frame)))
         results.append(simulator.points)
     np.testing.assert_array_equal(*results)
 
