@@ -6,7 +6,6 @@ recipe names. A broken plugin is kept on record with its distribution and reason
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
 import importlib.util
 import inspect
@@ -72,6 +71,8 @@ class PluginInfo:
     options: tuple[OptionInfo, ...] = ()
     source: Path | None = None
     """The plugin's Python file, where there is one."""
+    module: str = ""
+    """Full name of the module that the plugin is, or in which its class is defined."""
     suffixes: tuple[str, ...] = ()
     """File name endings that it reads or writes, from the module's `FORMAT`: `(".apx",)`."""
     format: FileFormat | None = None
@@ -185,11 +186,6 @@ class Manager:
         if values:
             raise OptionError(f"{where or name}: no option {next(iter(values))!r}; it has none")
         return None
-
-    def fingerprint(self, name: str) -> str:
-        """Return a text that changes when the plugin's distribution, version or source changes."""
-        info = self.info(name)
-        return f"{info.distribution} {info.version} {_source_digest(info.source)}"
 
     def call(self, stage: str, plugin: str, options: Any = None, **arguments: Any) -> Any:
         """Run one stage on one plugin and return its result.
@@ -345,18 +341,10 @@ def _inspect(plugin: object, name: str, distribution: str, version: str) -> Plug
         summary,
         options=options,
         source=Path(file) if file else None,
+        module=getattr(plugin, "__module__", getattr(plugin, "__name__", "")),
         suffixes=form.suffixes if form else tuple(getattr(plugin, "SUFFIXES", ())),
         format=form,
     )
-
-
-def _source_digest(source: Path | None) -> str:
-    """Return a digest of a plugin's file, or of all files of a plugin that is a folder."""
-    if source is None:
-        return ""
-    folder = source.name == "__init__.py"
-    files = sorted(source.parent.rglob("*.py")) if folder else [source]
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def _notifications() -> list[str]:

@@ -319,16 +319,6 @@ def test_a_file_that_is_no_plugin_is_an_error(tmp_path: Path, text: str) -> None
         Manager.loaded([tmp_path / "other.py"], autoload=False)
 
 
-def test_the_fingerprint_follows_the_source(tmp_path: Path) -> None:
-    """A changed plugin file has another fingerprint, an unchanged one the same."""
-    path = tmp_path / "mine.py"
-    prints = []
-    for text in (FILE_PLUGIN, FILE_PLUGIN, FILE_PLUGIN + "\n"):
-        path.write_text(text)
-        prints.append(Manager.loaded([path], autoload=False).fingerprint("mine"))
-    assert prints[0] == prints[1] != prints[2]
-
-
 class Listener:
     """Hears of grooms and falls over."""
 

@@ -12,7 +12,6 @@ angles = 64                          # options of the only plugin
 from __future__ import annotations
 
 import dataclasses
-import functools
 import hashlib
 import importlib.resources
 import os
@@ -26,6 +25,7 @@ from typing import Any
 from hairkit.errors import HairkitError, InputError, OptionError
 from hairkit.manager import Manager
 from hairkit.options import unknown_name
+from hairkit.pipeline.module_digest import module_digest
 
 HOOKS = {
     "segment": "segment",
@@ -188,24 +188,20 @@ def stage_digest(manager: Manager, stage: Stage) -> str:
     """Return a hex digest of plugins, versions and options: equal digests, equal behaviour.
 
     Options are taken with their defaults filled in; a file that an option names counts with its
-    content, and so do hairkit's modules that plugins build on.
+    content. A plugin counts with its distribution and with every module that it imports.
     """
-    digest = hashlib.sha256(f"{stage.hook} {_ground_digest()}".encode())
+    digest = hashlib.sha256(stage.hook.encode())
     for choice in stage.choices:
         options = manager.options(choice.plugin, choice.options)
-        digest.update(f"\n{choice.plugin} {manager.fingerprint(choice.plugin)}".encode())
+        info = manager.info(choice.plugin)
+        code = module_digest(info.module)
+        digest.update(f"\n{choice.plugin} {info.origin} {code}".encode())
         for field in dataclasses.fields(options) if options is not None else ():
             value = getattr(options, field.name)
             digest.update(f"\n{field.name}={value!r}".encode())
             if isinstance(value, Path) and value.is_file():
                 digest.update(hashlib.sha256(value.read_bytes()).digest())
     return digest.hexdigest()
-
-
-@functools.cache
-def _ground_digest() -> str:
-    files = sorted(Path(__file__).parents[1].rglob("*.py"))
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 def _stage(table: str, content: object, source: str) -> Stage:

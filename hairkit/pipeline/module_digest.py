@@ -1,0 +1,184 @@
+"""Digests of source code: a cached result is valid as long as the code that made it.
+
+The digest of a module covers its own source and every module that it imports, directly or not,
+as far as they belong to hairkit or to the module's own top-level package. Imports are read from
+the source without running it. Modules named only in strings (`importlib.import_module`) and files
+that a module loads at run time, such as shaders, are not covered.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import hashlib
+import importlib.util
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+FRONT_DOOR = "hairkit"
+"""This package loads its names lazily: each stands for the module that defines it."""
+
+Roots = Mapping[str, Path]
+"""Folder of a top-level package, or file of a top-level module, by name."""
+
+
+@dataclass(frozen=True)
+class _Import:
+    """One imported module, and the names taken out of it (none for `import a.b`)."""
+
+    module: str
+    names: tuple[str, ...] = ()
+    level: int = 0
+    """Leading dots of a relative import."""
+    for_types: bool = False
+    """True under `if TYPE_CHECKING:`, so it is never executed."""
+
+
+def module_digest(module: str, roots: Roots | None = None) -> str:
+    """Return a hex digest of a module's source and of all that it imports.
+
+    Parameters
+    ----------
+    module
+        Full name: `hairkit.imaging.waves`. A module without a Python source has the digest of
+        nothing.
+    roots
+        Where to look for sources; by default where Python finds hairkit and the module's package.
+    """
+    digest = hashlib.sha256()
+    for name, path in sorted(imported_modules(module, roots).items()):
+        digest.update(f"{name} {_read(path).digest}\n".encode())
+    return digest.hexdigest()
+
+
+def imported_modules(module: str, roots: Roots | None = None) -> dict[str, Path]:
+    """Return a module and all that it imports, directly or not, with their source files."""
+    known = _default_roots(module) if roots is None else roots
+    found: dict[str, Path] = {}
+    waiting = [*_with_packages(module, known)]
+    while waiting:
+        name = waiting.pop()
+        path = _source(name, known)
+        if name not in found and path is not None:
+            found[name] = path
+            waiting += _direct_imports(name, path, known)
+    return found
+
+
+def _direct_imports(name: str, path: Path, roots: Roots) -> Iterator[str]:
+    """Yield the modules that one file imports; several may be named twice."""
+    package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+    for item in _read(path).imports:
+        if item.for_types:
+            continue
+        base = _absolute(item, package)
+        if base == FRONT_DOOR:
+            yield from _front_door(item.names, roots)
+            continue
+        yield from _with_packages(base, roots)
+        yield from (f"{base}.{taken}" for taken in item.names)  # submodules; other names have none
+
+
+def _front_door(names: Iterable[str], roots: Roots) -> Iterator[str]:
+    """Yield the modules that define names of the front door, or that are these names."""
+    path = _source(FRONT_DOOR, roots)
+    shown = _read(path).imports if path is not None else ()
+    homes = {taken: item.module for item in shown if item.for_types for taken in item.names}
+    for name in names:
+        yield from _with_packages(homes.get(name, f"{FRONT_DOOR}.{name}"), roots)
+
+
+def _with_packages(module: str, roots: Roots) -> Iterator[str]:
+    """Yield a module and the packages around it, whose `__init__` runs first.
+
+    The front door itself is left out: it only names modules.
+    """
+    parts = module.split(".")
+    names = (".".join(parts[:count]) for count in range(1, len(parts) + 1))
+    yield from (name for name in names if name != FRONT_DOOR and parts[0] in roots)
+
+
+def _absolute(item: _Import, package: str) -> str:
+    if not item.level:
+        return item.module
+    parts = package.split(".")
+    parts = parts[: len(parts) - item.level + 1]
+    return ".".join([*parts, item.module] if item.module else parts)
+
+
+def _default_roots(module: str) -> dict[str, Path]:
+    tops = {FRONT_DOOR, module.partition(".")[0]}
+    return {top: path for top in tops if (path := _place(top)) is not None}
+
+
+def _place(top: str) -> Path | None:
+    """Return the folder of a top-level package, the file of a module, None where there is none."""
+    try:
+        spec = importlib.util.find_spec(top)
+    except ValueError:  # a module without a spec, as `__main__`
+        file = getattr(sys.modules.get(top), "__file__", None)
+        return Path(file) if file else None
+    if spec is None:
+        return None
+    if spec.submodule_search_locations:
+        return Path(next(iter(spec.submodule_search_locations)))
+    return Path(spec.origin) if spec.has_location and spec.origin else None
+
+
+def _source(module: str, roots: Roots) -> Path | None:
+    """Return the Python file of a module, None where it has none or belongs to others."""
+    top, *inner = module.split(".")
+    if top not in roots:
+        return None
+    base = roots[top].joinpath(*inner)
+    file = base if base.suffix == ".py" else base.with_name(f"{base.name}.py")
+    return next((path for path in (base / "__init__.py", file) if path.is_file()), None)
+
+
+@dataclass(frozen=True)
+class _Source:
+    """What a digest needs to know about a file."""
+
+    digest: str
+    imports: tuple[_Import, ...]
+
+
+def _read(path: Path) -> _Source:
+    state = path.stat()
+    return _parse(path, state.st_mtime_ns, state.st_size)
+
+
+@functools.cache
+def _parse(path: Path, modified: int, size: int) -> _Source:
+    """Read a file once; `modified` and `size` are there to read it again after a change."""
+    data = path.read_bytes()
+    try:
+        imports = tuple(_imports(ast.parse(data).body, False))
+    except (SyntaxError, ValueError):  # it cannot be imported either
+        imports = ()
+    if any(item.module == FRONT_DOOR and not item.names for item in imports):
+        used = re.findall(rf"\b{FRONT_DOOR}\.([A-Za-z]\w*)", data.decode(errors="replace"))
+        imports += (_Import(FRONT_DOOR, tuple(dict.fromkeys(used))),)
+    return _Source(hashlib.sha256(data).hexdigest(), imports)
+
+
+def _imports(statements: Iterable[ast.AST], for_types: bool) -> Iterator[_Import]:
+    """Yield every import of a block, those inside functions and branches too."""
+    for node in statements:
+        if isinstance(node, ast.Import):
+            yield from (_Import(alias.name, for_types=for_types) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            names = tuple(alias.name for alias in node.names)
+            yield _Import(node.module or "", names, node.level, for_types)
+        for block in ("body", "orelse", "finalbody", "handlers", "cases"):
+            inner = getattr(node, block, None)
+            if isinstance(inner, list):
+                typing = block == "body" and isinstance(node, ast.If) and _types_only(node.test)
+                yield from _imports(inner, for_types or typing)
+
+
+def _types_only(test: ast.expr) -> bool:
+    return ast.unparse(test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
