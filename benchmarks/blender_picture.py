@@ -27,7 +27,7 @@ from hairkit.manager import Manager
 from hairkit.rendering import Lights, draw
 from hairkit.rendering.picture import backdrop, drawn_width
 from hairkit.types.camera import Camera
-from hairkit.types.groom import Groom, read_groom, write_groom
+from hairkit.types.groom import Groom
 
 MADE = Path(__file__).parents[1] / ".clients" / "bpy" / "bin" / "python"
 SUN = np.pi
@@ -41,7 +41,7 @@ def main() -> int:
     if not python.exists() or not args.groom.exists():
         print("no Blender or no groom; see python benchmarks/blender_picture.py --help")
         return 0
-    groom = dense_groom(read_groom(args.groom), args.hairs)
+    groom = dense_groom(Groom.load(args.groom), args.hairs)
     width, height = parse_size(args.size)
     points = np.concatenate([groom.strands.points, groom.head.vertices])
     azimuth, elevation = (float(part) for part in args.camera.split(","))
@@ -61,7 +61,7 @@ def _by_blender(
     manager = Manager.loaded(autoload=False)
     options = manager.options("alembic", {})
     manager.call("export_groom", "alembic", options, groom=groom, path=folder / "hair.abc")
-    write_groom(folder / "groom.npz", groom)
+    groom.save(folder / "groom.npz")
     picture = folder / "picture.png"
     scene = _scene(groom, camera) | {
         "alembic": str(folder / "hair.abc"),

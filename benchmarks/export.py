@@ -34,7 +34,7 @@ from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.storage import write_bytes
-from hairkit.types.groom import Groom, read_groom, write_groom
+from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
 from hairkit.types.strands import Strands
 
@@ -81,7 +81,7 @@ def main() -> int:
         return 2
     with tempfile.TemporaryDirectory(dir=args.folder) as folder:
         groom = combed(args.strands, args.points)
-        write_groom(Path(folder) / "groom.npz", groom)
+        groom.save(Path(folder) / "groom.npz")
         blender = _blender(args, groom, Path(folder), endings)
         print(_heading(args), flush=True)
         for ending in endings:
@@ -127,7 +127,7 @@ def _measured(ending: str, folder: str, rounds: int) -> Measured:
 def _child(ending: str, folder: Path, rounds: int) -> int:
     """Write the groom in the folder; print what it took."""
     manager = Manager.loaded(autoload=False)
-    groom = read_groom(folder / "groom.npz")
+    groom = Groom.load(folder / "groom.npz")
     path = folder / f"hair{ending.split()[0]}"
     name = plugin_for(manager, "export_groom", path)
     options = manager.options(name, SETTINGS[ending])

@@ -22,7 +22,6 @@ from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.rendering.context import Renderer, renderer
 from hairkit.synth import grow
-from hairkit.types.groom import write_groom
 from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.draw.frame_budget import LEVELS, Budget
 from hairkit.viewer.preview import Preview
@@ -43,7 +42,7 @@ def main() -> int:
     args = _arguments()
     with tempfile.TemporaryDirectory() as folder, renderer() as gl:
         path = Path(folder) / "groom.npz"
-        write_groom(path, grow("straight", default_head(), args.guides))
+        grow("straight", default_head(), args.guides).save(path)
         print(f"{gl.description}, {os.cpu_count()} cores\n")
         print(f"{args.guides} guides, {args.hairs} hairs, {args.size}, {args.pictures} pictures\n")
         print(f"| {' | '.join(HEADINGS)} |\n|{'---|' * len(HEADINGS)}")

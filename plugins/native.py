@@ -8,7 +8,7 @@ from types import MappingProxyType
 from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.types.groom import Groom, read_groom, write_groom
+from hairkit.types.groom import Groom
 
 FORMAT = FileFormat(
     "hairkit",
@@ -24,11 +24,11 @@ Options = ExportOptions
 def export_groom(groom: Groom, path: Path, options: ExportOptions) -> bool:
     """Write everything that is on the groom, or the strands that the options choose."""
     whole = options == ExportOptions()
-    write_groom(path, groom if whole else prepared(groom, options).groom)
+    (groom if whole else prepared(groom, options).groom).save(path)
     return True
 
 
 @hookimpl
 def import_groom(path: Path) -> Groom:
     """Read the groom exactly as it was written."""
-    return read_groom(path)
+    return Groom.load(path)

@@ -19,7 +19,6 @@ import numpy as np
 from hairkit.cli import main as hairkit
 from hairkit.head_model.template import default_head
 from hairkit.synth import StyleName, grow
-from hairkit.types.groom import write_groom
 
 HERE = Path(__file__).parent
 MILLISECONDS = 35
@@ -33,7 +32,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         for name, style in shown.items():
             groom = Path(folder) / f"{style}.npz"
-            write_groom(groom, grow(style, default_head(), 600))
+            grow(style, default_head(), 600).save(groom)
             for simulator in args.simulators or ["pbd"]:
                 words = ["view", str(groom), "--headless", "--simulator", simulator]
                 words += ["--script", str(HERE / f"{name}.toml")]

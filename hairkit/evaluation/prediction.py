@@ -12,7 +12,7 @@ from hairkit.errors import InputError
 from hairkit.evaluation.truth import Truth
 from hairkit.storage import Stored, from_arrays, read_npz
 from hairkit.types.camera import Camera
-from hairkit.types.groom import Groom, read_groom
+from hairkit.types.groom import Groom
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import read_cameras
@@ -84,7 +84,7 @@ def read_prediction(
     names, cameras = read_cameras(scene_path)
     folder = groom_path.parent
     return Prediction(
-        read_groom(groom_path),
+        Groom.load(groom_path),
         names,
         cameras,
         _stage_results(folder, "orient", names, OrientationMap),

@@ -25,7 +25,7 @@ from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.io.head_reader import read_head
 from hairkit.io.strand_blocks import bounds
 from hairkit.options import option
-from hairkit.types.groom import Groom, HairMaterial, read_groom
+from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
 
@@ -251,7 +251,7 @@ def _head(strands: Strands, options: ImportOptions, own: Head | None, source: ob
 
 
 def _read(path: Path) -> Head:
-    return read_groom(path).head if path.suffix == ".npz" else read_head(path)
+    return Groom.load(path).head if path.suffix == ".npz" else read_head(path)
 
 
 def _away(points: Float32Array, head: Head) -> float:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hairkit.errors import InputError
 from hairkit.manager import Manager
-from hairkit.types.groom import Groom, read_groom
+from hairkit.types.groom import Groom
 
 
 def load_groom(
@@ -36,7 +36,7 @@ def load_groom(
     """
     path = groom_path(path)
     if plugin is None and path.suffix == ".npz" and not settings:
-        return read_groom(path)
+        return Groom.load(path)
     name = plugin or plugin_for(manager, "import_groom", path)
     options = manager.options(name, settings or {})
     groom = manager.call("import_groom", name, options, path=path)

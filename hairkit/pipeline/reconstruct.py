@@ -21,7 +21,7 @@ from hairkit.pipeline.stage_runner import Argument, Given, StageRunner
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
 from hairkit.types.capture import Capture
-from hairkit.types.groom import Groom, write_groom
+from hairkit.types.groom import Groom
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
@@ -158,7 +158,7 @@ def _write(
     exports: Sequence[tuple[str, Path]],
 ) -> None:
     """Write the groom, the scene and the exports; away with the sheet of another groom."""
-    write_groom(folder / "groom.npz", made.groom)
+    made.groom.save(folder / "groom.npz")
     _in_photo_pixels(made.scene, capture).write_json(folder / "scene.json")
     for plugin, path in exports:
         run.export(plugin, made.groom, path)

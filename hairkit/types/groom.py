@@ -107,13 +107,3 @@ class Groom(Stored):
             raise FormatError(f"{path}: a groom of version {version}, this hairkit reads {_NEWEST}")
         named = {_STRANDS + name if name in _AT_TOP else name: arrays[name] for name in arrays}
         return from_arrays(cls, named, str(path))
-
-
-def write_groom(path: str | os.PathLike[str], groom: Groom) -> None:
-    """Write the groom to hairkit's own file; see `Groom.save`."""
-    groom.save(path)
-
-
-def read_groom(path: str | os.PathLike[str]) -> Groom:
-    """Read a groom from hairkit's own file; see `Groom.load`."""
-    return Groom.load(path)

@@ -12,7 +12,7 @@ import pytest
 from hairkit.cli import main
 from hairkit.manager import DISABLE_AUTOLOAD
 from hairkit.testing import bristle_groom
-from hairkit.types.groom import read_groom, write_groom
+from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 
@@ -21,7 +21,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with groom.npz and, in centimetres, bare.data; the current one."""
     monkeypatch.setenv(DISABLE_AUTOLOAD, "1")
     monkeypatch.chdir(tmp_path)
-    write_groom("groom.npz", bristle_groom())
+    bristle_groom().save("groom.npz")
     assert main(["export", "groom.npz", "-o", "bare.data", "--set", "scale=0.01"]) == 0
     return tmp_path
 
@@ -31,7 +31,7 @@ def test_converting_keeps_the_points(folder: Path, capsys: pytest.CaptureFixture
     capsys.readouterr()
     assert main(["convert", "bare.data", "b.npz", "--scale", "0.01", "--up", "y"]) == 0
     printed, strands = capsys.readouterr().out, bristle_groom().strands
-    assert np.allclose(read_groom("b.npz").strands.points, strands.points, atol=1e-7)
+    assert np.allclose(Groom.load("b.npz").strands.points, strands.points, atol=1e-7)
     wanted = rf"b.npz: {len(strands)} strands, {len(strands.points)} points, {len(strands)} guides"
     assert re.fullmatch(wanted + r", [\d.]+ x [\d.]+ x [\d.]+ m, in [\d.]+ s\n", printed)
 
@@ -48,20 +48,20 @@ def test_z_up_files_are_turned_upright(folder: Path) -> None:
     assert main(["convert", "groom.npz", "z.ply", "--set", "ply.axis=z_up_metres"]) == 0
     words = ["convert", "z.ply", "b.npz", "--up", "z", "--head", "groom.npz"]
     assert main(words) == 0
-    back, true = read_groom("b.npz"), bristle_groom()
+    back, true = Groom.load("b.npz"), bristle_groom()
     assert np.allclose(back.strands.points, true.strands.points, atol=1e-7)
     assert np.array_equal(back.head.vertices, true.head.vertices)
 
 
 def test_options_go_to_reader_and_writer(folder: Path) -> None:
     """`--set` takes the plugin's name, or `reader` and `writer` where both are the same plugin."""
-    write_groom("groom.npz", bristle_groom())
+    bristle_groom().save("groom.npz")
     assert main(["convert", "groom.npz", "a.hair"]) == 0
     words = ["--set", "reader.reverse=true", "--set", "cyhair.axis=y_up_metres"]
     assert main(["convert", "a.hair", "b.hair", *words, "--set", "writer.colours=no"]) == 0
     assert main(["convert", "b.hair", "b.npz", "--from", "cyhair", "--to", "native"]) == 0
     tips = bristle_groom().strands.tips
-    assert np.allclose(read_groom("b.npz").strands.roots, tips, atol=1e-7)
+    assert np.allclose(Groom.load("b.npz").strands.roots, tips, atol=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_guides_are_picked_from_full_hair(folder: Path, capsys: pytest.CaptureFi
     """`--guides 20` marks 20 strands; written alone they are 20 of the strands that were read."""
     words = ["convert", "groom.npz", "g.npz", "--guides", "20"]
     assert main([*words, "--set", "writer.strands=guides"]) == 0
-    found, full = read_groom("g.npz").strands, bristle_groom().strands
+    found, full = Groom.load("g.npz").strands, bristle_groom().strands
     assert len(found) == 20
     assert {tuple(p) for p in found.points.tolist()} <= {tuple(p) for p in full.points.tolist()}
     capsys.readouterr()
@@ -174,10 +174,10 @@ def test_curl_is_measured_where_asked(folder: Path) -> None:
     points = straight.strands.roots[:, None] + (coil - coil[0])
     offsets = np.arange(len(points) + 1) * 120
     strands = Strands(points.reshape(-1, 3).astype(np.float32), offsets)
-    write_groom("coils.npz", replace(straight, strands=strands))
+    replace(straight, strands=strands).save("coils.npz")
     assert main(["convert", "coils.npz", "plain.npz"]) == 0
-    assert read_groom("plain.npz").material.curl_radius == 0
+    assert Groom.load("plain.npz").material.curl_radius == 0
     assert main(["convert", "coils.npz", "known.npz", "--measure-curl"]) == 0
-    look = read_groom("known.npz").material
+    look = Groom.load("known.npz").material
     assert abs(look.curl_radius - 0.008) < 0.0015
     assert abs(look.curl_pitch - 0.04) < 0.006

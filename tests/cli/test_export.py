@@ -11,13 +11,12 @@ from ball import PLUGIN_FILE, write_capture
 
 from hairkit.cli import main
 from hairkit.testing import bristle_groom, turn_scene
-from hairkit.types.groom import write_groom
 
 
 @pytest.fixture
 def groom_file(tmp_path: Path) -> Path:
     """A small groom on disk."""
-    write_groom(tmp_path / "groom.npz", bristle_groom())
+    bristle_groom().save(tmp_path / "groom.npz")
     return tmp_path / "groom.npz"
 
 

@@ -12,14 +12,13 @@ import pytest
 
 from hairkit.cli import main
 from hairkit.testing import bristle_groom
-from hairkit.types.groom import write_groom
 from hairkit.viewer.actions.actions import ACTIONS
 
 
 @pytest.fixture
 def groom_path(tmp_path: Path) -> Path:
     """A groom on disk."""
-    write_groom(tmp_path / "groom.npz", bristle_groom())
+    bristle_groom().save(tmp_path / "groom.npz")
     return tmp_path / "groom.npz"
 
 

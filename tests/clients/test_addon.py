@@ -13,7 +13,7 @@ from client_groom import read_back, written
 
 from hairkit.io.capture_reader import sample_folder
 from hairkit.manager import Manager
-from hairkit.types.groom import Groom, read_groom, write_groom
+from hairkit.types.groom import Groom
 
 ADDON = Path(__file__).parents[2] / "examples" / "hairkit-blender"
 FIND_TOOL = "import bpy; print(bpy.utils.resource_path('LOCAL'))"
@@ -39,7 +39,7 @@ def addon(blender: BlenderSession, tmp_path_factory: pytest.TempPathFactory) -> 
 def stored(groom: Groom, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The small groom as hairkit's own file."""
     path = tmp_path_factory.mktemp("groom") / "anna.npz"
-    write_groom(path, groom)
+    groom.save(path)
     return path
 
 
@@ -162,7 +162,7 @@ def test_a_folder_of_photos_becomes_hair(addon: BlenderSession, tmp_path: Path) 
         python=sys.executable,
         guides=60,
     )
-    hair, made = only(things, "CURVES"), read_groom(tmp_path / "out" / "groom.npz")
+    hair, made = only(things, "CURVES"), Groom.load(tmp_path / "out" / "groom.npz")
     np.testing.assert_allclose(hair["positions"], z_up(made.strands.points), atol=1e-7)
 
 

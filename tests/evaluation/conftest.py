@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hairkit.testing import ball_mask, bristle_groom, turn_scene
-from hairkit.types.groom import Groom, write_groom
+from hairkit.types.groom import Groom
 from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.scene import Scene
 
@@ -49,7 +49,7 @@ def out_folder(tmp_path: Path) -> Path:
 def write_out(folder: Path, groom: Groom, scene: Scene) -> None:
     """Write a groom, its scene and the stages that scoring reads."""
     (folder / "work").mkdir(parents=True)
-    write_groom(folder / "groom.npz", groom)
+    groom.save(folder / "groom.npz")
     scene.write_json(folder / "scene.json")
     for name, camera in zip(scene.names, scene.cameras, strict=True):
         mask = ball_mask(camera)

@@ -23,7 +23,7 @@ from hairkit.head_model.scalp import evaluate, sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.testing import bristle_groom
-from hairkit.types.groom import HairMaterial, write_groom
+from hairkit.types.groom import HairMaterial
 from hairkit.types.strands import Strands
 
 
@@ -73,7 +73,7 @@ def test_a_patch_of_hair_lies_where_it_faces(side: tuple[float, ...]) -> None:
 def test_the_named_head_is_taken(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """A head of a groom file stays where it is when roots are on it; else it is moved to them."""
     groom = bristle_groom()
-    write_groom(tmp_path / "groom.npz", groom)
+    groom.save(tmp_path / "groom.npz")
     options = ImportOptions(head=tmp_path / "groom.npz")
     same = adopt(groom.strands, options, "a.hair")
     assert np.array_equal(same.head.vertices, groom.head.vertices)

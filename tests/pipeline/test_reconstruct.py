@@ -20,7 +20,6 @@ from hairkit.pipeline.reconstruct import export_paths, reconstruct
 from hairkit.progress import Recorder, Silent
 from hairkit.storage import to_arrays
 from hairkit.testing import ball_head, turn_capture, turn_scene
-from hairkit.types.groom import read_groom
 from hairkit.types.scene import read_cameras
 
 STAGES = ["segment", "scene", "head", "orient", "hull", "field", "track"]
@@ -55,7 +54,7 @@ def test_photos_become_a_groom_and_its_files(tmp_path: Path) -> None:
     groom = run(tmp_path / "out")
     assert len(groom.strands) == 40
     assert set(files(tmp_path / "out")) == {"groom.npz", "scene.json", "groom.ball"}
-    kept = to_arrays(read_groom(tmp_path / "out" / "groom.npz"))
+    kept = to_arrays(Groom.load(tmp_path / "out" / "groom.npz"))
     assert all(np.array_equal(array, kept[name]) for name, array in to_arrays(groom).items())
     log = (tmp_path / "out" / "hairkit.log").read_text()
     assert all(f"\n{stage} " in log for stage in [*STAGES, "ball_plugin"])

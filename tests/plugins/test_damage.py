@@ -8,7 +8,6 @@ from __future__ import annotations
 import logging
 import tracemalloc
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -108,8 +107,8 @@ def quiet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     logger = logging.getLogger("hairkit")
     level = logger.level
     logger.setLevel(logging.CRITICAL)
-    small = replace(rich_groom(1), head=ball_head(4), root_triangle=np.zeros(1, np.int32))
-    monkeypatch.setattr(adopt_strands, "read_groom", lambda _: small)
+    head = ball_head(4)
+    monkeypatch.setattr(adopt_strands, "_read", lambda _: head)
     tracemalloc.start()
     yield
     tracemalloc.stop()

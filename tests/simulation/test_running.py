@@ -15,7 +15,7 @@ from hairkit.errors import HairkitError, InputError
 from hairkit.manager import Manager
 from hairkit.simulation import Weather, run, shaken, still
 from hairkit.testing import bristle_groom
-from hairkit.types.groom import Groom, write_groom
+from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache, read_cache
 
 
@@ -72,7 +72,7 @@ def test_what_is_not_finite_is_an_error(manager: Manager, groom: Groom) -> None:
 
 def simulate(groom: Groom, folder: Path, *more: str) -> int:
     """Run the verb on a groom's file."""
-    write_groom(folder / "groom.npz", groom)
+    groom.save(folder / "groom.npz")
     words = ["simulate", str(folder / "groom.npz"), "--frames", "4", "--quiet"]
     return cli.main([*words, "--set", "pbd.backend=reference", *more])
 

@@ -10,13 +10,13 @@ import pytest
 from hairkit.errors import FormatError, InputError
 from hairkit.storage import read_npz, to_arrays, write_npz
 from hairkit.testing import bristle_groom
-from hairkit.types.groom import read_groom, write_groom
+from hairkit.types.groom import Groom
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
     """Every field comes back equal in every bit."""
-    write_groom(tmp_path / "a.npz", bristle_groom())
-    before, after = to_arrays(bristle_groom()), to_arrays(read_groom(tmp_path / "a.npz"))
+    bristle_groom().save(tmp_path / "a.npz")
+    before, after = to_arrays(bristle_groom()), to_arrays(Groom.load(tmp_path / "a.npz"))
     assert before.keys() == after.keys()
     for name, array in before.items():
         assert array.dtype == after[name].dtype
@@ -26,14 +26,14 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
 def test_equal_grooms_give_equal_files(tmp_path: Path) -> None:
     """No time, name or order of this run goes into the file."""
     for name in ("a", "b"):
-        write_groom(tmp_path / f"{name}.npz", bristle_groom())
+        bristle_groom().save(tmp_path / f"{name}.npz")
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
 def test_numpy_alone_reads_points_and_offsets(tmp_path: Path) -> None:
     """`points` (P, 3) and `offsets` (S + 1,) stand at the top."""
     groom = bristle_groom()
-    write_groom(tmp_path / "a.npz", groom)
+    groom.save(tmp_path / "a.npz")
     with np.load(tmp_path / "a.npz") as data:
         assert np.array_equal(data["points"], groom.strands.points)
         assert np.array_equal(data["offsets"], groom.strands.offsets)
@@ -41,7 +41,7 @@ def test_numpy_alone_reads_points_and_offsets(tmp_path: Path) -> None:
 
 def test_anything_else_is_refused(tmp_path: Path) -> None:
     """Another npz, a newer version, missing and inconsistent arrays, text and nothing: one line."""
-    write_groom(tmp_path / "a.npz", bristle_groom())
+    bristle_groom().save(tmp_path / "a.npz")
     arrays = read_npz(tmp_path / "a.npz")
     wrong = {
         "not a groom": {"x": np.zeros(3)},
@@ -53,9 +53,9 @@ def test_anything_else_is_refused(tmp_path: Path) -> None:
     for reason, content in wrong.items():
         write_npz(tmp_path / "b.npz", content)
         with pytest.raises(FormatError, match=reason):
-            read_groom(tmp_path / "b.npz")
+            Groom.load(tmp_path / "b.npz")
     (tmp_path / "c.npz").write_text("hello")
     with pytest.raises(FormatError, match=r"not a readable \.npz"):
-        read_groom(tmp_path / "c.npz")
+        Groom.load(tmp_path / "c.npz")
     with pytest.raises(InputError, match="no such file"):
-        read_groom(tmp_path / "d.npz")
+        Groom.load(tmp_path / "d.npz")

@@ -9,7 +9,6 @@ import swaying
 
 from hairkit.manager import Manager
 from hairkit.testing import bristle_groom
-from hairkit.types.groom import write_groom
 from hairkit.viewer.session import Session
 
 
@@ -24,5 +23,5 @@ def swaying_manager() -> Manager:
 @pytest.fixture
 def session(swaying_manager: Manager, tmp_path: Path) -> Session:
     """A session of 160 x 120 pixels on the bristles."""
-    write_groom(tmp_path / "groom.npz", bristle_groom())
+    bristle_groom().save(tmp_path / "groom.npz")
     return Session(swaying_manager, tmp_path / "groom.npz", size=(160, 120), hairs=600)

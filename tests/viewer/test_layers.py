@@ -19,7 +19,6 @@ from hairkit.testing import (
     shell_hull,
     turn_scene,
 )
-from hairkit.types.groom import write_groom
 from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.layers import BOARDS, Layers
 from hairkit.viewer.preview import Preview
@@ -44,7 +43,7 @@ def results(tmp_path: Path) -> Path:
     for name, camera in zip(SCENE.names, SCENE.cameras, strict=True):
         keep(work, f"segment-{name}", ball_mask(camera))
         keep(work, f"orient-{name}", combed_orientation(ball_mask(camera)))
-    write_groom(tmp_path / "groom.npz", bristle_groom())
+    bristle_groom().save(tmp_path / "groom.npz")
     return tmp_path
 
 

@@ -21,7 +21,6 @@ from references import reference
 from hairkit.errors import FormatError, HairkitError, InputError
 from hairkit.grooming.prepare_export import selected
 from hairkit.testing import bristle_groom
-from hairkit.types.groom import write_groom
 
 CONSTANT = AbcGeom.GeometryScope.kConstantScope
 UNIFORM = AbcGeom.GeometryScope.kUniformScope
@@ -308,7 +307,7 @@ def test_damaged_bytes_give_a_groom_or_one_error(
     folder = tmp_path_factory.getbasetemp()
     groom, good = folder / "groom.npz", folder / "small.abc"
     if not good.exists():
-        write_groom(groom, bristle_groom())
+        bristle_groom().save(groom)
         small_file(folder)
     path = folder / "damaged.abc"
     path.write_bytes(data.draw(damaged(good.read_bytes())))

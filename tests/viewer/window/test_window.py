@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from hairkit.testing import bristle_groom
-from hairkit.types.groom import write_groom
 from hairkit.viewer.window.mouse import LEFT, MIDDLE, RIGHT, Mouse
 
 HERE = Path(__file__).parent
@@ -49,7 +48,7 @@ def screens(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Seen]:
     if shutil.which("Xvfb") is None:
         pytest.skip("no Xvfb; on Debian: apt-get install xvfb")
     folder = tmp_path_factory.mktemp("window")
-    write_groom(folder / "groom.npz", bristle_groom())
+    bristle_groom().save(folder / "groom.npz")
     numbers, signal = os.pipe()
     command = ["Xvfb", "-screen", "0", "320x240x24", "-fbdir", str(folder), "-nolisten", "tcp"]
     server = subprocess.Popen(
