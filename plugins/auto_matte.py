@@ -1,10 +1,10 @@
-"""Segmentation without strokes: what a portrait usually looks like gives the seeds.
+"""Segmentation without strokes: seeds from the usual composition of a portrait.
 
 The picture's upper border shows the backdrop, its middle the subject; skin is smooth, bright and of
 skin's hue; hair lies along the upper outline of the subject and is not skin; clothes are at the
-bottom and unlike the hair. From these seeds the labelling goes on as from a user's strokes
-(`hairkit.imaging.seeded_segmentation`, after Rother et al. 2004). No model file is needed; a beard
-between cheeks and neck counts as face. Landmarks, where a view has them, mark the face for certain.
+bottom and unlike the hair. These seeds are then used like a user's strokes
+(`hairkit.imaging.seeded_segmentation`, after Rother et al. 2004). No model file is needed. A beard
+between cheeks and neck counts as face. Landmarks, where a view has them, mark the face.
 """
 
 from __future__ import annotations
@@ -29,14 +29,60 @@ from hairkit.options import option
 from hairkit.types.capture import View
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 
+_SUBJECT_COLUMNS, _SUBJECT_TOP = (0.42, 0.58), 0.4
+"""Shares of the picture's width and height: the subject fills these columns below this row."""
+
 _SKIN_HUE_DEG = (15.0, 80.0)
+"""Hue of skin in Lab, degrees from +a (red) to +b (yellow)."""
+
 _SKIN_CHROMA, _SKIN_BRIGHTER = 9.0, 22.0
+"""Least chroma of skin in Lab, and by how much its L is above the darkest tenth of the subject."""
+
+_DARKEST = 0.1
+"""Share of the subject's pixels that are its darkest."""
+
 _SMALLEST_SKIN = 0.005
-_UNLIKE_HAIR = 4.0
+"""Share of the picture below which a patch of skin's colour is none."""
+
+_UNLIKE_HAIR, _COLOUR_NOISE = 4.0, 2.0
+"""Mahalanobis distance in deviations at which colours are not those of the hair, and a deviation in
+Lab that is added to the hair's own."""
+
+_CLOTHES_TOP = 0.93
+"""Share of the picture's height below which the subject may be clothes."""
+
+_HAIR_BOTTOM, _CHEEKS_TOP = 0.35, 0.45
+"""Shares of the way from the subject's top to the picture's bottom: the outline above the first is
+hair, skin below the second is cheeks or neck."""
+
+_CHEEK_COLUMNS = (0.25, 0.75)
+"""Quantiles of the cheeks' columns between which all that skin encloses is face."""
+
+_EYE_HEIGHT = 16
+"""Eyes and mouth are lower than the picture by more than this factor."""
+
 _FIRST_INNER_LANDMARK = 27
+"""First of the iBUG landmarks that are not jaw or brows: nose, eyes and mouth."""
+
 _FEWEST = 30
+"""Pixels of the reduced picture below which hair is not found, or its colours not measured."""
+
 _SPECK = 1e-4
+"""Share of the picture up to which parts of the hair that hold no seed are kept."""
+
+_BRIDGED = 200
+"""Parts of the hair this fraction of the picture's height from a common pixel are one part."""
+
 _NOTICEABLE = 3.0
+"""Distance in Lab from which two colours look different; a just noticeable one is 2.3 (Mahy, Van
+Eycken and Oosterlinck 1994)."""
+
+_EDGE, _SKIN_EDGE, _WITHIN = 5, 7, 7
+"""Edges in reduced pixels of the squares: by which the subject's inside is eroded, that opens skin,
+and by which the subject is eroded before background in it becomes person."""
+
+_SKIN_MARGIN, _BACKDROP_MARGIN = 2, 6
+"""Reduced pixels from skin where hair's seeds begin, and from the subject where the backdrop's."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +106,7 @@ class Options:
 
 @hookimpl
 def segment(view: View, options: Options) -> Mask:
-    """Label a photo from what portraits have in common.
+    """Label a photo from the usual composition of a portrait.
 
     Raises
     ------
@@ -76,7 +122,7 @@ def segment(view: View, options: Options) -> Mask:
             f"no hair found in photo {view.name}; draw strokes on it or give a mask file"
         )
     labels = label_from_seeds(view.image, seeds, subject, settings)
-    within = cv2.erode(subject.astype(np.uint8), np.ones((7, 7)))
+    within = cv2.erode(subject.astype(np.uint8), np.ones((_WITHIN, _WITHIN)))
     within = cv2.resize(within, (view.width, view.height), interpolation=cv2.INTER_NEAREST)
     lost = (within > 0) & (labels == BACKGROUND)
     lost |= _astray(labels == HAIR, seeds == HAIR)
@@ -93,24 +139,24 @@ def _subject(
     sides = round(options.side_height * height)
     seeds[:sides, :strip] = BACKGROUND
     seeds[:sides, -strip:] = BACKGROUND
-    middle = slice(round(0.42 * width), round(0.58 * width))
-    seeds[round(0.4 * height) :, middle] = HAIR
+    middle = slice(*(round(share * width) for share in _SUBJECT_COLUMNS))
+    seeds[round(_SUBJECT_TOP * height) :, middle] = HAIR
     labels = coarse_labels(image, seeds, np.ones(seeds.shape, np.bool_), settings)
     area = (labels == HAIR).astype(np.uint8)
     _, parts, stats, _ = cv2.connectedComponentsWithStats(area)
     largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
-    return _filled(parts == largest)
+    return _fill_holes(parts == largest)
 
 
 def _seeds(view: View, subject: BoolArray, options: Options) -> UInt8Array:
     """Return seeds (h, w) of the three classes from the subject's outline and colours."""
     height, width = subject.shape
     colour, _ = appearance(view.image, width, height)
-    inner = cv2.erode(subject.astype(np.uint8), np.ones((5, 5))) > 0
+    inner = cv2.erode(subject.astype(np.uint8), np.ones((_EDGE, _EDGE))) > 0
     skin = _skin(colour, inner)
-    hair = _upper_rim(subject, options.rim) & inner & ~_grown(skin, 2)
+    hair = _upper_rim(subject, options.rim) & inner & ~_dilate(skin, _SKIN_MARGIN)
     seeds = np.full(subject.shape, UNKNOWN, np.uint8)
-    seeds[~_grown(subject, 6)] = BACKGROUND
+    seeds[~_dilate(subject, _BACKDROP_MARGIN)] = BACKGROUND
     seeds[_clothes(colour, hair, inner)] = PERSON
     if _differ(colour[hair], colour[seeds == BACKGROUND]):
         seeds[hair] = HAIR
@@ -121,7 +167,7 @@ def _seeds(view: View, subject: BoolArray, options: Options) -> UInt8Array:
 
 
 def _differ(hair: Float32Array, backdrop: Float32Array) -> bool:
-    """Tell whether the eye could part hair (N, 3) from backdrop (M, 3), both Lab."""
+    """Return whether hair (N, 3) and backdrop (M, 3), both Lab, look different."""
     if not (len(hair) and len(backdrop)):
         return False
     apart = np.linalg.norm(np.median(hair, axis=0) - np.median(backdrop, axis=0))
@@ -129,26 +175,26 @@ def _differ(hair: Float32Array, backdrop: Float32Array) -> bool:
 
 
 def _skin(colour: Float32Array, inner: BoolArray) -> BoolArray:
-    """Return skin (h, w): of skin's hue, and clearly brighter than the darkest of the head."""
+    """Return skin (h, w): of skin's hue, and much brighter than the darkest of the subject."""
     hue = np.degrees(np.arctan2(colour[..., 2], colour[..., 1]))
     chroma = np.hypot(colour[..., 1], colour[..., 2])
     hued = (hue > _SKIN_HUE_DEG[0]) & (hue < _SKIN_HUE_DEG[1]) & (chroma > _SKIN_CHROMA) & inner
-    darkest = np.quantile(colour[..., 0][inner], 0.1) if inner.any() else 0.0
+    darkest = np.quantile(colour[..., 0][inner], _DARKEST) if inner.any() else 0.0
     skin = (hued & (colour[..., 0] > darkest + _SKIN_BRIGHTER)).astype(np.uint8)
-    opened = np.asarray(cv2.morphologyEx(skin, cv2.MORPH_OPEN, np.ones((7, 7))), np.uint8)
-    _, parts, stats, _ = cv2.connectedComponentsWithStats(opened)
+    opened = cv2.morphologyEx(skin, cv2.MORPH_OPEN, np.ones((_SKIN_EDGE, _SKIN_EDGE)))
+    _, parts, stats, _ = cv2.connectedComponentsWithStats(np.asarray(opened, np.uint8))
     large = stats[:, cv2.CC_STAT_AREA] > _SMALLEST_SKIN * skin.size
-    return np.asarray((opened > 0) & large[parts], np.bool_)
+    return np.asarray((np.asarray(opened) > 0) & large[parts], np.bool_)
 
 
 def _astray(hair: BoolArray, seeds: BoolArray) -> BoolArray:
-    """Return parts of the hair (H, W), specks apart, that hold no seed: brows, glasses, a beard.
+    """Return parts of the hair (H, W) that hold no seed, but for specks: brows, glasses, a beard.
 
     Parts less than a hundredth of the picture's height apart are one.
     """
     height, width = hair.shape
     large = cv2.resize(seeds.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
-    bridged = _grown(hair, height // 200).astype(np.uint8)
+    bridged = _dilate(hair, height // _BRIDGED).astype(np.uint8)
     count, parts, stats, _ = cv2.connectedComponentsWithStats(bridged)
     held = np.bincount(parts[large > 0], minlength=count) > 0
     astray = ~held & (stats[:, cv2.CC_STAT_AREA] > _SPECK * hair.size)
@@ -161,7 +207,7 @@ def _upper_rim(subject: BoolArray, rim: float) -> BoolArray:
     height = subject.shape[0]
     depth = cv2.distanceTransform(subject.astype(np.uint8), cv2.DIST_L2, 3)
     rows = np.flatnonzero(subject.any(axis=1))
-    lowest = rows[0] + 0.35 * (height - rows[0])
+    lowest = rows[0] + _HAIR_BOTTOM * (height - rows[0])
     above = np.arange(height)[:, None] < lowest
     return np.asarray(subject & (depth < rim * height) & above, np.bool_)
 
@@ -169,11 +215,11 @@ def _upper_rim(subject: BoolArray, rim: float) -> BoolArray:
 def _clothes(colour: Float32Array, hair: BoolArray, inner: BoolArray) -> BoolArray:
     """Return the subject's lowest rows where they are unlike the hair (Mahalanobis 1936)."""
     low = inner.copy()
-    low[: round(0.93 * len(low))] = False
+    low[: round(_CLOTHES_TOP * len(low))] = False
     if np.count_nonzero(hair) < _FEWEST:
         return low
     middle = np.median(colour[hair], axis=0)
-    precision = np.linalg.inv(np.cov(colour[hair].T) + 4.0 * np.eye(3))
+    precision = np.linalg.inv(np.cov(colour[hair].T) + _COLOUR_NOISE**2 * np.eye(3))
     offset = colour - middle
     squared = np.einsum("hwa,ab,hwb->hw", offset, precision, offset)
     return np.asarray(low & (squared > _UNLIKE_HAIR**2))
@@ -184,12 +230,12 @@ def _face(skin: BoolArray, subject: BoolArray) -> BoolArray:
     height = len(skin)
     top = int(np.flatnonzero(subject.any(axis=1))[0])
     short = cv2.morphologyEx(
-        skin.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((max(height // 16, 1) | 1, 3))
+        skin.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((max(height // _EYE_HEIGHT, 1) | 1, 3))
     )
-    cheeks = skin & (np.arange(height)[:, None] > top + 0.45 * (height - top))
+    cheeks = skin & (np.arange(height)[:, None] > top + _CHEEKS_TOP * (height - top))
     columns = np.flatnonzero(cheeks.any(axis=0))
     if len(columns):
-        left, right = np.quantile(columns, [0.25, 0.75]).astype(int)
+        left, right = np.quantile(columns, _CHEEK_COLUMNS).astype(int)
         cheeks[:, :left] = cheeks[:, right:] = False
     above = np.maximum.accumulate(cheeks, axis=0)
     below = np.maximum.accumulate(cheeks[::-1], axis=0)[::-1]
@@ -205,14 +251,15 @@ def _inner_face(view: View, landmarks: Float64Array, width: int, height: int) ->
     return canvas > 0
 
 
-def _filled(area: BoolArray) -> BoolArray:
+def _fill_holes(area: BoolArray) -> BoolArray:
     """Return the area without holes."""
     padded = np.pad(~area, 1, constant_values=True).astype(np.uint8)
     cv2.floodFill(padded, None, (0, 0), 2)
     return np.asarray(padded[1:-1, 1:-1] != 2, np.bool_)
 
 
-def _grown(area: BoolArray, radius: int) -> BoolArray:
+def _dilate(area: BoolArray, radius: int) -> BoolArray:
+    """Return the area dilated by a disc of `radius` pixels."""
     size = (2 * radius + 1, 2 * radius + 1)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, size)
     return np.asarray(cv2.dilate(area.astype(np.uint8), disc) > 0)

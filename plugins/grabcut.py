@@ -1,10 +1,10 @@
-"""Segmentation from a user's strokes: GrabCut as in the thesis (4.2), and a layered form of it.
+"""Segmentation from a user's strokes: GrabCut as in the thesis (4.2), or with three classes.
 
-The user draws a rectangle about the hair, lines and convex areas on hair, and lines and convex
+The user draws a rectangle around the hair, lines and convex areas on hair, and lines and convex
 areas on anything else (Rother, Kolmogorov and Blake, "GrabCut", SIGGRAPH 2004, with the tools of
-the thesis). `layered` learns hair, person and background apart, from colour and texture, at
-reduced size, and settles the edges at full size; `opencv` is OpenCV's two-class GrabCut, as the
-thesis ran it.
+the thesis). `layered` learns hair, person and background separately, from colour and texture, at
+reduced size, and refines the edges at full size; `opencv` is OpenCV's two-class GrabCut, which the
+thesis used.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from hairkit.arrays import BoolArray, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
+from hairkit.imaging.masked_filters import picture_scale
 from hairkit.imaging.seeded_segmentation import (
     UNKNOWN,
     LabelSettings,
@@ -29,6 +30,19 @@ from hairkit.types.capture import View
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 
 _GAMMA = {"as_is": 1.0, "brighter": 0.7, "much_brighter": 0.5, "darker": 1.4}
+"""Exponent of the brightness in [0, 1] for each preset."""
+
+_RECTANGLE_MARGIN = 2
+"""Reduced pixels by which the hair may be outside the rectangle; a hand draws no better."""
+
+_SIDE_STRIP = 2
+"""Reduced pixels at the picture's sides that are backdrop where the rectangle ends before them."""
+
+_OUTSIDE = 0.5
+"""Share of a background stroke outside the rectangle that makes it a stroke on the backdrop."""
+
+_ASPECT_TOLERANCE = 2
+"""Pixels by which photo and drawn-on picture may differ in height for their width: rounding."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +63,13 @@ class Options:
     brightness: str = option(
         "as_is", choices=tuple(_GAMMA), doc="Preset applied to the photo before segmentation."
     )
-    iterations: int = option(2, low=1, high=20, doc="How often the colour models are learnt.")
+    iterations: int = option(2, low=1, high=20, doc="Times that the colour models are learnt.")
     seed: int = option(1, low=0, high=2**31 - 1, doc="Seed of the colour clustering.")
 
 
 @hookimpl
 def segment(view: View, options: Options) -> Mask | None:
-    """Label the photo from its strokes; None when it has none, so that another plugin may try."""
+    """Label the photo from its strokes; None when it has none, so that the next plugin is asked."""
     if view.strokes_path is None:
         return None
     width, height = reduced_size(view.width, view.height, options.reduced_height)
@@ -66,7 +80,7 @@ def segment(view: View, options: Options) -> Mask | None:
             f"{view.strokes_path}: no foreground stroke, draw at least one on the hair"
         )
     image = brightened(view.image, options.brightness)
-    thickness = options.thickness * height / 1080
+    thickness = options.thickness * picture_scale(height)
     allowed = _inside(strokes, width, height)
     if options.model == "opencv":
         hair = _opencv_grabcut(image, strokes, allowed, thickness, options)
@@ -85,8 +99,8 @@ def segment(view: View, options: Options) -> Mask | None:
 def seed_image(strokes: Strokes, width: int, height: int, thickness: float) -> UInt8Array:
     """Return the (height, width) labels that the strokes make certain, `UNKNOWN` elsewhere.
 
-    A background stroke lies on the person or on the backdrop; which, `_is_backdrop` tells. The
-    rows above the rectangle and the picture's sides beside its upper half are backdrop too.
+    A background stroke is on the person or on the backdrop (`_is_backdrop`). The rows above the
+    rectangle and the picture's sides beside its upper half are backdrop too.
     """
     seeds = np.full((height, width), UNKNOWN, np.uint8)
     if strokes.rectangle is not None:
@@ -105,16 +119,17 @@ def seed_image(strokes: Strokes, width: int, height: int, thickness: float) -> U
 def _mark_backdrop(seeds: UInt8Array, rectangle: Float64Array) -> None:
     (left, top), (right, bottom) = rectangle
     width = seeds.shape[1]
-    seeds[: max(int(top) - 2, 0)] = BACKGROUND
+    seeds[: max(int(top) - _RECTANGLE_MARGIN, 0)] = BACKGROUND
     upper = slice(0, max(int((top + bottom) / 2), 0))
-    if left > 4:
-        seeds[upper, :2] = BACKGROUND
-    if right < width - 4:
-        seeds[upper, -2:] = BACKGROUND
+    room = _RECTANGLE_MARGIN + _SIDE_STRIP
+    if left > room:
+        seeds[upper, :_SIDE_STRIP] = BACKGROUND
+    if right < width - room:
+        seeds[upper, -_SIDE_STRIP:] = BACKGROUND
 
 
 def _is_backdrop(stroke: Stroke, strokes: Strokes, hair_top: float) -> bool:
-    """Tell whether a background stroke lies on the backdrop: it passes above or beside the hair."""
+    """Return whether a background stroke is on the backdrop: it passes above or beside the hair."""
     points = stroke.sampled()
     if points[:, 1].min() < hair_top:
         return True
@@ -122,12 +137,13 @@ def _is_backdrop(stroke: Stroke, strokes: Strokes, hair_top: float) -> bool:
         return False
     (left, top), (right, bottom) = strokes.rectangle
     outside = (points[:, 0] < left) | (points[:, 0] > right) | (points[:, 1] < top)
-    return bool(outside.mean() > 0.5 and points[:, 1].min() < (top + bottom) / 2)
+    return bool(outside.mean() > _OUTSIDE and points[:, 1].min() < (top + bottom) / 2)
 
 
 def _on_reduced(strokes: Strokes, view: View, width: int, height: int) -> Strokes:
     drawn_on = strokes.size or view.photo_size
-    if abs(drawn_on[0] * view.height - drawn_on[1] * view.width) > 2 * max(view.width, view.height):
+    difference = abs(drawn_on[0] * view.height - drawn_on[1] * view.width)
+    if difference > _ASPECT_TOLERANCE * max(view.width, view.height):
         raise InputError(
             f"{view.strokes_path}: drawn on a photo of {drawn_on[0]} x {drawn_on[1]} pixels, "
             f"expected {view.photo_size[0]} x {view.photo_size[1]}; draw on this photo"
@@ -136,13 +152,15 @@ def _on_reduced(strokes: Strokes, view: View, width: int, height: int) -> Stroke
 
 
 def _inside(strokes: Strokes, width: int, height: int) -> BoolArray:
-    """Return where hair may be: in the rectangle, just about it, and under foreground strokes."""
+    """Return where hair may be: in the rectangle and its margin, and under foreground strokes."""
     allowed = np.ones((height, width), np.bool_)
     if strokes.rectangle is not None:
         (left, top), (right, bottom) = strokes.rectangle
         rows, columns = np.arange(height), np.arange(width)
+        margin = _RECTANGLE_MARGIN
         allowed = np.logical_and.outer(
-            (rows >= top - 2) & (rows < bottom + 2), (columns >= left - 2) & (columns < right + 2)
+            (rows >= top - margin) & (rows < bottom + margin),
+            (columns >= left - margin) & (columns < right + margin),
         )
     for stroke in strokes.labelled("foreground"):
         allowed |= rasterise(stroke, width, height, 1.0)
@@ -150,7 +168,7 @@ def _inside(strokes: Strokes, width: int, height: int) -> BoolArray:
 
 
 def brightened(image: UInt8Array, preset: str) -> UInt8Array:
-    """Return the photo under one of the presets, which bend the scale between black and white."""
+    """Return the photo with the gamma curve of one of the presets applied."""
     if preset == "as_is":
         return image
     table = np.round(255 * (np.arange(256) / 255) ** _GAMMA[preset]).astype(np.uint8)
@@ -168,7 +186,7 @@ def _opencv_grabcut(
         mask[rasterise(stroke, width, height, thickness)] = sure
     small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
     hair_model, rest_model = np.zeros((1, 65)), np.zeros((1, 65))
-    everywhere = (0, 0, width, height)  # not read in this mode
+    everywhere = (0, 0, width, height)  # ignored in this mode
     cv2.setRNGSeed(options.seed)  # OpenCV's clustering is random otherwise
     rounds = options.iterations
     cv2.grabCut(small, mask, everywhere, rest_model, hair_model, rounds, cv2.GC_INIT_WITH_MASK)

@@ -1,4 +1,4 @@
-"""Settle the edges of a coarse labelling at full size: pixels there mix the colours beside them.
+"""Refine the edges of a coarse labelling at full size, where pixels mix the colours on both sides.
 
 Near an edge a pixel's colour C is explained as a H + (1 - a) B, with H and B the means of the sure
 hair and the sure background (or person) nearby; a is the share of hair (the alpha of Porter and
@@ -15,25 +15,46 @@ from hairkit.imaging.masked_filters import blur, picture_scale
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 _SIGMAS = (4.0, 12.0, 36.0)
+"""Gaussians in reduced pixels of the local means; wider ones count where narrower have nothing."""
+
+_CELL_OF_SIGMA = 4
+"""Wide Gaussians are computed on cells of a quarter of their sigma."""
+
 _FADE = 0.02
+"""Weight of a Gaussian against the next narrower one."""
+
+_NO_WEIGHT = 1e-9
+"""Weight of all Gaussians below which a pixel has no sure pixel nearby."""
+
 _NOISE = 30.0
+"""Squared distance in Lab from the line between two means that costs one unit: 5.5 in Lab."""
+
 _PER_PIXEL = 0.15
+"""Cost of a class for each reduced pixel of distance from its nearest sure pixel."""
+
+_SURE_MARGIN, _THIN_PERSON = 7, 9
+"""Edges in reduced pixels of the discs that a sure pixel's label has to fill, and that opens the
+person's label, so that strips of it between hair and background are unsure."""
+
+_LEAST_BLUR = 0.3
+"""Least Gaussian in pixels of the full picture under which colours are compared."""
+
 HAIR_OVER_BACKGROUND, HAIR_OVER_PERSON = 0.3, 0.6
-"""Share of hair from which on a pixel is hair. A wisp before a far backdrop is lit from behind and
-looks thinner than it is; hair on skin throws a shadow and looks thicker."""
+"""Least share of hair in a hair pixel. Light from behind makes a wisp before a backdrop look
+thinner than it is; the shadow of hair on skin makes it look thicker."""
 
 
 def refine_labels(
     image: UInt8Array, labels: UInt8Array, seeds: UInt8Array, hair_allowed: BoolArray
 ) -> UInt8Array:
-    """Return labels (H, W) for the full picture from those of a reduced one.
+    """Return labels (H, W) of the full picture from those of a reduced one.
 
     Parameters
     ----------
     image : (H, W, 3)
         RGB.
     labels : (h, w)
-        255, 128 and 0, right but for a few pixels at the edges.
+        255, 128 and 0, correct but for a few pixels at the edges.
     seeds : (h, w)
         Labels that are certain; other values elsewhere.
     hair_allowed : (h, w)
@@ -41,7 +62,7 @@ def refine_labels(
     """
     height, width = image.shape[:2]
     lab = cv2.cvtColor(image.astype(np.float32) / np.float32(255), cv2.COLOR_RGB2Lab)
-    lab = blur(np.asarray(lab, np.float32), max(picture_scale(height), 0.3))
+    lab = blur(np.asarray(lab, np.float32), max(picture_scale(height), _LEAST_BLUR))
     small = np.asarray(
         cv2.resize(lab, labels.shape[::-1], interpolation=cv2.INTER_AREA), np.float32
     )
@@ -64,9 +85,9 @@ def refine_labels(
 
 
 def _sure(labels: UInt8Array, seeds: UInt8Array) -> dict[int, BoolArray]:
-    """Return for each label the (h, w) pixels off any edge; thin bits of person are unsure."""
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7))
-    wide = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
+    """Return for each label the (h, w) pixels off any edge; thin strips of person are unsure."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_SURE_MARGIN, _SURE_MARGIN))
+    wide = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_THIN_PERSON, _THIN_PERSON))
     sure = {}
     for label in (HAIR, PERSON, BACKGROUND):
         area = (labels == label).astype(np.uint8)
@@ -79,7 +100,7 @@ def _sure(labels: UInt8Array, seeds: UInt8Array) -> dict[int, BoolArray]:
 def _explained(
     colour: Float32Array, mean: dict[int, Float32Array], away: dict[int, Float32Array]
 ) -> UInt8Array:
-    """Return the label (N,) of pixels of `colour` (N, 3) that mix hair with the likelier other."""
+    """Return the label (N,) of pixels of `colour` (N, 3), mixed of hair and the likelier other."""
     best = np.full(len(colour), np.inf, np.float32)
     result = np.full(len(colour), HAIR, np.uint8)
     limits = {PERSON: HAIR_OVER_PERSON, BACKGROUND: HAIR_OVER_BACKGROUND}
@@ -99,21 +120,21 @@ def _explained(
 
 
 def _local_mean(values: Float32Array, core: BoolArray) -> Float32Array:
-    """Return (h, w, 3) the mean over the core nearby; wider windows fill in where none is near."""
+    """Return (h, w, 3) the mean over the nearby core; wider windows count where none is near."""
     height, width = core.shape
     weight = core.astype(np.float32)
     total = np.zeros(values.shape, np.float32)
     share = np.zeros_like(weight)
     for index, sigma in enumerate(_SIGMAS):
-        step = int(sigma // 4)
+        step = int(sigma // _CELL_OF_SIGMA)
         size = (max(width // step, 1), max(height // step, 1))
         stack = np.dstack([values * weight[..., None], weight])
         coarse = cv2.resize(stack, size, interpolation=cv2.INTER_AREA)
         blurred = cv2.resize(blur(np.asarray(coarse, np.float32), sigma / step), (width, height))
         total += _FADE**index * blurred[..., :3]
         share += _FADE**index * blurred[..., 3]
-    lost = share < 1e-9
-    mean = np.asarray(total / np.maximum(share, 1e-9)[..., None], np.float32)
+    lost = share < _NO_WEIGHT
+    mean = np.asarray(total / np.maximum(share, _NO_WEIGHT)[..., None], np.float32)
     mean[lost] = values[core].mean(axis=0)
     return mean
 

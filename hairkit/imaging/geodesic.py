@@ -1,26 +1,31 @@
-"""Distance from seeds that counts edges crossed: near is what no contour parts (Criminisi 2008)."""
+"""Geodesic distance from seeds on an image, in which crossing a contour is expensive.
+
+A path costs its length and the contrast along it (Criminisi, Sharp and Blake, "GeoS: geodesic image
+segmentation", 2008).
+"""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.parallel import compiled
 
 FAR = np.float32(1e6)
 """Distance of pixels that no seed reaches."""
 
 _STEPS = ((0, -1), (-1, -1), (-1, 0), (-1, 1))
+"""(rows, columns) to the neighbours left, up left, up and up right, in the order of the costs."""
 
 
 def edge_costs(colour: Float32Array, per_pixel: float, per_contrast: float) -> Float32Array:
-    """Return what a step from each pixel to four of its neighbours costs, (H, W, 4).
+    """Return the cost of a step from each pixel to four of its neighbours, (H, W, 4).
 
-    The neighbours are those to the left, up left, up and up right; the other four are the same
-    steps seen from the other end. A step costs `per_pixel` times its length plus `per_contrast`
-    times the distance of the two colours (H, W, C). Steps that leave the picture cost `FAR`.
+    The neighbours are those of `_STEPS`; the other four steps are the same ones backwards. A step
+    costs `per_pixel` times its length plus `per_contrast` times the distance of the two colours
+    (H, W, C). Steps that leave the picture cost `FAR`.
     """
     height, width = colour.shape[:2]
     costs = np.full((height, width, 4), FAR, np.float32)
@@ -37,8 +42,8 @@ def edge_costs(colour: Float32Array, per_pixel: float, per_contrast: float) -> F
 def seed_distance(costs: Float32Array, seeds: BoolArray, sweeps: int = 4) -> Float32Array:
     """Return the (H, W) cost of the cheapest path from each pixel to any seed.
 
-    Raster sweeps to and fro (Toivanen 1996): every sweep lets paths turn once more, so that few are
-    enough for pictures; `seed_distance_exact` is what they converge to.
+    Raster sweeps down and up (Toivanen 1996): every sweep lets paths turn once more, so a few are
+    enough on photos; they converge to `seed_distance_exact`.
 
     Parameters
     ----------
@@ -49,12 +54,16 @@ def seed_distance(costs: Float32Array, seeds: BoolArray, sweeps: int = 4) -> Flo
         Pairs of sweeps, each once down and once up; stops early when nothing changes.
     """
     distance = np.where(seeds, np.float32(0), FAR)
-    _sweep(np.ascontiguousarray(costs), distance, sweeps)
+    costs = np.ascontiguousarray(costs)
+    for _ in range(sweeps):
+        down = _sweep(costs, distance, True)
+        if not _sweep(costs, distance, False) and not down:
+            break
     return distance
 
 
 def seed_distance_exact(costs: Float32Array, seeds: BoolArray) -> Float64Array:
-    """Return what `seed_distance` tends to, by Dijkstra's algorithm: its slow and readable twin."""
+    """Return the limit of `seed_distance` by Dijkstra's algorithm: the readable reference."""
     height, width = seeds.shape
     number = np.arange(height * width).reshape(height, width)
     rows, columns, values = [], [], []
@@ -73,32 +82,26 @@ def seed_distance_exact(costs: Float32Array, seeds: BoolArray) -> Float64Array:
     return result
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
-def _sweep(costs, distance, sweeps):  # type: ignore[no-untyped-def]
+@compiled
+def _sweep(costs: Float32Array, distance: Float32Array, down: bool) -> bool:
+    """Lower each distance (H, W) by paths through four neighbours; return whether any changed.
+
+    Downwards the neighbours are those of `_STEPS`, upwards the opposite four.
+    """
     height, width = distance.shape
-    for _ in range(sweeps):
-        changed = False
-        for y in range(height):
-            for x in range(width):
-                best = distance[y, x]
-                for k in range(4):
-                    ny = y if k == 0 else y - 1
-                    nx = x + 1 if k == 3 else (x if k == 2 else x - 1)
-                    if ny >= 0 and 0 <= nx < width:
-                        best = min(best, distance[ny, nx] + costs[y, x, k])
-                if best < distance[y, x]:
-                    distance[y, x] = best
-                    changed = True
-        for y in range(height - 1, -1, -1):
-            for x in range(width - 1, -1, -1):
-                best = distance[y, x]
-                for k in range(4):
-                    ny = y if k == 0 else y + 1
-                    nx = x - 1 if k == 3 else (x if k == 2 else x + 1)
-                    if ny < height and 0 <= nx < width:
-                        best = min(best, distance[ny, nx] + costs[ny, nx, k])
-                if best < distance[y, x]:
-                    distance[y, x] = best
-                    changed = True
-        if not changed:
-            break
+    changed = False
+    for row in range(height):
+        y = row if down else height - 1 - row
+        for column in range(width):
+            x = column if down else width - 1 - column
+            best = distance[y, x]
+            for k in range(len(_STEPS)):
+                dy, dx = _STEPS[k]
+                ny, nx = (y + dy, x + dx) if down else (y - dy, x - dx)
+                if 0 <= ny < height and 0 <= nx < width:
+                    cost = costs[y, x, k] if down else costs[ny, nx, k]
+                    best = min(best, distance[ny, nx] + cost)
+            if best < distance[y, x]:
+                distance[y, x] = best
+                changed = True
+    return changed

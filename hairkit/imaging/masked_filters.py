@@ -1,8 +1,8 @@
-"""Filters that respect a mask, and averages of undirected angles: the ground under every orienter.
+"""Filters that respect a mask, and averages of undirected angles, shared by the orienters.
 
-An undirected angle t is averaged as the vector (cos 2t, sin 2t), so that 179 and 1 degree meet at 0
-and not at 90. Values beyond a mask count for nothing: sums run over the mask and are divided by how
-much of the kernel lies on it (normalised convolution, Knutsson and Westin 1993).
+An undirected angle t is averaged as the vector (cos 2t, sin 2t), so that the mean of 179 and 1
+degree is 0 and not 90. Values outside a mask are ignored: sums run over the mask and are divided by
+the share of the kernel on it (normalised convolution, Knutsson and Westin 1993).
 """
 
 from __future__ import annotations
@@ -20,24 +20,44 @@ from hairkit.types.mask import Mask
 from hairkit.types.orientation import wrap_angle
 
 REFERENCE_HEIGHT = 1080
-"""Lengths in pixels given to the orienters are for pictures of this height."""
+"""Rows of the picture that options in pixels refer to; `picture_scale` converts them."""
 
 _LOG_FLOOR = 0.15
 """Added to brightness before its logarithm, as a share of the mean: keeps noise in shadows low."""
 
 _LEAST_CONTRAST = 0.25
-"""Local deviation, as a share of the typical one, below which contrast is not raised further."""
+"""Local deviation, as a share of the mean one, below which contrast is not amplified further."""
+
+_MOST_CONTRAST = 3.0
+"""Local deviations at which contrast is clipped, so that highlights do not dominate."""
+
+_GREY_LEVEL = 1 / 255
+"""One step of an 8-bit image."""
+
+_NO_WEIGHT = 1e-6
+"""Share of a kernel on the mask below which its mean is rounding noise, and taken as 0."""
+
+_FILL_WEIGHT = 1e-3
+"""Share of a kernel on the mask from which its mean fills a pixel outside the mask."""
+
+_FILL_PASSES = 2
+"""Kernels, each twice as wide as the last, that fill the outside of a mask."""
 
 _WIDE_SIGMA = 4.0
+"""Pixels; Gaussians wider than this are computed at half the size."""
+
 _HALVING_VARIANCE = 1.0
 """Square pixels that averaging 2 x 2 pixels and interpolating back add to a Gaussian."""
 
 COHERENT_WINDOW = 9
+"""Edge in pixels of the box in which a true orientation has to be coherent to be scored."""
+
 COHERENT_RESULTANT = 0.85
+"""Least mean resultant of the double angles in that box."""
 
 
 def picture_scale(height: int) -> float:
-    """Return what a length in pixels of a picture `REFERENCE_HEIGHT` high is multiplied with.
+    """Return the scale from pixels at `REFERENCE_HEIGHT` to those of a picture `height` high.
 
     >>> picture_scale(540)
     0.5
@@ -68,8 +88,8 @@ def luminance(image: UInt8Array) -> Float32Array:
 def blur(values: Float32Array, sigma: float) -> Float32Array:
     """Return `values` (H, W) or (H, W, C) under a Gaussian of `sigma` pixels.
 
-    The picture is mirrored at its border. Wide Gaussians (above `_WIDE_SIGMA`) are taken on a grid
-    half as fine, several times as fast and right to about one percent of the range.
+    The picture is mirrored at its border. Gaussians above `_WIDE_SIGMA` are computed at half the
+    size, which is several times as fast and correct to about one percent of the range.
     """
     height, width = values.shape[:2]
     if sigma <= _WIDE_SIGMA or min(height, width) < 2:
@@ -103,7 +123,7 @@ def masked_blur(
     """
     weight = np.asarray(weight, np.float32)
     total = blur(weight, sigma)
-    inverse = np.divide(1, total, out=np.zeros_like(total), where=total > 1e-6)
+    inverse = np.divide(1, total, out=np.zeros_like(total), where=total > _NO_WEIGHT)
     if values.ndim == 3:
         return blur(values * weight[..., None], sigma) * inverse[..., None]
     return blur(values * weight, sigma) * inverse
@@ -126,7 +146,7 @@ def bounding_box(mask: BoolArray, margin: int) -> tuple[slice, slice]:
 def well_inside(mask: BoolArray, sigma: float, share: float = 0.9) -> BoolArray:
     """Return the part of `mask` whose surroundings (Gaussian `sigma`) lie on it by `share` or more.
 
-    A mask too thin to have such a part comes back whole.
+    A mask that is too thin to have such a part is returned whole.
     """
     if sigma <= 0:
         return mask
@@ -135,40 +155,40 @@ def well_inside(mask: BoolArray, sigma: float, share: float = 0.9) -> BoolArray:
 
 
 def local_contrast(grey: Float32Array, weight: Float32Array, sigma: float) -> Float32Array:
-    """Return brightness freed of shading: log, minus its local mean, over its local deviation.
+    """Return log brightness minus its local mean, divided by its local deviation.
 
-    Means are taken by normalised convolution with a Gaussian of `sigma` pixels, so what lies beyond
-    the weight, and the step at its edge, leave no trace. A change of exposure changes nothing.
+    Means are normalised convolutions with a Gaussian of `sigma` pixels, so pixels without weight,
+    and the step at the mask's edge, have no effect. A change of exposure changes nothing.
 
     Parameters
     ----------
     grey, weight : (H, W)
-        Linear or gamma-coded brightness in [0, 1]; 1 where it counts and 0 elsewhere.
+        Linear or gamma-coded brightness in [0, 1]; 1 on the mask and 0 elsewhere.
     sigma : float
         In pixels.
 
     Returns
     -------
     (H, W) float32
-        About unit deviation and at most 3; 0 beyond the weight and where brightness is constant.
+        About unit deviation and at most 3; 0 outside the mask and where brightness is constant.
     """
     inside = weight > 0
     mean = float(grey[inside].mean(dtype=np.float64))
-    floor = _LOG_FLOOR * max(mean, 1 / 255)
+    floor = _LOG_FLOOR * max(mean, _GREY_LEVEL)
     logarithm = np.log(grey + floor)
     detail = (logarithm - masked_blur(logarithm, weight, sigma)) * weight
     variance = masked_blur(detail * detail, weight, sigma)
     typical = float(variance[inside].mean(dtype=np.float64))
-    least = max(_LEAST_CONTRAST**2 * typical, (0.5 / 255 / (mean + floor)) ** 2)
+    least = max(_LEAST_CONTRAST**2 * typical, (0.5 * _GREY_LEVEL / (mean + floor)) ** 2)
     scaled = detail / np.sqrt(np.maximum(variance, least))
-    return np.asarray(np.clip(scaled, -3, 3), np.float32)
+    return np.asarray(np.clip(scaled, -_MOST_CONTRAST, _MOST_CONTRAST), np.float32)
 
 
 def fill_beyond(values: Float32Array, mask: BoolArray, sigma: float) -> Float32Array:
-    """Return `values` with everything beyond `mask` replaced by means of the nearest masked values.
+    """Return `values` with pixels outside `mask` replaced by means of the nearest inside.
 
-    The means come from normalised convolution with ever wider kernels (`sigma`, then double),
-    so the fill meets the mask's edge without a step and fades to the mean of the mask.
+    The means are normalised convolutions with wider and wider kernels (`sigma`, then double), so
+    the fill has no step at the mask's edge and fades to the mean of the mask.
 
     Raises `InputError` when the mask is empty or of another shape.
     """
@@ -179,16 +199,16 @@ def fill_beyond(values: Float32Array, mask: BoolArray, sigma: float) -> Float32A
         )
     filled = np.where(mask, values, values[mask].mean(dtype=np.float64)).astype(np.float32)
     reach, open_pixels = sigma, ~mask
-    for _ in range(2):
+    for _ in range(_FILL_PASSES):
         weight = blur(mask.astype(np.float32), reach)
-        near = open_pixels & (weight > 1e-3)
+        near = open_pixels & (weight > _FILL_WEIGHT)
         filled[near] = masked_blur(values, mask, reach)[near]
         open_pixels, reach = open_pixels & ~near, 2 * reach
     return filled
 
 
 def double_angle(angle: npt.ArrayLike, weight: npt.ArrayLike = 1.0) -> Float32Array:
-    """Return `weight * (cos 2 angle, sin 2 angle)` as (..., 2) float32: angles fit for adding."""
+    """Return `weight * (cos 2 angle, sin 2 angle)` as (..., 2) float32, which can be averaged."""
     twice = 2 * np.asarray(angle, np.float32)
     vectors = np.stack([np.cos(twice), np.sin(twice)], axis=-1)
     return np.asarray(vectors * np.asarray(weight, np.float32)[..., None], np.float32)
@@ -211,7 +231,7 @@ def smooth_angles(
     Parameters
     ----------
     angle, weight : (H, W)
-        Angles in radians and what each counts for; 0 beyond the mask.
+        Angles in radians and their weights; 0 outside the mask.
     sigma : float
         Of the Gaussian, in pixels.
 
@@ -233,8 +253,8 @@ def coherent_truth(
     """Return where a true orientation is coherent enough to be scored against.
 
     A pixel is coherent when the double-angle vectors of the known pixels in the box of edge
-    `window` around it have a mean of length at least `resultant`: crossing strands have no single
-    orientation that an orienter could be asked for.
+    `window` around it have a mean of length at least `resultant`: where strands cross there is no
+    single orientation to compare with.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
 """Label a photo from seeds: hair, the rest of the person, background.
 
-The road is that of GrabCut (Rother, Kolmogorov and Blake 2004): a colour mixture for each class,
-learnt from the seeds, labels every pixel, and is learnt anew from the labels. Three things differ.
-There are three classes, because skin and clothes are unlike a backdrop. The mixtures see texture
-beside colour. And regions hold together by the distance from the seeds that counts edges
-crossed (`hairkit.imaging.geodesic`) instead of a cut through the graph, which trims thin hair away.
+The method follows GrabCut (Rother, Kolmogorov and Blake 2004): a colour mixture for each class is
+learnt from the seeds, labels every pixel, and is learnt again from the labels. Three things differ.
+There are three classes, because skin and clothes are unlike a backdrop. The mixtures use texture as
+well as colour. And the geodesic distance from the seeds (`hairkit.imaging.geodesic`) keeps regions
+connected instead of a graph cut, which trims thin hair away.
 """
 
 from __future__ import annotations
@@ -25,29 +25,59 @@ UNKNOWN = 64
 """Value of seed images where nothing is known."""
 
 _SAMPLES = 1500
+"""Pixels at most from which a class's mixture is learnt; k-means takes time linear in them."""
+
 _MIN_CLUSTER = 10
+"""Pixels of the smallest cluster that becomes a component."""
+
 _RIDGE = 0.05
+"""Added to a component's variances, as a share of each feature's variance in the picture."""
+
+_KMEANS_ROUNDS, _KMEANS_STILL = 10, 0.1
+"""Iterations of k-means at most, and the move of the centres (deviations) at which it ends."""
+
+_COST_PER_PIXEL, _COST_PER_CONTRAST = 0.02, 0.25
+"""Geodesic cost of one pixel's step, and of a difference of one in Lab along it."""
+
+_DENOISE_SIGMA = 1.0
+"""Gaussian in pixels before contrasts are measured, and after probabilities are."""
+
+_SMOOTH_SIGMA = 2.0
+"""Gaussian in pixels of the mean colour and of the deviation of lightness."""
+
+_DETAIL_SIGMA, _DETAIL_GAIN = 1.5, 4.0
+"""Gaussian in pixels that fine detail is measured against, and by which it is then averaged; gain
+of the detail before its logarithm, which brings hair's few grey levels to about the range of the
+other features."""
+
+_LEAST_DEVIATION = 1e-3
+"""Added to a feature's deviation, so that a feature that is constant in the picture counts as 0."""
+
+_CERTAIN, _CERTAIN_WINDOW = 0.95, 5
+"""Least probability of pixels from which the mixtures are learnt again, and the edge in pixels of
+the square that has to have one label around them."""
 
 
 @dataclass(frozen=True)
 class LabelSettings:
-    """How `label_from_seeds` weighs its evidence; lengths are pixels of the reduced picture."""
+    """Weights of the evidence in `label_from_seeds`."""
 
     rounds: int = 2
-    """How often the mixtures are learnt."""
+    """Times that the mixtures are learnt."""
     components: int = 12
-    """Normal distributions in the mixture of each class."""
+    """Normal distributions at most in the mixture of each class."""
     distance_weight: float = 1.0
-    """Log-likelihood that one unit of distance from the seeds takes away."""
+    """Log-likelihood lost for each unit of geodesic distance from the seeds."""
     distance_cap: float = 10.0
-    """Distances beyond this count no more."""
+    """Geodesic distance at which that loss ends."""
     evidence_cap: float = 6.0
-    """No pixel speaks louder than this against a class."""
+    """Largest difference in log-likelihood that one pixel's appearance makes between classes."""
     seed: int = 1
+    """Seed of the clustering."""
 
 
 def reduced_size(width: int, height: int, reduced_height: int) -> tuple[int, int]:
-    """Return (width, height) of a picture brought to at most `reduced_height` rows."""
+    """Return (width, height) of a picture scaled down to at most `reduced_height` rows."""
     rows = min(height, reduced_height)
     return max(round(width * rows / height), 1), rows
 
@@ -66,7 +96,7 @@ def label_from_seeds(
         RGB.
     seeds : (h, w)
         Of the reduced picture: 255, 128 or 0 where the label is certain, `UNKNOWN` elsewhere. A
-        class without seeds takes no part.
+        class without seeds is not used.
     hair_allowed : (h, w)
         False where no hair can be.
     settings : LabelSettings, optional
@@ -90,21 +120,25 @@ def coarse_labels(
     hair_allowed: BoolArray,
     settings: LabelSettings | None = None,
 ) -> UInt8Array:
-    """Return the labels (h, w) of the reduced picture, before edges are settled at full size.
+    """Return the labels (h, w) of the reduced picture, before edges are refined at full size.
 
     Parameters and errors are those of `label_from_seeds`.
     """
     settings = settings or LabelSettings()
     classes = [label for label in (HAIR, PERSON, BACKGROUND) if (seeds == label).any()]
     if HAIR not in classes or len(classes) < 2:
-        raise InputError("seeds need hair and something that is not hair, to tell them apart")
+        missing = "all are hair" if HAIR in classes else "none is hair"
+        raise InputError(
+            f"seeds of {len(classes)} classes, {missing}: mark hair and something that is not hair "
+            "to tell them apart"
+        )
     height, width = seeds.shape
     colour, features = appearance(image, width, height)
-    costs = edge_costs(blur(colour, 1.0), 0.02, 0.25)
+    costs = edge_costs(blur(colour, _DENOISE_SIGMA), _COST_PER_PIXEL, _COST_PER_CONTRAST)
     distance = np.stack([seed_distance(costs, seeds == label) for label in classes], axis=-1)
     prior = -np.float32(settings.distance_weight) * np.minimum(distance, settings.distance_cap)
     flat = features.reshape(height * width, -1)
-    flat = (flat - flat.mean(axis=0)) / (flat.std(axis=0) + np.float32(1e-3))
+    flat = (flat - flat.mean(axis=0)) / (flat.std(axis=0) + np.float32(_LEAST_DEVIATION))
     terms = polynomial_terms(flat)
     known = seeds
     for _ in range(settings.rounds):
@@ -119,19 +153,20 @@ def coarse_labels(
 def appearance(image: UInt8Array, width: int, height: int) -> tuple[Float32Array, Float32Array]:
     """Return the Lab picture (height, width, 3) and colour and texture features (height, width, 8).
 
-    Features: Lab; Lab under a Gaussian of 2 px; the deviation of lightness there; and the
-    fine detail of the full picture, in which hair differs from smooth cloth of its colour.
+    Features: Lab; its local mean; the local deviation of lightness; and the fine detail of the full
+    picture, in which hair differs from smooth cloth of its colour.
     """
     full = cv2.cvtColor(image.astype(np.float32) / np.float32(255), cv2.COLOR_RGB2Lab)
     colour = cv2.resize(full, (width, height), interpolation=cv2.INTER_AREA)
     lightness = np.ascontiguousarray(full[..., 0])
-    detail = cv2.absdiff(lightness, cv2.GaussianBlur(lightness, (0, 0), 1.5))
+    detail = cv2.absdiff(lightness, cv2.GaussianBlur(lightness, (0, 0), _DETAIL_SIGMA))
     detail = cv2.resize(detail, (width, height), interpolation=cv2.INTER_AREA)
-    smooth = cv2.GaussianBlur(colour, (0, 0), 2.0)
-    square = cv2.GaussianBlur(colour[..., 0] ** 2, (0, 0), 2.0)
+    smooth = cv2.GaussianBlur(colour, (0, 0), _SMOOTH_SIGMA)
+    square = cv2.GaussianBlur(colour[..., 0] ** 2, (0, 0), _SMOOTH_SIGMA)
     deviation = np.sqrt(np.maximum(square - smooth[..., 0] ** 2, 0))
-    texture = cv2.GaussianBlur(detail, (0, 0), 1.5)
-    features = np.dstack([colour, smooth, np.log1p(deviation), np.log1p(4 * texture)])
+    texture = cv2.GaussianBlur(detail, (0, 0), _DETAIL_SIGMA)
+    detailed = np.log1p(np.float32(_DETAIL_GAIN) * texture)
+    features = np.dstack([colour, smooth, np.log1p(deviation), detailed])
     return np.asarray(colour, np.float32), features.astype(np.float32)
 
 
@@ -144,8 +179,8 @@ def class_evidence(
 ) -> Float32Array:
     """Return (h, w, K) the log-likelihood of every pixel under the mixture of each class.
 
-    Each mixture is learnt by k-means from the pixels of (h, w) `known` with its label; a pixel is
-    scored by its best component, as GrabCut does.
+    Each mixture is learnt by k-means from the pixels of (h, w) `known` with its label; a pixel's
+    score is that of its best component, as in GrabCut.
 
     Parameters
     ----------
@@ -199,8 +234,15 @@ def _mixture(samples: Float32Array, settings: LabelSettings) -> tuple[Float32Arr
 
 
 def _clusters(samples: Float32Array, count: int, settings: LabelSettings) -> list[Float64Array]:
+    """Return the samples (N, F) in at most `count` clusters of `_MIN_CLUSTER` or more, or in one.
+
+    OpenCV takes a single row for N samples of one feature each, so one cluster is not left to it.
+    """
+    if count == 1:
+        return [samples.astype(np.float64)]
     cv2.setRNGSeed(settings.seed)
-    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 10, 0.1)
+    stop = cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER
+    criteria = (stop, _KMEANS_ROUNDS, _KMEANS_STILL)
     start = np.zeros((len(samples), 1), np.int32)
     _, owner, _ = cv2.kmeans(samples, count, start, criteria, 1, cv2.KMEANS_PP_CENTERS)
     groups = [samples[owner[:, 0] == index].astype(np.float64) for index in range(count)]
@@ -216,7 +258,7 @@ def _probability(
     hair_allowed: BoolArray,
     settings: LabelSettings,
 ) -> Float32Array:
-    """Return (h, w, K) how likely each class is, smoothed a little; certain at the seeds."""
+    """Return (h, w, K) the probability of each class, smoothed; certain at the seeds."""
     allowed = np.ones(evidence.shape, bool)
     allowed[..., classes.index(HAIR)] = hair_allowed
     evidence = np.where(allowed, evidence, -np.inf)
@@ -226,15 +268,15 @@ def _probability(
     probability = (odds / odds.sum(axis=-1, keepdims=True)).astype(np.float32)
     for index, label in enumerate(classes):
         probability[seeds == label] = np.eye(len(classes), dtype=np.float32)[index]
-    return np.asarray(cv2.GaussianBlur(probability, (0, 0), 1.0)).reshape(evidence.shape)
+    return np.asarray(cv2.GaussianBlur(probability, (0, 0), _DENOISE_SIGMA)).reshape(evidence.shape)
 
 
 def _certain(labels: UInt8Array, probability: Float32Array, seeds: UInt8Array) -> UInt8Array:
-    """Return seeds for the next round: what is likely and lies off the edges, and the old seeds."""
+    """Return seeds for the next round: likely pixels off the edges, and the old seeds."""
     known = np.full(labels.shape, UNKNOWN, np.uint8)
+    window = np.ones((_CERTAIN_WINDOW, _CERTAIN_WINDOW))
     for label in np.unique(labels):
-        inner = cv2.erode(
-            ((labels == label) & (probability > 0.95)).astype(np.uint8), np.ones((5, 5))
-        )
+        likely = ((labels == label) & (probability > _CERTAIN)).astype(np.uint8)
+        inner = cv2.erode(likely, window)
         known[inner > 0] = label
     return np.where(seeds != UNKNOWN, seeds, known)

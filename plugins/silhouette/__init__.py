@@ -24,6 +24,7 @@ from hairkit.arrays import Float64Array
 from hairkit.cameras.silhouette_coherence import Outlines, coherence
 from hairkit.cameras.turntable import LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, Turn
 from hairkit.errors import InputError
+from hairkit.imaging.masked_filters import picture_scale
 from hairkit.options import option
 
 from .landmark_equations import (
@@ -37,7 +38,6 @@ from .landmark_equations import (
 )
 from .landmark_transfer import PatchSettings, carry_landmarks
 
-REFERENCE_HEIGHT = 1080
 USUAL_DISTANCE = 0.7
 """Distance of head portraits, metres."""
 SHARED_SPREAD = (0.05, 0.01, 0.01, 0.1, 0.2, 0.1, 0.5, 0.5)
@@ -186,7 +186,7 @@ class _Problem:
     def of(
         cls, capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
     ) -> _Problem:
-        pixel = capture.views[0].height / REFERENCE_HEIGHT
+        pixel = picture_scale(capture.views[0].height)
         turn = Turn.of(capture)
         outlines = Outlines.of(masks, options.contour_points)
         angles = np.radians([options.azimuth, options.elevation, options.roll])

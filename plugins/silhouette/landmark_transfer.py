@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
+from hairkit.imaging.masked_filters import picture_scale
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.head import Head
@@ -57,7 +58,7 @@ def carry_landmarks(
     rows: list[tuple[int, int, float, float, float]] = []
     if head.landmark_vertices is not None and seen:
         normals = head.normals()[head.landmark_vertices]
-        pixel = capture.views[0].height / 1080
+        pixel = picture_scale(capture.views[0].height)
         for index in range(len(cameras)):
             source = max(seen, key=lambda other: _facing(cameras, other, index))
             if index in seen or _facing(cameras, source, index) < 0.5:

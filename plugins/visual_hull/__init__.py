@@ -32,6 +32,7 @@ from hairkit.cameras.projection_kernels import (
 from hairkit.errors import InputError
 from hairkit.head_model.signed_distance import signed_distance
 from hairkit.head_model.torso import Torso
+from hairkit.imaging.masked_filters import picture_scale
 from hairkit.options import option
 
 from .torso_fit import fit_torso
@@ -41,8 +42,6 @@ POOR_CAMERAS = 8.0
 """Misfit in pixels of a picture 1080 high above which one empty vote is forgiven."""
 LYING = 0.04
 """Metres off the body within which hair may lie where a picture's edge cuts it off."""
-REFERENCE_HEIGHT = 1080
-"""Pixel options are stated for pictures this high and scaled to others."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +173,7 @@ def _touched_edges(mask: Mask) -> list[bool]:
 
 def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Array, UInt8Array]:
     """Return the label pictures (H, W) that carve the loose and the dense hull."""
-    scale = mask.labels.shape[0] / REFERENCE_HEIGHT
+    scale = picture_scale(mask.labels.shape[0])
     hair = mask.hair.astype(np.uint8)
     grown = cv2.dilate(hair, _disc(options.slack * scale)) if options.slack else hair
     rest = np.where(mask.person, PERSON, EMPTY).astype(np.uint8)
@@ -263,7 +262,7 @@ def _forgiven(scene: Scene, options: Options) -> int:
     """Return how many empty votes a cell survives: the option, or one if cameras are poor."""
     if options.forgive >= 0:
         return options.forgive
-    limit = POOR_CAMERAS * scene.cameras[0].height / REFERENCE_HEIGHT
+    limit = POOR_CAMERAS * picture_scale(scene.cameras[0].height)
     return int(scene.residual_px is not None and scene.residual_px > limit)
 
 

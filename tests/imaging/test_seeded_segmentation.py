@@ -5,6 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hairkit.errors import InputError
 from hairkit.imaging.alpha_matting import refine_labels
@@ -95,6 +97,45 @@ def test_one_class_is_no_choice(label: int) -> None:
     seeds = np.where(seeds_of(truth) == label, label, UNKNOWN).astype(np.uint8)
     with pytest.raises(InputError, match="tell them apart"):
         coarse_labels(photo, seeds, np.ones(truth.shape, bool))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    random=st.integers(0, 10_000),
+    size=st.tuples(st.integers(1, 24), st.integers(1, 24)),
+    scale=st.integers(1, 3),
+    colours=st.integers(1, 4),
+    share=st.sampled_from([0.0, 0.005, 0.05, 0.5, 1.0]),
+    labels=st.sets(st.sampled_from([HAIR, PERSON, BACKGROUND]), min_size=1),
+    allowed=st.sampled_from([0.0, 0.5, 1.0]),
+)
+def test_any_seeds_give_a_segmentation_or_one_error(
+    random: int,
+    size: tuple[int, int],
+    scale: int,
+    colours: int,
+    share: float,
+    labels: set[int],
+    allowed: float,
+) -> None:
+    """Single seeds, pictures of one colour and pictures all of seeds are labelled.
+
+    An `InputError` is raised when hair, or everything else, has no seed.
+    """
+    rng = np.random.default_rng(random)
+    height, width = size
+    palette = rng.integers(0, 256, (colours, 3), np.uint8)
+    photo = palette[rng.integers(0, colours, (height * scale, width * scale))]
+    label = rng.choice(sorted(labels), size)
+    seeds = np.where(rng.random(size) < share, label, UNKNOWN).astype(np.uint8)
+    hair_allowed = rng.random(size) < allowed
+    if not (seeds == HAIR).any() or not np.isin(seeds, (PERSON, BACKGROUND)).any():
+        with pytest.raises(InputError, match="tell them apart"):
+            label_from_seeds(photo, seeds, hair_allowed)
+        return
+    found = label_from_seeds(photo, seeds, hair_allowed)
+    assert found.shape == photo.shape[:2]
+    assert set(np.unique(found)) <= {HAIR, PERSON, BACKGROUND}
 
 
 def test_refinement_moves_a_wrong_edge_to_the_true_one() -> None:
