@@ -25,7 +25,7 @@ from hairkit.cli.render import framing_cameras, parse_size, write_picture
 from hairkit.grooming.prepare_export import dense_groom
 from hairkit.manager import Manager
 from hairkit.rendering import Lights, draw
-from hairkit.rendering.picture import backdrop, drawn_width
+from hairkit.rendering.picture import backdrop, display_width
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 
@@ -88,7 +88,7 @@ def _by_blender(
 def _scene(groom: Groom, camera: Camera) -> dict[str, Any]:
     lights = Lights.at_camera(camera)
     pairs = ((lights.key_direction, lights.key_colour), (lights.rim_direction, lights.rim_colour))
-    widths = drawn_width(groom.strands, groom.material)
+    widths = display_width(groom.strands, groom.material)
     own = groom.material.width if groom.strands.widths is None else groom.strands.widths
     return {
         "width": camera.width,

@@ -42,7 +42,7 @@ from hairkit.errors import RenderError
 from hairkit.grooming.prepare_export import dense_groom
 from hairkit.head_model.template import default_head
 from hairkit.rendering.context import renderer
-from hairkit.simulation import Surroundings, shaken
+from hairkit.simulation import Surroundings, add_shakes
 from hairkit.synth import grow
 from hairkit.types.groom import Groom
 
@@ -127,7 +127,7 @@ def rest_of(groom: Groom) -> Array:
 
 def heads_of(groom: Groom, frames: int, substeps: int) -> Array:
     """Return the head's motion (frames * substeps, 4, 4) after each substep."""
-    motion = shaken(SHAKE, groom.head)
+    motion = add_shakes(SHAKE, groom.head)
     return np.stack([motion((k + 1) * FRAME / substeps) for k in range(frames * substeps)])
 
 
@@ -168,7 +168,7 @@ def ours_moved(groom: Groom, backend: str, substeps: int, frames: int) -> tuple[
 def ours_speed(groom: Groom, backend: str, substeps: int, steps: int) -> float:
     """Return pbd's steps a second."""
     simulator = PbdSimulator(groom, Options(backend=backend, substeps=substeps))
-    motion = shaken(SHAKE, groom.head)
+    motion = add_shakes(SHAKE, groom.head)
     simulator.advance(FRAME, Surroundings())
 
     def step(frame: int) -> None:

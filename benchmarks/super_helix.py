@@ -25,7 +25,7 @@ from hairkit.head_model.template import default_head
 from hairkit.parallel import thread_count
 from hairkit.rendering import draw
 from hairkit.simulation import Surroundings
-from hairkit.simulation.motion import HeadMotion, shaken, still
+from hairkit.simulation.motion import HeadMotion, add_shakes, static_motion
 from hairkit.synth import grow
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
@@ -43,11 +43,11 @@ def main() -> None:
     print(f"{GUIDES} guides, {thread_count()} threads")
     print("| scene | elements | ms a frame | cpu ms | frames a second | worst ms | max stretch % |")
     print("|---|---|---|---|---|---|---|")
-    shake = shaken(["yaw:25:1.5"], straight.head)
+    shake = add_shakes(["yaw:25:1.5"], straight.head)
     for elements in (ELEMENTS, 0):
-        scene("still head", straight, still(), np.zeros(3), folder, elements)
+        scene("still head", straight, static_motion(), np.zeros(3), folder, elements)
         scene("shaken head", straight, shake, np.zeros(3), folder, elements)
-        scene("wind", wavy, still(), np.array([4.0, 0.0, -3.0]), folder, elements)
+        scene("wind", wavy, static_motion(), np.array([4.0, 0.0, -3.0]), folder, elements)
     print("\n| elements | recursion ms a step | conjugate gradients ms a step |")
     print("|---|---|---|")
     for elements in (5, 10, 20, 40):

@@ -7,11 +7,11 @@ layout(std430, binding = 1) readonly buffer Solids { float solids[]; };
 layout(r32f, binding = 0) writeonly uniform image3D u_taken_image;
 
 uniform ivec3 u_cells;
-uniform float u_taken_by_hair;  // optical depth a metre, of a micrometre of hair in a cell
+uniform float u_hair_extinction;  // optical depth a metre, of a micrometre of hair in a cell
 
 void main() {
     ivec3 cell = ivec3(gl_GlobalInvocationID);
     if (any(greaterThanEqual(cell, u_cells))) return;
     int index = (cell.z * u_cells.y + cell.y) * u_cells.x + cell.x;
-    imageStore(u_taken_image, cell, vec4(solids[index] + u_taken_by_hair * float(dense[index])));
+    imageStore(u_taken_image, cell, vec4(solids[index] + u_hair_extinction * float(dense[index])));
 }

@@ -6,7 +6,7 @@
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(rgba16f, binding = 0) writeonly uniform image3D u_reached;
 
-uniform sampler3D u_taken;      // optical depth a metre
+uniform sampler3D u_extinction;      // optical depth a metre
 uniform ivec3 u_cells;
 uniform float u_spacing;        // metres
 uniform vec3 u_key_direction;
@@ -19,7 +19,7 @@ const float GROWTH = 1.35;
 const int SKY_STEPS = 5;
 const float SKY_GROWTH = 1.7;
 
-float taken(vec3 cell) { return textureLod(u_taken, (cell + 0.5) / vec3(u_cells), 0.0).r; }
+float taken(vec3 cell) { return textureLod(u_extinction, (cell + 0.5) / vec3(u_cells), 0.0).r; }
 
 float towards(vec3 cell, vec3 direction, float growth, int steps) {
     float near = 0.8, length = 1.0, depth = 0.0;

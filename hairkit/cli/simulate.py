@@ -62,7 +62,7 @@ def _run(args: argparse.Namespace) -> int:
     from hairkit.manager import Manager
     from hairkit.pipeline.open_groom import load_groom
     from hairkit.progress import progress_for
-    from hairkit.simulation import Weather, read_motion, shaken, still
+    from hairkit.simulation import Weather, add_shakes, read_motion, static_motion
     from hairkit.simulation import run as simulated
 
     _check(args)
@@ -79,8 +79,8 @@ def _run(args: argparse.Namespace) -> int:
     groom = load_groom(manager, args.groom, reading)
     if not len(groom.strands):
         raise InputError(f"{args.groom}: holds no strands, so there is nothing to simulate")
-    motion = still() if args.motion is None else read_motion(args.motion)
-    motion = shaken(args.shake, groom.head, motion)
+    motion = static_motion() if args.motion is None else read_motion(args.motion)
+    motion = add_shakes(args.shake, groom.head, motion)
     simulator = manager.call("make_simulator", using, options, groom=groom)
     with progress_for(sys.stderr, quiet=args.quiet) as progress:
         cache = simulated(

@@ -5,29 +5,29 @@ from __future__ import annotations
 from hairkit.rendering.head import Solid
 from hairkit.rendering.light import Lights
 from hairkit.rendering.measurement import (
-    Measured,
+    Measurements,
     draw_coverage,
     draw_depth,
     draw_directions,
     draw_layers,
-    draw_measured,
+    draw_measurements,
     points_at_depth,
     visible_points,
 )
-from hairkit.rendering.picture import draw, draw_views, drawn_width
+from hairkit.rendering.picture import display_width, draw, draw_views
 
 __all__ = [
     "Lights",
-    "Measured",
+    "Measurements",
     "Solid",
+    "display_width",
     "draw",
     "draw_coverage",
     "draw_depth",
     "draw_directions",
     "draw_layers",
-    "draw_measured",
+    "draw_measurements",
     "draw_views",
-    "drawn_width",
     "points_at_depth",
     "visible_points",
 ]

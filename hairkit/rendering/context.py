@@ -61,7 +61,7 @@ class Renderer:
         """Return the program of `name.vert` and `fragment.frag` (None: `name.frag`)."""
         key = f"{name}/{fragment or name}"
         if key not in self._programs:
-            self._programs[key] = _compiled(
+            self._programs[key] = _compile(
                 key,
                 lambda: self.context.program(
                     vertex_shader=shader_source(f"{name}.vert"),
@@ -70,7 +70,7 @@ class Renderer:
             )
         return self._programs[key]
 
-    def renew_programs(self) -> None:
+    def recompile_programs(self) -> None:
         """Compile every shader in use anew, as its file now is.
 
         Raises `RenderError` when one does not compile; all stay as they are then. Old ones are not
@@ -97,7 +97,7 @@ class Renderer:
             lines = [f"#define {word} {value}\n" for word, value in definitions.items()]
             version, text = source.split("\n", 1)
             full = "\n".join([version, "".join(lines) + text])
-            self._computes[key] = _compiled(key, lambda: self.context.compute_shader(full))
+            self._computes[key] = _compile(key, lambda: self.context.compute_shader(full))
         return self._computes[key]
 
 
@@ -160,7 +160,7 @@ def shader_source(name: str) -> str:
     return "\n".join(lines)
 
 
-def _compiled(name: str, compile_: Callable[[], Compiled]) -> Compiled:
+def _compile(name: str, compile_: Callable[[], Compiled]) -> Compiled:
     try:
         return compile_()
     except moderngl.Error as error:

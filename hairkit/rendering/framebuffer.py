@@ -62,12 +62,12 @@ def target(gl: Renderer, camera: Camera, kind: Literal["f1", "f4"] = "f1") -> It
         depth.release()
 
 
-def supersampled(camera: Camera, factor: int) -> Camera:
+def supersample_camera(camera: Camera, factor: int) -> Camera:
     """Return the camera with `factor` samples along each edge of a pixel."""
     return camera.resized(camera.width * factor, camera.height * factor)
 
 
-def averaged(samples: npt.NDArray[Sample], camera: Camera) -> npt.NDArray[Sample]:
+def average_samples(samples: npt.NDArray[Sample], camera: Camera) -> npt.NDArray[Sample]:
     """Return samples (k H, k W, C), uint8 or float32, averaged over each pixel, (H, W, C)."""
     if samples.shape[:2] == (camera.height, camera.width):
         return samples

@@ -29,7 +29,7 @@ FULL_HEAD = 100_000
 """Hairs on a head: fewer strands stand for as many."""
 HAIR_WIDTH = 8e-5
 """Diameter of a hair for the shadows, metres."""
-STOPPED = 0.3
+ABSORBED_SHARE = 0.3
 """Share of the light that meets a hair and goes no further: the rest scatters on (dark hair)."""
 STEPS = 28
 """Samples on the way to a light."""
@@ -70,7 +70,7 @@ class Density:
     """What hair and solids take from light per metre of way."""
 
     grid: VoxelGrid
-    taken: Float32Array
+    extinction: Float32Array
     """(X, Y, Z) optical depth per metre."""
 
 
@@ -79,7 +79,7 @@ class LightVolume:
     """What reaches each cell."""
 
     grid: VoxelGrid
-    reached: Float32Array
+    transmittance: Float32Array
     """(X, Y, Z, 3): transmittance towards key and rim light, share of the sky seen."""
 
     @property
@@ -90,7 +90,7 @@ class LightVolume:
 
     def texels(self) -> bytes:
         """Return the values in OpenGL's order, x fastest."""
-        return self.reached.transpose(2, 1, 0, 3).tobytes()
+        return self.transmittance.transpose(2, 1, 0, 3).tobytes()
 
     def uniforms(self) -> dict[str, Any]:
         """Return the values of `lighting.glsl` that place the volume."""
@@ -107,28 +107,28 @@ def hair_density(strands: Strands, solids: Sequence[Mesh]) -> Density:
     low = np.min([p.min(axis=0) for p in points if len(p)], axis=0) - 3 * CELL
     high = np.max([p.max(axis=0) for p in points if len(p)], axis=0) + 3 * CELL
     grid = VoxelGrid.around(low, high, max(CELL, float((high - low).max()) / MAX_EDGE))
-    taken = _taken_by_hair(grid, strands)
+    extinction = _hair_extinction(grid, strands)
     under = np.zeros(grid.shape, np.float32)
     for solid in solids:
-        _mark_under(under, grid, solid)
-    taken += SOLID * uniform_filter(under, 3)
-    return Density(grid, taken)
+        _mark_below_surface(under, grid, solid)
+    extinction += SOLID * uniform_filter(under, 3)
+    return Density(grid, extinction)
 
 
 def light_volume(density: Density, lights: Lights) -> LightVolume:
     """Return how much light reaches each place."""
-    grid, taken = density.grid, density.taken
-    reached = np.ones((*grid.shape, 3), np.float32)
-    inside = uniform_filter(taken, 3, mode="constant") > 0
+    grid, extinction = density.grid, density.extinction
+    transmittance = np.ones((*grid.shape, 3), np.float32)
+    inside = uniform_filter(extinction, 3, mode="constant") > 0
     for channel, direction in enumerate((lights.key_direction, lights.rim_direction)):
-        depth = _depth_towards(taken, grid, inside, np.array(direction))
-        reached[inside, channel] = np.exp(-depth)
-    reached[..., :2] = uniform_filter(reached[..., :2], (3, 3, 3, 1))
-    reached[..., 2] = _sky_seen(taken, grid.spacing)
-    return LightVolume(grid, reached)
+        depth = _optical_depth_towards(extinction, grid, inside, np.array(direction))
+        transmittance[inside, channel] = np.exp(-depth)
+    transmittance[..., :2] = uniform_filter(transmittance[..., :2], (3, 3, 3, 1))
+    transmittance[..., 2] = _sky_visibility(extinction, grid.spacing)
+    return LightVolume(grid, transmittance)
 
 
-def _taken_by_hair(grid: VoxelGrid, strands: Strands) -> Float32Array:
+def _hair_extinction(grid: VoxelGrid, strands: Strands) -> Float32Array:
     if not len(strands):
         return np.zeros(grid.shape, np.float32)
     vectors, first = strands.segments()
@@ -138,11 +138,11 @@ def _taken_by_hair(grid: VoxelGrid, strands: Strands) -> Float32Array:
     length = np.bincount(cell, np.linalg.norm(vectors, axis=1), cells).reshape(grid.shape)
     # strands cross the light at all angles: their shadow is pi / 4 of length times width on average
     stands_for = max(FULL_HEAD / len(strands), 1.0) * HAIR_WIDTH * np.pi / 4
-    taken = length * stands_for * STOPPED / grid.spacing**3
-    return np.asarray(uniform_filter(taken.astype(np.float32), 3), np.float32)
+    extinction = length * stands_for * ABSORBED_SHARE / grid.spacing**3
+    return np.asarray(uniform_filter(extinction.astype(np.float32), 3), np.float32)
 
 
-def _mark_under(marks: Float32Array, grid: VoxelGrid, solid: Mesh) -> None:
+def _mark_below_surface(marks: Float32Array, grid: VoxelGrid, solid: Mesh) -> None:
     """Set the cells just under a mesh to 1."""
     corners = solid.vertices[solid.faces].astype(np.float64)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -154,8 +154,8 @@ def _mark_under(marks: Float32Array, grid: VoxelGrid, solid: Mesh) -> None:
         marks[tuple(grid.nearest_cell(under).T)] = 1
 
 
-def _depth_towards(
-    taken: Float32Array,
+def _optical_depth_towards(
+    extinction: Float32Array,
     grid: VoxelGrid,
     inside: npt.NDArray[np.bool_],
     direction: npt.NDArray[np.float64],
@@ -165,7 +165,7 @@ def _depth_towards(
     edges = np.cumsum(1.08 ** np.arange(STEPS + 1)) * 0.9
     limit = np.array(grid.shape)
     total = np.zeros(len(start), np.float32)
-    padded = np.pad(taken, 1)
+    padded = np.pad(extinction, 1)
     for near, far in pairwise(edges):
         at = np.rint(start + (0.5 * (near + far) * direction).astype(np.float32)).astype(np.int32)
         at = np.clip(at, -1, limit) + 1
@@ -173,13 +173,13 @@ def _depth_towards(
     return total
 
 
-def _sky_seen(taken: Float32Array, spacing: float) -> Float32Array:
+def _sky_visibility(extinction: Float32Array, spacing: float) -> Float32Array:
     """Return (X, Y, Z) the mean transmittance along the six axes, upward counting double."""
-    total = np.zeros_like(taken)
+    total = np.zeros_like(extinction)
     for axis, weight_up in ((0, 1.0), (1, 2.0), (2, 1.0)):
-        before = np.cumsum(taken, axis=axis) * spacing
+        before = np.cumsum(extinction, axis=axis) * spacing
         after = before.take([-1], axis=axis) - before
-        total += np.exp(-(before - taken * spacing)) + weight_up * np.exp(-after)
+        total += np.exp(-(before - extinction * spacing)) + weight_up * np.exp(-after)
     return total / np.float32(7.0)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array
 from hairkit.rendering.context import Renderer, renderer
-from hairkit.rendering.framebuffer import SUPERSAMPLE, averaged, supersampled, target
+from hairkit.rendering.framebuffer import SUPERSAMPLE, average_samples, supersample_camera, target
 from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.hair import draw_ribbons, ribbons
 from hairkit.rendering.head import Mesh, draw_solid
@@ -42,7 +42,7 @@ def draw_layers(
     `width` is the drawn diameter in metres, one for all or (P,) one a point; `min_width_px` its
     least in pixels.
     """
-    fine = supersampled(camera, supersample)
+    fine = supersample_camera(camera, supersample)
     meshes = _meshes(solids)
     depth = DepthRange.around(fine, strands.points, *[mesh.vertices for mesh in meshes])
     with renderer() as gl, target(gl, fine) as picture:
@@ -52,12 +52,12 @@ def draw_layers(
         with ribbons(gl, strands, width) as buffers:
             draw_ribbons(gl, buffers, program, fine, depth, min_width_px=least, u_colour=_HAIR)
         samples = np.asarray(picture.read()[..., :2], np.float32)
-    shares = averaged(samples, camera) / np.float32(255)
+    shares = average_samples(samples, camera) / np.float32(255)
     return shares[..., 0], shares[..., 1]
 
 
 @dataclass(frozen=True)
-class Measured:
+class Measurements:
     """What is known at every pixel's centre about the strand seen there."""
 
     angle: Float32Array
@@ -68,14 +68,14 @@ class Measured:
     """(H, W) true where hair is the first thing seen."""
 
 
-def draw_measured(
+def draw_measurements(
     strands: Strands,
     solids: Solids,
     camera: Camera,
     *,
     width: float | Float32Array = 2e-4,
     min_width_px: float = 1.0,
-) -> Measured:
+) -> Measurements:
     """Return direction and depth of the strand seen at each pixel, in one drawing."""
     meshes = _meshes(solids)
     depth = DepthRange.around(camera, strands.points, *[mesh.vertices for mesh in meshes])
@@ -87,7 +87,7 @@ def draw_measured(
         values: Float32Array = np.asarray(picture.read(), np.float32)
     seen: BoolArray = values[..., 3] > 0.5
     angle = wrap_angle(np.arctan2(values[..., 1], values[..., 0]))
-    return Measured(
+    return Measurements(
         np.where(seen, angle, np.float32(0)),
         np.where(seen, values[..., 2], np.float32(np.inf)),
         seen,
@@ -118,7 +118,7 @@ def draw_directions(
 
     Angles are undirected, in [0, pi), from +x towards +y, as in `OrientationMap`; 0 without hair.
     """
-    measured = draw_measured(strands, head, camera, width=width, min_width_px=min_width_px)
+    measured = draw_measurements(strands, head, camera, width=width, min_width_px=min_width_px)
     return measured.angle, measured.seen
 
 
@@ -131,7 +131,7 @@ def draw_depth(
     min_width_px: float = 1.0,
 ) -> Float32Array:
     """Return the axial depth (H, W) in metres of the strand seen at each pixel, else infinity."""
-    return draw_measured(strands, head, camera, width=width, min_width_px=min_width_px).depth
+    return draw_measurements(strands, head, camera, width=width, min_width_px=min_width_px).depth
 
 
 def visible_points(strands: Strands, head: Solids, camera: Camera) -> BoolArray:

@@ -13,7 +13,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.rendering.context import Renderer, renderer
-from hairkit.rendering.framebuffer import SUPERSAMPLE, averaged, supersampled, target
+from hairkit.rendering.framebuffer import SUPERSAMPLE, average_samples, supersample_camera, target
 from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.hair import RibbonBuffers, draw_ribbons, ribbons
 from hairkit.rendering.head import Solid, draw_solid, head_solid
@@ -69,7 +69,7 @@ def draw(
     supersample
         Samples along each edge of a pixel.
     """
-    sized = _sized(camera, width, height)
+    sized = _resize_camera(camera, width, height)
     return draw_views(
         hair,
         head,
@@ -114,19 +114,21 @@ def draw_views(
     pictures = []
     with (
         renderer() as gl,
-        ribbons(gl, strands, drawn_width(strands, material)) as buffers,
+        ribbons(gl, strands, display_width(strands, material)) as buffers,
         contextlib.ExitStack() as kept,
     ):
         volume: LightVolume | None = None
         for index, camera in enumerate(cameras):
-            shot = _Shot(supersampled(camera, supersample), lights or Lights.at_camera(camera))
+            shot = _Shot(
+                supersample_camera(camera, supersample), lights or Lights.at_camera(camera)
+            )
             if volume is None or lights is None:
                 kept.close()
                 volume = light_volume(density, shot.lights)
                 kept.enter_context(_light_texture(gl, volume))
             samples = _shoot(gl, shot, strands, buffers, look, shown, volume)
             background = backgrounds[index] if backgrounds is not None else backdrop(camera)
-            pictures.append(_over(averaged(samples, camera), background))
+            pictures.append(_over(average_samples(samples, camera), background))
     return pictures
 
 
@@ -144,7 +146,7 @@ class _Shot:
     lights: Lights
 
 
-def _sized(camera: Camera, width: int | None, height: int | None) -> Camera:
+def _resize_camera(camera: Camera, width: int | None, height: int | None) -> Camera:
     if width is None and height is None:
         return camera
     if width is None:
@@ -159,7 +161,7 @@ def _sized(camera: Camera, width: int | None, height: int | None) -> Camera:
     return camera.resized(width, height)
 
 
-def drawn_width(strands: Strands, material: HairMaterial) -> float | Float32Array:
+def display_width(strands: Strands, material: HairMaterial) -> float | Float32Array:
     """Return the width in metres, or (P,) widths, that strands have in pictures."""
     wider = float(np.clip(np.sqrt(SHOWN_HAIRS / max(len(strands), 1)), 1.0, WIDEST))
     return wider * (material.width if strands.widths is None else strands.widths)

@@ -5,7 +5,7 @@ The methods are plugins: `manager.call("make_simulator", "pbd", groom=groom)` re
 
 from __future__ import annotations
 
-from hairkit.simulation.motion import HeadMotion, Shake, read_motion, shaken, still
+from hairkit.simulation.motion import HeadMotion, Shake, add_shakes, read_motion, static_motion
 from hairkit.simulation.running import Weather, run
 from hairkit.simulation.simulator import Grab, Measures, Simulator, Surroundings
 
@@ -17,8 +17,8 @@ __all__ = [
     "Simulator",
     "Surroundings",
     "Weather",
+    "add_shakes",
     "read_motion",
     "run",
-    "shaken",
-    "still",
+    "static_motion",
 ]

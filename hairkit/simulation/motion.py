@@ -61,17 +61,17 @@ class HeadMotion:
             )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "keys", keys)
-        object.__setattr__(self, "_turns", _continuous(quaternion.from_matrix(turn)))
+        object.__setattr__(self, "_turns", _align_signs(quaternion.from_matrix(turn)))
         if self.pivot is not None:
             pivot = frozen_array(self.pivot, np.float64, (3,), "motion pivot")
             object.__setattr__(self, "pivot", pivot)
 
     def __call__(self, time: float) -> Float64Array:
         """Return (4, 4) `head_from_rest` at `time`; before and after the keys the head is still."""
-        motion = self._keyed(time)
+        motion = self._interpolate_keys(time)
         if not self.shakes:
             return motion
-        both: Float64Array = motion @ self._shaken(time)
+        both: Float64Array = motion @ self._shake_transform(time)
         return both
 
     @property
@@ -79,7 +79,7 @@ class HeadMotion:
         """Time of the last key, seconds."""
         return float(self.times[-1])
 
-    def _keyed(self, time: float) -> Float64Array:
+    def _interpolate_keys(self, time: float) -> Float64Array:
         """Cubic through the keys (Catmull-Rom with the keys' own times), turns and places alike."""
         count = len(self.times)
         if count == 1 or time <= self.times[0]:
@@ -91,19 +91,19 @@ class HeadMotion:
         share = (time - self.times[at]) / span
         turns: Float64Array = self.__dict__["_turns"]
         values = np.concatenate([turns, self.keys[:, :3, 3]], axis=1)
-        slopes = [_slope(self.times, values, k) * span for k in (at, at + 1)]
+        slopes = [_key_slope(self.times, values, k) * span for k in (at, at + 1)]
         mixed = _hermite(values[at], slopes[0], values[at + 1], slopes[1], share)
         motion = np.eye(4)
-        motion[:3, :3] = quaternion.to_matrix(quaternion.unit(mixed[:4]))
+        motion[:3, :3] = quaternion.to_matrix(quaternion.normalize(mixed[:4]))
         motion[:3, 3] = mixed[4:]
         return motion
 
-    def _shaken(self, time: float) -> Float64Array:
+    def _shake_transform(self, time: float) -> Float64Array:
         turn = np.eye(3)
         for shake in self.shakes:
             angle = np.radians(shake.degrees) * np.sin(2 * np.pi * shake.hertz * time)
-            angle *= _eased(time, shake.until)
-            turn = turn @ quaternion.to_matrix(quaternion.about(AXES[shake.axis], angle))
+            angle *= _ease_in_out(time, shake.until)
+            turn = turn @ quaternion.to_matrix(quaternion.from_axis(AXES[shake.axis], angle))
         motion = np.eye(4)
         motion[:3, :3] = turn
         if self.pivot is not None:
@@ -111,12 +111,12 @@ class HeadMotion:
         return motion
 
 
-def still() -> HeadMotion:
+def static_motion() -> HeadMotion:
     """Return the motion of a head that does not move."""
     return HeadMotion(np.zeros(1), np.eye(4)[None])
 
 
-def shaken(
+def add_shakes(
     texts: Sequence[str], head: Head | None = None, base: HeadMotion | None = None
 ) -> HeadMotion:
     """Return a motion with shakes.
@@ -136,9 +136,9 @@ def shaken(
     InputError
         A text is none of that form.
     """
-    start = base if base is not None else still()
+    start = base if base is not None else static_motion()
     pivot = None if head is None else head.joints[1].astype(np.float64)
-    return HeadMotion(start.times, start.keys, tuple(_shake(text) for text in texts), pivot)
+    return HeadMotion(start.times, start.keys, tuple(_parse_shake(text) for text in texts), pivot)
 
 
 def read_motion(path: Path) -> HeadMotion:
@@ -172,7 +172,7 @@ def _read_json(path: Path) -> HeadMotion:
         if "frames" in found:
             frames = found["frames"]
             times = np.array([float(frame["time"]) for frame in frames])
-            keys = np.stack([_key(frame) for frame in frames])
+            keys = np.stack([_parse_key(frame) for frame in frames])
         else:
             times = np.array(found["times"], np.float64)
             keys = np.array(found["head_from_rest"], np.float64).reshape(len(times), 4, 4)
@@ -184,18 +184,18 @@ def _read_json(path: Path) -> HeadMotion:
         raise FormatError(f"{path}: not a head motion ({what})") from error
 
 
-def _key(frame: dict[str, object]) -> Float64Array:
+def _parse_key(frame: dict[str, object]) -> Float64Array:
     """Turn by pitch, then roll, then yaw, then move."""
     pitch, yaw, roll = np.radians(np.array(frame.get("turn_deg", (0, 0, 0)), np.float64))
     key = np.eye(4)
     turns = [("yaw", yaw), ("roll", roll), ("pitch", pitch)]
     for name, angle in turns:
-        key[:3, :3] = key[:3, :3] @ quaternion.to_matrix(quaternion.about(AXES[name], angle))
+        key[:3, :3] = key[:3, :3] @ quaternion.to_matrix(quaternion.from_axis(AXES[name], angle))
     key[:3, 3] = np.array(frame.get("move", (0, 0, 0)), np.float64)
     return key
 
 
-def _shake(text: str) -> Shake:
+def _parse_shake(text: str) -> Shake:
     names = "|".join(AXES)
     number = r"[-+]?\d*\.?\d+"
     match = re.fullmatch(rf"({names}):({number}):({number})(?::({number}))?", text.strip())
@@ -208,7 +208,7 @@ def _shake(text: str) -> Shake:
     return Shake(match[1], float(match[2]), float(match[3]), until)
 
 
-def _eased(time: float, until: float | None) -> float:
+def _ease_in_out(time: float, until: float | None) -> float:
     def ramp(share: float) -> float:
         t = min(max(share, 0.0), 1.0)
         return t * t * (3 - 2 * t)
@@ -216,7 +216,7 @@ def _eased(time: float, until: float | None) -> float:
     return ramp(time / EASE) * (1.0 if until is None else ramp((until - time) / EASE))
 
 
-def _continuous(turns: Float64Array) -> Float64Array:
+def _align_signs(turns: Float64Array) -> Float64Array:
     """Choose the quaternions' signs so that neighbours are near each other."""
     sign = np.sign((turns[1:] * turns[:-1]).sum(axis=1))
     sign[sign == 0] = 1.0
@@ -224,7 +224,7 @@ def _continuous(turns: Float64Array) -> Float64Array:
     return near
 
 
-def _slope(times: Float64Array, values: Float64Array, k: int) -> Float64Array:
+def _key_slope(times: Float64Array, values: Float64Array, k: int) -> Float64Array:
     low, high = max(k - 1, 0), min(k + 1, len(times) - 1)
     result: Float64Array = (values[high] - values[low]) / (times[high] - times[low])
     return result

@@ -1,6 +1,6 @@
 """Unit quaternions (w, x, y, z) as arrays (..., 4): what motion and orientation-carrying rods need.
 
-A quaternion turns the axes of a frame into the world: `rotated(q, e)` are its directors.
+A quaternion turns the axes of a frame into the world: `rotate(q, e)` are its directors.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ def inverse(q: Float64Array) -> Float64Array:
     return back
 
 
-def unit(q: Float64Array) -> Float64Array:
+def normalize(q: Float64Array) -> Float64Array:
     """Return quaternions or vectors of length 1; zero stays zero."""
     length = np.linalg.norm(q, axis=-1, keepdims=True)
     result: Float64Array = q / np.maximum(length, 1e-300)
     return result
 
 
-def rotated(q: Float64Array, vector: npt.ArrayLike) -> Float64Array:
+def rotate(q: Float64Array, vector: npt.ArrayLike) -> Float64Array:
     """Return vectors (..., 3) turned by unit quaternions."""
     v = np.asarray(vector, np.float64)
     along = 2.0 * np.cross(q[..., 1:], v)
@@ -53,7 +53,7 @@ def third_axis(q: Float64Array) -> Float64Array:
     return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
 
 
-def swing(start: Float64Array, end: Float64Array) -> Float64Array:
+def shortest_arc(start: Float64Array, end: Float64Array) -> Float64Array:
     """Return the smallest turns that bring unit vectors `start` to `end`; half turns pick an axis.
 
     This is parallel transport along the great circle between the two.
@@ -66,10 +66,10 @@ def swing(start: Float64Array, end: Float64Array) -> Float64Array:
         other = np.where(np.abs(start[..., :1]) < 0.6, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
         half = np.concatenate([np.zeros_like(cosine)[..., None], np.cross(start, other)], axis=-1)
         turn = np.where(opposite[..., None], half, turn)
-    return unit(turn)
+    return normalize(turn)
 
 
-def about(axis: npt.ArrayLike, angle: npt.ArrayLike) -> Float64Array:
+def from_axis(axis: npt.ArrayLike, angle: npt.ArrayLike) -> Float64Array:
     """Return turns by `angle` (...) radians about unit axes (..., 3)."""
     half = np.asarray(angle, np.float64)[..., None] / 2
     return np.concatenate([np.cos(half), np.sin(half) * np.asarray(axis, np.float64)], axis=-1)
@@ -105,7 +105,7 @@ def from_matrix(matrix: npt.ArrayLike) -> Float64Array:
         axis=-2,
     )
     best = np.argmax(squares, axis=-1)
-    q = unit(np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :])
+    q = normalize(np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :])
     return np.where(q[..., :1] < 0, -q, q)
 
 
@@ -113,7 +113,7 @@ def to_matrix(q: npt.ArrayLike) -> Float64Array:
     """Return the rotation matrices (..., 3, 3) of unit quaternions."""
     quaternion = np.asarray(q, np.float64)
     axes = np.eye(3)
-    return np.stack([rotated(quaternion, axes[k]) for k in range(3)], axis=-1)
+    return np.stack([rotate(quaternion, axes[k]) for k in range(3)], axis=-1)
 
 
 def slerp(start: Float64Array, end: Float64Array, share: float) -> Float64Array:
@@ -125,4 +125,4 @@ def slerp(start: Float64Array, end: Float64Array, share: float) -> Float64Array:
     sine = np.linalg.norm(step[..., 1:], axis=-1)
     angle = 2.0 * np.arctan2(sine, step[..., 0])
     axis = step[..., 1:] / np.maximum(sine, 1e-300)[..., None]
-    return product(about(axis, share * angle), start)
+    return product(from_axis(axis, share * angle), start)

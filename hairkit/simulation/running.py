@@ -71,7 +71,7 @@ def run(
     told.started(STAGE, before + frames)
     times = np.arange(before + frames) / frames_per_second
     heads = np.empty((frames, 4, 4))
-    points = _room(frames, len(simulator.strands.points))
+    points = _allocate_frames(frames, len(simulator.strands.points))
     for frame, time in enumerate(times):
         head = motion(float(time))
         if not frame:
@@ -81,15 +81,15 @@ def run(
             simulator.advance(1.0 / frames_per_second, around)
         if frame >= before:
             points[frame - before], heads[frame - before] = simulator.points, head
-            _check(points[frame - before], float(time))
+            _check_finite(points[frame - before], float(time))
         told.stepped(STAGE)
     told.finished(STAGE, perf_counter() - began, False)
     return PointCache(points, times[:frames], heads)
 
 
-def _room(frames: int, points: int) -> Float32Array:
+def _allocate_frames(frames: int, points: int) -> Float32Array:
     """Return room for all frames; says that there is none before hours are spent."""
-    size, memory = frames * points * 12, _memory()
+    size, memory = frames * points * 12, _physical_memory()
     if size > memory:
         raise InputError(
             f"{frames} frames of {points} points take {size / 2**30:.0f} GiB of memory,"
@@ -98,7 +98,7 @@ def _room(frames: int, points: int) -> Float32Array:
     return np.empty((frames, points, 3), np.float32)
 
 
-def _memory() -> float:
+def _physical_memory() -> float:
     """Return the bytes of this machine's memory, infinity where it does not tell."""
     try:
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
@@ -106,7 +106,7 @@ def _memory() -> float:
         return float("inf")
 
 
-def _check(points: Float32Array, time: float) -> None:
+def _check_finite(points: Float32Array, time: float) -> None:
     if not np.isfinite(points).all():
         raise HairkitError(
             f"the simulation is not finite at {time:.3f} s; take more substeps or less stiffness"

@@ -20,12 +20,12 @@ from hairkit.errors import InputError
 from hairkit.io.capture_reader import TURN
 from hairkit.rendering import (
     Lights,
-    Measured,
+    Measurements,
     Solid,
+    display_width,
     draw_layers,
-    draw_measured,
+    draw_measurements,
     draw_views,
-    drawn_width,
     points_at_depth,
 )
 from hairkit.storage import write_bytes, write_npz, write_text
@@ -136,15 +136,15 @@ class _Shoot:
         """Return the true labels (H, W): what covers at least half of a pixel."""
         strands, material = self.groom.strands, self.groom.material
         hair, solid = draw_layers(
-            strands, self._solids(), camera, width=drawn_width(strands, material)
+            strands, self._solids(), camera, width=display_width(strands, material)
         )
         labels = np.where(hair + solid >= 0.5, PERSON, BACKGROUND)
         return np.where(hair >= 0.5, HAIR, labels).astype(np.uint8)
 
-    def measured(self, camera: Camera) -> Measured:
+    def measured(self, camera: Camera) -> Measurements:
         """Return direction and depth of the hair at every pixel, drawn as in the photo."""
-        width = drawn_width(self.groom.strands, self.groom.material)
-        return draw_measured(self.groom.strands, self._solids(), camera, width=width)
+        width = display_width(self.groom.strands, self.groom.material)
+        return draw_measurements(self.groom.strands, self._solids(), camera, width=width)
 
     def _solids(self) -> list[Head | Solid]:
         return [self.groom.head, self.torso]
@@ -223,7 +223,7 @@ def _write_landmarks(
     write_text(base / "landmarks.json", json.dumps(document) + "\n")
 
 
-def _angle_codes(measured: Measured) -> UInt8Array:
+def _angle_codes(measured: Measurements) -> UInt8Array:
     """Return the true strand angles (H, W): 1 to 255 for [0, pi), 0 where no hair is."""
     coded = 1 + np.mod(np.rint(measured.angle / np.pi * 255), 255)
     return np.where(measured.seen, coded, 0).astype(np.uint8)

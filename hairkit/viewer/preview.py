@@ -81,7 +81,7 @@ class Preview:
 
     def restart(self) -> None:
         """Compile all shaders anew; the old ones stay when one does not compile."""
-        self.gl.renew_programs()
+        self.gl.recompile_programs()
         self.release()
 
     def frame(self, seconds: float, *, still: bool = False) -> None:

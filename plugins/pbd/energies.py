@@ -23,12 +23,12 @@ def elastic_energy(rods: Rods, state: State, shape: Float64Array | None = None) 
     `shape` (S, n): squared frequencies of that pull, 1/s^2.
     """
     edge = np.diff(state.position, axis=1)
-    frames = swung(state.frames, quaternion.unit(edge))
+    frames = swung(state.frames, quaternion.normalize(edge))
     before = rods.before(frames)
     reach = edge / rods.length[..., None]
     held = quaternion.third_axis(rods.root_frame)[:, None]
     turn = reach - np.concatenate([held, reach[:, :-1]], axis=1)
-    off = turn - quaternion.rotated(half_way(before, frames), rods.curvature)
+    off = turn - quaternion.rotate(half_way(before, frames), rods.curvature)
     energy = 0.5 * float((rods.bend[..., None] * off**2).sum())
     twist = twist_between(before, frames) - rods.natural_twist
     energy += 0.5 * float((rods.twist * twist**2).sum())

@@ -245,4 +245,4 @@ class ComputeEngine:
 
 def _quaternions(frames: Float64Array) -> Float64Array:
     """(x, y, z, w) of the shaders as unit (w, x, y, z)."""
-    return quaternion.unit(np.roll(frames, 1, axis=-1))
+    return quaternion.normalize(np.roll(frames, 1, axis=-1))

@@ -87,7 +87,7 @@ def _reachable(target: Float64Array, rods: Rods, rod: int, node: int) -> Float64
 def _compliance(system: System, position: Float64Array, rod: int, node: int) -> Float64Array:
     """(3, 3) metres per newton of a node whose rod keeps its lengths."""
     inverse = system.inverse[rod]
-    way = quaternion.unit(np.diff(position, axis=0))
+    way = quaternion.normalize(np.diff(position, axis=0))
     free = inverse[node - 1, node - 1]
     column = inverse[:, node - 1]
     coupled = np.diff(column, prepend=0.0)[:, None] * way

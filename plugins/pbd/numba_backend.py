@@ -63,7 +63,7 @@ class FastEngine:
     def state(self) -> State:
         """The present state as float64; setting it moves the rods."""
         nodes = self._unpacked(self._x)
-        return State(nodes[..., :3], nodes[..., 3:6], quaternion.unit(self._unpacked(self._q)))
+        return State(nodes[..., :3], nodes[..., 3:6], quaternion.normalize(self._unpacked(self._q)))
 
     @state.setter
     def state(self, value: State) -> None:

@@ -103,7 +103,7 @@ def pulled(
     old = carried(state, load.ride, rods, h)
     predicted = old.position + h * old.velocity
     edge = np.diff(predicted, axis=1)
-    direction = quaternion.unit(edge)
+    direction = quaternion.normalize(edge)
     frames = swung(old.frames, direction)
     frames = untwisted(rods, frames)
     force = elastic_force(rods, edge, frames)
@@ -123,7 +123,7 @@ def pulled(
     for _ in range(iterations):
         pull = tension(system, edge + _edges(free), direction, rods.length)
         change = free - system.inverse @ _edges_transposed(pull[..., None] * direction)
-        direction = quaternion.unit(edge + _edges(change))
+        direction = quaternion.normalize(edge + _edges(change))
     position, velocity = predicted.copy(), old.velocity.copy()
     position[:, 1:] += change
     velocity[:, 1:] += change / h
@@ -147,8 +147,8 @@ def carried(state: State, ride: Float64Array, rods: Rods, step: float) -> State:
 
 def swung(frames: Float64Array, direction: Float64Array) -> Float64Array:
     """Return frames transported in time on to new directions, without spin about them."""
-    turn = quaternion.swing(quaternion.third_axis(frames), direction)
-    return quaternion.unit(quaternion.product(turn, frames))
+    turn = quaternion.shortest_arc(quaternion.third_axis(frames), direction)
+    return quaternion.normalize(quaternion.product(turn, frames))
 
 
 def untwisted(rods: Rods, frames: Float64Array) -> Float64Array:
@@ -159,7 +159,7 @@ def untwisted(rods: Rods, frames: Float64Array) -> Float64Array:
     """
     before = rods.before(frames)
     torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
-    natural = quaternion.rotated(half_way(before, frames), rods.curvature)
+    natural = quaternion.rotate(half_way(before, frames), rods.curvature)
     direction = quaternion.third_axis(frames)
     turn = direction - quaternion.third_axis(before)
     spun = rods.bend[..., None] * np.cross(natural, turn)
@@ -173,7 +173,7 @@ def untwisted(rods: Rods, frames: Float64Array) -> Float64Array:
     angle = _tridiagonal(np.where(diagonal > 0, diagonal, 1.0), beside, -gradient)
     angle = np.clip(angle, -LARGEST_SPIN, LARGEST_SPIN)
     # half angles by a rational cosine and sine: exact turns, the angle right to third order
-    turn_by = quaternion.unit(
+    turn_by = quaternion.normalize(
         np.concatenate([np.ones_like(angle)[..., None], 0.5 * angle[..., None] * direction], -1)
     )
     return quaternion.product(turn_by, frames)
@@ -185,7 +185,7 @@ def elastic_force(rods: Rods, edge: Float64Array, frames: Float64Array) -> Float
     reach = edge / rods.length[..., None]
     held = quaternion.third_axis(rods.root_frame)[:, None]
     turn = reach - np.concatenate([held, reach[:, :-1]], axis=1)
-    natural = quaternion.rotated(half_way(before, frames), rods.curvature)
+    natural = quaternion.rotate(half_way(before, frames), rods.curvature)
     moment = rods.bend[..., None] * (natural - turn)
     spun = rods.bend[..., None] * np.cross(natural, turn)
     torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)

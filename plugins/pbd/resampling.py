@@ -48,7 +48,7 @@ def node_points(strands: Strands, nodes: int) -> Float64Array:
         way = points[bad, -1] - points[bad, 0]
         way[np.linalg.norm(way, axis=1) < 1e-9] = [0.0, 1.0, 0.0]
         along = np.arange(nodes)[None, :, None] * step
-        points[bad] = points[bad, :1] + along * quaternion.unit(way)[:, None]
+        points[bad] = points[bad, :1] + along * quaternion.normalize(way)[:, None]
     return points
 
 
@@ -66,7 +66,7 @@ def stiffest(points: Float64Array, step: float) -> Float64Array:
 
 def _sharpest(points: Float64Array) -> Float64Array:
     """Largest turn (S,) at a node, radians."""
-    direction = quaternion.unit(np.diff(points, axis=1))
+    direction = quaternion.normalize(np.diff(points, axis=1))
     cosine = (direction[:, 1:] * direction[:, :-1]).sum(axis=-1)
     result: Float64Array = np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1)
     return result
@@ -101,7 +101,7 @@ class Riders:
         if self.identity:
             return position.reshape(-1, 3).astype(np.float32)
         place, frame = _places(position, frames, self.rod, self.segment, self.share)
-        moved: Float32Array = (place + quaternion.rotated(frame, self.offset)).astype(np.float32)
+        moved: Float32Array = (place + quaternion.rotate(frame, self.offset)).astype(np.float32)
         return moved
 
 
@@ -117,7 +117,7 @@ def riders(strands: Strands, position: Float64Array, frames: Float64Array) -> Ri
     place, frame = _places(position, frames, rod, segment, share)
     apart = strands.points - place
     same = (strands.counts == segments + 1).all() and float(np.abs(apart).max(initial=0)) < 1e-7
-    return Riders(same, rod, segment, share, quaternion.rotated(quaternion.inverse(frame), apart))
+    return Riders(same, rod, segment, share, quaternion.rotate(quaternion.inverse(frame), apart))
 
 
 def _places(
@@ -145,4 +145,4 @@ def _places(
     part = np.abs(share - 0.5)[:, None]
     here, there = frames[rod, segment], frames[rod, other]
     sign = np.where((here * there).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
-    return place, quaternion.unit((1 - part) * here + part * sign * there)
+    return place, quaternion.normalize((1 - part) * here + part * sign * there)

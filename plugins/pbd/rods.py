@@ -105,7 +105,9 @@ def make_rods(
     gj = ei / 1.3 if torsion is None else np.broadcast_to(torsion, length.shape)
     direction = edge / length[..., None]
     held = direction[:, 0] if root_direction is None else np.asarray(root_direction, np.float64)
-    frames = transported(np.broadcast_to(quaternion.unit(held), direction[:, 0].shape), direction)
+    frames = transported(
+        np.broadcast_to(quaternion.normalize(held), direction[:, 0].shape), direction
+    )
     rods = Rods(
         nodes, mass, length, ei / span, gj / span, frames[:, 0], frames[:, 1:],
         np.zeros_like(nodes[:, 1:]), np.zeros_like(length),
@@ -116,11 +118,11 @@ def make_rods(
 def transported(held: Float64Array, direction: Float64Array) -> Float64Array:
     """Return frames (S, n, 4) without twist: of the root, then of the segments (Bishop 1975)."""
     first = np.broadcast_to([0.0, 0.0, 1.0], held.shape)
-    frames = [quaternion.swing(first, held)]
+    frames = [quaternion.shortest_arc(first, held)]
     before = held
     for j in range(direction.shape[1]):
-        turn = quaternion.swing(before, direction[:, j])
-        frames.append(quaternion.unit(quaternion.product(turn, frames[-1])))
+        turn = quaternion.shortest_arc(before, direction[:, j])
+        frames.append(quaternion.normalize(quaternion.product(turn, frames[-1])))
         before = direction[:, j]
     return np.stack(frames, axis=1)
 
@@ -173,7 +175,7 @@ def _with_moments(rods: Rods, moment: Float64Array, torque: Float64Array) -> Rod
     twisting = np.where(rods.twist > 0, rods.twist, np.inf)
     return replace(
         rods,
-        curvature=quaternion.rotated(quaternion.inverse(middle), natural),
+        curvature=quaternion.rotate(quaternion.inverse(middle), natural),
         natural_twist=twist_between(before, rods.frames) - torque / twisting,
     )
 
@@ -181,7 +183,7 @@ def _with_moments(rods: Rods, moment: Float64Array, torque: Float64Array) -> Rod
 def half_way(before: Float64Array, after: Float64Array) -> Float64Array:
     """Return the frames half way between neighbours."""
     sign = np.where((before * after).sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
-    return quaternion.unit(before + sign * after)
+    return quaternion.normalize(before + sign * after)
 
 
 def twist_between(before: Float64Array, after: Float64Array) -> Float64Array:

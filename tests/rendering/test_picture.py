@@ -60,7 +60,7 @@ def test_light_fades_into_the_hair() -> None:
     strands = Strands.from_list([[p, p + np.float32([0, 0.01, 0])] for p in roots])
     lights = Lights.studio((1, 0, 0), (0, 0, -1))
     volume = light_volume(hair_density(strands, ()), lights)
-    reached = volume.reached
+    reached = volume.transmittance
     assert reached.min() >= 0
     assert reached.max() <= 1 + 1e-6
     middle = reached[:, reached.shape[1] // 2, reached.shape[2] // 2, 0]

@@ -13,7 +13,7 @@ import pytest
 from hairkit import cli
 from hairkit.errors import HairkitError, InputError
 from hairkit.manager import Manager
-from hairkit.simulation import Weather, run, shaken, still
+from hairkit.simulation import Weather, add_shakes, run, static_motion
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache, read_cache
@@ -38,7 +38,7 @@ def made(manager: Manager, groom: Groom, **options: object) -> object:
 
 def test_the_first_frame_is_the_rest(manager: Manager, groom: Groom) -> None:
     """Frame 0 is the captured hair on the head's first key; times and heads are the motion's."""
-    motion = shaken(["yaw:20:2"], groom.head)
+    motion = add_shakes(["yaw:20:2"], groom.head)
     cache = run(made(manager, groom), motion, 5, 50.0)
     np.testing.assert_array_equal(cache.points[0], groom.strands.points)
     np.testing.assert_allclose(cache.times, np.arange(5) / 50)
@@ -49,8 +49,8 @@ def test_warm_up_is_the_end_of_a_longer_run(manager: Manager, groom: Groom) -> N
     """Frames after a warm-up are the frames of the same run without it."""
     weather = Weather(np.array([3.0, 0.0, 0.0]), 0.3)
     simulator = made(manager, groom)
-    long = run(simulator, still(), 8, weather=weather)
-    short = run(simulator, still(), 3, weather=weather, warm_up=5 / 60)
+    long = run(simulator, static_motion(), 8, weather=weather)
+    short = run(simulator, static_motion(), 3, weather=weather, warm_up=5 / 60)
     np.testing.assert_array_equal(short.points, long.points[5:])
 
 
@@ -65,9 +65,9 @@ def test_what_is_not_finite_is_an_error(manager: Manager, groom: Groom) -> None:
         def advance(self, seconds: float, around: object) -> None: ...
 
     with pytest.raises(HairkitError, match="not finite"):
-        run(Exploding(), still(), 2)
+        run(Exploding(), static_motion(), 2)
     with pytest.raises(InputError, match="frames"):
-        run(simulator, still(), 0)
+        run(simulator, static_motion(), 0)
 
 
 def simulate(groom: Groom, folder: Path, *more: str) -> int:
@@ -217,7 +217,7 @@ def test_frames_that_no_memory_holds_are_refused_at_once(groom: Groom, tmp_path:
     """Before the first frame, with the size."""
     many = SimpleNamespace(strands=SimpleNamespace(points=np.zeros((10**7, 3))))
     with pytest.raises(InputError, match=r"GiB of memory.*ask for fewer frames"):
-        run(many, still(), 10**6)  # type: ignore[arg-type]
+        run(many, static_motion(), 10**6)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

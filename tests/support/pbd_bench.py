@@ -73,7 +73,7 @@ def settled(
 def displaced(rods: Rods, shift: Float64Array) -> State:
     """Return rods at rest with their nodes shifted a little."""
     position = rods.points + shift
-    frames = swung(rods.frames, quaternion.unit(np.diff(position, axis=1)))
+    frames = swung(rods.frames, quaternion.normalize(np.diff(position, axis=1)))
     return State(position, np.zeros_like(position), frames)
 
 
@@ -83,7 +83,7 @@ def tangled(rng: np.random.Generator) -> tuple[Rods, State]:
     points = 0.2 * np.stack([s, 0.3 * np.sin(5 * s), 0.3 * np.cos(4 * s)], axis=-1)[None]
     rods = make_rods(points, DENSITY, DENSITY * 0.05)
     rods = loaded(rods, rods.mass[..., None] * DOWN)
-    way = quaternion.unit(np.diff(points, axis=1) + 0.003 * rng.normal(size=(1, 11, 3)))
+    way = quaternion.normalize(np.diff(points, axis=1) + 0.003 * rng.normal(size=(1, 11, 3)))
     moved = points[:, :1] + np.cumsum(way * rods.length[..., None], axis=1)
     position = np.concatenate([points[:, :1], moved], axis=1)
     frames = balanced(rods, swung(rods.frames, way))
@@ -101,7 +101,7 @@ def balanced(rods: Rods, frames: Float64Array) -> Float64Array:
 
 def spun(frames: Float64Array, angle: Float64Array) -> Float64Array:
     """Return frames turned about their segments by angles, radians."""
-    return quaternion.product(quaternion.about(quaternion.third_axis(frames), angle), frames)
+    return quaternion.product(quaternion.from_axis(quaternion.third_axis(frames), angle), frames)
 
 
 def clamped(rods: Rods) -> Rods:
@@ -115,7 +115,7 @@ def naturally_bent(rods: Rods, angle: Float64Array) -> Rods:
     """Return straight rods along X whose natural shapes are arcs of these angles towards Y."""
     # an element turns by its share of the arc; the chord of the turn is 2 sin(half of it)
     span = np.append(0.5, np.ones(rods.nodes - 2)) / (rods.nodes - 1)
-    side = quaternion.rotated(quaternion.inverse(rods.frames[:, :1]), np.array([0.0, 1.0, 0.0]))
+    side = quaternion.rotate(quaternion.inverse(rods.frames[:, :1]), np.array([0.0, 1.0, 0.0]))
     return replace(rods, curvature=side * 2 * np.sin(angle[:, None, None] * span[:, None] / 2))
 
 

@@ -79,7 +79,7 @@ def linearised(
     forces = balanced_force(rods, state.frames, moved).reshape(len(moved), -1)
     slope = (forces[1 : 3 * nodes + 1] - forces[3 * nodes + 1 :]).T / (2 * reach)
     edge = np.diff(position[0], axis=0)
-    way = quaternion.unit(edge)
+    way = quaternion.normalize(edge)
     lengthening = np.zeros((nodes - 1, nodes, 3))
     pick = np.arange(nodes - 1)
     lengthening[pick, pick], lengthening[pick, pick + 1] = -way, way
@@ -100,7 +100,7 @@ def balanced_force(rods: Rods, frames: Float64Array, position: Float64Array) -> 
     """Return the elastic forces (S, n, 3) of one rod at other places (S, n, 3) of its nodes."""
     many = copies(rods, len(position))
     edge = np.diff(position, axis=1)
-    carried = swung(np.repeat(frames, len(position), axis=0), quaternion.unit(edge))
+    carried = swung(np.repeat(frames, len(position), axis=0), quaternion.normalize(edge))
     return elastic_force(many, edge, balanced(many, carried))
 
 

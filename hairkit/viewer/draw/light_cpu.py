@@ -33,7 +33,7 @@ class SoftLightPass(LightVolume):
     def __init__(self, gl: Renderer, guides: Strands, solids: list[Mesh]) -> None:
         super().__init__(gl, guides, solids)
         self._solids = np.ascontiguousarray(solid_depth(self.grid, solids).transpose(2, 1, 0))
-        self._taken, self._rough = np.zeros_like(self._solids), np.zeros_like(self._solids)
+        self._extinction, self._rough = np.zeros_like(self._solids), np.zeros_like(self._solids)
         self._dense = np.zeros((thread_count(), *self._solids.shape), np.uint32)
         self._coming = np.ones((*self._solids.shape, 4), np.float32)
         self.array = self._coming.copy()
@@ -45,21 +45,23 @@ class SoftLightPass(LightVolume):
         parallel_for(
             fill_cells, len(self._dense), hair.places(), hairs, origin, per_metre, self._dense
         )
-        taken, rough = self._taken, self._rough
+        extinction, rough = self._extinction, self._rough
         stops = np.float32(per_micrometre)
-        parallel_for(sum_cells, layers, self._dense, self._solids, stops, taken, rough, min_chunk=8)
-        parallel_for(smooth_cells, layers, rough, taken, min_chunk=8)
+        parallel_for(
+            sum_cells, layers, self._dense, self._solids, stops, extinction, rough, min_chunk=8
+        )
+        parallel_for(smooth_cells, layers, rough, extinction, min_chunk=8)
 
     def _light(self, lights: Lights, turn: int, turns: int) -> None:
         spacing = self.grid.spacing
         way_of_key, depth = _way(lights.key_direction, STEPS, GROWTH, spacing)
         way_of_rim, _ = _way(lights.rim_direction, STEPS, GROWTH, spacing)
         ways = [_way(direction, SKY_STEPS, SKY_GROWTH, spacing) for direction in _SKY]
-        layers = -(-(len(self._taken) - turn) // turns)
+        layers = -(-(len(self._extinction) - turn) // turns)
         parallel_for(
             light_cells,
             layers,
-            self._taken,
+            self._extinction,
             np.stack([way_of_key, way_of_rim]),
             depth,
             np.stack([way for way, _ in ways]),
@@ -109,15 +111,15 @@ def fill_cells(  # type: ignore[no-untyped-def]
 
 @shared
 def sum_cells(  # type: ignore[no-untyped-def]
-    first, last, dense, solids, per_micrometre, taken, rough
+    first, last, dense, solids, per_micrometre, extinction, rough
 ) -> None:  # pragma: no cover - compiled
     """Write layers of `rough` (Z, Y, X): what hair and solids take per metre, smoothed by 1 2 1.
 
-    Within the layers only; those of `taken` are overwritten.
+    Within the layers only; those of `extinction` are overwritten.
     """
     chunks, _, high, wide = dense.shape
     for layer in range(first, last):
-        plain, lines = taken[layer], rough[layer]
+        plain, lines = extinction[layer], rough[layer]
         for j in range(high):
             for i in range(wide):
                 hair = np.uint32(0)
@@ -138,20 +140,20 @@ def sum_cells(  # type: ignore[no-untyped-def]
 
 
 @shared
-def smooth_cells(first, last, rough, taken) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Write layers of `taken` (Z, Y, X): `rough` smoothed by 1 2 1 across the layers."""
+def smooth_cells(first, last, rough, extinction) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Write layers of `extinction` (Z, Y, X): `rough` smoothed by 1 2 1 across the layers."""
     deep, high, wide = rough.shape
     for layer in range(first, last):
         below, above = max(layer - 1, 0), min(layer + 1, deep - 1)
         for j in range(high):
             for i in range(wide):
                 beside = rough[below, j, i] + rough[above, j, i]
-                taken[layer, j, i] = _HALF * rough[layer, j, i] + _QUARTER * beside
+                extinction[layer, j, i] = _HALF * rough[layer, j, i] + _QUARTER * beside
 
 
 @shared
 def light_cells(  # type: ignore[no-untyped-def]
-    first, last, taken, ways, depth, sky_ways, sky_depth, turn, turns, reached
+    first, last, extinction, ways, depth, sky_ways, sky_depth, turn, turns, transmittance
 ) -> None:  # pragma: no cover - compiled
     """Write (Z, Y, X, 4) transmittance towards key and rim light, share of the sky.
 
@@ -160,29 +162,29 @@ def light_cells(  # type: ignore[no-untyped-def]
     `ways` (2, STEPS, 3) and `sky_ways` (5, SKY_STEPS, 3) are cells z, y, x on the way, of so many
     metres each. Only cells at hair or solids are worked on: nothing is lit elsewhere.
     """
-    _, high, wide = taken.shape
+    _, high, wide = extinction.shape
     for number in range(first, last):
         z = number * turns + turn
         for y in range(high):
             for x in range(wide):
-                if taken[z, y, x] <= 0:
-                    reached[z, y, x, :] = _ONE
+                if extinction[z, y, x] <= 0:
+                    transmittance[z, y, x, :] = _ONE
                     continue
-                reached[z, y, x, 0] = _reaching(taken, z, y, x, ways[0], depth)
-                reached[z, y, x, 1] = _reaching(taken, z, y, x, ways[1], depth)
-                sky = _reaching(taken, z, y, x, sky_ways[0], sky_depth)
+                transmittance[z, y, x, 0] = _reaching(extinction, z, y, x, ways[0], depth)
+                transmittance[z, y, x, 1] = _reaching(extinction, z, y, x, ways[1], depth)
+                sky = _reaching(extinction, z, y, x, sky_ways[0], sky_depth)
                 for way in range(5):
-                    sky += _reaching(taken, z, y, x, sky_ways[way], sky_depth)
-                reached[z, y, x, 2] = sky / np.float32(6)
+                    sky += _reaching(extinction, z, y, x, sky_ways[way], sky_depth)
+                transmittance[z, y, x, 2] = sky / np.float32(6)
 
 
 @row
-def _reaching(taken, z, y, x, way, depth):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    deep, high, wide = taken.shape
+def _reaching(extinction, z, y, x, way, depth):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    deep, high, wide = extinction.shape
     total = np.float32(0)
     for step in range(way.shape[0]):
         c, b, a = z + way[step, 0], y + way[step, 1], x + way[step, 2]
         if not (0 <= c < deep and 0 <= b < high and 0 <= a < wide):
             break
-        total += taken[c, b, a] * depth[step]
+        total += extinction[c, b, a] * depth[step]
     return np.exp(-total)

@@ -12,7 +12,7 @@ from hairkit.arrays import Float32Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import set_uniforms
 from hairkit.rendering.head import Mesh
-from hairkit.rendering.light import FULL_HEAD, HAIR_WIDTH, STOPPED, Lights, hair_density
+from hairkit.rendering.light import ABSORBED_SHARE, FULL_HEAD, HAIR_WIDTH, Lights, hair_density
 from hairkit.types.strands import Strands
 from hairkit.types.volume import VoxelGrid
 from hairkit.viewer.draw.interface import HairDrawer
@@ -62,7 +62,7 @@ class LightVolume(ABC):
         self._turn = 0 if whole else self._turn % TURNS
         if self._turn == 0 or self._lights is None:
             stands_for = max(FULL_HEAD / max(hairs, 1), 1.0) * HAIR_WIDTH * np.pi / 4
-            per_micrometre = 1e-6 * stands_for * STOPPED / self.grid.spacing**3
+            per_micrometre = 1e-6 * stands_for * ABSORBED_SHARE / self.grid.spacing**3
             self._fill(hair, hairs, per_micrometre)
             self._lights = lights
         self._light(self._lights, self._turn, turns)
@@ -97,16 +97,16 @@ class LightPass(LightVolume):
 
     def __init__(self, gl: Renderer, guides: Strands, solids: list[Mesh]) -> None:
         super().__init__(gl, guides, solids)
-        taken = solid_depth(self.grid, solids)
-        self._solids = gl.context.buffer(np.ascontiguousarray(taken.transpose(2, 1, 0)))
-        self._dense = gl.context.buffer(reserve=4 * taken.size)
+        extinction = solid_depth(self.grid, solids)
+        self._solids = gl.context.buffer(np.ascontiguousarray(extinction.transpose(2, 1, 0)))
+        self._dense = gl.context.buffer(reserve=4 * extinction.size)
         self._coming = self._volume(4, "f2")
-        self._taken = self._volume(1, "f4")
+        self._extinction = self._volume(1, "f4")
 
     def release(self) -> None:
         """Free buffers and textures."""
         super().release()
-        for part in (self._solids, self._dense, self._taken, self._coming):
+        for part in (self._solids, self._dense, self._extinction, self._coming):
             part.release()
 
     def _fill(self, hair: HairDrawer, hairs: int, per_micrometre: float) -> None:
@@ -118,12 +118,12 @@ class LightPass(LightVolume):
         set_uniforms(fill, u_points=points, u_count=hairs, u_cells=self._cells, **self.uniforms())
         fill.run(max(-(-hairs // 64), 1))
         self._gl.context.memory_barrier()
-        taken = self._gl.compute("viewer_extinction")
-        set_uniforms(taken, u_cells=self._cells, u_taken_by_hair=per_micrometre)
+        extinction = self._gl.compute("viewer_extinction")
+        set_uniforms(extinction, u_cells=self._cells, u_hair_extinction=per_micrometre)
         self._solids.bind_to_storage_buffer(1)
-        self._taken.bind_to_image(0, read=False, write=True)
+        self._extinction.bind_to_image(0, read=False, write=True)
         x, y, z = self._cells
-        taken.run(-(-x // 8), -(-y // 8), z)
+        extinction.run(-(-x // 8), -(-y // 8), z)
         self._gl.context.memory_barrier()
 
     def _light(self, lights: Lights, turn: int, turns: int) -> None:
@@ -132,13 +132,13 @@ class LightPass(LightVolume):
             light,
             u_cells=self._cells,
             u_spacing=self.grid.spacing,
-            u_taken=3,
+            u_extinction=3,
             u_key_direction=lights.key_direction,
             u_rim_direction=lights.rim_direction,
             u_turn=turn,
             u_turns=turns,
         )
-        self._taken.use(3)
+        self._extinction.use(3)
         self._coming.bind_to_image(0, read=False, write=True)
         x, y, z = self._cells
         light.run(-(-x // 8), -(-y // 8), -(-z // turns))
@@ -162,6 +162,6 @@ def solid_depth(grid: VoxelGrid, solids: list[Mesh]) -> Float32Array:
     points = grid.centres().reshape(-1, 3)
     index = fine.grid.index_from_head(points)
     inside = ((index >= 0) & (index <= np.array(fine.grid.shape) - 1)).all(axis=1)
-    taken = np.zeros(len(points), np.float32)
-    taken[inside] = fine.grid.sample(fine.taken, points[inside])
-    return taken.reshape(grid.shape)
+    extinction = np.zeros(len(points), np.float32)
+    extinction[inside] = fine.grid.sample(fine.extinction, points[inside])
+    return extinction.reshape(grid.shape)

@@ -22,7 +22,7 @@ from hairkit.errors import HairkitError, RenderError
 from hairkit.manager import Manager
 from hairkit.rendering import context
 from hairkit.rendering.context import renderer
-from hairkit.simulation import Grab, Surroundings, quaternion, shaken
+from hairkit.simulation import Grab, Surroundings, add_shakes, quaternion
 from hairkit.types.groom import Groom
 from hairkit.types.head import Capsules
 
@@ -56,7 +56,7 @@ def test_shaders_move_hair_as_the_reference_does(
     groom: Groom, options: dict[str, object], shake: list[str], wind: np.ndarray, gusts: float
 ) -> None:
     """A quarter of a second on the head: no point differs by 0.02 mm."""
-    pair, motion = both(groom, **options), shaken(shake, groom.head)
+    pair, motion = both(groom, **options), add_shakes(shake, groom.head)
     gravity = np.array([3.0, -9.0, 0.0])  # not the groom's: hair has to move
     for frame in range(1, 16):
         for simulator in pair:
@@ -113,7 +113,7 @@ def test_a_grabbed_point_goes_where_the_reference_puts_it(groom: Groom) -> None:
 
 def test_reset_and_other_options_act_as_in_the_reference(groom: Groom) -> None:
     """Options change at once while hair stays; reset puts it at rest on the head's place."""
-    pair, motion = both(groom), shaken(SHAKE, groom.head)
+    pair, motion = both(groom), add_shakes(SHAKE, groom.head)
     for simulator in pair:
         simulator.advance(0.1, Surroundings(motion(0.1), WIND))
         before = simulator.points.copy()
@@ -131,13 +131,13 @@ def test_reset_and_other_options_act_as_in_the_reference(groom: Groom) -> None:
 def test_a_turned_world_gives_turned_motion(groom: Groom) -> None:
     """Head, gravity and wind turned together: the same motion turned, within 0.01 mm."""
     turn = np.eye(4)
-    turn[:3, :3] = quaternion.to_matrix(quaternion.about([0.48, 0.8, 0.36], 1.1))
+    turn[:3, :3] = quaternion.to_matrix(quaternion.from_axis([0.48, 0.8, 0.36], 1.1))
     turn[:3, 3] = [2.0, -1.0, 0.5]
     gravity, ends = np.array([0.0, -9.81, 0.0]), []
     for frame in (np.eye(4), turn):
         simulator = PbdSimulator(groom, Options(backend="compute", nodes=8))
         simulator.reset(frame)
-        motion = shaken(SHAKE, groom.head)
+        motion = add_shakes(SHAKE, groom.head)
         for k in range(1, 16):
             axes = frame[:3, :3]
             around = Surroundings(frame @ motion(k / 60), axes @ WIND, 0.0, axes @ gravity)

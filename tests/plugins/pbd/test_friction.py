@@ -84,7 +84,7 @@ def slipping(wrap: Float64Array, speed: Float64Array, friction: float, rounds: i
     nodes, step, pull = 31, 1e-3, 1e-5
     points = around(wrap, np.linspace(0, LENGTH, nodes))
     rods = make_rods(points, DENSITY, 1e-16, straight=True)
-    along = quaternion.unit(np.gradient(points, axis=1))
+    along = quaternion.normalize(np.gradient(points, axis=1))
     state = replace(at_rest(rods), velocity=-speed[:, None, None] * along)
     force = np.zeros_like(points)
     force[:, -1] = pull * np.stack([np.cos(wrap), -np.sin(wrap), 0 * wrap], axis=1)

@@ -170,7 +170,7 @@ def test_a_whirling_strand_is_taut_by_its_mass_further_out() -> None:
     nodes, spin, step = 25, 20.0, 1e-4
     rods = make_rods(straight(1, nodes), DENSITY, 1e-6, straight=True)
     ride = np.eye(4)
-    ride[:3, :3] = quaternion.to_matrix(quaternion.about(np.array([0, 0, 1.0]), -spin * step))
+    ride[:3, :3] = quaternion.to_matrix(quaternion.from_axis(np.array([0, 0, 1.0]), -spin * step))
     system, state = system_of(rods, step), at_rest(rods)
     state = replace(state, velocity=np.cross([0.0, 0.0, spin], rods.points))
     for _ in range(20):
@@ -193,7 +193,7 @@ def test_forces_are_the_slope_of_the_energy(rng: np.random.Generator) -> None:
                 position[0, node, axis] += side
                 ends.append(elastic_energy(rods, replace(state, position=position)))
             slope[0, node, axis] = -(ends[0] - ends[1]) / 2e-7
-    way = quaternion.unit(np.diff(state.position, axis=1))
+    way = quaternion.normalize(np.diff(state.position, axis=1))
     np.testing.assert_allclose(
         across(force, way), across(slope, way), atol=1e-7 * np.abs(force).max()
     )
@@ -202,7 +202,7 @@ def test_forces_are_the_slope_of_the_energy(rng: np.random.Generator) -> None:
 def test_motion_turns_with_the_axes(rng: np.random.Generator) -> None:
     """Rotate rods, gravity and air and the motion rotates along, to rounding."""
     rods, _ = tangled(rng)
-    turn = quaternion.to_matrix(quaternion.unit(rng.normal(size=4)))
+    turn = quaternion.to_matrix(quaternion.normalize(rng.normal(size=4)))
     wind = np.array([1.0, 0.5, -2.0])
     results = []
     for r in (np.eye(3), turn):
@@ -241,4 +241,4 @@ def across(force: Float64Array, way: Float64Array) -> Float64Array:
 
 def turn_about_y(angle: float) -> Float64Array:
     """Return the matrix of a turn about the vertical."""
-    return quaternion.to_matrix(quaternion.about(np.array([0.0, 1.0, 0.0]), angle))
+    return quaternion.to_matrix(quaternion.from_axis(np.array([0.0, 1.0, 0.0]), angle))

@@ -13,7 +13,15 @@ from hairkit_plugins.pbd.simulator import PbdSimulator
 
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.manager import Manager
-from hairkit.simulation import Grab, Simulator, Surroundings, quaternion, run, shaken, still
+from hairkit.simulation import (
+    Grab,
+    Simulator,
+    Surroundings,
+    add_shakes,
+    quaternion,
+    run,
+    static_motion,
+)
 from hairkit.simulation.wind import air_velocity, gust_waves
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
@@ -52,7 +60,7 @@ def test_captured_hair_does_not_sag(groom: Groom, backend: str) -> None:
 
 def test_backends_agree(groom: Groom) -> None:
     """Shaken, in gusts, for half a second: no point differs by 0.02 mm."""
-    motion = shaken(["yaw:25:2", "pitch:10:1.3"], groom.head)
+    motion = add_shakes(["yaw:25:2", "pitch:10:1.3"], groom.head)
     wind = np.array([2.0, 0.0, 1.0])
     both = [PbdSimulator(groom, Options(backend=name)) for name in ("reference", "fast")]
     for frame in range(1, 31):
@@ -66,7 +74,7 @@ def test_backends_agree(groom: Groom) -> None:
 def test_shaken_hair_keeps_its_length_and_stays_out_of_the_head(groom: Groom) -> None:
     """Stretch below 1 % at every frame; no node more than 2 mm inside."""
     simulator = PbdSimulator(groom, Options())
-    motion, deepest, stretch = shaken(["yaw:30:2"], groom.head), 0.0, 0.0
+    motion, deepest, stretch = add_shakes(["yaw:30:2"], groom.head), 0.0, 0.0
     rest = distance_to(groom.head, groom.strands.points)
     for frame in range(1, 61):
         head = motion(frame / 60)
@@ -95,7 +103,7 @@ def test_fine_points_do_not_cut_through_the_head(groom: Groom, backend: str) -> 
 
 def test_shaken_hair_comes_back_to_rest(groom: Groom) -> None:
     """Three seconds after a short shake the hair is within 2 mm of where it was."""
-    motion = shaken(["roll:20:2:0.5"], groom.head)
+    motion = add_shakes(["roll:20:2:0.5"], groom.head)
     cache = run(PbdSimulator(groom, Options(friction=0.0)), motion, 210)
     away = np.linalg.norm(cache.points - groom.strands.points, axis=2).max(axis=1)
     assert away[20] > 0.01
@@ -105,7 +113,7 @@ def test_shaken_hair_comes_back_to_rest(groom: Groom) -> None:
 def test_roots_ride_on_the_head(groom: Groom) -> None:
     """Whatever happens, a root is where the head carries it."""
     simulator = PbdSimulator(groom, Options())
-    head = shaken(["yaw:40:1"], groom.head)(0.3)
+    head = add_shakes(["yaw:40:1"], groom.head)(0.3)
     simulator.advance(0.05, Surroundings(head, np.array([5.0, 0, 0])))
     roots = simulator.points[groom.strands.offsets[:-1]]
     wanted = groom.strands.roots @ head[:3, :3].T + head[:3, 3]
@@ -115,7 +123,7 @@ def test_roots_ride_on_the_head(groom: Groom) -> None:
 def test_a_carried_head_carries_hair_at_rest(groom: Groom) -> None:
     """Reset on a turned and moved head: the captured shape, turned and moved, without motion."""
     simulator = PbdSimulator(groom, Options())
-    head = shaken(["yaw:90:1"], groom.head)(0.25)
+    head = add_shakes(["yaw:90:1"], groom.head)(0.25)
     head[:3, 3] += [10.0, 0.0, -3.0]
     simulator.reset(head)
     for _ in range(10):
@@ -142,7 +150,7 @@ def test_a_grabbed_point_is_at_the_hand(groom: Groom, backend: str, share: float
     simulator = PbdSimulator(groom, Options(backend=backend))
     tip = int(groom.strands.offsets[39]) - 1
     root = groom.strands.roots[38].astype(np.float64)
-    turn = quaternion.to_matrix(quaternion.about([0.0, 1.0, 0.0], 0.3))
+    turn = quaternion.to_matrix(quaternion.from_axis([0.0, 1.0, 0.0], 0.3))
     target = root + share * turn @ (groom.strands.points[tip] - root)
     assert np.linalg.norm(groom.strands.points[tip] - target) > 0.05
     grab = Grab(tip, (target[0], target[1], target[2]))
@@ -179,7 +187,7 @@ def test_more_stiffness_moves_less(groom: Groom) -> None:
 def test_the_stiffest_torsion_is_stable(groom: Groom, bend: float) -> None:
     """At the upper bound of twist, shaken hair calms down in a second and a half."""
     simulator = PbdSimulator(groom, Options(backend="reference", twist=1.0, bend=bend))
-    motion, energy = shaken(["yaw:30:2:0.5", "roll:25:3:0.5"], groom.head), []
+    motion, energy = add_shakes(["yaw:30:2:0.5", "roll:25:3:0.5"], groom.head), []
     for frame in range(1, 121):
         simulator.advance(1 / 60, Surroundings(motion(frame / 60)))
         energy.append(simulator.measure().kinetic_energy)
@@ -222,7 +230,7 @@ def test_folded_and_tiny_strands_stay_finite(groom: Groom) -> None:
         root_triangle=groom.root_triangle[:3],
         root_barycentric=groom.root_barycentric[:3],
     )
-    cache = run(PbdSimulator(few, Options()), shaken(["yaw:30:3"], few.head), 40)
+    cache = run(PbdSimulator(few, Options()), add_shakes(["yaw:30:3"], few.head), 40)
     assert np.abs(cache.points).max() < 0.5
 
 
@@ -233,7 +241,7 @@ def test_the_plugin_makes_a_simulator(manager: Manager, groom: Groom) -> None:
     simulator = manager.call("make_simulator", "pbd", {"nodes": 8}, groom=mixed)
     assert isinstance(simulator, Simulator)
     assert len(simulator.strands) == guide.sum()
-    cache = run(simulator, still(), 2)
+    cache = run(simulator, static_motion(), 2)
     assert cache.points.shape == (2, len(simulator.strands.points), 3)
 
 
@@ -241,7 +249,7 @@ def test_compiled_gusts_are_the_law_of_the_wind(groom: Groom) -> None:
     """At every fourth node and the last the air is `air_velocity`, between them it is straight."""
     from hairkit_plugins.pbd.numba_backend import FastEngine
 
-    wind, time, head = np.array([3.0, -1.0, 2.0]), 7.3, shaken(["yaw:40:1"], groom.head)(0.2)
+    wind, time, head = np.array([3.0, -1.0, 2.0]), 7.3, add_shakes(["yaw:40:1"], groom.head)(0.2)
     head[:3, 3] += [4.0, 1.0, -2.0]
     rods = PbdSimulator(groom, Options(backend="reference")).rods
     engine = FastEngine(rods, None)
@@ -271,7 +279,7 @@ def test_compiled_hair_among_hair_is_that_of_the_reference(groom: Groom, copies:
         position=0.7 * state.position + rng.normal(0, 1e-3, state.position.shape),
         velocity=rng.normal(0, 1, state.position.shape),
     )
-    ride = shaken(["yaw:40:1"], groom.head)(0.01)
+    ride = add_shakes(["yaw:40:1"], groom.head)(0.01)
     crowd = crowd_of(rods.points.reshape(-1, 3), rods.mass.reshape(-1))
     engine = FastEngine(rods, None)
     engine.state = state
@@ -284,7 +292,7 @@ def test_compiled_hair_among_hair_is_that_of_the_reference(groom: Groom, copies:
 @pytest.mark.parametrize("count", [1, 4])
 def test_a_course_goes_evenly_from_start_to_end(groom: Groom, count: int) -> None:
     """Each step ends on the motion between, and its ride leads there from the one before."""
-    motion = shaken(["yaw:40:1", "pitch:20:2"], groom.head)
+    motion = add_shakes(["yaw:40:1", "pitch:20:2"], groom.head)
     start, end = motion(0.1), motion(0.15)
     before = start
     for k, (after, ride) in enumerate(course(start, end, count)):

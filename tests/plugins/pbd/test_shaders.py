@@ -14,7 +14,7 @@ from shader_rods import AGREE, SHAKE, WIND, apart, bent_groom, both, skip_withou
 from hairkit.errors import RenderError
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.rendering.context import on_graphics_card, renderer
-from hairkit.simulation import Grab, Surroundings, shaken
+from hairkit.simulation import Grab, Surroundings, add_shakes
 from hairkit.types.groom import Groom
 
 
@@ -42,7 +42,7 @@ def pulled(groom: Groom, strands: list[int], back: int = 0) -> tuple[Grab, ...]:
 @pytest.mark.parametrize("nodes", [24, 40, 64])
 def test_many_nodes_move_as_in_the_reference(groom: Groom, nodes: int) -> None:
     """Shaken in gusts, with loops that compilers do not unroll: no point differs by 0.02 mm."""
-    pair, motion = both(groom, nodes=nodes), shaken(SHAKE, groom.head)
+    pair, motion = both(groom, nodes=nodes), add_shakes(SHAKE, groom.head)
     grabs = pulled(groom, [9]) if nodes == 24 else ()
     for frame in (1, 2, 3):
         around = Surroundings(motion(frame / 60), WIND, 1.0, grabs=grabs)
@@ -65,7 +65,7 @@ def test_more_loops_than_llvmpipe_does_are_told_in_one_line(groom: Groom) -> Non
 
 def test_gusts_are_those_of_the_reference_far_away_and_late(groom: Groom) -> None:
     """A head 20 m off that has been there for two minutes: the same gusts, to 0.05 mm."""
-    pair, head = both(groom, seed=3), shaken(["yaw:60:1"], groom.head)(0.2)
+    pair, head = both(groom, seed=3), add_shakes(["yaw:60:1"], groom.head)(0.2)
     head[:3, 3] += [20.0, -3.0, 7.0]
     for simulator in pair:
         simulator.reset(head)
@@ -127,7 +127,7 @@ def test_reset_lets_go(groom: Groom) -> None:
 
 def test_rows_are_places_between_the_points(groom: Groom) -> None:
     """What is drawn of a guide at shares of its length, in the head's axes, however it moves."""
-    simulator, motion = both(groom)[1], shaken(SHAKE, groom.head)
+    simulator, motion = both(groom)[1], add_shakes(SHAKE, groom.head)
     before = groom.strands.offsets[:-1, None] + np.array([0, 1, 3, 3])
     part = np.broadcast_to(np.array([0.0, 0.25, 0.5, 1.0], np.float32)[:, None], (20, 4, 1))
     for frame in (1, 2):

@@ -201,7 +201,7 @@ def test_a_curved_strand_leaves_its_plane_where_its_linear_theory_says() -> None
     rods = make_rods(straight(6, 33), weights[:, None] / G, EI, torsion, straight=True)
     rods = naturally_bent(rods, np.full(6, 4.0))
     state = settled(rods, DOWN, drag=10.0, step=1 / 100, steps=300)
-    frames = swung(state.frames, quaternion.unit(np.diff(state.position, axis=1)))
+    frames = swung(state.frames, quaternion.normalize(np.diff(state.position, axis=1)))
     stiffness = np.empty(6)
     for k in range(6):
         one = State(*(array[k : k + 1] for array in (state.position, state.velocity, frames)))
@@ -273,7 +273,7 @@ def writhe(corner: Float64Array) -> float:
         after[j] - after[i],
         corner[j] - after[i],
     )
-    faces = [quaternion.unit(np.cross(*pair)) for pair in ((a, b), (b, c), (c, d), (d, a))]
+    faces = [quaternion.normalize(np.cross(*pair)) for pair in ((a, b), (b, c), (c, d), (d, a))]
     sines = [(faces[k] * faces[(k + 1) % 4]).sum(axis=1) for k in range(4)]
     angle = np.arcsin(np.clip(sines, -1, 1)).sum(axis=0)
     side = np.cross(after[j] - corner[j], after[i] - corner[i])

@@ -151,7 +151,7 @@ def test_an_end_moment_makes_an_arc() -> None:
     system, state, force = system_of(rods, 1 / 200, 8.0), at_rest(rods), np.zeros_like(rods.points)
     for k in range(400):
         # a couple on the last segment that turns with it, brought up slowly
-        way = quaternion.unit(state.position[:, -1] - state.position[:, -2])
+        way = quaternion.normalize(state.position[:, -1] - state.position[:, -2])
         couple = min(1.0, k / 150) * angle * bending / LENGTH / rods.length[:, -1]
         force[:, -1] = couple[:, None] * np.cross([0.0, 0.0, 1.0], way)
         force[:, -2] = -force[:, -1]
@@ -206,8 +206,8 @@ def test_a_soft_strand_points_along_all_body_forces() -> None:
     rods = make_rods(straight(1, 16, (0, -1, 0)), DENSITY, 1e-16, straight=True)
     wind, drag = np.array([1.0, 0.0, 0.4]), 12.0
     state = settled(rods, DOWN, air=wind, drag=drag, step=1 / 240, steps=400)
-    way = quaternion.unit(state.position[0, -1] - state.position[0, 1])
-    cosine = way @ quaternion.unit(DOWN + drag * wind)
+    way = quaternion.normalize(state.position[0, -1] - state.position[0, 1])
+    cosine = way @ quaternion.normalize(DOWN + drag * wind)
     assert np.degrees(np.arccos(min(cosine, 1.0))) < 0.2
 
 
@@ -217,9 +217,9 @@ def test_natural_curls_come_back() -> None:
     helix = np.stack([0.02 * np.cos(t) - 0.02, 0.02 * np.sin(t), 0.008 * t], axis=-1)[None]
     rods = make_rods(helix, DENSITY, 1e-8)
     edge = np.diff(helix, axis=1)
-    flat = quaternion.unit(0.3 * edge + 0.7 * edge[:, :1]) * rods.length[..., None]
+    flat = quaternion.normalize(0.3 * edge + 0.7 * edge[:, :1]) * rods.length[..., None]
     position = np.concatenate([helix[:, :1], helix[:, :1] + np.cumsum(flat, axis=1)], axis=1)
-    frames = swung(rods.frames, quaternion.unit(flat))
+    frames = swung(rods.frames, quaternion.normalize(flat))
     start = State(position, np.zeros_like(position), frames)
     state = settled(rods, NOTHING, start=start, drag=5.0, steps=300)
     np.testing.assert_allclose(state.position, helix, atol=1e-4)

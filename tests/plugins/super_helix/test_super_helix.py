@@ -38,7 +38,7 @@ def hanging() -> Groom:
 def turned(angle: float, shift: float = 0.0) -> np.ndarray:
     """Return a head turned about the up axis and moved sideways."""
     head = np.eye(4)
-    head[:3, :3] = quaternion.to_matrix(quaternion.about(np.array([0.0, 1, 0]), angle))
+    head[:3, :3] = quaternion.to_matrix(quaternion.from_axis(np.array([0.0, 1, 0]), angle))
     head[0, 3] = shift
     return head
 
