@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import UInt8Array
+from hairkit.cameras.depth_raster import front_values
 from hairkit.errors import HairkitError
-from hairkit.evaluation.depth_map import front_values
 from hairkit.evaluation.evaluation import Evaluation
 from hairkit.evaluation.images import RIGHT, WRONG, orientation_gap
 from hairkit.evaluation.scores import Hits

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from numba import njit, prange
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
-from hairkit.cameras.projection_kernels import head_depth, pack_cameras, project_row
+from hairkit.cameras.depth_raster import head_depth, point_depth
+from hairkit.cameras.projection_kernels import PackedCamera, pack_camera, project
 from hairkit.errors import InputError
-from hairkit.evaluation.depth_map import Surface, first_surface, point_depth
+from hairkit.evaluation.depth_map import Surface, first_surface
 from hairkit.evaluation.scores import Samples
 from hairkit.imaging.masked_filters import coherent_truth
+from hairkit.parallel import compiled, parallel_for
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 from hairkit.types.orientation import OrientationMap, angle_between
@@ -25,10 +26,16 @@ DIRECTION_LIMIT_DEG = 20.0
 """A drawn strand is right when its direction is within this of the truth's."""
 VISIBLE_DEPTH = 0.003
 """A drawn sample is visible at most this far behind the first surface, metres."""
+DIRECTION_STEP = 1e-3
+"""Metres along a strand's tangent over which its direction in the picture is taken."""
+MIN_SAMPLES = 4096
+"""Least number of samples that are worth another thread."""
 DRAWN_FOOTPRINT_PX = 9
 """Edge of the square a drawn sample hides: guides are few, and must hide those of the far side."""
 HAIR_WIDTH = 0.0015
 """Width at which hair is drawn into silhouettes, metres."""
+NECK_SLICE = 0.02
+"""Height of the lowest part of a head's mesh whose middle is the neck's, metres."""
 EDGE_PX = 4
 """The mask is eroded by this many pixels before orientation errors are taken."""
 
@@ -140,9 +147,9 @@ def hair_silhouette(
 
 
 def _neck(head: Head) -> Float64Array:
-    """Return the middle (3,) of the lowest two centimetres of the head's mesh."""
+    """Return the middle (3,) of the lowest part of the head's mesh."""
     height = head.vertices[:, 1]
-    lowest = head.vertices[height < height.min() + 0.02].astype(np.float64)
+    lowest = head.vertices[height < height.min() + NECK_SLICE].astype(np.float64)
     middle: Float64Array = lowest.mean(axis=0)
     return middle
 
@@ -168,10 +175,12 @@ def judge_directions(
         raise InputError(
             f"true orientation has shape {truth.shape}, its camera {surface.depth.shape}"
         )
-    limit = np.radians(DIRECTION_LIMIT_DEG)
-    verdict = _judge(
-        pack_cameras([camera])[0], surface.depth, truth, samples.points, samples.directions, limit
-    )
+    view = _TrueView(pack_camera(camera), surface.depth, truth)
+    verdict = np.full(len(samples.points), HIDDEN, np.uint8)
+    parallel_for(
+        _judge, len(verdict), view, samples.points, samples.directions,
+        np.radians(DIRECTION_LIMIT_DEG), verdict, min_chunk=MIN_SAMPLES,
+    )  # fmt: skip
     return DrawnDirections(verdict)
 
 
@@ -190,32 +199,41 @@ def _sized(
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST_EXACT))
 
 
-@njit(cache=True, parallel=True)
+class _TrueView(NamedTuple):
+    """What samples are judged by in one view."""
+
+    camera: PackedCamera
+    depth: Float32Array
+    """(H, W) first surface, metres."""
+    truth: UInt8Array
+    """(H, W) true orientation, see `truth_angle`; 0 where there is no hair."""
+
+
+@compiled
 def _judge(
-    row: Float64Array,
-    depth: Float32Array,
-    truth: UInt8Array,
+    first: int,
+    last: int,
+    view: _TrueView,
     points: Float32Array,
     directions: Float32Array,
     limit: float,
-) -> UInt8Array:  # pragma: no cover - compiled
-    height, width = depth.shape
-    verdict = np.zeros(len(points), np.uint8)
-    for i in prange(len(points)):
+    verdict: UInt8Array,
+) -> None:
+    """Write the verdict on each visible sample; `limit` is in radians."""
+    height, width = view.depth.shape
+    for i in range(first, last):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        u, v, d = project_row(row, x, y, z)
+        u, v, d = project(view.camera, x, y, z)
         if not (u >= 0 and v >= 0 and u < width and v < height):
             continue
-        value = truth[int(v), int(u)]
-        if value == 0 or d - depth[int(v), int(u)] > 0.003:
+        value = view.truth[int(v), int(u)]
+        if value == 0 or d - view.depth[int(v), int(u)] > VISIBLE_DEPTH:
             continue
-        step = 1e-3
-        u2, v2, _ = project_row(
-            row,
-            x + step * directions[i, 0],
-            y + step * directions[i, 1],
-            z + step * directions[i, 2],
+        u2, v2, _ = project(
+            view.camera,
+            x + DIRECTION_STEP * directions[i, 0],
+            y + DIRECTION_STEP * directions[i, 1],
+            z + DIRECTION_STEP * directions[i, 2],
         )
         gap = ((value - 0.5) / 255 * np.pi - np.arctan2(v2 - v, u2 - u)) % np.pi
-        verdict[i] = 1 if min(gap, np.pi - gap) <= limit else 2
-    return verdict
+        verdict[i] = RIGHT if min(gap, np.pi - gap) <= limit else WRONG

@@ -8,27 +8,34 @@ cell's depth behind the first hair the view sees.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
 from scipy import ndimage
 
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
-from hairkit.cameras.projection_kernels import pack_cameras, project_row, splat_depth
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
+from hairkit.cameras.depth_raster import SPLAT_CELLS, splat_depth
+from hairkit.cameras.projection_kernels import PackedCamera, Vector, pack_camera, project
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
 from hairkit.imaging.waves import Waves, measure_waves, without_slant
 from hairkit.options import option
+from hairkit.parallel import compiled, parallel_for
 from hairkit.types.camera import Camera
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
-from hairkit.types.volume import Hull, outer_products
+from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ, Hull, outer_products
 
 DEPTH_SHRINK = 3
 """Depth maps of the hull are this much smaller than the pictures: cells are larger than pixels."""
 POOL_CELLS = 2
 """Planes are pooled on cells this many times as large."""
+LEAST_WEIGHT = 1e-4
+"""Views that fading leaves less weight than this do not speak about a cell."""
+MIN_CELLS = 4096
+"""Least number of cells that are worth another thread."""
 
 
 @dataclass(frozen=True)
@@ -105,26 +112,15 @@ def fuse_planes(
     free_depth
         Depth in metres behind the first hair that costs no weight.
     """
-    points = hull.grid.centres_of(hull.loose)
-    inner = hull.dense[hull.loose]
-    planes = np.zeros((len(points), 6))
-    count = np.zeros(len(points), np.int64)
+    cells = LooseCells(hull.grid.centres_of(hull.loose), hull.dense[hull.loose])
+    planes = np.zeros((len(cells.points), 6))
+    count = np.zeros(len(cells.points), np.int64)
     fronts = front_depths(cameras, orientations, hull)
-    for row, mask, found, front in zip(
-        pack_cameras(cameras), masks, orientations, fronts, strict=True
-    ):
-        certainty = found.confidence * mask.hair
-        _add_planes(
-            row,
-            points,
-            inner,
-            found.angle,
-            certainty,
-            front,
-            see_through,
-            free_depth,
-            planes,
-            count,
+    for camera, mask, found, front in zip(cameras, masks, orientations, fronts, strict=True):
+        view = OrientedView(pack_camera(camera), found.angle, found.confidence * mask.hair, front)
+        fading = Fading(float(see_through), float(free_depth))
+        parallel_for(
+            add_planes, len(planes), view, fading, cells, planes, count, min_chunk=MIN_CELLS
         )
     return planes, count
 
@@ -138,10 +134,10 @@ def front_depths(
     """
     surface = hull.grid.centres_of(hull.dense & ~ndimage.binary_erosion(hull.dense))
     fronts = []
-    for row, found in zip(pack_cameras(cameras), orientations, strict=True):
+    for camera, found in zip(cameras, orientations, strict=True):
         height, width = found.angle.shape
         front = np.full((height // DEPTH_SHRINK, width // DEPTH_SHRINK), np.inf, np.float32)
-        splat_depth(row, surface, 0.75 * hull.grid.spacing, front)
+        splat_depth(pack_camera(camera), surface, SPLAT_CELLS * hull.grid.spacing, front)
         fronts.append(front)
     return fronts
 
@@ -166,47 +162,98 @@ def pooled_planes(planes: Float64Array, hull: Hull, sigma: float) -> Float64Arra
     return result
 
 
-@njit(cache=True, parallel=True)
-def _add_planes(  # type: ignore[no-untyped-def]
-    row, points, inner, angle, certainty, front, see_through, free_depth, planes, count
-):
-    height, width = angle.shape
-    scale = front.shape[0] / row[19]
-    for i in prange(len(points)):
-        if not inner[i]:
+class OrientedView(NamedTuple):
+    """What one view says about the hair's direction."""
+
+    camera: PackedCamera
+    angle: Float32Array
+    """(H, W) 2D orientation, radians."""
+    certainty: Float32Array
+    """(H, W) its weight, 0 where the view sees no hair."""
+    front: Float32Array
+    """(h, w) depth of the first hair, metres; see `front_depths`."""
+
+
+class Fading(NamedTuple):
+    """How a view's weight falls behind the first hair that it sees, metres."""
+
+    see_through: float
+    """Depth at which the weight falls to 1/e; 0: nothing behind counts."""
+    free_depth: float
+    """Depth that costs no weight."""
+
+
+class LooseCells(NamedTuple):
+    """The cells whose direction is wanted."""
+
+    points: Float32Array
+    """(N, 3) centres, metres."""
+    dense: BoolArray
+    """(N,) cells that views may speak about."""
+
+
+@compiled
+def add_planes(
+    first: int,
+    last: int,
+    view: OrientedView,
+    fading: Fading,
+    cells: LooseCells,
+    planes: Float64Array,
+    count: Int64Array,
+) -> None:
+    """Add a view's `w N N^T` to planes (N, 6) and 1 to count (N,), for cells `first` to `last`."""
+    height, width = view.angle.shape
+    for i in range(first, last):
+        if not cells.dense[i]:
             continue
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        u, v, depth = project_row(row, x, y, z)
+        x, y, z = cells.points[i, 0], cells.points[i, 1], cells.points[i, 2]
+        u, v, depth = project(view.camera, x, y, z)
         if u < 0 or v < 0 or u >= width or v >= height:
             continue
-        weight = certainty[int(v), int(u)]
+        weight = _plane_weight(view, fading, u, v, depth)
         if weight <= 0:
             continue
-        line = min(int(v * scale), front.shape[0] - 1)
-        column = min(int(u * scale), front.shape[1] - 1)
-        behind = depth - front[line, column] - free_depth
-        if behind > 0:
-            if see_through <= 0:
-                continue
-            weight *= np.exp(-behind / see_through)
-            if weight < 1e-4:
-                continue
-        # the strand's direction in the picture, turned into the head frame, and the ray to the cell
-        c, s = np.cos(angle[int(v), int(u)]), np.sin(angle[int(v), int(u)])
-        dx, dy, dz = c * row[0] + s * row[3], c * row[1] + s * row[4], c * row[2] + s * row[5]
-        if row[15] > 0.5:
-            rx, ry, rz = row[6], row[7], row[8]
-        else:
-            rx, ry, rz = x - row[16], y - row[17], z - row[18]
-        nx, ny, nz = ry * dz - rz * dy, rz * dx - rx * dz, rx * dy - ry * dx
+        nx, ny, nz = _plane_normal(view.camera, view.angle[int(v), int(u)], x, y, z)
         norm = nx * nx + ny * ny + nz * nz
-        planes[i, 0] += weight * nx * nx / norm
-        planes[i, 1] += weight * ny * ny / norm
-        planes[i, 2] += weight * nz * nz / norm
-        planes[i, 3] += weight * nx * ny / norm
-        planes[i, 4] += weight * nx * nz / norm
-        planes[i, 5] += weight * ny * nz / norm
+        planes[i, XX] += weight * nx * nx / norm
+        planes[i, YY] += weight * ny * ny / norm
+        planes[i, ZZ] += weight * nz * nz / norm
+        planes[i, XY] += weight * nx * ny / norm
+        planes[i, XZ] += weight * nx * nz / norm
+        planes[i, YZ] += weight * ny * nz / norm
         count[i] += 1
+
+
+@compiled
+def _plane_weight(view: OrientedView, fading: Fading, u: float, v: float, depth: float) -> float:
+    """Return the weight of the view at pixel u, v for a cell at an axial depth."""
+    weight = float(view.certainty[int(v), int(u)])
+    if weight <= 0:
+        return 0.0
+    scale = view.front.shape[0] / view.camera.height
+    line = min(int(v * scale), view.front.shape[0] - 1)
+    column = min(int(u * scale), view.front.shape[1] - 1)
+    behind = depth - view.front[line, column] - fading.free_depth
+    if behind <= 0:
+        return weight
+    if fading.see_through <= 0:
+        return 0.0
+    weight *= math.exp(-behind / fading.see_through)
+    return weight if weight >= LEAST_WEIGHT else 0.0
+
+
+@compiled
+def _plane_normal(camera: PackedCamera, angle: float, x: float, y: float, z: float) -> Vector:
+    """Return the normal of the plane of the viewing ray and the strand that it meets at x, y, z."""
+    right, down, forward = camera.right, camera.down, camera.forward
+    c, s = np.cos(angle), np.sin(angle)
+    dx, dy, dz = c * right[0] + s * down[0], c * right[1] + s * down[1], c * right[2] + s * down[2]
+    if camera.orthographic:
+        rx, ry, rz = forward
+    else:
+        rx, ry, rz = x - camera.position[0], y - camera.position[1], z - camera.position[2]
+    return ry * dz - rz * dy, rz * dx - rx * dz, rx * dy - ry * dx
 
 
 def plane_directions(

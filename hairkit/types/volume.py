@@ -120,6 +120,8 @@ class Hull(Stored):
 
 TENSOR_INDICES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Order of the six stored components of a symmetric 3x3 tensor: xx, yy, zz, xy, xz, yz."""
+XX, YY, ZZ, XY, XZ, YZ = range(len(TENSOR_INDICES))
+"""Columns of the components in that order."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,11 @@ import numpy as np
 from numba import njit, prange
 
 from hairkit import Camera, Hull, Mask, OrientationMap, Strands
-from hairkit.arrays import Float32Array, Int64Array
-from hairkit.cameras.projection_kernels import pack_cameras
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.cameras.projection_kernels import PackedCamera, pack_camera, perspective_divisor
 from hairkit.field.sampling_kernels import sample_at
 from hairkit.field.view_fusion import DEPTH_SHRINK, front_depths
+from hairkit.parallel import compiled, parallel_for
 
 PIXELS = 2.0
 """Step along a line in a photo."""
@@ -69,7 +70,7 @@ def lifted(
     points = np.empty((offsets[-1], 3), np.float32)
     shift = np.arange(int(3 * SMOOTHING) + 1)
     weights = np.exp(-0.5 * (shift / SMOOTHING) ** 2)
-    _lift(pack_cameras([camera])[0], lines, long, offsets, weights, points)
+    parallel_for(_lift, len(long), pack_camera(camera), lines, long, offsets, weights, points)
     return points, counts[long]
 
 
@@ -152,27 +153,35 @@ def _follow_one(angle, weight, front, shrink, seed, sign, line):  # type: ignore
     return len(line)
 
 
-@njit(cache=True, parallel=True)
-def _lift(row, lines, chosen, offsets, weights, points):  # type: ignore[no-untyped-def]
+@compiled
+def _lift(
+    first: int,
+    last: int,
+    camera: PackedCamera,
+    lines: Float32Array,
+    chosen: Int64Array,
+    offsets: Int64Array,
+    weights: Float64Array,
+    points: Float32Array,
+) -> None:
     """Write the chosen lines (K,) of u, v, depth (N, M, 3) smoothed into points (P, 3)."""
-    for k in prange(len(chosen)):
-        first, last = offsets[k], offsets[k + 1]
-        rough = np.empty((last - first, 3))
-        for i in range(last - first):
-            _unproject(row, lines[chosen[k], i], rough[i])
-        _smooth(rough, weights, points[first:last])
+    for k in range(first, last):
+        rough = np.empty((offsets[k + 1] - offsets[k], 3))
+        for i in range(len(rough)):
+            _unproject(camera, lines[chosen[k], i], rough[i])
+        _smooth(rough, weights, points[offsets[k] : offsets[k + 1]])
 
 
-@njit(cache=True)
-def _unproject(row, pixel, point):  # type: ignore[no-untyped-def]
-    """Write the head frame point (3,) of pixel u, v and axial depth, of a packed camera."""
+@compiled
+def _unproject(camera: PackedCamera, pixel: Float32Array, point: Float64Array) -> None:
+    """Write the head frame point (3,) of pixel u, v and axial depth: `Camera.unproject`."""
     depth = np.float64(pixel[2])
-    scale = 1.0 if row[15] > 0.5 else depth
-    x = (pixel[0] - row[13]) / row[12] * scale - row[9]
-    y = (pixel[1] - row[14]) / row[12] * scale - row[10]
-    z = depth - row[11]
+    scale = perspective_divisor(camera, depth)
+    x = (pixel[0] - camera.centre_u) / camera.focal * scale - camera.translation[0]
+    y = (pixel[1] - camera.centre_v) / camera.focal * scale - camera.translation[1]
+    z = depth - camera.translation[2]
     for axis in range(3):
-        point[axis] = x * row[axis] + y * row[3 + axis] + z * row[6 + axis]
+        point[axis] = x * camera.right[axis] + y * camera.down[axis] + z * camera.forward[axis]
 
 
 @njit(cache=True)

@@ -17,31 +17,41 @@ from typing import Any
 import cv2
 import numpy as np
 import numpy.typing as npt
-from numba import njit, prange
 from scipy import ndimage
 
-from hairkit import Hull, Mask, Scene, VoxelGrid, hookimpl
+from hairkit import Camera, Head, Hull, Mask, Scene, VoxelGrid, hookimpl
 from hairkit.arrays import BoolArray, Float32Array, UInt8Array
-from hairkit.cameras.projection_kernels import (
-    head_depth,
-    mesh_depth,
-    pack_cameras,
-    project_row,
-    splat_depth,
-)
+from hairkit.cameras.depth_raster import SPLAT_CELLS, head_depth, mesh_depth, splat_depth
+from hairkit.cameras.projection_kernels import pack_camera
 from hairkit.errors import InputError
 from hairkit.head_model.signed_distance import signed_distance
 from hairkit.head_model.torso import Torso
 from hairkit.imaging.masked_filters import picture_scale
 from hairkit.options import option
 
+from .carving import EMPTY, HAIR, PERSON, LabelledView, Rule, carve
 from .torso_fit import fit_torso
 
-EMPTY, PERSON, HAIR, UNSEEN = 0, 1, 2, 3
 POOR_CAMERAS = 8.0
 """Misfit in pixels of a picture 1080 high above which one empty vote is forgiven."""
 LYING = 0.04
 """Metres off the body within which hair may lie where a picture's edge cuts it off."""
+BELOW_HEAD = np.array([0.3, 0.5, 0.3])
+"""Metres beside, below and behind the head's mesh in which hair is looked for: it may be long."""
+ABOVE_HEAD = np.array([0.3, 0.3, 0.3])
+"""Metres beside, above and before the head's mesh in which hair is looked for."""
+COARSE_CELLS = 4
+"""Edge, in cells, of those by which the box of the hair is found."""
+SCALP_ROOM = 0.012
+"""Metres about the scalp that the grid holds: its shell, and strands that leave the hull."""
+CLOTHES_SHRINK = 4
+"""Depth maps of the person's hull are this much smaller than the pictures: cells are larger."""
+LEAST_PART = 0.1
+"""Parts of the hull with fewer cells than this share of the largest are dropped."""
+SHELL_CELLS = 2
+"""Thickness of the shell over the scalp, in cells."""
+SCALP_REACH_CELLS = 3
+"""Cells from the scalp's vertices within which the shell lies: they are up to 8 mm apart."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +109,7 @@ def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
         outside &= ~torso.inside(grid, options.body_depth)
         above = grid.origin[1] + np.arange(grid.shape[1]) * grid.spacing > torso.top
         near = torso.inside(grid, -LYING) | above[:, None]
-        views = views.before(torso, scene)
+        views = views.in_front_of(torso)
     loose, dense = _carve_both(grid, outside, near, views, options)
     scalp = _scalp_shell(scene, grid, distance) if options.cut_head else np.zeros(grid.shape, bool)
     return Hull(grid, dense, loose | dense | scalp, distance)
@@ -108,7 +118,7 @@ def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
 def _torso(
     scene: Scene, masks: tuple[Mask, ...], grid: VoxelGrid, options: Options
 ) -> Torso | None:
-    """Return the fitted torso, None where nobody wants it or the hair does not reach down to it."""
+    """Return the fitted torso, None if disabled or if the hair ends above it."""
     reached = grid.origin[1] < Torso.under(scene.head).top
     if not (options.cut_body and options.mode == "labels" and reached):
         return None
@@ -116,22 +126,42 @@ def _torso(
 
 
 @dataclass(frozen=True)
-class _Views:
-    """What the carving kernel reads of every view, stacked (V, H, W)."""
+class _View:
+    """The pictures (H, W) by which a view carves."""
 
-    cameras: npt.NDArray[np.float64]
-    sizes: npt.NDArray[np.float64]
-    """(V, 2) width and height of each view's picture."""
+    camera: Camera
     loose: UInt8Array
+    """Labels that carve the loose hull: `carving.EMPTY`, `PERSON` or `HAIR`."""
     dense: UInt8Array
+    """Labels that carve the dense hull."""
     surface: Float32Array
+    """Depth of the head, and of the clothes once they are known, metres; infinite elsewhere."""
+    open_edges: tuple[bool, bool, bool, bool]
+    """Hair touches the left, top, right, bottom edge."""
+
+    @classmethod
+    def of(cls, head: Head, camera: Camera, mask: Mask, options: Options) -> _View:
+        depth = head_depth(head, camera)
+        return cls(camera, *_labels(mask, depth, options), depth, _touched_edges(mask))
+
+    def with_clothes(self, depth: Float32Array) -> _View:
+        """Return the view with `depth` (H, W) as the surface where it shows clothes."""
+        clothes = (self.loose == PERSON) & ~np.isfinite(self.surface)
+        return replace(self, surface=np.where(clothes, depth, self.surface))
+
+    def labelled(self, labels: UInt8Array) -> LabelledView:
+        """Return what carving by `labels` (H, W) reads."""
+        return LabelledView(pack_camera(self.camera), labels, self.surface, *self.open_edges)
+
+
+@dataclass(frozen=True)
+class _Views:
+    """All views, and how many of them may call a hair cell empty."""
+
+    views: tuple[_View, ...]
     forgive: int
-    """Views that may call a hair cell empty."""
-    open_edges: BoolArray
-    """(V, 4) hair touches the picture's left, top, right, bottom edge: nothing is known beyond
-    it."""
     clothed: bool = False
-    """True when `surface` holds the clothes' depth too."""
+    """True when the surfaces hold the clothes' depth too."""
 
     @classmethod
     def of(cls, scene: Scene, masks: tuple[Mask, ...], options: Options) -> _Views:
@@ -139,36 +169,31 @@ class _Views:
             raise InputError(
                 f"the scene has {len(scene.cameras)} cameras but {len(masks)} masks came"
             )
-        height = max(mask.labels.shape[0] for mask in masks)
-        width = max(mask.labels.shape[1] for mask in masks)
-        shape = (len(masks), height, width)
-        loose, dense = np.full(shape, UNSEEN, np.uint8), np.full(shape, UNSEEN, np.uint8)
-        surface = np.full(shape, np.inf, np.float32)
-        for i, (mask, camera) in enumerate(zip(masks, scene.cameras, strict=True)):
-            h, w = mask.labels.shape
-            depth = head_depth(scene.head, camera)
-            surface[i, :h, :w] = depth
-            loose[i, :h, :w], dense[i, :h, :w] = _labels(mask, depth, options)
-        edges = np.array([_touched_edges(mask) for mask in masks])
-        sizes = np.array([mask.labels.shape[::-1] for mask in masks], np.float64)
-        forgive = _forgiven(scene, options)
-        return cls(pack_cameras(scene.cameras), sizes, loose, dense, surface, forgive, edges)
+        views = tuple(
+            _View.of(scene.head, camera, mask, options)
+            for camera, mask in zip(scene.cameras, masks, strict=True)
+        )
+        return cls(views, _forgiven_votes(scene, options))
 
-    def before(self, torso: Torso, scene: Scene) -> _Views:
+    def in_front_of(self, torso: Torso) -> _Views:
         """Return the views with the torso as the surface of the clothes."""
-        vertices, faces = torso.mesh()
-        surface = self.surface.copy()
-        for i, camera in enumerate(scene.cameras):
-            depth = np.full(surface[i].shape, np.inf, np.float32)
-            depth[: camera.height, : camera.width] = mesh_depth(vertices, faces, camera)
-            clothes = (self.loose[i] == PERSON) & ~np.isfinite(surface[i])
-            surface[i][clothes] = depth[clothes]
-        return replace(self, surface=surface, clothed=True)
+        mesh = torso.mesh()
+        dressed = [view.with_clothes(mesh_depth(*mesh, view.camera)) for view in self.views]
+        return replace(self, views=tuple(dressed), clothed=True)
+
+    def loose(self) -> list[LabelledView]:
+        """Return the views that carve the loose hull."""
+        return [view.labelled(view.loose) for view in self.views]
+
+    def dense(self) -> list[LabelledView]:
+        """Return the views that carve the dense hull."""
+        return [view.labelled(view.dense) for view in self.views]
 
 
-def _touched_edges(mask: Mask) -> list[bool]:
+def _touched_edges(mask: Mask) -> tuple[bool, bool, bool, bool]:
     hair = mask.hair
-    return [bool(edge.any()) for edge in (hair[:, 0], hair[0], hair[:, -1], hair[-1])]
+    left, top, right, bottom = hair[:, 0], hair[0], hair[:, -1], hair[-1]
+    return bool(left.any()), bool(top.any()), bool(right.any()), bool(bottom.any())
 
 
 def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Array, UInt8Array]:
@@ -204,61 +229,54 @@ def _disc(radius: float) -> UInt8Array:
 def _bounding_box(
     scene: Scene, views: _Views, options: Options
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Return the corners of the box that holds the hair, found on cells four times as large."""
-    low = scene.head.vertices.min(axis=0).astype(np.float64) - np.array([0.3, 0.5, 0.3])
-    high = scene.head.vertices.max(axis=0).astype(np.float64) + np.array([0.3, 0.3, 0.3])
-    coarse = VoxelGrid.around(low, high, 4 * options.voxel_size)
+    """Return the corners of the box that holds the hair, found on coarse cells."""
+    low = scene.head.vertices.min(axis=0).astype(np.float64) - BELOW_HEAD
+    high = scene.head.vertices.max(axis=0).astype(np.float64) + ABOVE_HEAD
+    coarse = VoxelGrid.around(low, high, COARSE_CELLS * options.voxel_size)
     everywhere = np.ones(coarse.shape, bool)
-    occupied = _carve(
-        coarse,
-        everywhere,
-        everywhere,
-        views,
-        views.loose,
-        options,
-        views.forgive,
-    )
+    occupied = carve(coarse, everywhere, everywhere, views.loose(), _rule(options, views.forgive))
     cells = np.argwhere(_largest_part(occupied))
     if not len(cells):
         raise InputError(
             "the hull is empty: the masks of the views do not overlap in space; "
             "check masks and cameras"
         )
-    shell = 0.012  # room for the shell over the scalp and for strands that leave the hull
     corners = (
         coarse.origin + np.array([cells.min(axis=0) - 1, cells.max(axis=0) + 2]) * coarse.spacing
     )
     scalp = scene.head.vertices[scene.head.scalp > 0.5]
     return (
-        np.minimum(corners[0], scalp.min(axis=0) - shell),
-        np.maximum(corners[1], scalp.max(axis=0) + shell),
+        np.minimum(corners[0], scalp.min(axis=0) - SCALP_ROOM),
+        np.maximum(corners[1], scalp.max(axis=0) + SCALP_ROOM),
     )
 
 
 def _carve_both(
     grid: VoxelGrid, outside: BoolArray, near: BoolArray, views: _Views, options: Options
 ) -> tuple[BoolArray, BoolArray]:
-    forgive = views.forgive
     if options.mode == "votes":
-        voted = _carve(grid, outside, near, views, views.loose, options, len(views.cameras))
-        voted = (
-            ndimage.binary_erosion(voted, iterations=options.erosions)
-            if options.erosions
-            else voted
-        )
+        rule = _rule(options, forgive=len(views.views))
+        voted = carve(grid, outside, near, views.loose(), rule)
+        if options.erosions:
+            voted = ndimage.binary_erosion(voted, iterations=options.erosions)
         if options.dilations:
             voted = ndimage.binary_dilation(voted, iterations=options.dilations) & outside
         voted = _largest_part(voted)
         return voted, voted
-    body = views if views.clothed else _clothes_depth(grid, views, options)
-    loose = _largest_part(_carve(grid, outside, near, body, views.loose, options, forgive))
-    dense = _carve(grid, loose, near, body, views.dense, options, forgive)
+    rule = _rule(options, views.forgive)
+    body = views if views.clothed else _with_person_hull(grid, views, options)
+    loose = _largest_part(carve(grid, outside, near, body.loose(), rule))
+    dense = carve(grid, loose, near, body.dense(), rule)
     dense = _largest_part(dense) if dense.any() else loose
     reach = ndimage.binary_dilation(dense, iterations=options.loose_cells)
     return loose & reach, dense
 
 
-def _forgiven(scene: Scene, options: Options) -> int:
+def _rule(options: Options, forgive: int) -> Rule:
+    return Rule(options.min_views, forgive, float(options.front_margin))
+
+
+def _forgiven_votes(scene: Scene, options: Options) -> int:
     """Return how many empty votes a cell survives: the option, or one if cameras are poor."""
     if options.forgive >= 0:
         return options.forgive
@@ -266,129 +284,40 @@ def _forgiven(scene: Scene, options: Options) -> int:
     return int(scene.residual_px is not None and scene.residual_px > limit)
 
 
-def _clothes_depth(grid: VoxelGrid, views: _Views, options: Options) -> _Views:
-    """Return the views with a surface where they see clothes: the person's hull plus
-    `body_margin`."""
-    person = np.where(views.loose == EMPTY, EMPTY, np.where(views.loose == UNSEEN, UNSEEN, HAIR))
+def _with_person_hull(grid: VoxelGrid, views: _Views, options: Options) -> _Views:
+    """Return the views with clothes at `body_margin` behind the hull of the whole person."""
     everything = np.ones(grid.shape, bool)
-    hull = _carve(grid, everything, everything, views, person.astype(np.uint8), options, 0)
+    persons = [
+        view.labelled(np.where(view.loose == EMPTY, EMPTY, HAIR).astype(np.uint8))
+        for view in views.views
+    ]
+    hull = carve(grid, everything, everything, persons, _rule(options, forgive=0))
     points = grid.centres_of(hull & ~ndimage.binary_erosion(hull))
-    surface = views.surface.copy()
-    for i, row in enumerate(views.cameras):
-        height, width = surface[i].shape
-        depth = np.full((height // 4, width // 4), np.inf, np.float32)
-        row = row.copy()
-        row[19] = height
-        splat_depth(row, points, 0.75 * grid.spacing, depth)
+    behind = options.body_margin + options.front_margin
+    dressed = []
+    for view in views.views:
+        height, width = view.surface.shape
+        depth = np.full((height // CLOTHES_SHRINK, width // CLOTHES_SHRINK), np.inf, np.float32)
+        splat_depth(pack_camera(view.camera), points, SPLAT_CELLS * grid.spacing, depth)
         full = cv2.resize(depth, (width, height), interpolation=cv2.INTER_NEAREST)
-        clothes = (views.loose[i] == PERSON) & ~np.isfinite(surface[i])
-        surface[i][clothes] = full[clothes] + options.body_margin + options.front_margin
-    return replace(views, surface=surface)
-
-
-def _carve(
-    grid: VoxelGrid,
-    candidates: BoolArray,
-    near: BoolArray,
-    views: _Views,
-    labels: UInt8Array,
-    options: Options,
-    forgive: int,
-) -> BoolArray:
-    """Return the candidate cells (X, Y, Z) with enough hair votes and at most `forgive` empty
-    ones; beyond a picture only cells `near` the person may hold hair."""
-    kept: BoolArray = _carve_cells(
-        grid.origin,
-        grid.spacing,
-        candidates,
-        near,
-        views.cameras,
-        views.sizes,
-        views.open_edges,
-        labels,
-        views.surface,
-        options.front_margin,
-        options.min_views,
-        forgive,
-    )
-    return kept
-
-
-@njit(cache=True, parallel=True)
-def _carve_cells(  # type: ignore[no-untyped-def]
-    origin,
-    spacing,
-    candidates,
-    near,
-    cameras,
-    sizes,
-    open_edges,
-    labels,
-    surface,
-    margin,
-    min_views,
-    forgive,
-):
-    size_x, size_y, size_z = candidates.shape
-    views = labels.shape[0]
-    kept = np.zeros(candidates.shape, np.bool_)
-    for ix in prange(size_x):
-        x = origin[0] + (ix + 0.5) * spacing
-        for iy in range(size_y):
-            y = origin[1] + (iy + 0.5) * spacing
-            for iz in range(size_z):
-                if not candidates[ix, iy, iz]:
-                    continue
-                z = origin[2] + (iz + 0.5) * spacing
-                hair = 0
-                empty = 0
-                for view in range(views):
-                    u, v, depth = project_row(cameras[view], x, y, z)
-                    right, bottom = u >= sizes[view, 0], v >= sizes[view, 1]
-                    if u < 0 or v < 0 or right or bottom:
-                        edge = open_edges[view]
-                        unknown = near[ix, iy, iz] and (
-                            (u < 0 and edge[0])
-                            or (v < 0 and edge[1])
-                            or (right and edge[2])
-                            or (bottom and edge[3])
-                        )
-                        if not unknown:
-                            empty += 1
-                            if empty > forgive:
-                                break
-                        continue
-                    column, line = int(u), int(v)
-                    label = labels[view, line, column]
-                    if label == 2:
-                        hair += 1
-                    elif label == 0 or (
-                        label == 1
-                        and depth < surface[view, line, column] - margin
-                        and surface[view, line, column] < 1e9
-                    ):
-                        empty += 1
-                        if empty > forgive:
-                            break
-                kept[ix, iy, iz] = empty <= forgive and hair >= min_views
-    return kept
+        dressed.append(view.with_clothes(full + behind))
+    return replace(views, views=tuple(dressed))
 
 
 def _largest_part(occupied: BoolArray) -> BoolArray:
-    """Return the largest connected part and every other one at least a tenth as large, holes
-    filled."""
+    """Return the largest connected part, and others of at least `LEAST_PART` of its cells."""
     parts, count = ndimage.label(occupied)
     if count == 0:
         return occupied
     sizes = np.bincount(parts.ravel())[1:]
-    keep = np.array([False, *(sizes >= 0.1 * sizes.max())])
+    keep = np.array([False, *(sizes >= LEAST_PART * sizes.max())])
     return np.asarray(keep[parts], bool)
 
 
 def _scalp_shell(scene: Scene, grid: VoxelGrid, distance: Float32Array) -> BoolArray:
     """Return the cells that touch the scalp from outside: roots always lie in the hull."""
-    shell = (distance > -grid.spacing) & (distance < 2 * grid.spacing)
+    shell = (distance > -grid.spacing) & (distance < SHELL_CELLS * grid.spacing)
     near = np.zeros(grid.shape, bool)
     cells = grid.nearest_cell(scene.head.vertices[scene.head.scalp > 0.5])
     near[tuple(cells.T)] = True
-    return np.asarray(shell & ndimage.binary_dilation(near, iterations=3), bool)
+    return np.asarray(shell & ndimage.binary_dilation(near, iterations=SCALP_REACH_CELLS), bool)

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
-from hairkit.cameras.projection_kernels import head_depth, mesh_depth
+from hairkit.cameras.depth_raster import head_depth, mesh_depth
 from hairkit.head_model.torso import Torso
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head

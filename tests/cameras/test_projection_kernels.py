@@ -1,4 +1,4 @@
-"""Laws of the compiled projection and of depth maps."""
+"""Laws of the compiled projection."""
 
 from __future__ import annotations
 
@@ -7,13 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hairkit.arrays import Float32Array, Float64Array
-from hairkit.cameras.projection_kernels import head_depth, pack_cameras, project_row, splat_depth
-from hairkit.testing import ball_head
+from hairkit.cameras.projection_kernels import pack_camera, perspective_divisor, project
 from hairkit.types.camera import Camera, CameraModel
-from hairkit.types.head import Capsules, Head
 
-BALL = 0.1
 MODELS: tuple[CameraModel, ...] = ("perspective", "orthographic")
 coordinates = st.floats(-0.4, 0.4)
 
@@ -34,24 +30,14 @@ def camera_at(azimuth: float, elevation: float, model: CameraModel, height: int 
     )
 
 
-def sphere_depth(camera: Camera) -> Float64Array:
-    """The axial depth of the ball at every pixel's centre, infinity beside it."""
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    start, way = camera.rays(np.stack([x, y], axis=-1))
-    along = -np.sum(start * way, axis=-1)
-    square = BALL**2 - (np.sum(start * start, axis=-1) - along**2)
-    hit = start + (along - np.sqrt(np.maximum(square, 0)))[..., None] * way
-    return np.where(square > 0, camera.to_camera(hit)[..., 2], np.inf)
-
-
 @pytest.mark.parametrize("model", MODELS)
 @given(st.floats(-180, 180), st.floats(-80, 80), st.tuples(coordinates, coordinates, coordinates))
-def test_a_packed_row_projects_as_its_camera(
+def test_a_packed_camera_projects_as_its_camera(
     model: CameraModel, azimuth: float, elevation: float, point: tuple[float, float, float]
 ) -> None:
     """The compiled projection gives `Camera.project` and the z of `to_camera`."""
     camera = camera_at(azimuth, elevation, model)
-    u, v, depth = project_row(pack_cameras([camera])[0], *point)
+    u, v, depth = project(pack_camera(camera), *point)
     np.testing.assert_allclose([u, v], camera.project(point), rtol=1e-9, atol=1e-9)
     assert depth == pytest.approx(camera.to_camera(point)[2])
 
@@ -59,100 +45,30 @@ def test_a_packed_row_projects_as_its_camera(
 def test_points_behind_a_perspective_camera_have_no_depth_and_no_pixel() -> None:
     """Their depth is at most 0 and they fall far outside of every picture."""
     camera = camera_at(30, 10, "perspective")
-    u, v, depth = project_row(pack_cameras([camera])[0], *(camera.position - 0.2 * camera.forward))
+    u, v, depth = project(pack_camera(camera), *(camera.position - 0.2 * camera.forward))
     assert depth == pytest.approx(-0.2)
     assert max(u, v) < -1e6
 
 
-def test_rows_keep_the_cameras_apart() -> None:
-    """Packing several cameras is packing each; position and height are at their places."""
-    cameras = [camera_at(45.0 * i, 5, MODELS[i % 2], 100 + i) for i in range(4)]
-    rows = pack_cameras(cameras)
-    assert rows.shape == (4, 20)
-    for row, camera in zip(rows, cameras, strict=True):
-        np.testing.assert_array_equal(row, pack_cameras([camera])[0])
-        np.testing.assert_allclose(row[16:19], camera.position)
-        assert row[19] == camera.height
+@pytest.mark.parametrize("model", MODELS)
+def test_a_packed_camera_keeps_every_number(model: CameraModel) -> None:
+    """Its axes are the rotation's rows; position, principal point, height and model are kept."""
+    camera = camera_at(45.0, 5, model, 101)
+    packed = pack_camera(camera)
+    np.testing.assert_array_equal([packed.right, packed.down, packed.forward], camera.rotation)
+    np.testing.assert_array_equal(packed.translation, camera.translation)
+    np.testing.assert_array_equal(packed.position, camera.position)
+    assert (packed.centre_u, packed.centre_v) == tuple(camera.centre)
+    assert packed.height == 101
+    assert packed.orthographic == (model == "orthographic")
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_the_depth_of_a_ball_is_the_sphere_s(model: CameraModel) -> None:
-    """A fine mesh of a ball has the depth of the formula, and covers the same pixels."""
-    camera = camera_at(70, 20, model)
-    depth, wanted = head_depth(ball_head(96), camera), sphere_depth(camera)
-    inner = np.isfinite(wanted) & (wanted < wanted.min() + 0.6 * BALL)
-    assert np.isfinite(depth[inner]).all()
-    np.testing.assert_allclose(depth[inner], wanted[inner], atol=2e-4)
-    assert (np.isfinite(depth) != np.isfinite(wanted)).mean() < 0.005
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_the_depth_of_a_large_slanted_triangle_is_its_plane_s(model: CameraModel) -> None:
-    """Depth is right between far corners too, where it is not linear in the picture."""
-    camera = camera_at(0, 0, model)
-    corners = np.array([[-0.2, -0.3, -0.4], [0.3, -0.2, 0.1], [0.0, 0.4, 0.2]], np.float32)
-    zero = np.zeros((1, 3), np.float32)
-    capsules = Capsules(zero, zero, np.ones((1, 2), np.float32))
-    head = Head(
-        corners,
-        np.array([[0, 1, 2]], np.int32),
-        np.zeros((3, 2), np.float32),
-        np.ones(3, np.float32),
-        None,
-        np.zeros((3, 3), np.float32),
-        capsules,
-    )
-    depth = head_depth(head, camera)
-    rows, columns = np.nonzero(np.isfinite(depth))
-    assert len(rows) > 1000
-    found = camera.unproject(np.stack([columns, rows], axis=-1) + 0.5, depth[rows, columns])
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0]).astype(np.float64)
-    off_plane = (found - corners[0]) @ (normal / np.linalg.norm(normal))
-    np.testing.assert_allclose(off_plane, 0, atol=1e-5)
-
-
-def splatted(
-    camera: Camera, points: Float32Array, radius: float, size: int, far: float = np.inf
-) -> Float32Array:
-    """Draw the points into an empty depth map of `size` x `size` pixels."""
-    depth = np.full((size, size), far, np.float32)
-    splat_depth(pack_cameras([camera])[0], points, radius, depth)
-    return depth
-
-
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("size", [120, 40])
-def test_a_splat_is_the_nearest_of_the_squares_over_a_pixel(model: CameraModel, size: int) -> None:
-    """Point by point in NumPy: no pixel is deeper than any point drawn over it, none is missed."""
-    camera = camera_at(20, 15, model)
-    points = np.random.default_rng(2).normal(0, 0.08, (60, 3)).astype(np.float32)
-    wanted = np.full((size, size), np.inf)
-    for point in points.astype(np.float64):
-        pixel = camera.project(point) * size / camera.height
-        z = camera.to_camera(point)[2]
-        scale = camera.focal / (z if model == "perspective" else 1)
-        reach = 0.01 * scale * size / camera.height
-        low = np.maximum(np.floor(pixel - reach), 0).astype(int)
-        high = np.maximum(np.floor(pixel + reach) + 1, 0).astype(int)
-        square = wanted[low[1] : high[1], low[0] : high[0]]
-        np.minimum(square, z, out=square)
-    np.testing.assert_allclose(splatted(camera, points, 0.01, size), wanted, rtol=1e-5)
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_a_splat_only_brings_nearer(model: CameraModel) -> None:
-    """What is already in the map stays where it is nearer; the order of points does not matter."""
-    camera = camera_at(0, 0, model)
-    points = np.random.default_rng(3).normal(0, 0.05, (200, 3)).astype(np.float32)
-    before = float(camera.to_camera(np.zeros(3))[2])
-    depth = splatted(camera, points, 0.005, 120, far=before)
-    assert depth.max() <= np.float32(before)
-    assert (depth < before).any()
-    np.testing.assert_array_equal(depth, splatted(camera, points[::-1], 0.005, 120, far=before))
-
-
-def test_points_behind_the_camera_or_beside_the_picture_draw_nothing() -> None:
-    """They leave the map as it is."""
-    camera = camera_at(0, 0, "perspective")
-    points = np.array([camera.position - camera.forward, [5.0, 0, 0], [0, -5.0, 0]], np.float32)
-    assert not np.isfinite(splatted(camera, points, 0.01, 60)).any()
+def test_lengths_across_the_view_shrink_with_the_divisor(model: CameraModel) -> None:
+    """A centimetre to the right covers focal * 0.01 / divisor pixels."""
+    camera = pack_camera(camera_at(30, 10, model))
+    u, v, depth = project(camera, 0.02, 0.01, 0.03)
+    right = np.array([0.02, 0.01, 0.03]) + 0.01 * np.array(camera.right)
+    gap = np.subtract(project(camera, *right)[:2], (u, v))
+    wanted = camera.focal * 0.01 / perspective_divisor(camera, depth)
+    np.testing.assert_allclose(gap, [wanted, 0], atol=1e-9)

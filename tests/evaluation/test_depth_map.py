@@ -5,12 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairkit.evaluation.depth_map import (
-    first_surface,
-    front_values,
-    near_some_surface,
-    point_depth,
-)
+from hairkit.cameras.depth_raster import front_values, point_depth
+from hairkit.evaluation.depth_map import first_surface, near_some_surface
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hairkit_plugins.visual_hull.torso_fit import fit_torso
 
-from hairkit.cameras.projection_kernels import mesh_depth
+from hairkit.cameras.depth_raster import mesh_depth
 from hairkit.head_model.template import default_head
 from hairkit.head_model.torso import Torso
 from hairkit.types.camera import Camera

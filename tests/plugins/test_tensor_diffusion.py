@@ -9,9 +9,9 @@ import pytest
 from hairkit_plugins.tensor_diffusion import Options, solve_field
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
-from hairkit.cameras.projection_kernels import pack_cameras
+from hairkit.cameras.projection_kernels import pack_camera
 from hairkit.field import view_fusion
-from hairkit.field.view_fusion import _add_planes
+from hairkit.field.view_fusion import Fading, LooseCells, OrientedView, add_planes
 from hairkit.imaging.waves import Waves, measure_waves
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera, CameraModel
@@ -322,10 +322,9 @@ def test_planes_equal_their_twin(model: CameraModel) -> None:
     front = rng.uniform(0.5, 0.65, (40, 40)).astype(np.float32)
     for see_through in (0.0, 0.03):
         planes, count = np.zeros((300, 6)), np.zeros(300, np.int64)
-        row = pack_cameras([camera])[0]
-        _add_planes(
-            row, points, inner, angle, certainty, front, see_through, 0.01, planes, count
-        )  # fmt: skip
+        view = OrientedView(pack_camera(camera), angle, certainty, front)
+        cells, fading = LooseCells(points, inner), Fading(see_through, 0.01)
+        add_planes(0, 300, view, fading, cells, planes, count)
         for i, point in enumerate(points.astype(np.float64)):
             wanted = twin_plane(camera, point, angle, certainty, front, see_through, 0.01)
             wanted = wanted if inner[i] else np.zeros((3, 3))

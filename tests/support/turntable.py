@@ -9,7 +9,7 @@ import numpy as np
 
 from hairkit import Camera, Capture, Head, Mask, View
 from hairkit.arrays import Float64Array
-from hairkit.cameras.projection_kernels import head_depth
+from hairkit.cameras.depth_raster import head_depth
 from hairkit.head_model.template import default_head
 
 WIDTH, HEIGHT = 300, 400

@@ -8,7 +8,7 @@ import numpy as np
 from hairkit_plugins.visual_hull import Options, build_hull
 
 from hairkit.arrays import Float32Array, Int32Array
-from hairkit.cameras.projection_kernels import mesh_depth
+from hairkit.cameras.depth_raster import mesh_depth
 from hairkit.head_model.template import default_head
 from hairkit.head_model.torso import Torso
 from hairkit.types.camera import Camera

@@ -1,0 +1,128 @@
+"""Votes of views on cells: each says hair, empty or nothing, and the hull keeps what most allow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit import VoxelGrid
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
+from hairkit.cameras.projection_kernels import PackedCamera, project
+from hairkit.parallel import compiled, parallel_for
+
+EMPTY, PERSON, HAIR = 0, 1, 2
+"""Labels of pixels; as a vote, PERSON says nothing."""
+
+
+class LabelledView(NamedTuple):
+    """What one view says about cells."""
+
+    camera: PackedCamera
+    labels: UInt8Array
+    """(H, W) EMPTY, PERSON or HAIR."""
+    surface: Float32Array
+    """(H, W) depth of the person's surface without hair, metres; infinite where it is unknown."""
+    open_left: bool
+    """Hair touches this edge of the picture: beyond it nothing is known."""
+    open_top: bool
+    open_right: bool
+    open_bottom: bool
+
+
+class Cells(NamedTuple):
+    """The cells that are voted on."""
+
+    origin: Float64Array
+    """(3,) corner of the grid, metres."""
+    spacing: float
+    """Edge of a cell, metres."""
+    candidates: BoolArray
+    """(X, Y, Z) cells that may be hair at all."""
+    near: BoolArray
+    """(X, Y, Z) cells near enough to the person to hold hair that a picture's edge cuts off."""
+
+
+class Rule(NamedTuple):
+    """When a cell is kept."""
+
+    min_views: int
+    """Views that must see hair in it."""
+    forgive: int
+    """Views that may call it empty."""
+    front_margin: float
+    """Depth in front of the person's surface beyond which a cell is empty, metres."""
+
+
+def carve(
+    grid: VoxelGrid,
+    candidates: BoolArray,
+    near: BoolArray,
+    views: Sequence[LabelledView],
+    rule: Rule,
+) -> BoolArray:
+    """Return the candidate cells (X, Y, Z) that the views' votes keep.
+
+    Beyond a picture only cells `near` (X, Y, Z) the person may hold hair.
+    """
+    cells = Cells(grid.origin, float(grid.spacing), candidates, near)
+    hair, empty = (np.zeros(grid.shape, np.int16) for _ in range(2))
+    for view in views:
+        parallel_for(add_votes, grid.shape[0], view, cells, rule, hair, empty)
+    return candidates & (empty <= rule.forgive) & (hair >= rule.min_views)
+
+
+@compiled
+def add_votes(
+    first: int,
+    last: int,
+    view: LabelledView,
+    cells: Cells,
+    rule: Rule,
+    hair: npt.NDArray[np.int16],
+    empty: npt.NDArray[np.int16],
+) -> None:
+    """Add a view's votes to hair and empty (X, Y, Z), for the layers `first` to `last` along x.
+
+    Cells that already have too many empty votes are left out: they are lost.
+    """
+    _, size_y, size_z = cells.candidates.shape
+    for ix in range(first, last):
+        x = cells.origin[0] + (ix + 0.5) * cells.spacing
+        for iy in range(size_y):
+            y = cells.origin[1] + (iy + 0.5) * cells.spacing
+            for iz in range(size_z):
+                if not cells.candidates[ix, iy, iz] or empty[ix, iy, iz] > rule.forgive:
+                    continue
+                z = cells.origin[2] + (iz + 0.5) * cells.spacing
+                u, v, depth = project(view.camera, x, y, z)
+                vote = _vote(view, u, v, depth, rule.front_margin, cells.near[ix, iy, iz])
+                if vote == HAIR:
+                    hair[ix, iy, iz] += 1
+                elif vote == EMPTY:
+                    empty[ix, iy, iz] += 1
+
+
+@compiled
+def _vote(view: LabelledView, u: float, v: float, depth: float, margin: float, near: bool) -> int:
+    """Return a view's vote on a cell at pixel u, v: EMPTY, HAIR or, saying nothing, PERSON.
+
+    Where the view sees the person, a cell farther than `margin` in front of the surface is empty.
+    """
+    height, width = view.labels.shape
+    left, top, right, bottom = u < 0, v < 0, u >= width, v >= height
+    if left or top or right or bottom:
+        unknown = near and (
+            (left and view.open_left)
+            or (top and view.open_top)
+            or (right and view.open_right)
+            or (bottom and view.open_bottom)
+        )
+        return PERSON if unknown else EMPTY
+    label = view.labels[int(v), int(u)]
+    surface = view.surface[int(v), int(u)]
+    if label == PERSON and np.isfinite(surface) and depth < surface - margin:
+        return EMPTY
+    return int(label)
