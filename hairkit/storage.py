@@ -1,10 +1,16 @@
-"""Frozen types that can be written to one `.npz` and read back: the lossless native form."""
+"""Files on disk: guarded reading, atomic writing, and frozen types as one `.npz` and back.
+
+Every file that a user names is opened by `open_file`, and read by it, `read_bytes` or `read_text`.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import io
+import math
 import os
+import stat
 import tempfile
 import tokenize
 import types
@@ -13,15 +19,30 @@ import zipfile
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import FormatError, InputError
 
-MAX_UNPACKED_BYTES = 4 * 2**30
-"""Refuse archives that claim to unpack to more than this many bytes."""
+MAX_FILE_BYTES = 4 * 2**30
+"""Files larger than this are refused."""
+MAX_UNPACKED_RATIO, FREE_UNPACKED_BYTES = 32, 64 * 2**20
+"""An npz may unpack to 32 times its own size, and to 64 MiB whatever its size.
+
+Deflate reaches 1030 : 1 on zeros. Grooms are packed 1.5 : 1 and volumes 8 : 1; masks, 65 : 1, are
+below 64 MiB.
+"""
+_CHUNK_BYTES = 2**20
+"""Arrays are unpacked in pieces of this size, straight into their memory."""
+_KINDS = {
+    stat.S_IFDIR: "a folder",
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
 
 _UNREADABLE = (
     zipfile.BadZipFile,
@@ -38,6 +59,8 @@ _UNREADABLE = (
 )
 """What zipfile and NumPy raise on damaged archives, encrypted members and wild headers included."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
+_NAME_KEPT = 32
+"""Characters of a file's name that its temporary file bears; file systems allow 255 bytes."""
 
 
 class Stored:
@@ -105,24 +128,106 @@ def write_npz(
     write_bytes(path, buffer.getbuffer(), durable=durable)
 
 
-def read_npz(path: str | os.PathLike[str]) -> dict[str, npt.NDArray[Any]]:
-    """Read every array of an npz file; `FormatError` for pickles, bombs and damaged files."""
+def open_file(path: str | os.PathLike[str]) -> BinaryIO:
+    """Return a file opened for reading in binary.
+
+    Raises
+    ------
+    InputError
+        It is missing, cannot be read, or is a folder, pipe, socket or device: reading one of those
+        may wait forever or never end.
+    """
     try:
-        with zipfile.ZipFile(path) as archive:
-            unpacked = sum(info.file_size for info in archive.infolist())
-        if unpacked > MAX_UNPACKED_BYTES:
-            raise FormatError(
-                f"{path}: claims to unpack to {unpacked} bytes, more than {MAX_UNPACKED_BYTES}"
-            )
-        with np.load(path, allow_pickle=False) as data:
-            return {name: data[name] for name in data.files}
+        _check_kind(path, os.stat(path).st_mode)
+        # without O_NONBLOCK this would wait, if a pipe took the file's place since
+        handle = os.open(
+            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        )
+        try:
+            _check_kind(path, os.fstat(handle).st_mode)
+            return os.fdopen(handle, "rb")
+        except BaseException:
+            os.close(handle)
+            raise
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such file") from error
-    except _UNREADABLE as error:
-        if isinstance(error, FormatError):
+    except (OSError, ValueError) as error:  # ValueError: a NUL within the name
+        reason = getattr(error, "strerror", None) or error
+        if isinstance(error, InputError):
             raise
+        raise InputError(f"{path}: cannot be read ({reason})") from error
+
+
+def read_bytes(path: str | os.PathLike[str], limit: int = MAX_FILE_BYTES) -> bytes:
+    """Return a file's bytes; `InputError` where `open_file` raises it, or above `limit` bytes."""
+    with open_file(path) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > limit:
+            raise InputError(f"{path}: {size} bytes, hairkit reads up to {limit}")
+        try:
+            return file.read(size)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def read_text(path: str | os.PathLike[str], limit: int = MAX_FILE_BYTES) -> str:
+    """Return a file's UTF-8 text; `FormatError` when it is none, `InputError` as `read_bytes`."""
+    try:
+        return read_bytes(path, limit).decode()
+    except UnicodeDecodeError as error:
+        raise FormatError(
+            f"{path}: not UTF-8 text ({error.reason} at byte {error.start})"
+        ) from error
+
+
+def read_npz(path: str | os.PathLike[str]) -> dict[str, npt.NDArray[Any]]:
+    """Return every array of an npz file.
+
+    Sizes are checked before memory is allocated: the archive's claims against the file's size, and
+    each array's header against the archive. `FormatError` for pickles, archives that unpack to
+    more than `MAX_UNPACKED_RATIO` allows, and damaged files; `InputError` as `open_file`.
+    """
+    try:
+        with open_file(path) as file, zipfile.ZipFile(file) as archive:
+            members = archive.infolist()
+            unpacked = sum(info.file_size for info in members)
+            size = os.fstat(file.fileno()).st_size
+            if unpacked > max(MAX_UNPACKED_RATIO * size, FREE_UNPACKED_BYTES):
+                raise FormatError(
+                    f"{path}: {size} bytes that unpack to {unpacked}, more than any groom would"
+                )
+            return {info.filename.removesuffix(".npy"): _member(archive, info) for info in members}
+    except InputError:
+        raise
+    except _UNREADABLE as error:
         reason = str(error).partition("\n")[0][:120]  # zipfile quotes the damaged bytes in full
         raise FormatError(f"{path}: not a readable .npz file ({reason})") from error
+
+
+def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> npt.NDArray[Any]:
+    """Return one array of an open npz file, whose header must account for all of its bytes."""
+    with archive.open(info) as member:
+        version = np.lib.format.read_magic(member)
+        if version == (1, 0):
+            shape, fortran_order, dtype = np.lib.format.read_array_header_1_0(member)
+        else:
+            shape, fortran_order, dtype = np.lib.format.read_array_header_2_0(member)
+        if dtype.hasobject or not dtype.itemsize:
+            raise ValueError(f"{info.filename} holds no numbers or texts")
+        count = math.prod(shape)
+        if min(shape, default=0) < 0 or member.tell() + count * dtype.itemsize != info.file_size:
+            raise ValueError(f"{info.filename} has {info.file_size} bytes, its header says {shape}")
+        flat = np.empty(count, dtype)
+        buffer = flat.view(np.uint8).data
+        at = 0
+        while at < len(buffer):
+            piece = member.read(min(_CHUNK_BYTES, len(buffer) - at))
+            if not piece:
+                raise ValueError(f"{info.filename} ends too early")
+            buffer[at : at + len(piece)] = piece
+            at += len(piece)
+        member.read(1)  # at the end the checksum is compared
+    return flat.reshape(shape, order="F" if fortran_order else "C")
 
 
 def write_bytes(
@@ -136,11 +241,13 @@ def write_pieces(
     path: str | os.PathLike[str], pieces: Iterable[bytes | memoryview], *, durable: bool = True
 ) -> None:
     """Write pieces one after the other as `write_bytes` does, without joining them in memory."""
-    target = Path(path)
-    handle, temporary = tempfile.mkstemp(
-        prefix=f".{target.name}.", suffix=".part", dir=target.parent
-    )
+    target, temporary = Path(path), None
     try:
+        with contextlib.suppress(FileNotFoundError):
+            _check_kind(target, os.stat(target).st_mode)
+        handle, temporary = tempfile.mkstemp(
+            prefix=f".{target.name[:_NAME_KEPT]}.", suffix=".part", dir=target.parent
+        )
         with os.fdopen(handle, "wb") as file:
             for piece in pieces:
                 file.write(piece)
@@ -150,10 +257,18 @@ def write_pieces(
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, target)
     except BaseException as error:
-        Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError) and error.filename is None:
-            error.filename = str(target)  # a failed write does not say which file it was
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            error.filename, error.filename2 = str(target), None  # not the temporary file
         raise
+
+
+def _check_kind(path: str | os.PathLike[str], mode: int) -> None:
+    """Raise `InputError` for the mode of anything but a regular file."""
+    if not stat.S_ISREG(mode):
+        kind = _KINDS.get(stat.S_IFMT(mode), "no regular file")
+        raise InputError(f"{path}: is {kind}, expected a file")
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

@@ -20,13 +20,13 @@ from hairkit.errors import InputError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed, plain_widths, rows_kept
 from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.io.byte_reader import ByteReader, finite, read_file
+from hairkit.io.byte_reader import ByteReader, finite
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.strand_blocks import blocks, colours
 from hairkit.options import option
-from hairkit.storage import write_pieces
+from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
 
@@ -79,7 +79,7 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
 @hookimpl
 def import_groom(path: Path, options: Options) -> Groom:
     """Read the strands; a head is put under them."""
-    reader = ByteReader(read_file(path), path)
+    reader = ByteReader(read_bytes(path), path)
     header = _header(reader)
     counts = _counts(reader, header)
     total, arrays = int(header["points"]), int(header["arrays"])

@@ -17,13 +17,12 @@ from hairkit.errors import FormatError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
 from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.io.byte_reader import read_file
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.number_text import read_numbers, stripped, whole_digits, written_rows
 from hairkit.io.polylines import chains
 from hairkit.io.strand_blocks import blocks
-from hairkit.storage import write_pieces
+from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -45,7 +44,7 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
 @hookimpl
 def import_groom(path: Path, options: Options) -> Groom:
     """Read all lines as strands; faces are passed over, and a head is put under the strands."""
-    vertices, lines, before = _elements(read_file(path).decode("latin-1"))
+    vertices, lines, before = _elements(read_bytes(path).decode("latin-1"))
     if not lines:
         raise FormatError(f"{path}: holds no lines ('l' elements), so no strands")
     points = _points(vertices, path)

@@ -18,12 +18,12 @@ from hairkit.arrays import BoolArray, Int64Array
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
 from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.io.byte_reader import ByteReader, finite, read_file
+from hairkit.io.byte_reader import ByteReader, finite
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.strand_blocks import blocks
-from hairkit.storage import write_pieces
+from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -50,7 +50,7 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
 @hookimpl
 def import_groom(path: Path, options: Options) -> Groom:
     """Read the strands; a head is put under them."""
-    reader = ByteReader(read_file(path), path)
+    reader = ByteReader(read_bytes(path), path)
     width = _numbers_a_point(path)
     words = reader.array("<i4", reader.left // 4, "the file")
     if len(words) * 4 != len(reader.data) or not len(words):

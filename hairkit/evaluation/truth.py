@@ -14,7 +14,7 @@ from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
 from hairkit.evaluation.depth_map import Surface, first_surface
 from hairkit.evaluation.scores import Samples, sample_strands
-from hairkit.storage import read_npz
+from hairkit.storage import read_bytes, read_npz, read_text
 from hairkit.types.camera import Camera
 from hairkit.types.head import Capsules, Head
 from hairkit.types.scene import read_cameras
@@ -90,7 +90,7 @@ def _read_head(path: Path) -> Head:
     vertices: list[list[float]] = []
     faces: list[list[int]] = []
     try:
-        for line in path.read_text().splitlines():
+        for line in read_text(path).splitlines():
             kind, _, rest = line.partition(" ")
             if kind == "v":
                 vertices.append([float(value) for value in rest.split()[:3]])
@@ -101,7 +101,7 @@ def _read_head(path: Path) -> Head:
                 )
         points = np.array(vertices, np.float32).reshape(-1, 3)
         triangles = np.array(faces, np.int32).reshape(-1, 3)
-    except (ValueError, IndexError, UnicodeDecodeError) as error:
+    except (ValueError, IndexError) as error:
         raise FormatError(f"{path}: not a readable OBJ mesh ({error})") from error
     if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points):
         raise FormatError(f"{path}: its faces are missing or name vertices that do not exist")
@@ -116,7 +116,8 @@ def _picture(folder: Path, view: int) -> UInt8Array:
     files = sorted(folder.glob("*.png"))
     if view >= len(files):
         raise InputError(f"{folder}: no picture for view {view}; found {len(files)} .png files")
-    image = cv2.imread(str(files[view]), cv2.IMREAD_GRAYSCALE)
+    data = np.frombuffer(read_bytes(files[view]), np.uint8)
+    image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
     if image is None:
         raise FormatError(f"{files[view]}: not a readable picture")
     return np.asarray(image, np.uint8)

@@ -3,29 +3,12 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.errors import FormatError, InputError
-
-MAX_FILE_BYTES = 4 * 2**30
-"""Files larger than this are refused."""
-
-
-def read_file(path: str | os.PathLike[str], limit: int = MAX_FILE_BYTES) -> bytes:
-    """Return a file's bytes; raises `InputError` when it is missing, no file or above `limit`."""
-    source = Path(path)
-    if not source.exists():
-        raise InputError(f"{path}: no such file")
-    if not source.is_file():
-        raise InputError(f"{path}: not a file")
-    size = source.stat().st_size
-    if size > limit:
-        raise InputError(f"{path}: {size} bytes, hairkit reads up to {limit}")
-    return source.read_bytes()
+from hairkit.errors import FormatError
 
 
 class ByteReader:

@@ -22,6 +22,7 @@ from hairkit.errors import FormatError, InputError
 from hairkit.io.capture_toml import CaptureFile, ViewEntry, read_capture_file
 from hairkit.io.photos import PhotoHeader, focal_from_equivalent, read_header, read_photo
 from hairkit.options import unknown_name
+from hairkit.storage import read_bytes
 from hairkit.types.capture import Capture, View
 
 TURN = {
@@ -45,6 +46,8 @@ SMALLEST_SHARE = 0.85
 _PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png")
 _OTHER_SUFFIXES = (".heic", ".heif", ".webp", ".tif", ".tiff", ".bmp", ".gif", ".dng", ".avif")
 _LANDMARKS = 68
+_MAX_LANDMARK_BYTES = 2**22
+"""68 points of eight views are some 20 kB of JSON."""
 
 
 @dataclass(frozen=True)
@@ -216,12 +219,13 @@ def _check_mask(mask: Path | None, photo: PhotoHeader) -> None:
 
 def _landmarks(path: Path, places: list[_Place]) -> dict[str, Float64Array]:
     """Return 68 points (68, 2) in pixels of the photo on disk, by the photo's stem."""
-    if not path.exists():
+    if not os.path.lexists(path):
         return {}
+    data = read_bytes(path, _MAX_LANDMARK_BYTES)
     try:
-        views = json.loads(path.read_bytes())["views"]
+        views = json.loads(data)["views"]
         items: Iterable[tuple[str, Any]] = views.items()
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FormatError(
             f'{path}: expected JSON {{"views": {{NAME: points}}}} ({error})'
         ) from error

@@ -16,6 +16,7 @@ focal_px = 1492
 from __future__ import annotations
 
 import math
+import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -27,9 +28,10 @@ import numpy as np
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
 from hairkit.options import make_options, option, unknown_name
-from hairkit.storage import write_text
+from hairkit.storage import read_text, write_text
 
 _TABLES = ("head", "views")
+_MAX_BYTES = 2**20
 
 
 @dataclass(frozen=True)
@@ -90,11 +92,11 @@ class CaptureFile:
 
 def read_capture_file(path: Path) -> CaptureFile:
     """Read a `capture.toml`; a missing one says nothing. Raises `InputError` or `OptionError`."""
-    if not path.exists():
+    if not os.path.lexists(path):
         return CaptureFile(path)
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        document = tomllib.loads(read_text(path, _MAX_BYTES))
+    except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not a TOML file: {error}") from error
     keys = [field.name for field in fields(_Top)] + list(_TABLES)
     for key in document:
@@ -112,7 +114,7 @@ def read_capture_file(path: Path) -> CaptureFile:
 
 def write_head_entry(path: Path, entry: HeadEntry) -> None:
     """Put the head's pose into a `capture.toml`, made where there is none; all else in it stays."""
-    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    text = read_text(path, _MAX_BYTES) if path.exists() else ""
     kept, inside = [], False
     for line in text.splitlines():
         if line.strip().startswith("["):

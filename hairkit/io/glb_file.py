@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
 from hairkit.errors import FormatError, HairkitError
-from hairkit.io.byte_reader import MAX_FILE_BYTES, read_file
+from hairkit.storage import MAX_FILE_BYTES, read_bytes
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """NumPy types by the numbers that glTF gives them."""
@@ -64,7 +64,7 @@ class GlbFile:
     def __init__(self, path: str | os.PathLike[str], limit: int = MAX_FILE_BYTES) -> None:
         """Read a file of at most `limit` bytes; side files must lie in its own folder."""
         self.path = Path(path)
-        data = read_file(path, limit)
+        data = read_bytes(path, limit)
         self.bytes_read = len(data)
         """Bytes of the file and of what it brought in so far: a measure for what may come of it."""
         self._binary: memoryview | None = None
@@ -177,7 +177,7 @@ class GlbFile:
         file = self.path.parent / name
         if file.resolve().parent != self.path.parent.resolve():
             raise ValueError(f"buffer {number} lies outside the file's folder: {name[:80]!r}")
-        return memoryview(read_file(file))
+        return memoryview(read_bytes(file))
 
 
 def node_matrix(node: dict[str, Any]) -> Float64Array:

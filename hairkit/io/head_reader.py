@@ -15,13 +15,14 @@ from hairkit.head_model.template import default_head
 from hairkit.io.glb_mesh import read_glb
 from hairkit.io.mesh_text import FileMesh, read_obj, read_ply
 from hairkit.io.photos import read_drawing
-from hairkit.storage import write_text
+from hairkit.storage import read_text, write_text
 from hairkit.types.head import Capsules, Head
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres in one unit of a head file."""
 _READERS = {".obj": read_obj, ".ply": read_ply, ".glb": read_glb}
 _DEFAULT_BREADTH = 0.155
+_MAX_LANDMARK_BYTES = 2**20
 _TOP_OVER_BREADTH = 0.452
 """Height of the crown over the head's centre, in head breadths."""
 _HOW_TO_MARK = (
@@ -120,14 +121,14 @@ def _scalp_weight(mesh: FileMesh, file: Path, scalp: str | None) -> Float64Array
     """(V,) from the first mark that the file or the user gives."""
     if scalp is not None and scalp.lower() in mesh.groups:
         weight = mesh.groups[scalp.lower()]
-    elif scalp is not None and Path(scalp).is_file():
+    elif scalp is not None and os.path.lexists(scalp):
         weight = _picture_weight(mesh, file, Path(scalp))
     elif scalp is not None:
         known = ", ".join(sorted(mesh.groups)) or "none"
         raise InputError(f"{file}: no group or picture {scalp!r} for the scalp; groups: {known}")
     elif "scalp" in mesh.groups:
         weight = mesh.groups["scalp"]
-    elif _beside(file, "scalp.png").is_file():
+    elif os.path.lexists(_beside(file, "scalp.png")):
         weight = _picture_weight(mesh, file, _beside(file, "scalp.png"))
     elif mesh.colours is not None:
         weight = _painted_weight(mesh.colours, file)
@@ -200,12 +201,13 @@ def _breadth_and_middle(
 def _landmarks(file: Path, vertices: Float64Array, units: str, up: str) -> Int32Array | None:
     """(68,) vertices named by, or nearest to the points in, NAME.landmarks.json."""
     path = _beside(file, "landmarks.json")
-    if not path.is_file():
+    if not os.path.lexists(path):
         return None
+    text = read_text(path, _MAX_LANDMARK_BYTES)
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(text)
         values = np.array(data["landmarks"] if isinstance(data, dict) else data, np.float64)
-    except (ValueError, TypeError, KeyError, OverflowError, RecursionError, OSError) as error:
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
         raise FormatError(f"{path}: not a JSON list of 68 landmarks ({error})") from error
     if values.shape not in ((68,), (68, 3)) or not np.isfinite(values).all():
         raise FormatError(f"{path}: expected 68 vertex numbers or 68 points, all finite")

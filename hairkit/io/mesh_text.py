@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, Int64Array
-from hairkit.errors import FormatError, InputError
+from hairkit.errors import FormatError
+from hairkit.storage import read_bytes
 
-MAX_FILE_BYTES = 512 * 2**20
+MAX_MESH_BYTES = 512 * 2**20
 MAX_VERTICES = 2_000_000
 MAX_FACES = 4_000_000
 
@@ -39,17 +39,6 @@ class FileMesh:
     """(V, 3) painted colours in [0, 1]."""
     groups: dict[str, Float64Array] = field(default_factory=dict)
     """Lower-case name of a group, material or vertex property: (V,) weights in [0, 1]."""
-
-
-def read_mesh_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Return the bytes of a mesh file that exists and is not absurdly large."""
-    try:
-        size = Path(path).stat().st_size
-        if size > MAX_FILE_BYTES:
-            raise InputError(f"{path}: {size} bytes, more than the {MAX_FILE_BYTES} allowed")
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
 
 
 def checked_mesh(mesh: FileMesh, path: str | os.PathLike[str]) -> FileMesh:
@@ -87,7 +76,8 @@ def read_obj(path: str | os.PathLike[str]) -> FileMesh:
     vertex's faces that are in it. Raises `FormatError` with the line's number.
     """
     parser = _ObjParser()
-    for number, line in enumerate(read_mesh_bytes(path).decode("latin-1").splitlines(), 1):
+    text = read_bytes(path, MAX_MESH_BYTES).decode("latin-1")
+    for number, line in enumerate(text.splitlines(), 1):
         try:
             parser.read(line)
         except (ValueError, IndexError, OverflowError) as error:
@@ -197,7 +187,7 @@ def read_ply(path: str | os.PathLike[str]) -> FileMesh:
     Every scalar vertex property that is no position, normal, colour or texture coordinate becomes
     a group of that name, with values above 1 divided by 255. Raises `FormatError`.
     """
-    data = read_mesh_bytes(path)
+    data = read_bytes(path, MAX_MESH_BYTES)
     try:
         elements, order, body = _ply_header(data)
         tables = _ply_tables(elements, order, body)

@@ -18,6 +18,7 @@ import numpy as np
 from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
 from hairkit.io.exif import Exif, read_exif
+from hairkit.storage import read_bytes
 
 MAX_PIXELS = 64_000_000
 """Pictures with more pixels than this are refused before they are decoded."""
@@ -77,7 +78,7 @@ def focal_from_equivalent(focal_mm: float, width: int, height: int) -> float:
 
 def read_header(path: str | os.PathLike[str]) -> PhotoHeader:
     """Return what the picture's header says; `InputError` when it is unusable."""
-    return _header(_read_bytes(Path(path)), Path(path))
+    return _header(read_bytes(path, MAX_BYTES), Path(path))
 
 
 def read_photo(
@@ -104,7 +105,7 @@ def read_photo(
     InputError
         The file is missing, no picture, damaged, or has more than `MAX_PIXELS` pixels.
     """
-    data = _read_bytes(Path(path))
+    data = read_bytes(path, MAX_BYTES)
     header = _header(data, Path(path))
     scale = min(1.0, (max_edge or math.inf) / max(header.width, header.height))
     # a JPEG decoder halves pictures almost for free; never below the size that is wanted
@@ -124,7 +125,7 @@ def read_drawing(path: str | os.PathLike[str]) -> UInt8Array:
 
     A drawing with transparency is its alpha channel; a coloured one is refused with `InputError`.
     """
-    data = _read_bytes(Path(path))
+    data = read_bytes(path, MAX_BYTES)
     if _header(data, Path(path)).kind != "PNG":
         raise InputError(f"{path}: masks must be PNG files, because JPEG smears their labels")
     pixels = _decode(data, cv2.IMREAD_UNCHANGED, Path(path))
@@ -137,15 +138,6 @@ def read_drawing(path: str | os.PathLike[str]) -> UInt8Array:
     if (pixels[..., :3] != pixels[..., :1]).any():
         raise InputError(f"{path}: a coloured picture, expected a mask in shades of grey")
     return np.ascontiguousarray(pixels[..., 0])
-
-
-def _read_bytes(path: Path) -> bytes:
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"{path}: {path.stat().st_size} bytes, more than {MAX_BYTES} allowed")
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: picture cannot be read: {error.strerror}") from error
 
 
 def _header(data: bytes, path: Path) -> PhotoHeader:

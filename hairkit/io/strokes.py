@@ -15,6 +15,7 @@ import numpy as np
 from hairkit.arrays import BoolArray, Float64Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.options import unknown_name
+from hairkit.storage import read_bytes
 
 StrokeLabel = Literal["foreground", "background", "person"]
 
@@ -110,13 +111,10 @@ def rasterise(stroke: Stroke, width: int, height: int, thickness: float) -> Bool
 
 
 def _document(path: Path) -> dict[str, Any]:
+    data = read_bytes(path, _MAX_BYTES)
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise FormatError(f"{path}: is larger than {_MAX_BYTES} bytes, expected strokes")
-        document = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
-        if isinstance(error, FormatError):
-            raise
+        document = json.loads(data)
+    except (ValueError, RecursionError) as error:
         raise FormatError(f"{path}: no strokes could be read ({error})") from error
     if not isinstance(document, dict):
         raise FormatError(f"{path}: holds no JSON object, expected strokes in labelme's JSON")

@@ -26,6 +26,7 @@ from hairkit.errors import HairkitError, InputError, OptionError
 from hairkit.manager import Manager
 from hairkit.options import unknown_name
 from hairkit.pipeline.module_digest import module_digest
+from hairkit.storage import read_bytes
 
 HOOKS = {
     "segment": "segment",
@@ -151,13 +152,10 @@ def load_recipe(name: str | os.PathLike[str]) -> Recipe:
         data = (importlib.resources.files("hairkit") / "recipes" / f"{text}.toml").read_bytes()
         return parse_recipe(data, text, f"recipe {text}")
     path = Path(text)
-    if path.suffix != ".toml" and not path.is_file():
+    if path.suffix != ".toml" and not path.exists():
         reason = unknown_name("recipe", text, recipe_names())
         raise InputError(f"{reason}, or the path of a .toml file")
-    try:
-        return parse_recipe(path.read_bytes(), path.stem, text)
-    except OSError as error:
-        raise InputError(f"{text}: recipe cannot be read: {error.strerror}") from error
+    return parse_recipe(read_bytes(path), path.stem, text)
 
 
 def recipe_names() -> tuple[str, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from hairkit.arrays import Float64Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.simulation import quaternion
+from hairkit.storage import read_text
 from hairkit.types.head import Head
 
 AXES = {"pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.0), "roll": (0.0, 0.0, 1.0)}
@@ -163,12 +164,9 @@ def read_motion(path: Path) -> HeadMotion:
 
 
 def _read_json(path: Path) -> HeadMotion:
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
-    if path.stat().st_size > _LARGEST_FILE:
-        raise FormatError(f"{path}: larger than {_LARGEST_FILE} bytes, which no head motion is")
+    text = read_text(path, _LARGEST_FILE)
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(text)
         if "frames" in found:
             frames = found["frames"]
             times = np.array([float(frame["time"]) for frame in frames])

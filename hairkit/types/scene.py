@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
 from hairkit.errors import FormatError, InputError
-from hairkit.storage import Stored, write_text
+from hairkit.storage import Stored, read_text, write_text
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 
@@ -47,12 +46,10 @@ class Scene(Stored):
 def read_cameras(path: str | os.PathLike[str]) -> tuple[tuple[str, ...], tuple[Camera, ...]]:
     """Read view names and cameras from a `scene.json` or a capture's `truth.json`."""
     try:
-        views = json.loads(Path(path).read_text())["views"]
+        views = json.loads(read_text(path))["views"]
         names = tuple(str(view.get("name", index)) for index, view in enumerate(views))
         return names, tuple(Camera.from_json(view) for view in views)
     except (
-        OSError,
-        UnicodeDecodeError,
         json.JSONDecodeError,
         KeyError,
         TypeError,

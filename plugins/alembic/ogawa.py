@@ -12,7 +12,7 @@ import struct
 from pathlib import Path
 
 from hairkit.errors import FormatError, InputError
-from hairkit.io.byte_reader import read_file
+from hairkit.storage import read_bytes
 
 _MAGIC, _HDF5, _FROZEN = b"Ogawa", b"\x89HDF", 0xFF
 _HEADER_BYTES = 16
@@ -43,7 +43,7 @@ class Ogawa:
     @classmethod
     def open(cls, path: Path) -> Ogawa:
         """Read a file; raises `InputError` when it is missing, `FormatError` when not Ogawa."""
-        return cls(read_file(path), path)
+        return cls(read_bytes(path), path)
 
     def group(self, child: int, name: str) -> tuple[int, ...]:
         """Return the children of a group; 0 is an empty group."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NoReturn
 from xml.parsers import expat
@@ -15,6 +14,7 @@ import numpy as np
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import FormatError
 from hairkit.io.number_text import read_numbers
+from hairkit.storage import read_bytes
 
 from . import schema
 from .asset import ApxAsset, Material, MaterialValue
@@ -48,8 +48,9 @@ def read_apx(path: str | os.PathLike[str]) -> ApxAsset:
         The file cannot be read, is no .apx, declares entities, is nested or large beyond reason,
         lies about sizes, or holds what HairWorks would not load.
     """
+    data = read_bytes(path, _MAX_BYTES)
     try:
-        classes = _classes(_parse(Path(path)))
+        classes = _classes(_parse(data))
         texts = _fields(classes["HairSceneDescriptor"])
         info = _fields(classes["HairWorksInfo"])
         fields = _fields(classes["HairAssetDescriptor"])
@@ -57,8 +58,6 @@ def read_apx(path: str | os.PathLike[str]) -> ApxAsset:
         return _asset(fields, materials, _strings(info, schema.INFO_FIELDS), texts)
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error
-    except OSError as error:
-        raise FormatError(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
 def _asset(
@@ -92,11 +91,8 @@ def _asset(
     )
 
 
-def _parse(path: Path) -> _Element:
+def _parse(data: bytes) -> _Element:
     """Return the root element; nothing but elements, attributes and text is let in."""
-    size = path.stat().st_size
-    if size > _MAX_BYTES:
-        raise FormatError(f"is {size} bytes long, expected at most {_MAX_BYTES}")
     parser = expat.ParserCreate("utf-8")  # whatever a prolog says
     parser.buffer_text = True
     root = _Element("", {})
@@ -128,9 +124,8 @@ def _parse(path: Path) -> _Element:
     parser.ExternalEntityRefHandler = _refuse_entities
     parser.SkippedEntityHandler = _refuse_entities
     try:
-        with path.open("rb") as file:
-            while chunk := file.read(_CHUNK):
-                parser.Parse(chunk, False)
+        for start_at in range(0, len(data), _CHUNK):
+            parser.Parse(data[start_at : start_at + _CHUNK], False)
         parser.Parse(b"", True)
     except expat.ExpatError as error:
         raise FormatError(f"is no well-formed .apx ({error})") from error

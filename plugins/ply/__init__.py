@@ -28,13 +28,13 @@ from hairkit.grooming.adopt_strands import (
 )
 from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.io.byte_reader import finite, read_file
+from hairkit.io.byte_reader import finite
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.polylines import chains
 from hairkit.io.strand_blocks import blocks, colours
-from hairkit.storage import write_pieces
+from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
 
@@ -86,7 +86,7 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
 @hookimpl
 def import_groom(path: Path, options: Options) -> Groom:
     """Read the strands, or put edges together to strands; a head is put under them."""
-    elements = read_elements(read_file(path), path)
+    elements = read_elements(read_bytes(path), path)
     vertex = elements.get("vertex")
     if vertex is None or not {"x", "y", "z"} <= set(vertex):
         raise FormatError(f"{path}: has no element vertex with x, y and z")

@@ -25,11 +25,11 @@ from hairkit.grooming.adopt_strands import (
 )
 from hairkit.grooming.prepare_export import ExportOptions, prepared
 from hairkit.hookspecs import hookimpl
-from hairkit.io.byte_reader import ByteReader, read_file
+from hairkit.io.byte_reader import ByteReader
 from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
-from hairkit.storage import write_bytes, write_pieces
+from hairkit.storage import read_bytes, write_bytes, write_pieces
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
 
@@ -84,7 +84,7 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
 @hookimpl
 def import_groom(path: Path, options: Options) -> Groom:
     """Read a .tfx of version 4, or a text file of version 1 or 2; a head is put under it."""
-    data = read_file(path)
+    data = read_bytes(path)
     hair, counts = read_text(data, path) if is_text(data) else read_binary(ByteReader(data, path))
     points = options.space.points_to_head(hair.points.reshape(-1, 3))
     strands, kept = packed(points, counts, path)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy.typing as npt
 
 from hairkit.errors import FormatError, InputError, MissingExtraError
-from hairkit.storage import read_npz
+from hairkit.storage import open_file, read_npz
 
 from .stage import MISSING
 
@@ -48,8 +48,8 @@ def contents(path: Path) -> Contents:
     """
     if importlib.util.find_spec("pxr") is None:
         raise MissingExtraError(MISSING)
-    if not path.is_file():
-        raise InputError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+    with open_file(path):
+        pass  # it is there and a file
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise InputError(f"{path}: {size} bytes, hairkit reads up to {MAX_BYTES}")

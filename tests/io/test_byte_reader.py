@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hairkit.errors import FormatError, InputError
-from hairkit.io.byte_reader import ByteReader, finite, read_file
+from hairkit.errors import FormatError
+from hairkit.io.byte_reader import ByteReader, finite
 from hairkit.io.byte_writer import joined
 
 KINDS = ("<u2", ">i4", "<f4", "<f8", "u1")
@@ -55,15 +53,6 @@ def test_text_ends_at_the_first_nul() -> None:
     reader = ByteReader(b"head\0\0\xff\xfeab", "a.bin")
     assert reader.text(6, "name") == "head"
     assert reader.text(4, "name").endswith("ab")
-
-
-def test_files_that_cannot_be_read_are_said(tmp_path: Path) -> None:
-    """Missing files, folders and giants are one line each."""
-    (tmp_path / "big").write_bytes(bytes(100))
-    for path, reason in (("none", "no such file"), (".", "not a file"), ("big", "reads up to 99")):
-        with pytest.raises(InputError, match=reason):
-            read_file(tmp_path / path, 99)
-    assert read_file(tmp_path / "big", 100) == bytes(100)
 
 
 def test_only_finite_numbers_pass() -> None:

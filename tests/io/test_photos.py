@@ -160,7 +160,7 @@ def test_what_is_no_photo_is_named(tmp_path: Path, data: bytes, reason: str) -> 
 def test_a_missing_photo_is_named(tmp_path: Path) -> None:
     """A file that does not exist and a folder give one line."""
     for path in (tmp_path / "none.jpg", tmp_path):
-        with pytest.raises(InputError, match="cannot be read"):
+        with pytest.raises(InputError, match=r"no such file|is a folder"):
             read_photo(path)
 
 

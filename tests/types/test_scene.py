@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hairkit import testing
-from hairkit.errors import FormatError, InputError
+from hairkit.errors import InputError
 from hairkit.types.groom import HairMaterial
 from hairkit.types.scene import Scene, read_cameras
 
@@ -37,7 +37,7 @@ def test_what_holds_no_cameras_is_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(InputError) as caught:
         read_cameras(path)
     assert "\n" not in str(caught.value)
-    with pytest.raises(FormatError, match="none"):
+    with pytest.raises(InputError, match="none"):
         read_cameras(tmp_path / "none.json")
 
 

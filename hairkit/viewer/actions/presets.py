@@ -6,6 +6,7 @@ A table a preset, in it the simulator's plugin and its options that differ from 
 from __future__ import annotations
 
 import json
+import os
 import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
@@ -14,7 +15,7 @@ from typing import Any
 
 from hairkit.errors import InputError
 from hairkit.options import unknown_name
-from hairkit.storage import write_text
+from hairkit.storage import read_text, write_text
 
 Preset = dict[str, Any]
 
@@ -26,11 +27,11 @@ def presets_path(groom: Path) -> Path:
 
 def read_presets(path: Path) -> dict[str, Preset]:
     """Return presets by name; none when there is no file."""
-    if not path.exists():
+    if not os.path.lexists(path):
         return {}
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        document = tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not a TOML file: {error}") from error
     for name, table in document.items():
         if not isinstance(table, Mapping):

@@ -25,6 +25,7 @@ from typing import Any
 
 from hairkit.errors import HairkitError, InputError
 from hairkit.options import make_options, option
+from hairkit.storage import read_text
 from hairkit.viewer.actions.actions import checked_values, perform
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import FRAMES_PER_SECOND, Recorder
@@ -56,10 +57,8 @@ class Script:
 def read_script(path: Path) -> Script:
     """Read a script; raises `InputError` or `OptionError` that names the step at fault."""
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: no such file") from error
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        document = tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not a TOML file: {error}") from error
     steps = document.pop("steps", [])
     if not isinstance(steps, list) or not all(isinstance(step, Mapping) for step in steps):

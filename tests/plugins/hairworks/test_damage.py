@@ -13,7 +13,7 @@ from hairkit_plugins import hairworks
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hairkit.errors import FormatError
+from hairkit.errors import FormatError, InputError
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 
@@ -95,9 +95,9 @@ def test_deep_nesting_is_refused(tmp_path: Path) -> None:
         hairworks.read_apx(path)
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
-    """No file is a FormatError too, with its name."""
-    with pytest.raises(FormatError, match=r"none\.apx"):
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    """The error of a missing file names it."""
+    with pytest.raises(InputError, match=r"none\.apx"):
         hairworks.read_apx(tmp_path / "none.apx")
 
 
