@@ -21,11 +21,13 @@ import cv2
 import numpy as np
 
 from hairkit.arrays import UInt8Array
-from hairkit.cli.render import framing_cameras, parse_size, write_picture
+from hairkit.cli.render import parse_size
 from hairkit.grooming.prepare_export import dense_groom
 from hairkit.manager import Manager
 from hairkit.rendering import Lights, draw
+from hairkit.rendering.framing import framing_cameras
 from hairkit.rendering.picture import backdrop, display_width
+from hairkit.rendering.picture_file import write_picture
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 

@@ -13,11 +13,12 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from hairkit.cli.render import framing_cameras, parse_size
+from hairkit.cli.render import parse_size
 from hairkit.grooming.densify import densify
 from hairkit.head_model.template import default_head
 from hairkit.rendering import Lights, draw, draw_coverage, draw_directions, draw_views
 from hairkit.rendering.context import renderer
+from hairkit.rendering.framing import framing_cameras
 from hairkit.synth import grow
 
 GUIDES = 600

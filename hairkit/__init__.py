@@ -1,6 +1,9 @@
-"""hairkit: eight photos around a head in, simulation-ready guide hair out.
+"""Eight photos around a head in, simulation-ready guide hair out.
 
-The names below load when they are first used, so that the command line answers at once.
+>>> import hairkit
+>>> groom = hairkit.reconstruct("photos/", "out/")  # doctest: +SKIP
+
+Every name below is loaded when it is first used, so that `import hairkit` takes no time.
 """
 
 from __future__ import annotations
@@ -9,14 +12,30 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from hairkit.api import (
+        evaluate,
+        export,
+        read_groom,
+        render,
+        sample_capture,
+        simulate,
+        write_groom,
+    )
     from hairkit.errors import HairkitError
     from hairkit.hookspecs import hookimpl, hookspec
+    from hairkit.io.capture_reader import read_capture
+    from hairkit.io.head_reader import read_head
+    from hairkit.manager import Manager
+    from hairkit.options import option
+    from hairkit.pipeline.recipe import Recipe, load_recipe
+    from hairkit.pipeline.reconstruct import reconstruct
     from hairkit.types.camera import Camera
     from hairkit.types.capture import Capture, View
     from hairkit.types.groom import Groom, HairMaterial, HairPhysics
     from hairkit.types.head import Capsules, Head, Roots
     from hairkit.types.mask import Mask
     from hairkit.types.orientation import OrientationMap
+    from hairkit.types.point_cache import PointCache
     from hairkit.types.scene import Scene
     from hairkit.types.strands import Strands
     from hairkit.types.volume import Hull, OrientationField, VoxelGrid
@@ -33,39 +52,77 @@ __all__ = [
     "HairkitError",
     "Head",
     "Hull",
+    "Manager",
     "Mask",
     "OrientationField",
     "OrientationMap",
+    "PointCache",
+    "Recipe",
     "Roots",
     "Scene",
     "Strands",
     "View",
     "VoxelGrid",
+    "evaluate",
+    "export",
     "hookimpl",
     "hookspec",
+    "load_recipe",
+    "option",
+    "read_capture",
+    "read_groom",
+    "read_head",
+    "reconstruct",
+    "render",
+    "sample_capture",
+    "simulate",
+    "write_groom",
 ]
 
 _HOMES = {
+    "api": (
+        "evaluate",
+        "export",
+        "read_groom",
+        "render",
+        "sample_capture",
+        "simulate",
+        "write_groom",
+    ),
+    "errors": ("HairkitError",),
+    "hookspecs": ("hookimpl", "hookspec"),
+    "io.capture_reader": ("read_capture",),
+    "io.head_reader": ("read_head",),
+    "manager": ("Manager",),
+    "options": ("option",),
+    "pipeline.recipe": ("Recipe", "load_recipe"),
+    "pipeline.reconstruct": ("reconstruct",),
     "types.camera": ("Camera",),
     "types.capture": ("Capture", "View"),
-    "errors": ("HairkitError",),
     "types.groom": ("Groom", "HairMaterial", "HairPhysics"),
     "types.head": ("Capsules", "Head", "Roots"),
-    "hookspecs": ("hookimpl", "hookspec"),
     "types.mask": ("Mask",),
     "types.orientation": ("OrientationMap",),
+    "types.point_cache": ("PointCache",),
     "types.scene": ("Scene",),
     "types.strands": ("Strands",),
     "types.volume": ("Hull", "OrientationField", "VoxelGrid"),
 }
+"""Public names by the module that defines them, the same as in the imports for type checkers.
+
+No public name may be that of a module in this folder: importing the module would hide it.
+"""
+
+_HOME_OF = {name: f"hairkit.{module}" for module, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
-    for module, names in _HOMES.items():
-        if name in names:
-            return getattr(importlib.import_module(f"hairkit.{module}"), name)
-    raise AttributeError(f"module 'hairkit' has no attribute {name!r}")
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'hairkit' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME_OF[name]), name)
+    globals()[name] = value  # found without this function from now on
+    return value
 
 
 def __dir__() -> list[str]:
-    return [*globals(), *__all__]
+    return sorted({*globals(), *__all__})

@@ -5,23 +5,20 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
-import numpy.typing as npt
 
-from hairkit.arrays import UInt8Array
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.io.capture_reader import TURN
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom
 from hairkit.rendering import Lights, draw_views
-from hairkit.storage import write_bytes
+from hairkit.rendering.framing import framing_cameras
+from hairkit.rendering.picture_file import write_picture
 from hairkit.types.camera import Camera
 from hairkit.types.scene import read_cameras
 from hairkit.types.strands import Strands
@@ -32,10 +29,6 @@ Example: hairkit render out/groom.npz -o front-left.png --camera front-left
 Draw a groom on its head, its guides interpolated to full hair. The camera is a name of the turn,
 "azimuth,elevation" in degrees, or a view of a scene.json. --turntable 24 writes 24 pictures."""
 
-VERTICAL_ANGLE = np.radians(26.0)
-"""Field of view of a named camera over the picture's height."""
-MARGIN = 1.12
-"""Room around the groom in the picture."""
 MOST_HAIRS = 200_000
 LARGEST = 8192
 """Longest edge of a picture, pixels."""
@@ -74,55 +67,6 @@ def run(args: argparse.Namespace) -> int:
         print(path)
         print(f"{path.name}: {len(hair)} strands, {camera.width}x{camera.height}", file=sys.stderr)
     return 0
-
-
-def write_picture(path: Path, picture: UInt8Array) -> None:
-    """Write a picture (H, W, 3) RGB as PNG or JPEG, as the name says, atomically."""
-    kind = path.suffix.lower()
-    if kind not in (".png", ".jpg", ".jpeg"):
-        raise InputError(f"{path}: pictures are written as .png or .jpg, not {kind or 'without'}")
-    done, data = cv2.imencode(kind, picture[..., ::-1])
-    if not done:
-        raise InputError(f"{path}: the picture of {picture.shape[:2]} cannot be encoded")
-    write_bytes(path, data.tobytes())
-
-
-def framing_cameras(
-    points: npt.ArrayLike, turn: Sequence[tuple[float, float]], width: int, height: int
-) -> list[Camera]:
-    """Return a camera for each (azimuth, elevation) in degrees, all as near as shows all.
-
-    Every point (N, 3) lies inside every picture, with a margin.
-    """
-    cloud = np.asarray(points, np.float64)
-    middle = (cloud.min(axis=0) + cloud.max(axis=0)) / 2
-    half = np.tan(VERTICAL_ANGLE / 2)
-    slopes = np.array([half * width / height, half]) / MARGIN
-    cameras = [
-        Camera.on_turn(
-            azimuth,
-            elevation_deg=elevation,
-            distance=0.0,
-            target=middle,
-            focal=height / 2 / float(half),
-            width=width,
-            height=height,
-        )
-        for azimuth, elevation in turn
-    ]
-    distance = 0.0
-    for camera in cameras:
-        local = camera.to_camera(cloud)
-        needed = (np.abs(local[:, :2]) / slopes).max(axis=1) - local[:, 2]
-        distance = max(distance, float(needed.max()))
-    return [moved_back(camera, distance) for camera in cameras]
-
-
-def moved_back(camera: Camera, distance: float) -> Camera:
-    """Return the camera moved `distance` metres against its view."""
-    matrix = camera.camera_from_head.copy()
-    matrix[2, 3] += distance
-    return replace(camera, camera_from_head=matrix)
 
 
 def _cameras(args: argparse.Namespace, head: Any, hair: Strands) -> list[Camera]:

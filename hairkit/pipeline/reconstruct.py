@@ -14,8 +14,10 @@ from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.imaging.waves import measure_waves
+from hairkit.io.capture_reader import read_capture
+from hairkit.io.head_reader import read_head
 from hairkit.manager import Manager
-from hairkit.pipeline.recipe import Recipe
+from hairkit.pipeline.recipe import Recipe, load_recipe
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.stage_runner import Argument, Given, StageRunner
 from hairkit.pipeline.work_folder import WorkFolder
@@ -37,32 +39,34 @@ SHEET = "contact_sheet.png"
 
 
 def reconstruct(
-    capture: Capture,
+    photos: Capture | str | os.PathLike[str],
     out: str | os.PathLike[str],
-    recipe: Recipe,
-    manager: Manager,
+    recipe: Recipe | str | os.PathLike[str] = "default",
+    manager: Manager | None = None,
     *,
-    head: Head | None = None,
+    head: Head | str | os.PathLike[str] | None = None,
     guides: int = 600,
     seed: int = 0,
     progress: Progress | None = None,
     reuse: bool = True,
     sheet: bool = True,
 ) -> Groom:
-    """Run a recipe on a capture and return the groom.
+    """Run a recipe on photos and return the groom: `reconstruct("photos/", "out/")`.
 
     Parameters
     ----------
-    capture
-        The photos, see `hairkit.io.capture_reader`.
+    photos
+        The folder of a capture, or a capture that was read before.
     out
         Folder for `groom.npz`, `scene.json`, the recipe's exports, `contact_sheet.png` and
         `hairkit.log`; its `work/` keeps what the stages found, so that unchanged stages are not
         run again.
-    recipe, manager
-        Which plugin does each stage, and the plugins.
+    recipe
+        Which plugin does each stage: a shipped recipe's name, a `.toml` file or a recipe.
+    manager
+        The plugins; the installed ones when None.
     head
-        The head to fit, the default head when None.
+        The head to fit, or a file of it (OBJ, PLY, GLB in metres, y up); None for the default head.
     guides
         Number of roots, each of which grows a strand.
     seed
@@ -81,9 +85,12 @@ def reconstruct(
     OSError
         A file cannot be written. Files are written whole or not at all.
     """
+    manager = manager or Manager.loaded()
+    recipe = recipe if isinstance(recipe, Recipe) else load_recipe(recipe)
     recipe.check(manager)
     if not 1 <= guides <= MAX_GUIDES:
         raise InputError(f"{guides} guides, expected 1 to {MAX_GUIDES}")
+    capture = photos if isinstance(photos, Capture) else read_capture(photos)
     log = RunLog(progress or Silent())
     folder = Path(out)
     work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(_waiting(folder)))
@@ -91,7 +98,7 @@ def reconstruct(
         _sweep(folder)
         run = StageRunner(recipe, manager, work, log, pool)
         try:
-            made = _grow(run, capture, head or default_head(), guides, seed)
+            made = _grow(run, capture, _head(head), guides, seed)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -103,6 +110,12 @@ def reconstruct(
         _note_photos(log, capture)
         log.write(folder / "hairkit.log", recipe, manager)
     return made.groom
+
+
+def _head(head: Head | str | os.PathLike[str] | None) -> Head:
+    if head is None:
+        return default_head()
+    return head if isinstance(head, Head) else read_head(head)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hairkit.cli import main
-from hairkit.cli.render import framing_cameras
 from hairkit.evaluation.truth import read_truth
+from hairkit.rendering.framing import framing_cameras
 from hairkit.testing import bristle_groom, turn_scene
 
 

@@ -23,7 +23,7 @@ FLOORS = (
     ("simulation", "grooming", "synth"),
     ("manager", "testing"),
     ("pipeline", "evaluation"),
-    ("viewer",),
+    ("viewer", "api"),
     ("cli", "__main__"),
 )
 """Rooms of hairkit, lowest floor first. A room may use its own floor and those below."""
