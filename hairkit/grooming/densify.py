@@ -73,7 +73,7 @@ def densify(
     generator = np.random.default_rng(seed)
     even = strands.resampled(int(np.clip(strands.counts.max(), 2, MAX_POINTS)))
     bundle = _Bundle.of(even)
-    positions, uv = _new_roots(guides, bundle, count - len(strands), roots, generator)
+    positions, uv = _new_roots(guides, bundle, count - len(strands), roots, seed, generator)
     mix = _choose_guides(bundle, positions)
     shapes = _mixed_shapes(bundle, mix)
     if scatter > 0:
@@ -138,10 +138,11 @@ def _new_roots(
     bundle: _Bundle,
     count: int,
     roots: Roots | npt.ArrayLike | None,
+    seed: int,
     generator: np.random.Generator,
 ) -> tuple[Float32Array, Float32Array | None]:
     if roots is None and isinstance(guides, Groom):
-        roots = sample_roots(guides.head, count, int(generator.integers(2**31)))
+        roots = sample_roots(guides.head, count, seed, first=len(bundle.roots))
     if isinstance(roots, Roots):
         positions, uv = roots.positions, roots.uv
     elif roots is not None:

@@ -106,7 +106,8 @@ def dense_groom(groom: Groom, count: int, seed: int = 0) -> Groom:
     guides = _guides_of(groom)
     if count <= len(guides.strands):
         return guides
-    roots = sample_roots(guides.head, count - len(guides.strands), seed)
+    own = len(guides.strands)
+    roots = sample_roots(guides.head, count - own, seed, first=own)
     strands = densify(guides, count, seed, roots=roots)
     return replace(
         guides,

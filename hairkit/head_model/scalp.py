@@ -1,6 +1,8 @@
-"""Roots on the scalp: where strands start, how they are bound, and the mesh that joins them."""
+"""Roots on the scalp: sampling, binding to faces, and the growth mesh that joins them."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -10,42 +12,57 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
+from hairkit.head_model.template import default_head
 from hairkit.types.head import Head, Roots
 
 MAX_ROOTS = 200_000
-_CANDIDATES_PER_ROOT = 12
-_BISECTIONS = 12
+CANDIDATES_PER_ROOT = 12
+"""Points tried for each root; with fewer, gaps stay open."""
+SHRINK = 0.95
+"""Factor from one radius of the dart throwing to the next."""
 _LONGEST_EDGE = 3.2
 """Edges of the growth mesh longer than this many root spacings bridge what is not scalp."""
+_STEPS = np.array(
+    [15111065706836454659, 12378569675163806722, 10140184033053478359], dtype=np.uint64
+)
+"""2^64 / g, / g^2 and / g^3 with g^4 = g + 1: steps of Roberts' R3 sequence (2018), in integers."""
 
 
-def sample_roots(head: Head, count: int, seed: int = 0) -> Roots:
-    """Return exactly `count` roots spread evenly over the scalp, equal for equal input.
+def sample_roots(
+    head: Head, count: int, seed: int = 0, *, first: int = 0, rest: Head | None = None
+) -> Roots:
+    """Return `count` roots of a sequence whose every beginning covers the scalp evenly.
 
-    Random points on the faces, kept where the interpolated scalp weight is above 0.5, are thinned
-    out until no two are nearer than a radius, chosen so that `count` are left.
+    Progressive dart throwing (McCool and Fiume 1992): candidates are taken in turn when no root is
+    nearer than a radius; when all have been tried the radius shrinks and there are more candidates.
+    So the first 600 of 8,000 roots are those of 600.
+
+    Distances are measured on the head at rest. Triangles and barycentric weights therefore depend
+    on its topology and scalp alone: heads fitted to other photos, or by other versions of a
+    library, carry their roots at the same places.
 
     Parameters
     ----------
     head : Head
     count : int
-        1 to 200,000.
+        1 to 200,000, with `first`.
     seed : int
-        Of the random points; another seed gives another even spread.
+        Another seed gives another sequence.
+    first : int
+        Roots of the sequence to leave out, for hair that is added to guides.
+    rest : Head, optional
+        The head before it was fitted; by default the template where `head` has its faces, else
+        `head` itself.
 
     Raises
     ------
     InputError
-        `count` is out of bounds.
+        `count` is out of bounds, or the scalp has no area.
     """
-    if not 1 <= count <= MAX_ROOTS:
+    if not (count >= 1 and first >= 0 and first + count <= MAX_ROOTS):
         raise InputError(f"{count} roots asked for, expected 1 to {MAX_ROOTS}")
-    generator = np.random.default_rng(seed)
-    triangle, barycentric = _random_points(head, _CANDIDATES_PER_ROOT * count + 64, generator)
-    points = evaluate(head, triangle, barycentric)
-    shuffled = generator.permutation(len(points))
-    chosen = shuffled[_spread(points[shuffled], count)]
-    return roots_at(head, triangle[chosen], barycentric[chosen])
+    triangle, barycentric = _progressive_roots(_at_rest(head, rest), first + count, seed)
+    return roots_at(head, triangle[first:], barycentric[first:])
 
 
 def roots_at(head: Head, triangle: npt.ArrayLike, barycentric: npt.ArrayLike) -> Roots:
@@ -93,10 +110,10 @@ def growth_mesh(roots: Roots, head: Head) -> Int32Array:
         raise InputError(f"a growth mesh needs at least 3 roots, got {len(roots)}")
     points = roots.positions.astype(np.float64)
     try:
-        faces = Delaunay(_flattened(points, roots.normals.astype(np.float64))).simplices
+        faces = Delaunay(_project(points, roots.normals.astype(np.float64))).simplices
     except QhullError as error:
         raise InputError("the roots lie on one line; a growth mesh needs area") from error
-    faces = _short(points, faces)
+    faces = _without_bridges(points, faces)
     a, b, c = (points[faces[:, k]] for k in range(3))
     outward = roots.normals.astype(np.float64)[faces].sum(axis=1)
     inverted = (np.cross(b - a, c - a) * outward).sum(axis=1) < 0
@@ -112,66 +129,75 @@ def _interpolate(
     return result
 
 
-def _random_points(
-    head: Head, wanted: int, generator: np.random.Generator
-) -> tuple[Int32Array, Float64Array]:
-    """At least `wanted` uniform points of the scalp: faces (M,) and weights (M, 3)."""
-    scalp = head.scalp.astype(np.float64)[head.faces]
+def _at_rest(head: Head, rest: Head | None) -> Head:
+    """Return the head in the shape that it had before it was fitted, as far as that is known."""
+    for shape in (rest, default_head()):
+        if shape is not None and np.array_equal(shape.faces, head.faces):
+            return replace(head, vertices=shape.vertices)
+    return head
+
+
+def _progressive_roots(head: Head, count: int, seed: int) -> tuple[Int32Array, Float64Array]:
+    """Return the first `count` roots of a seed's sequence: faces (N,) and weights (N, 3)."""
+    area = _scalp_area(head)
+    shift = np.random.PCG64(seed).random_raw(3)  # raw bits are the same in every NumPy (NEP 19)
+    faces, weights, points = np.empty(0, np.int32), np.empty((0, 3)), np.empty((0, 3))
+    apart, tried = np.empty(0), 0  # metres to the root that is known to be nearest
+    taken, found = np.empty(count, np.int64), 0
+    radius = np.sqrt(area.sum())
+    while found < count:
+        radius *= SHRINK
+        wanted = int(CANDIDATES_PER_ROOT * 0.7 * area.sum() / radius**2) + 64
+        face, weight = _candidates(head, area, tried, wanted, shift)
+        tried = wanted
+        faces, weights = np.concatenate([faces, face]), np.concatenate([weights, weight])
+        points = np.concatenate([points, evaluate(head, face, weight)])
+        apart = np.concatenate([apart, np.full(len(face), np.inf)])
+        found = take_free(points, apart, radius, taken, found)
+    return faces[taken], weights[taken]
+
+
+def _scalp_area(head: Head) -> Float64Array:
+    """Return the area (F,) of each face, 0 of those that bear no hair."""
     corners = head.vertices.astype(np.float64)[head.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = 0.5 * np.linalg.norm(normal, axis=1) * (scalp.max(axis=1) > 0.5)
+    bears = head.scalp[head.faces].max(axis=1) > 0.5
+    area: Float64Array = 0.5 * np.linalg.norm(normal, axis=1) * bears
     if not area.sum() > 0:
         raise InputError("the head's scalp has no area: mark whole faces, not single vertices")
+    return area
+
+
+def _candidates(
+    head: Head, area: Float64Array, first: int, last: int, shift: npt.NDArray[np.uint64]
+) -> tuple[Int32Array, Float64Array]:
+    """Return points `first` to `last` of an even sequence that lie on the scalp: faces, weights."""
+    index = np.arange(first, last, dtype=np.uint64)[:, None]
+    along, root, share = ((index * _STEPS + shift) >> np.uint64(11)).T * 2.0**-53
     total = np.cumsum(area)
-    faces: list[Int32Array] = []
-    weights: list[Float64Array] = []
-    found = 0
-    for _ in range(64):
-        # Evenly stepped along the summed area: fewer clumps than independent draws.
-        drawn = wanted + wanted // 8
-        steps = (np.arange(drawn) + generator.random(drawn)) / drawn * total[-1]
-        face = np.minimum(np.searchsorted(total, steps, side="right"), len(area) - 1)
-        root, share = np.sqrt(generator.random(drawn)), generator.random(drawn)
-        weight = np.stack([1 - root, root * (1 - share), root * share], axis=1)
-        keep = (scalp[face] * weight).sum(axis=1) > 0.5
-        faces.append(face[keep].astype(np.int32))
-        weights.append(weight[keep])
-        found += int(np.count_nonzero(keep))
-        if found >= wanted:
-            return np.concatenate(faces), np.concatenate(weights)
-    raise InputError("the head's scalp has almost no area: mark more of it")
-
-
-def _spread(points: Float64Array, count: int) -> Int64Array:
-    """Indices (count,) of points (M, 3), given in random order, that are far from each other.
-
-    Points are taken in turn if none taken before is within a radius (Cook 1986); the largest radius
-    that still yields `count` is searched for, and of those it yields the last few are dropped.
-    """
-    area = 2.0 * float(np.prod(np.sort(np.ptp(points, axis=0))[1:]))
-    too_near, too_far = 0.0, 2.0 * np.sqrt(area / count) + 1e-9
-    best = np.arange(count)
-    radius = 0.4 * too_far
-    for _ in range(_BISECTIONS):
-        taken = scattered(points, radius)
-        if len(taken) >= count:
-            too_near, best = radius, taken
-            if len(taken) <= 1.005 * count:
-                break
-        else:
-            too_far = radius
-        # The number taken falls with the square of the radius: a better guess than the middle.
-        guess = radius * np.sqrt(len(taken) / (1.0025 * count))
-        inside = too_near + 0.05 * (too_far - too_near) < guess < too_far
-        radius = guess if inside else 0.5 * (too_near + too_far)
-    return best[:count]
+    face = np.minimum(np.searchsorted(total, along * total[-1], side="right"), len(area) - 1)
+    root = np.sqrt(root)
+    weight = np.stack([1 - root, root * (1 - share), root * share], axis=1)
+    on_scalp = (head.scalp[head.faces[face]] * weight).sum(axis=1) > 0.5
+    return face[on_scalp].astype(np.int32), weight[on_scalp]
 
 
 @njit(cache=True)
-def scattered(points: Float64Array, radius: float) -> Int64Array:  # pragma: no cover - compiled
-    """Return which points (M, 3) have none of the earlier returned ones within `radius`: indices.
+def take_free(
+    points: Float64Array, apart: Float64Array, radius: float, taken: Int64Array, found: int
+) -> int:  # pragma: no cover - compiled
+    """Append to `taken` in turn the points (M, 3) that have no taken one within the radius.
 
-    Taken points hang in chains, one for each cubic cell of about that edge.
+    Parameters
+    ----------
+    apart
+        (M,) distance to some taken point, infinite where none is known, 0 for taken ones; updated.
+    taken
+        (N,) indices of taken points, `found` of them known; ends when it is full.
+
+    Returns
+    -------
+    How many are taken now.
     """
     low, shape = np.empty(3), np.empty(3, np.int64)
     edge = radius
@@ -180,45 +206,60 @@ def scattered(points: Float64Array, radius: float) -> Int64Array:  # pragma: no 
         edge = max(edge, (points[:, k].max() - low[k]) / 200)
     for k in range(3):
         shape[k] = int((points[:, k].max() - low[k]) / edge) + 3
-    heads = np.full((shape[0], shape[1], shape[2]), -1, np.int64)
-    following = np.full(len(points), -1, np.int64)
-    taken = np.empty(len(points), np.int64)
-    count = 0
+    heads = np.full((shape[0], shape[1], shape[2]), -1, np.int32)
+    following = np.full(len(taken), -1, np.int32)
+    for n in range(found):
+        _link(n, ((points[taken[n]] - low) / edge).astype(np.int64) + 1, heads, following)
     for i in range(len(points)):
+        if apart[i] < radius:
+            continue
+        if found == len(taken):
+            break
         cell = ((points[i] - low) / edge).astype(np.int64) + 1
-        if _is_free(points, i, cell, heads, following, radius):
-            following[i] = heads[cell[0], cell[1], cell[2]]
-            heads[cell[0], cell[1], cell[2]] = i
-            taken[count] = i
-            count += 1
-    return taken[:count].copy()
+        apart[i] = _distance_to_taken(points, i, cell, heads, following, taken)
+        if apart[i] >= radius:
+            apart[i] = 0.0
+            taken[found] = i
+            _link(found, cell, heads, following)
+            found += 1
+    return found
 
 
 @njit(cache=True)
-def _is_free(
+def _link(
+    n: int, cell: Int64Array, heads: Int32Array, following: Int32Array
+) -> None:  # pragma: no cover - compiled
+    """Put taken point n in front of the chain of its cell."""
+    following[n] = heads[cell[0], cell[1], cell[2]]
+    heads[cell[0], cell[1], cell[2]] = n
+
+
+@njit(cache=True)
+def _distance_to_taken(
     points: Float64Array,
     i: int,
     cell: Int64Array,
-    heads: Int64Array,
-    following: Int64Array,
-    radius: float,
-) -> bool:  # pragma: no cover - compiled
-    """Whether no taken point of the 27 cells around is within the radius of point i."""
+    heads: Int32Array,
+    following: Int32Array,
+    taken: Int64Array,
+) -> float:  # pragma: no cover - compiled
+    """Return the distance of point i to the nearest taken one of the 27 cells around it."""
     x, y, z = points[i, 0], points[i, 1], points[i, 2]
+    nearest = np.inf
     for a in range(cell[0] - 1, cell[0] + 2):
         for b in range(cell[1] - 1, cell[1] + 2):
             for c in range(cell[2] - 1, cell[2] + 2):
-                other = heads[a, b, c]
-                while other >= 0:
-                    gap = (points[other, 0] - x) ** 2 + (points[other, 1] - y) ** 2
-                    if gap + (points[other, 2] - z) ** 2 < radius * radius:
-                        return False
-                    other = following[other]
-    return True
+                n = heads[a, b, c]
+                while n >= 0:
+                    at = points[taken[n]]
+                    apart = (at[0] - x) ** 2 + (at[1] - y) ** 2 + (at[2] - z) ** 2
+                    nearest = min(nearest, apart)
+                    n = following[n]
+    return float(np.sqrt(nearest))
 
 
-def _flattened(points: Float64Array, normals: Float64Array) -> Float64Array:
-    """(N, 2) stereographic projection about the mean normal, from a middle below the points."""
+def _project(points: Float64Array, normals: Float64Array) -> Float64Array:
+    """Project points (N, 3) stereographically to (N, 2), about their mean normal."""
     pole = normals.mean(axis=0)
     pole /= max(float(np.linalg.norm(pole)), 1e-12)
     helper = np.eye(3)[np.abs(pole).argmin()]
@@ -233,8 +274,8 @@ def _flattened(points: Float64Array, normals: Float64Array) -> Float64Array:
     return result
 
 
-def _short(points: Float64Array, faces: Int32Array) -> Int32Array:
-    """Faces without those that bridge gaps; a root that would lose all keeps its shortest."""
+def _without_bridges(points: Float64Array, faces: Int32Array) -> Int32Array:
+    """Return the faces that bridge no gap; a root that would lose all keeps its smallest."""
     edges = np.stack([points[faces[:, k]] - points[faces[:, k - 1]] for k in range(3)])
     longest = np.linalg.norm(edges, axis=2).max(axis=0)
     spacing = np.median(cKDTree(points).query(points, k=2)[0][:, 1])

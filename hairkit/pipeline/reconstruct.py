@@ -152,7 +152,7 @@ def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int
     hull = run.once("hull", Hull, scene=scene, masks=masks)
     seen: dict[str, Argument] = {"scene": scene, "masks": masks, "orientations": orientations}
     field = run.once("field", OrientationField, **seen, hull=hull)
-    roots = Given.of(sample_roots(scene.value.head, guides, seed))
+    roots = Given.of(sample_roots(scene.value.head, guides, seed, rest=head))
     strands = run.once("track", Strands, **seen, hull=hull, field=field, roots=roots)
     labels = tuple(mask.result().value for mask in masks)
     angles = tuple(orientation.result().value for orientation in orientations)

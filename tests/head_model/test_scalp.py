@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
 from hairkit.errors import InputError
-from hairkit.head_model.scalp import bind, evaluate, growth_mesh, sample_roots, scattered
+from hairkit.head_model.scalp import bind, evaluate, growth_mesh, sample_roots, take_free
 from hairkit.head_model.template import default_head
 from hairkit.types.head import Head
 
@@ -17,6 +19,11 @@ def _scalp_area(head: Head) -> float:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     chosen = head.scalp[head.faces].mean(axis=1) > 0.5
     return float(0.5 * np.linalg.norm(normal, axis=1)[chosen].sum())
+
+
+def _turned_over(head: Head) -> Head:
+    """Return the head with its faces in another order, so that it is not the template's mesh."""
+    return replace(head, faces=head.faces[::-1])
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 17, 600, 5000])
@@ -59,14 +66,60 @@ def test_equal_input_gives_equal_roots_and_another_seed_others() -> None:
     assert not np.array_equal(first.positions, sample_roots(head, 300, seed=5).positions)
 
 
-def test_scattered_points_equal_the_slow_rule() -> None:
+def test_fewer_roots_are_the_beginning_of_more() -> None:
+    """The first 300 of 2,000 roots are those of 300, and the other 1,700 follow them."""
+    head = default_head()
+    every, few = sample_roots(head, 2000), sample_roots(head, 300)
+    rest = sample_roots(head, 1700, first=300)
+    np.testing.assert_array_equal(every.triangle, np.concatenate([few.triangle, rest.triangle]))
+    np.testing.assert_array_equal(every.positions, np.concatenate([few.positions, rest.positions]))
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_a_shape_that_differs_slightly_has_the_same_roots(own: bool) -> None:
+    """Heads fitted 0.02 mm apart carry all roots at the same places, the template and others."""
+    rest = _turned_over(default_head()) if own else default_head()
+    rng = np.random.default_rng(0)
+    fitted = replace(rest, vertices=1.04 * rest.vertices + rng.normal(0, 1e-3, rest.vertices.shape))
+    again = replace(fitted, vertices=fitted.vertices + rng.normal(0, 2e-5, rest.vertices.shape))
+    first, second = (
+        sample_roots(head, 2000, rest=rest if own else None) for head in (fitted, again)
+    )
+    np.testing.assert_array_equal(first.triangle, second.triangle)
+    np.testing.assert_array_equal(first.barycentric, second.barycentric)
+    assert np.linalg.norm(first.positions - second.positions, axis=1).max() < 2e-4
+
+
+def test_rounding_of_the_rest_shape_moves_no_root() -> None:
+    """Vertices of the rest shape that were rounded the other way leave all roots in place."""
+    head = _turned_over(default_head())
+    vertices = head.vertices.copy()
+    vertices[::1000] = np.nextafter(vertices[::1000], np.float32(1))
+    first, second = sample_roots(head, 2000), sample_roots(replace(head, vertices=vertices), 2000)
+    np.testing.assert_array_equal(first.triangle, second.triangle)
+    np.testing.assert_array_equal(first.barycentric, second.barycentric)
+
+
+def test_the_sequence_is_the_same_on_every_machine() -> None:
+    """The first roots of seed 0 lie on known faces, whatever libraries compute them."""
+    first = sample_roots(default_head(), 6).triangle
+    np.testing.assert_array_equal(first, [14639, 302, 2920, 8232, 1512, 22785])
+
+
+def test_taking_free_points_equals_the_slow_rule() -> None:
     """The compiled kernel takes just those points that have none of the taken within the radius."""
     points = np.random.default_rng(3).random((400, 3))
-    taken: list[int] = []
-    for i, point in enumerate(points):
-        if all(((points[j] - point) ** 2).sum() >= 0.15**2 for j in taken):
-            taken.append(i)
-    np.testing.assert_array_equal(scattered(points, 0.15), taken)
+    wanted: list[int] = []
+    for radius in (0.3, 0.15):
+        for i, point in enumerate(points):
+            if i not in wanted and all(
+                ((points[j] - point) ** 2).sum() >= radius**2 for j in wanted
+            ):
+                wanted.append(i)
+    taken, apart, found = np.empty(400, np.int64), np.full(400, np.inf), 0
+    for radius in (0.3, 0.15):
+        found = take_free(points, apart, radius, taken, found)
+    np.testing.assert_array_equal(taken[:found], wanted)
 
 
 def test_roots_follow_a_moved_head() -> None:
@@ -121,8 +174,8 @@ def test_growth_mesh_is_one_sheet_over_all_roots(count: int) -> None:
 def test_impossible_roots_are_refused() -> None:
     """No roots, far too many, or a growth mesh of two give one line each."""
     head = default_head()
-    for count in (0, -3, 10**9):
+    for count, first in ((0, 0), (-3, 0), (10**9, 0), (1, -1), (1, 200_000)):
         with pytest.raises(InputError, match="expected 1 to"):
-            sample_roots(head, count)
+            sample_roots(head, count, first=first)
     with pytest.raises(InputError, match="at least 3 roots"):
         growth_mesh(sample_roots(head, 2), head)

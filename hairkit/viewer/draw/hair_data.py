@@ -194,7 +194,7 @@ def _hair(
         chosen = _scattered(own.roots, order)[: max(hairs - count, 0)]
         parts.append(_at(_fine(own.select(chosen)), shares))
     elif hairs > count:
-        roots = sample_roots(head, hairs - count, seed)
+        roots = sample_roots(head, hairs - count, seed, first=count)
         new = densify(guides, hairs, seed, roots=roots, material=material)
         shuffled = new.select(count + _scattered(new.roots[count:], order))
         parts.append(_at(_fine(shuffled), shares))
