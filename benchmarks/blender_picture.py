@@ -1,9 +1,9 @@
-"""The same groom drawn by hairkit and, imported as Alembic, by Blender's Cycles: one picture.
+"""Draw one groom by hairkit and, imported as Alembic, by Blender's Cycles, side by side.
 
-python benchmarks/blender_picture.py --groom out/groom.npz -o docs/images/blender.png
+python benchmarks/blender_picture.py --groom out/groom.npz -o blender.png
 
-Left hairkit's own picture, right Blender's: the same strands, camera, key and rim light. Without
-Blender (see `make test-clients`) or a groom it says so and does nothing.
+Left is hairkit's picture, right Blender's: the same strands, camera, key and rim light. Without
+Blender (`make test-clients` installs it) or a groom, the program says so and does nothing.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from hairkit.types.groom import Groom
 
 MADE = Path(__file__).parents[1] / ".clients" / "bpy" / "bin" / "python"
 SUN = np.pi
-"""Watts per square metre of Blender's sun for a light of 1, under which white is white."""
+"""W/m2 of Blender's sun that match a light of 1: under it a white surface appears white."""
 
 
 def main() -> int:

@@ -1,15 +1,16 @@
-"""Print how far fitted cameras and heads are from the truth, and the time it takes.
+"""Print errors of fitted cameras and heads against ground truth, and the time they take.
 
 python benchmarks/cameras.py captures/ --plugin silhouette
 
-The masks are the captures' own. Cameras and head are brought into the truth's frame as `evaluate`
-does it. Each plugin runs twice and the second run is timed, so kernels are compiled already.
+Masks are those of the capture. Cameras and head are aligned to the true ones as `hairkit evaluate`
+does it. Each plugin runs twice; the second run, with compiled kernels, is timed.
 """
 
 from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import time
 from pathlib import Path
 from typing import Any
@@ -30,11 +31,20 @@ PLUGINS = ("silhouette", "landmarks")
 
 def main() -> None:
     """Run one scene plugin, then `thin_plate`, over every capture that has truth and masks."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("captures", type=Path, help="folder of capture folders")
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "captures",
+        type=Path,
+        nargs="?",
+        default=os.environ.get("HAIRKIT_CAPTURES"),
+        help="folder of captures (default: $HAIRKIT_CAPTURES)",
+    )
     parser.add_argument("--plugin", choices=PLUGINS, default="silhouette")
     parser.add_argument("--set", action="append", default=[], metavar="OPTION=VALUE")
     arguments = parser.parse_args()
+    if arguments.captures is None:
+        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        return
     plugin: Any = importlib.import_module(f"hairkit_plugins.{arguments.plugin}")
     chosen = dict(item.split("=", 1) for item in arguments.set)
     options = make_options(plugin.Options, chosen, arguments.plugin)

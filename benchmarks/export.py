@@ -1,13 +1,12 @@
-"""How long large grooms take to write: prints one table, Blender's exporters beside where they can.
+"""Time the export of large grooms, beside Blender's exporters where those can write the format.
 
 python benchmarks/export.py --strands 100000 --points 32
 
-Each format is written in a process of its own: wall and processor seconds (of all threads, which
-on a busy machine mean more) are the best of the rounds, memory is the highest during the rounds
-beyond what the groom itself holds. `raw` is the time to write as many
-bytes as the file has, in the same way (whole, then renamed, the disk waited for). Blender writes
-the same strands: hair curves to .abc and .usdc, a mesh of edges to the others. Its Python is the
-one that `make test-clients` makes, or --blender.
+Each format is written in a process of its own. Wall and CPU seconds (of all threads; on a busy
+machine they mean more) are the best of the rounds; memory is the peak above what the groom itself
+takes. `raw` is the time to write as many bytes in the same way: whole, synced to the disk, renamed.
+Blender writes the same strands, as hair curves to .abc and .usdc and as a mesh of edges to the
+others, with the Python that `make test-clients` installs, or with --blender.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
-"""How fast full hair is grown: strands tracked through one field, in one call.
+"""Time a tracker that grows full hair: many strands through one field in one call.
 
 python benchmarks/growth.py [PHOTOS] --strands 100000
 
-Reconstructs a capture (the sample by default) once with the recipe, keeps hull and field, and then
-times the tracker alone, kernels compiled, beside the tracker of the default recipe in the same
-field. Prints a Markdown table.
+Reconstructs a capture (the sample by default) once, keeps its hull and field, and times both
+trackers alone in that field, with compiled kernels. Prints a Markdown table.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ def main() -> int:
     began = time.perf_counter()
     roots = sample_roots(scene.head, args.strands)
     print(f"{args.strands} roots spread over the scalp in {time.perf_counter() - began:.2f} s\n")
-    print("| tracker | strands | seconds, best of 3 | longest |\n|---|---|---|---|")
+    print("| tracker | strands | seconds, best round | longest |\n|---|---|---|---|")
     for name in TRACKERS:
         given = {"scene": scene, "masks": (), "orientations": (), "hull": hull, "field": field}
         options = manager.options(name, {"waves": False})

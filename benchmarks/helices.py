@@ -1,16 +1,17 @@
-"""Print how well helix arcs keep strands, how many they need, and the time.
+"""Print how closely helix arcs follow strands, how many arcs that takes, and the time.
 
 python benchmarks/helices.py captures/
 
-Distances are means in mm between 1,000 true strands of each capture (and of procedural grooms,
-named synth) and the curve made of their arcs: `to` from the curve to the strand, `from` the
-converse; `worst` is the 95th percentile over strands. `patent` counts arcs by the patent's rule
-and keeps the tangents; `adaptive` is what hairkit uses. Time is of strand -> helices, warm.
+Distances are means in mm between 1,000 true strands of each capture (or strands of procedural
+grooms, named synth) and the curve made of their arcs: `to` is measured from the curve to the
+strand, `from` the other way; `worst` is the 95th percentile over strands. `patent` counts arcs by
+the patent's rule and keeps the tangents; `adaptive` is what hairkit uses.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -32,8 +33,14 @@ METHODS: dict[str, Callable[[Strands], Arcs]] = {
 
 def main() -> None:
     """Print one row a set of strands and method."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("captures", type=Path, nargs="?", help="folder of captures with truth")
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "captures",
+        type=Path,
+        nargs="?",
+        default=os.environ.get("HAIRKIT_CAPTURES"),
+        help="folder of captures, whose true strands are measured too (default: $HAIRKIT_CAPTURES)",
+    )
     sets = procedural()
     folder = parser.parse_args().captures
     if folder:

@@ -1,15 +1,16 @@
-"""Print how far 2D orientations are from the truth, how well confidence ranks them, and the time.
+"""Print errors of 2D orientation against ground truth, in all pixels and in the confident half.
 
-python benchmarks/orientation.py captures/ --pictures /tmp/orientation
+python benchmarks/orientation.py captures/ --pictures orientation/
 
 Errors are mean degrees over true hair, the mask eroded by 4 pixels, where the truth is coherent
-(`hairkit.imaging.masked_filters.coherent_truth`); guessing gives 45. `sure half`: the pixels with
-confidence above the view's median. Masks are the true ones; OpenCV runs on one thread.
+(`hairkit.imaging.masked_filters.coherent_truth`); guessing gives 45. `sure half` takes the pixels
+with confidence above the view's median. Masks are the true ones; OpenCV runs on one thread.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,11 +45,20 @@ class Sample:
 
 def main() -> None:
     """Print a table of methods by captures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("captures", type=Path, help="folder of capture folders with truth")
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "captures",
+        type=Path,
+        nargs="?",
+        default=os.environ.get("HAIRKIT_CAPTURES"),
+        help="folder of captures (default: $HAIRKIT_CAPTURES)",
+    )
     parser.add_argument("--pictures", type=Path, help="folder for photos beside maps by hue")
     parser.add_argument("--only", action="append", help="name of a method; may be repeated")
     arguments = parser.parse_args()
+    if arguments.captures is None:
+        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        return
     cv2.setNumThreads(1)
     folders = sorted(path.parents[1] for path in arguments.captures.glob("*/truth/orientation"))
     captures = {folder.name: read_samples(folder) for folder in folders}

@@ -1,9 +1,9 @@
-"""How long pictures take: draws a procedural groom and prints one table.
+"""Time pictures of a procedural groom and print one table.
 
 python benchmarks/render.py --strands 10000 --size 810x1080
 
-Times are the best of three, everything warm, as wall seconds and as processor seconds of all
-threads; on a busy machine only the latter mean something.
+Times are the best of three with everything warm: wall seconds, and CPU seconds of all threads,
+which on a busy machine mean more.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Print how well hair and person are found in captures with true masks, and the time it takes.
+"""Print the overlap of hair and person masks with true ones, and the time of a view.
 
 python benchmarks/segmentation.py captures/ --plugin grabcut
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import time
 from pathlib import Path
 from typing import Any
@@ -24,12 +25,21 @@ SIDES = ("front", "front-left", "left", "back-left", "back", "back-right", "righ
 
 def main() -> None:
     """Run one plugin over every capture below a folder that has masks."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("captures", type=Path, help="folder of capture folders")
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "captures",
+        type=Path,
+        nargs="?",
+        default=os.environ.get("HAIRKIT_CAPTURES"),
+        help="folder of captures (default: $HAIRKIT_CAPTURES)",
+    )
     parser.add_argument("--plugin", choices=PLUGINS, default="grabcut")
     parser.add_argument("--set", action="append", default=[], metavar="OPTION=VALUE")
     parser.add_argument("--overlays", type=Path, help="folder for pictures of the errors")
     arguments = parser.parse_args()
+    if arguments.captures is None:
+        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        return
     plugin: Any = importlib.import_module(f"hairkit_plugins.{arguments.plugin}")
     chosen = dict(item.split("=", 1) for item in arguments.set)
     options = make_options(plugin.Options, chosen, arguments.plugin)

@@ -1,9 +1,9 @@
-"""Print how fast super-helices run, and how far a step's cost grows with elements.
+"""Print the speed of super-helices, and how the cost of a step grows with elements.
 
-python benchmarks/super_helix.py --pictures /tmp/super_helix
+python benchmarks/super_helix.py --pictures pictures/
 
-600 guides of a procedural groom, frames of 1/60 s with the default options: a still head, a head
-shaken by 25 degrees 1.5 times a second (long straight hair), and a wind of 5 m/s with gusts (long
+600 guides of a procedural groom, frames of 1/60 s with default options: a still head, a head
+shaken by 25 degrees 1.5 times a second (long straight hair), and wind of 5 m/s with gusts (long
 wavy hair). `cpu ms` is the time of all threads together. The second table is one step of both
 solvers without contact and neighbours.
 """
@@ -36,7 +36,7 @@ GUIDES, ELEMENTS, FRAMES = 600, 10, 90
 
 def main() -> None:
     """Print both tables."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--pictures", type=Path, help="folder for frames of the two scenes")
     folder = parser.parse_args().pictures
     straight, wavy = (grow(style, default_head(), GUIDES) for style in ("straight", "wavy"))

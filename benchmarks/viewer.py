@@ -1,11 +1,11 @@
-"""How many pictures a second the viewer draws: prints one table.
+"""Print how many frames per second the viewer draws.
 
 python benchmarks/viewer.py --guides 600 --hairs 10000 --size 1280x720
 
-Each row is the median picture of a shaken head in wind, as wall time, and as processor time of all
-threads over the number of cores: what the wall time is on a machine that does nothing else.
-`chosen` is what the frame budget settles on by itself. Hair is drawn by compute shaders, which a
-graphics card wants, or by compiled loops, which is what the viewer does without one.
+Each row is the median frame of a shaken head in wind: as wall time, and as CPU time of all threads
+over the number of cores, which is the wall time on an otherwise idle machine. `chosen` is what the
+frame budget settles on. Hair is drawn by compute shaders, meant for a graphics card, or by
+compiled loops on the processor, which the viewer uses without one.
 """
 
 from __future__ import annotations

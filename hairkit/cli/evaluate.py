@@ -22,7 +22,6 @@ A high score needs many strands: reconstruct with --guides 8000 to compare with 
 
 _PLAIN_WIDTH = 100
 """Columns of a table that goes to a file or a pipe."""
-_MARKS = {"aim": "[green]aim[/]", "must": "[yellow]must[/]", "missed": "[red]missed[/]", "": ""}
 
 
 def register(subparsers: Any) -> None:
@@ -97,14 +96,12 @@ def _score_table(evaluation: Evaluation) -> Table:
 def _figure_table(evaluation: Evaluation) -> Table:
     from rich.table import Table
 
-    from hairkit.evaluation.scorecard import band_text, figures
+    from hairkit.evaluation.scorecard import figures
 
     table = Table()
     table.add_column("figure")
-    for name in ("value", "must", "aim"):
-        table.add_column(name, justify="right")
-    table.add_column("")
+    table.add_column("value", justify="right")
+    table.add_column("what is good")
     for row in figures(evaluation):
-        must, aim = band_text(row.must, row.digits), band_text(row.aim, row.digits)
-        table.add_row(row.name, row.text(), must, aim, _MARKS[row.verdict])
+        table.add_row(row.name, row.text(), row.meaning)
     return table

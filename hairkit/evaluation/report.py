@@ -15,7 +15,7 @@ import numpy.typing as npt
 from hairkit.evaluation.error_maps import LEVEL_COLOURS, view_pictures
 from hairkit.evaluation.evaluation import Evaluation
 from hairkit.evaluation.prediction import Prediction
-from hairkit.evaluation.scorecard import Figure, band_text, figures
+from hairkit.evaluation.scorecard import Figure, figures
 from hairkit.evaluation.scores import Score
 from hairkit.evaluation.truth import Truth
 from hairkit.storage import write_text
@@ -25,8 +25,8 @@ _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 1800px; color: #222 }
 table { border-collapse: collapse; margin: 1em 0 }
 td, th { padding: .2em .8em; border-bottom: 1px solid #ddd; text-align: right }
-td:first-child, th:first-child { text-align: left }
-.aim { background: #d8f0d8 } .must { background: #f5f0cc } .missed { background: #f6d5d2 }
+td:first-child, th:first-child, td.text { text-align: left }
+td.text { color: #555 }
 .view { display: flex; gap: 6px; flex-wrap: wrap }
 figure { margin: 0 } figcaption { font-size: 12px; color: #555 }
 .key { display: inline-block; width: 1em; height: 1em; vertical-align: -2px }
@@ -79,11 +79,10 @@ def _page(evaluation: Evaluation, prediction: Prediction, truth: Truth) -> str:
 
 
 def _figure_table(rows: tuple[Figure, ...]) -> str:
-    lines = ["<table><tr><th>figure<th>value<th>must<th>aim"]
+    lines = ["<table><tr><th>figure<th>value<th>what is good"]
     lines += [
-        f"<tr><td>{html.escape(row.name)}<td class='{row.verdict}'>{html.escape(row.text())}"
-        f"<td>{html.escape(band_text(row.must, row.digits))}"
-        f"<td>{html.escape(band_text(row.aim, row.digits))}"
+        f"<tr><td>{html.escape(row.name)}<td>{html.escape(row.text())}"
+        f"<td class=text>{html.escape(row.meaning)}"
         for row in rows
     ]
     return "\n".join([*lines, "</table>"])

@@ -1,57 +1,37 @@
-"""The figures a reconstruction is judged by, one line each, with what is wanted of them."""
+"""The figures of an evaluation, one line each, with what a good value is in plain words."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hairkit.evaluation.evaluation import Evaluation
+from hairkit.evaluation.scores import Score
 
-Band = tuple[float, float]
-"""Least and greatest value wanted."""
-_MOST = float("inf")
+_F_MEANING = "higher is better, 100 is best: points of either side that have a match on the other"
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One number with the band it must lie in and the band aimed at."""
+    """One measured number."""
 
     name: str
     value: float | None
     """None when it could not be measured."""
     unit: str
-    must: Band | None = None
-    aim: Band | None = None
     digits: int = 1
-
-    @property
-    def verdict(self) -> str:
-        """`aim`, `must`, `missed`, or nothing where nothing is wanted or known."""
-        if self.value is None or self.must is None:
-            return ""
-        if self.aim is not None and self.aim[0] <= self.value <= self.aim[1]:
-            return "aim"
-        return "must" if self.must[0] <= self.value <= self.must[1] else "missed"
+    meaning: str = ""
+    """What a good value is."""
 
     def text(self) -> str:
         """Return the value with its unit."""
         return "-" if self.value is None else f"{self.value:.{self.digits}f}{self.unit}"
 
 
-def band_text(band: Band | None, digits: int) -> str:
-    """Return a band as people write it: at least, at most, or from to."""
-    if band is None:
-        return ""
-    low, high = band
-    if high == _MOST:
-        return f">= {low:.{digits}f}"
-    return f"<= {high:.{digits}f}" if low <= 0 else f"{low:.{digits}f} to {high:.{digits}f}"
-
-
 def figures(evaluation: Evaluation) -> tuple[Figure, ...]:
-    """Return the figures of one evaluation, the ones that are judged first."""
+    """Return the figures of one evaluation, the most telling ones first."""
     return (*_strand_figures(evaluation), *_view_figures(evaluation), *_head_figures(evaluation))
 
 
@@ -60,42 +40,40 @@ def mean_figures(several: Sequence[Sequence[Figure]]) -> tuple[Figure, ...]:
     means = []
     for column in zip(*several, strict=True):
         known = [figure.value for figure in column if figure.value is not None]
-        first = column[0]
-        mean = float(np.mean(known)) if known else None
-        means.append(Figure(first.name, mean, first.unit, first.must, first.aim, first.digits))
+        means.append(replace(column[0], value=float(np.mean(known)) if known else None))
     return tuple(means)
 
 
 def _strand_figures(evaluation: Evaluation) -> tuple[Figure, ...]:
-    fine, middle, coarse = (100 * score.f for score in evaluation.scores.all)
-    signed = [100 * score.f for score in evaluation.scores.all_signed]
-    outer = evaluation.scores.outer
-    behind = max(fine - signed[0], middle - signed[1], coarse - signed[2])
-    lengths = evaluation.lengths
+    scores, lengths = evaluation.scores, evaluation.lengths
+    behind = max(
+        100 * (free.f - signed.f)
+        for free, signed in zip(scores.all, scores.all_signed, strict=True)
+    )
+    outer: Sequence[Score | None] = scores.outer or (None, None, None)
     return (
-        Figure("F 4 mm/40, all", coarse, "", (65, _MOST), (84, _MOST)),
-        Figure("F 3 mm/30, all", middle, ""),
-        Figure("F 2 mm/20, all", fine, "", (32, _MOST), (52, _MOST)),
-        Figure("F 4 mm/40, outer", None if outer is None else 100 * outer[2].f, ""),
-        Figure(
-            "F 3 mm/30, outer",
-            None if outer is None else 100 * outer[1].f,
-            "",
-            (50, _MOST),
-            (72, _MOST),
-        ),
-        Figure("F 2 mm/20, outer", None if outer is None else 100 * outer[0].f, ""),
-        Figure("signed F behind sign-free F", behind, "", (-_MOST, 4), (-_MOST, 1)),
-        Figure("mean length / true", lengths.mean_ratio, "", (0.75, 1.3), (0.95, 1.05), 2),
+        *_f_figures(scores.all, "all"),
+        *_f_figures(outer, "outer"),
+        Figure("signed F behind sign-free F", behind, "", 1, "0 is best: no strand runs backwards"),
+        Figure("mean length / true", lengths.mean_ratio, "", 2, "1 is best"),
         Figure(
             "strands under half their neighbours",
             100 * lengths.broken_share,
             " %",
-            (0, 10),
-            (0, 2),
+            1,
+            "lower is better: share of broken strands",
         ),
-        Figure("strands", evaluation.strands, "", digits=0),
+        Figure("strands", evaluation.strands, "", 0, "compare only with equal numbers"),
     )
+
+
+def _f_figures(scores: Sequence[Score | None], samples: str) -> list[Figure]:
+    """Return F of the coarse, middle and fine threshold in per cent."""
+    names = ("F 2 mm/20", "F 3 mm/30", "F 4 mm/40")
+    return [
+        Figure(f"{name}, {samples}", None if score is None else 100 * score.f, "", 1, _F_MEANING)
+        for name, score in reversed(list(zip(names, scores, strict=True)))
+    ]
 
 
 def _view_figures(evaluation: Evaluation) -> tuple[Figure, ...]:
@@ -103,24 +81,27 @@ def _view_figures(evaluation: Evaluation) -> tuple[Figure, ...]:
     share = 100 * evaluation.direction_share
     rotation = float(np.mean([camera.rotation_deg for camera in cameras]))
     apart = 1000 * float(np.mean([camera.position_m for camera in cameras]))
+    lower, overlap = "lower is better", "higher is better, 1 is best"
+    orientation, azimuth = evaluation.orientation_deg, evaluation.azimuth_error_deg
     return (
-        Figure("drawn direction within 20 deg", share, " %", (65, _MOST), (85, _MOST)),
-        Figure("silhouette IoU", evaluation.silhouette, "", (0.75, _MOST), (0.88, _MOST), 3),
-        Figure("2D orientation error", evaluation.orientation_deg, " deg", (0, 13), (0, 8)),
-        Figure("hair mask IoU", evaluation.mask_iou, "", (0.82, _MOST), (0.92, _MOST), 3),
-        Figure("camera azimuth error", evaluation.azimuth_error_deg, " deg", (0, 1.5), (0, 0.5), 2),
-        Figure("camera rotation error", rotation, " deg", digits=2),
-        Figure("camera position error", apart, " mm"),
-        Figure("reprojection", evaluation.similarity.residual_px, " px"),
+        Figure("drawn direction within 20 deg", share, " %", 1, "higher is better, 100 is best"),
+        Figure("silhouette IoU", evaluation.silhouette, "", 3, overlap),
+        Figure("2D orientation error", orientation, " deg", 1, f"{lower}, guessing gives 45"),
+        Figure("hair mask IoU", evaluation.mask_iou, "", 3, overlap),
+        Figure("camera azimuth error", azimuth, " deg", 2, lower),
+        Figure("camera rotation error", rotation, " deg", 2, lower),
+        Figure("camera position error", apart, " mm", 1, lower),
+        Figure("reprojection", evaluation.similarity.residual_px, " px", 1, lower),
     )
 
 
 def _head_figures(evaluation: Evaluation) -> tuple[Figure, ...]:
     own, true = evaluation.own_head, evaluation.true_head
+    none = "0 is best: no hair inside the head"
     return (
-        Figure("points inside own head", own.points_inside, "", (0, 0), digits=0),
-        Figure("samples inside own head", own.samples_inside, "", (0, 0), digits=0),
-        Figure("points inside true head", true.points_inside, "", digits=0),
-        Figure("roots off own head", own.root_distance_mean_mm, " mm", digits=2),
-        Figure("roots off true head", true.root_distance_mean_mm, " mm", digits=2),
+        Figure("points inside own head", own.points_inside, "", 0, none),
+        Figure("samples inside own head", own.samples_inside, "", 0, none),
+        Figure("points inside true head", true.points_inside, "", 0, "lower is better"),
+        Figure("roots off own head", own.root_distance_mean_mm, " mm", 2, "0 is best"),
+        Figure("roots off true head", true.root_distance_mean_mm, " mm", 2, "lower is better"),
     )

@@ -29,16 +29,16 @@ def fidelity(project: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 def test_recipes_stand_side_by_side_with_their_means(fidelity: ModuleType) -> None:
     """Each recipe has its captures and their mean; a failed capture has no column."""
     columns = {
-        ("default", "a"): (Figure("F", 80.0, "", (65, 100)),),
-        ("default", "b"): (Figure("F", 60.0, "", (65, 100)),),
-        ("thesis", "a"): (Figure("F", 20.0, "", (65, 100)),),
+        ("default", "a"): (Figure("F", 80.0, ""),),
+        ("default", "b"): (Figure("F", 60.0, ""),),
+        ("thesis", "a"): (Figure("F", 20.0, ""),),
     }
     table = fidelity._table(columns, ["default", "thesis"], ["a", "b"]).splitlines()
-    head = "| figure | must | aim | default: a | default: b | **default: mean** "
+    head = "| figure | default: a | default: b | **default: mean** "
     assert table[0] == head + "| thesis: a | **thesis: mean** |"
-    assert table[1] == "|---" * 8 + "|"
+    assert table[1] == "|---" * 6 + "|"
     values = [cell.strip() for cell in table[2].split("|")]
-    assert [values[1], *values[4:9]] == ["F", "80.0", "60.0", "70.0", "20.0", "20.0"]
+    assert values[1:7] == ["F", "80.0", "60.0", "70.0", "20.0", "20.0"]
     assert table[-1] == "default over thesis, F: 3.50"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +19,7 @@ from hairkit.evaluation import evaluate as evaluate_whole
 from hairkit.evaluation.align import Similarity
 from hairkit.evaluation.prediction import Prediction
 from hairkit.evaluation.report import write_report
-from hairkit.evaluation.scorecard import Figure, band_text, figures, mean_figures
+from hairkit.evaluation.scorecard import figures, mean_figures
 from hairkit.testing import VIEW_NAMES
 
 
@@ -163,13 +164,14 @@ def test_another_captures_truth_is_one_line(truth_folder: Path, out_folder: Path
         evaluate(seven, read_truth(truth_folder))
 
 
-def test_a_figure_knows_whether_it_will_do() -> None:
-    """In the aim, in the must only, or missed; nothing where nothing is wanted or known."""
-    verdicts = [Figure("x", v, "", (0.0, 10.0), (0.0, 2.0)).verdict for v in (1.0, 5.0, 11.0, None)]
-    assert verdicts == ["aim", "must", "missed", ""]
-    assert Figure("x", 3.0, "").verdict == ""
-    texts = [band_text(b, 1) for b in ((65, np.inf), (0, 10), (0.75, 1.3), None)]
-    assert texts == [">= 65.0", "<= 10.0", "0.8 to 1.3", ""]
+def test_every_figure_says_what_is_good(truth_folder: Path, out_folder: Path) -> None:
+    """Names are unique, and each figure has a text that says which values are better."""
+    found = figures(evaluate(read_prediction(out_folder), read_truth(truth_folder)))
+    assert len({figure.name for figure in found}) == len(found)
+    assert all(re.search("better|best|compare", figure.meaning) for figure in found)
+    by_name = {figure.name: figure.text() for figure in found}
+    assert by_name["F 4 mm/40, all"] == "100.0"
+    assert by_name["mean length / true"] == "1.00"
 
 
 def test_means_leave_out_what_is_unknown(truth_folder: Path, out_folder: Path) -> None:

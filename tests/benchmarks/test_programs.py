@@ -1,0 +1,96 @@
+"""Laws of all programs in benchmarks/: they run on small inputs and print what they announce."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from hairkit.cli import main as hairkit
+
+PROJECT = Path(__file__).parents[2]
+PROGRAMS = sorted(path.stem for path in (PROJECT / "benchmarks").glob("*.py"))
+SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
+    "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
+    "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
+    "helices": ({"COUNT": 10}, []),
+    "orientation": ({}, ["CAPTURES", "--only", "structure_tensor"]),
+    "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
+    "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
+    "super_helix": ({"GUIDES": 8, "ELEMENTS": 5, "FRAMES": 2}, []),
+    "viewer": (
+        {"WARM": 1},
+        ["--guides", "20", "--hairs", "60", "--size", "64x48", "--pictures", "1"],
+    ),
+}
+"""Constants and arguments that make a program quick. CAPTURES is a folder with one capture."""
+ELSEWHERE = {"blender_picture", "export", "fidelity", "simulation"}
+"""Programs with tests of their own beside this one, or that need Blender."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one small procedural capture and its ground truth."""
+    folder = tmp_path_factory.mktemp("captures")
+    words = ["synth", "short", "-o", str(folder / "short"), "--strands", "2000"]
+    assert hairkit([*words, "--size", "240x320"]) == 0
+    return folder
+
+
+def program(name: str, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """Return a program of benchmarks/ as a module."""
+    spec = importlib.util.spec_from_file_location(name, PROJECT / "benchmarks" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, name, module)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_program_is_run_by_a_test() -> None:
+    """A new program gets a line in `SMALL`, or a test of its own."""
+    assert set(PROGRAMS) == set(SMALL) | ELSEWHERE
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_it_prints_its_table(
+    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A program prints at least one row of as many cells as its heading has."""
+    module = program(name, monkeypatch)
+    constants, words = SMALL[name]
+    for constant, value in constants.items():
+        monkeypatch.setattr(module, constant, value)
+    monkeypatch.setattr(
+        sys, "argv", [f"{name}.py", *(w.replace("CAPTURES", str(folder)) for w in words)]
+    )
+    capsys.readouterr()
+    assert module.main() in (None, 0)
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("|")]
+    assert len(rows) >= 3
+    assert rows[0].count("|") == rows[2].count("|")
+
+
+@pytest.mark.parametrize("name", ["cameras", "orientation", "segmentation", "fidelity"])
+def test_captures_are_named_by_the_user(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without a folder and without HAIRKIT_CAPTURES a program says what to do, and that is all."""
+    monkeypatch.delenv("HAIRKIT_CAPTURES", raising=False)
+    monkeypatch.setattr(sys, "argv", [f"{name}.py"])
+    assert program(name, monkeypatch).main() in (None, 0)
+    assert capsys.readouterr().out.startswith("no captures")
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_help_tells_what_it_measures(name: str) -> None:
+    """`--help` works for every program and begins with its purpose."""
+    path = PROJECT / "benchmarks" / f"{name}.py"
+    done = subprocess.run([sys.executable, path, "--help"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert f"usage: {name}.py" in done.stdout
