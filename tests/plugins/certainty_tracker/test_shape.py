@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.certainty_tracker import Options, _smoothed, _trimmed
+from hairkit_plugins.certainty_tracker import Options, smooth_strands, trim_u_turns
 from tracked_ball import (
     BALL,
     CENTRES,
@@ -83,7 +83,7 @@ def trimmed_twin(steps: list[float], mu: float) -> int:
 def test_strands_that_turn_up_into_a_u_are_cut_at_its_bottom() -> None:
     """Ten steps down and ten up leave the ten down; the points that stay are not moved."""
     points, counts = heights(*[-1] * 10, *[1] * 10)
-    same, kept = _trimmed(points, counts, 0.3)
+    same, kept = trim_u_turns(points, counts, 0.3)
     assert kept.tolist() == [11]
     np.testing.assert_array_equal(same, points)
 
@@ -95,18 +95,18 @@ def test_trimming_follows_the_rule_of_the_thesis(share: float) -> None:
     for _ in range(60):
         steps = rng.choice([-1.0, -1.0, 0.0, 1.0], rng.integers(2, 25)).tolist()
         points, counts = heights(*steps)
-        assert _trimmed(points, counts, share)[1].tolist() == [trimmed_twin(steps, share)]
+        assert trim_u_turns(points, counts, share)[1].tolist() == [trimmed_twin(steps, share)]
 
 
 @pytest.mark.parametrize(
     "steps", [[1] * 8, [-1] * 8, [1, 1, 1, -1, -1, -1], [-1] * 9 + [1, 1], [0, 0, 0]]
 )
-def test_rising_falling_and_little_curled_strands_are_not_trimmed(steps: list[int]) -> None:
+def test_rising_falling_and_little_curled_strands_are_nottrim_u_turns(steps: list[int]) -> None:
     """Up then down is an arch, no U; a tip that turns up a little may."""
     points, counts = heights(*steps)
-    assert _trimmed(points, counts, 0.3)[1].tolist() == [len(steps) + 1]
+    assert trim_u_turns(points, counts, 0.3)[1].tolist() == [len(steps) + 1]
     bowl, full = heights(-1, 1, 1, 1)
-    assert _trimmed(bowl, full, 1.0)[1].tolist() == [5]
+    assert trim_u_turns(bowl, full, 1.0)[1].tolist() == [5]
 
 
 def test_tracked_strands_are_trimmed_and_the_option_keeps_them() -> None:
@@ -138,20 +138,20 @@ def test_smoothing_keeps_root_and_length_and_takes_off_the_zigzag() -> None:
     before = np.linalg.norm(np.diff(points, axis=1), axis=2)
     rough = [roughness(points)]
     for iterations in (1, 5):
-        smooth = _smoothed(points, iterations)
+        smooth = smooth_strands(points, iterations)
         np.testing.assert_array_equal(smooth[:, 0], points[:, 0])
         after = np.linalg.norm(np.diff(smooth, axis=1), axis=2)
         np.testing.assert_allclose(after, before, atol=1e-6)
         rough.append(roughness(smooth))
     assert rough[2] < 0.7 * rough[1] < 0.7 * 0.8 * rough[0]
-    np.testing.assert_array_equal(_smoothed(points, 0), points)
+    np.testing.assert_array_equal(smooth_strands(points, 0), points)
 
 
 def test_smoothing_leaves_straight_strands() -> None:
     """A line has nothing to smooth, however uneven its segments."""
     t = np.cumsum(np.random.default_rng(8).uniform(0.001, 0.01, 20))
     line = (t[None, :, None] * np.array([0.6, -0.8, 0.0])).astype(np.float32)
-    np.testing.assert_allclose(_smoothed(line, 5), line, atol=1e-6)
+    np.testing.assert_allclose(smooth_strands(line, 5), line, atol=1e-6)
 
 
 @pytest.mark.parametrize("clearance", [0.0, 0.001, 0.004])
