@@ -149,6 +149,21 @@ def make_options(kind: type[_T], values: Mapping[str, object], where: str) -> _T
     return kind(**checked)
 
 
+def split_setting(text: str) -> tuple[str, str, str]:
+    """Return plugin, option and value of a `--set` text; the plugin is empty for a bare option.
+
+    Raises `OptionError` for a text of another form.
+
+    >>> split_setting("gabor.angles=64")
+    ('gabor', 'angles', '64')
+    """
+    target, equals, value = (part.strip() for part in text.partition("="))
+    plugin, dot, option = target.rpartition(".")
+    if not equals or not option or bool(dot) != bool(plugin):
+        raise OptionError(f"--set {text}: expected plugin.option=value")
+    return plugin, option, value
+
+
 def unknown_name(thing: str, name: str, known: typing.Iterable[str]) -> str:
     """Return `no option 'x', did you mean 'y'?; valid: y, z` for error messages."""
     names = list(known)

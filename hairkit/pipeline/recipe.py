@@ -1,5 +1,6 @@
 """Recipes: which plugin does each stage, with which options, written as TOML.
 
+head = false                         # leave a stage out
 [segment]
 plugin = ["mask_files", "grabcut"]   # the first that has an answer wins
 [segment.grabcut]                    # options of one plugin of several
@@ -7,11 +8,15 @@ scale = 0.5
 [orient]
 plugin = "gabor"
 angles = 64                          # options of the only plugin
+
+What a recipe does not say is as in the recipe `default`: a stage without a table, and the plugin of
+a table that only has options.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import hashlib
 import importlib.resources
 import os
@@ -24,7 +29,7 @@ from typing import Any
 
 from hairkit.errors import HairkitError, InputError, OptionError
 from hairkit.manager import Manager
-from hairkit.options import unknown_name
+from hairkit.options import split_setting, unknown_name
 from hairkit.pipeline.module_digest import module_digest
 from hairkit.storage import read_bytes
 
@@ -94,12 +99,11 @@ class Recipe:
         """
         recipe = self
         for text in assignments:
-            target, equals, value = (part.strip() for part in text.partition("="))
-            plugin, _, name = target.partition(".")
-            if not equals or not plugin or ("." in target and not name):
-                raise OptionError(f"--set {text}: expected plugin.option=value or stage=plugin")
-            change = recipe._with_option if name else recipe._with_plugins
-            recipe = change(plugin, name or value, value, text)
+            plugin, name, value = split_setting(text)
+            if plugin:
+                recipe = recipe._with_option(plugin, name, value, text)
+            else:
+                recipe = recipe._with_plugins(name, value, text)
         return replace(recipe, source=f"{self.source} with --set") if assignments else self
 
     def check(self, manager: Manager) -> None:
@@ -126,9 +130,12 @@ class Recipe:
             )
         )
 
-    def _with_plugins(self, table: str, value: str, _: str, text: str) -> Recipe:
+    def _with_plugins(self, table: str, value: str, text: str) -> Recipe:
         if table not in HOOKS:
-            raise OptionError(f"--set {text}: {unknown_name('stage', table, HOOKS)}")
+            reason = unknown_name("stage", table, HOOKS)
+            raise OptionError(
+                f"--set {text}: expected plugin.option=value or stage=plugin; {reason}"
+            )
         names = [name.strip() for name in value.split(",") if name.strip()]
         kept = {stage.table: stage for stage in self.stages}
         if names == ["none"] and table not in NEEDED:
@@ -149,8 +156,7 @@ def load_recipe(name: str | os.PathLike[str]) -> Recipe:
     """Read a shipped recipe by name, or a `.toml` file by path; `InputError` says what is wrong."""
     text = os.fspath(name)
     if text in recipe_names():
-        data = (importlib.resources.files("hairkit") / "recipes" / f"{text}.toml").read_bytes()
-        return parse_recipe(data, text, f"recipe {text}")
+        return parse_recipe(_shipped(text), text, f"recipe {text}")
     path = Path(text)
     if path.suffix != ".toml" and not path.exists():
         reason = unknown_name("recipe", text, recipe_names())
@@ -167,19 +173,37 @@ def recipe_names() -> tuple[str, ...]:
 
 def parse_recipe(data: bytes, name: str, source: str) -> Recipe:
     """Read a recipe from TOML; plugins and options are checked later, by `Recipe.check`."""
-    try:
-        document = tomllib.loads(data.decode())
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{source}: not a TOML file: {error}") from error
+    document = _document(data, source)
     description = document.pop("description", "")
     for key in document:
         if key not in HOOKS:
             raise InputError(f"{source}: {key}: {unknown_name('stage', key, HOOKS)}")
-    for key in NEEDED:
-        if key not in document:
-            raise InputError(f'{source}: no [{key}] table; add one with plugin = "..."')
-    stages = tuple(_stage(key, document[key], source) for key in HOOKS if key in document)
+    tables = {**_default_tables(), **document}
+    for key, content in document.items():
+        if content is False and key not in NEEDED:
+            del tables[key]
+        elif isinstance(content, dict) and "plugin" not in content:
+            tables[key] = {**_default_tables()[key], **content}
+    stages = tuple(_stage(key, tables[key], source) for key in HOOKS if key in tables)
     return Recipe(name, source, str(description), stages)
+
+
+def _document(data: bytes, source: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(data.decode())
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{source}: not a TOML file: {error}") from error
+
+
+@functools.cache
+def _default_tables() -> Mapping[str, Any]:
+    """Return the tables of the recipe that others differ from."""
+    document = _document(_shipped("default"), "recipe default")
+    return {key: content for key, content in document.items() if key in HOOKS}
+
+
+def _shipped(name: str) -> bytes:
+    return (importlib.resources.files("hairkit") / "recipes" / f"{name}.toml").read_bytes()
 
 
 def stage_digest(manager: Manager, stage: Stage) -> str:
@@ -203,8 +227,9 @@ def stage_digest(manager: Manager, stage: Stage) -> str:
 
 
 def _stage(table: str, content: object, source: str) -> Stage:
-    if not isinstance(content, dict) or "plugin" not in content:
-        raise InputError(f'{source}: [{table}]: expected a table with plugin = "..."')
+    if not isinstance(content, dict):
+        also = "" if table in NEEDED else f", or {table} = false to leave the stage out"
+        raise InputError(f"{source}: {table} is {content!r}, expected a table [{table}]{also}")
     named = content["plugin"]
     names = [named] if isinstance(named, str) else named
     if not isinstance(names, list) or not all(isinstance(n, str) and n for n in names):
@@ -224,7 +249,7 @@ def _stage(table: str, content: object, source: str) -> Stage:
 
 def _choice(name: str, options: dict[str, Any], alone: bool) -> Choice:
     """Take the options of one plugin out of the stage's table."""
-    values: dict[str, Any] = options.pop(name) if isinstance(options.get(name), dict) else {}
+    values = dict(options.pop(name)) if isinstance(options.get(name), dict) else {}
     if alone:
         values |= options
         options.clear()

@@ -48,7 +48,7 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
         ("hairkit/storage.py", "segment scene head orient hull field track"),
         ("hairkit/cameras/silhouette_coherence.py", "scene head"),
         ("hairkit/cameras/projection_kernels.py", "hull field"),
-        ("hairkit/imaging/masked_filters.py", "segment orient"),
+        ("hairkit/imaging/seeded_segmentation.py", "segment"),
         ("hairkit/imaging/geodesic.py", "segment"),
         ("hairkit/head_model/signed_distance.py", "hull"),
         ("hairkit/field/diffusion.py", "field"),
