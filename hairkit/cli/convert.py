@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.cli.export import assigned, check_target
+from hairkit.cli.export import check_target
+from hairkit.cli.settings import add_setting, split_settings
 from hairkit.errors import InputError, OptionError
 from hairkit.grooming.decimate import simplified
 from hairkit.grooming.guide_weights import guide_mask
@@ -27,7 +28,6 @@ each format carries."""
 
 UP = {"y": "y_up_metres", "z": "z_up_metres"}
 """Axis option of the reader for each way up."""
-READER, WRITER = "reader", "writer"
 CURLS = 400
 """Strands at most whose curl is measured."""
 
@@ -54,13 +54,7 @@ def register(subparsers: Any) -> None:
         help="measure the strands' waves or coils for the material (HairWorks draws them)",
     )
     add("--to", metavar="PLUGIN", help="export plugin; by default the one of the ending")
-    add(
-        "--set",
-        action="append",
-        default=[],
-        metavar="P.X=V",
-        help="option X of plugin P; P may also be reader or writer",
-    )
+    add_setting(add)
 
 
 def add_reader_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,9 +77,9 @@ def run(args: argparse.Namespace) -> int:
     writer = args.to or plugin_for(manager, "export_groom", target)
     manager.implementer("import_groom", reader)
     manager.implementer("export_groom", writer)
-    reading, writing = _parted(args.set, reader, writer)
-    reading = reader_settings(manager, reader, args) | reading
-    options = manager.options(writer, writing)
+    settings = split_settings(manager, {"reader": reader, "writer": writer}, args.set)
+    reading = reader_settings(manager, reader, args) | settings["reader"]
+    options = manager.options(writer, settings["writer"])
     check_target(target)
     if target.exists() and target.samefile(source):
         raise InputError(f"{target}: is the file that is read; name another to write")
@@ -123,25 +117,6 @@ def reader_settings(manager: Manager, reader: str, args: argparse.Namespace) -> 
             f"{missing[0]}: files of plugin {reader!r} say that themselves; leave it out"
         )
     return {name: wanted[name][1] for name in given}
-
-
-def _parted(
-    assignments: list[str], reader: str, writer: str
-) -> tuple[dict[str, object], dict[str, object]]:
-    """Return the options of reader and writer out of `plugin.option=value` texts."""
-    reading: list[str] = []
-    writing: list[str] = []
-    for text in assignments:
-        plugin, dot, rest = text.strip().partition(".")
-        if not dot or "=" in plugin or plugin not in (reader, writer, READER, WRITER):
-            raise OptionError(
-                f"--set {text}: expected {reader}.option=value or {writer}.option=value"
-            )
-        if plugin in (reader, READER):
-            reading.append(rest)
-        if plugin in (writer, WRITER):
-            writing.append(rest)
-    return assigned(reading, reader), assigned(writing, writer)
 
 
 def _summary(groom: Groom, target: Path, seconds: float) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from hairkit.errors import InputError, OptionError
+from hairkit.cli.settings import add_setting, importer_of, split_settings
+from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
 
@@ -26,7 +26,7 @@ def register(subparsers: Any) -> None:
     add = parser.add_argument
     add("groom", metavar="GROOM", help="groom.npz, or a file that an import plugin reads")
     add("-o", "--out", required=True, metavar="FILE", help="file to write")
-    add("--set", action="append", default=[], metavar="X=V", help="option=V of the export plugin")
+    add_setting(add)
     add("--using", metavar="NAME", help="export plugin; by default the one of the file's ending")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
 
@@ -36,10 +36,12 @@ def run(args: argparse.Namespace) -> int:
     manager = Manager.loaded(args.plugin)
     source, target = Path(args.groom), Path(args.out)
     exporter = args.using or plugin_for(manager, "export_groom", target)
-    settings = assigned(args.set, exporter)
-    options = manager.options(exporter, settings)
+    manager.implementer("export_groom", exporter)
+    plugins = {"reader": importer_of(manager, source), "writer": exporter}
+    settings = split_settings(manager, plugins, args.set)
+    options = manager.options(exporter, settings["writer"])
     check_target(target)
-    groom = load_groom(manager, source, {})
+    groom = load_groom(manager, source, settings["reader"])
     manager.call("export_groom", exporter, options, groom=groom, path=target)
     print(target)
     return 0
@@ -51,15 +53,3 @@ def check_target(path: Path) -> None:
         raise InputError(f"{path.parent}: no such folder; make it first")
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file")
-
-
-def assigned(assignments: Iterable[str], plugin: str) -> dict[str, object]:
-    """Take `option=value` and `plugin.option=value` texts apart."""
-    values: dict[str, object] = {}
-    for text in assignments:
-        target, equals, value = (part.strip() for part in text.partition("="))
-        name = target.removeprefix(f"{plugin}.")
-        if not equals or not name:
-            raise OptionError(f"--set {text}: expected option=value of {plugin}")
-        values[name] = value
-    return values

@@ -11,18 +11,19 @@ import numpy as np
 
 from hairkit.arrays import Float32Array
 from hairkit.cli.convert import add_reader_arguments, reader_settings
-from hairkit.cli.export import assigned
+from hairkit.cli.settings import add_setting, split_settings
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
+from hairkit.types.point_cache import PointCache, is_cache_file
 
 _DESCRIPTION = """\
 Example: hairkit info out/groom.npz
 
 Say what a file holds: a groom (.npz or what an import plugin reads; --scale, --up and --set say
-what bare strands leave open), a scene.json, a head (.obj, .ply, .glb), or a capture's folder.
-Lengths are in metres."""
+what bare strands leave open), a simulation (.npz), a scene.json, a head (.obj, .ply, .glb), or a
+capture's folder. Lengths are in metres."""
 
 _HEADS = (".obj", ".ply", ".glb")
 
@@ -35,9 +36,7 @@ def register(subparsers: Any) -> None:
         "--head-units", default="m", metavar="U", help="units of a head file (default m)"
     )
     add_reader_arguments(parser)
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="X=V", help="option=V of the import plugin"
-    )
+    add_setting(parser.add_argument)
     parser.add_argument("--json", action="store_true", help="print for machines")
 
 
@@ -55,6 +54,8 @@ def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
         raise InputError(f"{path}: no such file")
     if path.suffix == ".json":
         return _scene(path)
+    if is_cache_file(path):
+        return _simulation(PointCache.load(path))
     if path.suffix.lower() not in _HEADS:
         return _groom(path, args)
     try:
@@ -63,10 +64,25 @@ def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
         return _head_file(path, args.head_units)
 
 
+def _simulation(cache: PointCache) -> dict[str, Any]:
+    traces = np.trace(cache.head_from_rest[:, :3, :3], axis1=1, axis2=2)
+    turns = np.degrees(np.arccos(np.clip((traces - 1) / 2, -1, 1)))
+    return {
+        "kind": "simulation",
+        "frames": len(cache),
+        "points": cache.points.shape[1],
+        "frames_per_second": round(cache.frames_per_second, 3),
+        "seconds": _range(cache.times),
+        "bounds_m": _bounds(cache.points.reshape(-1, 3)),
+        "largest_head_turn_deg": round(float(turns.max()), 2),
+    }
+
+
 def _groom(path: Path, args: argparse.Namespace) -> dict[str, Any]:
     manager = Manager.loaded(args.plugin)
     reader = args.reader or plugin_for(manager, "import_groom", path)
-    settings = reader_settings(manager, reader, args) | assigned(args.set, reader)
+    given = split_settings(manager, {"reader": reader}, args.set)["reader"]
+    settings = reader_settings(manager, reader, args) | given
     groom = load_groom(manager, path, settings, reader)
     strands = groom.strands
     lengths, counts = strands.lengths(), strands.counts

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from hairkit.cli.settings import STAGE_HELP, add_setting
 from hairkit.errors import InputError
 
 _DESCRIPTION = """\
@@ -24,6 +25,8 @@ where it stopped.
 
 def register(subparsers: Any) -> None:
     """Add the verb to the command line."""
+    from hairkit.pipeline.recipe import recipe_names
+
     parser = subparsers.add_parser(
         "reconstruct", help="turn eight photos into a groom", description=_DESCRIPTION
     )
@@ -31,15 +34,16 @@ def register(subparsers: Any) -> None:
     add("photos", nargs="?", metavar="PHOTOS", help="folder of the capture")
     add("-o", "--out", required=True, metavar="OUT", help="folder for what is made")
     add("--sample", action="store_true", help="use the capture that ships with hairkit")
-    add("--recipe", default="default", metavar="R", help="default, thesis or a .toml file")
-    add("--set", action="append", default=[], metavar="X=V", help="plugin.option=V or stage=PLUGIN")
+    recipes = f"{', '.join(recipe_names())} or a .toml file"
+    add("--recipe", default="default", metavar="R", help=recipes)
+    add_setting(add, STAGE_HELP)
     add("--head", metavar="FILE", help="your head: OBJ, PLY or GLB with a scalp")
     add("--head-units", default="m", metavar="U", help="units of the head file (default m)")
     add("--head-scalp", metavar="NAME", help="the scalp: a group of it, or a mask picture")
     add("--head-up", default="y", metavar="AXIS", help="axis that points up in it (default y)")
     add("--guides", type=int, default=600, metavar="N", help="number of guide hairs (default 600)")
     add("--seed", type=int, default=0, metavar="N", help="seed of the roots' places (default 0)")
-    add("--max-edge", type=int, default=0, metavar="PX", help="scale larger photos to this edge")
+    add("--max-edge", type=int, metavar="PX", help="scale larger photos to this edge (1440)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--no-cache", action="store_true", help="run every stage again")
     add("--no-sheet", action="store_true", help="draw no contact sheet")
@@ -101,9 +105,11 @@ def _photos(args: argparse.Namespace) -> Path:
 
 
 def _max_edge(args: argparse.Namespace, default: int) -> int:
-    if args.max_edge and not 128 <= args.max_edge <= 8192:
+    if args.max_edge is None:
+        return default
+    if not 128 <= args.max_edge <= 8192:
         raise InputError(f"--max-edge is {args.max_edge}, expected 128 to 8192 pixels")
-    return args.max_edge or default
+    return int(args.max_edge)
 
 
 def _head(args: argparse.Namespace) -> Any:

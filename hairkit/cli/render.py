@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.cli.settings import add_setting, importer_of, split_settings
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.io.capture_reader import TURN
@@ -19,7 +20,10 @@ from hairkit.pipeline.open_groom import load_groom
 from hairkit.rendering import Lights, draw_views
 from hairkit.rendering.framing import framing_cameras
 from hairkit.rendering.picture_file import write_picture
+from hairkit.simulation.posing import pose_groom
 from hairkit.types.camera import Camera
+from hairkit.types.groom import Groom
+from hairkit.types.point_cache import read_cache
 from hairkit.types.scene import read_cameras
 from hairkit.types.strands import Strands
 
@@ -27,7 +31,8 @@ _DESCRIPTION = """\
 Example: hairkit render out/groom.npz -o front-left.png --camera front-left
 
 Draw a groom on its head, its guides interpolated to full hair. The camera is a name of the turn,
-"azimuth,elevation" in degrees, or a view of a scene.json. --turntable 24 writes 24 pictures."""
+"azimuth,elevation" in degrees, or a view of a scene.json. --turntable 24 writes 24 pictures.
+--cache draws a frame of what hairkit simulate wrote."""
 
 MOST_HAIRS = 200_000
 LARGEST = 8192
@@ -50,11 +55,17 @@ def register(subparsers: Any) -> None:
     parser.add_argument("--size", metavar="WxH", help="pixels (1280x720; the scene's own size)")
     parser.add_argument("--turntable", type=int, metavar="N", help="N pictures all around")
     parser.add_argument("--seed", type=int, default=0, help="of the interpolated hair (0)")
+    parser.add_argument("--cache", type=Path, metavar="FILE", help="simulation of the groom (.npz)")
+    parser.add_argument("--frame", type=int, metavar="N", help="its frame, -1 is the last (0)")
+    add_setting(parser.add_argument)
+    parser.add_argument(
+        "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Draw and print the names of the pictures."""
-    groom = load_groom(Manager.loaded(), args.groom)
+    groom = _posed(args)
     if not 1 <= args.hairs <= MOST_HAIRS:
         raise InputError(f"--hairs is {args.hairs}, expected 1 to {MOST_HAIRS}")
     hair = densify(groom, args.hairs, args.seed)
@@ -67,6 +78,19 @@ def run(args: argparse.Namespace) -> int:
         print(path)
         print(f"{path.name}: {len(hair)} strands, {camera.width}x{camera.height}", file=sys.stderr)
     return 0
+
+
+def _posed(args: argparse.Namespace) -> Groom:
+    """Return the groom, at the frame of its simulation where one is given."""
+    manager = Manager.loaded(args.plugin)
+    reader = importer_of(manager, args.groom)
+    settings = split_settings(manager, {"reader": reader}, args.set)
+    groom = load_groom(manager, args.groom, settings["reader"])
+    if args.cache is None:
+        if args.frame is not None:
+            raise InputError(f"--frame {args.frame} needs --cache with a simulation of the groom")
+        return groom
+    return pose_groom(groom, read_cache(args.cache, groom), args.frame or 0)
 
 
 def _cameras(args: argparse.Namespace, head: Any, hair: Strands) -> list[Camera]:

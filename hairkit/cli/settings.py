@@ -1,64 +1,85 @@
-"""`--set` of the verbs that read a groom and use it: whose option is meant."""
+"""`--set` of every verb: options of the plugins that the verb uses."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hairkit.errors import OptionError
-from hairkit.pipeline.open_groom import groom_path, plugin_for
+from hairkit.options import split_setting, unknown_name
+
+if TYPE_CHECKING:
+    from hairkit.manager import Manager
+
+SET_HELP = "set an option: plugin.option=V, or option=V where one plugin has it"
+STAGE_HELP = "set an option: plugin.option=V, or a stage's plugin: stage=PLUGIN"
+"""Of the verb that runs a recipe, where many plugins are used."""
 
 Settings = dict[str, dict[str, object]]
-"""Values by option, by plugin."""
+"""Values by option, by role."""
 
 
-def add_setting(add: Callable[..., Any]) -> None:
+def add_setting(add: Callable[..., Any], text: str = SET_HELP) -> None:
     """Add `--set` by a parser's `add_argument`."""
-    what = "option=V of simulator or file format"
-    add("--set", action="append", default=[], metavar="X=V", help=what)
+    add("--set", action="append", default=[], metavar="P.X=V", help=text)
 
 
-def importer_of(manager: Any, path: Path) -> str | None:
+def importer_of(manager: Manager, path: Path) -> str | None:
     """Return the plugin that reads a groom's file, None for hairkit's own."""
+    from hairkit.pipeline.open_groom import groom_path, plugin_for
+
     path = groom_path(path)
-    return None if path.suffix == ".npz" else str(plugin_for(manager, "import_groom", path))
+    return None if path.suffix == ".npz" else plugin_for(manager, "import_groom", path)
 
 
-def split_settings(manager: Any, user: str, importer: str | None, texts: Iterable[str]) -> Settings:
-    """Return what `--set` says, by plugin.
+def split_settings(
+    manager: Manager, plugins: Mapping[str, str | None], texts: Iterable[str]
+) -> Settings:
+    """Return what `--set` says, by role; a role without settings has an empty dict.
 
     Parameters
     ----------
     manager
         The plugins.
-    user
-        The plugin that takes the groom: a simulator, or `none`.
-    importer
-        The plugin that reads its file, if any.
+    plugins
+        The plugin in each role of the verb: `{"reader": "ply", "simulator": "pbd"}`; None where
+        the verb does without one.
     texts
-        `option=value` or `plugin.option=value`. A bare option is the user's, or the importer's
-        where only that one has it.
+        `plugin.option=value`, by the plugin's name or role, or `option=value` for the option of
+        the only plugin that has it. A plugin in two roles takes the value in both.
 
     Raises
     ------
     OptionError
-        A text is none of that form.
+        A text has another form, names a plugin that the verb does not use, or names an option that
+        none or several of its plugins have.
     """
-    settings: Settings = {}
+    used = {role: plugin for role, plugin in plugins.items() if plugin is not None}
+    settings: Settings = {role: {} for role in plugins}
     for text in texts:
-        target, equals, value = (part.strip() for part in text.partition("="))
-        plugin, dot, option = target.rpartition(".")
-        if not equals or not option or (dot and not plugin):
-            raise OptionError(f"--set {text}: expected option=value or plugin.option=value")
-        if not plugin:
-            read = option in _names(manager, importer) and option not in _names(manager, user)
-            plugin = str(importer) if read else user
-        settings.setdefault(plugin, {})[option] = value
+        plugin, option, value = split_setting(text)
+        for role in _roles(manager, used, plugin, option, text):
+            settings[role][option] = value
     return settings
 
 
-def _names(manager: Any, plugin: str | None) -> set[str]:
-    if plugin is None or plugin == "none":
-        return set()
-    return {info.name for info in manager.info(plugin).options}
+def _roles(
+    manager: Manager, used: Mapping[str, str], plugin: str, option: str, text: str
+) -> list[str]:
+    """Return the roles whose plugin a setting is for."""
+    if plugin:
+        roles = [role for role, name in used.items() if plugin in (name, role)]
+        if not roles:
+            reason = unknown_name("plugin", plugin, dict.fromkeys(used.values()))
+            raise OptionError(f"--set {text}: this command uses {reason}")
+        return roles
+    known = {name: [i.name for i in manager.info(name).options] for name in used.values()}
+    having = [name for name, options in known.items() if option in options]
+    if not having:
+        options = dict.fromkeys(o for options in known.values() for o in options)
+        raise OptionError(f"--set {text}: {unknown_name('option', option, options)}")
+    if len(having) > 1:
+        choices = " or ".join(f"{name}.{option}" for name in having)
+        raise OptionError(f"--set {text}: several plugins have this option; write {choices}")
+    return [role for role, name in used.items() if name == having[0]]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.errors import InputError, OptionError
+from hairkit.errors import InputError
 
 _DESCRIPTION = """\
 Example: hairkit simulate out/groom.npz -o cache.npz --shake yaw:20:1.5 --wind 3,0,1
@@ -59,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
+    from hairkit.api import export
     from hairkit.manager import Manager
     from hairkit.pipeline.open_groom import load_groom
     from hairkit.progress import progress_for
@@ -69,14 +69,14 @@ def _run(args: argparse.Namespace) -> int:
     manager = Manager.loaded(args.plugin)
     using, kept = _preset(args)
     manager.implementer("make_simulator", using)
-    importer = importer_of(manager, args.groom)
-    others = split_settings(manager, using, importer, args.set)
-    options = manager.options(using, kept | others.pop(using, {}))
-    reading = others.pop(importer, {}) if importer is not None else {}
-    exporter = _exporter(manager, args.out)
-    _refuse_unknown(others, exporter)
+    importer, exporter = importer_of(manager, args.groom), _exporter(manager, args.out)
+    plugins = {"reader": importer, "simulator": using, "writer": exporter}
+    settings = split_settings(manager, plugins, args.set)
+    options = manager.options(using, kept | settings["simulator"])
+    if exporter is not None:
+        manager.options(exporter, settings["writer"])  # refused before the simulation, not after
     weather = Weather(_vector("--wind", args.wind), args.turbulence, _gravity(args.gravity))
-    groom = load_groom(manager, args.groom, reading)
+    groom = load_groom(manager, args.groom, settings["reader"])
     if not len(groom.strands):
         raise InputError(f"{args.groom}: holds no strands, so there is nothing to simulate")
     motion = static_motion() if args.motion is None else read_motion(args.motion)
@@ -90,7 +90,7 @@ def _run(args: argparse.Namespace) -> int:
     if exporter is None:
         cache.save(args.out)
     else:
-        _export(manager, exporter, others.get(exporter, {}), groom, cache, args.out)
+        export(groom, args.out, cache=cache, plugin=exporter, manager=manager, **settings["writer"])
     stretch = simulator.measure().stretch
     print(
         f"{args.out.name}: {len(cache)} frames of {len(simulator.strands)} guides,"
@@ -164,21 +164,3 @@ def _exporter(manager: Any, path: Path) -> str | None:
 
 def _animated(manager: Any, exporter: str) -> bool:
     return "cache" in {info.name for info in manager.info(exporter).options}
-
-
-def _refuse_unknown(others: dict[str, dict[str, object]], exporter: str | None) -> None:
-    for plugin in others:
-        if plugin != exporter:
-            known = "the simulator's options" if exporter is None else f"those or {exporter}'s"
-            raise OptionError(f"--set {plugin}.{next(iter(others[plugin]))}: expected {known}")
-
-
-def _export(
-    manager: Any, exporter: str, values: dict[str, object], groom: Any, cache: Any, path: Path
-) -> None:
-    """Write the animated file; its exporter reads the frames from a cache that goes away again."""
-    with tempfile.TemporaryDirectory(prefix="hairkit-") as folder:
-        frames = Path(folder) / "cache.npz"
-        cache.save(frames)
-        options = manager.options(exporter, values | {"cache": frames})
-        manager.call("export_groom", exporter, options, groom=groom, path=path)

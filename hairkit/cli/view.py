@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 from hairkit.cli.render import parse_size
 from hairkit.cli.settings import add_setting
-from hairkit.errors import InputError, OptionError
+from hairkit.errors import InputError
 
 MOST_HAIRS = 200_000
 _DESCRIPTION = """\
@@ -103,9 +103,10 @@ def _headless(args: argparse.Namespace) -> int:
     if args.hairs is None:
         args.hairs = script.setup.hairs
     size = _size(args) if args.size else script.setup.size
+    manager = _manager(args)
     with renderer() as gl:
         print(gl.description, file=sys.stderr)
-        preview = Preview(gl, _session(args, _manager(args), size, script.setup.seed))
+        preview = Preview(gl, _session(args, manager, size, script.setup.seed))
         play(preview, script, args.out or Path())
         preview.release()
     for path in preview.written:
@@ -114,13 +115,15 @@ def _headless(args: argparse.Namespace) -> int:
 
 
 def _manager(args: argparse.Namespace) -> Any:
-    """Return the plugins, when one of them reads the groom and `--set` has its form."""
-    from hairkit.cli.settings import importer_of, split_settings
+    """Return the plugins; raises when none reads the groom or a `--set` has another form."""
+    from hairkit.cli.settings import importer_of
     from hairkit.manager import Manager
-    from hairkit.viewer.simulation import STILL
+    from hairkit.options import split_setting
 
     manager = Manager.loaded(args.plugin)
-    split_settings(manager, STILL, importer_of(manager, args.groom), args.set)
+    importer_of(manager, args.groom)
+    for text in args.set:
+        split_setting(text)
     return manager
 
 
@@ -130,14 +133,17 @@ def _session(args: argparse.Namespace, manager: Any, size: tuple[int, int], seed
     from hairkit.viewer.actions.actions import perform
     from hairkit.viewer.actions.presets import presets_path, read_preset
     from hairkit.viewer.session import HAIRS, Session
-    from hairkit.viewer.simulation import preferred
+    from hairkit.viewer.simulation import STILL, preferred
 
     simulator = args.simulator
     if args.preset is not None and simulator is None:
         simulator = read_preset(presets_path(groom_path(args.groom)), args.preset).get("simulator")
-    importer = importer_of(manager, args.groom)
     user = simulator or preferred(manager)
-    settings = split_settings(manager, user, importer, args.set)
+    plugins = {
+        "reader": importer_of(manager, args.groom),
+        "simulator": None if user == STILL else user,
+    }
+    settings = split_settings(manager, plugins, args.set)
     session = Session(
         manager,
         args.groom,
@@ -146,15 +152,12 @@ def _session(args: argparse.Namespace, manager: Any, size: tuple[int, int], seed
         hairs=HAIRS if args.hairs is None else args.hairs,
         capture=args.capture,
         seed=seed,
-        reading=settings.pop(importer, {}) if importer is not None else {},
+        reading=settings["reader"],
     )
     if args.preset is not None:
         perform(session, "preset_load", {"name": args.preset})
-    for name, value in settings.pop(user, {}).items():
+    for name, value in settings["simulator"].items():
         session.tuned.set(name, value)
-    for plugin, values in settings.items():
-        known = user if importer is None else f"{user} or {importer}"
-        raise OptionError(f"--set {plugin}.{next(iter(values))}: expected options of {known}")
     return session
 
 

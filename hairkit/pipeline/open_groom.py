@@ -8,6 +8,7 @@ from pathlib import Path
 from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.types.groom import Groom
+from hairkit.types.point_cache import is_cache_file
 
 
 def load_groom(
@@ -35,6 +36,11 @@ def load_groom(
         There is no such file, or nothing that reads it.
     """
     path = groom_path(path)
+    if is_cache_file(path):
+        raise InputError(
+            f"{path}: a simulation (point cache), not a groom; give the groom that was simulated,"
+            f" as in hairkit render GROOM --cache {path.name}"
+        )
     if plugin is None and path.suffix == ".npz" and not settings:
         return Groom.load(path)
     name = plugin or plugin_for(manager, "import_groom", path)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+import zipfile
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -44,6 +45,16 @@ class PointCache(Stored):
         if len(self.times) < 2:
             return 24.0
         return float((len(self.times) - 1) / (self.times[-1] - self.times[0]))
+
+
+def is_cache_file(path: str | os.PathLike[str]) -> bool:
+    """Return whether an npz file has the arrays of a point cache, without reading them."""
+    try:
+        with zipfile.ZipFile(path) as file:
+            names = set(file.namelist())
+    except (OSError, zipfile.BadZipFile):
+        return False
+    return {f"{field.name}.npy" for field in fields(PointCache)} <= names
 
 
 def read_cache(path: str | os.PathLike[str], groom: Groom) -> PointCache:

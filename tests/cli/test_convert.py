@@ -78,7 +78,7 @@ def test_options_go_to_reader_and_writer(folder: Path) -> None:
         (["bare.data", "b.npz", "--up", "x"], "invalid choice: 'x'"),
         (["bare.data", "b.npz", "--head", "none.obj", "--scale", "0.01"], "none.obj"),
         (["groom.npz", "b.hair", "--scale", "2"], "--scale: files of plugin 'native'"),
-        (["bare.data", "b.npz", "--set", "x=1"], "expected usc_data.option=value or native."),
+        (["bare.data", "b.npz", "--set", "x=1"], "--set x=1: no option 'x'"),
         (["bare.data", "b.npz", "--set", "writer.x=1"], "no option 'x'"),
         (["bare.data", "b.npz", "--to", "gabor"], "implements 'export_groom'"),
         (["bare.data", "b.npz", "--from", "ply"], "no PLY file"),

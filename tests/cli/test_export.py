@@ -43,7 +43,7 @@ def test_native_copies_are_equal(groom_file: Path) -> None:
         (["groom.npz", "-o", "none/b.npz"], "no such folder"),
         (["groom.npz", "-o", "b.npz", "--using", "gabor"], "implements 'export_groom'"),
         (["groom.npz", "-o", "b.npz", "--set", "native.x=1"], "no option 'x'"),
-        (["groom.npz", "-o", "b.npz", "--set", "x"], "expected option=value"),
+        (["groom.npz", "-o", "b.npz", "--set", "x"], "expected plugin.option=value"),
     ],
 )
 def test_wrong_words_get_one_line(

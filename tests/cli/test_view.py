@@ -74,10 +74,10 @@ def test_a_folder_of_results_is_opened_by_its_name(groom_path: Path, tmp_path: P
         (("--budget", "-1"), "--budget is -1.0"),
         (("--hairs", "-4"), "--hairs is -4"),
         (("--capture", "nowhere"), "--capture nowhere: no such folder"),
-        (("--set", "drag"), "--set drag: expected option=value"),
+        (("--set", "drag"), "--set drag: expected plugin.option=value"),
         (
             ("--headless", "--script", "S", "--set", "gabor.angles=3"),
-            "--set gabor.angles: expected",
+            "--set gabor.angles=3: this command uses no plugin 'gabor'",
         ),
         (("--script", "nothing.toml"), "nothing.toml: no such file"),
     ],
