@@ -12,7 +12,7 @@ EXAMPLE := examples/hairkit-sobel
 LIBRARIES := libegl1 libgl1 libgl1-mesa-dri libosmesa6
 DISPLAYS := xvfb
 
-.PHONY: test test-clients demo lint bench clean
+.PHONY: test test-clients demo lint docs matrix bench clean
 
 test: $(VENV)/.tests
 	@sh .ci/libraries $(DISPLAYS)
@@ -33,6 +33,13 @@ lint: $(VENV)/.lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "The site is in build/site/: open build/site/index.html"
+
+matrix: $(VENV)/.hairkit
+	$(BIN)/python .ci/matrix.py $(MATRIX)
 
 bench: $(VENV)/.tests
 	@for program in benchmarks/*.py; do echo "== $$program"; $(BIN)/python $$program || exit 1; done
@@ -61,6 +68,10 @@ $(VENV)/.tests: $(VENV)/.hairkit $(wildcard $(EXAMPLE)/*.*)
 $(CLIENTS)/.blender: .ci/blender
 	@mkdir -p $(CLIENTS)
 	@sh .ci/blender $(CLIENTS)/bpy $(BPY_PYTHON) python3.11 $(PYTHON)
+	@touch $@
+
+$(VENV)/.docs: $(VENV)/.hairkit
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
 	@touch $@
 
 $(VENV)/.lint: $(VENV)/.hairkit

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from hairkit.types.strands import Strands
     from hairkit.types.volume import Hull, OrientationField, VoxelGrid
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Camera",

@@ -65,6 +65,9 @@ def follow(
 ) -> Float32Array:
     """Return (T, P, 3) all strands moved with their guides.
 
+    Each hair keeps its offset, seen from the head, from the weighted guides at the same share of
+    its length.
+
     Parameters
     ----------
     strands
@@ -73,9 +76,6 @@ def follow(
         (T, G, 3) the guides' points only, in their order in `strands`.
     head_from_rest
         (T, 4, 4) rigid motion of the head; None: it rests. Hair goes along with it whole.
-
-    Each hair keeps its offset, seen from the head, from the weighted guides at the same share of
-    its length.
     """
     guide = guide_mask(strands)
     rows = np.flatnonzero(guide[strands.strand_of_point])

@@ -143,17 +143,6 @@ def test_the_format_table_has_every_format(
     assert used == set(range(1, len(notes.splitlines()) + 1))
 
 
-def test_the_table_in_the_documents_is_the_generated_one(
-    folder: Path, project: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """docs/formats.md holds what `hairkit plugins --formats` prints; run it and paste it there."""
-    capsys.readouterr()
-    assert main(["plugins", "--formats"]) == 0
-    text = (project / "docs" / "formats.md").read_text()
-    inside = text.partition("<!-- formats -->\n")[2].partition("\n<!-- end -->")[0]
-    assert inside == capsys.readouterr().out.rstrip("\n")
-
-
 def test_guides_are_picked_from_full_hair(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """`--guides 20` marks 20 strands; written alone they are 20 of the strands that were read."""
     words = ["convert", "groom.npz", "g.npz", "--guides", "20"]

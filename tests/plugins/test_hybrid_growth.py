@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
-from hairkit_plugins import hybrid_field, hybrid_growth
 from hairkit_plugins.hybrid_growth import Options, grown, track
 
 from hairkit.arrays import Float32Array
 from hairkit.grooming import postprocess
 from hairkit.imaging.waves import Waves
-from hairkit.options import describe
 from hairkit.testing import ball_head, combed_field, scalp_roots, shell_hull, turn_scene
 from hairkit.types.head import Roots
 from hairkit.types.strands import Strands
@@ -128,15 +124,6 @@ def test_the_step_hardly_matters() -> None:
     assert both.mean() > 0.9
     apart = np.linalg.norm(coarse.points - fine.points, axis=1).reshape(len(roots), -1)
     assert np.median(apart[both].max(axis=1)) < 2e-3
-
-
-@pytest.mark.parametrize("plugin", [hybrid_field, hybrid_growth])
-def test_the_page_has_every_option_with_its_default(project: Path, plugin: ModuleType) -> None:
-    """The tables of docs/hybrid.md are those of the code."""
-    page = (project / "docs" / "hybrid.md").read_text()
-    for info in describe(plugin.Options):
-        default = str(info.default).lower() if info.type is bool else info.default
-        assert f"| `{info.name}` | {default} |" in page, info.name
 
 
 def test_strands_can_be_smoothed_by_helix_arcs() -> None:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
-from hairkit_plugins import certainty_tracker, tensor_diffusion, visual_hull
+from hairkit_plugins import certainty_tracker
 from hairkit_plugins.certainty_tracker import Options
 from tracked_ball import (
     CENTRES,
@@ -28,7 +26,6 @@ from tracked_ball import (
 
 from hairkit import parallel
 from hairkit.arrays import Float64Array
-from hairkit.options import describe
 from hairkit.testing import scalp_roots, turn_scene
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
@@ -191,12 +188,3 @@ def test_the_number_of_threads_does_not_change_a_byte(
     expected = run(constant(-UP), filled(), roots, Options(waves=False)).points.tobytes()
     monkeypatch.setattr(parallel, "thread_count", lambda: threads)
     assert run(constant(-UP), filled(), roots, Options(waves=False)).points.tobytes() == expected
-
-
-@pytest.mark.parametrize("plugin", [visual_hull, tensor_diffusion, certainty_tracker])
-def test_the_page_has_every_option_with_its_default(project: Path, plugin: ModuleType) -> None:
-    """The tables of docs/reconstruction.md are those of the code."""
-    page = (project / "docs" / "reconstruction.md").read_text()
-    for info in describe(plugin.Options):
-        default = str(info.default).lower() if info.type is bool else info.default
-        assert f"| `{info.name}` | {default} |" in page, info.name
