@@ -125,9 +125,10 @@ def parsed(command: Command, monkeypatch: pytest.MonkeyPatch) -> argparse.Namesp
     with monkeypatch.context() as patch:
         patch.setattr(module, "run", lambda args: setattr(caught, "args", args) or 0)
         try:
-            assert main(command.words) == 0, command.words
-        except SystemExit as done:
-            assert not done.code, command.words
+            code = main(command.words)
+        except SystemExit as done:  # after --help and the like
+            code = done.code
+    assert not code, command.words
     return caught.args
 
 
