@@ -41,7 +41,7 @@ WORKING_EDGE = 1440
 """Long edge in pixels that photos are scaled down to."""
 
 SMALLEST_SHARE = 0.85
-"""The smallest photo's edges may be this share of the largest photo's: a little cropping."""
+"""Least width and height of the smallest photo, as a share of the largest: photos may be cropped."""
 
 _PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png")
 _OTHER_SUFFIXES = (".heic", ".heif", ".webp", ".tif", ".tiff", ".bmp", ".gif", ".dng", ".avif")
@@ -181,15 +181,19 @@ def _view_name(photo: Path) -> str:
 
 
 def _check_sizes(places: list[_Place], headers: list[PhotoHeader]) -> None:
-    """Refuse a photo that cannot be of the same turn; a little cropping is no harm."""
-    largest = max(h.width for h in headers), max(h.height for h in headers)
-    for place, header in zip(places, headers, strict=True):
-        size = header.width, header.height
-        if min(size[0] / largest[0], size[1] / largest[1]) < SMALLEST_SHARE:
-            raise InputError(
-                f"{place.photo}: {size[0]} x {size[1]} pixels, other photos have {largest[0]} x"
-                f" {largest[1]}; take all photos at the same size"
-            )
+    """Raise `InputError` for the photo whose size differs most from the others', beyond cropping.
+
+    The size of most photos is the median of their edges.
+    """
+    sizes = np.array([(header.width, header.height) for header in headers])
+    if (sizes.min(axis=0) >= SMALLEST_SHARE * sizes.max(axis=0)).all():
+        return
+    usual = np.sort(sizes, axis=0)[len(sizes) // 2]
+    odd = int(np.abs(np.log(sizes / usual)).max(axis=1).argmax())
+    raise InputError(
+        f"{places[odd].photo}: {sizes[odd, 0]} x {sizes[odd, 1]} pixels, most photos have"
+        f" {usual[0]} x {usual[1]}; take all photos at the same size"
+    )
 
 
 def _beside(folder: Path, suffix: str, places: list[_Place]) -> dict[str, Path]:

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import struct
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
@@ -38,7 +41,23 @@ _KINDS = {
     b"MM\0*": "TIFF or raw",
     b"%PDF": "PDF",
 }
+_FILL, _START_OF_IMAGE, _END_OF_IMAGE, _START_OF_SCAN, _EXIF_SEGMENT = 0xFF, 0xD8, 0xD9, 0xDA, 0xE1
+"""Second bytes of JPEG's markers (ITU-T T.81, table B.1); the first is the fill byte."""
+_RESTARTS = range(0xD0, 0xD8)
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+_SEQUENTIAL_FRAMES = (0xC0, 0xC1)
+"""Kinds of frame with one scan of Huffman codes for all coefficients of a block."""
+_MARKER = re.compile(rb"\xff+[^\x00\xff]")
+"""A marker within picture data, where 255 is followed by 0."""
+_PADDING = np.random.default_rng(0).integers(0, 255, 64, np.uint8).tobytes()
+"""Noise that holds no marker, long enough for the data of several blocks."""
+_AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
+_THUMBNAIL = cv2.IMREAD_REDUCED_GRAYSCALE_8
+_MID_GREY, _BLOCK = 128, 4
+"""Value of blocks without data, and the edge of a block of 8 pixels at half its size."""
+_MISSING = "some of its picture data is missing"
+_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+"""Samples of a pixel by PNG's colour type."""
 
 
 @dataclass(frozen=True)
@@ -173,23 +192,79 @@ def _scan_jpeg(data: bytes) -> tuple[int, int, bytes]:
     """Return width, height and the EXIF block of a JPEG file; `ValueError` when it is cut short."""
     position, exif, size = 2, b"", (0, 0)
     while True:
-        while data[position + 1] == 0xFF:  # fill bytes
+        while data[position + 1] == _FILL:
             position += 1
         marker, (length,) = data[position + 1], struct.unpack_from(">H", data, position + 2)
-        if data[position] != 0xFF or length < 2:
+        if data[position] != _FILL or length < 2:
             raise ValueError("no marker")
         block = data[position + 4 : position + 2 + length]
         if marker in _JPEG_FRAMES:
             height, width = struct.unpack_from(">HH", block, 1)
             size = (width, height)
-        elif marker == 0xE1 and block.startswith(b"Exif\0\0"):
+        elif marker == _EXIF_SEGMENT and block.startswith(b"Exif\0\0"):
             exif = exif or block[6:]
-        elif marker == 0xDA:
+        elif marker == _START_OF_SCAN:
             break
         position += 2 + length
-    if data.find(b"\xff\xd9", position) < 0:
-        raise ValueError("no end marker")
     return (*size, exif)
+
+
+def _loses_data(data: bytes, pixels: npt.NDArray[Any]) -> bool:
+    """Return whether some of a sequential JPEG file's picture data is missing.
+
+    Decoders fill what is missing with mid-grey blocks. Where there are such blocks, the picture is
+    decoded once as it is and once with noise after the data of each scan and restart interval: a
+    decoder that has all its data ignores what follows, one that lacks some uses it. (This is not
+    done to every picture, because the decoder prints a warning about the noise.)
+    """
+    pieces, frame = _jpeg_pieces(data)
+    if frame not in _SEQUENTIAL_FRAMES or not _has_grey_block(pixels):
+        return False
+    whole, padded = (
+        cv2.imdecode(np.frombuffer(each, np.uint8), _THUMBNAIL | _AS_STORED)
+        for each in (data, _PADDING.join(pieces))
+    )
+    return whole is None or padded is None or not np.array_equal(whole, padded)
+
+
+def _has_grey_block(pixels: npt.NDArray[Any]) -> bool:
+    """Return whether a block of a picture, which may be decoded at half its size, is mid-grey."""
+    corners = (pixels[::_BLOCK, ::_BLOCK] == _MID_GREY).all(axis=-1)
+    if not corners.any():
+        return False
+    rows, columns = (edge // _BLOCK for edge in pixels.shape[:2])
+    grey = (pixels[: rows * _BLOCK, : columns * _BLOCK] == _MID_GREY).all(axis=-1)
+    return bool(grey.reshape(rows, _BLOCK, columns, _BLOCK).all(axis=(1, 3)).any())
+
+
+def _jpeg_pieces(data: bytes) -> tuple[list[bytes], int]:
+    """Return a JPEG file cut at the end of each run of picture data, and the kind of its frame.
+
+    Raises `ValueError`, `IndexError` or `struct.error` when the file ends before its picture does.
+    """
+    pieces: list[bytes] = []
+    begin, position, frame = 0, 2, 0
+    while True:
+        while data[position + 1] == _FILL:
+            position += 1
+        start, marker = data[position : position + 2]
+        if start != _FILL or marker == _START_OF_IMAGE:
+            raise ValueError("no marker")
+        if marker == _END_OF_IMAGE:
+            return [*pieces, data[begin:]], frame
+        if marker in _JPEG_FRAMES:
+            frame = marker
+        if marker not in _RESTARTS:
+            (length,) = struct.unpack_from(">H", data, position + 2)
+            position += length
+        position += 2
+        if marker == _START_OF_SCAN or marker in _RESTARTS:
+            end = _MARKER.search(data, position)
+            if end is None:
+                raise ValueError("no end marker")
+            position = end.start()
+            pieces.append(data[begin:position])
+            begin = position
 
 
 def _scan_png(data: bytes) -> tuple[int, int, bytes]:
@@ -211,38 +286,42 @@ def _scan_png(data: bytes) -> tuple[int, int, bytes]:
 
 
 def _decode(data: bytes, mode: int, path: Path) -> UInt8Array:
-    if _kind(data) == "PNG" and _unpacks_to_more(data):
-        raise FormatError(f"{path}: damaged PNG file: it unpacks to more than its picture holds")
+    kind = _kind(data)
     try:
+        if kind == "PNG":
+            _check_png_data(data)
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), mode | _AS_STORED)
-    except cv2.error:
-        pixels = None
-    if pixels is None:
-        raise FormatError(f"{path}: damaged picture, it cannot be decoded; save it again")
+        if pixels is None:
+            raise ValueError("it cannot be decoded")
+        if kind == "JPEG" and _loses_data(data, pixels):
+            raise ValueError(_MISSING)
+    except (struct.error, IndexError, ValueError, cv2.error) as error:
+        reason = str(error).partition("\n")[0]
+        raise FormatError(f"{path}: damaged {kind} file ({reason}); save it again") from error
     return pixels  # type: ignore[return-value]  # uint8, or uint16 for IMREAD_UNCHANGED
 
 
-def _unpacks_to_more(data: bytes) -> bool:
-    """Tell whether a whole PNG file's packed data is larger than any picture of its size."""
-    width, height = struct.unpack_from(">II", data, 16)
-    left = height * (1 + 8 * width) + 8 * (height + 8)  # 16 bit RGBA, a filter byte a row and pass
-    inflate, position = zlib.decompressobj(), 8
+def _check_png_data(data: bytes) -> None:
+    """Raise `ValueError` when a PNG file's packed data is not of the size of its picture."""
+    width, height, depth, colour = struct.unpack_from(">IIBB", data, 16)
+    interlaced = data[28] != 0
+    row = -(-width * depth * _CHANNELS.get(colour, 4) // 8)
+    least = height * (row + (not interlaced))  # each row has a filter byte, interlaced ones more
+    most = height * (1 + 8 * width) + 8 * (height + 8)  # 16 bit RGBA, a filter byte a row and pass
+    inflate, position, found = zlib.decompressobj(), 8, 0
     while data[position + 4 : position + 8] != b"IEND":
         (length,) = struct.unpack_from(">I", data, position)
         if data[position + 4 : position + 8] == b"IDAT":
+            packed = data[position + 8 : position + 8 + length]
             try:
-                left -= len(
-                    inflate.decompress(data[position + 8 : position + 8 + length], left + 1)
-                )
-            except zlib.error:
-                return False  # the decoder says what is wrong
-            if left < 0:
-                return True
+                found += len(inflate.decompress(packed, most + 1 - found))
+            except zlib.error as error:
+                raise ValueError(f"its picture data cannot be unpacked: {error}") from error
+            if found > most:
+                raise ValueError("it unpacks to more than its picture holds")
         position += 12 + length
-    return False
-
-
-_AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
+    if found < least or not inflate.eof:
+        raise ValueError(_MISSING)
 
 
 def _upright(image: UInt8Array, orientation: int) -> UInt8Array:

@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 import pytest
 from ball import write_capture, write_grey
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from hairkit.errors import InputError
 from hairkit.io.capture_reader import TURN, read_capture, sample_folder
@@ -123,7 +125,7 @@ WRONG = {
     ),
     "4_back.png: not a picture, expected a JPEG or PNG": lambda f: spoil_photo(f, b"hello"),
     "4_back.png: an empty file": lambda f: spoil_photo(f, b""),
-    "4_back.png: 60 x 40 pixels, other photos have 96 x 128": lambda f: write_grey(
+    "4_back.png: 60 x 40 pixels, most photos have 96 x 128": lambda f: write_grey(
         f / "photos" / "4_back.png", np.zeros((40, 60), np.uint8)
     ),
     "no view 'frnt' .did you mean 'front'": lambda f: (f / "photos" / "0_front.png").rename(
@@ -172,6 +174,27 @@ def test_wrong_input_gets_one_line(tmp_path: Path, reason: str) -> None:
     with pytest.raises(InputError, match=reason) as caught:
         read_capture(folder)
     assert "\n" not in str(caught.value)
+
+
+@given(
+    odd=st.integers(0, 7),
+    size=st.sampled_from([(128, 96), (60, 80), (160, 160), (96, 50), (300, 400)]),
+    crops=st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=8, max_size=8),
+)
+@settings(max_examples=30)
+def test_the_photo_of_another_size_is_blamed(
+    tmp_path_factory: pytest.TempPathFactory,
+    odd: int,
+    size: tuple[int, int],
+    crops: list[tuple[int, int]],
+) -> None:
+    """Seven photos of about one size and one of another, turned, larger or smaller: that one."""
+    folder = tmp_path_factory.mktemp("sizes")
+    for number, (across, down) in enumerate(crops):
+        width, height = size if number == odd else (96 - across, 128 - down)
+        write_grey(folder / f"b{number}.png", np.zeros((height, width), np.uint8))
+    with pytest.raises(InputError, match=rf"b{odd}\.png: {size[0]} x {size[1]} pixels, most"):
+        read_capture(folder)
 
 
 def test_a_head_pose_is_a_similarity() -> None:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hairkit.errors import InputError
+from hairkit.errors import FormatError, InputError
 from hairkit.io.photos import focal_from_equivalent, read_drawing, read_header, read_photo
 
 
@@ -145,7 +145,7 @@ def test_a_bomb_is_refused_before_it_is_decoded(
         (jpeg(scene_picture())[:30], "damaged JPEG"),
         (png_claiming(4, 4)[:40], "damaged PNG"),
         (png_claiming(4, 4).replace(b"sense", b"SENSE"), "damaged PNG"),
-        (png_claiming(4, 4), "cannot be decoded"),
+        (png_claiming(4, 4), "cannot be unpacked"),
     ],
 )
 def test_what_is_no_photo_is_named(tmp_path: Path, data: bytes, reason: str) -> None:
@@ -213,3 +213,54 @@ def test_data_beyond_the_pictures_size_is_refused(tmp_path: Path) -> None:
     path.write_bytes(bomb)
     with pytest.raises(InputError, match="unpacks to more"):
         read_photo(path)
+
+
+def _cut(data: bytes, way: str, share: float) -> bytes:
+    """Return a picture's file without some of its data."""
+    at = int(share * len(data))
+    gone = data[: min(at, len(data) - 2)]
+    return {
+        "end": gone,
+        "end, closed": gone + b"\xff\xd9",
+        "middle": gone + data[at + len(data) // 8 :],
+        "begins again": gone + data,
+    }[way]
+
+
+@pytest.mark.parametrize("share", [0.45, 0.6, 0.75])
+@pytest.mark.parametrize("way", ["end", "end, closed", "middle", "begins again"])
+@pytest.mark.parametrize("restarts", [0, 3])
+def test_a_photo_that_lost_data_is_refused(
+    tmp_path: Path, way: str, share: float, restarts: int
+) -> None:
+    """A JPEG without its end, or without a piece from its middle, is named; nothing is made up."""
+    settings = [cv2.IMWRITE_JPEG_RST_INTERVAL, restarts]
+    data = cv2.imencode(".jpg", cv2.resize(scene_picture(), (400, 300)), settings)[1].tobytes()
+    path = tmp_path / "a.jpg"
+    path.write_bytes(data)
+    read_photo(path)
+    path.write_bytes(_cut(data, way, share))
+    with pytest.raises(FormatError, match=r"a\.jpg: damaged JPEG"):
+        read_photo(path)
+
+
+@pytest.mark.parametrize("value", [0, 128, 255])
+@pytest.mark.parametrize("settings", [[], [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]])
+def test_a_flat_photo_is_whole(tmp_path: Path, value: int, settings: list[int]) -> None:
+    """A picture of mid-grey is not taken for one that lost its data."""
+    flat = np.full((90, 130, 3), value, np.uint8)
+    data = cv2.imencode(".jpg", flat, settings)[1].tobytes()
+    (tmp_path / "a.jpg").write_bytes(data)
+    assert (read_photo(tmp_path / "a.jpg")[0] == flat).all()
+
+
+@pytest.mark.parametrize("rows", [0, 20, 39])
+def test_a_png_that_lost_rows_is_refused(tmp_path: Path, rows: int) -> None:
+    """A PNG with whole chunks but too few rows is named."""
+    kept = cv2.imencode(".png", scene_picture()[:rows] if rows else scene_picture()[:1])[1]
+    data = kept.tobytes()
+    header = b"IHDR" + struct.pack(">II", 60, 40) + data[24:29]
+    data = data[:12] + header + struct.pack(">I", zlib.crc32(header)) + data[33:]
+    (tmp_path / "a.png").write_bytes(data)
+    with pytest.raises(FormatError, match=r"a\.png: damaged PNG"):
+        read_photo(tmp_path / "a.png")
