@@ -17,7 +17,7 @@ import types
 import typing
 import zipfile
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
@@ -241,18 +241,44 @@ def write_pieces(
     path: str | os.PathLike[str], pieces: Iterable[bytes | memoryview], *, durable: bool = True
 ) -> None:
     """Write pieces one after the other as `write_bytes` does, without joining them in memory."""
+    with replaced_file(path, durable=durable) as part, part.open("wb") as file:
+        for piece in pieces:
+            file.write(piece)
+
+
+@contextlib.contextmanager
+def replaced_file(
+    path: str | os.PathLike[str], suffix: str = ".part", *, durable: bool = True
+) -> Iterator[Path]:
+    """Yield an empty file beside `path`, which takes its place when the block ends without error.
+
+    Parameters
+    ----------
+    path
+        The file; it is either the old one or the whole new one at any moment.
+    suffix
+        Ending of the temporary file's name, for libraries that go by it.
+    durable
+        False does not wait for the disk: a power failure, not a crash, may lose the file.
+
+    Raises
+    ------
+    InputError
+        There is something other than a file in the place, such as a device.
+    OSError
+        The folder cannot be written to, or there is no room. It names `path`.
+    """
     target, temporary = Path(path), None
     try:
         with contextlib.suppress(FileNotFoundError):
             _check_kind(target, os.stat(target).st_mode)
         handle, temporary = tempfile.mkstemp(
-            prefix=f".{target.name[:_NAME_KEPT]}.", suffix=".part", dir=target.parent
+            prefix=f".{target.name[:_NAME_KEPT]}.", suffix=suffix, dir=target.parent
         )
-        with os.fdopen(handle, "wb") as file:
-            for piece in pieces:
-                file.write(piece)
-            file.flush()
-            if durable:
+        os.close(handle)
+        yield Path(temporary)
+        if durable:
+            with open(temporary, "rb+") as file:
                 os.fsync(file.fileno())
         os.chmod(temporary, 0o666 & ~_umask())
         os.replace(temporary, target)
@@ -262,6 +288,17 @@ def write_pieces(
         if isinstance(error, OSError):
             error.filename, error.filename2 = str(target), None  # not the temporary file
         raise
+
+
+def utf8_name(path: str | os.PathLike[str]) -> str:
+    """Return a path as C++ libraries take it: its bytes are UTF-8, whatever the locale says.
+
+    Raises `InputError` where the file system's name is not UTF-8.
+    """
+    try:
+        return os.fsencode(path).decode()
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: its name is not UTF-8; rename the file or its folder") from error
 
 
 def _check_kind(path: str | os.PathLike[str], mode: int) -> None:

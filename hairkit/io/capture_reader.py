@@ -41,7 +41,7 @@ WORKING_EDGE = 1440
 """Long edge in pixels that photos are scaled down to."""
 
 SMALLEST_SHARE = 0.85
-"""Least width and height of the smallest photo, as a share of the largest: photos may be cropped."""
+"""Least width and height of the smallest photo, as a share of the largest: it may be cropped."""
 
 _PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png")
 _OTHER_SUFFIXES = (".heic", ".heif", ".webp", ".tif", ".tiff", ".bmp", ".gif", ".dng", ".avif")

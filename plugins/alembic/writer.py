@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-import tempfile
 import traceback
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
 import hairkit
 from hairkit.errors import InputError
+from hairkit.storage import replaced_file, utf8_name
 
 from .curves import GroomCurves
 from .ogawa import is_complete
@@ -30,30 +30,26 @@ _UNIFORM, _VERTEX = AbcGeom.GeometryScope.kUniformScope, AbcGeom.GeometryScope.k
 def write_curves(curves: GroomCurves, path: Path) -> None:
     """Write the curves to `path`: afterwards it is the old file or the whole new one.
 
-    The library writes into a folder of its own beside the file, so that nothing is left behind.
-
     Raises
     ------
     InputError
         There is no room for the file.
     """
-    with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=path.parent) as folder:
-        part = Path(folder, "groom.abc")
+    with replaced_file(path, ".abc") as part:
         try:
             _make_room(part, _size(curves))
-            _write(curves, part)
         except OSError as error:
             raise InputError(
                 f"{path}: no room for {_size(curves)} bytes: {error.strerror}"
             ) from error
+        try:
+            _write(curves, part)
         except BaseException as error:
             # the library closes its file when the last of its objects goes, which frames hold
             traceback.clear_frames(error.__traceback__)
             raise
-        _put_on_disk(part)
         if not is_complete(part):
             raise InputError(f"{path}: the Alembic library did not write the whole file")
-        os.replace(part, path)
 
 
 def _make_room(part: Path, size: int) -> None:
@@ -77,7 +73,7 @@ def _size(curves: GroomCurves) -> int:
 
 def _write(curves: GroomCurves, part: Path) -> None:
     # Abc.OArchive writes no date, unlike CreateArchiveWithInfo: equal grooms are equal files
-    archive = Abc.OArchive(str(part))
+    archive = Abc.OArchive(utf8_name(part))
     groom = AbcGeom.OXform(archive.getTop(), "groom")
     _write_groom_properties(groom)
     sampling = 0
@@ -150,8 +146,3 @@ def _imath(values: np.ndarray[Any, Any]) -> Any:
     if values.ndim == 2:
         name = f"V{values.shape[1]}{name[0].lower()}"
     return getattr(imath, f"{name}ArrayFromBuffer")(np.ascontiguousarray(values))
-
-
-def _put_on_disk(part: Path) -> None:
-    with part.open("rb+") as file:
-        os.fsync(file.fileno())

@@ -15,7 +15,7 @@ from typing import Any
 import numpy.typing as npt
 
 from hairkit.errors import FormatError, InputError, MissingExtraError
-from hairkit.storage import open_file, read_npz
+from hairkit.storage import open_file, read_npz, utf8_name
 
 from .stage import MISSING
 
@@ -48,8 +48,8 @@ def contents(path: Path) -> Contents:
     """
     if importlib.util.find_spec("pxr") is None:
         raise MissingExtraError(MISSING)
-    with open_file(path):
-        pass  # it is there and a file
+    open_file(path).close()  # it is there, and a file
+    utf8_name(path.resolve())
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise InputError(f"{path}: {size} bytes, hairkit reads up to {MAX_BYTES}")

@@ -71,7 +71,7 @@ def extracted(source: str) -> dict[str, npt.NDArray[Any]]:
     """Return arrays by name; `description` is JSON text as bytes."""
     from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
-    layer = Sdf.Layer.FindOrOpen(source)
+    layer = Sdf.Layer.FindOrOpen(os.fsencode(source).decode())  # UTF-8 in any locale
     if layer is None:
         raise ValueError("the USD library cannot open it")
     _refuse_other_files(layer)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 from typing import Any, Protocol
 
 from hairkit.errors import InputError, MissingExtraError
 from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.io.coordinate_space import FileSpace
+from hairkit.storage import replaced_file, utf8_name
 
 MISSING = "USD files need usd-core, which is not installed: pip install 'hairkit[usd]'"
 DIGITS = 6
@@ -52,7 +51,8 @@ def write_stage(ready: PreparedGroom, path: Path, options: StageOptions) -> None
     stage = Usd.Stage.CreateInMemory(f"groom{path.suffix.lower()}")
     _describe(stage, ready, space)
     _fill(stage, ready, space, options)
-    _export(stage, path)
+    with replaced_file(path, path.suffix.lower()) as part:
+        stage.GetRootLayer().Export(utf8_name(part))
 
 
 def _describe(stage: Any, ready: PreparedGroom, space: FileSpace) -> None:
@@ -103,26 +103,3 @@ def _fill(stage: Any, ready: PreparedGroom, space: FileSpace, options: StageOpti
         time_codes(ready),
         attributes=options.attributes,
     )
-
-
-def _export(stage: Any, path: Path) -> None:
-    """Write the stage beside its place and move it there, so that no half file is ever seen."""
-    handle, temporary = tempfile.mkstemp(
-        dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix.lower()
-    )
-    os.close(handle)
-    try:
-        stage.GetRootLayer().Export(temporary)
-        with open(temporary, "rb+") as file:
-            os.fsync(file.fileno())  # as hairkit.storage does: the name is not before the bytes
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
