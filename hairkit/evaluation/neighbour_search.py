@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit, prange
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array, UInt8Array
+from hairkit.parallel import compiled, parallel_for
 
 FIRST_HIT_NONE = 255
 """Marks a sample that has a partner at no threshold."""
+LEAST_BUCKETS = 1 << 10
+"""Least number of buckets of a grid."""
+MIN_QUERIES = 512
+"""Least number of queries that are worth another thread."""
+_PRIME_Y, _PRIME_Z = 19349663, 83492791
+"""Multipliers of the hash of cells (Teschner et al. 2003)."""
+NONE, AGAINST, ALONG = 0, 1, 2
+"""What a search found: no sample, one of opposite direction only, one of the same direction."""
 
 
-@dataclass(frozen=True, eq=False)
-class HashGrid:
+class HashGrid(NamedTuple):
     """Directed samples sorted by the hashed grid cell they lie in.
 
     Cells in a row along x fall into neighbouring buckets, so that a search reads runs of memory.
@@ -39,7 +47,7 @@ class HashGrid:
         points: npt.NDArray[np.float32], directions: npt.NDArray[np.float32], cell: float
     ) -> HashGrid:
         """Sort samples (N, 3) with unit directions (N, 3) into cells of edge `cell` metres."""
-        buckets = 1 << max(10, len(points).bit_length())
+        buckets = max(LEAST_BUCKETS, 1 << len(points).bit_length())
         key = _keys(points, cell, buckets - 1)
         order = np.argsort(key, kind="stable")
         start = np.zeros(buckets + 1, np.int64)
@@ -68,11 +76,11 @@ def first_hits(
     free, signed : (Q,) uint8 arrays
         Rank of the threshold, 255 where none matches; `free` allows opposite directions.
     """
-    free: UInt8Array
-    signed: UInt8Array
-    free, signed = _first_hits(
-        grid.points, grid.directions, grid.start, grid.cell, points, directions, distances, cosines
-    )
+    free, signed = (np.full(len(points), FIRST_HIT_NONE, np.uint8) for _ in range(2))
+    parallel_for(
+        _find_hits, len(points), grid, _Queries(points, directions), distances, cosines, free,
+        signed, min_chunk=MIN_QUERIES,
+    )  # fmt: skip
     return free, signed
 
 
@@ -109,28 +117,37 @@ def most_followed(
     Strand s is the samples `bounds[s]:bounds[s + 1]`; `owner` (N,) are the strands of the grid's
     samples, in the grid's order; matches are sign-free.
     """
-    result: Float64Array = _most_followed(
-        grid.points, grid.directions, grid.start, grid.cell, owner,
-        points, directions, bounds, distance, cosine,
+    shares = np.zeros(len(bounds) - 1)
+    parallel_for(
+        _follow_strands, len(shares), grid, owner, _Queries(points, directions), bounds, distance,
+        cosine, shares,
     )  # fmt: skip
-    return result
+    return shares
 
 
-@njit(cache=True)
-def _row(y: int, z: int) -> int:  # pragma: no cover - compiled
+class _Queries(NamedTuple):
+    """Samples whose neighbours are looked for."""
+
+    points: Float32Array
+    """(Q, 3) metres."""
+    directions: Float32Array
+    """(Q, 3) unit."""
+
+
+@compiled
+def _row(y: int, z: int) -> int:
     """Spread the rows of cells along x over the buckets (primes of Teschner et al. 2003)."""
-    return (y * 19349663) ^ (z * 83492791)
+    return (y * _PRIME_Y) ^ (z * _PRIME_Z)
 
 
-@njit(cache=True)
-def _cell_of(value: float, cell: float) -> int:  # pragma: no cover - compiled
-    return int(np.floor(value / cell))
+@compiled
+def _cell_of(value: float, cell: float) -> int:
+    return math.floor(value / cell)
 
 
-@njit(cache=True)
-def _keys(
-    points: npt.NDArray[np.float32], cell: float, mask: int
-) -> Int64Array:  # pragma: no cover - compiled
+@compiled
+def _keys(points: Float32Array, cell: float, mask: int) -> Int64Array:
+    """Return the bucket (N,) of each point."""
     keys = np.empty(len(points), np.int64)
     for i in range(len(points)):
         x = _cell_of(points[i, 0], cell)
@@ -139,103 +156,121 @@ def _keys(
     return keys
 
 
-@njit(cache=True, parallel=True)
-def _first_hits(
-    points: npt.NDArray[np.float32],
-    directions: npt.NDArray[np.float32],
-    start: Int64Array,
-    cell: float,
-    queries: npt.NDArray[np.float32],
-    headings: npt.NDArray[np.float32],
+@compiled
+def _cosine_within(grid: HashGrid, i: int, queries: _Queries, q: int, distance: float) -> float:
+    """Return the cosine between a query's and a sample's direction; 0 beyond `distance`."""
+    square = 0.0
+    for axis in range(3):
+        gap = np.float64(grid.points[i, axis]) - np.float64(queries.points[q, axis])
+        square += gap * gap
+    if square > distance * distance:
+        return 0.0
+    cosine = 0.0
+    for axis in range(3):
+        cosine += np.float64(grid.directions[i, axis]) * np.float64(queries.directions[q, axis])
+    return cosine
+
+
+@compiled
+def _find_hits(
+    first: int,
+    last: int,
+    grid: HashGrid,
+    queries: _Queries,
     distances: Float64Array,
     cosines: Float64Array,
-) -> tuple[UInt8Array, UInt8Array]:  # pragma: no cover - compiled
-    free = np.full(len(queries), 255, np.uint8)
-    signed = np.full(len(queries), 255, np.uint8)
-    for q in prange(len(queries)):
+    free: UInt8Array,
+    signed: UInt8Array,
+) -> None:
+    """Write the ranks of `first_hits` for the queries `first` to `last`."""
+    for q in range(first, last):
         for rank in range(len(distances)):
-            found = _search(
-                points, directions, start, cell, queries[q], headings[q],
-                distances[rank], cosines[rank], free[q] == 255,
-            )  # fmt: skip
-            if found > 0 and free[q] == 255:
+            want_free = free[q] == FIRST_HIT_NONE
+            found = _search(grid, queries, q, distances[rank], cosines[rank], want_free)
+            if found != NONE and want_free:
                 free[q] = rank
-            if found == 2:
+            if found == ALONG:
                 signed[q] = rank
                 break
-    return free, signed
 
 
-@njit(cache=True)
+@compiled
 def _search(
-    points: npt.NDArray[np.float32],
-    directions: npt.NDArray[np.float32],
-    start: Int64Array,
-    cell: float,
-    query: npt.NDArray[np.float32],
-    heading: npt.NDArray[np.float32],
-    distance: float,
-    cosine: float,
-    want_free: bool,
-) -> int:  # pragma: no cover - compiled
-    """Return 2 when a sample matches with its sign, 1 when only against it, 0 when none does."""
-    mask = len(start) - 2
-    limit = distance * distance
-    qx, qy, qz = np.float64(query[0]), np.float64(query[1]), np.float64(query[2])
-    hx, hy, hz = np.float64(heading[0]), np.float64(heading[1]), np.float64(heading[2])
-    x0, x1 = _cell_of(qx - distance, cell), _cell_of(qx + distance, cell)
-    best = 0
-    for y in range(_cell_of(qy - distance, cell), _cell_of(qy + distance, cell) + 1):
-        for z in range(_cell_of(qz - distance, cell), _cell_of(qz + distance, cell) + 1):
-            row = _row(y, z)
-            for x in range(x0, x1 + 1):
-                key = (row + x) & mask
-                for i in range(start[key], start[key + 1]):
-                    dx, dy, dz = points[i, 0] - qx, points[i, 1] - qy, points[i, 2] - qz
-                    if dx * dx + dy * dy + dz * dz > limit:
-                        continue
-                    dot = directions[i, 0] * hx + directions[i, 1] * hy + directions[i, 2] * hz
-                    if dot >= cosine:
-                        return 2
-                    if want_free and dot <= -cosine:
-                        best = 1
+    grid: HashGrid, queries: _Queries, q: int, distance: float, cosine: float, want_free: bool
+) -> int:
+    """Return ALONG where a sample matches with its sign, AGAINST where one only against it."""
+    mask = len(grid.start) - 2
+    x, y, z = queries.points[q, 0], queries.points[q, 1], queries.points[q, 2]
+    x_first, x_last = _cells_about(x, distance, grid.cell)
+    y_first, y_last = _cells_about(y, distance, grid.cell)
+    z_first, z_last = _cells_about(z, distance, grid.cell)
+    best = NONE
+    for iy in range(y_first, y_last + 1):
+        for iz in range(z_first, z_last + 1):
+            for ix in range(x_first, x_last + 1):
+                key = (_row(iy, iz) + ix) & mask
+                for i in range(grid.start[key], grid.start[key + 1]):
+                    found = _cosine_within(grid, i, queries, q, distance)
+                    if found >= cosine:
+                        return ALONG
+                    if want_free and found <= -cosine:
+                        best = AGAINST
     return best
 
 
-@njit(cache=True, parallel=True)
-def _most_followed(
-    points: npt.NDArray[np.float32],
-    directions: npt.NDArray[np.float32],
-    start: Int64Array,
-    cell: float,
+@compiled
+def _cells_about(value: float, distance: float, cell: float) -> tuple[int, int]:
+    """Return the first and the last cell along an axis within a distance of a coordinate."""
+    centre = np.float64(value)
+    return _cell_of(centre - distance, cell), _cell_of(centre + distance, cell)
+
+
+@compiled
+def _follow_strands(
+    first: int,
+    last: int,
+    grid: HashGrid,
     owner: Int64Array,
-    queries: npt.NDArray[np.float32],
-    headings: npt.NDArray[np.float32],
+    queries: _Queries,
     bounds: Int64Array,
     distance: float,
     cosine: float,
-) -> Float64Array:  # pragma: no cover - compiled
-    mask = len(start) - 2
-    result = np.zeros(len(bounds) - 1)
+    shares: Float64Array,
+) -> None:
+    """Write the shares (S,) of `most_followed` for the strands `first` to `last`."""
     owners = owner.max() + 1
-    for s in prange(len(bounds) - 1):
-        followed = np.zeros(owners, np.int64)
-        last = np.full(owners, -1, np.int64)
+    followed, seen = np.zeros(owners, np.int64), np.full(owners, -1, np.int64)
+    for s in range(first, last):
+        followed[:] = 0
         for q in range(bounds[s], bounds[s + 1]):
-            qx, qy, qz = queries[q, 0], queries[q, 1], queries[q, 2]
-            for y in range(_cell_of(qy - distance, cell), _cell_of(qy + distance, cell) + 1):
-                for z in range(_cell_of(qz - distance, cell), _cell_of(qz + distance, cell) + 1):
-                    row = _row(y, z)
-                    x_last = _cell_of(qx + distance, cell)
-                    for x in range(_cell_of(qx - distance, cell), x_last + 1):
-                        key = (row + x) & mask
-                        for i in range(start[key], start[key + 1]):
-                            if last[owner[i]] == q:
-                                continue
-                            gap = points[i] - queries[q]
-                            dot = abs(np.sum(directions[i] * headings[q]))
-                            if np.sum(gap * gap) <= distance * distance and dot >= cosine:
-                                last[owner[i]] = q
-                                followed[owner[i]] += 1
-        result[s] = followed.max() / (bounds[s + 1] - bounds[s])
-    return result
+            _count_owners(grid, owner, queries, q, distance, cosine, followed, seen)
+        shares[s] = followed.max() / (bounds[s + 1] - bounds[s])
+
+
+@compiled
+def _count_owners(
+    grid: HashGrid,
+    owner: Int64Array,
+    queries: _Queries,
+    q: int,
+    distance: float,
+    cosine: float,
+    followed: Int64Array,
+    seen: Int64Array,
+) -> None:
+    """Add 1 to `followed` (O,) of each owner that matches a query; `seen` holds its last query."""
+    mask = len(grid.start) - 2
+    x, y, z = queries.points[q, 0], queries.points[q, 1], queries.points[q, 2]
+    x_first, x_last = _cells_about(x, distance, grid.cell)
+    y_first, y_last = _cells_about(y, distance, grid.cell)
+    z_first, z_last = _cells_about(z, distance, grid.cell)
+    for iy in range(y_first, y_last + 1):
+        for iz in range(z_first, z_last + 1):
+            for ix in range(x_first, x_last + 1):
+                key = (_row(iy, iz) + ix) & mask
+                for i in range(grid.start[key], grid.start[key + 1]):
+                    if seen[owner[i]] == q:
+                        continue
+                    if abs(_cosine_within(grid, i, queries, q, distance)) >= cosine:
+                        seen[owner[i]] = q
+                        followed[owner[i]] += 1

@@ -1,5 +1,4 @@
-"""Screened diffusion on the cells of a mask: the one linear solver that fields and potentials
-share.
+"""Screened diffusion on the cells of a mask: the linear solver of fields and potentials.
 
 Minimises `sum_i c_i |u_i - d_i|^2 + s * sum_(i,j) |u_i - u_j|^2` over the occupied cells, the sum
 over pairs of face neighbours inside the mask (no flux through its border). This is the tensor
@@ -9,19 +8,25 @@ a very large `c` makes a cell fixed.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit, prange
 
-from hairkit.arrays import BoolArray, Float32Array, Int32Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
 from hairkit.errors import InputError
+from hairkit.parallel import compiled, parallel_for
 
 CHUNKS = 64
 """Sums are taken over this many parts of the cells, whatever the number of threads."""
 COARSEST_CELLS = 4000
 """Below this many cells no coarser grid is made."""
+COARSE_TOLERANCE = 1e-2
+"""Relative residual of the solution on a coarser grid: it is only a first guess."""
+NO_WEIGHT = 1e-30
+"""Cells of less weight than this hold no data."""
+MIN_CELLS = 4096
+"""Least number of cells that are worth another thread."""
 
 
 def solve_screened(
@@ -61,16 +66,17 @@ def solve_screened(
     if not (weight > 0).any():
         raise InputError("diffusion needs at least one cell with a weight above 0")
     guess = start if start is not None else _coarse_guess(occupied, data, weight, smoothness)
-    solution: Float32Array = _conjugate_gradients(
-        cell_neighbours(occupied),
+    neighbours = cell_neighbours(occupied)
+    weight = np.ascontiguousarray(weight, np.float32)
+    inverse = np.empty(count, np.float32)
+    _invert_diagonal(neighbours, weight, np.float32(smoothness), inverse)
+    return _conjugate_gradients(
+        _System(neighbours, weight, np.float32(smoothness), inverse),
         np.ascontiguousarray(data, np.float32),
-        np.ascontiguousarray(weight, np.float32),
-        np.float32(smoothness),
-        np.float32(tolerance),
-        max_iterations,
         np.array(guess, np.float32, order="C"),
+        float(np.float32(tolerance)),
+        max_iterations,
     )
-    return solution
 
 
 def _coarse_guess(
@@ -91,9 +97,13 @@ def _coarse_guess(
     coarse.ravel()[merged] = True
     total = np.bincount(row, weight, len(merged))
     columns = [np.bincount(row, weight * column, len(merged)) for column in data.T]
-    mean = np.stack(columns, axis=1) / np.maximum(total, 1e-30)[:, None]
+    mean = np.stack(columns, axis=1) / np.maximum(total, NO_WEIGHT)[:, None]
     solved = solve_screened(
-        coarse, mean.astype(np.float32), total.astype(np.float32), 2 * smoothness, tolerance=1e-2
+        coarse,
+        mean.astype(np.float32),
+        total.astype(np.float32),
+        2 * smoothness,
+        tolerance=COARSE_TOLERANCE,
     )
     return solved[row]
 
@@ -122,103 +132,178 @@ def apply_operator(
     return result
 
 
-@njit(cache=True, parallel=True)
-def _operate(neighbours, weight, smoothness, values, result, partial):  # type: ignore[no-untyped-def]
-    """Write `A values` into result and the chunks' sums of values * result into partial (CHUNKS,
-    C)."""
-    count, channels = values.shape
-    size = (count + CHUNKS - 1) // CHUNKS
-    for chunk in prange(CHUNKS):
-        partial[chunk] = 0
-        for i in range(chunk * size, min((chunk + 1) * size, count)):
-            degree = weight[i]
-            for k in range(6):
-                if neighbours[i, k] >= 0:
-                    degree += smoothness
-            for c in range(channels):
-                result[i, c] = degree * values[i, c]
-            for k in range(6):
-                j = neighbours[i, k]
-                if j >= 0:
-                    for c in range(channels):
-                        result[i, c] -= smoothness * values[j, c]
-            for c in range(channels):
-                partial[chunk, c] += values[i, c] * result[i, c]
+class _System(NamedTuple):
+    """The linear system `(diag(c) + s L) u = c d`."""
+
+    neighbours: Int32Array
+    """(N, 6) rows of the face neighbours, see `cell_neighbours`."""
+    weight: Float32Array
+    """(N,) `c`."""
+    smoothness: np.float32
+    """`s`."""
+    inverse: Float32Array
+    """(N,) inverse of the diagonal, the preconditioner."""
 
 
-@njit(cache=True, parallel=True)
-def _advance(x, r, p, ap, inverse, alpha, squares, products):  # type: ignore[no-untyped-def]
-    """Step x, r along p; sum chunks' (r / diagonal)^2 into squares, r^2 / diagonal into
-    products."""
-    count, channels = x.shape
-    size = (count + CHUNKS - 1) // CHUNKS
-    for chunk in prange(CHUNKS):
-        squares[chunk] = 0
-        products[chunk] = 0
-        for i in range(chunk * size, min((chunk + 1) * size, count)):
-            for c in range(channels):
-                x[i, c] += alpha[c] * p[i, c]
-                residual = r[i, c] - alpha[c] * ap[i, c]
-                r[i, c] = residual
-                step = residual * inverse[i]
-                squares[chunk, c] += step * step
-                products[chunk, c] += residual * step
+class _Iterate(NamedTuple):
+    """What conjugate gradients keep, (N, C) each."""
+
+    solution: Float32Array
+    residual: Float32Array
+    direction: Float32Array
+    image: Float32Array
+    """The operator applied to the direction."""
 
 
-@njit(cache=True, parallel=True)
-def _turn(p, r, inverse, beta):  # type: ignore[no-untyped-def]
-    count, channels = p.shape
-    for i in prange(count):
-        for c in range(channels):
-            p[i, c] = inverse[i] * r[i, c] + beta[c] * p[i, c]
+def _conjugate_gradients(
+    system: _System,
+    data: Float32Array,
+    guess: Float32Array,
+    tolerance: float,
+    max_iterations: int,
+) -> Float32Array:
+    """Return the solution (N, C) by Jacobi-preconditioned conjugate gradients from a guess.
 
-
-@njit(cache=True)
-def _conjugate_gradients(neighbours, data, weight, smoothness, tolerance, max_iterations, x):  # type: ignore[no-untyped-def]
-    """Jacobi-preconditioned conjugate gradients, one scalar recursion a column, columns in step.
-
-    Sums are taken over a fixed number of chunks, so the result does not depend on the number of
-    threads.
+    Each column is a problem of its own (Shewchuk 1994, algorithm B3); all take their steps
+    together. Sums are taken over a fixed number of chunks, so the result does not depend on the
+    number of threads.
     """
     count, channels = data.shape
-    inverse = np.empty(count, np.float32)
-    for i in range(count):
+    least = max(1, CHUNKS * MIN_CELLS // count)
+    now = _Iterate(guess, *(np.empty_like(guess) for _ in range(3)))
+    products, squares = np.zeros((CHUNKS, channels)), np.zeros((CHUNKS, channels))
+    parallel_for(_apply, CHUNKS, system, now.solution, now.image, products, min_chunk=least)
+    energy, size = np.zeros(channels), np.zeros(channels)
+    _begin(system, data, now, energy, size)
+    for _ in range(max_iterations):
+        parallel_for(_apply, CHUNKS, system, now.direction, now.image, products, min_chunk=least)
+        step = _ratio(energy, _column_sums(products))
+        parallel_for(_advance, CHUNKS, system, now, step, squares, products, min_chunk=least)
+        if (_column_sums(squares) <= tolerance * tolerance * size).all():
+            break
+        before, energy = energy, _column_sums(products)
+        turn = _ratio(energy, before)
+        parallel_for(_turn_direction, CHUNKS, system, now, turn, min_chunk=least)
+    return now.solution
+
+
+def _ratio(value: Float64Array, divisor: Float64Array) -> Float32Array:
+    """Return (C,) the quotients, 0 where the divisor is not positive."""
+    positive = np.where(divisor > 0, divisor, 1.0)
+    return np.where(divisor > 0, value / positive, 0.0).astype(np.float32)
+
+
+@compiled
+def _column_sums(chunks: Float64Array) -> Float64Array:
+    """Return (C,) the sums of (CHUNKS, C), added in order."""
+    total = np.zeros(chunks.shape[1])
+    for chunk in range(len(chunks)):
+        for c in range(len(total)):
+            total[c] += chunks[chunk, c]
+    return total
+
+
+@compiled
+def _invert_diagonal(
+    neighbours: Int32Array, weight: Float32Array, smoothness: np.float32, inverse: Float32Array
+) -> None:
+    """Write the inverse of the operator's diagonal (N,), 1 where a cell is alone and unknown."""
+    for i in range(len(inverse)):
         diagonal = weight[i]
         for k in range(6):
             if neighbours[i, k] >= 0:
                 diagonal += smoothness
         inverse[i] = 1 / diagonal if diagonal > 0 else np.float32(1.0)
-    ap = np.empty_like(x)
-    first = np.zeros((CHUNKS, channels))
-    second = np.zeros((CHUNKS, channels))
-    _operate(neighbours, weight, smoothness, x, ap, first)
-    r = np.empty_like(x)
-    p = np.empty_like(x)
-    rz = np.zeros(channels)
-    size = np.zeros(channels)
+
+
+@compiled
+def _chunk_of_cells(chunk: int, count: int) -> tuple[int, int]:
+    """Return the first cell of a chunk and the one after its last."""
+    size = (count + CHUNKS - 1) // CHUNKS
+    return chunk * size, min((chunk + 1) * size, count)
+
+
+@compiled
+def _apply(
+    first: int,
+    last: int,
+    system: _System,
+    values: Float32Array,
+    image: Float32Array,
+    products: Float64Array,
+) -> None:
+    """Write the operator's image (N, C) of values (N, C), and chunks' sums of values * image."""
+    count, channels = values.shape
+    for chunk in range(first, last):
+        products[chunk] = 0
+        begin, end = _chunk_of_cells(chunk, count)
+        for i in range(begin, end):
+            degree = system.weight[i]
+            for k in range(6):
+                if system.neighbours[i, k] >= 0:
+                    degree += system.smoothness
+            for c in range(channels):
+                image[i, c] = degree * values[i, c]
+            for k in range(6):
+                j = system.neighbours[i, k]
+                if j >= 0:
+                    for c in range(channels):
+                        image[i, c] -= system.smoothness * values[j, c]
+            for c in range(channels):
+                products[chunk, c] += values[i, c] * image[i, c]
+
+
+@compiled
+def _begin(
+    system: _System, data: Float32Array, now: _Iterate, energy: Float64Array, size: Float64Array
+) -> None:
+    """Write first residual and direction; sums of r^2 / diagonal and (right side / diagonal)^2."""
+    count, channels = data.shape
     for i in range(count):
         for c in range(channels):
-            b = weight[i] * data[i, c]
-            size[c] += (b * inverse[i]) ** 2
-            r[i, c] = b - ap[i, c]
-            p[i, c] = inverse[i] * r[i, c]
-            rz[c] += r[i, c] * p[i, c]
-    alpha = np.zeros(channels, np.float32)
-    beta = np.zeros(channels, np.float32)
-    for _ in range(max_iterations):
-        _operate(neighbours, weight, smoothness, p, ap, first)
-        curvature = first.sum(axis=0)
-        for c in range(channels):
-            alpha[c] = rz[c] / curvature[c] if curvature[c] > 0 else 0.0
-        _advance(x, r, p, ap, inverse, alpha, first, second)
-        squares, products = first.sum(axis=0), second.sum(axis=0)
-        done = True
-        for c in range(channels):
-            if squares[c] > tolerance * tolerance * size[c]:
-                done = False
-            beta[c] = products[c] / rz[c] if rz[c] > 0 else 0.0
-            rz[c] = products[c]
-        if done:
-            break
-        _turn(p, r, inverse, beta)
-    return x
+            b = system.weight[i] * data[i, c]
+            size[c] += (b * system.inverse[i]) ** 2
+            now.residual[i, c] = b - now.image[i, c]
+            now.direction[i, c] = system.inverse[i] * now.residual[i, c]
+            energy[c] += now.residual[i, c] * now.direction[i, c]
+
+
+@compiled
+def _advance(
+    first: int,
+    last: int,
+    system: _System,
+    now: _Iterate,
+    step: Float32Array,
+    squares: Float64Array,
+    products: Float64Array,
+) -> None:
+    """Step (C,) along the direction; write chunks' sums of (r / diagonal)^2 and r^2 / diagonal."""
+    count, channels = now.solution.shape
+    for chunk in range(first, last):
+        squares[chunk] = 0
+        products[chunk] = 0
+        begin, end = _chunk_of_cells(chunk, count)
+        for i in range(begin, end):
+            for c in range(channels):
+                now.solution[i, c] += step[c] * now.direction[i, c]
+                residual = now.residual[i, c] - step[c] * now.image[i, c]
+                now.residual[i, c] = residual
+                scaled = residual * system.inverse[i]
+                squares[chunk, c] += scaled * scaled
+                products[chunk, c] += residual * scaled
+
+
+@compiled
+def _turn_direction(
+    first: int, last: int, system: _System, now: _Iterate, turn: Float32Array
+) -> None:
+    """Make the directions conjugate: the preconditioned residual plus turn (C,) times the last."""
+    count, channels = now.direction.shape
+    for chunk in range(first, last):
+        begin, end = _chunk_of_cells(chunk, count)
+        for i in range(begin, end):
+            for c in range(channels):
+                now.direction[i, c] = (
+                    system.inverse[i] * now.residual[i, c] + turn[c] * now.direction[i, c]
+                )

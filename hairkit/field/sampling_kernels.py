@@ -1,21 +1,42 @@
-"""Compiled look-ups in volumes, for everything that walks through a field."""
+"""Compiled look-ups in volumes, for everything that follows a field."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numba import njit
+
+from hairkit.arrays import Float32Array, Float64Array
+from hairkit.parallel import compiled
+from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
+
+BORDER_CELLS = 1.001
+"""Samples are taken at most this many cells before the last, so that the next cell exists."""
+SHORTEST_VECTOR = 1e-9
+"""Vectors below this length have no direction."""
+SMALLEST_TENSOR = 1e-6
+"""Tensors that shrink a unit vector below this length have no direction."""
+POWER_ROUNDS = 6
+"""Power iterations; each divides the error by the ratio of the two largest eigenvalues."""
 
 
-@njit(cache=True, inline="always")
-def sample_at(origin, spacing, values, p, result):  # type: ignore[no-untyped-def]
+@compiled
+def sample_at(
+    origin: Float64Array,
+    spacing: float,
+    values: Float32Array,
+    p: Float64Array,
+    result: Float64Array,
+) -> None:
     """Write the trilinear sample of values (X, Y, Z, C) at p (3,) into result (C,).
 
-    The compiled twin of `VoxelGrid.sample` for one point; clamped at the border.
+    The compiled twin of `VoxelGrid.sample` for one point; clamped at the border. `origin` (3,) is
+    the grid's corner and `spacing` the edge of a cell, metres.
     """
     nx, ny, nz, channels = values.shape
-    fx = min(max((p[0] - origin[0]) / spacing - 0.5, 0.0), nx - 1.001)
-    fy = min(max((p[1] - origin[1]) / spacing - 0.5, 0.0), ny - 1.001)
-    fz = min(max((p[2] - origin[2]) / spacing - 0.5, 0.0), nz - 1.001)
+    fx = min(max((p[0] - origin[0]) / spacing - 0.5, 0.0), nx - BORDER_CELLS)
+    fy = min(max((p[1] - origin[1]) / spacing - 0.5, 0.0), ny - BORDER_CELLS)
+    fz = min(max((p[2] - origin[2]) / spacing - 0.5, 0.0), nz - BORDER_CELLS)
     ix, iy, iz = int(fx), int(fy), int(fz)
     tx, ty, tz = fx - ix, fy - iy, fz - iz
     for c in range(channels):  # along z, then y, then x: seven mixes instead of eight products
@@ -30,8 +51,14 @@ def sample_at(origin, spacing, values, p, result):  # type: ignore[no-untyped-de
         result[c] = v00 + (v10 - v00) * tx
 
 
-@njit(cache=True)
-def gradient_at(origin, spacing, values, p, result):  # type: ignore[no-untyped-def]
+@compiled
+def gradient_at(
+    origin: Float64Array,
+    spacing: float,
+    values: Float32Array,
+    p: Float64Array,
+    result: Float64Array,
+) -> None:
     """Write the unit gradient of values (X, Y, Z, 1) at p into result (3,); zero where flat."""
     at = np.empty(3)
     one = np.empty(1)
@@ -46,31 +73,33 @@ def gradient_at(origin, spacing, values, p, result):  # type: ignore[no-untyped-
     make_unit(result)
 
 
-@njit(cache=True, inline="always")
-def make_unit(vector):  # type: ignore[no-untyped-def]
+@compiled
+def make_unit(vector: Float64Array) -> bool:
     """Scale vector (3,) to length 1 in place; returns False, and leaves it, where it vanishes."""
-    norm = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
-    if norm < 1e-9:
+    norm = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    if norm < SHORTEST_VECTOR:
         return False
     for axis in range(3):
         vector[axis] /= norm
     return True
 
 
-@njit(cache=True)
-def principal_direction(tensor, direction, result):  # type: ignore[no-untyped-def]
+@compiled
+def principal_direction(
+    tensor: Float64Array, direction: Float64Array, result: Float64Array
+) -> bool:
     """Write the tensor's (6,) largest eigenvector nearest to `direction` into result (3,).
 
-    Six rounds of power iteration from `direction`, which picks the sign and, where the tensor is
-    undecided, keeps the way straight. Returns False where the tensor vanishes.
+    Power iteration from `direction`, which picks the sign and, where the two largest eigenvalues
+    agree, the direction. Returns False where the tensor vanishes.
     """
     x, y, z = direction[0], direction[1], direction[2]
-    for _ in range(6):
-        a = tensor[0] * x + tensor[3] * y + tensor[4] * z
-        b = tensor[3] * x + tensor[1] * y + tensor[5] * z
-        c = tensor[4] * x + tensor[5] * y + tensor[2] * z
-        norm = np.sqrt(a * a + b * b + c * c)
-        if norm < 1e-6:
+    for _ in range(POWER_ROUNDS):
+        a = tensor[XX] * x + tensor[XY] * y + tensor[XZ] * z
+        b = tensor[XY] * x + tensor[YY] * y + tensor[YZ] * z
+        c = tensor[XZ] * x + tensor[YZ] * y + tensor[ZZ] * z
+        norm = math.sqrt(a * a + b * b + c * c)
+        if norm < SMALLEST_TENSOR:
             return False
         x, y, z = a / norm, b / norm, c / norm
     sign = -1.0 if x * direction[0] + y * direction[1] + z * direction[2] < 0 else 1.0
