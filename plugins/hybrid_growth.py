@@ -1,30 +1,36 @@
-"""Growth along a signed field: the patent's rules, one point after the other from every root.
+"""Strand growth along a signed field by the patent's rules, point by point from every root.
 
 `p_i = p_(i-1) + delta H(p_(i-1)) / |H|` with a step delta of 1 mm, until the internal distance says
-that the point has left the hair (I > 1.1) or the strand is as long as it may be. With a field that
-has no signs of its own, its tensors are followed along the growth potential.
+that the point has left the hair (I > 1.1) or the strand has its greatest length. In a field without
+signs the tensors are followed in the direction in which the growth potential rises.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
 from scipy import ndimage
 
 from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, Strands, hookimpl
-from hairkit.arrays import Float32Array
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.field.growth_prior import hair_length, scalp_way
 from hairkit.field.sampling_kernels import gradient_at, make_unit, sample_at
 from hairkit.grooming.postprocess import FinishOptions, finished
 from hairkit.options import option
+from hairkit.parallel import compiled, parallel_for
 from hairkit.types.volume import cell_slopes, symmetric_matrices
 
-NEAR = 4
-"""Cells of the grid in a row whose roots are grown together."""
-PARTS = 64
-"""Runs of roots that are grown side by side."""
+BLOCK = 4
+"""Edge in cells of the blocks whose roots are grown one after the other: strands that read the same
+part of the field find it in the cache."""
+MIN_STRANDS = 32
+"""Least number of strands worth a call on another thread."""
+DISTANCE = 3
+"""Channel of the internal distance after the three of the direction."""
+CENTIMETRES = 100
+"""Of a metre: the unit of the internal distance where the field has none of its own."""
 
 
 @dataclass(frozen=True)
@@ -43,17 +49,17 @@ class Options(FinishOptions):
         doc="Strands grow no longer than this share of the longest way through the hair.",
     )
     blind: float = option(
-        0.02, low=0, high=0.2, unit="m", doc="Way after the root on which nothing ends a strand."
+        0.02, low=0, high=0.2, unit="m", doc="Length from the root on which nothing ends a strand."
     )
     slide_sine: float = option(
         0.35,
         low=0,
         high=1,
-        doc="Strands that leave the hair at an angle of a smaller sine run on along its surface;"
-        " 0: never.",
+        doc="Strands that leave the hair at an angle of a smaller sine slide along its surface;"
+        " 0 never.",
     )
     slide_from: float = option(
-        1.0, low=0, high=10, doc="Internal distance from which strands run along the surface."
+        1.0, low=0, high=10, doc="Internal distance from which strands slide."
     )
     inertia: float = option(
         0.92, low=0, high=0.99, doc="Share of the previous direction in the next step's."
@@ -72,11 +78,11 @@ def track(
 ) -> Strands:
     """Grow one strand from every root."""
     way = hair_length(hull, scalp_way(scene.head, hull))
-    strands = grown(field, _signed(field), _distance(field, hull), roots.positions, way, options)
+    strands = grow(field, _signed(field), _distance(field, hull), roots.positions, way, options)
     return finished(replace(strands, root_uv=roots.uv), scene, masks, orientations, hull, options)
 
 
-def grown(
+def grow(
     field: OrientationField,
     direction: Float32Array,
     distance: Float32Array,
@@ -84,7 +90,7 @@ def grown(
     way: float,
     options: Options,
 ) -> Strands:
-    """Return the strands grown from `starts` (N, 3), metres, by the rules.
+    """Return the strands grown from `starts` (N, 3), metres.
 
     Parameters
     ----------
@@ -93,11 +99,11 @@ def grown(
     distance
         (X, Y, Z) internal distance.
     way
-        Longest way through the hair, metres; strands slide along its surface only up to there.
+        Longest way through the hair, metres; strands slide only up to this length.
     """
     steps = max(int(min(options.max_length, options.reach * way) / options.step), 2)
     points = np.zeros((len(starts), options.points, 3), np.float32)
-    rules = (
+    rules = Rules(
         options.step,
         options.bound,
         options.inertia,
@@ -107,10 +113,11 @@ def grown(
         options.slide_from,
         int(way / options.step),
     )
-    volume = np.concatenate([direction, distance[..., None]], axis=3)
-    # neighbours grow one after the other: what they read of the field is still in the cache
-    order = np.lexsort((field.grid.nearest_cell(starts) // NEAR).T)
-    _grow(field.grid.origin, field.grid.spacing, volume, rules, starts, order, points)
+    values = np.concatenate([direction, distance[..., None]], axis=3)
+    volume = SignedVolume(field.grid.origin, field.grid.spacing, values)
+    order = np.lexsort((field.grid.nearest_cell(starts) // BLOCK).T)
+    growth = (volume, rules, starts, order, points)
+    parallel_for(_grow_strands, len(starts), *growth, min_chunk=MIN_STRANDS)
     return Strands(points.reshape(-1, 3), np.arange(len(starts) + 1) * options.points)
 
 
@@ -132,71 +139,110 @@ def _distance(field: OrientationField, hull: Hull) -> Float32Array:
     if field.internal_distance is not None:
         return field.internal_distance
     filled = hull.dense | (hull.head_distance < 0)
-    away = ndimage.distance_transform_edt(~filled) * (100 * hull.grid.spacing)
+    away = ndimage.distance_transform_edt(~filled) * (CENTIMETRES * hull.grid.spacing)
     return np.where(away > 0, 1 + away, 0.5).astype(np.float32)
 
 
-@njit(cache=True, parallel=True)
-def _grow(origin, spacing, volume, rules, starts, order, points):  # type: ignore[no-untyped-def]
-    """Write strands (N, M, 3) of equal steps, grown in `order` (N,)."""
-    parts = min(PARTS, len(order))
-    for part in prange(parts):
-        course = np.empty((rules[4] + 1, 3))
-        for k in range(part * len(order) // parts, (part + 1) * len(order) // parts):
-            s = order[k]
-            count = _grow_one(origin, spacing, volume, rules, starts[s], course)
-            _evenly(course, count, points[s])
+class SignedVolume(NamedTuple):
+    """The signed field and the internal distance, sampled together."""
+
+    origin: Float64Array
+    """(3,) lowest corner of the grid, metres, head frame."""
+    spacing: float
+    """Edge of a cell, metres."""
+    values: Float32Array
+    """(X, Y, Z, 4): direction, 0 where nothing is known, and internal distance (`DISTANCE`)."""
 
 
-@njit(cache=True)
-def _evenly(course, count, points):  # type: ignore[no-untyped-def]
-    """Write points (M, 3) at equal shares of a course of `count` points, all steps equal."""
+class Rules(NamedTuple):
+    """The options in the units of the growth."""
+
+    step: float
+    """Metres (delta)."""
+    bound: float
+    """Internal distance at which a strand has left the hair."""
+    inertia: float
+    """Share of the previous direction in the next one."""
+    blind_steps: int
+    """Steps from the root on which nothing ends a strand."""
+    steps: int
+    """Most steps of a strand."""
+    slide_sine: float
+    """Of the angle to the hair's surface, below which a strand slides along it; 0 for never."""
+    slide_from: float
+    """Internal distance from which strands slide."""
+    slide_steps: int
+    """Steps from the root on which strands may slide."""
+
+
+@compiled
+def _grow_strands(
+    first: int,
+    last: int,
+    volume: SignedVolume,
+    rules: Rules,
+    starts: Float32Array,
+    order: Int64Array,
+    points: Float32Array,
+) -> None:
+    """Write strands order[first:last] into points (N, M, 3) of equal steps; `starts` is (N, 3)."""
+    path = np.empty((rules.steps + 1, 3))
+    for k in range(first, last):
+        s = order[k]
+        count = _grow_strand(volume, rules, starts[s], path)
+        _resample(path[:count], points[s])
+
+
+@compiled
+def _resample(path: Float64Array, points: Float32Array) -> None:
+    """Write points (M, 3) at equal shares of a path (N, 3) of equal steps, N at least 2."""
     for m in range(len(points)):
-        at = m * (count - 1) / (len(points) - 1)
-        before = min(int(at), count - 2)
+        at = m * (len(path) - 1) / (len(points) - 1)
+        before = min(int(at), len(path) - 2)
         for axis in range(3):
-            first = course[before, axis]
-            points[m, axis] = first + (course[before + 1, axis] - first) * (at - before)
+            first = path[before, axis]
+            points[m, axis] = first + (path[before + 1, axis] - first) * (at - before)
 
 
-@njit(cache=True)
-def _grow_one(origin, spacing, volume, rules, start, course):  # type: ignore[no-untyped-def]
-    """Write one strand's points into course (M, 3); returns how many, at least two."""
-    step, bound, inertia, blind, steps, sine, skin, sliding = rules
+@compiled
+def _grow_strand(
+    volume: SignedVolume, rules: Rules, start: Float32Array, path: Float64Array
+) -> int:
+    """Write one strand's points into path (M, 3); return their number, at least 2."""
     p, d, found = np.empty(3), np.zeros(3), np.empty(4)
     p[:] = start
-    course[0] = p
+    path[0] = p
     count = 1
-    for i in range(1, steps + 1):
-        sample_at(origin, spacing, volume, p, found)
+    for i in range(1, rules.steps + 1):
+        sample_at(volume.origin, volume.spacing, volume.values, p, found)
         known = make_unit(found[:3])
-        if i > blind and (found[3] > bound or not known):
+        if i > rules.blind_steps and (found[DISTANCE] > rules.bound or not known):
             break
         if known and i > 1:
             for axis in range(3):
-                d[axis] = inertia * d[axis] + (1 - inertia) * found[axis]
+                d[axis] = rules.inertia * d[axis] + (1 - rules.inertia) * found[axis]
         elif known:
             d[:] = found[:3]
         if not make_unit(d):
             break
-        if i < sliding and found[3] >= skin:
-            _slide(origin, spacing, volume, p, sine, d)
+        if i < rules.slide_steps and found[DISTANCE] >= rules.slide_from:
+            _slide(volume, rules.slide_sine, p, d)
         for axis in range(3):
-            p[axis] += step * d[axis]
-        course[count] = p
+            p[axis] += rules.step * d[axis]
+        path[count] = p
         count += 1
-    if count == 1:  # nothing is known at the root: a stub keeps the strand's place
-        course[1] = course[0]
-        course[1, 1] += step
+    if count == 1:  # nothing is known at the root: a step upwards, since every root has a strand
+        path[1] = path[0]
+        path[1, 1] += rules.step
         count = 2
     return count
 
 
-@njit(cache=True)
-def _slide(origin, spacing, volume, p, sine, d):  # type: ignore[no-untyped-def]
-    """Take from d (3,) its part along the internal distance's gradient, p beyond the surface."""
+@compiled
+def _slide(volume: SignedVolume, sine: float, p: Float64Array, d: Float64Array) -> None:
+    """Remove d's part along the internal distance's gradient if d leaves the hair at less."""
     normal = np.empty(3)
-    gradient_at(origin, spacing, volume[..., 3:], p, normal)
+    gradient_at(volume.origin, volume.spacing, volume.values[..., DISTANCE:], p, normal)
     outward = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]
     if 0 < outward < sine:
         for axis in range(3):

@@ -1,17 +1,17 @@
 """Hybrid field: surface structure, internal direction, internal distance and growth direction.
 
-The patent's first stage on a grid of the hull's cells: `H = a_s S + a_v V + a_i grad(I) + a_o O`.
+The patent's first stage, on the cells of the hull: `H = a_s S + a_v V + a_i grad(I) + a_o O`.
 
 1. Oriented 3D segments: lines followed in each photo and lifted onto the hull, and lines followed
-   through the confident outer cells of the fused field. Segments agree on which end is the root.
-2. S, surface structure: segments as ribbons that reach sideways, spread by heat diffusion.
-3. V, internal direction: the tensor v v^T, kept at strands and roots, elsewhere drawn to what the
-   views say through the hair, diffused; its sign comes from O.
-4. I, internal distance: 0 in the head, 1 on strands, 1 and the distance beyond at the border,
-   harmonic in between; its gradient leads outward.
-5. O, growth direction: the signed course of segments and of the roots, diffused.
+   through the confident outer cells of the fused field. Neighbouring segments vote on their signs.
+2. S, surface structure: segments widened to ribbons, spread by diffusion.
+3. V, internal direction: the tensor v v^T, fixed at strands and roots, elsewhere weighted by the
+   certainty of the fused views, diffused; its sign comes from O.
+4. I, internal distance: 0 in the head, 1 on strands, 1 plus the distance to them at the border,
+   harmonic in between; its gradient points outward.
+5. O, growth direction: the signed tangents of segments and the scalp prior, diffused.
 
-Weights differ from cell to cell: S near strands, V where they are far, grad(I) at the scalp.
+Weights differ from cell to cell: S counts near strands, V away from them, grad(I) at the scalp.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from hairkit.options import option
 
 from .four_fields import (
     Fields,
-    blended,
+    blend,
     growth_direction,
     internal_direction,
     internal_distance,
@@ -36,7 +36,7 @@ from .four_fields import (
 from .ribbons import ribbons
 from .segments import find_segments
 
-__all__ = ["Options", "blended", "find_segments", "internal_distance", "ribbons"]
+__all__ = ["Options", "blend", "find_segments", "internal_distance", "ribbons"]
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Options(FusionOptions):
         low=1,
         high=90,
         unit="deg",
-        doc="A lifted line is dropped where it differs by more from what all views say together.",
+        doc="A lifted line is dropped if it differs by more from the fused field of all views.",
     )
     ribbon: float = option(
         0.004, low=0, high=0.05, unit="m", doc="How far a ribbon reaches to either side."
@@ -93,7 +93,7 @@ def solve_field(
     hull: Hull,
     options: Options,
 ) -> OrientationField:
-    """Return the blended field with its signs and the internal distance."""
+    """Return the blend field with its signs and the internal distance."""
     growth = growth_potential(scene.head, hull, options.tip_share)
     fused = fuse_views(scene.cameras, masks, orientations, hull, options)
     segments = find_segments(scene.cameras, masks, fused, hull, growth, options)
@@ -107,7 +107,7 @@ def solve_field(
     distance = internal_distance(hull, segments, options.tolerance)
     surface = surface_structure(hull, band, options.tolerance)
     fields = Fields(surface, inner, distance, signs)
-    direction, outer = blended(hull, band, fields, options)
+    direction, outer = blend(hull, band, fields, options)
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
     return OrientationField(hull.grid, outer, confidence, growth, direction, distance)

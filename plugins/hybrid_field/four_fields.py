@@ -1,4 +1,4 @@
-"""The four fields and their blend, all on the hull's grid."""
+"""The patent's four fields and their weighted sum, on the hull's grid."""
 
 from __future__ import annotations
 
@@ -18,15 +18,17 @@ from hairkit.types.volume import cell_slopes, outer_products
 from .ribbons import Band
 
 FIXED = 1e3
-"""Weight against a smoothness of 1 that keeps a cell as it is (Dirichlet)."""
+"""Weight of a cell's data against a smoothness of 1 that fixes its value (Dirichlet)."""
 UNIT = 0.01
-"""Metres in one unit of the internal distance, of which the patent says nothing: centimetres."""
+"""Metres in one unit of the internal distance: a centimetre; the patent names no unit."""
 COARSE = 2
 """The internal distance is solved on cells this many times as large, then interpolated."""
+SCALP_CELLS = 2.0
+"""Distance from the head in cells at which the weight of grad(I) falls to 1/e."""
 
 
 class FieldOptions(Protocol):
-    """What the fields ask of the plugin's options."""
+    """Options of the fields and their weights."""
 
     @property
     def smoothness(self) -> float: ...
@@ -49,7 +51,7 @@ class FieldOptions(Protocol):
 
 
 def surface_structure(hull: Hull, band: Band, tolerance: float) -> Float32Array:
-    """Return S (N, 3) of the loose cells: the ribbons' tangents, spread by heat diffusion."""
+    """Return S (N, 3) of the loose cells: the ribbons' tangents, spread by diffusion."""
     weight = np.where(band.cells[hull.loose], FIXED, 0).astype(np.float32)
     data = band.direction[hull.loose].copy()
     if not weight.any():
@@ -60,7 +62,7 @@ def surface_structure(hull: Hull, band: Band, tolerance: float) -> Float32Array:
 def growth_direction(
     head: Head, hull: Hull, growth: Float32Array, band: Band, options: FieldOptions
 ) -> Float32Array:
-    """Return O (N, 3) of the loose cells: ribbons and the scalp's combing, diffused with signs."""
+    """Return O (N, 3) of the loose cells: ribbons and the scalp prior, diffused as vectors."""
     data = band.direction[hull.loose].copy()
     weight = np.where(band.cells[hull.loose], FIXED, 0).astype(np.float32)
     near = (hull.head_distance[hull.loose] < options.scalp_reach) & (weight == 0)
@@ -126,7 +128,7 @@ def _pooled(cells: BoolArray, shape: tuple[int, ...]) -> BoolArray:
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """The four fields of the patent, but for the distance one row for each loose cell."""
+    """The four fields of the patent; all but the distance have a row for each loose cell."""
 
     surface: Float32Array
     """S, (N, 3)."""
@@ -138,21 +140,21 @@ class Fields:
     """O, (N, 3)."""
 
 
-def blended(
+def blend(
     hull: Hull, band: Band, fields: Fields, options: FieldOptions
 ) -> tuple[Float32Array, Float32Array]:
     """Return H (X, Y, Z, 3) and its tensor (X, Y, Z, 6), both 0 outside the loose hull.
 
-    The weights differ from cell to cell: S speaks on strands, V the more the farther they are,
-    grad(I) at the scalp, O a little everywhere; V takes its sign from O.
+    The weights differ from cell to cell: S counts on strands, V away from them, grad(I) at the
+    scalp, O a little everywhere. V takes its sign from O.
     """
     spacing = hull.grid.spacing
     off = ndimage.distance_transform_edt(~band.cells)[hull.loose] * spacing
-    main = smallest_eigenvectors(-fields.inner.astype(np.float64))[0]  # the largest of V
+    main = smallest_eigenvectors(-fields.inner.astype(np.float64))[0]  # V's largest eigenvector
     main *= np.where((main * fields.growth).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     slope = cell_slopes(fields.distance)[hull.loose]
     slope /= np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
-    near_scalp = np.exp(-np.maximum(hull.head_distance[hull.loose], 0) / (2 * spacing))
+    near_scalp = np.exp(-np.maximum(hull.head_distance[hull.loose], 0) / (SCALP_CELLS * spacing))
     a_s = options.surface * np.exp(-off / options.surface_reach)
     a_v = 1 - np.minimum(a_s, 1)
     a_i = options.outward * near_scalp
@@ -166,6 +168,7 @@ def blended(
 
 
 def _unit(vectors: Float32Array | Float64Array) -> Float64Array:
+    """Return vectors (N, 3) at length 1, those of no length unchanged."""
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     result: Float64Array = vectors / np.maximum(length, 1e-9)
     return result

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numba import njit, prange
+import numpy.typing as npt
 
 from hairkit import Camera, Hull, Mask, OrientationMap, Strands
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
@@ -14,23 +14,32 @@ from hairkit.cameras.projection_kernels import PackedCamera, pack_camera, perspe
 from hairkit.field.sampling_kernels import sample_at
 from hairkit.field.view_fusion import DEPTH_SHRINK, front_depths
 from hairkit.parallel import compiled, parallel_for
+from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
 
 PIXELS = 2.0
-"""Step along a line in a photo."""
+"""Step along a line in a photo, pixels."""
 CONFIDENT = 0.25
-"""Least confidence along a line, both of a pixel and, as a share of the best, of a cell."""
+"""Least confidence along a line, of a pixel and, as a share of the best one, of a cell."""
 DEPTH_JUMP = 0.008
 """Metres by which the hull's front may change in one step along a line."""
 STEP = 0.002
 """Metres between a segment's points."""
 SMOOTHING = 3.0
-"""Points over which lifted lines are smoothed: the hull's front is a staircase."""
+"""Gaussian in points under which lifted lines are smoothed: the hull's front has steps."""
+KERNEL_SIGMAS = 3
+"""Half width of that Gaussian's kernel in its sigmas."""
 FEWEST = 5
 """Points of the shortest segment."""
+MIN_COSINE = 0.8
+"""Cosine of the sharpest turn in one step; beyond 37 degrees it is another strand."""
+LEAST_TRACE = 1e-6
+"""Certainty below which the tensors along a line are unknown."""
+MIN_LINES = 64
+"""Least number of lines worth a call on another thread."""
 
 
 class LineOptions(Protocol):
-    """What following lines asks of the plugin's options."""
+    """Options of the lines."""
 
     @property
     def line_spacing(self) -> int: ...
@@ -50,15 +59,18 @@ def lifted_lines(
     fronts = front_depths(cameras, orientations, hull)
     for camera, mask, oriented, front in zip(cameras, masks, orientations, fronts, strict=True):
         weight = (oriented.confidence * mask.hair).astype(np.float32)
-        seeds = _seeds(weight, options.line_spacing)
-        steps = int(options.longest / PIXELS * camera.focal / _middle(front))
-        lines = np.empty((len(seeds), 2 * max(steps // 2, FEWEST) + 1, 3), np.float32)
-        counts = np.zeros(len(seeds), np.int64)
-        _follow_photo(oriented.angle, weight, front, DEPTH_SHRINK, seeds, lines, counts)
+        rows, columns = _seeds(weight, options.line_spacing)
+        steps = int(options.longest / PIXELS * camera.focal / _median_depth(front))
+        lines = np.empty((len(rows), 2 * max(steps // 2, FEWEST) + 1, 3), np.float32)
+        counts = np.zeros(len(rows), np.int64)
+        photo = Photo(oriented.angle, weight, front)
+        parallel_for(
+            _follow_photo, len(rows), photo, rows, columns, lines, counts, min_chunk=MIN_LINES
+        )
         found.append(lifted(camera, lines, counts))
     points = np.concatenate([points for points, _ in found])
     counts = np.concatenate([counts for _, counts in found])
-    return _even(points, counts)
+    return _resample_lines(points, counts)
 
 
 def lifted(
@@ -68,28 +80,33 @@ def lifted(
     long = np.flatnonzero(counts >= FEWEST)
     offsets = np.concatenate([[0], np.cumsum(counts[long])])
     points = np.empty((offsets[-1], 3), np.float32)
-    shift = np.arange(int(3 * SMOOTHING) + 1)
+    shift = np.arange(int(KERNEL_SIGMAS * SMOOTHING) + 1)
     weights = np.exp(-0.5 * (shift / SMOOTHING) ** 2)
-    parallel_for(_lift, len(long), pack_camera(camera), lines, long, offsets, weights, points)
+    view = pack_camera(camera)
+    parallel_for(_lift, len(long), view, lines, long, offsets, weights, points, min_chunk=MIN_LINES)
     return points, counts[long]
 
 
 def agreeing(lines: Strands, hull: Hull, volume: Float32Array, angle_deg: float) -> Strands:
-    """Return the lines whose points on average run along the tensors (X, Y, Z, 6) where these are
-    sure, whose traces are."""
+    """Return the lines that differ by at most an angle from the tensors (X, Y, Z, 6) along them.
+
+    A tensor's trace is its certainty, so the mean over a line is one of the certain cells.
+    """
     share = np.empty(len(lines))
-    grid = hull.grid
-    _share_along(grid.origin, grid.spacing, volume, lines.points, lines.offsets, share)
+    tensors = TensorVolume(hull.grid.origin, hull.grid.spacing, volume)
+    along = (tensors, lines.points, lines.offsets, share)
+    parallel_for(_share_along, len(lines), *along, min_chunk=MIN_LINES)
     return lines.select(share >= np.cos(np.radians(angle_deg)) ** 2)
 
 
-def _middle(front: Float32Array) -> float:
+def _median_depth(front: Float32Array) -> float:
+    """Return the median axial depth of a hull's front, metres."""
     seen = front[np.isfinite(front)]
     return float(np.median(seen)) if len(seen) else 1.0
 
 
-def _seeds(weight: Float32Array, spacing: int) -> Int64Array:
-    """Return (N, 2) row and column of the most confident pixel of each square of `spacing`."""
+def _seeds(weight: Float32Array, spacing: int) -> tuple[Int64Array, Int64Array]:
+    """Return rows and columns (N,) of the most confident pixel of each square of `spacing`."""
     height, width = (n // spacing for n in weight.shape)
     squares = weight[: height * spacing, : width * spacing]
     squares = squares.reshape(height, spacing, width, spacing).swapaxes(1, 2)
@@ -97,55 +114,100 @@ def _seeds(weight: Float32Array, spacing: int) -> Int64Array:
     best = squares.argmax(axis=2)
     row, column = np.nonzero(squares.max(axis=2) > CONFIDENT)
     inside = best[row, column]
-    return np.stack([row * spacing + inside // spacing, column * spacing + inside % spacing], 1)
+    return row * spacing + inside // spacing, column * spacing + inside % spacing
 
 
-@njit(cache=True, parallel=True)
-def _follow_photo(angle, weight, front, shrink, seeds, lines, counts):  # type: ignore[no-untyped-def]
-    """Write u, v, depth of each line's points in order into lines (N, M, 3), counts into (N,)."""
+class TensorVolume(NamedTuple):
+    """Tensors on a grid."""
+
+    origin: Float64Array
+    """(3,) lowest corner of the grid, metres, head frame."""
+    spacing: float
+    """Edge of a cell, metres."""
+    values: Float32Array
+    """(X, Y, Z, 6) in the order xx yy zz xy xz yz, each times its certainty."""
+
+
+class Photo(NamedTuple):
+    """One view's maps, of which `front` is `DEPTH_SHRINK` times smaller than the others."""
+
+    angle: Float32Array
+    """(H, W) strand angle, radians."""
+    weight: Float32Array
+    """(H, W) confidence on hair, 0 elsewhere."""
+    front: Float32Array
+    """(h, w) axial depth of the hull's front, metres, infinite beyond it."""
+
+
+@compiled
+def _follow_photo(
+    first: int,
+    last: int,
+    photo: Photo,
+    rows: Int64Array,
+    columns: Int64Array,
+    lines: Float32Array,
+    counts: Int64Array,
+) -> None:
+    """Write u, v, depth of lines `first` to `last` in order into lines (N, M, 3), counts (N,).
+
+    Each line is followed both ways from the middle of its seed, a pixel's row and column (N,).
+    """
     half = lines.shape[1] // 2
-    for s in prange(len(seeds)):
+    for s in range(first, last):
+        x, y = columns[s] + 0.5, rows[s] + 0.5
         back = np.empty((half, 3), np.float32)
         ahead = np.empty((half, 3), np.float32)
-        before = _follow_one(angle, weight, front, shrink, seeds[s], -1.0, back)
-        after = _follow_one(angle, weight, front, shrink, seeds[s], 1.0, ahead)
-        counts[s] = join(back, before, ahead, after, lines[s])
+        before = _follow_line(photo, x, y, -1.0, back)
+        after = _follow_line(photo, x, y, 1.0, ahead)
+        counts[s] = join(back[:before], ahead[:after], lines[s])
 
 
-@njit(cache=True)
-def join(back, before, ahead, after, line):  # type: ignore[no-untyped-def]
-    """Write `before` points backwards and `after` points ahead, which both begin at the seed, in
-    order into line (M, 3); returns their number."""
+@compiled
+def join(
+    back: npt.NDArray[np.floating[Any]],
+    ahead: npt.NDArray[np.floating[Any]],
+    line: npt.NDArray[np.floating[Any]],
+) -> int:
+    """Write back (A, 3) reversed, then ahead (B, 3), into line (M, 3); return the number of points.
+
+    Both begin at the seed, which is written once.
+    """
     total = 0
-    for k in range(before - 1, 0, -1):  # the seed itself is the first point of `ahead`
+    for k in range(len(back) - 1, 0, -1):
         line[total] = back[k]
         total += 1
-    for k in range(after):
+    for k in range(len(ahead)):
         line[total] = ahead[k]
         total += 1
     return total
 
 
-@njit(cache=True)
-def _follow_one(angle, weight, front, shrink, seed, sign, line):  # type: ignore[no-untyped-def]
-    height, width = angle.shape
-    y, x = seed[0] + 0.5, seed[1] + 0.5
+@compiled
+def _follow_line(photo: Photo, x: float, y: float, sign: float, line: Float32Array) -> int:
+    """Write u, v, depth (M, 3) of a line from a pixel on, and return its number of points.
+
+    It starts along the angle times `sign` and ends where the photo is unsure, the hull's front
+    jumps or the angle bends sharply.
+    """
+    height, width = photo.angle.shape
+    rows, columns = photo.front.shape
     dx, dy, before = 0.0, 0.0, 0.0
     for k in range(len(line)):
         i, j = int(y), int(x)
-        if i < 0 or j < 0 or i >= height or j >= width or weight[i, j] < CONFIDENT:
+        if i < 0 or j < 0 or i >= height or j >= width or photo.weight[i, j] < CONFIDENT:
             return k
-        depth = front[min(i // shrink, front.shape[0] - 1), min(j // shrink, front.shape[1] - 1)]
+        depth = photo.front[min(i // DEPTH_SHRINK, rows - 1), min(j // DEPTH_SHRINK, columns - 1)]
         if not np.isfinite(depth) or (k > 0 and abs(depth - before) > DEPTH_JUMP):
             return k
         before = depth
         line[k, 0], line[k, 1], line[k, 2] = x, y, depth
-        c, s = np.cos(angle[i, j]), np.sin(angle[i, j])
+        c, s = np.cos(photo.angle[i, j]), np.sin(photo.angle[i, j])
         if k == 0:
             c, s = sign * c, sign * s
         elif c * dx + s * dy < 0:
             c, s = -c, -s
-        if k > 0 and c * dx + s * dy < 0.8:  # a bend of more than 37 degrees is another strand
+        if k > 0 and c * dx + s * dy < MIN_COSINE:
             return k + 1
         dx, dy = c, s
         x += PIXELS * c
@@ -184,10 +246,12 @@ def _unproject(camera: PackedCamera, pixel: Float32Array, point: Float64Array) -
         point[axis] = x * camera.right[axis] + y * camera.down[axis] + z * camera.forward[axis]
 
 
-@njit(cache=True)
-def _smooth(rough, weights, smooth):  # type: ignore[no-untyped-def]
-    """Write a line (M, 3) smoothed by a kernel, whose one half is weights (R,), into smooth (M,
-    3); beyond the ends there is nothing."""
+@compiled
+def _smooth(rough: Float64Array, weights: Float64Array, smooth: Float32Array) -> None:
+    """Write a line (M, 3) smoothed by a symmetric kernel into smooth (M, 3).
+
+    `weights` (R,) are the kernel's middle and one side; points beyond the ends have no weight.
+    """
     reach = len(weights) - 1
     for i in range(len(rough)):
         x, y, z, norm = 0.0, 0.0, 0.0, 0.0
@@ -200,7 +264,8 @@ def _smooth(rough, weights, smooth):  # type: ignore[no-untyped-def]
         smooth[i, 0], smooth[i, 1], smooth[i, 2] = x / norm, y / norm, z / norm
 
 
-def _even(points: Float32Array, counts: Int64Array) -> Strands:
+def _resample_lines(points: Float32Array, counts: Int64Array) -> Strands:
+    """Return packed lines (P, 3) as strands with points `STEP` apart, without the shortest."""
     strands = Strands(points, np.concatenate([[0], np.cumsum(counts)]))
     if not len(strands):
         return strands
@@ -208,11 +273,21 @@ def _even(points: Float32Array, counts: Int64Array) -> Strands:
     return strands.resampled_by_length(STEP) if len(strands) else strands
 
 
-@njit(cache=True, parallel=True)
-def _share_along(origin, spacing, volume, points, offsets, share):  # type: ignore[no-untyped-def]
-    """Write for each line the share of the tensors' traces that lies along its tangents, (S,)."""
-    for s in prange(len(share)):
-        tensor, d = np.empty(6), np.empty(3)
+@compiled
+def _share_along(
+    first: int,
+    last: int,
+    tensors: TensorVolume,
+    points: Float32Array,
+    offsets: Int64Array,
+    share: Float64Array,
+) -> None:
+    """Write for lines `first` to `last` the share of the tensors' traces along their tangents.
+
+    `points` (P, 3) and `offsets` (S + 1,) are those of the strands, `share` is (S,).
+    """
+    tensor, d = np.empty(6), np.empty(3)
+    for s in range(first, last):
         along, trace = 0.0, 0.0
         for i in range(offsets[s], offsets[s + 1]):
             ahead = min(i, offsets[s + 1] - 2)  # the last point has the tangent of the one before
@@ -220,16 +295,16 @@ def _share_along(origin, spacing, volume, points, offsets, share):  # type: igno
             for axis in range(3):
                 d[axis] = np.float64(points[ahead + 1, axis]) - points[ahead, axis]
                 square += d[axis] * d[axis]
-            sample_at(origin, spacing, volume, points[i], tensor)
-            trace += tensor[0] + tensor[1] + tensor[2]
+            sample_at(tensors.origin, tensors.spacing, tensors.values, points[i], tensor)
+            trace += tensor[XX] + tensor[YY] + tensor[ZZ]
             if square > 0:
-                along += _quadratic(tensor, d) / square
-        share[s] = along / max(trace, 1e-6)
+                along += _quadratic_form(tensor, d) / square
+        share[s] = along / max(trace, LEAST_TRACE)
 
 
-@njit(cache=True, inline="always")
-def _quadratic(t, d):  # type: ignore[no-untyped-def]
+@compiled
+def _quadratic_form(t: Float64Array, d: Float64Array) -> float:
     """Return d T d of a tensor (6,) and a vector (3,)."""
     x, y, z = d[0], d[1], d[2]
-    square = t[0] * x * x + t[1] * y * y + t[2] * z * z
-    return square + 2 * (t[3] * x * y + t[4] * x * z + t[5] * y * z)
+    square = t[XX] * x * x + t[YY] * y * y + t[ZZ] * z * z
+    return float(square + 2 * (t[XY] * x * y + t[XZ] * x * z + t[YZ] * y * z))

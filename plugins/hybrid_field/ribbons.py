@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy import ndimage
 
 from hairkit import Hull, Strands
-from hairkit.arrays import BoolArray, Float32Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
 from hairkit.field.sampling_kernels import sample_at
+from hairkit.parallel import compiled
 from hairkit.types.volume import cell_slopes
 
 SURFACE = 2.0
-"""Gaussian in cells of the hull's occupancy, whose slope is the surface's normal."""
+"""Gaussian in cells of the hull's occupancy, whose gradient is the surface's normal."""
+EDGE_SIGMAS = 2
+"""Sigmas of the Gaussian weight at a ribbon's edges."""
+STEP_CELLS = 0.5
+"""Cells at most between the lines that a ribbon is drawn as, so that none is left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,52 +39,76 @@ def ribbons(segments: Strands, hull: Hull, reach: float) -> Band:
     square to the segment.
     """
     grid = hull.grid
-    steps = max(int(np.ceil(reach / (0.5 * grid.spacing))), 1) if reach > 0 else 0
+    steps = max(int(np.ceil(reach / (STEP_CELLS * grid.spacing))), 1) if reach > 0 else 0
     share = np.arange(-steps, steps + 1) / max(steps, 1)
-    row = np.full(grid.shape, -1, np.int32)
-    row[hull.loose] = np.arange(np.count_nonzero(hull.loose))
-    total = np.zeros((row.max() + 1, 4))
-    _draw(
-        grid.origin,
-        grid.spacing,
-        cell_slopes(ndimage.gaussian_filter(hull.dense.astype(np.float32), SURFACE)),
-        segments.points,
-        segments.tangents(),
-        reach * share,
-        np.exp(-0.5 * (2 * share) ** 2),
-        row,
-        total,
-    )
-    on = total[:, 3] > 0
-    cells = np.zeros(grid.shape, bool)
-    cells[hull.loose] = on
+    rank = np.full(grid.shape, -1, np.int32)
+    rank[hull.loose] = np.arange(np.count_nonzero(hull.loose))
+    occupancy = ndimage.gaussian_filter(hull.dense.astype(np.float32), SURFACE)
+    cells = Cells(grid.origin, grid.spacing, rank, cell_slopes(occupancy))
+    profile = Profile(reach * share, np.exp(-0.5 * (EDGE_SIGMAS * share) ** 2))
+    total = np.zeros((rank.max() + 1, 3))
+    weight = np.zeros(len(total))
+    _draw(segments.points, segments.tangents(), cells, profile, total, weight)
+    on = weight > 0
+    drawn = np.zeros(grid.shape, bool)
+    drawn[hull.loose] = on
     direction = np.zeros((*grid.shape, 3), np.float32)
-    direction[cells] = total[on, :3] / total[on, 3:]
-    return Band(cells, direction)
+    direction[drawn] = total[on] / weight[on, None]
+    return Band(drawn, direction)
 
 
-@njit(cache=True)
-def _draw(origin, spacing, slopes, points, tangents, shifts, weights, row, total):  # type: ignore[no-untyped-def]
-    """Add weighted tangents (P, 3), and the weights, to total (N, 4) at every shift to the side,
-    metres; row (X, Y, Z) says which of N a cell is, -1 for none."""
-    nx, ny, nz = row.shape
+class Cells(NamedTuple):
+    """The grid that ribbons are drawn on."""
+
+    origin: Float64Array
+    """(3,) lowest corner of the grid, metres, head frame."""
+    spacing: float
+    """Edge of a cell, metres."""
+    rank: Int32Array
+    """(X, Y, Z) number of each loose cell, -1 elsewhere."""
+    slopes: Float32Array
+    """(X, Y, Z, 3) gradient of the hull's smoothed occupancy."""
+
+
+class Profile(NamedTuple):
+    """A ribbon's cross-section."""
+
+    shifts: Float64Array
+    """(K,) metres to the side."""
+    weights: Float64Array
+    """(K,) of the tangents there."""
+
+
+@compiled
+def _draw(
+    points: Float32Array,
+    tangents: Float32Array,
+    cells: Cells,
+    profile: Profile,
+    total: Float64Array,
+    weight: Float64Array,
+) -> None:
+    """Add weighted tangents (P, 3), and the weights, to the cells (N, 3), (N,) under all ribbons.
+
+    `points` and `tangents` are those of the segments.
+    """
     slope, side = np.empty(3), np.empty(3)
     for i in range(len(points)):
-        sample_at(origin, spacing, slopes, points[i], slope)
+        sample_at(cells.origin, cells.spacing, cells.slopes, points[i], slope)
         _across(tangents[i], slope, side)
-        for k in range(len(shifts)):
-            x = _cell(origin[0], spacing, nx, points[i, 0] + shifts[k] * side[0])
-            y = _cell(origin[1], spacing, ny, points[i, 1] + shifts[k] * side[1])
-            z = _cell(origin[2], spacing, nz, points[i, 2] + shifts[k] * side[2])
-            n = row[x, y, z]
+        for k in range(len(profile.shifts)):
+            x = _cell(cells, 0, points[i, 0] + profile.shifts[k] * side[0])
+            y = _cell(cells, 1, points[i, 1] + profile.shifts[k] * side[1])
+            z = _cell(cells, 2, points[i, 2] + profile.shifts[k] * side[2])
+            n = cells.rank[x, y, z]
             if n >= 0:
                 for axis in range(3):
-                    total[n, axis] += weights[k] * tangents[i, axis]
-                total[n, 3] += weights[k]
+                    total[n, axis] += profile.weights[k] * tangents[i, axis]
+                weight[n] += profile.weights[k]
 
 
-@njit(cache=True, inline="always")
-def _across(along, slope, side):  # type: ignore[no-untyped-def]
+@compiled
+def _across(along: Float32Array, slope: Float64Array, side: Float64Array) -> None:
     """Write the unit vector square to both, or 0 where they are parallel, into side (3,)."""
     for axis in range(3):
         b, c = (axis + 1) % 3, (axis + 2) % 3
@@ -89,7 +118,9 @@ def _across(along, slope, side):  # type: ignore[no-untyped-def]
         side[axis] /= max(length, 1e-9)
 
 
-@njit(cache=True, inline="always")
-def _cell(origin, spacing, count, at):  # type: ignore[no-untyped-def]
+@compiled
+def _cell(cells: Cells, axis: int, at: float) -> int:
     """Return the cell along one axis that holds a coordinate, clamped to the grid."""
-    return min(max(int(np.rint((at - origin) / spacing - 0.5)), 0), count - 1)
+    nearest = int(np.rint((at - cells.origin[axis]) / cells.spacing - 0.5))
+    last = int(cells.rank.shape[axis]) - 1
+    return min(max(nearest, 0), last)

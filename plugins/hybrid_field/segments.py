@@ -6,23 +6,44 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numba import njit, prange
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from hairkit import Camera, Hull, Mask, Strands
-from hairkit.arrays import Float32Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.field.sampling_kernels import make_unit, principal_direction, sample_at
 from hairkit.field.view_fusion import FusedViews
+from hairkit.parallel import compiled, parallel_for
 
-from .photo_lines import CONFIDENT, FEWEST, STEP, LineOptions, agreeing, join, lifted_lines
+from .photo_lines import (
+    CONFIDENT,
+    FEWEST,
+    MIN_LINES,
+    STEP,
+    LineOptions,
+    TensorVolume,
+    agreeing,
+    join,
+    lifted_lines,
+)
 
 NEIGHBOURS, ROUNDS = 8, 10
-"""Segments that a segment compares its sign with, and how often."""
+"""Nearest segments that a segment compares its sign with, and the rounds of it."""
+NEIGHBOUR_WEIGHT = 0.5
+"""Weight of a parallel neighbour's sign against a growth of one metre per metre."""
+OUTER_CELLS = 2
+"""Depth in cells of the hull's outer shell, which photos see."""
+BEST = 95
+"""Percentile of the shell's certainty that is taken for the best: the maximum may be an outlier."""
+RUN_ON = 0.5
+"""Share of a seed's least certainty at which a line still runs on."""
+FIRST_WAY = np.array([0.3, 0.9, 0.3])
+"""Way that a line's two ends are sorted along; oblique, so that no frequent direction is square to
+it. The growth decides later which end is the root."""
 
 
 class SegmentOptions(LineOptions, Protocol):
-    """What finding segments asks of the plugin's options."""
+    """Options of the segments."""
 
     @property
     def agreement_deg(self) -> float: ...
@@ -41,9 +62,9 @@ def find_segments(
     Parameters
     ----------
     fused
-        The maps of all views, and what they say together about the loose cells.
+        The maps of all views, and their fusion in the loose cells.
     growth
-        (X, Y, Z) potential that grows root to tip: the first guess of a segment's sign.
+        (X, Y, Z) potential that rises from root to tip: the first guess of a segment's sign.
     """
     certainty = fused.certainty
     volume = np.zeros((*hull.grid.shape, 6), np.float32)
@@ -55,55 +76,76 @@ def find_segments(
     offsets = np.concatenate([lines.offsets, inner.offsets[1:] + lines.offsets[-1]])
     if len(offsets) == 1:
         return Strands(points, offsets)
-    return directed(Strands(points, offsets), hull, growth)
+    return orient_segments(Strands(points, offsets), hull, growth)
 
 
 def lines_through_cells(
     hull: Hull, volume: Float32Array, certainty: Float32Array, longest: float
 ) -> Strands:
-    """Return lines through the tensors (X, Y, Z, 6), one from every second confident outer cell."""
-    outer = hull.dense & ~ndimage.binary_erosion(hull.dense, iterations=2)
+    """Return lines through the tensors (X, Y, Z, 6) from every second confident outer cell."""
+    outer = hull.dense & ~ndimage.binary_erosion(hull.dense, iterations=OUTER_CELLS)
     sure = np.zeros(hull.grid.shape, np.float32)
     sure[hull.loose] = certainty
-    best = float(np.percentile(sure[outer], 95)) if outer.any() else 0.0
+    best = float(np.percentile(sure[outer], BEST)) if outer.any() else 0.0
     cells = np.argwhere(outer & (sure > CONFIDENT * best))
     cells = cells[cells.sum(axis=1) % 2 == 0]
     seeds = hull.grid.origin + (cells + 0.5) * hull.grid.spacing
     half = max(int(longest / STEP / 2), FEWEST)
     lines = np.zeros((len(seeds), 2 * half + 1, 3))
     counts = np.zeros(len(seeds), np.int64)
-    inside = (hull.dense & (sure > 0.5 * CONFIDENT * best))[..., None].astype(np.float32)
-    _follow_cells(hull.grid.origin, hull.grid.spacing, volume, inside, seeds, lines, counts)
+    inside = (hull.dense & (sure > RUN_ON * CONFIDENT * best))[..., None].astype(np.float32)
+    tensors = TensorVolume(hull.grid.origin, hull.grid.spacing, volume)
+    follow = (tensors, inside, seeds, lines, counts)
+    parallel_for(_follow_cells, len(seeds), *follow, min_chunk=MIN_LINES)
     long = counts >= FEWEST
     real = np.arange(lines.shape[1])[None] < counts[long, None]
     offsets = np.concatenate([[0], np.cumsum(counts[long])])
     return Strands(lines[long][real].astype(np.float32), offsets)
 
 
-@njit(cache=True, parallel=True)
-def _follow_cells(origin, spacing, volume, inside, seeds, lines, counts):  # type: ignore[no-untyped-def]
+@compiled
+def _follow_cells(
+    first: int,
+    last: int,
+    tensors: TensorVolume,
+    inside: Float32Array,
+    seeds: Float64Array,
+    lines: Float64Array,
+    counts: Int64Array,
+) -> None:
+    """Write lines `first` to `last` from seeds (N, 3) both ways into lines (N, M, 3), counts (N,).
+
+    `inside` (X, Y, Z, 1) is 1 in the cells that lines may run through.
+    """
     half = lines.shape[1] // 2
-    for s in prange(len(seeds)):
-        tensor, way = np.empty(6), np.empty(3)
-        sample_at(origin, spacing, volume, seeds[s], tensor)
-        if not principal_direction(tensor, np.array([0.3, 0.9, 0.3]), way):
+    tensor, way = np.empty(6), np.empty(3)
+    for s in range(first, last):
+        sample_at(tensors.origin, tensors.spacing, tensors.values, seeds[s], tensor)
+        if not principal_direction(tensor, FIRST_WAY, way):
             continue
         back, ahead = np.empty((half, 3)), np.empty((half, 3))
-        before = _follow_tensor(origin, spacing, volume, inside, seeds[s], -way, back)
-        after = _follow_tensor(origin, spacing, volume, inside, seeds[s], way, ahead)
-        counts[s] = join(back, before, ahead, after, lines[s])
+        before = _follow_tensors(tensors, inside, seeds[s], -way, back)
+        after = _follow_tensors(tensors, inside, seeds[s], way, ahead)
+        counts[s] = join(back[:before], ahead[:after], lines[s])
 
 
-@njit(cache=True)
-def _follow_tensor(origin, spacing, volume, inside, seed, way, line):  # type: ignore[no-untyped-def]
+@compiled
+def _follow_tensors(
+    tensors: TensorVolume,
+    inside: Float32Array,
+    seed: Float64Array,
+    way: Float64Array,
+    line: Float64Array,
+) -> int:
+    """Write a line's points (M, 3) from seed (3,) along way (3,), and return their number."""
     p, d = seed.copy(), way.copy()
-    tensor, one = np.empty(6), np.empty(1)
+    tensor, share = np.empty(6), np.empty(1)
     for k in range(len(line)):
-        sample_at(origin, spacing, inside, p, one)
-        if one[0] < 0.5:
+        sample_at(tensors.origin, tensors.spacing, inside, p, share)
+        if share[0] < 0.5:
             return k
         line[k] = p
-        sample_at(origin, spacing, volume, p, tensor)
+        sample_at(tensors.origin, tensors.spacing, tensors.values, p, tensor)
         if not principal_direction(tensor, d, d) or not make_unit(d):
             return k + 1
         for axis in range(3):
@@ -111,11 +153,11 @@ def _follow_tensor(origin, spacing, volume, inside, seed, way, line):  # type: i
     return len(line)
 
 
-def directed(segments: Strands, hull: Hull, growth: Float32Array) -> Strands:
-    """Return the segments with the ends exchanged of those that run tip to root.
+def orient_segments(segments: Strands, hull: Hull, growth: Float32Array) -> Strands:
+    """Return the segments root to tip, those that ran tip to root reversed.
 
-    Each starts with the sign of the growth along it, and then takes the sign that its nearest
-    segments, weighted by how parallel they are, and the growth together want, for some rounds.
+    Each starts with the sign of the growth along it. In each round it then takes the sign of a
+    vote: the growth, and the signs of its nearest segments weighted by the cosine between them.
     """
     count = len(segments)
     level = hull.grid.sample(growth, np.concatenate([segments.roots, segments.tips]))
@@ -128,14 +170,13 @@ def directed(segments: Strands, hull: Hull, growth: Float32Array) -> Strands:
     parallel = np.einsum("nkc,nc->nk", unit[near], unit)
     sign = np.where(wish < 0, -1.0, 1.0)
     for _ in range(ROUNDS):
-        vote = wish + 0.5 * (parallel * sign[near]).sum(axis=1)
+        vote = wish + NEIGHBOUR_WEIGHT * (parallel * sign[near]).sum(axis=1)
         sign = np.where(vote < 0, -1.0, 1.0)
-    return _reversed(segments, sign < 0)
+    return _reverse(segments, sign < 0)
 
 
-def _reversed(
-    segments: Strands, turned: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
-) -> Strands:
+def _reverse(segments: Strands, turned: BoolArray) -> Strands:
+    """Return the segments, those of `turned` (S,) with their points in reverse order."""
     owner = segments.strand_of_point
     rank = np.arange(len(segments.points))
     mirrored = segments.offsets[:-1][owner] + segments.offsets[1:][owner] - 1 - rank

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.hybrid_growth import Options, grown, track
+from hairkit_plugins.hybrid_growth import Options, grow, track
 
 from hairkit.arrays import Float32Array
 from hairkit.grooming import postprocess
@@ -37,7 +37,7 @@ def run(
 ) -> Strands:
     assert field.direction is not None
     starts = np.array([[0.0, 0, 0], [0.05, 0.02, -0.03]], np.float32)
-    return grown(field, field.direction, distance, starts, way, options)
+    return grow(field, field.direction, distance, starts, way, options)
 
 
 def test_strands_follow_the_sign_of_the_field() -> None:
@@ -69,7 +69,7 @@ def test_strands_slide_along_the_surface_they_meet_at_a_small_angle() -> None:
     options = replace(FREE, slide_sine=0.35, reach=1.0, inertia=0.0, blind=0.0, bound=1.5)
     starts = np.array([[-0.1, -0.005, 0.0]], np.float32)
     flat, steep = (
-        grown(field, field.direction, distance, starts, 0.15, options)
+        grow(field, field.direction, distance, starts, 0.15, options)
         for field in (constant((0.97, 0.24, 0)), constant((0.5, 0.87, 0)))
         if field.direction is not None
     )
@@ -101,6 +101,54 @@ def test_a_field_without_signs_is_followed_along_its_growth() -> None:
     away = np.linalg.norm(found.points, axis=1)
     assert away.max() < 0.16
     np.testing.assert_allclose(found.roots, roots.positions, atol=1e-7)
+
+
+def growth_twin(
+    values: Float32Array, start: Float32Array, steps: int, free: int, options: Options
+) -> list[np.ndarray]:
+    """One strand by the rules, in NumPy; it slides on the first `free` steps."""
+    p, d = start.astype(np.float64), np.zeros(3)
+    path = [p]
+    for i in range(1, steps + 1):
+        found = GRID.sample(values, p[None])[0].astype(np.float64)
+        size = np.linalg.norm(found[:3])
+        if i * options.step > options.blind + 1e-9 and (found[3] > options.bound or size < 1e-9):
+            break
+        if size > 1e-9:
+            keep = options.inertia if i > 1 else 0.0
+            d = keep * d + (1 - keep) * found[:3] / size
+        d = d / np.linalg.norm(d)
+        if i < free and found[3] >= options.slide_from:
+            probes = p + GRID.spacing * np.concatenate([np.eye(3), -np.eye(3)])
+            level = GRID.sample(values, probes)[:, 3].astype(np.float64)
+            normal = (level[:3] - level[3:]) / np.linalg.norm(level[:3] - level[3:])
+            if 0 < d @ normal < options.slide_sine:
+                d = d - (d @ normal) * normal
+                d = d / np.linalg.norm(d)
+        p = p + options.step * d
+        path.append(p)
+    return path
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_growth_equals_its_readable_twin(seed: int) -> None:
+    """Through a swirling field whose distance rises outward: the twin's path, resampled."""
+    rng = np.random.default_rng(seed)
+    at = GRID.centres()
+    axis = rng.normal(size=3)
+    direction = (np.cross(axis, at) + 0.2 * axis + at).astype(np.float32)
+    distance = (0.5 + 6 * np.linalg.norm(at, axis=-1)).astype(np.float32)
+    options = replace(FREE, slide_sine=0.6, slide_from=0.8, bound=1.4, inertia=0.5, blind=0.01)
+    starts = rng.normal(0, 0.02, (40, 3)).astype(np.float32)
+    field = constant((0, 1, 0))
+    found = grow(field, direction, distance, starts, 0.1, options)
+    values = np.concatenate([direction, distance[..., None]], axis=3)
+    steps, free = int(options.reach * 0.1 / options.step), int(0.1 / options.step)
+    for start, points in zip(starts, found.points.reshape(40, -1, 3), strict=True):
+        path = np.array(growth_twin(values, start, steps, free, options))
+        share = np.linspace(0, len(path) - 1, options.points)
+        expected = [np.interp(share, np.arange(len(path)), path[:, k]) for k in range(3)]
+        np.testing.assert_allclose(points, np.stack(expected, 1), atol=2e-5)
 
 
 def test_strands_do_not_depend_on_each_other() -> None:

@@ -8,14 +8,25 @@ import numpy as np
 import pytest
 from hairkit_plugins.hybrid_field import Options, solve_field
 from hairkit_plugins.hybrid_field.four_fields import internal_distance, surface_structure
-from hairkit_plugins.hybrid_field.photo_lines import SMOOTHING, agreeing, lifted
-from hairkit_plugins.hybrid_field.ribbons import Band, ribbons
-from hairkit_plugins.hybrid_field.segments import directed, find_segments
+from hairkit_plugins.hybrid_field.photo_lines import (
+    CONFIDENT,
+    DEPTH_JUMP,
+    MIN_COSINE,
+    PIXELS,
+    SMOOTHING,
+    Photo,
+    _follow_photo,
+    agreeing,
+    lifted,
+)
+from hairkit_plugins.hybrid_field.ribbons import SURFACE, Band, ribbons
+from hairkit_plugins.hybrid_field.segments import find_segments, orient_segments
+from scipy import ndimage
 
 from hairkit.arrays import Float64Array
 from hairkit.field import view_fusion
 from hairkit.field.growth_prior import growth_potential
-from hairkit.field.view_fusion import fuse_views
+from hairkit.field.view_fusion import DEPTH_SHRINK, fuse_views
 from hairkit.imaging.waves import Waves
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera
@@ -23,7 +34,7 @@ from hairkit.types.mask import HAIR, Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
-from hairkit.types.volume import Hull, VoxelGrid, outer_products
+from hairkit.types.volume import Hull, VoxelGrid, cell_slopes, outer_products
 
 CENTRE = np.array([0.0, 0.16, 0.0])
 ALONG = np.array([0.5, -0.75, 0.433])
@@ -152,7 +163,7 @@ def test_segments_agree_on_which_end_is_the_root() -> None:
     growth = hull.grid.centres()[..., 1]
     growth = growth + 0.004 * rng.standard_normal(growth.shape).astype(np.float32)
     mixed = Strands(points.reshape(-1, 3).astype(np.float32), np.arange(61) * 8)
-    result = directed(mixed, hull, growth.astype(np.float32))
+    result = orient_segments(mixed, hull, growth.astype(np.float32))
     assert ((result.tips - result.roots)[:, 1] > 0).all()
     np.testing.assert_array_equal(np.sort(result.points[:, 1]), np.sort(mixed.points[:, 1]))
 
@@ -231,3 +242,64 @@ def test_an_empty_band_has_no_direction() -> None:
     assert isinstance(band, Band)
     assert not band.cells.any()
     assert not band.direction.any()
+
+
+def test_a_line_in_a_photo_equals_its_readable_twin() -> None:
+    """Steps of two pixels along the angle, both ways, until one of the four reasons to end."""
+    rng = np.random.default_rng(5)
+    y, x = np.mgrid[0:60, 0:60]
+    angle = wrap_angle(0.6 + 0.02 * x + 0.015 * y + rng.normal(0, 0.25, x.shape))
+    angle = angle.astype(np.float32)
+    weight = np.clip(1.2 - np.hypot(x - 30, y - 30) / 28, 0, 1).astype(np.float32)
+    front = (0.5 + 1e-4 * np.arange(400).reshape(20, 20)).astype(np.float32)
+    front[8:10, 12:] = np.inf
+    front[14:, 3:] += 0.02
+    rows, columns = (part.ravel() for part in np.mgrid[4:60:8, 4:60:8])
+    lines = np.zeros((len(rows), 41, 3), np.float32)
+    counts = np.zeros(len(rows), np.int64)
+    _follow_photo(0, len(rows), Photo(angle, weight, front), rows, columns, lines, counts)
+    for row, column, line, count in zip(rows, columns, lines, counts, strict=True):
+        parts = []
+        for sign in (-1.0, 1.0):
+            at, way, part = np.array([column + 0.5, row + 0.5]), None, []
+            while len(part) < 20:
+                j, i = np.floor(at).astype(int)
+                if not (0 <= i < 60 and 0 <= j < 60 and weight[i, j] >= CONFIDENT):
+                    break
+                depth = float(front[i // DEPTH_SHRINK, j // DEPTH_SHRINK])
+                if not np.isfinite(depth) or (part and abs(depth - part[-1][2]) > DEPTH_JUMP):
+                    break
+                part.append([*at, depth])
+                turn = np.array([np.cos(angle[i, j]), np.sin(angle[i, j])])
+                turn = sign * turn if way is None else turn * (1 if turn @ way >= 0 else -1)
+                if way is not None and turn @ way < MIN_COSINE:
+                    break
+                way, at = turn, at + PIXELS * turn
+            parts.append(part)
+        expected = [*parts[0][:0:-1], *parts[1]]
+        assert count == len(expected)
+        if count:
+            np.testing.assert_allclose(line[:count], expected, atol=1e-3)
+    assert len(set(counts.tolist())) > 5
+
+
+def test_ribbons_equal_their_readable_twin() -> None:
+    """Every cell under a ribbon has the weighted mean of the tangents drawn on it."""
+    found, hull = segments()
+    reach = 2 * SPACING
+    band = ribbons(found, hull, reach)
+    occupancy = ndimage.gaussian_filter(hull.dense.astype(np.float32), SURFACE)
+    points, along = found.points.astype(np.float64), found.tangents().astype(np.float64)
+    side = np.cross(along, hull.grid.sample(cell_slopes(occupancy), found.points))
+    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
+    total, weight = np.zeros((*hull.grid.shape, 3)), np.zeros(hull.grid.shape)
+    for share in np.linspace(-1, 1, 9):
+        cells = hull.grid.nearest_cell((points + share * reach * side).astype(np.float64))
+        part = np.exp(-2 * share**2)
+        np.add.at(total, tuple(cells.T), part * along)
+        np.add.at(weight, tuple(cells.T), part)
+    drawn = (weight > 0) & hull.loose
+    assert (drawn != band.cells).mean() < 1e-4  # a point on the border of two cells
+    same = drawn & band.cells
+    difference = np.abs(total[same] / weight[same, None] - band.direction[same]).max(axis=1)
+    assert np.quantile(difference, 0.99) < 1e-3
