@@ -4,6 +4,32 @@
 >>> groom = hairkit.reconstruct("photos/", "out/")  # doctest: +SKIP
 
 Every name below is loaded when it is first used, so that `import hairkit` takes no time.
+
+* `types`: frozen types between stages
+* `cameras`: turntable, projection, silhouettes
+* `imaging`: methods on images
+* `helices`: helix arcs
+* `head_model`: template head, scalp, distances
+* `rendering`: pictures without a window
+* `field`: methods on volumes
+* `io`: files
+* `simulation`: contract of simulators, motion, wind
+* `grooming`: methods on strands and grooms
+* `synth`: procedural hair
+* `pipeline`: recipes and runs
+* `evaluation`: scores against ground truth
+* `viewer`: the live preview
+* `cli`: the command line
+* `api`: the verbs of the front door
+* `arrays`: array types
+* `errors`: errors that users can mend
+* `hookspecs`: the hooks that plugins implement
+* `manager`: plugins by name
+* `options`: options of plugins
+* `parallel`: compiled loops on threads
+* `progress`: progress reporting
+* `storage`: safe files, frozen types as `.npz`
+* `testing`: a small head with hair for tests of plugins
 """
 
 from __future__ import annotations

@@ -3,6 +3,22 @@
 `register(subparsers)` adds the verb's parser, its description beginning with an example;
 `run(args)` does the work and returns the exit code. Only the verb that is asked for is imported.
 Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 2 one line says why.
+
+* `convert`: read hair of one format, write another
+* `doctor`: check this machine
+* `evaluate`: scores against the truth
+* `export`: write a groom for an engine
+* `format_table`: the table of file formats
+* `info`: what a file holds
+* `new_plugin`: a plugin to start from
+* `plugins`: list of plugins and options
+* `reconstruct`: photos to groom
+* `render`: pictures of a groom
+* `scaffold`: the files that `new-plugin` writes
+* `settings`: `--set` of all verbs
+* `simulate`: simulation to a cache
+* `synth`: procedural captures
+* `view`: the viewer
 """
 
 from __future__ import annotations

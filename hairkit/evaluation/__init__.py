@@ -1,4 +1,21 @@
-"""Scores of a groom against a capture's truth (docs/evaluation.md)."""
+"""Scores of a groom against a capture's ground truth (docs/evaluation.md).
+
+Everything that compares with true strands, masks, directions or cameras, and the report. Nothing
+here is used by a reconstruction.
+
+* `align`: the similarity that aligns a prediction with the truth; camera errors
+* `depth_map`: first visible surfaces of strands and head
+* `error_maps`: pictures of the report: right and wrong strands in each view
+* `evaluation`: all figures of one groom against one truth
+* `images`: drawn direction, silhouette overlap, 2D orientation error, mask overlap
+* `neighbour_search`: exact search for a neighbour within a distance and an angle
+* `prediction`: what a reconstruction left in its folder
+* `report`: `evaluation.json` and `report.html`
+* `scorecard`: the figures by name, with what a good value is
+* `scores`: precision, recall and F of strands
+* `strand_statistics`: lengths, roots, hair inside the head, broken strands
+* `truth`: the truth folder of a capture
+"""
 
 from __future__ import annotations
 

@@ -1,1 +1,11 @@
-"""Methods on volumes: view fusion, growth prior, diffusion, sampling."""
+"""Methods on volumes: from 2D orientations to a 3D direction field.
+
+What field and tracking plugins share: fusing views, priors, diffusion, and sampling of volumes.
+
+* `diffusion`: screened diffusion on masked cells, by conjugate gradients
+* `growth_prior`: geodesic distances from scalp and tips, and a direction prior
+* `isosurface`: the smooth surface of a volume of cells
+* `sampling_kernels`: compiled look-ups in volumes
+* `symmetric_eigen`: eigenvectors of symmetric 3x3 tensors, in closed form
+* `view_fusion`: 2D orientations of all views fused into 3D tensors
+"""

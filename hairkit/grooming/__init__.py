@@ -1,1 +1,14 @@
-"""Methods on strands and grooms: densify, decimate, weights, collision."""
+"""Methods on strands and grooms after tracking.
+
+Make a groom of tracked or imported strands, thin it out or fill it up, and prepare it for export.
+
+* `adopt_strands`: a groom from bare strands of a file
+* `assemble`: strands, head and photo colours put together as a groom
+* `decimate`: guides chosen from full hair
+* `densify`: full hair interpolated between guides
+* `guide_weights`: the nearest guides of each hair, and hair that follows them
+* `head_collision`: strand points pushed out of the head
+* `postprocess`: smoothing, waves and head collision after tracking
+* `prepare_export`: choice of strands and defaults for exporters
+* `wind_waves`: measured waves put onto strands
+"""

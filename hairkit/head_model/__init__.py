@@ -1,1 +1,13 @@
-"""The head: template, scalp, signed distance, torso."""
+"""The head: procedural template, scalp, distances, skin weights, torso.
+
+Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.types.head.Head`.
+
+* `bvh`: nearest points and ray crossings on triangle meshes
+* `placement`: a head placed under given strands
+* `scalp`: roots: sampling, binding to faces, growth mesh
+* `signed_distance`: signed distance to a head, on a grid or at points
+* `skinning`: skin weights of the three joints
+* `template`: the default head
+* `template_shape`: its profile curves and displacements
+* `torso`: a torso by nine numbers, below a head
+"""

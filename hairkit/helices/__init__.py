@@ -1,4 +1,16 @@
-"""Curves made of helix arcs: fitting them to strands, packing them, and measuring curls by them."""
+"""Curves made of helix arcs: fitting them to strands, storing them, measuring curls.
+
+Arcs have constant curvature and torsion and join with common tangents. Super-helices start from
+them, and trackers may smooth strands by them.
+
+* `arc_between`: the helix arc through two points with given tangents
+* `arc_counts`: how many arcs a strand needs
+* `arc_length`: strands as smooth curves over arc length
+* `curl`: radius, pitch and handedness of curls
+* `floating_tangents`: a strand as joined helix arcs
+* `helix`: frames along curves of constant curvature and torsion
+* `helix_strands`: hair stored as helix arcs
+"""
 
 from __future__ import annotations
 

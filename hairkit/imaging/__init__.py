@@ -1,1 +1,11 @@
-"""Methods on images: filters, segmentation, matting, waves."""
+"""Methods on images: masked filters, segmentation, matting, measured waves.
+
+What segmenters and orienters share. Nothing here knows cameras or 3D, except that waves are
+measured over all views.
+
+* `alpha_matting`: mask edges refined at full size
+* `geodesic`: geodesic distance from seeds; contours are expensive to cross
+* `masked_filters`: filters that respect a mask, means of undirected angles
+* `seeded_segmentation`: hair, person and background from seeds
+* `waves`: radius and pitch of waves in the orientation maps
+"""

@@ -1,1 +1,23 @@
-"""Files: readers, writers and what they share."""
+"""Files: readers and writers, and what file formats share.
+
+Captures, photos, heads and meshes, and the parts that format plugins are built from. Readers check
+every size before they ask for memory. Grooms and caches save and load themselves.
+
+* `byte_reader`: binary files with every size checked
+* `byte_writer`: arrays as bytes of binary files
+* `capture_reader`: a folder of photos with masks, strokes and landmarks
+* `capture_toml`: `capture.toml`
+* `coordinate_space`: axes and unit of a file
+* `exif`: orientation and focal length from EXIF
+* `file_format`: what a format carries, as its plugin declares it
+* `glb_file`: glTF documents
+* `glb_mesh`: the triangle mesh of a glTF file
+* `glb_motion`: the motion of a head in a glTF file
+* `head_reader`: heads from OBJ, PLY and GLB
+* `mesh_text`: triangle meshes of OBJ and PLY files
+* `number_text`: numbers in text files, fast
+* `photos`: photos, with their headers checked first
+* `polylines`: strands from loose edges
+* `strand_blocks`: large grooms written in blocks of little memory
+* `strokes`: strokes on photos, labelme's JSON
+"""

@@ -1,1 +1,14 @@
-"""From photos to a groom: recipes, stages, the work folder."""
+"""From photos to a groom: recipes, stages, the work folder and what a run leaves.
+
+The program that runs the plugins of a recipe. No method of reconstruction is here: those are
+plugins.
+
+* `contact_sheet`: one picture of all stages
+* `module_digest`: digests of the code that made a cached result
+* `open_groom`: grooms by any name that a user may give
+* `recipe`: which plugin does each stage, with which options
+* `reconstruct`: a whole run
+* `run_log`: `hairkit.log`: versions, options and times
+* `stage_runner`: one stage, once or once for each view
+* `work_folder`: cached results of stages
+"""

@@ -1,4 +1,19 @@
-"""Offscreen pictures of hair on a head: shaded ones to look at, and plain ones to measure with."""
+"""Pictures of hair on a head without a window: shaded ones, and plain ones to measure with.
+
+OpenGL contexts, lights and cameras that the viewer shares.
+
+* `context`: OpenGL contexts: EGL, else OSMesa
+* `framebuffer`: colour and depth buffer, read back as an array
+* `framing`: cameras that show a whole groom
+* `gl_camera`: OpenGL matrices of a camera
+* `hair`: strands as ribbons on the GPU
+* `head`: the head and other meshes on the GPU
+* `light`: lights and shadow volumes
+* `measurement`: coverage, directions, depth and visibility of hair
+* `osmesa`: OSMesa contexts for moderngl
+* `picture`: shaded pictures
+* `picture_file`: PNG and JPEG files
+"""
 
 from __future__ import annotations
 

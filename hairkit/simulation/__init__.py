@@ -1,6 +1,14 @@
-"""Simulation of guides: the contract of simulators, how the head moves, and point caches.
+"""Simulation of guides: the contract of simulators, how the head moves, wind, and running one.
 
 The methods are plugins: `manager.call("make_simulator", "pbd", groom=groom)` returns a `Simulator`.
+
+* `motion`: motion of the head: keyframes and shakes
+* `obstacles`: head and capsules as one distance on a grid
+* `posing`: a groom at one frame of a simulation
+* `quaternion`: unit quaternions as arrays
+* `running`: run a simulator and keep its frames
+* `simulator`: the protocol of all simulators
+* `wind`: mean wind and gusts
 """
 
 from __future__ import annotations

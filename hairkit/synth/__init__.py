@@ -1,4 +1,11 @@
-"""Procedural grooms and photos of them with their truth: for tests, and where photos lack."""
+"""Procedural grooms, and photos of them with ground truth.
+
+For tests and benchmarks, and to try hairkit without photos.
+
+* `bust`: shoulders under a head
+* `growth`: strands grown from the scalp in five styles
+* `photographs`: photos, masks, landmarks and truth of a groom
+"""
 
 from __future__ import annotations
 

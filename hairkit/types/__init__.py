@@ -1,1 +1,16 @@
-"""Frozen types that travel between stages; see each module."""
+"""Frozen types that travel between stages, and nothing else.
+
+Each checks its arrays when it is made and saves itself to an `.npz` file. Methods on them are in
+the packages named after the subject.
+
+* `camera`: pinhole and orthographic cameras
+* `capture`: the photos and what is known about each
+* `groom`: strands on a head with material and physics
+* `head`: the head mesh, roots, capsules
+* `mask`: labels: hair, person, background
+* `orientation`: 2D strand angle and confidence
+* `point_cache`: simulated frames of the guides
+* `scene`: cameras and fitted head
+* `strands`: packed polylines
+* `volume`: grid, hull and orientation field
+"""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 import tomllib
@@ -13,6 +14,7 @@ import pytest
 
 PROJECT = Path(__file__).parents[2]
 SOURCES = sorted((PROJECT / "hairkit").rglob("*.py"))
+PACKAGES = sorted(path.parent for path in (PROJECT / "hairkit").rglob("__init__.py"))
 PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins" / "__init__.py"})
 
 FLOORS = (
@@ -149,3 +151,14 @@ def test_every_public_name_is_there() -> None:
     import hairkit
 
     assert all(hasattr(hairkit, name) for name in hairkit.__all__)
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda p: str(p.relative_to(PROJECT)))
+def test_a_package_lists_its_modules(package: Path) -> None:
+    """The docstring of a package says what belongs there and names each module, once."""
+    docstring = ast.get_docstring(ast.parse((package / "__init__.py").read_text())) or ""
+    listed = re.findall(r"^\* `(\w+)`: \S", docstring, re.MULTILINE)
+    found = {path.stem for path in package.glob("*.py")}
+    found |= {path.parent.name for path in package.glob("*/__init__.py")}
+    assert sorted(listed) == sorted(found - {"__init__", "__main__"})
+    assert docstring.partition("\n")[0].endswith((".", ")"))
