@@ -65,7 +65,7 @@ class PluginInfo:
     version: str
     """Version of the distribution; empty for a plugin file."""
     summary: str = ""
-    """First line of the module's docstring."""
+    """First paragraph of the module's docstring, in one line."""
     stages: tuple[str, ...] = ()
     notifications: tuple[str, ...] = ()
     options: tuple[OptionInfo, ...] = ()
@@ -329,7 +329,7 @@ def _inspect(plugin: object, name: str, distribution: str, version: str) -> Plug
         if parameters is None or not parameters.frozen:
             raise PluginError("its Options is not a frozen dataclass")
         options = describe(kind)
-    summary = (inspect.getdoc(plugin) or "").partition("\n")[0]
+    summary = " ".join((inspect.getdoc(plugin) or "").partition("\n\n")[0].split())
     file = getattr(plugin, "__file__", None)
     form = getattr(plugin, "FORMAT", None)
     if form is not None and not isinstance(form, FileFormat):

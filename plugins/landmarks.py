@@ -1,5 +1,4 @@
-"""Cameras from landmarks alone, as in the thesis: the turn is taken at its word, only the head is
-placed in it.
+"""Cameras from landmarks alone, at the nominal angles of the turn, as in the thesis.
 
 Landmarks of two or more views are intersected in space by least squares, with cameras exactly on
 the nominal turn (orthographic as in the thesis, or perspective); a weighted similarity (Umeyama

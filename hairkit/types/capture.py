@@ -9,6 +9,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array, UInt8Array, frozen_array
 from hairkit.errors import InputError
+from hairkit.types.preview import PHOTO_HEIGHT, Previewed, row
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,9 @@ class View:
                 frozen_array(self.landmarks, np.float64, (68, 2), f"landmarks of {self.name}"),
             )
 
+    def __repr__(self) -> str:
+        return f"View({self.name!r}, {self.width} x {self.height} px)"
+
     @property
     def width(self) -> int:
         """Width of `image` in pixels."""
@@ -57,7 +61,7 @@ class View:
 
 
 @dataclass(frozen=True, eq=False)
-class Capture:
+class Capture(Previewed):
     """The views of one head, in the order of the turn."""
 
     views: tuple[View, ...]
@@ -72,6 +76,14 @@ class Capture:
         if self.head_pose is not None:
             pose = frozen_array(self.head_pose, np.float64, (4, 4), "head_pose")
             object.__setattr__(self, "head_pose", _similarity(pose))
+
+    def __repr__(self) -> str:
+        sizes = " or ".join(sorted({f"{view.width} x {view.height}" for view in self.views}))
+        return f"Capture({len(self.views)} views of {sizes} px)"
+
+    def preview(self) -> UInt8Array | None:
+        """Return the photos side by side, (H, W, 3) uint8 RGB."""
+        return row([view.image for view in self.views], PHOTO_HEIGHT)
 
 
 def _similarity(matrix: Float64Array) -> Float64Array:

@@ -8,10 +8,11 @@ from typing import Self
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Int32Array, frozen_array
+from hairkit.arrays import Float32Array, Int32Array, UInt8Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
 from hairkit.types.head import Head
+from hairkit.types.preview import Previewed, draw_turn
 from hairkit.types.strands import Strands
 
 _VERSION, _NEWEST = "hairkit_groom", 1
@@ -63,7 +64,7 @@ class HairPhysics(Stored):
 
 
 @dataclass(frozen=True, eq=False)
-class Groom(Stored):
+class Groom(Previewed, Stored):
     """Guides on a fitted head, bound at their roots, with look and physics."""
 
     strands: Strands
@@ -85,6 +86,14 @@ class Groom(Stored):
             self.root_barycentric, np.float32, (count, 3), "root_barycentric"
         )
         object.__setattr__(self, "root_barycentric", barycentric)
+
+    def __repr__(self) -> str:
+        strands = repr(self.strands).removeprefix("Strands(").removesuffix(")")
+        return f"Groom({strands}, head of {len(self.head.vertices)} vertices)"
+
+    def preview(self) -> UInt8Array | None:
+        """Return the guides on their head: front, left and back, (H, W, 3) uint8 RGB."""
+        return draw_turn(self.head, self.strands)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the groom as hairkit's own file, atomically; equal grooms give equal files.

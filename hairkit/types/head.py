@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, Int32Array, frozen_array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array, frozen_array
 from hairkit.errors import InputError
 from hairkit.storage import Stored
+from hairkit.types.preview import Previewed, draw_turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,7 @@ class Capsules(Stored):
 
 
 @dataclass(frozen=True, eq=False)
-class Head(Stored):
+class Head(Previewed, Stored):
     """A head mesh in the head frame, faces counter-clockwise seen from outside."""
 
     vertices: Float32Array
@@ -73,6 +74,14 @@ class Head(Stored):
         if self.landmark_vertices is not None:
             index = frozen_array(self.landmark_vertices, np.int32, (68,), "head landmark_vertices")
             object.__setattr__(self, "landmark_vertices", index)
+
+    def __repr__(self) -> str:
+        marked = "with" if self.landmark_vertices is not None else "without"
+        return f"Head({len(self.vertices)} vertices, {len(self.faces)} faces, {marked} landmarks)"
+
+    def preview(self) -> UInt8Array | None:
+        """Return front, left and back, (H, W, 3) uint8 RGB."""
+        return draw_turn(self, None)
 
     def normals(self) -> Float64Array:
         """Return (V, 3) unit vertex normals, outward, weighted by face area."""

@@ -6,14 +6,16 @@ import json
 import os
 from dataclasses import dataclass
 
+from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
 from hairkit.storage import Stored, read_text, write_text
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
+from hairkit.types.preview import PHOTO_HEIGHT, Previewed, draw_view, row
 
 
 @dataclass(frozen=True, eq=False)
-class Scene(Stored):
+class Scene(Previewed, Stored):
     """Cameras in view order and the fitted head, all in the head frame."""
 
     names: tuple[str, ...]
@@ -27,6 +29,19 @@ class Scene(Stored):
             raise InputError(
                 f"scene has {len(self.cameras)} cameras for {len(self.names)} view names"
             )
+
+    def __repr__(self) -> str:
+        misfit = "" if self.residual_px is None else f", residual {self.residual_px:.2f} px"
+        head = len(self.head.vertices)
+        return f"Scene({len(self.cameras)} cameras, head of {head} vertices{misfit})"
+
+    def preview(self) -> UInt8Array | None:
+        """Return the head as the cameras see it, side by side, (H, W, 3) uint8 RGB."""
+        small = (
+            camera.resized(round(camera.width * PHOTO_HEIGHT / camera.height), PHOTO_HEIGHT)
+            for camera in self.cameras
+        )
+        return row([draw_view(camera, self.head) for camera in small], PHOTO_HEIGHT)
 
     def write_json(self, path: str | os.PathLike[str]) -> None:
         """Write cameras and head joints as JSON, cameras in the form of `truth.json`."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import SupportsIndex
 
 import numpy as np
 import numpy.typing as npt
@@ -14,14 +16,16 @@ from hairkit.arrays import (
     Float64Array,
     Int32Array,
     Int64Array,
+    UInt8Array,
     frozen_array,
 )
 from hairkit.errors import InputError
 from hairkit.storage import Stored
+from hairkit.types.preview import Previewed, draw_turn
 
 
 @dataclass(frozen=True, eq=False)
-class Strands(Stored):
+class Strands(Previewed, Stored):
     """Polylines, root first, packed: strand s is `points[offsets[s]:offsets[s + 1]]`."""
 
     points: Float32Array
@@ -63,6 +67,19 @@ class Strands(Stored):
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
+
+    def __getitem__(self, index: SupportsIndex) -> Float32Array:
+        """Return the points (n, 3) of one strand, root first; negative counts from the last."""
+        number = range(len(self))[operator.index(index)]
+        return self.points[self.offsets[number] : self.offsets[number + 1]]
+
+    def __repr__(self) -> str:
+        mean = f", {100 * self.lengths().mean():.1f} cm mean length" if len(self) else ""
+        return f"Strands({len(self)} strands, {len(self.points)} points{mean})"
+
+    def preview(self) -> UInt8Array | None:
+        """Return front, left and back, (H, W, 3) uint8 RGB; None without strands."""
+        return draw_turn(None, self)
 
     @property
     def counts(self) -> Int64Array:

@@ -48,6 +48,13 @@ def test_the_list_has_every_plugin_below_its_stage(
         assert f"  {info.name} " in text
 
 
+def test_summaries_are_whole_sentences(manager: Manager) -> None:
+    """What the list says of a shipped plugin fits a line and is not cut."""
+    for info in manager.plugins():
+        assert info.summary.endswith("."), info.name
+        assert len(info.summary) <= 100, info.name
+
+
 def test_one_plugin_tells_its_options(
     plugin_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

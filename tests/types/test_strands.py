@@ -180,3 +180,17 @@ def test_impossible_resampling_is_refused() -> None:
     for step in (0.0, -1.0, float("nan")):
         with pytest.raises(InputError, match="step"):
             strands.resampled_by_length(step)
+
+
+def test_an_index_gives_one_polyline() -> None:
+    """`strands[i]` is what was packed as strand i; negative numbers count from the last."""
+    lines = [np.arange(3.0 * n).reshape(n, 3) for n in (2, 4, 3)]
+    strands = Strands.from_list(lines)
+    for index in (0, 1, 2, -1, -3, np.int64(1)):
+        np.testing.assert_array_equal(strands[index], lines[index])
+    assert [len(line) for line in strands] == [2, 4, 3]
+    for index in (3, -4):
+        with pytest.raises(IndexError):
+            strands[index]
+    with pytest.raises(TypeError):
+        strands["0"]  # type: ignore[index]
