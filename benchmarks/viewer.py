@@ -71,7 +71,7 @@ def _row(
 ) -> None:
     """Print one line: a fixed level of quality, or the budget's choice."""
     budget = Budget(1 / 20)
-    session.most_seconds = 0.4 * budget.seconds
+    session.max_seconds = 0.4 * budget.seconds
     preview = Preview(gl, session, budget, soft)
     walls, processors = [], []
     for picture in range(WARM + args.pictures + (80 if level is None else 0)):
@@ -92,7 +92,7 @@ def _row(
         f"{'chosen: ' if level is None else ''}scale {quality.scale}, {quality.share:.0%} of hairs"
     )
     print(
-        f"| {session.tuned.plugin} | {'processor' if preview.stage.soft else 'shaders'}"
+        f"| {session.simulation.plugin} | {'processor' if preview.stage.soft else 'shaders'}"
         f" | {name}{', soft' if quality.smooth else ''} | {1e3 * wall:.0f}"
         f" | {1 / wall:.1f} | {1e3 * processor:.0f} | {1 / processor:.1f} |",
         flush=True,

@@ -133,15 +133,15 @@ def _session(args: argparse.Namespace, manager: Any, size: tuple[int, int], seed
     from hairkit.viewer.actions.actions import perform
     from hairkit.viewer.actions.presets import presets_path, read_preset
     from hairkit.viewer.session import HAIRS, Session
-    from hairkit.viewer.simulation import STILL, preferred
+    from hairkit.viewer.simulation import NO_SIMULATOR, default_simulator
 
     simulator = args.simulator
     if args.preset is not None and simulator is None:
         simulator = read_preset(presets_path(groom_path(args.groom)), args.preset).get("simulator")
-    user = simulator or preferred(manager)
+    user = simulator or default_simulator(manager)
     plugins = {
         "reader": importer_of(manager, args.groom),
-        "simulator": None if user == STILL else user,
+        "simulator": None if user == NO_SIMULATOR else user,
     }
     settings = split_settings(manager, plugins, args.set)
     session = Session(
@@ -157,7 +157,7 @@ def _session(args: argparse.Namespace, manager: Any, size: tuple[int, int], seed
     if args.preset is not None:
         perform(session, "preset_load", {"name": args.preset})
     for name, value in settings["simulator"].items():
-        session.tuned.set(name, value)
+        session.simulation.set(name, value)
     return session
 
 

@@ -79,7 +79,7 @@ def contact_sheet(
     rows = (
         photos,
         [_mask_picture(photo, mask) for photo, mask in zip(photos, masks, strict=True)],
-        [_orientation_picture(map_, size) for map_ in orientations],
+        [_hsv_picture(map_, size) for map_ in orientations],
         _hull_pictures(hull, cameras),
         _guide_pictures(groom, cameras),
         _hair_pictures(groom, cameras),
@@ -104,7 +104,7 @@ def _mask_picture(photo: UInt8Array, mask: Mask) -> UInt8Array:
     return np.asarray(grey + hair * _HAIR_TINT + person * _PERSON_TINT).astype(np.uint8)
 
 
-def _orientation_picture(map_: OrientationMap, size: tuple[int, int]) -> UInt8Array:
+def _hsv_picture(map_: OrientationMap, size: tuple[int, int]) -> UInt8Array:
     """Return hue for the angle and brightness for the confidence."""
     fine = (2 * size[0], 2 * size[1])
     angle = cv2.resize(map_.angle, fine, interpolation=cv2.INTER_NEAREST)

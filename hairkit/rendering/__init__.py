@@ -1,15 +1,15 @@
-"""Pictures of hair on a head without a window: shaded ones, and plain ones to measure with.
+"""Offscreen rendering of hair on a head: shaded pictures, and buffers to measure with.
 
-OpenGL contexts, lights and cameras that the viewer shares.
+The viewer shares its OpenGL context, cameras and lights.
 
 * `context`: OpenGL contexts: EGL, else OSMesa
-* `framebuffer`: colour and depth buffer, read back as an array
+* `framebuffer`: frame buffers, supersampling, read-back
 * `framing`: cameras that show a whole groom
 * `gl_camera`: OpenGL matrices of a camera
 * `hair`: strands as ribbons on the GPU
 * `head`: the head and other meshes on the GPU
-* `light`: lights and shadow volumes
-* `measurement`: coverage, directions, depth and visibility of hair
+* `light`: lights and the volume of their transmittance
+* `measurement`: coverage, direction, depth and visibility of hair
 * `osmesa`: OSMesa contexts for moderngl
 * `picture`: shaded pictures
 * `picture_file`: PNG and JPEG files

@@ -1,12 +1,12 @@
-"""Simulation of guides: the contract of simulators, how the head moves, wind, and running one.
+"""Simulation of guides: the protocol of simulators, head motion, wind, obstacles, and a runner.
 
-The methods are plugins: `manager.call("make_simulator", "pbd", groom=groom)` returns a `Simulator`.
+The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)` returns a `Simulator`.
 
 * `motion`: motion of the head: keyframes and shakes
-* `obstacles`: head and capsules as one distance on a grid
+* `obstacles`: head and capsules as a signed distance on a grid
 * `posing`: a groom at one frame of a simulation
-* `quaternion`: unit quaternions as arrays
-* `running`: run a simulator and keep its frames
+* `quaternion`: arrays of unit quaternions
+* `running`: runs a simulator without a window
 * `simulator`: the protocol of all simulators
 * `wind`: mean wind and gusts
 """

@@ -1,21 +1,22 @@
-"""The live preview: a groom in motion, in a window or by a script, with one table of actions.
+"""The interactive preview of a groom: simulation, drawing and user actions.
 
-`Session` holds what the user sees and changes, `Preview` draws it, and keys, mouse, panel and
-scripts all go through `actions`.
+It runs in a window or headless. Every user input is an action of one table, so that keys, mouse,
+panel and scripts do the same things. A `Session` holds the state, a `Preview` draws it offscreen,
+and the window only passes events on and shows the result.
 
-* `actions`: what the user can do
-* `draw`: drawing on the GPU or the processor
-* `head_adjustment`: the head placed by hand against the photos
+* `actions`: the table of actions, presets and scripts
+* `draw`: drawing on the GPU or the CPU
+* `head_adjustment`: manual alignment of the head with the photos
 * `head_motion`: shakes and turns of the head
-* `layers`: photos, masks, orientation, hull and field lines to show
-* `opening`: files that the user opens
-* `orbit_camera`: the camera that the mouse moves
-* `picking`: what is under the mouse
-* `preview`: a session and what draws it
-* `recording`: screenshots and films
+* `layers`: photos, masks, orientation, hull and field lines as drawable layers
+* `opening`: opens a groom, an importable file or a results folder
+* `orbit_camera`: the camera that orbits a target
+* `picking`: the guide under the mouse and the lock grabbed with it
+* `preview`: draws a session frame by frame
+* `recording`: PNG files and MP4 videos
 * `session`: the state: groom, simulation, view
-* `simulation`: the simulator behind the preview
-* `window`: window, input, panel and texts
+* `simulation`: the simulator of a session and its option values
+* `window`: window, input, option panel and text overlay
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The head placed by hand against the photos, and the reconstruction that starts from there.
+"""Manual alignment of the head with the photos, and a reconstruction from that pose.
 
-The photos' cameras stand exactly on the nominal turn, as the scene plugin `manual` puts them; what
-is moved is the head. Its pose is kept in the capture's `capture.toml`.
+The cameras stay at the nominal turntable angles, where the scene plugin `manual` puts them; only
+the head is moved. Its pose is saved in the capture's `capture.toml`.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from hairkit.types.head import Head
 from hairkit.viewer.head_motion import AXES, rotation_about
 
 PLUGIN = "manual"
-"""The scene plugin that takes the pose."""
+"""The scene plugin that reads the pose."""
 EDGE = 640
-"""Pixels of the photos' long edge here."""
+"""Long edge of the photos while the head is aligned, pixels."""
 
 
 @dataclass(frozen=True)
-class Before:
-    """How a session was before the head is placed."""
+class PreviousView:
+    """What a session showed before the alignment began; restored when it ends."""
 
     paused: bool
     photos: bool
@@ -46,23 +46,22 @@ class Before:
 
 @dataclass
 class Adjustment:
-    """A capture whose head is being placed."""
+    """A capture whose head is being aligned."""
 
     manager: Manager
     folder: Path
-    """The capture."""
+    """Folder of the capture."""
     capture: Capture
     head: Head
     pose: Float64Array
     """(4, 4) similarity, scene_from_head, metres."""
-    before: Before | None = None
-    """What was shown before it began, to be shown again after it."""
+    before: PreviousView | None = None
 
     @classmethod
     def of(
         cls, manager: Manager, folder: Path, head: Head, cameras: dict[str, Camera]
     ) -> Adjustment:
-        """Return the adjustment as capture.toml has it, or, without it, as `cameras` suggest."""
+        """Return the alignment saved in capture.toml; without one, fit it to `cameras`."""
         capture = read_capture(folder, EDGE)
         if capture.head_pose is not None:
             return cls(manager, folder, capture, head, capture.head_pose)
@@ -71,11 +70,11 @@ class Adjustment:
         names = [name for name in nominal if name in cameras]
         if len(names) >= 3:
             found = [cameras[n].resized(nominal[n].width, nominal[n].height) for n in names]
-            start.pose = _fitted_pose(found, [nominal[n] for n in names], head.vertices)
+            start.pose = _fit_pose(found, [nominal[n] for n in names], head.vertices)
         return start
 
     def cameras(self) -> dict[str, Camera]:
-        """Return the photos' cameras in the head frame, with the head as it is placed."""
+        """Return the photos' cameras in the head frame for the present pose."""
         capture = replace(self.capture, head_pose=self.pose)
         scene = self.manager.call(
             "estimate_scene", PLUGIN, None, capture=capture, masks=(), head=self.head
@@ -89,12 +88,12 @@ class Adjustment:
         self.pose[:3, 3] += self._scene_from_head(camera.rotation.T @ steps)
 
     def turn(self, axis: str, degrees: float) -> None:
-        """Turn the head about one of its own axes, through its middle."""
+        """Rotate the head by degrees about one of its own axes, through its centre."""
         middle = self.head.vertices.mean(axis=0).astype(np.float64)
         self.pose = self.pose @ rotation_about(AXES[axis], float(np.radians(degrees)), middle)
 
     def grow(self, factor: float) -> None:
-        """Make the head larger, its middle where it was."""
+        """Scale the head about its centre."""
         middle = self.head.vertices.mean(axis=0).astype(np.float64)
         matrix = np.eye(4)
         matrix[:3, :3] *= factor
@@ -102,22 +101,20 @@ class Adjustment:
         self.pose = self.pose @ matrix
 
     def save(self) -> Path:
-        """Keep the pose in capture.toml and return its path."""
+        """Write the pose to capture.toml; return the path of that file."""
         path = self.folder / "capture.toml"
         write_head_entry(path, head_entry(self.pose))
         return path
 
     def _scene_from_head(self, way: Float64Array) -> Float64Array:
-        """Return a way (3,) of the head frame, in metres of the scene."""
+        """Return a displacement (3,) of the head frame in the scene frame, metres."""
         linear = self.pose[:3, :3]
         result: Float64Array = linear @ way / np.cbrt(np.linalg.det(linear))
         return result
 
 
-def _fitted_pose(
-    found: list[Camera], nominal: list[Camera], vertices: Float32Array
-) -> Float64Array:
-    """Return the pose (4, 4) with which nominal cameras see the head where `found` ones do."""
+def _fit_pose(found: list[Camera], nominal: list[Camera], vertices: Float32Array) -> Float64Array:
+    """Return the pose (4, 4) whose projections by `nominal` cameras match those by `found` ones."""
     points = vertices[np.linspace(0, len(vertices) - 1, 40).astype(int)].astype(np.float64)
     wanted = np.stack([camera.project(points) for camera in found])
     rough = fit_similarity([c.position for c in found], [c.position for c in nominal])
@@ -141,18 +138,18 @@ def _fitted_pose(
 
 @dataclass
 class Rerun:
-    """A reconstruction in a process of its own, which tells how it goes on."""
+    """A reconstruction in a child process."""
 
     process: subprocess.Popen[str]
     lines: list[str] = field(default_factory=list)
-    """What it has said: a line for each stage when that is done."""
+    """Lines of its standard error: one for each finished stage."""
     began: float = field(default_factory=time.monotonic)
-    """Seconds of the monotonic clock."""
+    """Start time on the monotonic clock, seconds."""
     _listener: threading.Thread | None = None
 
     @classmethod
     def start(cls, capture: Path, results: Path, settings: tuple[str, ...]) -> Rerun:
-        """Reconstruct a capture into the folder of results, with `stage=plugin` settings."""
+        """Start to reconstruct a capture into a folder, with `stage=plugin` settings."""
         command = [sys.executable, "-m", "hairkit", "reconstruct", str(capture), "-o", str(results)]
         for setting in settings:
             command += ["--set", setting]
@@ -166,28 +163,29 @@ class Rerun:
 
     @property
     def running(self) -> bool:
-        """True until it has ended."""
+        """True until the process has ended."""
         return self.process.poll() is None
 
     @property
     def progress(self) -> str:
-        """How long it runs, and the last thing it said."""
-        said = " ".join(self.lines[-1].split()) if self.lines else "starting"
-        return f"{time.monotonic() - self.began:.0f} s; {said}"
+        """Elapsed seconds and the last line of output."""
+        last = " ".join(self.lines[-1].split()) if self.lines else "starting"
+        return f"{time.monotonic() - self.began:.0f} s; {last}"
 
     def wait(self) -> None:
-        """Wait for its end and all that it says."""
+        """Wait until the process has ended and all its output is read."""
         self.process.wait()
         if self._listener is not None:
             self._listener.join()
 
     def check(self) -> None:
-        """Raise `InputError` when it has failed."""
+        """Raise `InputError` if the process has failed."""
         if self.process.poll() not in (None, 0):
-            raise InputError(f"reconstruction failed: {self.lines[-1] if self.lines else ''}")
+            last = self.lines[-1] if self.lines else "it printed no error"
+            raise InputError(f"reconstruction failed: {last}")
 
     def stop(self) -> None:
-        """End it, what is done stays done."""
+        """Terminate the process; results of finished stages stay."""
         if self.running:
             self.process.terminate()
             self.process.wait(timeout=10)

@@ -1,4 +1,4 @@
-"""How the user moves the head: shakes that fade out, turns that glide to where they are asked."""
+"""Head motion made by the user: damped turns to a target angle, and shakes that fade in and out."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ from hairkit.arrays import Float64Array
 
 AXES = {"yaw": (0.0, 1.0, 0.0), "pitch": (1.0, 0.0, 0.0), "roll": (0.0, 0.0, 1.0)}
 """Yaw turns to the subject's left, pitch nods down, roll tilts to the right shoulder."""
+MAX_TURN = 2.0
+"""Largest angle of the head about each axis, radians."""
 GLIDE = 0.18
-"""Seconds in which a turn goes most of its way."""
+"""Time scale of a turn, seconds; a critically damped spring of rate 2 / GLIDE."""
 FADE = 0.25
-"""Seconds in which a shake swells and dies."""
+"""Fade-in and fade-out time of a shake, seconds."""
 
 
 @dataclass
 class Shake:
-    """A swing about one axis."""
+    """A sinusoidal rotation about one axis."""
 
     axis: str
     amplitude: float
@@ -36,18 +38,18 @@ class Shake:
 
 @dataclass
 class HeadMotion:
-    """The head's pose about a pivot since rest."""
+    """The head's rotation about a pivot, relative to its rest pose."""
 
     pivot: Float64Array
     """(3,) the neck, metres."""
     shakes: list[Shake] = field(default_factory=list)
     turn: dict[str, float] = field(default_factory=lambda: dict.fromkeys(AXES, 0.0))
-    """Where the head glides to, radians an axis."""
+    """Target angle of each axis, radians."""
     _turned: dict[str, float] = field(default_factory=lambda: dict.fromkeys(AXES, 0.0))
     _speed: dict[str, float] = field(default_factory=lambda: dict.fromkeys(AXES, 0.0))
 
     def advance(self, seconds: float) -> None:
-        """Go on in time."""
+        """Advance by `seconds`."""
         for shake in self.shakes:
             shake.age += seconds
         self.shakes = [shake for shake in self.shakes if shake.age < shake.seconds]
@@ -60,18 +62,18 @@ class HeadMotion:
             self._speed[axis] = float((speed - rate * drift * seconds) * decay)
 
     def stop(self) -> None:
-        """Put the head back to rest at once."""
+        """Reset the head to its rest pose."""
         self.shakes = []
         self.turn = dict.fromkeys(AXES, 0.0)
         self._turned, self._speed = dict(self.turn), dict(self.turn)
 
     @property
     def still(self) -> bool:
-        """True while the head does not move."""
+        """True if the head does not move."""
         return not self.shakes and all(abs(speed) < 1e-4 for speed in self._speed.values())
 
     def matrix(self) -> Float64Array:
-        """Return head_from_rest (4, 4): yaw last."""
+        """Return head_from_rest (4, 4): roll first, then pitch, then yaw."""
         result = np.eye(4)
         for axis in ("roll", "pitch", "yaw"):
             angle = self._turned[axis] + sum(s.angle() for s in self.shakes if s.axis == axis)

@@ -1,6 +1,6 @@
-"""What the stages found, as things to show: photos in space, masks, orientation, hull, field lines.
+"""Results of the pipeline stages as drawable layers: photos, masks, orientation, hull, field.
 
-All is read from the work folder of `hairkit reconstruct` when it is first shown.
+Each layer is read from the work folder of `hairkit reconstruct` when it is first shown.
 """
 
 from __future__ import annotations
@@ -26,16 +26,23 @@ from hairkit.types.mask import HAIR, PERSON, Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import Scene
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid
-from hairkit.viewer.draw.lines import Board, LineSet
+from hairkit.viewer.draw.lines import Billboard, LineSet
 
-BOARDS = ("photos", "masks", "orientation")
-"""Layers of pictures in space, one a camera."""
-NAMES = ("head", "torso", *BOARDS, "cameras", "hull", "field")
+BILLBOARDS = ("photos", "masks", "orientation")
+"""Layers of one picture for each camera, drawn as billboards."""
+NAMES = ("head", "torso", *BILLBOARDS, "cameras", "hull", "field")
 FRUSTUM = 0.35
-"""Metres from a camera to its picture."""
+"""Distance from a camera to its billboard, metres."""
 CLAY = (0.30, 0.28, 0.26)
+"""Linear RGB of the hull."""
 CLOTH = (0.05, 0.06, 0.08)
+"""Linear RGB of the torso."""
 FIELD_LINES = 4000
+"""Line segments drawn of an orientation field at most."""
+FIELD_LINE_HALF = 1.6
+"""Half the length of such a segment, voxels."""
+PHOTO_EDGE = 640
+"""Long edge of the photos on billboards, pixels."""
 _Found = TypeVar("_Found", bound=Stored)
 
 
@@ -44,12 +51,12 @@ class Layers:
 
     def __init__(self, results: Path | None, capture: Path | None = None) -> None:
         self._work = None if results is None else results / "work"
-        self.capture = _noted_capture(results) if capture is None else capture
-        """Folder of the photos, None where it is not known."""
+        self.capture = _find_capture(results) if capture is None else capture
+        """Folder of the photos; None if unknown."""
 
     @property
     def available(self) -> tuple[str, ...]:
-        """Names of the layers that can be shown."""
+        """Names of the layers whose data exists."""
         photos = self.capture is not None and bool(self.cameras)
         have = {"head": True, "torso": True, "photos": photos}
         files = {"masks": "segment-*", "orientation": "orient-*", "cameras": "scene"}
@@ -59,36 +66,38 @@ class Layers:
         return tuple(name for name in NAMES if have[name])
 
     def check(self, name: str) -> None:
-        """Raise `InputError` when there is no such layer here."""
+        """Raise `InputError` if a layer does not exist or its data is missing."""
         if name not in NAMES:
-            raise InputError(f"no layer {name!r}; there are {', '.join(NAMES)}")
+            raise InputError(f"no layer {name!r}; expected one of {', '.join(NAMES)}")
         if name not in self.available:
             cure = (
-                "name the photos' folder by --capture"
+                "pass the folder of the photos with --capture"
                 if name == "photos"
-                else ("open the folder that hairkit reconstruct wrote")
+                else "open a folder that hairkit reconstruct wrote"
             )
-            raise InputError(f"the layer {name!r} is not here; {cure}")
+            raise InputError(f"no data for the layer {name!r}; {cure}")
 
     @cached_property
     def cameras(self) -> dict[str, Camera]:
-        """Cameras of the photos by view name, working size, head frame; empty without a scene."""
+        """Cameras of the photos by view name, head frame, working size; empty without a scene."""
         scene = self._read(Scene, "head") or self._read(Scene, "scene")
         return {} if scene is None else dict(zip(scene.names, scene.cameras, strict=True))
 
-    def boards(self, layer: str, cameras: dict[str, Camera] | None = None) -> dict[str, Board]:
+    def billboards(
+        self, layer: str, cameras: dict[str, Camera] | None = None
+    ) -> dict[str, Billboard]:
         """Return the pictures of a layer, by view name, in front of their `cameras` (as found)."""
         cameras = self.cameras if cameras is None else cameras
         pictures = {"photos": self._photos, "masks": self._masks, "orientation": self._angles}
         found = pictures[layer]()
         return {
-            name: Board(_picture_corners(cameras[name]), image)
+            name: Billboard(_picture_corners(cameras[name]), image)
             for name, image in found.items()
             if name in cameras
         }
 
     def frusta(self) -> LineSet:
-        """Return the cameras as pyramids."""
+        """Return the view frusta of the cameras as lines."""
         corners = [_picture_corners(camera) for camera in self.cameras.values()]
         eyes = [camera.position for camera in self.cameras.values()]
         paths = []
@@ -97,7 +106,7 @@ class Layers:
         return _line_set(paths, (0.15, 0.35, 0.75, 0.8))
 
     def hull(self) -> Solid | None:
-        """Return the dense hair as clay."""
+        """Return the surface of the dense part of the hull; None without a hull."""
         hull = self._read(Hull, "hull")
         if hull is None:
             return None
@@ -106,13 +115,13 @@ class Layers:
         return Solid(vertices, faces, normals, colours, scatter=0.0)
 
     def torso(self, head: Head) -> Solid:
-        """Return shoulders under a head, which photos do not tell of."""
+        """Return a generic torso under a head."""
         bust = Bust.under(head)
         colours = np.tile(np.array(CLOTH, np.float32), (len(bust.vertices), 1))
         return Solid(bust.vertices, bust.faces, bust.normals, colours, scatter=0.0)
 
     def field_lines(self) -> LineSet | None:
-        """Return short strokes along the field, coloured by their direction."""
+        """Return short lines along the field, coloured by direction; None without a field."""
         field, hull = self._read(OrientationField, "field"), self._read(Hull, "hull")
         if field is None or hull is None:
             return None
@@ -122,7 +131,7 @@ class Layers:
         full = tensor[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
         way = np.linalg.eigh(full)[1][:, :, 2]
         middle = field.grid.origin + (chosen + 0.5) * field.grid.spacing
-        half = 1.6 * field.grid.spacing * way
+        half = FIELD_LINE_HALF * field.grid.spacing * way
         points = np.stack([middle - half, middle + half], axis=1).reshape(-1, 3)
         colours = np.ones((len(points), 4), np.float32)
         colours[:, :3] = np.repeat(np.abs(way[:, [0, 2, 1]]), 2, axis=0)
@@ -130,7 +139,7 @@ class Layers:
         return LineSet(points.astype(np.float32), offsets, colours)
 
     def confidence(self, rows: Float32Array) -> Float32Array | None:
-        """Return (G, m) the field's confidence along guides (G, m, 3) at rest, None without one."""
+        """Return the field's confidence (G, m) at rest points (G, m, 3); None without a field."""
         if self._confidence is None:
             return None
         grid, confidence = self._confidence
@@ -138,19 +147,22 @@ class Layers:
 
     @cached_property
     def _confidence(self) -> tuple[VoxelGrid, Float32Array] | None:
-        """The field's confidence, kept: every picture asks for it, and its file is large."""
+        """Grid and confidence of the field, cached: each frame reads them."""
         field = self._read(OrientationField, "field")
         return None if field is None else (field.grid, field.confidence)
 
     @property
     def has_confidence(self) -> bool:
-        """Whether a field's confidence can be shown."""
+        """True if the confidence of a field can be shown."""
         return "field" in self.available
 
     def _photos(self) -> dict[str, UInt8Array]:
         if self.capture is None:
             return {}
-        return {view.name: _opaque(view.image) for view in read_capture(self.capture, 640).views}
+        return {
+            view.name: _add_alpha(view.image)
+            for view in read_capture(self.capture, PHOTO_EDGE).views
+        }
 
     def _masks(self) -> dict[str, UInt8Array]:
         pictures = {}
@@ -162,14 +174,17 @@ class Layers:
         return pictures
 
     def _angles(self) -> dict[str, UInt8Array]:
-        return {name: _hue(found) for name, found in self._every(OrientationMap, "orient").items()}
+        return {
+            name: _hsv_picture(found)
+            for name, found in self._every(OrientationMap, "orient").items()
+        }
 
     def _every(self, kind: type[_Found], stage: str) -> dict[str, _Found]:
         found = {name: self._read(kind, f"{stage}-{name}") for name in self.cameras}
         return {name: value for name, value in found.items() if value is not None}
 
     def _read(self, kind: type[_Found], stem: str) -> _Found | None:
-        """Return what a stage left, None when it is not there or of another version."""
+        """Return the stored result of a stage; None if missing or of another version."""
         if self._work is None or not (path := self._work / f"{stem}.npz").is_file():
             return None
         try:
@@ -180,8 +195,8 @@ class Layers:
             return None
 
 
-def _noted_capture(results: Path | None) -> Path | None:
-    """Return the folder of the photos that the log of a reconstruction names, if it is there."""
+def _find_capture(results: Path | None) -> Path | None:
+    """Return the folder of photos named in the log of a reconstruction, None if it is gone."""
     if results is None or not (results / "hairkit.log").is_file():
         return None
     for line in (results / "hairkit.log").read_text(errors="replace").splitlines():
@@ -192,8 +207,8 @@ def _noted_capture(results: Path | None) -> Path | None:
     return None
 
 
-def _hue(found: OrientationMap) -> UInt8Array:
-    """Return (H, W, 4): hue for the angle, opacity for the confidence."""
+def _hsv_picture(found: OrientationMap) -> UInt8Array:
+    """Return a picture (H, W, 4) whose hue is the angle and whose opacity is the confidence."""
     half = np.full(found.angle.shape, 220, np.uint8)
     hue = (found.angle * (180 / np.pi)).astype(np.uint8)
     rgb = cv2.cvtColor(np.stack([hue, half, half], axis=-1), cv2.COLOR_HSV2RGB)
@@ -201,7 +216,7 @@ def _hue(found: OrientationMap) -> UInt8Array:
     return np.asarray(np.dstack([rgb, alpha]), np.uint8)
 
 
-def _opaque(image: UInt8Array) -> UInt8Array:
+def _add_alpha(image: UInt8Array) -> UInt8Array:
     return np.asarray(np.dstack([image, np.full(image.shape[:2], 255, np.uint8)]), np.uint8)
 
 

@@ -1,4 +1,4 @@
-"""Opens what the user names: a groom, a file that an import plugin reads, a folder of results."""
+"""Open a groom file, a file that an import plugin reads, or a results folder."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ class Opened:
     groom: Groom
     path: Path
     results: Path | None
-    """The folder that `hairkit reconstruct` wrote, when the groom lies in one."""
+    """The folder that `hairkit reconstruct` wrote, if the groom is in one."""
 
 
 def open_path(path: Path, manager: Manager, settings: Mapping[str, object] | None = None) -> Opened:
     """Open a groom.npz, a folder that holds one, or a file that an import plugin reads.
 
-    `settings` are options of that plugin.
+    `settings` are options of the import plugin.
 
     Raises
     ------
     InputError
-        There is no such file, nothing that reads it, or no hair in it.
+        The file does not exist, no plugin reads it, or it holds no strands.
     """
     path = groom_path(path)
     groom = load_groom(manager, path, settings)
     if not len(groom.strands):
-        raise InputError(f"{path}: holds no strands, so there is nothing to show")
+        raise InputError(f"{path}: holds 0 strands, expected at least 1; open another file")
     results = path.parent if (path.parent / "work").is_dir() else None
     return Opened(groom, path, results)

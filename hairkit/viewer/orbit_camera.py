@@ -1,4 +1,4 @@
-"""Where the user looks from: a camera on a sphere about a point, changed by what the mouse does."""
+"""A camera that orbits a target point."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ import numpy.typing as npt
 from hairkit.types.camera import Camera
 
 VERTICAL_ANGLE = np.radians(28.0)
-"""Field of view over the picture's height."""
+"""Vertical field of view, radians."""
 MARGIN = 1.12
+"""Distance over the one at which the points just fit into the picture."""
 NEAREST, FARTHEST = 0.05, 20.0
-"""Metres from camera to target."""
-STEEPEST = 89.0
+"""Limits of the distance from camera to target, metres."""
+MAX_ELEVATION = 89.0
+"""Degrees; the up direction is undefined at 90."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class OrbitView:
 
     @classmethod
     def around(cls, points: npt.ArrayLike, aspect: float) -> OrbitView:
-        """Return the view that shows points (N, 3) from anywhere; `aspect` is width by height."""
+        """Return a view of all points (N, 3), whatever the azimuth; `aspect` is width by height."""
         cloud = np.asarray(points, np.float64)
         low, high = cloud.min(axis=0), cloud.max(axis=0)
         middle = (low + high) / 2
@@ -40,7 +42,7 @@ class OrbitView:
         return cls(distance=float(MARGIN * max(up, across)), target=(x, y, z))
 
     def camera(self, width: int, height: int) -> Camera:
-        """Return the camera of this view for a picture of `width` x `height` pixels."""
+        """Return the camera for a picture of `width` x `height` pixels."""
         return Camera.on_turn(
             self.azimuth,
             elevation_deg=self.elevation,
@@ -52,13 +54,13 @@ class OrbitView:
         )
 
     def orbited(self, right: float, up: float) -> OrbitView:
-        """Return the view turned by degrees: the camera goes to its right and up."""
-        elevation = float(np.clip(self.elevation + up, -STEEPEST, STEEPEST))
+        """Return the view with the camera moved around the target, degrees to its right and up."""
+        elevation = float(np.clip(self.elevation + up, -MAX_ELEVATION, MAX_ELEVATION))
         azimuth = (self.azimuth + right + 180.0) % 360.0 - 180.0
         return replace(self, azimuth=azimuth, elevation=elevation)
 
     def panned(self, right: float, down: float) -> OrbitView:
-        """Return the view whose picture slid by shares of its height."""
+        """Return the view with the picture shifted by fractions of its height."""
         rotation = self.camera(1, 1).rotation
         whole = 2 * self.distance * np.tan(VERTICAL_ANGLE / 2)
         slid = np.array(self.target) - whole * (right * rotation[0] + down * rotation[1])
@@ -66,10 +68,10 @@ class OrbitView:
         return replace(self, target=(x, y, z))
 
     def zoomed(self, factor: float) -> OrbitView:
-        """Return the view `factor` times nearer."""
+        """Return the view at 1 / `factor` of the distance."""
         return replace(self, distance=float(np.clip(self.distance / factor, NEAREST, FARTHEST)))
 
     def centred(self, point: npt.ArrayLike) -> OrbitView:
-        """Return the view that looks at a point (3,), from as far as before."""
+        """Return the view with a point (3,) as its target, at the same distance."""
         x, y, z = np.asarray(point, np.float64).tolist()
         return replace(self, target=(x, y, z))

@@ -1,4 +1,4 @@
-"""What lies under the mouse: the nearest guide, and the lock of hair that is grabbed with it."""
+"""Picking: the guide point under the mouse, and the lock of hair grabbed around it."""
 
 from __future__ import annotations
 
@@ -12,33 +12,35 @@ from hairkit.simulation.simulator import Grab
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 
-REACH = 14.0
-"""Pixels from the mouse within which a guide is picked."""
-LOCK = 0.02
-"""Strands this near to the grabbed point come along, metres."""
+PICK_RADIUS = 14.0
+"""Largest distance from the mouse at which a guide point is picked, pixels."""
+LOCK_RADIUS = 0.02
+"""Strands within this distance of the picked point belong to the lock, metres."""
+DEPTH_PER_PIXEL = 1e-3
+"""Metres of depth that a pixel of distance from the mouse counts for, so that the front wins."""
 
 
 @dataclass(frozen=True, eq=False)
-class Hold:
-    """A lock of hair in the user's hand."""
+class GrabbedLock:
+    """A lock of hair that the user drags: one point on each of its strands."""
 
     points: Int64Array
-    """(N,) numbers of the held points."""
+    """(N,) indices of the grabbed points."""
     offsets: Float64Array
-    """(N, 3) from the hand to each."""
-    hand: Float64Array
+    """(N, 3) from the grab point to each of them, metres."""
+    grab_point: Float64Array
     """(3,) world, metres."""
     depth: float
-    """Of the hand, along the camera's axis, metres."""
+    """Axial depth of the grab point, metres."""
 
-    def moved(self, camera: Camera, pixel: npt.ArrayLike) -> Hold:
-        """Return the lock with the hand under another pixel (2,), as deep as before."""
-        hand = camera.unproject(pixel, np.float64(self.depth))
-        return Hold(self.points, self.offsets, hand, self.depth)
+    def moved(self, camera: Camera, pixel: npt.ArrayLike) -> GrabbedLock:
+        """Return the lock with the grab point at another pixel (2,), at the same depth."""
+        grab_point = camera.unproject(pixel, np.float64(self.depth))
+        return GrabbedLock(self.points, self.offsets, grab_point, self.depth)
 
     def grabs(self) -> tuple[Grab, ...]:
-        """Return where the simulator shall pull."""
-        targets = (self.hand + self.offsets).tolist()
+        """Return the grabs of the simulator: each point and its target."""
+        targets = (self.grab_point + self.offsets).tolist()
         return tuple(
             Grab(int(point), (x, y, z))
             for point, (x, y, z) in zip(self.points, targets, strict=True)
@@ -46,13 +48,12 @@ class Hold:
 
 
 def nearest_point(camera: Camera, points: Float32Array, pixel: npt.ArrayLike) -> int | None:
-    """Return the number of the front-most of the points (P, 3) at a pixel (2,), None for none."""
+    """Return the index of the front-most of the points (P, 3) at a pixel (2,), or None."""
     gap = np.linalg.norm(camera.project(points) - np.asarray(pixel, np.float64), axis=1)
-    near = np.flatnonzero(np.nan_to_num(gap, nan=np.inf) < REACH)
+    near = np.flatnonzero(np.nan_to_num(gap, nan=np.inf) < PICK_RADIUS)
     if not len(near):
         return None
-    # a pixel aside counts as a millimetre behind, so that the front wins over the exact
-    cost = camera.depth(points[near]) + 1e-3 * gap[near]
+    cost = camera.depth(points[near]) + DEPTH_PER_PIXEL * gap[near]
     return int(near[np.argmin(cost)])
 
 
@@ -61,10 +62,10 @@ def grab_lock(
     points: Float32Array,
     offsets: Int64Array,
     pixel: npt.ArrayLike,
-) -> Hold | None:
-    """Return the lock around the guide point at a pixel, one point a strand, None for none.
+) -> GrabbedLock | None:
+    """Return the lock around the guide point at a pixel; None if there is no hair.
 
-    Roots stay: they are never held.
+    It has one point for each strand, never one of the first two, which the scalp holds.
     """
     picked = nearest_point(camera, points, pixel)
     if picked is None:
@@ -74,17 +75,17 @@ def grab_lock(
     distance[offsets[:-1] + 1] = np.inf
     nearest = np.minimum.reduceat(distance, offsets[:-1])
     owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-    held = np.flatnonzero((distance == nearest[owner]) & (distance < LOCK))
+    held = np.flatnonzero((distance == nearest[owner]) & (distance < LOCK_RADIUS))
     _, first = np.unique(owner[held], return_index=True)
     held = held[first]
     if not len(held):
         return None
-    hand = points[picked].astype(np.float64)
-    depth = float(camera.depth(hand))
-    return Hold(held, points[held] - hand, hand, depth)
+    grab_point = points[picked].astype(np.float64)
+    depth = float(camera.depth(grab_point))
+    return GrabbedLock(held, points[held] - grab_point, grab_point, depth)
 
 
 def surface_point(camera: Camera, head: Head, pixel: npt.ArrayLike) -> Float64Array | None:
-    """Return the front-most vertex (3,) of the head near a pixel, None for none."""
+    """Return the front-most vertex (3,) of the head near a pixel; None if none is."""
     picked = nearest_point(camera, head.vertices, pixel)
     return None if picked is None else head.vertices[picked].astype(np.float64)

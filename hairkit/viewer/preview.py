@@ -1,4 +1,4 @@
-"""A session and the stage that draws it: one picture after the other, in a window or without."""
+"""Simulate and draw a session frame by frame, in a window or headless."""
 
 from __future__ import annotations
 
@@ -13,27 +13,29 @@ from hairkit.arrays import UInt8Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.head import Solid, head_solid
 from hairkit.viewer.draw.colouring import point_values, ramp
-from hairkit.viewer.draw.frame import Shot, Stage
+from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
 from hairkit.viewer.draw.frame_budget import LEVELS, Budget
 from hairkit.viewer.draw.interface import HairLook
 from hairkit.viewer.draw.lines import LineSet
-from hairkit.viewer.layers import BOARDS
+from hairkit.viewer.layers import BILLBOARDS
 from hairkit.viewer.recording import free_name, write_png
 from hairkit.viewer.session import Session
 from hairkit.viewer.window.hud import Readings
 
-GUIDE_WIDER = 7.0
-"""Guides shown alone are drawn this many times wider than hair."""
-FEW = 4_000
-"""So few strands always have soft edges: that is cheap, and each of them is seen."""
+GUIDE_WIDTH_SCALE = 7.0
+"""Width of guides shown alone over that of hair."""
+MIN_SMOOTH = 4_000
+"""Up to this many strands are always drawn with antialiased edges, which is cheap for few."""
 MEASURE_EVERY = 12
-"""Pictures between two looks at the simulator's read-outs."""
-PICKED = (1.0, 0.85, 0.1)
-"""sRGB of the guide whose numbers are told."""
+"""Frames between two measurements of stretch and energy."""
+PICKED_COLOUR = (1.0, 0.85, 0.1)
+"""sRGB of the picked guide."""
+TIME_SMOOTHING = 0.2
+"""Weight of the newest frame in the displayed times."""
 
 
 class Preview:
-    """Draws a session; used inside `renderer()` only."""
+    """Draws a session; use it inside `renderer()` only."""
 
     def __init__(
         self,
@@ -42,15 +44,15 @@ class Preview:
         budget: Budget | None = None,
         soft: bool | None = None,
     ) -> None:
-        """Draw within a budget, by default the best; `soft` as in `Stage`."""
+        """Draw within a frame budget (None: best quality); `soft` as in `FrameRenderer`."""
         self.gl = gl
         self.soft = soft
         self.session = session
         self.budget = budget or Budget(0.0)
         self.readings = Readings(renderer=gl.description)
         self.written: list[Path] = []
-        """Screenshots so far."""
-        self._stage: Stage | None = None
+        """Paths of the screenshots and recordings written so far."""
+        self._frame_renderer: FrameRenderer | None = None
         self._drawn: tuple[object, object] = (None, None)
         self._kept: dict[str, list[str]] = {}
         self._lines: dict[str, LineSet | None] = {}
@@ -59,33 +61,33 @@ class Preview:
         self._times: dict[str, float] = {}
 
     @property
-    def stage(self) -> Stage:
-        """The stage, up to date with the session's groom."""
+    def frame_renderer(self) -> FrameRenderer:
+        """The frame renderer of the session's groom."""
         session = self.session
         now = (session.opened, session.body)
-        if self._stage is None or self._drawn[0] is not now[0]:
+        if self._frame_renderer is None or self._drawn[0] is not now[0]:
             self.release()
             groom = session.opened.groom
             solid = head_solid(groom.head, groom.material)
-            self._stage = Stage(self.gl, solid, session.body, self.soft)
+            self._frame_renderer = FrameRenderer(self.gl, solid, session.body, self.soft)
         elif self._drawn[1] is not now[1]:
-            self._stage.replace_body(session.body)
+            self._frame_renderer.replace_body(session.body)
         self._drawn = now
-        return self._stage
+        return self._frame_renderer
 
     def release(self) -> None:
-        """Free what is on the GPU."""
-        if self._stage is not None:
-            self._stage.release()
-        self._stage, self._kept, self._lines = None, {}, {}
+        """Free all GPU objects."""
+        if self._frame_renderer is not None:
+            self._frame_renderer.release()
+        self._frame_renderer, self._kept, self._lines = None, {}, {}
 
     def restart(self) -> None:
-        """Compile all shaders anew; the old ones stay when one does not compile."""
+        """Recompile all shaders; keep the old ones if one does not compile."""
         self.gl.recompile_programs()
         self.release()
 
     def frame(self, seconds: float, *, still: bool = False) -> None:
-        """Let time pass, draw, and keep the picture where it is asked for.
+        """Simulate `seconds`, draw, and write pending screenshots and the recording.
 
         `still` draws at the best quality, whatever the budget.
         """
@@ -93,23 +95,26 @@ class Preview:
         self.session.advance(seconds)
         simulated = time.perf_counter()
         self.draw(still=still)
-        self._keep_picture()
+        self._save_picture()
         drawn = time.perf_counter()
-        self.budget.spent(drawn - simulated, simulated - began)
-        self._read_out(simulated - began, drawn - simulated)
+        self.budget.record(drawn - simulated, simulated - began)
+        self._update_readings(simulated - began, drawn - simulated)
 
     def draw(self, *, still: bool = False) -> None:
-        """Draw the session as it is."""
-        stage, session = self.stage, self.session
+        """Draw the present state of the session."""
+        frame_renderer, session = self.frame_renderer, self.session
         quality = LEVELS[0] if still else self.budget.quality
         width, height = (max(round(n * quality.scale), 16) for n in session.size)
-        buffer = None if stage.soft else session.guide_buffer()
+        buffer = None if frame_renderer.soft else session.guide_buffer()
         rows = session.guide_rows() if buffer is None or self._needs_rows else None
         look = self._look(quality.smooth, quality.share)
         overlays = self._overlays(rows)
-        boards, solids = self._shown_boards(stage), self._shown_solids(stage)
-        stage.draw(
-            Shot(
+        billboards, solids = (
+            self._load_billboards(frame_renderer),
+            self._load_solids(frame_renderer),
+        )
+        frame_renderer.draw(
+            FrameInputs(
                 session.camera((width, height)),
                 session.world_from_head,
                 rows if buffer is None else buffer,
@@ -119,24 +124,24 @@ class Preview:
                 exposure=session.shown.exposure,
                 whole_light=still,
                 lines=overlays,
-                boards=boards,
-                board_opacity=session.shown.opacity,
+                billboards=billboards,
+                billboard_opacity=session.shown.opacity,
                 solids=solids,
             )
         )
         self._hairs = 0 if look is None else look.hairs
-        if not np.isfinite(stage.cloud).all():
-            session.look_for_runaways()
+        if not np.isfinite(frame_renderer.cloud).all():
+            session.check_stability()
 
     @property
     def _needs_rows(self) -> bool:
-        """Whether lines are drawn along guides."""
+        """True if lines are drawn along guides."""
         shown = self.session.shown.colours
         return shown not in ("hair", "direction") or self.session.picked is not None
 
     def picture(self) -> UInt8Array:
-        """Return the last picture (H, W, 3) RGB, as large as it was drawn."""
-        return self.stage.read()
+        """Return the last picture (H, W, 3) RGB, at the size at which it was drawn."""
+        return self.frame_renderer.read()
 
     def _look(self, smooth: bool, share: float) -> HairLook | None:
         session, material = self.session, self.session.opened.groom.material
@@ -148,15 +153,15 @@ class Preview:
         count = max(round(count * (1.0 if shown.guides_only else share)), 1)
         return HairLook(
             count,
-            smooth or count <= FEW,
+            smooth or count <= MIN_SMOOTH,
             _triple(material.root_colour),
             _triple(material.tip_colour),
             by_direction=shown.colours == "direction",
-            wider=GUIDE_WIDER if shown.guides_only else None,
+            wider=GUIDE_WIDTH_SCALE if shown.guides_only else None,
         )
 
     def _overlays(self, rows: Any) -> tuple[tuple[LineSet, bool], ...]:
-        """Return lines, and whether they move with the head."""
+        """Return line sets, and for each whether it moves with the head."""
         session = self.session
         lines: list[tuple[LineSet, bool]] = []
         if session.shown.colours not in ("hair", "direction"):
@@ -166,7 +171,7 @@ class Preview:
             lines.append((_guide_lines(rows, ramp(values)), True))
         if session.picked is not None:
             one = rows[session.picked : session.picked + 1]
-            colour = np.broadcast_to(np.array(PICKED, np.float32), one.shape)
+            colour = np.broadcast_to(np.array(PICKED_COLOUR, np.float32), one.shape)
             lines.append((_guide_lines(one, colour), True))
         finders = {"cameras": session.layers.frusta, "field": session.layers.field_lines}
         for name, find in finders.items():
@@ -178,21 +183,21 @@ class Preview:
                     lines.append((found, name == "field"))
         return tuple(lines)
 
-    def _shown_boards(self, stage: Stage) -> tuple[str, ...]:
+    def _load_billboards(self, frame_renderer: FrameRenderer) -> tuple[str, ...]:
         session, names = self.session, []
-        for layer in BOARDS:
+        for layer in BILLBOARDS:
             if layer not in session.shown.layers:
                 continue
             if layer not in self._kept or self._places.get(layer) is not session.adjusted:
-                boards = session.layers.boards(layer, session.photo_cameras)
-                for name, board in boards.items():
-                    stage.keep_board(f"{layer}/{name}", board)
-                self._kept[layer], self._places[layer] = list(boards), session.adjusted
+                billboards = session.layers.billboards(layer, session.photo_cameras)
+                for name, board in billboards.items():
+                    frame_renderer.upload_billboard(f"{layer}/{name}", board)
+                self._kept[layer], self._places[layer] = list(billboards), session.adjusted
             only = session.shown.through
             names += [f"{layer}/{n}" for n in self._kept[layer] if only is None or n == only]
         return tuple(names)
 
-    def _shown_solids(self, stage: Stage) -> tuple[str, ...]:
+    def _load_solids(self, frame_renderer: FrameRenderer) -> tuple[str, ...]:
         session = self.session
         finders: dict[str, Callable[[], Solid | None]] = {
             "hull": session.layers.hull,
@@ -204,10 +209,10 @@ class Preview:
                 solid = finders[name]()
                 self._kept[name] = [] if solid is None else [name]
                 if solid is not None:
-                    stage.keep_solid(name, solid)
+                    frame_renderer.upload_solid(name, solid)
         return tuple(kept for name in names for kept in self._kept[name])
 
-    def _keep_picture(self) -> None:
+    def _save_picture(self) -> None:
         session = self.session
         if session.recorder is None and not session.screenshots:
             return
@@ -218,14 +223,14 @@ class Preview:
             free = path if session.overwrite else free_name(path)
             write_png(free, picture)
             self.written.append(free)
-            session.message = f"written: {free}"
+            session.message = f"wrote {free}"
         session.screenshots = []
 
-    def _read_out(self, simulated: float, drawn: float) -> None:
+    def _update_readings(self, simulated: float, drawn: float) -> None:
         self._pictures += 1
         for name, value in (("simulate", simulated), ("draw", drawn)):
             before = self._times.get(name, value)
-            self._times[name] = before + 0.2 * (value - before)
+            self._times[name] = before + TIME_SMOOTHING * (value - before)
         readings = self.readings
         stretch, energy = readings.stretch, readings.energy
         if self._pictures % MEASURE_EVERY == 1:
@@ -239,7 +244,7 @@ class Preview:
             stretch,
             energy,
             self._hairs,
-            self.stage.framebuffer.width / self.session.size[0],
+            self.frame_renderer.framebuffer.width / self.session.size[0],
             readings.renderer,
         )
 

@@ -1,4 +1,4 @@
-"""Keeps pictures: single PNG files, numbered PNG files, MP4."""
+"""Write pictures: PNG files, numbered PNG sequences, MP4."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def write_png(path: Path, picture: UInt8Array) -> None:
 
 
 def free_name(path: Path) -> Path:
-    """Return the path, or the first of `name_1`, `name_2` ... that is not taken."""
+    """Return the path, or the first of `name_1`, `name_2`, ... that does not exist."""
     number, free = 0, path
     while free.exists():
         number += 1
@@ -32,7 +32,7 @@ def free_name(path: Path) -> Path:
 
 
 class Recorder:
-    """Takes one picture after the other; `close` ends the recording."""
+    """Records pictures one after the other; `close` ends the recording."""
 
     def __init__(self, path: Path) -> None:
         """Record into `path`: an .mp4 file, or a folder for `0000.png`, `0001.png`, ..."""
@@ -41,13 +41,15 @@ class Recorder:
         self._video: cv2.VideoWriter | None = None
         self._size = (0, 0)
         if path.suffix and path.suffix.lower() != ".mp4":
-            raise InputError(f"{path}: recordings are .mp4 files or folders of PNG files")
+            raise InputError(
+                f"{path}: cannot record to {path.suffix!r}, expected an .mp4 file or a folder"
+            )
         self._is_video = path.suffix.lower() == ".mp4"
         if not self._is_video:
             path.mkdir(parents=True, exist_ok=True)
 
     def add(self, picture: UInt8Array) -> None:
-        """Take a picture (H, W, 3) RGB; all must have the size of the first one."""
+        """Add a picture (H, W, 3) RGB; videos scale it to the size of the first one."""
         if self._is_video:
             self._add_to_video(picture)
         else:
@@ -55,7 +57,7 @@ class Recorder:
         self.count += 1
 
     def close(self) -> None:
-        """Finish the file."""
+        """Finish the video file."""
         if self._video is not None:
             self._video.release()
             self._video = None
@@ -68,7 +70,9 @@ class Recorder:
             self._video = cv2.VideoWriter(str(self.path), code, FRAMES_PER_SECOND, size)
             self._size = size
             if not self._video.isOpened():
-                raise InputError(f"{self.path}: OpenCV cannot write MP4 here; record into a folder")
+                raise InputError(
+                    f"{self.path}: this build of OpenCV cannot write MP4; record into a folder"
+                )
         if size != self._size:
             even = np.asarray(cv2.resize(even, self._size, interpolation=cv2.INTER_AREA), np.uint8)
         self._video.write(np.ascontiguousarray(even[..., ::-1]))

@@ -1,6 +1,6 @@
-"""What the user sees and changes: a groom in motion, the view of it, and what is shown with it.
+"""The state of the viewer: a simulated groom, the view of it, and display settings.
 
-A session knows nothing of OpenGL or windows; `actions` change it, `preview` draws it.
+A session does not use OpenGL or windows; `actions` change it, `preview` draws it.
 """
 
 from __future__ import annotations
@@ -24,28 +24,36 @@ from hairkit.viewer.head_motion import HeadMotion
 from hairkit.viewer.layers import Layers
 from hairkit.viewer.opening import Opened, open_path
 from hairkit.viewer.orbit_camera import OrbitView
-from hairkit.viewer.picking import Hold
+from hairkit.viewer.picking import GrabbedLock
 from hairkit.viewer.recording import Recorder
-from hairkit.viewer.simulation import Tuned
+from hairkit.viewer.simulation import TunableSimulator
 
 STEP = 1 / 60
-"""Seconds of one step of the simulator as the session asks for it."""
+"""Time step of the simulator, seconds."""
 HAIRS = 10_000
+"""Strands drawn by default."""
+MAX_WIND = 60.0
+"""Highest wind speed, m/s."""
+MAX_TURBULENCE = 5.0
+"""Highest RMS speed of gusts over the mean speed."""
+FLOOR_GAP = 0.03
+"""Distance of the floor below groom and head, metres."""
 
 
 @dataclass
 class Wind:
-    """The air around the head."""
+    """Settings of the wind."""
 
     blowing: bool = False
     speed: float = 4.0
     """Metres per second."""
     azimuth: float = 90.0
-    """Degrees, where it comes from: 0 in front, 90 from the subject's left."""
+    """Degrees where it comes from: 0 front, 90 the subject's left."""
     turbulence: float = 0.4
+    """RMS speed of gusts over the mean speed."""
 
     def velocity(self) -> Float64Array:
-        """Return (3,) metres per second, world."""
+        """Return the mean velocity (3,), world, metres per second."""
         if not self.blowing:
             return np.zeros(3)
         angle = np.radians(self.azimuth)
@@ -54,22 +62,22 @@ class Wind:
 
 @dataclass
 class Shown:
-    """What is drawn, and how."""
+    """Display settings."""
 
     hairs: int = HAIRS
     guides_only: bool = False
     colours: str = "hair"
     layers: set[str] = field(default_factory=lambda: {"head"})
     opacity: float = 0.8
-    """Of the photos in space."""
+    """Opacity of the photos."""
     exposure: float = 0.75
     help: bool = False
     panel: bool = True
     numbers: bool = True
     option: int = 0
-    """The option that the keyboard changes."""
+    """Index of the simulator option that the keyboard changes."""
     through: str | None = None
-    """Name of the photo whose camera the user looks through."""
+    """Name of the photo whose camera is used; None: the orbit camera."""
 
 
 class Session:
@@ -96,80 +104,80 @@ class Session:
         self.seed = seed
         self.wind, self.shown = Wind(), Shown(hairs=hairs)
         self.paused = False
-        self.hold: Hold | None = None
+        self.grabbed_lock: GrabbedLock | None = None
         self.picked: int | None = None
         self.message = ""
         self.pending = 0.0
-        """Seconds that a script still wants to see."""
+        """Seconds that a script still has to simulate."""
         self.screenshots: list[Path] = []
-        """Files that the next picture is written to."""
+        """Files to write the next picture to."""
         self.recorder: Recorder | None = None
         self.adjustment: Adjustment | None = None
         self.adjusted: dict[str, Camera] | None = None
-        """The head against the photos, while it is placed by hand."""
+        """Cameras of the photos during the manual alignment."""
         self.rerun: Rerun | None = None
-        """The reconstruction that goes on."""
-        self.most_seconds: float | None = None
-        """A picture's simulation ends after the step that takes it beyond this: on slow machines
-        hair moves slower instead of stopping. None simulates all, which scripts want."""
+        """The running reconstruction."""
+        self.max_seconds: float | None = None
+        """Longest simulation time of a frame, seconds: slow machines show slow motion. None: no
+        limit, as for scripts."""
         self.steps = 0
-        """Steps since the groom was opened."""
-        self._behind = 0.0
-        self.on_card = False
-        """True while the guides are drawn from where shaders left them."""
+        """Simulation steps since the groom was opened."""
+        self._time_debt = 0.0
+        self.guides_on_gpu = False
+        """True if the guides are drawn from a buffer of the simulator."""
         self.overwrite = False
-        """True lets screenshots take the place of older ones of the same name."""
+        """True overwrites existing screenshots and recordings."""
         self.finished = False
         self.open(path)
 
     def open(self, path: Path) -> None:
-        """Show another groom, from its best side."""
+        """Open another groom and fit it into the picture."""
         self._take(open_path(path, self.manager, self._reading_of(path)))
         self.frame()
 
     def reload(self) -> None:
-        """Read the file again; view, wind and options stay."""
-        values = dict(self.tuned.values)
+        """Reload the file; keep view, wind and options."""
+        values = dict(self.simulation.values)
         path = self.opened.path
         self._take(open_path(path, self.manager, self._reading_of(path)))
-        if self.tuned.infos:
-            self.tuned.replace(values)
+        if self.simulation.infos:
+            self.simulation.replace(values)
 
     def _reading_of(self, path: Path) -> Mapping[str, object]:
-        """Return the import options of a file: those of the first one, no others are known."""
+        """Return the import options of a file; known for the first one only."""
         return self._reading if path == self._first else {}
 
     def frame(self) -> None:
-        """Look at all of it, from the front and a little to the side."""
+        """Fit groom and head into the picture, from the front and a little to the side."""
         groom = self.opened.groom
         points = np.concatenate([groom.strands.points, groom.head.vertices])
         self.view = OrbitView.around(points, self.size[0] / self.size[1])
-        self.floor = float(points[:, 1].min()) - 0.03
+        self.floor = float(points[:, 1].min()) - FLOOR_GAP
         self.shown.through = None
 
     @property
     def world_from_head(self) -> Float64Array:
-        """(4, 4) where the head is."""
+        """(4, 4) pose of the head."""
         return self.motion.matrix()
 
     def camera(self, size: tuple[int, int] | None = None) -> Camera:
-        """Return the camera of the picture, world."""
+        """Return the camera of the picture, world frame."""
         width, height = size or self.size
         through = self.shown.through
         if through is not None and through in self.photo_cameras:
-            return fitted(self.photo_cameras[through], width, height)
+            return fit_camera(self.photo_cameras[through], width, height)
         return self.view.camera(width, height)
 
     @property
     def photo_cameras(self) -> dict[str, Camera]:
-        """Cameras of the photos by view name: as found, or as the head is being placed."""
+        """Cameras of the photos by view name: reconstructed, or of the manual alignment."""
         return self.layers.cameras if self.adjusted is None else self.adjusted
 
     def adjust(self, on: bool) -> None:
-        """Begin to place the head by hand, or leave it; raises `InputError` without photos."""
+        """Start or leave the manual alignment of the head; raises `InputError` without photos."""
         before = None if self.adjustment is None else self.adjustment.before
         self.adjustment, self.adjusted = None, None
-        if before is not None:  # what the adjustment has changed goes back
+        if before is not None:  # restore the display settings
             self.paused, self.shown.opacity = before.paused, before.opacity
             self.shown.through = before.through
             if not before.photos:
@@ -177,21 +185,21 @@ class Session:
         if on:
             folder = self.layers.capture
             if folder is None:
-                raise InputError("the photos are not here; name their folder by --capture")
+                raise InputError("the folder of the photos is unknown; pass it with --capture")
             self.adjustment = Adjustment.of(
                 self.manager, folder, self.opened.groom.head, self.layers.cameras
             )
-            self.place_head()
+            self.update_photo_cameras()
         elif self.shown.through not in self.layers.cameras:
             self.shown.through = None
 
-    def place_head(self) -> None:
-        """Take over the pose of the adjustment."""
+    def update_photo_cameras(self) -> None:
+        """Update the cameras of the photos from the alignment."""
         if self.adjustment is not None:
             self.adjusted = self.adjustment.cameras()
 
-    def look_after_rerun(self) -> None:
-        """Tell how a reconstruction goes on; show what it has made when it ends."""
+    def poll_rerun(self) -> None:
+        """Show the progress of a reconstruction; load its result when it ends."""
         if self.rerun is None:
             return
         self.message = f"reconstructing: {self.rerun.progress}"
@@ -202,26 +210,26 @@ class Session:
         rerun.check()
         self.adjust(False)
         self.reload()
-        self.message = "reconstructed from the head as it was placed"
+        self.message = "reconstructed from the aligned head"
 
     def advance(self, seconds: float) -> None:
-        """Let time pass, unless paused."""
+        """Simulate `seconds`, unless paused."""
         if self.paused:
             return
-        self._behind += seconds
+        self._time_debt += seconds
         before, began = self.steps, time.perf_counter()
-        while self._behind >= STEP * (1 - 1e-6):
-            self._behind -= STEP
+        while self._time_debt >= STEP * (1 - 1e-6):
+            self._time_debt -= STEP
             self._step()
-            if self.most_seconds is not None and time.perf_counter() - began > self.most_seconds:
-                self._behind = 0.0
-        if self.steps > before and not self.on_card:
-            self.look_for_runaways()
+            if self.max_seconds is not None and time.perf_counter() - began > self.max_seconds:
+                self._time_debt = 0.0
+        if self.steps > before and not self.guides_on_gpu:
+            self.check_stability()
 
     def step(self) -> None:
-        """Let one step of time pass."""
+        """Simulate one step."""
         self._step()
-        self.look_for_runaways()
+        self.check_stability()
 
     def _step(self) -> None:
         self.motion.advance(STEP)
@@ -229,47 +237,47 @@ class Session:
             head_from_rest=self.world_from_head,
             wind=self.wind.velocity(),
             turbulence=self.wind.turbulence,
-            grabs=() if self.hold is None else self.hold.grabs(),
+            grabs=() if self.grabbed_lock is None else self.grabbed_lock.grabs(),
         )
-        self.tuned.simulator.advance(STEP, surroundings)
+        self.simulation.simulator.advance(STEP, surroundings)
         self.steps += 1
 
-    def look_for_runaways(self) -> None:
-        """Put hair that is nowhere any more back to rest."""
-        if not np.isfinite(self.tuned.simulator.points).all():
+    def check_stability(self) -> None:
+        """Reset head and hair if a point is not finite."""
+        if not np.isfinite(self.simulation.simulator.points).all():
             self.reset()
-            self.message = "the simulation became unstable and was put back to rest"
+            self.message = "the simulation diverged and was reset to rest; use more substeps"
 
     def reset(self) -> None:
-        """Put head and hair back to rest."""
+        """Reset head and hair to rest."""
         self.motion.stop()
-        self.hold = None
-        self._behind = 0.0
-        self.tuned.simulator.reset(np.eye(4))
+        self.grabbed_lock = None
+        self._time_debt = 0.0
+        self.simulation.simulator.reset(np.eye(4))
 
     def guide_rows(self) -> Float32Array:
-        """Return (G, m, 3) the present guides in the head frame."""
+        """Return the present guides (G, m, 3), head frame, metres."""
         matrix = self.world_from_head.astype(np.float32)
-        rows = self._sampler(self.tuned.simulator.points)
+        rows = self._sampler(self.simulation.simulator.points)
         return np.asarray((rows - matrix[:3, 3]) @ matrix[:3, :3], np.float32)
 
     def guide_buffer(self) -> Any:
-        """Return the same as a moderngl buffer, None where the simulator does not keep hair there.
+        """Return the guides as a moderngl buffer, None if the simulator does not run on the GPU.
 
-        A simulator that computes by shaders has `rows_buffer(before, part)` (see the one of `pbd`);
-        use it inside `renderer()`.
+        A simulator on the GPU has a method `rows_buffer(before, part)`, see that of `pbd`; use it
+        inside `renderer()`.
         """
-        made = getattr(self.tuned.simulator, "rows_buffer", None)
+        made = getattr(self.simulation.simulator, "rows_buffer", None)
         buffer = None if made is None else made(self._sampler.before, self._sampler.part)
-        self.on_card = buffer is not None
+        self.guides_on_gpu = buffer is not None
         return buffer
 
     def measures(self) -> Measures:
         """Return the simulator's read-outs."""
-        return self.tuned.simulator.measure()
+        return self.simulation.simulator.measure()
 
     def set_hairs(self, count: int) -> None:
-        """Draw so many strands, the guides among them."""
+        """Set the number of strands drawn, including guides."""
         self.shown.hairs = count
         if count > len(self.body) and self._own is None:
             self._make_body()
@@ -277,23 +285,23 @@ class Session:
     def _take(self, opened: Opened) -> None:
         guides, self._own = split_guides(opened.groom)
         self.opened = opened
-        self.tuned = Tuned(self.manager, guides, self._simulator)
+        self.simulation = TunableSimulator(self.manager, guides, self._simulator)
         self.motion = HeadMotion(opened.groom.head.joints[1].astype(np.float64))
         self.adjustment, self.adjusted = None, None
         self.layers = Layers(opened.results, self._capture)
-        self.hold = self.picked = None
-        self.steps, self._behind = 0, 0.0
+        self.grabbed_lock = self.picked = None
+        self.steps, self._time_debt = 0, 0.0
         self._make_body()
 
     def _make_body(self) -> None:
-        groom, strands = self.opened.groom, self.tuned.simulator.strands
+        groom, strands = self.opened.groom, self.simulation.simulator.strands
         hairs = max(self.shown.hairs, len(strands))
         self.body = HairBody.of(strands, groom.head, groom.material, hairs, self._own, self.seed)
         self._sampler = GuideSampler(strands, self.body.shares)
 
 
-def fitted(camera: Camera, width: int, height: int) -> Camera:
-    """Return a photo's camera for a picture of another shape: all of the photo is in it."""
+def fit_camera(camera: Camera, width: int, height: int) -> Camera:
+    """Return a photo's camera for a picture of another aspect that shows the whole photo."""
     scale = min(width / camera.width, height / camera.height)
     focal, centre = camera.focal * scale, camera.centre * scale
     spare = np.array([width - camera.width * scale, height - camera.height * scale]) / 2

@@ -1,4 +1,4 @@
-"""The simulator behind the preview: a plugin by name, tuned by its own options, or none at all."""
+"""The simulator of the viewer: a plugin and its option values, or hair that moves rigidly."""
 
 from __future__ import annotations
 
@@ -16,11 +16,17 @@ from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 PREFERRED = "pbd"
-STILL = "none"
+"""Plugin used if none is named."""
+NO_SIMULATOR = "none"
+"""Name that stands for no simulation."""
+OPTION_STEPS = 20
+"""Steps from the lowest to the highest value of an option."""
+RELATIVE_STEP = 0.1
+"""Step of an option without a useful range, as a share of its value."""
 
 
-class StillHair:
-    """Hair that goes rigidly with the head: what is shown when no simulator is there."""
+class RigidHair:
+    """Hair that moves rigidly with the head, for viewing without a simulator."""
 
     def __init__(self, groom: Groom) -> None:
         self._strands = groom.strands
@@ -34,7 +40,7 @@ class StillHair:
 
     @property
     def options(self) -> Any:
-        """There are none."""
+        """None: there are no options."""
         return None
 
     @property
@@ -48,20 +54,20 @@ class StillHair:
         return self._points
 
     def advance(self, seconds: float, surroundings: Surroundings) -> None:
-        """Go with the head."""
+        """Move the hair with the head."""
         self._time += seconds
         self._move(surroundings.head_from_rest)
 
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
-        """Go to the head."""
+        """Move the hair to the head; set the time to 0."""
         self._time = 0.0
         self._move(np.eye(4) if head_from_rest is None else np.asarray(head_from_rest))
 
     def retune(self, options: Any) -> None:
-        """Take no notice: there are no options."""
+        """Do nothing: there are no options."""
 
     def measure(self) -> Measures:
-        """Return that nothing moves."""
+        """Return zeros: rigid hair has no strain."""
         return Measures(0.0, 0.0, 0.0)
 
     def _move(self, matrix: npt.NDArray[np.float64]) -> None:
@@ -69,35 +75,35 @@ class StillHair:
         self._points = moved.astype(np.float32)
 
 
-def preferred(manager: Manager) -> str:
-    """Return the simulator that is taken when none is named."""
+def default_simulator(manager: Manager) -> str:
+    """Return the name of the simulator used if none is named."""
     names = manager.names("make_simulator")
-    return PREFERRED if PREFERRED in names else (names[0] if names else STILL)
+    return PREFERRED if PREFERRED in names else (names[0] if names else NO_SIMULATOR)
 
 
-class Tuned:
-    """A simulator with the values of its plugin's options."""
+class TunableSimulator:
+    """A simulator whose options can be changed while it runs."""
 
     def __init__(self, manager: Manager, groom: Groom, plugin: str | None = None) -> None:
-        """Make the simulator `plugin`; by default `pbd`, else the first one, else `none`."""
+        """Make the simulator `plugin`; None: `pbd`, or the first installed one, or `none`."""
         names = manager.names("make_simulator")
-        plugin = preferred(manager) if plugin is None else plugin
-        if plugin not in (*names, STILL):
-            raise InputError(unknown_name("simulator", plugin, [*names, STILL]))
+        plugin = default_simulator(manager) if plugin is None else plugin
+        if plugin not in (*names, NO_SIMULATOR):
+            raise InputError(unknown_name("simulator", plugin, [*names, NO_SIMULATOR]))
         self._manager = manager
         self.plugin = plugin
         self.values: dict[str, Any] = {}
-        """Options that differ from their defaults."""
+        """Values of the options that differ from their defaults."""
         self.simulator: Simulator = (
-            StillHair(groom)
-            if plugin == STILL
+            RigidHair(groom)
+            if plugin == NO_SIMULATOR
             else manager.call("make_simulator", plugin, None, groom=groom)
         )
 
     @property
     def infos(self) -> tuple[OptionInfo, ...]:
         """The options of the plugin."""
-        return () if self.plugin == STILL else self._manager.info(self.plugin).options
+        return () if self.plugin == NO_SIMULATOR else self._manager.info(self.plugin).options
 
     def value(self, name: str) -> Any:
         """Return the present value of an option."""
@@ -105,7 +111,7 @@ class Tuned:
         return getattr(self.simulator.options, name) if value is None else value
 
     def set(self, name: str, value: object) -> None:
-        """Change one option, from now on; `OptionError` when the value is refused."""
+        """Change one option; raises `OptionError` if the value is invalid."""
         info = self._info(name)
         options = self._manager.options(self.plugin, {**self.values, name: value})
         checked = getattr(options, name)
@@ -115,13 +121,13 @@ class Tuned:
         self.simulator.retune(options)
 
     def replace(self, values: dict[str, object]) -> None:
-        """Take these values, and the defaults of all others."""
+        """Set these options, and all others to their defaults."""
         options = self._manager.options(self.plugin, values)
         self.values = {name: getattr(options, name) for name in values}
         self.simulator.retune(options)
 
-    def nudged(self, name: str, steps: int) -> Any:
-        """Return an option's next value: a twentieth of its range, the next choice, the other."""
+    def step_option(self, name: str, steps: int) -> Any:
+        """Return an option's value some steps on: of its range, its choices, or on and off."""
         info, value = self._info(name), self.value(name)
         if info.choices:
             place = info.choices.index(value) + steps
@@ -129,9 +135,9 @@ class Tuned:
         if isinstance(value, bool):
             return not value
         if isinstance(value, int):
-            return int(_within(info, value + steps))
+            return int(_clamp(info, value + steps))
         if isinstance(value, float):
-            return float(_within(info, value + steps * _stride(info, value)))
+            return float(_clamp(info, value + steps * _step_size(info, value)))
         return value
 
     def _info(self, name: str) -> OptionInfo:
@@ -141,13 +147,13 @@ class Tuned:
         raise InputError(unknown_name("option", name, [info.name for info in self.infos]))
 
 
-def _stride(info: OptionInfo, value: float) -> float:
+def _step_size(info: OptionInfo, value: float) -> float:
     if info.low is not None and info.high is not None and info.high <= 100 * max(abs(value), 1e-9):
-        return (info.high - info.low) / 20
-    return 0.1 * max(abs(value), 1e-3)
+        return (info.high - info.low) / OPTION_STEPS
+    return RELATIVE_STEP * max(abs(value), 1e-3)
 
 
-def _within(info: OptionInfo, value: float) -> float:
+def _clamp(info: OptionInfo, value: float) -> float:
     low = -np.inf if info.low is None else info.low
     high = np.inf if info.high is None else info.high
     return float(np.clip(value, low, high))

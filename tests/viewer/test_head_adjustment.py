@@ -135,7 +135,7 @@ def test_without_photos_there_is_nothing_to_adjust(session: Session) -> None:
     with pytest.raises(InputError, match="--capture"):
         perform(session, "adjust")
     for name in ("head_move", "head_turn", "head_save", "reconstruct"):
-        with pytest.raises(InputError, match="begin with the action adjust"):
+        with pytest.raises(InputError, match="start with the action adjust"):
             perform(session, name)
 
 

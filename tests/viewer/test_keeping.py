@@ -17,8 +17,8 @@ from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import Recorder, free_name, write_png
 from hairkit.viewer.session import Session
-from hairkit.viewer.simulation import StillHair
-from hairkit.viewer.window.file_watcher import EVERY, Watch, shader_files
+from hairkit.viewer.simulation import RigidHair
+from hairkit.viewer.window.file_watcher import POLL_INTERVAL, FileWatcher, shader_files
 
 PICTURE = np.full((48, 64, 3), (200, 60, 20), np.uint8)
 
@@ -47,7 +47,7 @@ def test_a_folder_of_pictures_is_numbered(tmp_path: Path) -> None:
     read = cv2.imread(str(tmp_path / "frames" / "0001.png"))
     assert read is not None
     assert read[0, 0].tolist() == [20, 60, 200]
-    with pytest.raises(InputError, match=r"\.mp4 files or folders"):
+    with pytest.raises(InputError, match=r"expected an \.mp4 file or a folder"):
         Recorder(tmp_path / "a.avi")
 
 
@@ -62,14 +62,14 @@ def test_names_that_are_taken_get_a_number(tmp_path: Path) -> None:
 def test_a_changed_file_is_noticed_once(tmp_path: Path) -> None:
     """After the next look it counts as seen; a file that comes later counts as a change."""
     path = tmp_path / "groom.npz"
-    watch = Watch([path])
-    assert not watch.changed(EVERY + 1)
+    watch = FileWatcher([path])
+    assert not watch.changed(POLL_INTERVAL + 1)
     path.write_bytes(b"1")
-    assert not watch.changed(EVERY + 1.1)  # too early to look again
-    assert watch.changed(2 * EVERY + 2)
-    assert not watch.changed(3 * EVERY + 3)
+    assert not watch.changed(POLL_INTERVAL + 1.1)  # too early to look again
+    assert watch.changed(2 * POLL_INTERVAL + 2)
+    assert not watch.changed(3 * POLL_INTERVAL + 3)
     os.utime(path, ns=(1, 1))
-    assert watch.changed(4 * EVERY + 4)
+    assert watch.changed(4 * POLL_INTERVAL + 4)
 
 
 def test_all_shaders_of_the_viewer_are_watched() -> None:
@@ -82,7 +82,7 @@ def test_runaway_hair_is_put_back_to_rest(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A simulator that gives no numbers any more does not take the viewer with it."""
-    simulator = session.tuned.simulator
+    simulator = session.simulation.simulator
     rest = simulator.points.copy()
 
     def explode(seconds: float, surroundings: object) -> None:
@@ -90,13 +90,13 @@ def test_runaway_hair_is_put_back_to_rest(
 
     monkeypatch.setattr(simulator, "advance", explode)
     session.advance(0.05)
-    np.testing.assert_array_equal(session.tuned.simulator.points, rest)
-    assert "unstable" in session.message
+    np.testing.assert_array_equal(session.simulation.simulator.points, rest)
+    assert "diverged" in session.message
 
 
 def test_without_a_simulator_hair_goes_rigidly_with_the_head(session: Session) -> None:
     """Points keep their places in the head's frame, and read-outs say that all is calm."""
-    still = StillHair(session.opened.groom)
+    still = RigidHair(session.opened.groom)
     matrix = np.eye(4)
     matrix[:3, 3] = (0.1, 0.0, -0.2)
     still.reset(matrix)
@@ -107,13 +107,13 @@ def test_without_a_simulator_hair_goes_rigidly_with_the_head(session: Session) -
 
 def test_every_option_can_be_changed_by_keys(session: Session) -> None:
     """Each kind of option has a next value, and within its bounds."""
-    for info in describe(type(session.tuned.simulator.options)):
-        before = session.tuned.value(info.name)
+    for info in describe(type(session.simulation.simulator.options)):
+        before = session.simulation.value(info.name)
         for steps in (1, -1, 200, -400):
-            value = session.tuned.nudged(info.name, steps)
+            value = session.simulation.step_option(info.name, steps)
             perform(session, "option", {"name": info.name, "value": value})  # is within bounds
         perform(session, "option", {"name": info.name, "value": before})
-        assert session.tuned.nudged(info.name, 1) != before
+        assert session.simulation.step_option(info.name, 1) != before
 
 
 def test_a_broken_shader_leaves_the_picture_as_it_was(

@@ -20,7 +20,7 @@ from hairkit.testing import (
     turn_scene,
 )
 from hairkit.viewer.actions.actions import perform
-from hairkit.viewer.layers import BOARDS, Layers
+from hairkit.viewer.layers import BILLBOARDS, Layers
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
 
@@ -51,10 +51,10 @@ def test_a_picture_in_space_covers_what_its_camera_sees(results: Path) -> None:
     """Its corners project onto the corners of the photo."""
     layers = Layers(results)
     for layer in ("masks", "orientation"):
-        boards = layers.boards(layer)
-        assert sorted(boards) == sorted(SCENE.names)
+        billboards = layers.billboards(layer)
+        assert sorted(billboards) == sorted(SCENE.names)
         for name, camera in zip(SCENE.names, SCENE.cameras, strict=True):
-            corners = camera.project(boards[name].corners)
+            corners = camera.project(billboards[name].corners)
             size = np.array([camera.width, camera.height])
             np.testing.assert_allclose(corners, [[0, 0], [1, 0], [0, 1], [1, 1]] * size, atol=1e-3)
 
@@ -63,10 +63,10 @@ def test_masks_show_hair_and_orientation_shows_upright_strands_in_one_hue(result
     """Opaque where hair is, clear in the background."""
     layers = Layers(results)
     mask = ball_mask(SCENE.cameras[0])
-    image = layers.boards("masks")["front"].image
+    image = layers.billboards("masks")["front"].image
     assert (image[mask.hair][:, 3] > 200).all()
     assert (image[mask.labels == 0][:, 3] == 0).all()
-    angles = layers.boards("orientation")["front"].image
+    angles = layers.billboards("orientation")["front"].image
     assert len(np.unique(angles[mask.hair], axis=0)) == 1
 
 
@@ -97,7 +97,7 @@ def test_a_groom_alone_has_the_head_alone(tmp_path: Path) -> None:
     """Layers that are not there are refused with what to do."""
     layers = Layers(None)
     assert layers.available == ("head", "torso")
-    with pytest.raises(InputError, match="open the folder that hairkit reconstruct wrote"):
+    with pytest.raises(InputError, match="open a folder that hairkit reconstruct wrote"):
         layers.check("hull")
     with pytest.raises(InputError, match="no layer 'hat'"):
         layers.check("hat")
@@ -120,7 +120,7 @@ def test_every_layer_changes_the_picture(results: Path, swaying_manager: Manager
         preview = Preview(gl, session)
         preview.frame(0.0, still=True)
         plain = preview.picture().copy()
-        for layer in (*BOARDS[1:], "cameras", "hull", "field", "head", "torso"):
+        for layer in (*BILLBOARDS[1:], "cameras", "hull", "field", "head", "torso"):
             perform(session, "layer", {"name": layer})
             preview.frame(0.0, still=True)
             assert (preview.picture() != plain).any(), layer

@@ -1,10 +1,10 @@
-"""What the user can do in the viewer, as one table of actions with names and values.
+"""The actions of the viewer: what a user or a script can do.
 
-Keys, mouse, panel and scripts go through this table, so each of them can do the same.
+Each action is a function of a session and of named values; keys, mouse, panel and scripts use it.
 
 * `actions`: the actions
-* `pose`: the actions that place the head by hand
-* `presets`: named settings beside the groom
+* `pose`: actions that align the head with the photos
+* `presets`: simulator options saved under a name
 * `registry`: the table: names, values and keys
-* `script`: scripts of actions, without a window
+* `script`: TOML scripts of actions, run without a window
 """

@@ -1,4 +1,4 @@
-"""Everything a user can do, in one table: keys, mouse, panel and scripts all go through it.
+"""The actions of the viewer, with their keys: mouse, panel and scripts use them too.
 
 >>> sorted(ACTIONS)[:3]
 ['adjust', 'colours', 'drag']
@@ -12,41 +12,42 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.errors import InputError
-from hairkit.options import unknown_name
-from hairkit.viewer.actions import pose  # adds its own to the table
+from hairkit.options import OptionInfo, unknown_name
+from hairkit.viewer.actions import pose  # registers its actions
 from hairkit.viewer.actions.presets import presets_path, read_preset, write_preset
-from hairkit.viewer.actions.registry import ACTIONS, action, bindings, checked_values, perform
+from hairkit.viewer.actions.registry import ACTIONS, action, bindings, check_values, perform
 from hairkit.viewer.draw.colouring import COLOURINGS
 from hairkit.viewer.draw.hair_data import MAX_HAIRS
-from hairkit.viewer.head_motion import AXES, Shake
+from hairkit.viewer.head_motion import AXES, MAX_TURN, Shake
 from hairkit.viewer.picking import grab_lock, nearest_point, surface_point
 from hairkit.viewer.recording import Recorder, free_name
-from hairkit.viewer.session import Session
+from hairkit.viewer.session import MAX_TURBULENCE, MAX_WIND, Session
 
-__all__ = ["ACTIONS", "LOOKS", "bindings", "checked_values", "perform", "pose"]
-
+__all__ = ["ACTIONS", "LOOKS", "bindings", "check_values", "perform", "pose"]
 LOOKS = {"front": (0.0, 0.0), "side": (90.0, 0.0), "back": (180.0, 0.0), "top": (0.0, 89.0)}
 """Named views: azimuth and elevation, degrees."""
 MAX_SECONDS = 3600.0
+"""Longest `run` of a script."""
+EXPOSURES = 0.05, 8.0
 
 
 @action()
 def orbit(session: Session, right: float = 0.0, up: float = 0.0) -> None:
-    """Turn the camera around the hair, by degrees to its right and up."""
+    """Orbit the camera, by degrees to its right and up."""
     session.shown.through = None
     session.view = session.view.orbited(right, up)
 
 
 @action()
 def pan(session: Session, right: float = 0.0, down: float = 0.0) -> None:
-    """Slide the picture, in shares of its height."""
+    """Pan the picture, by fractions of its height."""
     session.shown.through = None
     session.view = session.view.panned(right, down)
 
 
 @action(PAGE_UP={"factor": 1.15}, PAGE_DOWN={"factor": 1 / 1.15})
 def zoom(session: Session, factor: float) -> None:
-    """Go nearer, or away."""
+    """Zoom in or out."""
     if not factor > 0:
         raise InputError(f"zoom: factor is {factor}, expected a number above 0")
     session.shown.through = None
@@ -55,9 +56,9 @@ def zoom(session: Session, factor: float) -> None:
 
 @action()
 def recentre(session: Session, x: float, y: float) -> None:
-    """Look at what is under a pixel."""
+    """Orbit around the point under a pixel."""
     camera = session.camera()
-    points = session.tuned.simulator.points
+    points = session.simulation.simulator.points
     picked = nearest_point(camera, points, (x, y))
     point = points[picked] if picked is not None else None
     if point is None:
@@ -79,16 +80,16 @@ def look(session: Session, name: str) -> None:
 
 @action(HOME={})
 def frame(session: Session) -> None:
-    """Show all of the hair again."""
+    """Fit all of the hair into the picture."""
     session.frame()
 
 
 @action(N={"step": 1}, B={"step": -1})
 def through(session: Session, name: str = "", step: int = 0) -> None:
-    """Look through the camera of the next photo, of the one before, or by name."""
+    """Look through the camera of the next or previous photo, or by name."""
     names = list(session.photo_cameras)
     if not names:
-        raise InputError("there are no photos' cameras here; open the folder of a reconstruction")
+        raise InputError("no cameras of photos; open a folder that hairkit reconstruct wrote")
     if name and name not in names:
         raise InputError(unknown_name("view", name, names))
     if step:
@@ -99,28 +100,28 @@ def through(session: Session, name: str = "", step: int = 0) -> None:
 
 @action(SPACE={})
 def pause(session: Session, on: bool | None = None) -> None:
-    """Stop time, or let it go on."""
+    """Pause or resume the simulation."""
     session.paused = not session.paused if on is None else on
 
 
 @action(PERIOD={})
 def step(session: Session) -> None:
-    """Stop time and let one sixtieth of a second pass."""
+    """Pause, and simulate one step of 1/60 s."""
     session.paused = True
     session.step()
 
 
 @action(R={})
 def reset(session: Session) -> None:
-    """Put head and hair back to rest."""
+    """Reset head and hair to rest."""
     session.reset()
 
 
 @action()
 def run(session: Session, seconds: float) -> None:
-    """Let a script wait while time passes and pictures are recorded."""
+    """Simulate for some seconds; for scripts."""
     if not 0 <= seconds <= MAX_SECONDS:
-        raise InputError(f"run: {seconds} seconds, expected 0 to {MAX_SECONDS:g}")
+        raise InputError(f"run: seconds is {seconds}, expected 0 to {MAX_SECONDS:g}")
     session.pending += seconds
 
 
@@ -132,12 +133,14 @@ def wind(
     azimuth: float | None = None,
     turbulence: float | None = None,
 ) -> None:
-    """Let the wind blow or not."""
+    """Turn the wind on or off."""
     air = session.wind
     air.blowing = not air.blowing if on is None else on
-    air.speed = air.speed if speed is None else float(np.clip(speed, 0, 60))
+    air.speed = air.speed if speed is None else float(np.clip(speed, 0, MAX_WIND))
     air.azimuth = air.azimuth if azimuth is None else azimuth
-    air.turbulence = air.turbulence if turbulence is None else float(np.clip(turbulence, 0, 5))
+    air.turbulence = (
+        air.turbulence if turbulence is None else float(np.clip(turbulence, 0, MAX_TURBULENCE))
+    )
 
 
 @action(
@@ -151,7 +154,7 @@ def wind(
 def wind_change(
     session: Session, degrees: float = 0.0, faster: float = 0.0, gustier: float = 0.0
 ) -> None:
-    """Turn the wind by degrees, make it faster by m/s, more or less turbulent."""
+    """Change the wind's direction (degrees), speed (m/s) or turbulence."""
     air = session.wind
     azimuth = (air.azimuth + degrees + 180.0) % 360.0 - 180.0
     gusts = round(air.turbulence + gustier, 6)
@@ -182,46 +185,46 @@ def turn(
     roll: float = 0.0,
     straight: bool = False,
 ) -> None:
-    """Turn the head to its right, its left, up, down, or set it straight."""
+    """Turn the head right, left, up or down, or straighten it."""
     for axis, degrees in (("yaw", yaw), ("pitch", pitch), ("roll", roll)):
         now = 0.0 if straight else session.motion.turn[axis]
-        session.motion.turn[axis] = float(np.clip(now + np.radians(degrees), -2.0, 2.0))
+        session.motion.turn[axis] = float(np.clip(now + np.radians(degrees), -MAX_TURN, MAX_TURN))
 
 
 @action()
 def grab(session: Session, x: float, y: float) -> None:
-    """Take the lock under a pixel into the hand."""
-    simulator = session.tuned.simulator
+    """Grab the lock of hair under a pixel."""
+    simulator = session.simulation.simulator
     offsets = simulator.strands.offsets
-    session.hold = grab_lock(session.camera(), simulator.points, offsets, (x, y))
-    if session.hold is None:
-        session.message = "no hair there to grab"
+    session.grabbed_lock = grab_lock(session.camera(), simulator.points, offsets, (x, y))
+    if session.grabbed_lock is None:
+        session.message = "no hair under the mouse"
 
 
 @action()
 def drag(session: Session, x: float, y: float) -> None:
-    """Move the hand that holds hair to a pixel."""
-    if session.hold is not None:
-        session.hold = session.hold.moved(session.camera(), (x, y))
+    """Drag the grabbed lock to a pixel."""
+    if session.grabbed_lock is not None:
+        session.grabbed_lock = session.grabbed_lock.moved(session.camera(), (x, y))
 
 
 @action()
 def release(session: Session) -> None:
-    """Let go of the hair."""
-    session.hold = None
+    """Release the grabbed lock."""
+    session.grabbed_lock = None
 
 
 @action()
 def pick(session: Session, x: float, y: float) -> None:
-    """Tell the numbers of the guide under a pixel; beside hair: of none."""
-    simulator = session.tuned.simulator
+    """Show the length and stretch of the guide under a pixel; none beside hair."""
+    simulator = session.simulation.simulator
     picked = nearest_point(session.camera(), simulator.points, (x, y))
     session.picked = None if picked is None else int(simulator.strands.strand_of_point[picked])
 
 
 @action(LEFT_BRACKET={"times": 0.8}, RIGHT_BRACKET={"times": 1.25})
 def hairs(session: Session, count: int = 0, times: float = 1.0) -> None:
-    """Draw fewer or more hairs."""
+    """Draw fewer or more strands."""
     wanted = count or round(session.shown.hairs * times)
     session.set_hairs(int(np.clip(wanted, len(session.body.guides), MAX_HAIRS)))
     session.message = f"{session.shown.hairs} hairs"
@@ -229,18 +232,18 @@ def hairs(session: Session, count: int = 0, times: float = 1.0) -> None:
 
 @action(G={})
 def guides(session: Session, only: bool | None = None) -> None:
-    """Show the guides alone."""
+    """Show only the guides."""
     session.shown.guides_only = not session.shown.guides_only if only is None else only
 
 
 @action(D={})
 def colours(session: Session, by: str = "") -> None:
-    """Colour by hair, direction, length, stretch, curvature, confidence."""
+    """Colour by hair, direction, length, stretch, curvature or confidence."""
     if by and by not in COLOURINGS:
         raise InputError(unknown_name("colouring", by, COLOURINGS))
     known = COLOURINGS if session.layers.has_confidence else COLOURINGS[:-1]
     if by and by not in known:
-        raise InputError("no confidence is here; open the folder that hairkit reconstruct wrote")
+        raise InputError("no confidence to show; open a folder that hairkit reconstruct wrote")
     now = known.index(session.shown.colours) if session.shown.colours in known else -1
     session.shown.colours = by or known[(now + 1) % len(known)]
     session.message = f"coloured by {session.shown.colours}"
@@ -266,85 +269,82 @@ def layer(session: Session, name: str, on: bool | None = None) -> None:
 
 @action(E={"times": 1.15}, SHIFT_E={"times": 1 / 1.15})
 def exposure(session: Session, value: float | None = None, times: float = 1.0) -> None:
-    """Make the light brighter or darker."""
+    """Raise or lower the exposure."""
     wanted = times * (session.shown.exposure if value is None else value)
-    session.shown.exposure = float(np.clip(wanted, 0.05, 8.0))
+    session.shown.exposure = float(np.clip(wanted, *EXPOSURES))
 
 
 @action(O={"more": 0.1}, SHIFT_O={"more": -0.1})
 def opacity(session: Session, value: float | None = None, more: float = 0.0) -> None:
-    """Make photos in space more or less opaque, 0 to 1."""
+    """Raise or lower the opacity of the photos, 0 to 1."""
     wanted = more + (session.shown.opacity if value is None else value)
     session.shown.opacity = float(np.clip(wanted, 0.0, 1.0))
 
 
 @action()
 def option(session: Session, name: str, value: object) -> None:
-    """Change an option of the simulator."""
-    session.tuned.set(name, value)
+    """Set an option of the simulator."""
+    session.simulation.set(name, value)
 
 
 @action(TAB={"by": 1}, SHIFT_TAB={"by": -1})
 def option_next(session: Session, by: int = 1) -> None:
-    """Choose the option that + and - change."""
-    infos = session.tuned.infos
-    if not infos:
-        raise InputError(f"the simulator {session.tuned.plugin!r} has no options")
-    session.shown.option = (session.shown.option + by) % len(infos)
-    _tell_option(session)
+    """Select the option that + and - change."""
+    session.shown.option += by
+    _show_option(session)
 
 
 @action(EQUAL={"steps": 1}, MINUS={"steps": -1}, KP_ADD={"steps": 1}, KP_SUBTRACT={"steps": -1})
 def option_change(session: Session, steps: int = 1) -> None:
-    """Change the chosen option by steps."""
-    infos = session.tuned.infos
-    if not infos:
-        raise InputError(f"the simulator {session.tuned.plugin!r} has no options")
-    name = infos[session.shown.option % len(infos)].name
-    session.tuned.set(name, session.tuned.nudged(name, steps))
-    _tell_option(session)
+    """Change the selected option by steps."""
+    name = _selected_option(session).name
+    session.simulation.set(name, session.simulation.step_option(name, steps))
+    _show_option(session)
 
 
 @action(CTRL_S={})
 def preset_save(session: Session, name: str = "preset") -> None:
-    """Keep the simulator's options under a name, beside the groom."""
+    """Save the simulator's options under a name, beside the groom."""
     path = presets_path(session.opened.path)
-    values = {k: v for k, v in session.tuned.values.items() if v is not None}
-    write_preset(path, name, {"simulator": session.tuned.plugin, "options": values})
-    session.message = f"kept in {path}"
+    values = {k: v for k, v in session.simulation.values.items() if v is not None}
+    write_preset(path, name, {"simulator": session.simulation.plugin, "options": values})
+    session.message = f"saved to {path}"
 
 
 @action(CTRL_L={})
 def preset_load(session: Session, name: str = "preset") -> None:
-    """Take the options that were kept under a name."""
+    """Load the options saved under a name."""
     preset = read_preset(presets_path(session.opened.path), name)
-    plugin = preset.get("simulator", session.tuned.plugin)
-    if plugin != session.tuned.plugin:
-        raise InputError(f"preset {name!r} is of {plugin!r}; run view with --simulator {plugin}")
-    session.tuned.replace(dict(preset.get("options", {})))
-    session.message = f"preset {name}"
+    plugin = preset.get("simulator", session.simulation.plugin)
+    if plugin != session.simulation.plugin:
+        raise InputError(
+            f"preset {name!r} is for the simulator {plugin!r}, not {session.simulation.plugin!r};"
+            f" run hairkit view with --simulator {plugin}"
+        )
+    session.simulation.replace(dict(preset.get("options", {})))
+    session.message = f"loaded preset {name}"
 
 
 @action(CTRL_D={})
 def option_defaults(session: Session) -> None:
-    """Take the default of every option of the simulator."""
-    session.tuned.replace({})
-    session.message = f"{session.tuned.plugin} as it is by default"
+    """Reset all options of the simulator to their defaults."""
+    session.simulation.replace({})
+    session.message = f"defaults of {session.simulation.plugin}"
 
 
 @action(P={})
 def screenshot(session: Session, file: str = "hairkit.png") -> None:
-    """Write the picture to hairkit.png, or the next free number."""
+    """Save the picture to hairkit.png, or hairkit_1.png if that exists."""
     session.screenshots.append(Path(file))
 
 
 @action(V={})
 def record(session: Session, on: bool | None = None, file: str = "hairkit.mp4") -> None:
-    """Record into an .mp4 file (or a folder of PNG files), or stop."""
+    """Start or stop recording to an .mp4 file or a folder of PNG files."""
     wanted = session.recorder is None if on is None else on
     if session.recorder is not None:
         session.recorder.close()
-        session.message = f"{session.recorder.count} pictures in {session.recorder.path}"
+        session.message = f"wrote {session.recorder.count} frames to {session.recorder.path}"
         session.recorder = None
     if wanted:
         path = Path(file)
@@ -353,31 +353,31 @@ def record(session: Session, on: bool | None = None, file: str = "hairkit.mp4") 
 
 @action(H={})
 def help_sheet(session: Session, on: bool | None = None) -> None:
-    """Show the keys."""
+    """Show or hide the keys."""
     session.shown.help = not session.shown.help if on is None else on
 
 
 @action(F1={})
 def panel(session: Session, on: bool | None = None) -> None:
-    """Show the panel of options."""
+    """Show or hide the option panel."""
     session.shown.panel = not session.shown.panel if on is None else on
 
 
 @action(T={})
 def numbers(session: Session, on: bool | None = None) -> None:
-    """Show the read-outs."""
+    """Show or hide the read-outs."""
     session.shown.numbers = not session.shown.numbers if on is None else on
 
 
 @action()
 def open_file(session: Session, file: str) -> None:
-    """Show another groom, also when its file is dropped on the window."""
+    """Open another groom; a file dropped on the window does the same."""
     session.open(Path(file))
 
 
 @action(F5={})
 def reload(session: Session) -> None:
-    """Read the groom again."""
+    """Reload the groom from its file."""
     session.reload()
 
 
@@ -387,7 +387,13 @@ def leave(session: Session) -> None:
     session.finished = True
 
 
-def _tell_option(session: Session) -> None:
-    infos = session.tuned.infos
-    info = infos[session.shown.option % len(infos)]
-    session.message = f"{info.name} = {session.tuned.value(info.name)}   {info.doc}"
+def _show_option(session: Session) -> None:
+    info = _selected_option(session)
+    session.message = f"{info.name} = {session.simulation.value(info.name)}   {info.doc}"
+
+
+def _selected_option(session: Session) -> OptionInfo:
+    infos = session.simulation.infos
+    if not infos:
+        raise InputError(f"the simulator {session.simulation.plugin!r} has no options to change")
+    return infos[session.shown.option % len(infos)]

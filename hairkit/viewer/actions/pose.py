@@ -1,4 +1,4 @@
-"""The actions that place the head by hand against the photos; part of the table of `actions`."""
+"""Actions that align the head with the photos by hand."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from hairkit.errors import InputError
 from hairkit.options import unknown_name
 from hairkit.types.camera import Camera
 from hairkit.viewer.actions.registry import action
-from hairkit.viewer.head_adjustment import PLUGIN, Adjustment, Before, Rerun
+from hairkit.viewer.head_adjustment import PLUGIN, Adjustment, PreviousView, Rerun
 from hairkit.viewer.head_motion import AXES
 from hairkit.viewer.session import Session
 
-SEEN_THROUGH = 0.5
-"""Opacity of the photos while the head is placed: both must be seen."""
+PHOTO_OPACITY = 0.5
+"""Opacity of the photos during the alignment, so that both photo and head are visible."""
 
 
 @action(A={})
 def adjust(session: Session, on: bool | None = None) -> None:
-    """Place the head by hand against the photos, or leave that."""
+    """Start or leave the manual alignment of the head with the photos."""
     wanted = session.adjustment is None if on is None else on
     if wanted == (session.adjustment is not None):
         return
@@ -25,15 +25,15 @@ def adjust(session: Session, on: bool | None = None) -> None:
         return
     shown = session.shown
     photos = "photos" in shown.layers
-    session.adjustment.before = Before(session.paused, photos, shown.opacity, shown.through)
+    session.adjustment.before = PreviousView(session.paused, photos, shown.opacity, shown.through)
     session.reset()
     session.paused = True
     shown.layers.add("photos")
-    shown.opacity = SEEN_THROUGH
+    shown.opacity = PHOTO_OPACITY
     shown.through = shown.through or next(iter(session.photo_cameras))
     session.message = (
         "ctrl+arrows move the head, ctrl+J O I K T Y turn it; N next photo; O shift+O opacity;"
-        " ctrl+E keeps it, ctrl+R reconstructs from it, A leaves"
+        " ctrl+E saves the pose, ctrl+R reconstructs from it, A leaves"
     )
 
 
@@ -44,10 +44,10 @@ def adjust(session: Session, on: bool | None = None) -> None:
     CTRL_DOWN={"up": -0.001},
 )
 def head_move(session: Session, right: float = 0.0, up: float = 0.0, back: float = 0.0) -> None:
-    """Move the head by metres, as the photo's camera sees it."""
+    """Move the head by metres along the axes of the photo's camera."""
     adjustment = _adjusting(session)
     adjustment.move(_photo_camera(session), right, up, back)
-    session.place_head()
+    session.update_photo_cameras()
 
 
 @action(
@@ -63,43 +63,43 @@ def head_turn(session: Session, axis: str = "yaw", degrees: float = 1.0) -> None
     if axis not in AXES:
         raise InputError(unknown_name("axis", axis, AXES))
     _adjusting(session).turn(axis, degrees)
-    session.place_head()
+    session.update_photo_cameras()
 
 
 @action(CTRL_PAGE_UP={"factor": 1.01}, CTRL_PAGE_DOWN={"factor": 1 / 1.01})
 def head_scale(session: Session, factor: float) -> None:
-    """Make the head larger or smaller."""
+    """Scale the head."""
     if not 0.1 <= factor <= 10:
         raise InputError(f"head_scale: factor is {factor}, expected 0.1 to 10")
     _adjusting(session).grow(factor)
-    session.place_head()
+    session.update_photo_cameras()
 
 
 @action(CTRL_E={})
 def head_save(session: Session) -> None:
-    """Keep the head's pose in capture.toml."""
-    session.message = f"kept in {_adjusting(session).save()}"
+    """Save the head's pose to capture.toml."""
+    session.message = f"saved to {_adjusting(session).save()}"
 
 
 @action(CTRL_R={})
 def reconstruct(session: Session) -> None:
-    """Keep the head's pose, and reconstruct the hair again from there."""
+    """Save the head's pose and reconstruct the hair from it."""
     adjustment, results = _adjusting(session), session.opened.results
     if results is None:
-        raise InputError("the groom lies in no folder of results; run hairkit reconstruct first")
+        raise InputError("the groom is not in a results folder; run hairkit reconstruct first")
     if session.rerun is not None:
-        raise InputError("a reconstruction is going on already; wait for its end")
+        raise InputError("a reconstruction is already running; wait until it ends")
     adjustment.save()
     session.rerun = Rerun.start(adjustment.folder, results, (f"scene={PLUGIN}",))
 
 
 def _adjusting(session: Session) -> Adjustment:
     if session.adjustment is None:
-        raise InputError("the head is not being placed; begin with the action adjust (key A)")
+        raise InputError("the head is not being aligned; start with the action adjust (key A)")
     return session.adjustment
 
 
 def _photo_camera(session: Session) -> Camera:
-    """Return the camera that is looked through, or the first one."""
+    """Return the camera of the photo on screen, or the first one."""
     cameras, name = session.photo_cameras, session.shown.through
     return cameras[name] if name in cameras else next(iter(cameras.values()))

@@ -1,6 +1,6 @@
-"""Settings under a name, beside the groom: `groom.presets.toml`, which people can edit.
+"""Named presets of simulator options, in a TOML file beside the groom: `groom.presets.toml`.
 
-A table a preset, in it the simulator's plugin and its options that differ from the defaults.
+Each preset is a table: the plugin, and its options that differ from the defaults.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ Preset = dict[str, Any]
 
 
 def presets_path(groom: Path) -> Path:
-    """Return where the presets of a groom are kept."""
+    """Return the path of a groom's presets."""
     return groom.with_name(f"{groom.stem}.presets.toml")
 
 
 def read_presets(path: Path) -> dict[str, Preset]:
-    """Return presets by name; none when there is no file."""
+    """Return presets by name; empty if the file does not exist."""
     if not os.path.lexists(path):
         return {}
     try:
@@ -35,15 +35,15 @@ def read_presets(path: Path) -> dict[str, Preset]:
         raise InputError(f"{path}: not a TOML file: {error}") from error
     for name, table in document.items():
         if not isinstance(table, Mapping):
-            raise InputError(f"{path}: {name} is no table; begin it with [{name}]")
+            raise InputError(f"{path}: {name!r} is not a table; start it with [{name}]")
     return document
 
 
 def preset_names(path: Path) -> tuple[str, ...]:
-    """Return the names of the presets, none where the file cannot be read; cheap to ask again."""
+    """Return the names of the presets, none if the file cannot be read; cached."""
     try:
         return _names(path, path.stat().st_mtime_ns)
-    except (OSError, InputError):  # told of when one of them is taken
+    except (OSError, InputError):  # reported when a preset is loaded
         return ()
 
 
@@ -53,7 +53,7 @@ def _names(path: Path, changed: int) -> tuple[str, ...]:
 
 
 def read_preset(path: Path, name: str) -> Preset:
-    """Return one preset; `InputError` when there is none of that name."""
+    """Return one preset; raises `InputError` if there is none of that name."""
     presets = read_presets(path)
     if name not in presets:
         raise InputError(f"{path}: {unknown_name('preset', name, presets)}")
@@ -61,7 +61,7 @@ def read_preset(path: Path, name: str) -> Preset:
 
 
 def write_preset(path: Path, name: str, preset: Mapping[str, Any]) -> None:
-    """Keep a preset, among those that are there."""
+    """Add a preset to the file, or replace it."""
     presets = read_presets(path) | {name: dict(preset)}
     lines = []
     for title, table in presets.items():

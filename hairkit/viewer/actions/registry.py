@@ -1,4 +1,4 @@
-"""The one table of actions: name, function, values and keys; how they are added and done."""
+"""The table of actions: how they are registered, checked and performed."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ _Do = Callable[..., None]
 
 @dataclass(frozen=True)
 class Action:
-    """One thing the user can do."""
+    """An action of the user."""
 
     name: str
     do: _Do
-    """Takes the session, then the values."""
+    """Function of the session and the values."""
     doc: str
-    """One line for help sheet and manual."""
+    """One line for the help sheet and the manual."""
     values: type[Any]
-    """Dataclass of the values that it takes."""
+    """Dataclass of its values."""
     keys: Mapping[str, Mapping[str, object]]
-    """Keys that do it, and the values that they give."""
+    """Keys bound to it, and the values that each of them passes."""
 
 
 ACTIONS: dict[str, Action] = {}
@@ -36,19 +36,20 @@ ACTIONS: dict[str, Action] = {}
 
 
 def perform(session: Session, name: str, values: Mapping[str, object] | None = None) -> None:
-    """Do one action.
+    """Perform an action.
 
     Raises
     ------
     InputError, OptionError
-        There is no such action, a value is unknown, missing or refused, or it cannot be done here.
+        The action does not exist, a value is unknown, missing or invalid, or the action is not
+        possible in this session.
     """
-    wanted = checked_values(name, values or {})
+    wanted = check_values(name, values or {})
     ACTIONS[name].do(session, **wanted)
 
 
-def checked_values(name: str, values: Mapping[str, object]) -> dict[str, Any]:
-    """Return all values of an action, defaults among them; raises as `perform`."""
+def check_values(name: str, values: Mapping[str, object]) -> dict[str, Any]:
+    """Return all values of an action, including defaults; raises as `perform`."""
     if name not in ACTIONS:
         raise InputError(unknown_name("action", name, sorted(ACTIONS)))
     kind = ACTIONS[name].values
@@ -56,12 +57,12 @@ def checked_values(name: str, values: Mapping[str, object]) -> dict[str, Any]:
     wanted = {f.name: getattr(checked, f.name) for f in dataclasses.fields(kind)}
     missing = [key for key, value in wanted.items() if value is _MISSING]
     if missing:
-        raise InputError(f"{name}: no value for {', '.join(missing)}")
+        raise InputError(f"{name}: missing value of {', '.join(missing)}")
     return wanted
 
 
 def signature(action: Action) -> str:
-    """Return name and values of an action: `zoom factor: float`, `turn yaw: float = 0.0, ...`."""
+    """Return the signature of an action: `zoom factor: float`, `turn yaw: float = 0.0, ...`."""
     values = []
     for field in dataclasses.fields(action.values):
         kind = field.type.__name__ if isinstance(field.type, type) else str(field.type)
@@ -71,7 +72,7 @@ def signature(action: Action) -> str:
 
 
 def bindings() -> dict[str, tuple[str, Mapping[str, object]]]:
-    """Return what each key does: action and values."""
+    """Return the action and values of each key."""
     return {
         key: (action.name, values)
         for action in ACTIONS.values()
@@ -83,7 +84,7 @@ _MISSING: Any = inspect.Parameter.empty
 
 
 def action(**keys: Mapping[str, object]) -> Callable[[_Do], _Do]:
-    """Put a function into the table under its name; keys are written as in `keyboard.KEYS`."""
+    """Register a function as an action; keys are named as by `keyboard.key_name`."""
 
     def add(do: _Do) -> _Do:
         hints = typing.get_type_hints(do)

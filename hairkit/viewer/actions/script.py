@@ -1,9 +1,9 @@
-"""Scripts of actions, run without a window: `[[steps]]` tables of a TOML file.
+"""Scripts of actions, run without a window: a TOML file with a list of `[[steps]]`.
 
 size = [640, 360]          # pixels
 hairs = 5000
 [[steps]]
-do = "wind"                # an action of `hairkit.viewer.actions.actions`, the rest are its values
+do = "wind"                # name of an action; the other keys are its values
 on = true
 speed = 5
 [[steps]]
@@ -11,7 +11,7 @@ do = "run"
 seconds = 1.5
 [[steps]]
 do = "screenshot"
-file = "windy.png"         # in the folder of --out
+file = "windy.png"         # relative to --out
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import Any
 from hairkit.errors import HairkitError, InputError
 from hairkit.options import make_options, option
 from hairkit.storage import read_text
-from hairkit.viewer.actions.actions import checked_values, perform
+from hairkit.viewer.actions.actions import check_values, perform
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import FRAMES_PER_SECOND, Recorder
 from hairkit.viewer.session import Session
@@ -37,16 +37,16 @@ _READS = ("open_file",)
 
 @dataclass(frozen=True)
 class Setup:
-    """What a script says beside its steps."""
+    """Settings of a script."""
 
-    size: tuple[int, int] = option((1280, 720), low=16, high=8192, doc="Picture.", unit="px")
+    size: tuple[int, int] = option((1280, 720), low=16, high=8192, doc="Picture size.", unit="px")
     hairs: int = option(10_000, low=0, high=200_000, doc="Strands drawn.")
-    seed: int = option(0, low=0, doc="Of the interpolated hair.")
+    seed: int = option(0, low=0, doc="Seed of the interpolated hair.")
 
 
 @dataclass(frozen=True)
 class Script:
-    """A script that was read."""
+    """A script and its settings."""
 
     path: Path
     setup: Setup
@@ -55,37 +55,37 @@ class Script:
 
 
 def read_script(path: Path) -> Script:
-    """Read a script; raises `InputError` or `OptionError` that names the step at fault."""
+    """Read a script; raises `InputError` or `OptionError` that names the invalid step."""
     try:
         document = tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: not a TOML file: {error}") from error
     steps = document.pop("steps", [])
     if not isinstance(steps, list) or not all(isinstance(step, Mapping) for step in steps):
-        raise InputError(f"{path}: steps are no tables; begin each with [[steps]]")
+        raise InputError(f"{path}: steps is not a list of tables; start each step with [[steps]]")
     setup = make_options(Setup, document, str(path))
-    return Script(path, setup, tuple(_step(path, i, dict(s)) for i, s in enumerate(steps, 1)))
+    return Script(path, setup, tuple(_check_step(path, i, dict(s)) for i, s in enumerate(steps, 1)))
 
 
 def play(preview: Preview, script: Script, out: Path) -> None:
-    """Do the steps one after the other; files go to the folder `out`, names are from there.
+    """Run the steps in order; files are written relative to the folder `out`.
 
-    Files take the place of older ones of the same name.
+    Existing files of the same name are overwritten.
 
     Raises
     ------
     InputError
-        A step cannot be done; the text says which one.
+        A step fails; the message gives its number.
     """
     out.mkdir(parents=True, exist_ok=True)
     session = preview.session
     session.overwrite = True
     films: list[Recorder] = []
     try:
-        for _ in performed(session, script, out):
+        for _ in run_steps(session, script, out):
             if session.recorder is not None and session.recorder not in films:
                 films.append(session.recorder)
-            _let_time_pass(preview)
+            _advance_pending(preview)
             _wait_for_rerun(session)
             if session.screenshots:
                 preview.frame(0.0, still=True)
@@ -99,17 +99,17 @@ def play(preview: Preview, script: Script, out: Path) -> None:
         preview.written += [film.path for film in films if film.count]
 
 
-def performed(session: Session, script: Script, out: Path) -> Iterator[None]:
-    """Do one step at each `next`, and leave it to the caller to let time pass."""
+def run_steps(session: Session, script: Script, out: Path) -> Iterator[None]:
+    """Perform one step at each `next`; the caller simulates the time in between."""
     for number, (name, values) in enumerate(script.steps, 1):
         try:
-            perform(session, name, _placed(name, values, out, script.path.parent))
+            perform(session, name, _resolve_paths(name, values, out, script.path.parent))
         except HairkitError as error:
             raise InputError(f"{script.path}: step {number}: {error}") from error
         yield
 
 
-def _let_time_pass(preview: Preview) -> None:
+def _advance_pending(preview: Preview) -> None:
     session, frame = preview.session, 1 / FRAMES_PER_SECOND
     while session.pending > 1e-9:
         seconds = min(frame, session.pending)
@@ -117,27 +117,27 @@ def _let_time_pass(preview: Preview) -> None:
         if session.recorder is not None:
             preview.frame(seconds)
         else:
-            session.advance(seconds)  # nobody sees it
+            session.advance(seconds)
 
 
 def _wait_for_rerun(session: Session) -> None:
     while session.rerun is not None:
         time.sleep(0.05)
-        session.look_after_rerun()
+        session.poll_rerun()
 
 
-def _step(path: Path, number: int, table: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+def _check_step(path: Path, number: int, table: dict[str, Any]) -> tuple[str, dict[str, Any]]:
     name = str(table.pop("do", None))
     try:
-        checked_values(name, table)
+        check_values(name, table)
     except HairkitError as error:
         raise InputError(f"{path}: step {number}: {error}") from error
     return name, table
 
 
-def _placed(name: str, values: dict[str, Any], out: Path, here: Path) -> dict[str, Any]:
-    """Return the values with file names taken from the right folder."""
+def _resolve_paths(name: str, values: dict[str, Any], out: Path, here: Path) -> dict[str, Any]:
+    """Return the values with the file name resolved: output from `out`, input from `here`."""
     base = out if name in _WRITES else here if name in _READS else None
     if base is None:
         return values
-    return {**values, "file": str(base / str(checked_values(name, values)["file"]))}
+    return {**values, "file": str(base / str(check_values(name, values)["file"]))}

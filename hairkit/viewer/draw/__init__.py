@@ -1,19 +1,20 @@
-"""Drawing of the viewer: one frame on the GPU, or by compiled loops on the processor.
+"""Drawing of the viewer: render passes for hair, light, meshes and lines.
 
-`*_gpu` and `*_cpu` modules do the same; tests compare them.
+Hair and its light volume exist twice, as compute shaders (`*_gpu`) and as compiled loops for
+machines without a graphics card (`*_cpu`); tests compare both.
 
-* `colouring`: colours of guides by length, stretch, curvature or confidence
+* `colouring`: colour maps of guides: length, stretch, curvature or confidence
 * `frame`: one frame of a session
-* `frame_budget`: lower quality where frames take too long
-* `hair_cpu`: hair drawn on the processor
-* `hair_data`: hair at rest, as the drawing code reads it
+* `frame_budget`: quality that keeps the frame time
+* `hair_cpu`: hair drawn by compiled loops
+* `hair_data`: hair at rest as offsets from guides
 * `hair_gpu`: hair drawn by compute shaders
 * `interface`: inputs and interface of the hair renderers
-* `light_cpu`: the light volume on the processor
+* `light_cpu`: the light volume on the CPU
 * `light_gpu`: the light volume on the GPU
-* `lines`: coloured lines, camera frusta, photos in space
-* `meshes`: head and hull
-* `place_kernels`: compiled placement of hair that follows guides
+* `lines`: coloured polylines and billboards
+* `meshes`: shaded meshes on the GPU
+* `place_kernels`: compiled interpolation of hair from guides
 * `raster_kernels`: compiled rasteriser of hair
 * `shade_kernels`: compiled fibre shading
 """

@@ -1,4 +1,4 @@
-"""Colours that tell numbers: guides by length, stretch, curvature or confidence."""
+"""Colour maps of guides: length, stretch, curvature or confidence."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy.typing as npt
 from hairkit.arrays import Float32Array
 
 COLOURINGS = ("hair", "direction", "length", "stretch", "curvature", "confidence")
-"""`hair` and `direction` colour all hair; the others the guides."""
+"""`hair` and `direction` apply to all hair, the others to guides."""
 FULL_STRETCH = 0.02
-"""Relative change of length that is drawn as red (longer) or blue (shorter)."""
+"""Relative change of length shown in full red (longer) or blue (shorter)."""
 _RAMP = np.array(
     [
         [0.16, 0.22, 0.60],
@@ -24,7 +24,7 @@ _RAMP = np.array(
 
 
 def ramp(values: npt.ArrayLike) -> Float32Array:
-    """Return sRGB (..., 3) of numbers in [0, 1]: blue, green, yellow, red."""
+    """Return sRGB (..., 3) for values in [0, 1]: blue, green, yellow, red."""
     place = np.clip(np.nan_to_num(np.asarray(values, np.float32)), 0, 1) * (len(_RAMP) - 1)
     low = np.minimum(place.astype(int), len(_RAMP) - 2)
     part = (place - low)[..., None]
@@ -35,7 +35,7 @@ def ramp(values: npt.ArrayLike) -> Float32Array:
 def point_values(
     by: str, rows: Float32Array, rest: Float32Array, confidence: Float32Array | None
 ) -> Float32Array:
-    """Return (G, m) numbers in [0, 1] for guides at `rows` (G, m, 3), at rest `rest`."""
+    """Return values (G, m) in [0, 1] of guides at `rows` (G, m, 3), whose rest is `rest`."""
     step, was = np.diff(rows, axis=1), np.diff(rest, axis=1)
     length, before = np.linalg.norm(step, axis=2), np.linalg.norm(was, axis=2)
     if by == "stretch":
@@ -52,7 +52,7 @@ def point_values(
 
 
 def legend(by: str, rows: Float32Array, rest: Float32Array) -> str:
-    """Return what the colours of guides (G, m, 3) say, in one line; empty for `hair`."""
+    """Return a one-line legend for guides at `rows` (G, m, 3); empty for `hair`."""
     if by == "direction":
         return "red: left and right, green: front and back, blue: up and down"
     if by == "length":
@@ -66,7 +66,7 @@ def legend(by: str, rows: Float32Array, rest: Float32Array) -> str:
 
 
 def _curvatures(rows: Float32Array) -> Float32Array:
-    """Return (G, m) curvatures of guides, 1/m; of two points: none."""
+    """Return the curvature (G, m) of guides, 1/m; 0 for guides of two points."""
     if rows.shape[1] < 3:
         return np.zeros(rows.shape[:2], np.float32)
     step = np.diff(rows, axis=1)
@@ -78,11 +78,11 @@ def _curvatures(rows: Float32Array) -> Float32Array:
 
 
 def _curvature_scale(bent: Float32Array) -> float:
-    """Return the curvature that is drawn in full red: few are beyond it."""
+    """Return the curvature shown in full red: the 98 % quantile."""
     return max(float(np.quantile(bent, 0.98)), 1e-9) if bent.size else 1e-9
 
 
 def _at_points(segments: npt.NDArray[np.floating]) -> Float32Array:
-    """Return values of segments (G, m - 1) at the points (G, m)."""
+    """Average values of segments (G, m - 1) at the points (G, m)."""
     padded = np.pad(segments, ((0, 0), (1, 1)), mode="edge")
     return np.asarray(0.5 * (padded[:, 1:] + padded[:, :-1]), np.float32)

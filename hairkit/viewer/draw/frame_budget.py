@@ -1,29 +1,29 @@
-"""Keeps drawing within a frame's time by drawing less: softness first, then pixels, then hairs."""
+"""Lower the quality until frames keep their time: antialiasing, then resolution, then strands."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 SMOOTHING = 0.3
-"""Weight of the newest time in the running one."""
-PATIENCE = 6
-"""Pictures between two changes."""
+"""Weight of the newest frame in the moving average of the draw time."""
+SETTLE_FRAMES = 6
+"""Frames between two changes of quality."""
 HEADROOM = 0.55
-"""More is drawn only when less than this share of the budget is used."""
-CALM, CALMEST = 24, 1500
-"""Pictures before more is drawn; twice as many each time that had to be taken back."""
+"""The quality is raised only below this share of the allowed time."""
+RAISE_AFTER, RAISE_AFTER_MAX = 24, 1500
+"""Frames to wait before raising the quality; doubled after a raise that was reverted."""
 
 
 @dataclass(frozen=True)
 class Quality:
-    """How much is drawn."""
+    """A level of quality."""
 
     smooth: bool
-    """Strokes have soft edges."""
+    """Strands are antialiased."""
     scale: float
-    """Pixels drawn over pixels shown, along an edge."""
+    """Drawn over displayed resolution, along an edge."""
     share: float
-    """Of the hairs asked for."""
+    """Share of the strands that are drawn."""
 
 
 LEVELS = (
@@ -35,50 +35,50 @@ LEVELS = (
     Quality(False, 0.5, 0.4),
     Quality(False, 0.5, 0.2),
 )
-"""From the best to the fastest."""
+"""From the best quality to the fastest."""
 
 
 @dataclass
 class Budget:
-    """Chooses a level by the time that pictures take."""
+    """Chooses the quality of the next frame from the times of the last ones."""
 
     seconds: float = 1 / 20
-    """A picture may take so long, simulation included (half of it at most); 0 draws the best."""
+    """Allowed time of a frame with its simulation, of which drawing gets at least half; 0: best."""
     level: int = 1
     taken: float = 0.0
-    """Running time of drawing a picture, seconds."""
-    _wait: int = PATIENCE
-    _calm: int = CALM
-    _rise_in: int = 0
-    _risen: int = CALMEST
+    """Moving average of the draw time, seconds."""
+    _wait: int = SETTLE_FRAMES
+    _raise_after: int = RAISE_AFTER
+    _frames_until_raise: int = 0
+    _frames_since_raise: int = RAISE_AFTER_MAX
 
     @property
     def quality(self) -> Quality:
-        """What to draw now."""
+        """Quality of the next frame."""
         return LEVELS[0] if self.seconds <= 0 else LEVELS[self.level]
 
-    def spent(self, seconds: float, simulated: float = 0.0) -> None:
-        """Take note of how long a picture took to draw and, before that, to simulate."""
+    def record(self, seconds: float, simulated: float = 0.0) -> None:
+        """Record how many seconds a frame took to draw and to simulate."""
         allowed = max(self.seconds - simulated, 0.5 * self.seconds)
         self.taken += SMOOTHING * (seconds - self.taken) if self.taken else seconds
         self._wait -= 1
-        self._rise_in -= 1
-        self._risen += 1
+        self._frames_until_raise -= 1
+        self._frames_since_raise += 1
         if self._wait > 0 or self.seconds <= 0:
             return
         if self.taken > allowed and self.level < len(LEVELS) - 1:
-            self._fall()
-        elif self.taken < HEADROOM * allowed and self.level > 0 and self._rise_in <= 0:
+            self._lower_quality()
+        elif self.taken < HEADROOM * allowed and self.level > 0 and self._frames_until_raise <= 0:
             self._change(-1)
-            self._risen = 0
+            self._frames_since_raise = 0
 
-    def _fall(self) -> None:
-        """Draw less; a rise that did not last makes the next one wait longer: no popping."""
-        hasty = self._risen < CALM
-        self._calm = min(2 * self._calm, CALMEST) if hasty else CALM
+    def _lower_quality(self) -> None:
+        """Lower the quality; wait longer before the next raise if the last one did not last."""
+        reverted = self._frames_since_raise < RAISE_AFTER
+        self._raise_after = min(2 * self._raise_after, RAISE_AFTER_MAX) if reverted else RAISE_AFTER
         self._change(1)
 
     def _change(self, step: int) -> None:
         self.level += step
         self.taken = 0.0
-        self._wait, self._rise_in = PATIENCE, self._calm
+        self._wait, self._frames_until_raise = SETTLE_FRAMES, self._raise_after

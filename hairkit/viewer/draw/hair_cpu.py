@@ -1,8 +1,7 @@
-"""Draws hair that follows guides on the processor, and lays the result over the picture.
+"""Draw hair that follows guides on the CPU, and composite it over the picture.
 
-Without a graphics card OpenGL's shaders run on the processor too, but in lockstep and without its
-cache in mind: this pass, made of compiled loops, draws the same hair about three times as fast.
-What it draws is what `HairPass` draws; the tests hold both together.
+Software OpenGL runs shaders on the CPU in lockstep and makes poor use of its caches; these compiled
+loops draw the same hair about three times faster. Tests compare the result with `HairPass`.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ MOST_CHUNKS = 8
 PIECE = 256
 """Hairs that a thread shades at a time, at least."""
 FARTHEST = 100.0
-"""Metres from the head's origin beyond which no guide is drawn."""
+"""Guide coordinates are clamped to this, metres from the head's origin."""
 EDGE = 3
-"""Pixels around the outermost points that strokes may reach."""
+"""Margin around the outermost points for the width of strokes, pixels."""
 
 
 class SoftHairPass:
-    """The hair's arrays and the compiled passes that draw it (see `hair_pass.HairPass`)."""
+    """The hair's arrays and the compiled passes that draw it; the CPU twin of `HairPass`."""
 
     def __init__(self, gl: Renderer, body: HairBody) -> None:
         self._gl = gl
@@ -47,30 +46,30 @@ class SoftHairPass:
         self._colours: tuple[object, Float32Array] | None = None
         self._texture: moderngl.Texture | None = None
         lay = gl.program("viewer_screen", "viewer_composite")
-        self._lay = gl.context.vertex_array(lay, [])
+        self._composite_quad = gl.context.vertex_array(lay, [])
 
     def release(self) -> None:
-        """Free what is held by OpenGL."""
-        self._lay.release()
+        """Free all GPU objects."""
+        self._composite_quad.release()
         if self._texture is not None:
             self._texture.release()
 
     def places(self) -> Float32Array:
-        """Return (S, m, 3) where the hair was last placed, metres."""
+        """Return the last positions (S, m, 3) of the hair, head frame, metres."""
         return self._places
 
     def move_guides(self, rows: GuidePlaces) -> Float32Array:
-        """Put the guides at `rows` (G, m, 3), head frame, metres; return them as points (N, 3)."""
-        # compiled loops do not check bounds: what a runaway simulation left must become a place
+        """Move the guides to `rows` (G, m, 3), head frame, metres; return them as points (N, 3)."""
+        # compiled loops do not check bounds: replace NaN and infinity of a diverged simulation
         tame = np.nan_to_num(np.clip(rows, -FARTHEST, FARTHEST))
         self._now = np.ascontiguousarray(tame, np.float32)
         self._turns = place_kernels.guide_turns(self._rest, self._now)
         return self._now.reshape(-1, 3)
 
     def place(self, view: HairView, look: HairLook) -> None:
-        """Place the hair and find what of it hides what."""
+        """Interpolate the hair from the guides and accumulate its opacity by depth."""
         body, camera = self.body, view.camera
-        self._camera = packed_camera(view)
+        self._camera = pack_camera(view)
         near, far = view.hair_depth.near, view.hair_depth.far
         self._slices = np.array([near, place_kernels.SLICES / (far - near)], np.float32)
         tiles = (-(-camera.height // place_kernels.TILE), -(-camera.width // place_kernels.TILE))
@@ -96,14 +95,14 @@ class SoftHairPass:
             corners,
         )
         self._opacity = np.empty((place_kernels.SLICES + 1, *tiles), np.float32)
-        parallel_for(place_kernels.opacity_before, tiles[0], filled, self._opacity, min_chunk=8)
+        parallel_for(place_kernels.accumulate_opacity, tiles[0], filled, self._opacity, min_chunk=8)
         size = np.array([camera.width, camera.height])
         low = np.clip(np.floor(corners[:, :2].min(axis=0)) - EDGE, 0, size - 1)
         high = np.clip(np.ceil(corners[:, 2:].max(axis=0)) + EDGE, low + 1, size)
         self._frame = low.astype(np.int64), (high - low).astype(np.int64)
 
     def draw(self, scene: HairScene) -> None:
-        """Draw the placed hair over the picture, hidden by the solids of the set."""
+        """Draw the hair over the picture, behind nearer meshes."""
         view, look = scene.view, scene.look
         (x, y), (width, height) = self._frame[0].tolist(), self._frame[1].tolist()
         frame = (x, y, width, height)
@@ -112,7 +111,7 @@ class SoftHairPass:
         if self._sums.shape[1] < width * height:
             pixels = view.camera.width * view.camera.height
             self._sums = np.zeros((self._chunks, pixels, 4), np.float32)
-        shading = shade_kernels.shading_of(
+        shading = shade_kernels.pack_shading(
             view.camera, scene.lights, scene.light.grid, direction=look.by_direction
         )
         parallel_for(
@@ -146,9 +145,9 @@ class SoftHairPass:
         )
         picture = np.empty((height, width, 4), np.uint8)
         parallel_for(raster_kernels.resolve, height, self._sums, picture, min_chunk=32)
-        self._lay_over(scene.target, picture, frame)
+        self._composite(scene.target, picture, frame)
 
-    def _lay_over(
+    def _composite(
         self, target: moderngl.Framebuffer, picture: object, frame: tuple[int, int, int, int]
     ) -> None:
         context, size = self._gl.context, target.size
@@ -164,7 +163,7 @@ class SoftHairPass:
         context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
         self._texture.use(5)
         set_uniforms(self._gl.program("viewer_screen", "viewer_composite"), u_hair=5)
-        self._lay.render(moderngl.TRIANGLES, vertices=3)
+        self._composite_quad.render(moderngl.TRIANGLES, vertices=3)
         target.scissor = (0, 0, *size)
 
     def _fibres(self, look: HairLook) -> Float32Array:
@@ -175,8 +174,8 @@ class SoftHairPass:
         return self._colours[1]
 
 
-def packed_camera(view: HairView) -> Float32Array:
-    """Return (24,): clip from head, row by row; forward and offset; size, focal, perspective."""
+def pack_camera(view: HairView) -> Float32Array:
+    """Return (24,): clip_from_head by rows, forward and offset, size, focal length, perspective."""
     camera = view.camera
     matrix = clip_from_camera(camera, view.depth) @ camera.camera_from_head
     rest = [

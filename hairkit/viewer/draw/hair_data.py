@@ -1,4 +1,4 @@
-"""What the viewer's shaders need to know of hair at rest: guides, and hair that follows them."""
+"""Hair at rest as guides and interpolated strands, in the form that the renderers read."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from hairkit.types.head import Head
 from hairkit.types.strands import Strands
 
 MOST_POINTS = 64
-"""Points of every drawn strand at most."""
+"""Largest number of points of a drawn strand."""
 TOLERANCE = 8e-4
-"""Root mean square distance that drawn strands may keep from the guides, metres."""
+"""Allowed RMS distance between guides and drawn strands, metres."""
 COUNTS, POWERS = (8, 10, 12, 14, 16, 20, 24, 32, 48), (1.0, 1.5, 2.0)
-"""Numbers of points tried, and how they crowd towards the root: most hair bends there."""
+"""Point counts tried, and exponents of their density towards the root, where hair bends most."""
 TUFT = 8
-"""Neighbouring hairs that are drawn side by side."""
+"""Neighbouring strands that stay adjacent in the order of drawing."""
 FINE = 256
-"""Points of the strands from which these are taken."""
+"""Points of the dense resampling from which drawn points are interpolated."""
 MAX_HAIRS = 200_000
 MAX_GUIDES = 2_000
-"""Of a groom without marked guides, so many strands at most are guides; the rest follow them."""
+"""Most strands taken as guides in a groom that marks none; the others follow them."""
 
 
 @dataclass(frozen=True, eq=False)
 class HairBody:
-    """Hair at rest in the form that follows moving guides; all strands have equal point counts."""
+    """Hair at rest, each strand as an offset from its guides; all have equal point counts."""
 
     guides: Strands
     """The guides, with their own points."""
     shares: Float64Array
-    """(m,) places of the drawn points, in shares of the strand's length."""
+    """(m,) positions of the drawn points, as shares of the arc length."""
     guide_rest: Float32Array
-    """(G, m, 3) the guides with the drawn number of points, metres."""
+    """(G, m, 3) the guides resampled at these shares, metres."""
     followed: Int32Array
-    """(S, 3) the guides of every hair; the first G hairs are the guides themselves."""
+    """(S, 3) indices of each strand's guides; the first G strands are the guides themselves."""
     weights: Float32Array
-    """(S, 3) of these guides, sum 1."""
+    """(S, 3) weights of these guides, sum 1."""
     offsets: Float32Array
-    """(S, m, 3) from the mix of the guides to the hair, metres."""
+    """(S, m, 3) from the weighted mean of the guides to the strand, metres."""
     widths: Float32Array
     """(S, m) diameters, metres."""
 
@@ -67,18 +67,18 @@ class HairBody:
         own: Strands | None = None,
         seed: int = 0,
     ) -> HairBody:
-        """Return guides made up to `hairs` strands, by `own` hair first, then by interpolation.
+        """Return `hairs` strands: the guides, then hair of `own` or, without it, interpolated hair.
 
-        Beyond the guides, any first part of the hair is spread evenly over the scalp. Raises
-        `InputError` when there are no guides or too many hairs are asked for.
+        After the guides the order is random, so that any first part covers the scalp evenly. Raises
+        `InputError` if there are no guides or `hairs` is out of range.
         """
         if not len(guides):
-            raise InputError("the groom has no strands to look at")
+            raise InputError("the groom has 0 guides, expected at least 1")
         if not 0 <= hairs <= MAX_HAIRS:
-            raise InputError(f"{hairs} hairs, expected 0 to {MAX_HAIRS}")
-        shares = shares_needed(guides)
+            raise InputError(f"hairs is {hairs}, expected 0 to {MAX_HAIRS}")
+        shares = choose_shares(guides)
         rest = GuideSampler(guides, shares)(guides.points)
-        hair = _hair(guides, head, material, hairs, own, seed, shares)
+        hair = _drawn_hair(guides, head, material, hairs, own, seed, shares)
         mix = closest_guides(hair)
         shape = hair.points.reshape(-1, len(shares), 3)
         course = np.einsum("sk,skmc->smc", mix.weights, rest[mix.guides], optimize=True)
@@ -89,23 +89,23 @@ class HairBody:
 
 
 class GuideSampler:
-    """Brings guides' points to equal counts, at shares (m,) of the arc length at rest."""
+    """Resamples moving guides at shares (m,) of their arc length at rest."""
 
     def __init__(self, guides: Strands, shares: Float64Array) -> None:
         self.before, self.part = _places(guides, shares)
-        """(G, m) points before the places, and (G, m, 1) how far these are on to the next ones."""
+        """(G, m) point before each sample, and (G, m, 1) fraction towards the next one."""
 
     def __call__(self, points: Float32Array) -> Float32Array:
-        """Return points (P, 3) as (G, m, 3)."""
+        """Return the samples (G, m, 3) of points (P, 3)."""
         low = points[self.before]
         rows: Float32Array = low + (points[self.before + 1] - low) * self.part
         return rows
 
 
 def split_guides(groom: Groom, most: int = MAX_GUIDES) -> tuple[Groom, Strands | None]:
-    """Return the groom of the guides alone, and its other strands or None where it has none.
+    """Return a groom of the guides alone, and the other strands; None if there are none.
 
-    Where no strand is marked as a guide and there are more than `most`, every so many-th is taken.
+    If no strand is marked as a guide and there are more than `most`, evenly spaced ones are taken.
     """
     strands = groom.strands
     guide = guide_mask(strands)
@@ -126,10 +126,10 @@ def split_guides(groom: Groom, most: int = MAX_GUIDES) -> tuple[Groom, Strands |
     return alone, strands.select(~guide)
 
 
-def shares_needed(guides: Strands) -> Float64Array:
-    """Return (m,) as few places along strands as keep the guides' shape within `TOLERANCE`."""
+def choose_shares(guides: Strands) -> Float64Array:
+    """Return the fewest sample positions (m,) that keep the guides' shape within `TOLERANCE`."""
     some = guides.select(np.arange(0, len(guides), max(1, len(guides) // 100)))
-    fine = _fine(some)
+    fine = _resample_fine(some)
     for count in COUNTS:
         for power in POWERS:
             shares = np.linspace(0, 1, count) ** power
@@ -139,8 +139,8 @@ def shares_needed(guides: Strands) -> Float64Array:
 
 
 def _misfit(fine: Float32Array, shares: Float64Array) -> float:
-    """Return the root mean square distance between strands and their chords through `shares`."""
-    coarse = _at(fine, shares)
+    """Return the RMS distance between strands and their polylines through `shares`."""
+    coarse = _sample_rows(fine, shares)
     wanted = np.linspace(0, 1, FINE)
     after = np.clip(np.searchsorted(shares, wanted, side="right"), 1, len(shares) - 1)
     span = shares[after] - shares[after - 1]
@@ -149,13 +149,13 @@ def _misfit(fine: Float32Array, shares: Float64Array) -> float:
     return float(np.sqrt(((chords - fine) ** 2).sum(axis=2).mean()))
 
 
-def _fine(strands: Strands) -> Float32Array:
-    """Return (S, FINE, 3) the strands with very many points, at equal shares."""
+def _resample_fine(strands: Strands) -> Float32Array:
+    """Return the strands resampled at FINE equal shares, (S, FINE, 3)."""
     return Strands(strands.points, strands.offsets).resampled(FINE).points.reshape(-1, FINE, 3)
 
 
-def _at(fine: Float32Array, shares: Float64Array) -> Float32Array:
-    """Return (S, m, 3) points at shares of the length."""
+def _sample_rows(fine: Float32Array, shares: Float64Array) -> Float32Array:
+    """Return points (S, m, 3) at shares of the length."""
     place = shares * (FINE - 1)
     low = np.minimum(place.astype(int), FINE - 2)
     part = (place - low).astype(np.float32)[:, None]
@@ -177,7 +177,7 @@ def _places(guides: Strands, shares: Float64Array) -> tuple[Int64Array, Float32A
     return before, part
 
 
-def _hair(
+def _drawn_hair(
     guides: Strands,
     head: Head,
     material: HairMaterial,
@@ -186,18 +186,18 @@ def _hair(
     seed: int,
     shares: Float64Array,
 ) -> Strands:
-    """Return the guides, then hair in tufts in random order, as `closest_guides` wants it."""
+    """Return the guides, marked as such, then other hair in tufts in random order."""
     count = len(guides)
-    parts = [_at(_fine(guides), shares)]
+    parts = [_sample_rows(_resample_fine(guides), shares)]
     order = np.random.default_rng(seed)
     if own is not None:
-        chosen = _scattered(own.roots, order)[: max(hairs - count, 0)]
-        parts.append(_at(_fine(own.select(chosen)), shares))
+        chosen = _shuffle_tufts(own.roots, order)[: max(hairs - count, 0)]
+        parts.append(_sample_rows(_resample_fine(own.select(chosen)), shares))
     elif hairs > count:
         roots = sample_roots(head, hairs - count, seed, first=count)
         new = densify(guides, hairs, seed, roots=roots, material=material)
-        shuffled = new.select(count + _scattered(new.roots[count:], order))
-        parts.append(_at(_fine(shuffled), shares))
+        shuffled = new.select(count + _shuffle_tufts(new.roots[count:], order))
+        parts.append(_sample_rows(_resample_fine(shuffled), shares))
     total = sum(len(part) for part in parts)
     return Strands(
         np.concatenate(parts).reshape(-1, 3),
@@ -206,14 +206,14 @@ def _hair(
     )
 
 
-def _scattered(roots: Float32Array, generator: np.random.Generator) -> Int64Array:
-    """Return an order (N,) of hairs: tufts of neighbours, the tufts in random order.
+def _shuffle_tufts(roots: Float32Array, generator: np.random.Generator) -> Int64Array:
+    """Return an order (N,) of strands: tufts of neighbours, the tufts in random order.
 
-    Neighbours are hidden together and equally long: software renderers draw 8 hairs side by side.
+    Software renderers draw `TUFT` strands in lockstep; neighbours are occluded together.
     """
     low, high = roots.min(axis=0), roots.max(axis=0)
     cell = ((roots - low) / np.maximum(high - low, 1e-9) * 1023).astype(np.int64)
-    code = np.zeros(len(roots), np.int64)  # along a Morton curve neighbours stay together
+    code = np.zeros(len(roots), np.int64)  # Morton code: neighbours in space are near in order
     for bit in range(10):
         for axis in range(3):
             code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)

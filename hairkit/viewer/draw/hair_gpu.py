@@ -1,7 +1,7 @@
-"""Draws hair that follows guides by compute shaders; without a card `soft_hair` is faster.
+"""Draw hair that follows guides with compute shaders; on software renderers `hair_cpu` is faster.
 
-Passes: guides turned since rest; hair placed, projected and counted in cells of the view; cells
-summed to what hides what; hair shaded and drawn.
+Passes: rotation of the guides since rest; interpolation and projection of the hair, whose opacity
+is splatted into view cells; accumulation of opacity by depth; shading and rasterisation.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ SLICES, TILE = 32, 8
 _GROUP = 64
 MOST_GUIDES = 65_535
 LATE = 0.05
-"""Metres that a box of the picture before is made larger by."""
+"""Margin added to the bounding box of the previous frame, metres."""
 _NOTHING = np.array([2**31 - 1] * 3 + [-(2**31)] * 3, np.int32).tobytes()
 NEAR_HAIR, OFF_GUIDES = 0.05, 0.06
-"""Metres: hair nearer than the first may be anywhere in the picture; hair keeps within the second
-of the guides."""
+"""Metres: hair nearer to the camera than the first may cover the whole picture; hair is within the
+second of its guides."""
 
 
 class HairPass:
@@ -41,7 +41,9 @@ class HairPass:
         self._gl = gl
         self.body = body
         if len(body.guides) > MOST_GUIDES:
-            raise InputError(f"{len(body.guides)} guides, the viewer draws at most {MOST_GUIDES}")
+            raise InputError(
+                f"{len(body.guides)} guides, expected at most {MOST_GUIDES}; mark fewer as guides"
+            )
         count, points = len(body), body.points_each
         context = gl.context
         self._rest = context.buffer(np.ascontiguousarray(body.guide_rest, np.float32))
@@ -65,14 +67,14 @@ class HairPass:
             self._view.release()
 
     def places(self) -> moderngl.Buffer:
-        """Return (S, m, 3) float32 where the hair was last placed, metres."""
+        """Return the last positions (S, m, 3) of the hair, float32, head frame, metres."""
         return self._places
 
     def move_guides(self, rows: GuidePlaces) -> Float32Array:
-        """Put the guides at `rows` (G, m, 3), head frame, metres; return points around them.
+        """Move the guides to `rows` (G, m, 3), head frame, metres; return points that bound them.
 
-        Guides in a buffer are not read back, only the box around them, and that of the picture
-        before, which the card has finished; hair moves less than `LATE` meanwhile.
+        Guides in a buffer are not read back, only their bounding box of the previous frame, which
+        is already computed; it is enlarged by `LATE`.
         """
         given = isinstance(rows, moderngl.Buffer)
         if not given:
@@ -96,14 +98,14 @@ class HairPass:
         return self._cloud
 
     def _read_box(self) -> tuple[Float32Array, Float32Array]:
-        """Return the lowest and the highest coordinates (3,) of the guides."""
+        """Return the corners (3,) of the guides' bounding box."""
         code = np.frombuffer(self._bounds.read(), np.int32)
-        # the bits of negative numbers are turned over in the shader so that they can be compared
+        # the shader maps floats to integers of the same order; undo that
         values = np.where(code < 0, code ^ 0x7FFFFFFF, code).astype(np.int32).view(np.float32)
         return values[:3], values[3:]
 
     def place(self, view: HairView, look: HairLook) -> None:
-        """Place the hair and find what of it hides what."""
+        """Interpolate the hair from the guides and accumulate its opacity by depth."""
         buffers = self._sized(view.camera)
         near, far = view.hair_depth.near, view.hair_depth.far
         self._shared: dict[str, Any] = {
@@ -122,7 +124,7 @@ class HairPass:
         self._run("viewer_opacity", buffers.tiles[0] * buffers.tiles[1], **self._shared)
 
     def draw(self, scene: HairScene) -> None:
-        """Draw the placed hair over the picture, hidden by the solids."""
+        """Draw the hair over the picture, behind nearer meshes."""
         view, look = scene.view, scene.look
         buffers = self._sized(view.camera)
         scene.solid_depth.use(1)
@@ -147,15 +149,15 @@ class HairPass:
             **scene.lights.uniforms(),
             **scene.light.uniforms(),
         )
-        self._lay_over(scene.target, buffers, _frame_of(view.camera, self._cloud))
+        self._composite(scene.target, buffers, _frame_of(view.camera, self._cloud))
 
-    def _lay_over(
+    def _composite(
         self,
         target: moderngl.Framebuffer,
         buffers: _ViewBuffers,
         frame: tuple[int, int, int, int],
     ) -> None:
-        """Resolve the sums inside a frame, which takes them all."""
+        """Blend the accumulated hair over `target` inside a frame, and clear the sums."""
         context = self._gl.context
         target.use()
         target.scissor = frame
@@ -185,7 +187,7 @@ class HairPass:
 
 @dataclass(frozen=True)
 class _ViewBuffers:
-    """What depends on the picture's size."""
+    """Buffers whose size depends on that of the picture."""
 
     size: tuple[int, int]
     tiles: tuple[int, int]
@@ -212,7 +214,7 @@ class _ViewBuffers:
 
 
 def _frame_of(camera: Camera, cloud: Float32Array) -> tuple[int, int, int, int]:
-    """Return x, y, width and height in pixels of where hair that follows guides can be."""
+    """Return x, y, width, height, in pixels, of a frame that holds all hair of these guides."""
     size = np.array([camera.width, camera.height])
     depth = camera.depth(cloud)
     if depth.min() < NEAR_HAIR:
@@ -226,7 +228,7 @@ def _frame_of(camera: Camera, cloud: Float32Array) -> tuple[int, int, int, int]:
 
 
 def _hair_records(body: HairBody) -> bytes:
-    """Return three words a hair: guides, last guide and random number, weights of two guides."""
+    """Pack three words for each strand: guides, third guide and random number, two weights."""
     guides = body.followed.astype(np.uint32)
     random = np.rint(strand_numbers(len(body)) * 65535).astype(np.uint32)
     weights = np.rint(np.clip(body.weights, 0, 1) * 65535).astype(np.uint32)
@@ -239,6 +241,6 @@ def _hair_records(body: HairBody) -> bytes:
 
 
 def _offset_records(body: HairBody) -> bytes:
-    """Return two words a point: offset and diameter in millimetres, as half floats."""
+    """Pack two words for each point: offset and diameter in millimetres, as half floats."""
     values = np.concatenate([body.offsets, body.widths[..., None]], axis=2) * 1e3
     return np.clip(values, -6e4, 6e4).astype(np.float16).tobytes()

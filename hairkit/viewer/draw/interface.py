@@ -1,4 +1,4 @@
-"""What the passes that draw hair are told, and what they have in common."""
+"""Inputs and interface of the hair renderers."""
 
 from __future__ import annotations
 
@@ -18,29 +18,30 @@ if TYPE_CHECKING:
     from hairkit.viewer.draw.hair_data import HairBody
 
 GuidePlaces = Any
-"""(G, m, 3) float32: an array, or a moderngl buffer for drawers by shaders."""
+"""(G, m, 3) float32: an array, or a moderngl buffer for the GPU renderer."""
 FULL_LOOK = 50_000
-"""Fewer hairs are drawn wider, so that they cover the head as this many would."""
+"""Fewer strands are drawn wider, so that they cover the head as this many would."""
 WIDEST = 5.0
+"""Largest factor of that widening."""
 
 
 @dataclass(frozen=True)
 class HairLook:
-    """How the hair is drawn in one picture."""
+    """How the hair is drawn in one frame."""
 
     hairs: int
-    """Strands drawn, the guides first."""
+    """Number of strands, the guides first."""
     smooth: bool
-    """True: strokes have soft edges; False is faster."""
+    """True antialiases strands; False is faster."""
     root_colour: tuple[float, float, float]
     tip_colour: tuple[float, float, float]
     by_direction: bool = False
     wider: float | None = None
-    """How many times wider than they are strands are drawn; None: by their number."""
+    """Drawn over true width; None: from the number of strands."""
 
     @property
     def times_wider(self) -> float:
-        """How many times wider strands are drawn."""
+        """Drawn over true width."""
         if self.wider is not None:
             return self.wider
         return float(np.clip(np.sqrt(FULL_LOOK / max(self.hairs, 1)), 1.0, WIDEST))
@@ -48,53 +49,53 @@ class HairLook:
 
 @dataclass(frozen=True)
 class HairView:
-    """Where hair is looked at from."""
+    """The camera of the hair and its depth ranges."""
 
     camera: Camera
-    """In the head frame, at the picture's size."""
+    """Head frame, at the size of the frame."""
     depth: DepthRange
-    """Of the depth buffer."""
+    """Range of the depth buffer."""
     hair_depth: DepthRange
-    """That holds the hair alone."""
+    """Range of the hair alone."""
 
 
 @dataclass(frozen=True)
 class HairScene:
-    """What placed hair is drawn in."""
+    """Lights, occluders and target of the hair."""
 
     view: HairView
     look: HairLook
     lights: Lights
     light: Any
-    """What of the lights reaches each place, of the drawer's own kind; texture 0 holds it."""
+    """Light volume of the renderer's kind, bound as texture 0."""
     solids: moderngl.Framebuffer
-    """Whose depth hides hair."""
+    """Frame buffer whose depth occludes hair."""
     solid_depth: moderngl.Texture
-    """That depth."""
+    """Its depth texture."""
     target: moderngl.Framebuffer
-    """The picture, with everything in it that stands behind hair."""
+    """The picture, with everything drawn that is behind hair."""
 
 
 class HairDrawer(Protocol):
-    """A pass that draws hair: `hair_pass.HairPass` by shaders, `soft_hair.SoftHairPass` without."""
+    """A hair renderer: `hair_gpu.HairPass` or `hair_cpu.SoftHairPass`."""
 
     body: HairBody
 
     def release(self) -> None:
-        """Free what is held by OpenGL."""
+        """Free all GPU objects."""
 
     def places(self) -> Any:
-        """Return (S, m, 3) float32 where the hair was last placed, metres: a buffer or an array."""
+        """Return the last positions (S, m, 3) of the hair, metres: a float32 buffer or array."""
 
     def move_guides(self, rows: GuidePlaces) -> Float32Array:
-        """Put the guides at `rows` (G, m, 3), head frame, metres; return points around them.
+        """Move the guides to `rows` (G, m, 3), head frame, metres; return points (N, 3).
 
-        The points (N, 3) are the rows, or corners of a box around them where only the graphics card
-        knows these.
+        The points are the guides' own, or the corners of their bounding box if the guides are only
+        on the GPU.
         """
 
     def place(self, view: HairView, look: HairLook) -> None:
-        """Place the hair and find what of it hides what."""
+        """Interpolate the hair from the guides and accumulate its opacity by depth."""
 
     def draw(self, scene: HairScene) -> None:
-        """Draw the placed hair over the picture, hidden by the solids."""
+        """Draw the hair over the picture, behind nearer meshes."""

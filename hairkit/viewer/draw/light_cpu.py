@@ -1,7 +1,7 @@
-"""The light volume made on the processor: the compiled twin of viewer_density and viewer_light.
+"""The light volume on the CPU: the compiled twin of viewer_density.comp and viewer_light.comp.
 
-Optical depth is summed on the way to the lights and along the axes for the sky, in growing steps,
-each by the cell it ends in; the density is smoothed first, where the shaders interpolate it.
+Optical depth is integrated towards the lights, and along the axes for the sky, with steps of
+growing length, one cell lookup each; the density is smoothed first, where the shaders interpolate.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from hairkit.viewer.draw.place_kernels import row, shared
 STEPS, GROWTH = 9, 1.35
 SKY_STEPS, SKY_GROWTH = 5, 1.7
 START = 0.8
-"""Cells from the middle of a cell on: as in viewer_light.comp."""
+"""First sample, in cells from the centre of a cell, as in viewer_light.comp."""
 _SKY = ((0, 1, 0), (1, 0, 0), (-1, 0, 0), (0, 0, 1), (0, 0, -1))
 _ONE, _HALF, _QUARTER = np.float32(1), np.float32(0.5), np.float32(0.25)
 
 
 class SoftLightPass(LightVolume):
-    """The volume made by compiled loops, for hair that `SoftHairPass` places."""
+    """The light volume of hair drawn by `SoftHairPass`."""
 
     def __init__(self, gl: Renderer, guides: Strands, solids: list[Mesh]) -> None:
         super().__init__(gl, guides, solids)
@@ -37,7 +37,7 @@ class SoftLightPass(LightVolume):
         self._dense = np.zeros((thread_count(), *self._solids.shape), np.uint32)
         self._coming = np.ones((*self._solids.shape, 4), np.float32)
         self.array = self._coming.copy()
-        """(Z, Y, X, 4) what is seen of key light, rim light and sky."""
+        """(Z, Y, X, 4) transmittance towards key and rim light, visible share of the sky."""
 
     def _fill(self, hair: HairDrawer, hairs: int, per_micrometre: float) -> None:
         origin = self.grid.origin.astype(np.float32)
@@ -80,7 +80,7 @@ class SoftLightPass(LightVolume):
 def _way(
     direction: npt.ArrayLike, steps: int, growth: float, spacing: float
 ) -> tuple[Int32Array, Float32Array]:
-    """Return (steps, 3) cells z, y, x on the way along a direction, and metres in each."""
+    """Return cell offsets (steps, 3), z, y, x, along a direction, and metres in each."""
     length = growth ** np.arange(steps)
     middle = START + np.cumsum(length) - 0.5 * length
     cells = np.rint(middle[:, None] * np.asarray(direction, np.float64)[::-1])
@@ -91,7 +91,7 @@ def _way(
 def fill_cells(  # type: ignore[no-untyped-def]
     first_chunk, last_chunk, places, count, origin, per_metre, dense
 ) -> None:  # pragma: no cover - compiled
-    """Write micrometres of hair in each cell, `dense` (chunks, Z, Y, X), of places (S, m, 3)."""
+    """Write micrometres of hair in each cell, `dense` (chunks, Z, Y, X), for points (S, m, 3)."""
     chunks, deep, high, wide = dense.shape
     for chunk in range(first_chunk, last_chunk):
         own = dense[chunk]
@@ -113,9 +113,9 @@ def fill_cells(  # type: ignore[no-untyped-def]
 def sum_cells(  # type: ignore[no-untyped-def]
     first, last, dense, solids, per_micrometre, extinction, rough
 ) -> None:  # pragma: no cover - compiled
-    """Write layers of `rough` (Z, Y, X): what hair and solids take per metre, smoothed by 1 2 1.
+    """Write layers of `rough` (Z, Y, X): extinction of hair and meshes, 1/m, smoothed by 1 2 1.
 
-    Within the layers only; those of `extinction` are overwritten.
+    Smoothed within the layers only; those of `extinction` are overwritten.
     """
     chunks, _, high, wide = dense.shape
     for layer in range(first, last):

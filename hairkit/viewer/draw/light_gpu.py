@@ -1,4 +1,4 @@
-"""The light volume of moving hair: what reaches each place, kept up to date a part a picture."""
+"""The light volume of moving hair: transmittance on a grid, updated over several frames."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from hairkit.viewer.draw.interface import HairDrawer
 CELL = 0.01
 """Edge of a cell, metres."""
 MOST_CELLS = 56
-"""Along the longest side; longer hair gets larger cells."""
-REACH = 0.08
-"""Room around the hair at rest, metres."""
+"""Cells along the longest side; longer hair gets larger cells."""
+MARGIN = 0.08
+"""Margin around the hair at rest, metres."""
 TURNS = 6
-"""Pictures that share the work of one volume."""
+"""Frames over which the update of one volume is spread."""
 
 
 class LightVolume(ABC):
-    """A 3D texture of the light that reaches hair and head, in the head frame."""
+    """A 3D texture of the light that reaches hair and head, head frame."""
 
     def __init__(self, gl: Renderer, guides: Strands, solids: list[Mesh]) -> None:
         self._gl = gl
@@ -36,7 +36,7 @@ class LightVolume(ABC):
         cells = self.grid.shape
         self._cells: tuple[int, int, int] = (cells[0], cells[1], cells[2])
         self.texture = self._volume(4, "f2")
-        """What is seen of key light, rim light and sky."""
+        """Transmittance towards key and rim light, visible share of the sky."""
         self._turn = 0
         self._lights: Lights | None = None
 
@@ -54,9 +54,9 @@ class LightVolume(ABC):
         }
 
     def update(self, hair: HairDrawer, hairs: int, lights: Lights, *, whole: bool) -> None:
-        """Make a part of the next volume, or all of it, for the placed hair and the lights.
+        """Compute a part of the next volume, or all of it, for the present hair and lights.
 
-        A volume is made for one state of hair and lights, and shown when all of it is there.
+        A volume belongs to one state of hair and lights; it is shown once it is complete.
         """
         turns = 1 if whole else TURNS
         self._turn = 0 if whole else self._turn % TURNS
@@ -73,18 +73,18 @@ class LightVolume(ABC):
 
     @abstractmethod
     def _fill(self, hair: HairDrawer, hairs: int, per_micrometre: float) -> None:
-        """Find what hair and solids take, `per_micrometre` of hair in a cell."""
+        """Compute the extinction of hair, `per_micrometre` in a cell, and meshes."""
 
     @abstractmethod
     def _light(self, lights: Lights, turn: int, turns: int) -> None:
-        """Find what reaches every so many-th layer."""
+        """Compute the transmittance of every `turns`-th layer, from `turn` on."""
 
     @abstractmethod
     def _show(self) -> None:
-        """Let the finished volume be the one that is seen."""
+        """Show the finished volume."""
 
     def _volume(self, components: int, kind: str) -> moderngl.Texture3D:
-        """Return a texture of ones."""
+        """Return a 3D texture of ones."""
         ones = np.ones(int(np.prod(self._cells)) * components, f"f{kind[1]}")
         texture = self._gl.context.texture3d(self._cells, components, ones.tobytes(), dtype=kind)
         texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
@@ -93,7 +93,7 @@ class LightVolume(ABC):
 
 
 class LightPass(LightVolume):
-    """The volume made by shaders, for hair that `HairPass` places."""
+    """The light volume of hair drawn by `HairPass`."""
 
     def __init__(self, gl: Renderer, guides: Strands, solids: list[Mesh]) -> None:
         super().__init__(gl, guides, solids)
@@ -150,13 +150,13 @@ class LightPass(LightVolume):
 
 def _grid(guides: Strands, solids: list[Mesh]) -> VoxelGrid:
     clouds = [guides.points, *[solid.vertices for solid in solids]]
-    low = np.min([cloud.min(axis=0) for cloud in clouds], axis=0) - REACH
-    high = np.max([cloud.max(axis=0) for cloud in clouds], axis=0) + REACH
+    low = np.min([cloud.min(axis=0) for cloud in clouds], axis=0) - MARGIN
+    high = np.max([cloud.max(axis=0) for cloud in clouds], axis=0) + MARGIN
     return VoxelGrid.around(low, high, max(CELL, float((high - low).max()) / MOST_CELLS))
 
 
 def solid_depth(grid: VoxelGrid, solids: list[Mesh]) -> Float32Array:
-    """Return (X, Y, Z) what solids take from light per metre."""
+    """Return the extinction (X, Y, Z) of meshes, per metre."""
     nothing = Strands(np.empty((0, 3), np.float32), np.zeros(1, np.int64))
     fine = hair_density(nothing, solids)
     points = grid.centres().reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Coloured lines and pictures in space: guides, field lines, camera frusta with their photos."""
+"""Coloured polylines and billboards: guides, field lines, camera frusta, photos."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _RESTART = 0xFFFFFFFF
 
 @dataclass(frozen=True, eq=False)
 class LineSet:
-    """Polylines with a colour a point."""
+    """Polylines with a colour at each point."""
 
     points: Float32Array
     """(P, 3) metres."""
     offsets: Int64Array
-    """(L + 1,) where each line begins in `points`."""
+    """(L + 1,) first point of each line."""
     colours: Float32Array
     """(P, 4) sRGB and opacity in [0, 1]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Board:
-    """A picture in space."""
+class Billboard:
+    """A picture in 3D space."""
 
     corners: Float32Array
     """(4, 3) metres: top left, top right, bottom left, bottom right."""
@@ -40,13 +40,13 @@ class Board:
 def draw_lines(
     gl: Renderer, lines: LineSet, camera: Camera, depth: DepthRange, pull: float = 0.0
 ) -> None:
-    """Draw lines; `pull` shares of the depth range nearer than they are."""
+    """Draw lines, `pull` of the depth range nearer to the camera than they are."""
     program = gl.program("viewer_line")
     set_camera(program, camera, depth)
     set_uniforms(program, u_pull=pull)
     values = np.concatenate([lines.points, lines.colours], axis=1)
     vertices = gl.context.buffer(np.ascontiguousarray(values, np.float32))
-    indices = gl.context.buffer(_strips(lines))
+    indices = gl.context.buffer(_strip_indices(lines))
     array = gl.context.vertex_array(
         program, [(vertices, "3f 4f", "in_position", "in_colour")], index_buffer=indices
     )
@@ -55,10 +55,10 @@ def draw_lines(
         part.release()
 
 
-class BoardPass:
-    """A picture in space, on the GPU."""
+class BillboardPass:
+    """A billboard on the GPU."""
 
-    def __init__(self, gl: Renderer, board: Board) -> None:
+    def __init__(self, gl: Renderer, board: Billboard) -> None:
         self._gl = gl
         self._program = gl.program("viewer_billboard")
         height, width = board.image.shape[:2]
@@ -85,7 +85,7 @@ class BoardPass:
             part.release()
 
 
-def _strips(lines: LineSet) -> bytes:
+def _strip_indices(lines: LineSet) -> bytes:
     total, count = len(lines.points), len(lines.offsets) - 1
     owner = np.repeat(np.arange(count), np.diff(lines.offsets))
     indices = np.full(total + count, _RESTART, np.uint32)

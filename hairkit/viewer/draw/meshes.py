@@ -1,4 +1,4 @@
-"""Meshes that stay on the GPU: the head with its skin, the hull as clay."""
+"""Shaded meshes that stay on the GPU: head, hull, torso."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hairkit.types.camera import Camera
 
 
 class SolidPass:
-    """One shaded mesh on the GPU, lit at its pixels or, for software renderers, at its vertices."""
+    """A shaded mesh, lit at its pixels or, for software renderers, at its vertices."""
 
     def __init__(self, gl: Renderer, solid: Solid, *, by_vertex: bool = False) -> None:
         self._gl = gl
@@ -33,7 +33,7 @@ class SolidPass:
         )
 
     def place(self, matrix: Float64Array) -> None:
-        """Put the mesh elsewhere by a rigid motion (4, 4), from where it was made."""
+        """Move the mesh by a rigid motion (4, 4) from its original pose."""
         if np.array_equal(matrix, self._placed):
             return
         self._placed = matrix
@@ -46,7 +46,7 @@ class SolidPass:
     def draw(
         self, camera: Camera, depth: DepthRange, push: float, lighting: dict[str, Any]
     ) -> None:
-        """Draw the mesh, its depth `push` metres behind its surface."""
+        """Draw the mesh with its depth `push` metres behind its surface."""
         set_camera(self._program, camera, depth)
         set_uniforms(
             self._program,

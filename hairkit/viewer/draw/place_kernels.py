@@ -1,7 +1,7 @@
-"""Where hair that follows guides is, and what of it hides what: compiled twins of three shaders.
+"""Interpolation of hair from guides, and opacity by depth: compiled twins of three shaders.
 
-`viewer_guides.comp`, `viewer_place.comp` and `viewer_opacity.comp` do the same on a graphics card;
-the tests hold both together. Everything is float32.
+`viewer_guides.comp`, `viewer_place.comp` and `viewer_opacity.comp` do the same on a GPU; tests
+compare both. Everything is float32.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ _HOW: dict[str, Any] = {
     "cache": True, "fastmath": True, "error_model": "numpy", "_nrt": False,
 }  # fmt: skip
 row: Callable[[Any], Any] = njit(**_HOW)
-"""Compiles a function that allocates nothing: views are then not counted."""
+"""Compiles a function that allocates nothing, so that array views are not reference-counted."""
 shared: Callable[[Any], Any] = njit(nogil=True, **_HOW)
 """The same for what threads do at once (see `hairkit.parallel`)."""
 inlined: Callable[[Any], Any] = njit(fastmath=True, error_model="numpy", inline="always")
-"""Puts a function into its caller, so that loops around it run side by side."""
+"""Inlines a function, so that the compiler can vectorise loops around it."""
 SLICES, TILE = 32, 8
-"""Of the view's depth; pixels along an edge of a cell: as in viewer_hair.glsl."""
+"""Depth slices of the view; edge of a view cell in pixels, as in viewer_hair.glsl."""
 OPACITY_UNIT = np.float32(4096)
 _FAR_BEHIND = np.float32(-1)
 _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
@@ -33,7 +33,7 @@ _NEAREST, _PER_TILE, _FAR = np.float32(0.01), np.float32(1 / TILE), np.float32(1
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def guide_turns(rest, now):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return (G, m, 4) how far guides (G, m, 3) have turned since rest: x, y, z, w."""
+    """Return the rotations (G, m, 4), x, y, z, w, of guides (G, m, 3) since rest."""
     count, points = now.shape[:2]
     turns = np.empty((count, points, 4), np.float32)
     for g in range(count):
@@ -64,8 +64,8 @@ def _direction(points, g, a, b):  # type: ignore[no-untyped-def] # pragma: no co
 
 
 @inlined
-def seen_from(camera, x, y, z):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return pixel x, y, depth-buffer depth, axial depth (below 0: behind) of a place."""
+def project_point(camera, x, y, z):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return pixel x, y, depth-buffer depth and axial depth of a point; below 0: behind."""
     w = camera[12] * x + camera[13] * y + camera[14] * z + camera[15]
     over = _ONE / max(w, _CLOSE)
     px = (camera[0] * x + camera[1] * y + camera[2] * z + camera[3]) * over
@@ -83,8 +83,8 @@ def seen_from(camera, x, y, z):  # type: ignore[no-untyped-def] # pragma: no cov
 
 
 @inlined
-def pixels_a_metre(camera, depth):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the picture's scale at an axial depth."""
+def pixels_per_metre(camera, depth):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the scale of the picture at an axial depth, pixels per metre."""
     return camera[22] / max(depth, _CLOSE) if camera[23] > _HALF else camera[22]
 
 
@@ -93,11 +93,12 @@ def place_hair(  # type: ignore[no-untyped-def]
     first_chunk, last_chunk, guides, turns, followed, weights, offsets, widths, camera, slices,
     wider, count, places, seen, filled, frame,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Put chunks of `count` hairs where they are, and their pieces into cells of the view.
+    """Interpolate chunks of `count` strands, and splat their segments into the view cells.
 
-    Each point keeps its offset from the mix of three guides, turned as the nearest one turns.
-    Writes `places` (S, m, 3) metres, `seen` (S, m, 4) of `seen_from`, and for each of the chunks
-    `filled` (chunks, SLICES, tiles y, tiles x) and `frame` (chunks, 4): lowest and highest pixel.
+    Each point keeps its offset from the mean of three guides, rotated with the nearest one.
+    Writes `places` (S, m, 3) in metres and `seen` (S, m, 4), the results of `project_point`. Each
+    chunk also writes its part of `filled` (chunks, SLICES, tiles y, tiles x) and of `frame`
+    (chunks, 4), the lowest and highest pixel.
     """
     chunks = filled.shape[0]
     for chunk in range(first_chunk, last_chunk):
@@ -120,7 +121,7 @@ def _place_chunk(  # type: ignore[no-untyped-def]
         for k in range(offsets.shape[1]):
             x, y, z = _place(guides, turns, followed, weights, offsets, s, k)
             places[s, k, 0], places[s, k, 1], places[s, k, 2] = x, y, z
-            px, py, pz, depth = seen_from(camera, x, y, z)
+            px, py, pz, depth = project_point(camera, x, y, z)
             seen[s, k, 0], seen[s, k, 1], seen[s, k, 2], seen[s, k, 3] = px, py, pz, depth
             if depth > _ZERO:
                 low_x, low_y = min(low_x, px), min(low_y, py)
@@ -128,7 +129,7 @@ def _place_chunk(  # type: ignore[no-untyped-def]
         for k in range(1, offsets.shape[1]):
             depth = seen[s, k, 3]
             if depth > _ZERO and seen[s, k - 1, 3] > _ZERO:
-                width = widths[s, k] * wider * pixels_a_metre(camera, depth)
+                width = widths[s, k] * wider * pixels_per_metre(camera, depth)
                 _fill(filled, seen, s, k, slices, width)
     frame[0], frame[1], frame[2], frame[3] = low_x, low_y, high_x, high_y
 
@@ -158,7 +159,7 @@ def _place(  # type: ignore[no-untyped-def]
 
 @row
 def _fill(filled, seen, s, k, slices, width) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Add the piece from point k - 1 to k to the cells at its quarters."""
+    """Splat the segment from point k - 1 to k into the cells at its quarters."""
     ax, ay = seen[s, k - 1, 0], seen[s, k - 1, 1]
     x, y = seen[s, k, 0] - ax, seen[s, k, 1] - ay
     opacity = _HALF * np.sqrt(x * x + y * y) * width / np.float32(TILE * TILE)
@@ -177,11 +178,11 @@ def _fill(filled, seen, s, k, slices, width) -> None:  # type: ignore[no-untyped
 
 
 @shared
-def opacity_before(first, last, filled, opacity) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Write rows of (SLICES + 1, tiles y, tiles x) what hair in front of slices takes from light.
+def accumulate_opacity(first, last, filled, opacity) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Write rows of the optical depth (SLICES + 1, tiles y, tiles x) of hair before each slice.
 
-    Optical depth, a coarse form of deep opacity maps (Yuksel and Keyser 2008) along the line of
-    sight; each tile is smoothed with its neighbours. `filled` is that of `place_hair`.
+    A coarse form of deep opacity maps (Yuksel and Keyser 2008) along the line of sight; each tile
+    is smoothed with its neighbours. `filled` is the result of `place_hair`.
     """
     chunks, slices, rows, columns = filled.shape
     for j in range(first, last):

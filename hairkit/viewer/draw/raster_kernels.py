@@ -1,8 +1,8 @@
-"""Draws placed hair into sums a pixel: the compiled twin of viewer_raster.comp.
+"""Rasterise hair into a weighted sum for each pixel: the compiled twin of viewer_raster.comp.
 
-A sum is red, green and blue, each times the weight, and the weight: the coverage of the pixel times
-the share of light that hair in front lets by. Threads have sums of their own, which `resolve` adds
-up, so that equal input gives equal pictures.
+A sum holds red, green and blue times the weight, and the weight: the coverage of the pixel times
+the transmittance of the hair before it. Each chunk has its own sums, which `resolve` adds in order,
+so that equal input gives equal pictures.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.viewer.draw.place_kernels import inlined, pixels_a_metre, row, shared
+from hairkit.viewer.draw.place_kernels import inlined, pixels_per_metre, row, shared
 from hairkit.viewer.draw.shade_kernels import HIDDEN
 
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
@@ -25,10 +25,10 @@ def draw_hair(  # type: ignore[no-untyped-def]
     first_chunk, last_chunk, seen, looks, widths, solid, camera, wider, smooth, count,
     frame, sums,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Draw chunks of `count` hairs into `sums` (chunks, at least H W, 4).
+    """Draw chunks of `count` strands into `sums` (chunks, at least H W, 4).
 
-    `seen` is that of `place_hair`, `looks` of `shade_hair`; `frame` holds the lowest x and y of
-    the part of the picture that is drawn, and `solid` (H, W) the depth buffer of it.
+    `seen` comes from `place_hair`, `looks` from `shade_hair`; `frame` holds the lowest x and y of
+    the drawn part of the picture, and `solid` (H, W) its depth buffer.
     """
     chunks = sums.shape[0]
     for chunk in range(first_chunk, last_chunk):
@@ -46,7 +46,7 @@ def _draw_chunk(  # type: ignore[no-untyped-def]
     for s in range(first, last):
         for k in range(1, seen.shape[1]):
             if looks[s, k, 3] > HIDDEN and looks[s, k - 1, 3] > HIDDEN:
-                width = widths[s, k] * wider * pixels_a_metre(camera, seen[s, k, 3])
+                width = widths[s, k] * wider * pixels_per_metre(camera, seen[s, k, 3])
                 _stroke(seen, looks, s, k, width, smooth, solid, frame, sums)
 
 
@@ -54,11 +54,11 @@ def _draw_chunk(  # type: ignore[no-untyped-def]
 def _stroke(  # type: ignore[no-untyped-def]
     seen, looks, s, k, width, smooth, solid, frame, sums
 ) -> None:  # pragma: no cover - compiled
-    """Draw the piece from point k - 1 to k."""
+    """Draw the segment from point k - 1 to k."""
     ax, ay, az = seen[s, k - 1, 0] - frame[0], seen[s, k - 1, 1] - frame[1], seen[s, k - 1, 2]
     bx, by, bz = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
-    hidden = _behind(ax, ay, az, solid) + _behind(bx, by, bz, solid)
-    hidden += _behind(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid)
+    hidden = _time_debt(ax, ay, az, solid) + _time_debt(bx, by, bz, solid)
+    hidden += _time_debt(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid)
     if hidden == 3:
         return
     steep = abs(by - ay) > abs(bx - ax)
@@ -78,15 +78,15 @@ def _stroke(  # type: ignore[no-untyped-def]
     last = min(np.int64(np.ceil(bx - _HALF)), limit_x)
     t = (np.float32(x) + _HALF - ax) * pace
     y, slope = ay + t * slope, slope * pace
-    r, g, b, w = _weighted(looks, s, begin, min(across, _ONE))
-    red, green, blue, weight = _weighted(looks, s, end, min(across, _ONE))
+    r, g, b, w = _weight_colour(looks, s, begin, min(across, _ONE))
+    red, green, blue, weight = _weight_colour(looks, s, end, min(across, _ONE))
     dr, dg, db, dw = red - r, green - g, blue - b, weight - w
     half = _HALF * max(across, _ONE)
     narrow, soft, free = across <= _ONE, smooth != 0, hidden == 0
     while x < last:
         red, green, blue, weight = r + t * dr, g + t * dg, b + t * db, w + t * dw
         depth = az + t * (bz - az)
-        if narrow and soft:  # as wide as a pixel: shared by two of them
+        if narrow and soft:  # one pixel wide: split between two pixels
             low = np.int64(np.floor(y - _HALF))
             part = y - _HALF - np.float32(low)
             at = x * stride_x + low * stride_y
@@ -113,8 +113,8 @@ def _stroke(  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _weighted(looks, s, k, cover):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return colour times weight, and weight, of a point."""
+def _weight_colour(looks, s, k, cover):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the colour of a point times its weight, and the weight."""
     weight = looks[s, k, 3] * cover
     return looks[s, k, 0] * weight, looks[s, k, 1] * weight, looks[s, k, 2] * weight, weight
 
@@ -128,8 +128,8 @@ def _add(sums, at, part, red, green, blue, weight):  # type: ignore[no-untyped-d
 
 
 @inlined
-def _behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return 1 where a solid is nearer than a point, in pixels of the frame."""
+def _time_debt(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return 1 if a mesh is nearer than a point, given in pixels of the frame."""
     column = min(max(np.int64(x), 0), solid.shape[1] - 1)
     row = min(max(np.int64(y), 0), solid.shape[0] - 1)
     return 1 if depth > solid[row, column] else 0
@@ -137,7 +137,7 @@ def _behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no co
 
 @shared
 def resolve(first, last, sums, picture) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Write rows of (H, W, 4) bytes, colour and opacity, of the sums, and leave these empty."""
+    """Convert the sums to rows of (H, W, 4) bytes, colour and opacity, and clear them."""
     wide = picture.shape[1]
     for y in range(first, last):
         for x in range(wide):

@@ -1,7 +1,7 @@
-"""Light from hair fibres, compiled: the twin of lighting.glsl, marschner.glsl and tone.glsl.
+"""Shading of hair fibres: the compiled twin of lighting.glsl, marschner.glsl and tone.glsl.
 
 Marschner et al. 2003 in the cheap form of those shaders: R, TT and TRT as Gaussians about tilted
-cones, and Kajiya and Kay's (1989) diffuse term for what scatters on. All float32.
+cones, and the diffuse term of Kajiya and Kay (1989) for multiple scattering. All float32.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from hairkit.types.volume import VoxelGrid
 from hairkit.viewer.draw.place_kernels import TILE, inlined, row
 
 LANES, FIELDS = 64, 14
-"""Points that are shaded side by side, and numbers of each."""
+"""Points shaded together, and values of each."""
 DENSE = np.float32(0.4)
-"""Of the opacity of a whole tile: locks are denser than the gaps beside them."""
+"""Share of a tile's mean optical depth that is applied: locks are denser than gaps."""
 HIDDEN = np.float32(0.14)
-"""A point of which less arrives is not drawn."""
+"""Points with a lower transmittance towards the camera are not drawn."""
 
 TONES, BRIGHTEST = 4096, 7.3
-"""Entries of the table of tones; light that is white, over the exposure."""
+"""Entries of the tone table; radiance times exposure of its last entry, which is white."""
 EYE, FORWARD, KEY, KEY_COLOUR, RIM, RIM_COLOUR, SKY, ORIGIN, PER_METRE, EXPOSURE = range(0, 30, 3)
-"""Where `shading` holds what: three numbers each; the exposure, whether the view is perspective and
-whether direction is shown come last."""
+"""First index of each group of three values in `shading`; the last group is the exposure, whether
+the camera is perspective, and whether directions are shown."""
 _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
 _BOUNCED, _TINY = np.float32(0.1), np.float32(1e-20)
 _TILT, _ROUGHNESS = np.float32(0.0524), np.float32(0.14)
@@ -35,14 +35,16 @@ _OTHER, _JITTER = np.float32(61.8034), np.float32(0.12)
 
 
 def tone_table() -> Float32Array:
-    """Return (TONES,) the tone of light (k / (TONES - 1))^2 BRIGHTEST, as in tone.glsl."""
+    """Return the tone (TONES,) of radiance (k / (TONES - 1))^2 BRIGHTEST, as in tone.glsl."""
     x = (np.arange(TONES) / (TONES - 1)) ** 2 * BRIGHTEST
     film = np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0, 1)
     curve = np.where(film < 0.0031308, 12.92 * film, 1.055 * film ** (1 / 2.4) - 0.055)
     return curve.astype(np.float32)
 
 
-def shading_of(camera: Camera, lights: Lights, grid: VoxelGrid, *, direction: bool) -> Float32Array:
+def pack_shading(
+    camera: Camera, lights: Lights, grid: VoxelGrid, *, direction: bool
+) -> Float32Array:
     """Return (30,) what `shade` is told: camera, lights, and where the light volume lies."""
     sky = np.array(lights.sky_colour) * 0.65 + np.array(lights.ground_colour) * 0.35
     flags = [lights.exposure, float(camera.model == "perspective"), float(direction)]
@@ -60,7 +62,7 @@ def fibre_colours(
     random: Float32Array,
     points: int,
 ) -> Float32Array:
-    """Return (S, points, 3) the colours of fibres with random numbers (S,), linear."""
+    """Return linear colours (S, points, 3) of fibres, varied by random numbers (S,)."""
     share = np.linspace(0, 1, points, dtype=np.float32)[:, None]
     along = np.array(root, np.float32) * (1 - share) + np.array(tip, np.float32) * share
     power = (0.85 + 0.3 * random)[:, None, None]
@@ -73,10 +75,10 @@ def fibre_colours(
 def shade_hair(  # type: ignore[no-untyped-def]
     first, last, seen, places, colours, random, opacity, slices, shading, light, tones, looks,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Write `looks` (S, m, 4) of some hairs: colour as seen, and what arrives of it.
+    """Write `looks` (S, m, 4) of some strands: colour, and transmittance towards the camera.
 
-    `seen`, `places` and `opacity` are those of `soft_places`, `light` (Z, Y, X, 4) what reaches
-    each place. Points of which no more than `HIDDEN` arrives get no colour.
+    `seen`, `places` and `opacity` come from `place_kernels`; `light` (Z, Y, X, 4) is the light
+    volume. Points with a transmittance up to `HIDDEN` are not shaded.
     """
     points = np.empty(FIELDS * LANES, np.float32)
     lit = np.empty(3 * LANES, np.float32)
@@ -92,13 +94,13 @@ def _shade_chunk(  # type: ignore[no-untyped-def]
     seen, places, colours, random, opacity, slices, shading, light, tones, first, last, looks,
     points, lit, which,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Gather points that are seen, shade so many at a time side by side, and put them back."""
+    """Gather visible points, shade them in batches of `LANES`, and scatter the results."""
     waiting = 0
     for s in range(first, last):
         other = random[s] * _OTHER
         other -= np.floor(other)
         for k in range(looks.shape[1]):
-            arriving = _arriving(seen, s, k, opacity, slices)
+            arriving = _visibility(seen, s, k, opacity, slices)
             looks[s, k, 3] = arriving
             if arriving <= HIDDEN:
                 continue
@@ -115,7 +117,7 @@ def _shade_chunk(  # type: ignore[no-untyped-def]
 def _gather(  # type: ignore[no-untyped-def]
     places, colours, s, k, random, other, shading, light, points, at
 ) -> None:  # pragma: no cover - compiled
-    """Put one point into a lane: tangent, colour, random numbers and light that reaches it."""
+    """Write one point into a lane: tangent, colour, random numbers, light."""
     before, after = max(k - 1, 0), min(k + 1, places.shape[1] - 1)
     x, y, z = places[s, k, 0], places[s, k, 1], places[s, k, 2]
     points[at], points[LANES + at], points[2 * LANES + at] = x, y, z
@@ -144,7 +146,7 @@ def _flush(points, shading, tones, lit, which, count, looks) -> None:  # type: i
 
 @row
 def _show_direction(points, lit) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Colours of directions: red runs left and right, green front and back, blue up and down."""
+    """Colour by direction: red for x, green for z, blue for y."""
     low, high = np.float32(0.2), np.float32(0.8)
     for n in range(LANES):
         x, y, z = points[3 * LANES + n], points[4 * LANES + n], points[5 * LANES + n]
@@ -157,7 +159,7 @@ def _show_direction(points, lit) -> None:  # type: ignore[no-untyped-def] # prag
 
 @row
 def _light_lanes(points, shading, lit) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """What lights and sky send to the eye by way of each lane's point, as places in the tones."""
+    """Compute the radiance of each lane's point towards the camera, as an index of the tones."""
     ex, ey, ez = shading[EYE], shading[EYE + 1], shading[EYE + 2]
     fx, fy, fz = shading[FORWARD], shading[FORWARD + 1], shading[FORWARD + 2]
     kx, ky, kz = shading[KEY], shading[KEY + 1], shading[KEY + 2]
@@ -168,7 +170,7 @@ def _light_lanes(points, shading, lit) -> None:  # type: ignore[no-untyped-def] 
     bright, perspective = shading[EXPOSURE] / np.float32(BRIGHTEST), shading[EXPOSURE + 1]
     size = np.float32(TONES - 1)
     for n in range(LANES):
-        # towards the eye, which is everywhere the same without perspective
+        # towards the eye; constant for orthographic cameras
         x = perspective * (ex - points[n]) - (_ONE - perspective) * fx
         y = perspective * (ey - points[LANES + n]) - (_ONE - perspective) * fy
         z = perspective * (ez - points[2 * LANES + n]) - (_ONE - perspective) * fz
@@ -199,9 +201,10 @@ def _light_lanes(points, shading, lit) -> None:  # type: ignore[no-untyped-def] 
 
 @inlined
 def _fibre(sin_in, sin_out, away, beside, jitter):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return what is sent on white, times the colour, and times its power of one and a half.
+    """Return the factors of white, of the colour and of its power 3/2 in the scattered light.
 
-    Sines of the angles to the normal plane, the second angle, and the product of both directions.
+    Arguments: sines of the angles to the normal plane, the second angle, and the dot product of
+    both directions.
     """
     half = _HALF * (_arcsine(sin_in) + away) + (jitter - _HALF) * _JITTER
     square_in = max(_ONE - sin_in * sin_in, _ZERO)
@@ -225,7 +228,7 @@ def _lobe(x, width):  # type: ignore[no-untyped-def] # pragma: no cover - compil
 
 @inlined
 def _decay(x):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return exp(x) of x up to 0 as (1 + x / 1024)^1024, which runs side by side: 5e-4 x^2 off."""
+    """Return exp(x), x <= 0, as (1 + x / 1024)^1024, which vectorises; relative error 5e-4 x^2."""
     y = max(_ONE + x * np.float32(1 / 1024), _ZERO)
     y *= y
     y *= y
@@ -252,11 +255,11 @@ def _arcsine(x):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
 
 @inlined
 def light_at(x, y, z, shading, light):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return what of key light, rim light and sky reaches a place: `light` (Z, Y, X, 4)."""
+    """Interpolate the light volume (Z, Y, X, 4) at a point: key light, rim light, sky."""
     deep, high, wide = light.shape[:3]
-    i, u = _between((x - shading[ORIGIN]) * shading[PER_METRE] - _HALF, wide)
-    j, v = _between((y - shading[ORIGIN + 1]) * shading[PER_METRE] - _HALF, high)
-    k, w = _between((z - shading[ORIGIN + 2]) * shading[PER_METRE] - _HALF, deep)
+    i, u = _locate((x - shading[ORIGIN]) * shading[PER_METRE] - _HALF, wide)
+    j, v = _locate((y - shading[ORIGIN + 1]) * shading[PER_METRE] - _HALF, high)
+    k, w = _locate((z - shading[ORIGIN + 2]) * shading[PER_METRE] - _HALF, deep)
     key = rim = sky = _ZERO
     for a in range(2):
         along_z = w if a else _ONE - w
@@ -270,15 +273,15 @@ def light_at(x, y, z, shading, light):  # type: ignore[no-untyped-def] # pragma:
 
 
 @inlined
-def _arriving(seen, s, k, opacity, slices):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the share of light from a point that hair in front of it lets by."""
+def _visibility(seen, s, k, opacity, slices):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the transmittance from a point to the camera through the hair before it."""
     depth = seen[s, k, 3]
     if depth < _ZERO:
         return _ZERO
     layers, rows, columns = opacity.shape
-    layer, w = _between((depth - slices[0]) * slices[1], layers)
-    j, v = _between(seen[s, k, 1] * np.float32(1 / TILE) - _HALF, rows)
-    i, u = _between(seen[s, k, 0] * np.float32(1 / TILE) - _HALF, columns)
+    layer, w = _locate((depth - slices[0]) * slices[1], layers)
+    j, v = _locate(seen[s, k, 1] * np.float32(1 / TILE) - _HALF, rows)
+    i, u = _locate(seen[s, k, 0] * np.float32(1 / TILE) - _HALF, columns)
     total = _ZERO
     for a in range(2):
         along = w if a else _ONE - w
@@ -290,8 +293,8 @@ def _arriving(seen, s, k, opacity, slices):  # type: ignore[no-untyped-def] # pr
 
 
 @inlined
-def _between(place, count):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the cell before a place, and how far the place is on the way to the next."""
+def _locate(place, count):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the cell before a coordinate, and the fraction towards the next one."""
     place = min(max(place, _ZERO), np.float32(count - 1))
     cell = min(np.int64(place), count - 2)
     return cell, place - np.float32(cell)

@@ -1,13 +1,13 @@
-"""The viewer's window: everything that the operating system or the user touches directly.
+"""The window of the viewer: GLFW, input events, option panel and text overlay.
 
-It passes events on to the actions and shows what the preview has drawn.
+It passes events to the actions and shows the frames that the preview draws.
 
-* `file_watcher`: files that changed on disk
+* `file_watcher`: detects changed files
 * `gl_context`: a window with an OpenGL context
-* `hud`: text over the picture
+* `hud`: text overlay
 * `keyboard`: names of keys
 * `mouse`: mouse events to actions
-* `panel`: the optional panel of sliders
-* `splash`: the window until the first frame
-* `window`: the window itself
+* `panel`: the option panel, if imgui-bundle is installed
+* `splash`: the wait screen until the first frame
+* `window`: the main loop
 """

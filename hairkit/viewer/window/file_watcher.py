@@ -1,4 +1,4 @@
-"""Tells when files change: the groom that is shown, the shaders it is drawn with."""
+"""Detect changes of files: the open groom and the shaders."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 
-EVERY = 0.5
-"""Seconds between two looks."""
+POLL_INTERVAL = 0.5
+"""Seconds between two checks."""
 
 
-class Watch:
-    """Looks at files from time to time."""
+class FileWatcher:
+    """Polls the modification times of files."""
 
     def __init__(self, paths: Iterable[Path]) -> None:
         self._paths = tuple(paths)
@@ -19,8 +19,8 @@ class Watch:
         self._looked = 0.0
 
     def changed(self, now: float) -> bool:
-        """Return whether a file has changed since the last time; looks every half second."""
-        if now - self._looked < EVERY:
+        """Return whether a file has changed since the last check; checks every `POLL_INTERVAL`."""
+        if now - self._looked < POLL_INTERVAL:
             return False
         self._looked = now
         states = self._states()
@@ -32,7 +32,7 @@ class Watch:
 
 
 def shader_files() -> list[Path]:
-    """Return the shaders' files; none where the package is not a folder."""
+    """Return the shader files; empty if the package is not a folder."""
     folder = Path(str(resources.files("hairkit.shaders")))
     return sorted(folder.glob("*.*")) if folder.is_dir() else []
 

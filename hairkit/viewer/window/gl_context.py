@@ -1,4 +1,4 @@
-"""A GLFW window with OpenGL 4.3, as the context that moderngl takes."""
+"""A GLFW window with OpenGL 4.3 as a context for moderngl."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _CURE = (
 
 
 class WindowContext:
-    """A GLFW window as the context that moderngl takes."""
+    """A GLFW window in the form in which moderngl accepts a context."""
 
     def __init__(self, size: tuple[int, int]) -> None:
         self.glfw = load_windowing()
         failures: list[str] = []
         self.glfw.set_error_callback(lambda code, text: failures.append(_text(text)))
         if not self.glfw.init():
-            raise RenderError(f"no window: {'; '.join(failures) or 'GLFW fails'}; {_CURE}")
+            raise RenderError(f"no window: {'; '.join(failures) or 'GLFW cannot start'}; {_CURE}")
         self.window = self._create(size)
         if not self.window:
             raise RenderError(f"no window with OpenGL 4.3: {'; '.join(failures)}; {_CURE}")
@@ -45,15 +45,15 @@ class WindowContext:
 
     @property
     def settings(self) -> Any:
-        """What moderngl is to be called with."""
+        """Keyword arguments for `moderngl.create_context`."""
         return {"context": self}
 
     def load(self, name: str) -> int:
-        """Return the address of an OpenGL function, 0 when there is none."""
+        """Return the address of an OpenGL function, 0 if there is none."""
         return self.glfw.get_proc_address(name) or 0
 
     def release(self) -> None:
-        """The window stays until it is closed."""
+        """Do nothing: the window stays open until `close`."""
 
     def close(self) -> None:
         """Close the window."""
@@ -66,7 +66,7 @@ class WindowContext:
 
     def __exit__(self, *exception: object) -> None:
         self._depth -= 1
-        if not self._depth:  # no outer block goes on drawing
+        if not self._depth:  # an outer block still needs the context
             self.glfw.make_context_current(None)
 
 

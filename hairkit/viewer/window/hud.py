@@ -1,4 +1,4 @@
-"""Text over the picture, drawn on the CPU: read-outs, messages, the help sheet."""
+"""Text overlay, drawn on the CPU: read-outs, messages, the help sheet."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ from hairkit.viewer.draw.colouring import legend
 from hairkit.viewer.session import Session
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
-LINE = 18
-"""Pixels from line to line."""
+LINE_HEIGHT = 18
+"""Pixels."""
 SIZE = 0.43
-PAPER = (20, 22, 26)
+"""Scale of the font."""
+BACKGROUND = (20, 22, 26)
 """sRGB of the box behind the text."""
 OPACITY = 165
-"""Of the box, of 255."""
-LETTERS = (240, 240, 240, 255)
+"""Opacity of the box, 0 to 255."""
+TEXT_COLOUR = (240, 240, 240, 255)
 MOUSE = (
     ("left drag", "orbit"),
     ("middle or shift+left drag", "pan"),
     ("wheel or right drag", "zoom"),
     ("double click", "recentre"),
     ("ctrl+left drag", "grab hair"),
-    ("click", "numbers of a guide"),
+    ("click", "show length and stretch of a guide"),
     ("drop a file", "open it"),
 )
 
@@ -44,30 +45,30 @@ _ARROWS = ("LEFT", "RIGHT", "UP", "DOWN")
 GAP = 24
 """Pixels between columns."""
 SMALLEST = 0.75
-"""Share of its size to which a sheet shrinks at most; where that is too large it is cut off."""
+"""Smallest scale of the help sheet; a window too small for it cuts it off."""
 
 
 @dataclass(frozen=True)
 class Readings:
-    """Numbers of the last pictures."""
+    """Read-outs of the last frames."""
 
     fps: float = 0.0
     simulate_ms: float = 0.0
     draw_ms: float = 0.0
     stretch: float = 0.0
     energy: float = 0.0
-    """Joules, kinetic and potential."""
+    """Kinetic and potential, joules."""
     hairs: int = 0
     scale: float = 1.0
     renderer: str = ""
 
 
 def status_lines(session: Session, readings: Readings) -> list[str]:
-    """Return the read-outs as lines."""
+    """Return the read-outs as lines of text."""
     name, shown = session.opened.path.name, session.shown
     lines = [
         f"{name}: {len(session.body.guides)} guides{_hairs(session, readings)},"
-        f" {session.tuned.plugin}{', paused' if session.paused else ''}",
+        f" {session.simulation.plugin}{', paused' if session.paused else ''}",
         f"{readings.fps:.1f} fps   simulate {readings.simulate_ms:.1f} ms"
         f"   draw {readings.draw_ms:.1f} ms   scale {readings.scale:.2f}",
         f"stretch {100 * readings.stretch:.2f} %   energy {1e3 * readings.energy:.3g} mJ",
@@ -76,7 +77,7 @@ def status_lines(session: Session, readings: Readings) -> list[str]:
     if session.wind.blowing:
         lines.append(f"wind {session.wind.speed:.1f} m/s from {session.wind.azimuth:.0f} deg")
     if shown.through is not None:
-        lines.append(f"through the camera of {shown.through}")
+        lines.append(f"camera of photo {shown.through}")
     if shown.colours != "hair":
         lines.append(legend(shown.colours, session.guide_rows(), session.body.guide_rest))
     if session.recorder is not None:
@@ -85,7 +86,7 @@ def status_lines(session: Session, readings: Readings) -> list[str]:
 
 
 def _hairs(session: Session, readings: Readings) -> str:
-    """Return how many hairs are drawn, and of how many, when the machine is too slow for all."""
+    """Return the number of strands drawn and, if lowered to keep the frame time, requested."""
     wanted = session.shown.hairs
     if session.shown.guides_only or not readings.hairs:
         return ""
@@ -93,9 +94,9 @@ def _hairs(session: Session, readings: Readings) -> str:
 
 
 def help_lines() -> list[str]:
-    """Return the help sheet, `what<TAB>does`: mouse, then every action that has keys."""
+    """Return the help sheet, lines of `input<TAB>effect`: mouse, then actions with keys."""
     lines = [f"{what}\t{does}" for what, does in MOUSE]
-    placing = "hairkit.viewer.actions.pose"  # last: what only some need
+    placing = "hairkit.viewer.actions.pose"  # listed last, since few users need it
     for action in sorted(ACTIONS.values(), key=lambda one: one.do.__module__ == placing):
         if action.keys:
             lines.append(f"{keys_label(list(action.keys))}\t{action.doc.removesuffix('.')}")
@@ -103,12 +104,12 @@ def help_lines() -> list[str]:
 
 
 def keys_label(keys: Sequence[str]) -> str:
-    """Return how keys are called together: `ctrl+arrows`, `ctrl+J O I`, `F2 F3`, `[ ]`.
+    """Return the label of several keys: `ctrl+arrows`, `ctrl+J O I`, `F2 F3`, `[ ]`.
 
     >>> keys_label(["CTRL_LEFT", "CTRL_RIGHT", "CTRL_UP", "CTRL_DOWN"])
     'ctrl+arrows'
     """
-    keys = [key for key in keys if not key.startswith("KP_")]  # said by their twins
+    keys = [key for key in keys if not key.startswith("KP_")]  # same as + and -
     if len(keys) > 1 and all(key.startswith("CTRL_") for key in keys):
         return f"ctrl+{keys_label([key.removeprefix('CTRL_') for key in keys])}"
     if set(_ARROWS) <= set(keys):
@@ -118,7 +119,7 @@ def keys_label(keys: Sequence[str]) -> str:
 
 
 def key_label(key: str) -> str:
-    """Return how a key is called on the keyboard: `N1` is `1`, `PERIOD` is `.`."""
+    """Return the label of a key: `1` for `N1`, `.` for `PERIOD`."""
     if key.startswith("N") and key[1:].isdigit():
         return key[1:]
     for modifier in ("CTRL", "SHIFT"):
@@ -130,7 +131,7 @@ def key_label(key: str) -> str:
 
 
 def overlay(size: tuple[int, int], session: Session, readings: Readings) -> UInt8Array | None:
-    """Return text (H, W, 4) RGBA for a picture of `size`, None when there is none."""
+    """Return the text overlay (H, W, 4) RGBA for a picture of `size`; None if it is empty."""
     width, height = size
     image = np.zeros((height, width, 4), np.uint8)
     drawn = False
@@ -141,27 +142,27 @@ def overlay(size: tuple[int, int], session: Session, readings: Readings) -> UInt
         _write_sheet(image, help_lines())
         drawn = True
     if session.message:
-        lines = wrapped(session.message, width - 40)
-        _write(image, lines, (10, height - LINE * len(lines) - 14))
+        lines = wrap_text(session.message, width - 40)
+        _write(image, lines, (10, height - LINE_HEIGHT * len(lines) - 14))
         drawn = True
     return image if drawn else None
 
 
-def paper(size: tuple[int, int], lines: Sequence[str]) -> UInt8Array:
-    """Return a dark page (H, W, 4) RGBA with lines in its middle."""
+def message_page(size: tuple[int, int], lines: Sequence[str]) -> UInt8Array:
+    """Return a dark page (H, W, 4) RGBA with centred lines of text."""
     width, height = size
     page = np.empty((height, width, 4), np.uint8)
-    page[:] = (*PAPER, 255)
-    whole = [part for line in lines for part in wrapped(line, width - 40)]
+    page[:] = (*BACKGROUND, 255)
+    whole = [part for line in lines for part in wrap_text(line, width - 40)]
     widest = max((_width(line, 1.0) for line in whole), default=0)
-    corner = max((width - widest) // 2, 20), max((height - LINE * len(whole)) // 2, 10)
+    corner = max((width - widest) // 2, 20), max((height - LINE_HEIGHT * len(whole)) // 2, 10)
     _write(page, whole, corner)
     page[..., 3] = 255
     return page
 
 
-def wrapped(text: str, width: int) -> list[str]:
-    """Return a text as lines of at most `width` pixels; a longer word has a line of its own."""
+def wrap_text(text: str, width: int) -> list[str]:
+    """Break a text into lines of at most `width` pixels; a longer word gets its own line."""
     lines: list[str] = []
     for word in text.split():
         if lines and _width(f"{lines[-1]} {word}", 1.0) <= width:
@@ -172,14 +173,14 @@ def wrapped(text: str, width: int) -> list[str]:
 
 
 def _write_sheet(image: UInt8Array, lines: Sequence[str]) -> None:
-    """Write `what<TAB>does` lines in one or two columns, as large as fits."""
+    """Write tabulated lines in one or two columns, as large as fits."""
     height, width = image.shape[:2]
     best: tuple[float, list[Sequence[str]]] = (0.0, [])
     for columns in (1, 2):
         rows = -(-len(lines) // columns)
         parts = [lines[at : at + rows] for at in range(0, len(lines), rows)]
         wide = sum(sum(_widths(part, 1.0)) + 2 * GAP for part in parts)
-        scale = min(1.0, (width - 40) / wide, (height - 40) / (LINE * rows))
+        scale = min(1.0, (width - 40) / wide, (height - 40) / (LINE_HEIGHT * rows))
         if scale > best[0]:
             best = (scale, parts)
     scale, parts = best if best[0] > SMALLEST else (1.0, [lines])
@@ -190,7 +191,7 @@ def _write_sheet(image: UInt8Array, lines: Sequence[str]) -> None:
 
 
 def _widths(lines: Sequence[str], scale: float) -> list[int]:
-    """Return how wide each column is that tabs part."""
+    """Return the widths of the columns that tabs separate, pixels."""
     cells = [line.split("\t") for line in lines]
     count = max((len(row) for row in cells), default=0)
     return [
@@ -206,10 +207,10 @@ def _width(text: str, scale: float) -> int:
 def _write(
     image: UInt8Array, lines: Sequence[str], corner: tuple[int, int], scale: float = 1.0
 ) -> None:
-    """Write lines in a box with its top left corner there; tabs part columns."""
+    """Write lines into a box whose top left corner is `corner`; tabs separate columns."""
     if not lines:
         return
-    height, widths = round(LINE * scale), _widths(lines, scale)
+    height, widths = round(LINE_HEIGHT * scale), _widths(lines, scale)
     starts = np.cumsum([0, *(width + round(GAP * scale) for width in widths)]).tolist()
     left, top = max(corner[0] - 6, 0), max(corner[1] - 4, 0)
     right = corner[0] + starts[len(widths) - 1] + widths[-1] + 6
@@ -219,17 +220,17 @@ def _write(
         for start, part in zip(starts, line.split("\t"), strict=False):
             place = (corner[0] - left + start, corner[1] - top + height * (index + 1) - 5)
             cv2.putText(ink, part, place, FONT, SIZE * scale, 255, 1, cv2.LINE_AA)
-    # mixed here: drawing soft edges into the opacity would make them holes
+    # blended here: antialiased text drawn into the alpha channel would punch holes
     share = (ink / np.float32(255))[..., None]
-    ground, letters = np.array([*PAPER, OPACITY]), np.array(LETTERS)
+    ground, letters = np.array([*BACKGROUND, OPACITY]), np.array(TEXT_COLOUR)
     box[:] = (ground + share * (letters - ground)).astype(np.uint8)
 
 
 def _guide_lines(session: Session) -> list[str]:
-    """Return the numbers of the picked guide."""
+    """Return the read-outs of the picked guide."""
     if session.picked is None:
         return []
-    strands, points = session.tuned.simulator.strands, session.tuned.simulator.points
+    strands, points = session.simulation.simulator.strands, session.simulation.simulator.points
     low, high = strands.offsets[session.picked], strands.offsets[session.picked + 1]
     now = np.linalg.norm(np.diff(points[low:high], axis=0), axis=1).sum()
     rest = strands.lengths()[session.picked]

@@ -1,4 +1,4 @@
-"""Names of keys, as the table of actions has them, from what the window system says."""
+"""Names of keys, as the table of actions uses them, from GLFW key codes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From mouse events to actions: which button with which key drags, zooms, grabs or picks."""
+"""Map mouse events to actions: orbit, pan, zoom, grab, pick."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ from dataclasses import dataclass
 from hairkit.viewer.window.keyboard import CONTROL, SHIFT
 
 LEFT, RIGHT, MIDDLE = 0, 1, 2
-"""GLFW's numbers of the buttons."""
+"""GLFW's button codes."""
 ORBIT_DEGREES = 220.0
-"""Degrees that a drag over the picture's height turns."""
+"""Orbit angle of a drag over the height of the picture, degrees."""
 WHEEL = 1.12
-"""Times nearer a notch of the wheel."""
+"""Zoom factor of a notch of the wheel."""
+ZOOM_NOTCHES = 20
+"""Notches of the wheel that a drag over the height of the picture counts for."""
 DOUBLE_SECONDS = 0.3
+"""Longest time between the clicks of a double click."""
 STILL_PIXELS = 4.0
-"""A button released so near to where it was pressed has clicked."""
+"""Largest motion between press and release of a click, pixels."""
 
 Perform = Callable[[str, Mapping[str, object]], None]
 
@@ -26,7 +29,7 @@ class Mouse:
 
     perform: Perform
     height: float
-    """Of the picture, pixels."""
+    """Height of the picture, pixels."""
     x: float = 0.0
     y: float = 0.0
     _drags: str | None = None
@@ -34,7 +37,7 @@ class Mouse:
     _clicked: float = -1e9
 
     def press(self, button: int, mods: int) -> None:
-        """A button went down."""
+        """Handle a pressed button."""
         self._start = (self.x, self.y)
         if button == LEFT and mods & CONTROL:
             self._drags = "grab"
@@ -47,7 +50,7 @@ class Mouse:
             self._drags = "orbit"
 
     def release(self, now: float) -> None:
-        """The button went up, at `now` seconds."""
+        """Handle a released button, at `now` seconds."""
         drags, self._drags = self._drags, None
         if drags == "grab":
             self.perform("release", {})
@@ -61,7 +64,7 @@ class Mouse:
         self._clicked = now
 
     def move(self, x: float, y: float) -> None:
-        """The mouse is at a pixel now."""
+        """Handle a motion to pixel (x, y)."""
         right, down = (x - self.x) / self.height, (y - self.y) / self.height
         self.x, self.y = x, y
         if self._drags == "orbit":
@@ -69,10 +72,10 @@ class Mouse:
         elif self._drags == "pan":
             self.perform("pan", {"right": right, "down": down})
         elif self._drags == "zoom":
-            self.perform("zoom", {"factor": WHEEL ** (-20 * down)})
+            self.perform("zoom", {"factor": WHEEL ** (-ZOOM_NOTCHES * down)})
         elif self._drags == "grab":
             self.perform("drag", {"x": x, "y": y})
 
     def scroll(self, notches: float) -> None:
-        """The wheel turned."""
+        """Handle a turn of the wheel."""
         self.perform("zoom", {"factor": WHEEL**notches})

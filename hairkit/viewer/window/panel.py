@@ -1,7 +1,7 @@
-"""The panel of options, by imgui-bundle where it is installed; without it nothing is missing.
+"""The option panel, drawn by imgui-bundle; optional, since every control also has a key or action.
 
-imgui-bundle brings a GLFW of its own and makes the module `glfw` use it, if it is imported first:
-`load_windowing` is the only place that imports either.
+imgui-bundle bundles its own GLFW, and the module `glfw` uses that one if imgui-bundle is imported
+first: import both through `load_windowing` only.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from hairkit.viewer.actions.actions import LOOKS
 from hairkit.viewer.actions.presets import preset_names, presets_path
 from hairkit.viewer.draw.colouring import COLOURINGS
 from hairkit.viewer.head_motion import AXES
-from hairkit.viewer.layers import BOARDS
+from hairkit.viewer.layers import BILLBOARDS
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
 
 WIDTH = 340
 """Pixels."""
 LABELS = 116.0
-"""Of them for names beside sliders."""
+"""Width of the names beside sliders, pixels."""
 HINT = 48
-"""Letters in a line of a hint."""
+"""Characters in a line of a tooltip."""
 
 Perform = Callable[[str, Mapping[str, object]], None]
 
 
 def load_windowing() -> Any:
-    """Return the module glfw, imgui-bundle imported before it where there is one."""
+    """Return the module glfw; imports imgui-bundle before it if that is installed."""
     with contextlib.suppress(ImportError):
         importlib.import_module("imgui_bundle")
     try:
@@ -47,7 +47,7 @@ class Panel:
     """Sliders and buttons over the picture; does nothing without imgui-bundle."""
 
     missing: str
-    """Why there is no panel and what to do, empty where there is one."""
+    """Why the panel is missing and what to install; empty if it is there."""
 
     def __init__(self, window: Any) -> None:
         self._imgui, self._backend, self.missing = _load(window)
@@ -62,38 +62,38 @@ class Panel:
 
     @property
     def wants_keys(self) -> bool:
-        """True while a text is typed."""
+        """True while text is entered."""
         return self._shown and bool(self._imgui.get_io().want_text_input)
 
     def listen(self) -> None:
-        """Hear of characters, which the window does not use."""
+        """Receive character events, which the window does not use."""
         if self._backend is not None:
             import glfw
 
             glfw.set_char_callback(self._backend.window, self._backend.char_callback)
 
     def on_key(self, key: int, event: int, mods: int) -> None:
-        """Pass a key on."""
+        """Forward a key event."""
         if self._backend is not None:
             self._backend.keyboard_callback(self._backend.window, key, 0, event, mods)
 
     def on_button(self, button: int, event: int) -> None:
-        """Pass a button of the mouse on."""
+        """Forward a mouse button event."""
         if self._backend is not None:
             self._backend.mouse_button_callback(self._backend.window, button, event, 0)
 
     def on_move(self, x: float, y: float) -> None:
-        """Pass the mouse's place on."""
+        """Forward the mouse position."""
         if self._backend is not None:
             self._backend.mouse_callback(self._backend.window, x, y)
 
     def on_scroll(self, right: float, up: float) -> None:
-        """Pass the wheel on."""
+        """Forward a wheel event."""
         if self._backend is not None:
             self._backend.scroll_callback(self._backend.window, right, up)
 
     def draw(self, session: Session, preview: Preview, perform: Perform) -> None:
-        """Draw the panel and do what was asked for in it."""
+        """Draw the panel and perform the actions of its controls."""
         imgui = self._imgui
         self._shown = imgui is not None and session.shown.panel and not session.shown.help
         if not self._shown:
@@ -107,16 +107,16 @@ class Panel:
         imgui.begin("hairkit")
         imgui.push_item_width(-LABELS)
         if imgui.collapsing_header("View", imgui.TreeNodeFlags_.default_open):
-            _view(imgui, session, perform)
-        if imgui.collapsing_header("Air and head", imgui.TreeNodeFlags_.default_open):
-            _air(imgui, session, perform)
-        title = f"Simulator {session.tuned.plugin}"
+            _draw_view(imgui, session, perform)
+        if imgui.collapsing_header("Wind and head", imgui.TreeNodeFlags_.default_open):
+            _draw_wind_and_head(imgui, session, perform)
+        title = f"Simulator {session.simulation.plugin}"
         if imgui.collapsing_header(title, imgui.TreeNodeFlags_.default_open):
-            for info in session.tuned.infos:
-                _option(imgui, session, info, perform)
-            self._preset = _presets(imgui, session, self._preset, perform)
+            for info in session.simulation.infos:
+                _draw_option(imgui, session, info, perform)
+            self._preset = _draw_presets(imgui, session, self._preset, perform)
         if session.layers.capture is not None and imgui.collapsing_header("Head in the photos"):
-            _pose(imgui, session, perform)
+            _draw_pose(imgui, session, perform)
         imgui.pop_item_width()
         imgui.end()
         imgui.render()
@@ -128,14 +128,16 @@ def _load(window: Any) -> tuple[Any, Any, str]:
         imgui = importlib.import_module("imgui_bundle").imgui
         backends = importlib.import_module("imgui_bundle.python_backends.glfw_backend")
     except ImportError as error:
-        return None, None, f"no panel ({error}); pip install 'hairkit[viewer]' brings it"
+        return None, None, f"no option panel ({error}); pip install 'hairkit[viewer]'"
     imgui.create_context()
     imgui.get_io().set_ini_filename("")  # leave no file behind
-    imgui.get_io().config_windows_move_from_title_bar_only = True  # a missed slider moves nothing
+    imgui.get_io().config_windows_move_from_title_bar_only = (
+        True  # else a drag beside a slider moves the panel
+    )
     return imgui, backends.GlfwRenderer(window, attach_callbacks=False), ""
 
 
-def _view(imgui: Any, session: Session, perform: Perform) -> None:
+def _draw_view(imgui: Any, session: Session, perform: Perform) -> None:
     for name in LOOKS:
         if imgui.button(name):
             perform("look", {"name": name})
@@ -151,15 +153,15 @@ def _view(imgui: Any, session: Session, perform: Perform) -> None:
     if changed:
         perform("guides", {"only": only})
     changed, count = imgui.slider_int("hairs", shown.hairs, 100, 50_000)
-    _hint(imgui, "Strands drawn, guides among them; fewer while the machine is too slow.")
+    _hint(imgui, "Strands drawn, including guides; lowered if frames take too long.")
     if changed:
         perform("hairs", {"count": count})
     changed, value = imgui.slider_float("exposure", shown.exposure, 0.1, 3.0)
     if changed:
         perform("exposure", {"value": value})
-    if shown.layers & set(BOARDS):
+    if shown.layers & set(BILLBOARDS):
         changed, value = imgui.slider_float("opacity", shown.opacity, 0.0, 1.0)
-        _hint(imgui, "Of the photos in space.")
+        _hint(imgui, "Opacity of the photos.")
         if changed:
             perform("opacity", {"value": value})
     for name in session.layers.available:
@@ -168,31 +170,37 @@ def _view(imgui: Any, session: Session, perform: Perform) -> None:
             perform("layer", {"name": name, "on": on})
 
 
-def _presets(imgui: Any, session: Session, name: str, perform: Perform) -> str:
-    """Draw what keeps options and takes them again; return the name that is typed."""
+def _draw_presets(imgui: Any, session: Session, name: str, perform: Perform) -> str:
+    """Draw the controls of presets; return the name in the text field."""
     imgui.separator()
     imgui.set_next_item_width(0.4 * WIDTH)
     _, name = imgui.input_text("##name", name)
     imgui.same_line()
-    if imgui.button("keep as preset") and name.strip():
+    if imgui.button("save preset") and name.strip():
         perform("preset_save", {"name": name.strip()})
     for found in preset_names(presets_path(session.opened.path)):
-        if imgui.button(f"take {found}"):
+        if imgui.button(f"load {found}"):
             perform("preset_load", {"name": found})
     if imgui.button("defaults"):
         perform("option_defaults", {})
     return str(name)
 
 
-def _air(imgui: Any, session: Session, perform: Perform) -> None:
+def _draw_wind_and_head(imgui: Any, session: Session, perform: Perform) -> None:
     air = session.wind
     changed, on = imgui.checkbox("wind", air.blowing)
     if changed:
         perform("wind", {"on": on})
     ranges = (
-        ("speed", 0.0, 20.0, "%.1f m/s", "Of the wind."),
-        ("azimuth", -180.0, 180.0, "%.0f deg", "From where: 0 in front, 90 the subject's left."),
-        ("turbulence", 0.0, 2.0, "%.2f", "Gusts as a share of the wind."),
+        ("speed", 0.0, 20.0, "%.1f m/s", "Wind speed."),
+        (
+            "azimuth",
+            -180.0,
+            180.0,
+            "%.0f deg",
+            "Where the wind comes from: 0 front, 90 the subject's left.",
+        ),
+        ("turbulence", 0.0, 2.0, "%.2f", "RMS gusts over the mean wind speed."),
     )
     for name, low, high, shape, hint in ranges:
         changed, value = imgui.slider_float(name, float(getattr(air, name)), low, high, shape)
@@ -209,12 +217,12 @@ def _air(imgui: Any, session: Session, perform: Perform) -> None:
     if imgui.button("reset"):
         perform("reset", {})
     imgui.same_line()
-    if imgui.button("go on" if session.paused else "pause"):
+    if imgui.button("resume" if session.paused else "pause"):
         perform("pause", {})
 
 
-def _pose(imgui: Any, session: Session, perform: Perform) -> None:
-    changed, on = imgui.checkbox("place the head", session.adjustment is not None)
+def _draw_pose(imgui: Any, session: Session, perform: Perform) -> None:
+    changed, on = imgui.checkbox("align the head", session.adjustment is not None)
     if changed:
         perform("adjust", {"on": on})
     if session.adjustment is None:
@@ -236,21 +244,21 @@ def _pose(imgui: Any, session: Session, perform: Perform) -> None:
                 perform("head_turn", {"axis": axis, "degrees": degrees})
             imgui.same_line()
     imgui.new_line()
-    for label, values in (("next photo", {"step": 1}), ("photo before", {"step": -1})):
+    for label, values in (("next photo", {"step": 1}), ("previous photo", {"step": -1})):
         if imgui.button(label):
             perform("through", values)
         imgui.same_line()
     if imgui.button("save"):
         perform("head_save", {})
-    if imgui.button("reconstruct from here") and session.rerun is None:
+    if imgui.button("save and reconstruct") and session.rerun is None:
         perform("reconstruct", {})
     if session.rerun is not None:
         imgui.text(session.rerun.progress)
 
 
-def _option(imgui: Any, session: Session, info: OptionInfo, perform: Perform) -> None:
-    """Draw the slider, box or list of one option."""
-    value = session.tuned.value(info.name)
+def _draw_option(imgui: Any, session: Session, info: OptionInfo, perform: Perform) -> None:
+    """Draw the slider, check box or list of one option."""
+    value = session.simulation.value(info.name)
     kind = typing.get_args(info.type) or (info.type,)
     shape = f"%.4g {info.unit}" if info.unit and "%" not in info.unit else "%.4g"
     changed = False
@@ -277,6 +285,6 @@ def _option(imgui: Any, session: Session, info: OptionInfo, perform: Perform) ->
 
 
 def _hint(imgui: Any, text: str) -> None:
-    """Tell about the last item while the mouse is over it, in lines that the window holds."""
+    """Show a tooltip for the last item while the mouse is over it."""
     if imgui.is_item_hovered():
         imgui.set_tooltip("\n".join(textwrap.wrap(text, HINT)))

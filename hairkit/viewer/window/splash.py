@@ -1,7 +1,7 @@
-"""The window until its first picture: it says what it waits for, and can be closed meanwhile.
+"""The wait screen of the window: shows the current task and its time; it can be closed.
 
-Simulators and shaders may be compiled when they are first used, which takes up to a minute. That is
-done in a thread of its own, one thing after the other, while the window answers.
+Simulators and shaders are compiled at their first use, which takes up to a minute. That runs in a
+thread while the window handles events.
 """
 
 from __future__ import annotations
@@ -17,34 +17,34 @@ from hairkit.errors import HairkitError
 from hairkit.rendering.context import renderer
 from hairkit.simulation.simulator import Grab, Surroundings
 from hairkit.viewer.session import STEP, Session
-from hairkit.viewer.window.hud import paper
+from hairkit.viewer.window.hud import message_page
 
 TITLE = "hairkit"
-_PATIENCE = (
-    "Only the first time on a machine this takes a minute or two, for all is compiled then.",
-    "Esc leaves.",
+_ADVICE = (
+    "The first start on a machine takes a minute or two to compile everything.",
+    "Esc quits.",
 )
-BEAT = 0.05
-"""Seconds between two looks at mouse and keys."""
+POLL_INTERVAL = 0.05
+"""Seconds between two polls for events."""
 _Made = TypeVar("_Made")
 
 
 class AbandonedError(HairkitError):
-    """The user left before the first picture; a thread may still be at work."""
+    """The user quit before the first picture; a thread may still be running."""
 
 
-class Waiting:
-    """Does work aside while a window says what is being done."""
+class WaitScreen:
+    """Runs tasks in a thread while a window shows their titles."""
 
     def __init__(self, glfw: Any, window: Any) -> None:
         self._glfw, self._window = glfw, window
         self._left = False
         glfw.set_key_callback(window, self._on_key)
 
-    def until(self, title: str, work: Callable[[], _Made], *, draws: bool = False) -> _Made:
-        """Return what `work` makes; the title and the seconds so far are shown until then.
+    def run(self, title: str, work: Callable[[], _Made], *, draws: bool = False) -> _Made:
+        """Return the result of `work`; show the title and the elapsed seconds meanwhile.
 
-        `draws` tells that the work draws all the time: the seconds are in the window's title only.
+        If `draws`, the work holds the OpenGL context, and only the window's title is updated.
 
         Raises
         ------
@@ -57,7 +57,7 @@ class Waiting:
         def try_work() -> None:
             try:
                 made.append(work())
-            except BaseException as error:  # raised again in the thread that waits
+            except BaseException as error:  # raised again in the waiting thread
                 failed.append(error)
 
         try:
@@ -74,7 +74,7 @@ class Waiting:
     def _wait(self, thread: threading.Thread, title: str, draws: bool) -> None:
         glfw, began, told = self._glfw, time.monotonic(), 0
         while thread.is_alive():
-            thread.join(BEAT)
+            thread.join(POLL_INTERVAL)
             glfw.poll_events()
             if self._left or glfw.window_should_close(self._window):
                 raise AbandonedError("the window was closed before the first picture")
@@ -89,11 +89,11 @@ class Waiting:
         self._left = self._left or (key == self._glfw.KEY_ESCAPE and event == self._glfw.PRESS)
 
     def _show(self, title: str, seconds: int) -> None:
-        """Bring words onto the screen, without a shader, which would be compiled first."""
-        lines = [f"{title} ... {f'{seconds} s' if seconds else ''}", *_PATIENCE]
+        """Draw the text without a shader, since a shader would have to be compiled first."""
+        lines = [f"{title} ... {f'{seconds} s' if seconds else ''}", *_ADVICE]
         width, height = self._glfw.get_framebuffer_size(self._window)
         with renderer() as gl:
-            picture = np.flipud(paper((width, height), lines))
+            picture = np.flipud(message_page((width, height), lines))
             texture = gl.context.texture((width, height), 4, np.ascontiguousarray(picture))
             drawn = gl.context.framebuffer([texture])
             screen = gl.context.detect_framebuffer(0)
@@ -106,11 +106,11 @@ class Waiting:
 
 
 def warm_up(session: Session) -> None:
-    """Let the simulator do once all that a user can ask of it, then put the hair back to rest.
+    """Run the simulator once with wind and a grab, then reset it, so that all of it is compiled.
 
-    What is compiled at its first use is compiled now, and not when someone grabs a lock.
+    Otherwise the first grab would wait for the compiler.
     """
-    simulator = session.tuned.simulator
+    simulator = session.simulation.simulator
     points = simulator.points
     if not len(points):
         return

@@ -1,6 +1,6 @@
-"""The window: passes events on to the actions and shows what the preview draws. Nothing else.
+"""The window: passes events to actions and shows the frames that the preview draws.
 
-The window's OpenGL context becomes the one that all of hairkit draws with in this process.
+Its OpenGL context becomes the one that all of hairkit uses in this process.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from hairkit.errors import HairkitError, RenderError
 from hairkit.rendering.context import REQUIRED_VERSION, install, renderer
 from hairkit.rendering.gl_camera import set_uniforms
 from hairkit.viewer.actions.actions import bindings, perform
-from hairkit.viewer.actions.script import Script, performed
+from hairkit.viewer.actions.script import Script, run_steps
 from hairkit.viewer.draw.frame_budget import Budget
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import FRAMES_PER_SECOND
 from hairkit.viewer.session import Session
-from hairkit.viewer.window.file_watcher import Watch, shader_files
+from hairkit.viewer.window.file_watcher import FileWatcher, shader_files
 from hairkit.viewer.window.gl_context import WindowContext
 from hairkit.viewer.window.hud import overlay
 from hairkit.viewer.window.keyboard import key_name
 from hairkit.viewer.window.mouse import Mouse
 from hairkit.viewer.window.panel import Panel
-from hairkit.viewer.window.splash import AbandonedError, Waiting, warm_up
+from hairkit.viewer.window.splash import AbandonedError, WaitScreen, warm_up
 
 TEXT_EVERY = 0.25
-"""Seconds between two redraws of numbers; what the user has asked for is told at once."""
+"""Seconds between two updates of the read-outs; messages appear at once."""
 IDLE = 0.1
-"""Seconds between pictures that nobody has asked for, while time stands still."""
-LONGEST_PAUSE = 0.1
-"""Seconds that pass at most between two pictures, as far as the hair is told."""
+"""Seconds between frames while the simulation is paused and no event arrives."""
+MAX_FRAME_STEP = 0.1
+"""Longest time step of a frame, seconds; slower frames slow the simulation down."""
 
 
 def show(
@@ -48,40 +48,40 @@ def show(
     script: Script | None = None,
     budget: float = 1 / 20,
 ) -> None:
-    """Open the window and stay until it is closed, or interrupted.
+    """Open the window; return when it is closed or interrupted.
 
     Parameters
     ----------
     make_session
-        Makes the session for a picture size; called when OpenGL is there, which simulators use.
+        Makes the session for a picture size; called once OpenGL is ready, which simulators may use.
     size
-        Pixels.
+        Width and height, pixels.
     script
-        Actions to do first.
+        Actions to perform first.
     budget
-        Seconds that a picture may take before less is drawn.
+        Seconds that a frame may take before the quality is lowered.
 
     Raises
     ------
     RenderError
-        No window can be opened, or it has no OpenGL 4.3; the text says what to install.
+        No window can be opened, or it has no OpenGL 4.3; the message says what to install.
     AbandonedError
-        The window was closed before its first picture; a thread may still be at work.
+        The window was closed before its first picture; a thread may still be running.
     """
-    with opened(make_session, size, budget) as window, contextlib.suppress(KeyboardInterrupt):
-        window.loop(None if script is None else performed(window.session, script, Path()))
+    with open_window(make_session, size, budget) as window, contextlib.suppress(KeyboardInterrupt):
+        window.loop(None if script is None else run_steps(window.session, script, Path()))
 
 
 @contextlib.contextmanager
-def opened(
+def open_window(
     make_session: Callable[[tuple[int, int]], Session], size: tuple[int, int], budget: float
 ) -> Iterator[Window]:
     """Open a window for a block; see `show`."""
     context = WindowContext(size)
     try:
         install(moderngl.create_context(REQUIRED_VERSION, **context.settings), "window")
-        window = _started(context, make_session, size, budget)
-    except AbandonedError:  # what a thread still draws with must stay until the process ends
+        window = _start_window(context, make_session, size, budget)
+    except AbandonedError:  # a thread may still use the context, so it stays until the process ends
         context.glfw.hide_window(context.window)
         raise
     except BaseException:
@@ -94,35 +94,35 @@ def opened(
         context.close()
 
 
-def _started(
+def _start_window(
     context: WindowContext,
     make_session: Callable[[tuple[int, int]], Session],
     size: tuple[int, int],
     budget: float,
 ) -> Window:
-    """Return the window with its first picture drawn, though not shown."""
-    waiting = Waiting(context.glfw, context.window)
-    session = waiting.until("opening the groom", lambda: make_session(size))
-    waiting.until("making the hair move", lambda: warm_up(session))
+    """Return the window with its first picture drawn but not shown."""
+    waiting = WaitScreen(context.glfw, context.window)
+    session = waiting.run("opening the groom", lambda: make_session(size))
+    waiting.run("compiling the simulator", lambda: warm_up(session))
     window = Window(context, session, budget)
-    waiting.until("drawing the first picture", window.draw_aside, draws=True)
+    waiting.run("drawing the first picture", window.draw_hidden, draws=True)
     return window
 
 
 class Window:
-    """Events in, pictures out."""
+    """The main loop: handles events, simulates, draws."""
 
     def __init__(self, context: WindowContext, session: Session, budget: float) -> None:
         self._glfw, self._window = context.glfw, context.window
         self.session = session
-        self._most_seconds = 0.4 * budget if budget > 0 else None
+        self._max_seconds = 0.4 * budget if budget > 0 else None
         self._keys = bindings()
         self.mouse = Mouse(self.perform, session.size[1])
         self._watched = session.opened.path
-        self._watch_groom = Watch([self._watched])
-        self._watch_shaders = Watch(shader_files())
+        self._watch_groom = FileWatcher([self._watched])
+        self._watch_shaders = FileWatcher(shader_files())
         self._pace = 0.0
-        """Seconds that a picture takes until it is on the screen, over the last few."""
+        """Moving average of the frame time, seconds."""
         self._told: object = None
         self._told_at = 0.0
         with renderer() as gl:
@@ -136,10 +136,10 @@ class Window:
         self._warnings = _Warnings(session)
         logging.getLogger("hairkit").addHandler(self._warnings)
         self._listen()
-        session.message = session.message or "H shows the keys"
+        session.message = session.message or "press H for the keys"
 
     def perform(self, name: str, values: Mapping[str, object]) -> None:
-        """Do an action; what goes wrong is told in the picture."""
+        """Perform an action; show its error as a message."""
         self.session.message = ""
         try:
             with renderer():
@@ -150,51 +150,51 @@ class Window:
             self.session.message = self._panel.missing
 
     def loop(self, steps: Iterator[None] | None = None) -> None:
-        """Draw until the window is closed; `steps` does an action of a script at each `next`."""
+        """Draw until the window is closed; `next(steps)` performs an action of a script."""
         before = time.perf_counter()
         while not (self.session.finished or self._glfw.window_should_close(self._window)):
             self._listen_for_events()
             steps = self._next(steps)
             passed = time.perf_counter() - before
-            if self.session.recorder is not None:  # a film has its own time, slower or not
+            if self.session.recorder is not None:  # a recording has a fixed frame time
                 wait, passed = 1 / FRAMES_PER_SECOND - passed, 1 / FRAMES_PER_SECOND
                 time.sleep(max(wait, 0.0))
             before = time.perf_counter()
-            passed = min(passed, LONGEST_PAUSE)
+            passed = min(passed, MAX_FRAME_STEP)
             self.picture(passed)
             self.session.pending = max(self.session.pending - passed, 0.0)
 
     def _listen_for_events(self) -> None:
-        """Take note of mouse and keys; where nothing moves, wait for them a little."""
+        """Handle mouse and keys; wait for them a little if nothing moves."""
         still = self.session.paused and not self.session.pending
         if self.session.recorder is None and (still or self.session.rerun is not None):
             self._glfw.wait_events_timeout(IDLE)
         self._glfw.poll_events()
 
     def leave(self) -> None:
-        """Finish what is being written and end what runs aside."""
+        """Finish the recording and stop a running reconstruction."""
         logging.getLogger("hairkit").removeHandler(self._warnings)
         if self.session.recorder is not None:
             self.session.recorder.close()
         if self.session.rerun is not None:
             self.session.rerun.stop()
 
-    def draw_aside(self) -> None:
-        """Draw a picture that nobody sees, so that shaders are compiled."""
+    def draw_hidden(self) -> None:
+        """Draw a picture without showing it, so that all shaders are compiled."""
         with renderer():
             self.preview.draw()
 
     def picture(self, seconds: float) -> None:
-        """Let time pass and show a picture."""
+        """Simulate `seconds` and show a picture."""
         began = time.perf_counter()
         self._fit()
         self._reload_changed()
         filmed = self.session.recorder is not None
-        self.session.most_seconds = None if filmed else self._most_seconds
+        self.session.max_seconds = None if filmed else self._max_seconds
         with renderer() as gl:
             try:
                 self.preview.frame(seconds, still=filmed or bool(self.session.screenshots))
-            except (HairkitError, OSError) as error:  # a full disk, a simulator at its end
+            except (HairkitError, OSError) as error:  # for example a full disk
                 self.session.message = " ".join(str(error).split())
                 self.session.paused, self.session.recorder = True, None
                 self.session.screenshots = []
@@ -206,7 +206,7 @@ class Window:
         self._pace += 0.2 * (taken - self._pace) if self._pace else taken
 
     def _next(self, steps: Iterator[None] | None) -> Iterator[None] | None:
-        """Do the next action of a script when the last one has had its time."""
+        """Perform the next action of a script once the last one is finished."""
         session = self.session
         if steps is None or session.pending > 1e-9 or session.rerun is not None:
             return steps
@@ -221,14 +221,14 @@ class Window:
         return steps
 
     def _show(self, gl: Any) -> None:
-        """Bring the picture and the text onto the screen."""
+        """Draw the picture and the text to the screen."""
         if self._text_is_old():
             self._write_text()
         size = self._glfw.get_framebuffer_size(self._window)
         self._screen.use()
         gl.context.viewport = (0, 0, *size)
         gl.context.enable_only(moderngl.NOTHING)
-        self.preview.stage.texture.use(5)
+        self.preview.frame_renderer.texture.use(5)
         self._text.use(6)
         program = gl.program("viewer_screen", "viewer_blit")
         set_uniforms(program, u_picture=5, u_text=6, u_size=size)
@@ -264,14 +264,14 @@ class Window:
         if self.session.rerun is not None:
             try:
                 with renderer():
-                    self.session.look_after_rerun()
+                    self.session.poll_rerun()
             except (HairkitError, OSError) as error:
                 self.session.message = " ".join(str(error).split())
-            if self.session.rerun is None:  # what it has written is shown already
-                self._watch_groom = Watch([self.session.opened.path])
+            if self.session.rerun is None:  # its result is loaded already
+                self._watch_groom = FileWatcher([self.session.opened.path])
         elif self._watched != self.session.opened.path:
             self._watched = self.session.opened.path
-            self._watch_groom = Watch([self._watched])
+            self._watch_groom = FileWatcher([self._watched])
         elif self._watch_groom.changed(now):
             self.perform("reload", {})
         if self._watch_shaders.changed(now):
@@ -281,7 +281,7 @@ class Window:
                     program = gl.program("viewer_screen", "viewer_blit")
                     self._blit = gl.context.vertex_array(program, [])
                     self.preview.draw()
-            except RenderError as error:  # a shader that is being written: wait for the next save
+            except RenderError as error:  # for example a half-edited shader: retry at the next save
                 self.session.message = " ".join(str(error).split())
 
     def _listen(self) -> None:
@@ -294,17 +294,19 @@ class Window:
         self._panel.listen()
 
     def on_key(self, window: Any, key: int, scancode: int, event: int, mods: int) -> None:
-        """A key was pressed, released or repeated."""
+        """Handle a pressed, released or repeated key."""
         self._panel.on_key(key, event, mods)
         name = key_name(self._glfw, key, mods)
         if name is not None and name not in self._keys:
-            name = name.removeprefix("SHIFT_")  # capital letters do what small ones do
+            name = name.removeprefix(
+                "SHIFT_"
+            )  # without its own binding, shift+key does what the key does
         if event == self._glfw.RELEASE or name not in self._keys or self._panel.wants_keys:
             return
         self.perform(*self._keys[name])
 
     def on_button(self, window: Any, button: int, event: int, mods: int) -> None:
-        """A button of the mouse was pressed or released."""
+        """Handle a pressed or released mouse button."""
         self._panel.on_button(button, event)
         if event == self._glfw.RELEASE:
             self.mouse.release(time.monotonic())
@@ -312,20 +314,20 @@ class Window:
             self.mouse.press(button, mods)
 
     def on_move(self, window: Any, x: float, y: float) -> None:
-        """The mouse moved; `x`, `y` in screen units."""
+        """Handle a mouse motion to (x, y), in screen units."""
         width, height = self._glfw.get_window_size(self._window)
         self._panel.on_move(x, y)
         scale = self.session.size[0] / max(width, 1), self.session.size[1] / max(height, 1)
         self.mouse.move(x * scale[0], y * scale[1])
 
     def on_scroll(self, window: Any, right: float, up: float) -> None:
-        """The wheel turned."""
+        """Handle a turn of the wheel."""
         self._panel.on_scroll(right, up)
         if not self._panel.wants_mouse:
             self.mouse.scroll(up)
 
     def on_drop(self, window: Any, paths: list[str]) -> None:
-        """Files were dropped; the first one is opened."""
+        """Open the first of the dropped files."""
         if paths:
             self.session.message = f"opening {paths[0]}"
             self.picture(0.0)
@@ -333,12 +335,12 @@ class Window:
 
 
 class _Warnings(logging.Handler):
-    """Tells in the picture what is warned of."""
+    """Shows warnings in the picture."""
 
     def __init__(self, session: Session) -> None:
         super().__init__(logging.WARNING)
         self._session = session
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show it until the next action."""
+        """Show the warning until the next action."""
         self._session.message = " ".join(record.getMessage().split())

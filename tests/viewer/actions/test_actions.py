@@ -19,7 +19,7 @@ NEEDS_RESULTS += ("head_move", "head_turn", "head_scale", "head_save")
 
 def tip_pixel(session: Session, strand: int) -> tuple[float, float]:
     """Return where a guide's point before its tip is seen."""
-    simulator = session.tuned.simulator
+    simulator = session.simulation.simulator
     point = simulator.points[simulator.strands.offsets[strand + 1] - 1]
     x, y = session.camera().project(point)
     return float(x), float(y)
@@ -27,7 +27,7 @@ def tip_pixel(session: Session, strand: int) -> tuple[float, float]:
 
 def front_strand(session: Session) -> int:
     """Return the guide whose tip is nearest to the camera."""
-    simulator = session.tuned.simulator
+    simulator = session.simulation.simulator
     tips = simulator.points[simulator.strands.offsets[1:] - 1]
     return int(np.argmin(session.camera().depth(tips)))
 
@@ -63,7 +63,7 @@ def test_unknown_actions_and_refused_values_are_named(session: Session) -> None:
         perform(session, "orbit", {"left": 3.0})
     with pytest.raises(OptionError, match=r"orbit: option right is 'far'"):
         perform(session, "orbit", {"right": "far"})
-    with pytest.raises(InputError, match="zoom: no value for factor"):
+    with pytest.raises(InputError, match="zoom: missing value of factor"):
         perform(session, "zoom")
     with pytest.raises(InputError, match="expected a number above 0"):
         perform(session, "zoom", {"factor": -1.0})
@@ -82,17 +82,17 @@ def test_named_views_look_from_there(session: Session, name: str) -> None:
 
 def test_wind_blows_tips_away_and_roots_not(session: Session) -> None:
     """Wind from the left moves tips to the right; without wind they go back."""
-    simulator = session.tuned.simulator
+    simulator = session.simulation.simulator
     rest = simulator.points.copy()
     perform(session, "wind", {"on": True, "speed": 5.0, "azimuth": 90.0})
     session.advance(0.1)
-    moved = session.tuned.simulator.points - rest
+    moved = session.simulation.simulator.points - rest
     offsets = simulator.strands.offsets
     assert (moved[offsets[1:] - 1, 0] < -0.01).all()
     np.testing.assert_allclose(moved[offsets[:-1]], 0, atol=1e-6)
     perform(session, "wind", {"on": False})
     session.advance(0.1)
-    np.testing.assert_allclose(session.tuned.simulator.points, rest, atol=1e-6)
+    np.testing.assert_allclose(session.simulation.simulator.points, rest, atol=1e-6)
 
 
 def test_a_shaken_head_takes_its_hair_along_in_its_own_frame(session: Session) -> None:
@@ -111,22 +111,24 @@ def test_grabbed_hair_follows_the_mouse_and_is_let_go(session: Session) -> None:
     strand = front_strand(session)
     x, y = tip_pixel(session, strand)
     perform(session, "grab", {"x": x, "y": y})
-    assert session.hold is not None
+    assert session.grabbed_lock is not None
     perform(session, "drag", {"x": x + 20.0, "y": y - 10.0})
     session.advance(0.1)
-    held = session.hold.points[np.argmin(np.linalg.norm(session.hold.offsets, axis=1))]
-    seen = session.camera().project(session.tuned.simulator.points[held])
+    held = session.grabbed_lock.points[
+        np.argmin(np.linalg.norm(session.grabbed_lock.offsets, axis=1))
+    ]
+    seen = session.camera().project(session.simulation.simulator.points[held])
     np.testing.assert_allclose(seen, [x + 20, y - 10], atol=1.0)
     perform(session, "release")
     session.advance(0.1)
-    assert session.hold is None
+    assert session.grabbed_lock is None
     np.testing.assert_allclose(tip_pixel(session, strand), (x, y), atol=1e-3)
 
 
 def test_grabbing_beside_the_hair_holds_nothing(session: Session) -> None:
     """The corner of the picture has no hair."""
     perform(session, "grab", {"x": 1.0, "y": 1.0})
-    assert session.hold is None
+    assert session.grabbed_lock is None
     assert session.message
 
 
@@ -152,9 +154,9 @@ def test_paused_time_stands_still_and_steps_are_sixtieths(session: Session) -> N
     """A step lets one sixtieth of a second pass, a pause none."""
     perform(session, "pause", {"on": True})
     session.advance(0.5)
-    assert session.tuned.simulator.time == 0
+    assert session.simulation.simulator.time == 0
     perform(session, "step")
-    assert session.tuned.simulator.time == pytest.approx(STEP)
+    assert session.simulation.simulator.time == pytest.approx(STEP)
 
 
 def test_time_is_the_same_in_small_and_large_portions(session: Session) -> None:
@@ -167,23 +169,23 @@ def test_time_is_the_same_in_small_and_large_portions(session: Session) -> None:
 def test_options_are_checked_changed_by_keys_and_kept_as_presets(session: Session) -> None:
     """Sliders, keys and scripts change the simulator's own options; presets bring them back."""
     perform(session, "option", {"name": "lean", "value": 0.05})
-    assert session.tuned.simulator.options.lean == 0.05
+    assert session.simulation.simulator.options.lean == 0.05
     with pytest.raises(OptionError, match="lean is 7"):
         perform(session, "option", {"name": "lean", "value": 7})
     with pytest.raises(InputError, match="did you mean 'lean'"):
         perform(session, "option", {"name": "leen", "value": 1.0})
     perform(session, "option_next")
     perform(session, "option_change", {"steps": 2})
-    assert session.tuned.value("turns") == 5
+    assert session.simulation.value("turns") == 5
     perform(session, "option_next")
     perform(session, "option_change")
-    assert session.tuned.value("mode") == "hard"
+    assert session.simulation.value("mode") == "hard"
     perform(session, "preset_save", {"name": "windy day"})
     assert presets_path(session.opened.path).is_file()
-    session.tuned.replace({})
-    assert session.tuned.value("lean") == 0.01
+    session.simulation.replace({})
+    assert session.simulation.value("lean") == 0.01
     perform(session, "preset_load", {"name": "windy day"})
-    assert session.tuned.values == {"lean": 0.05, "turns": 5, "mode": "hard"}
+    assert session.simulation.values == {"lean": 0.05, "turns": 5, "mode": "hard"}
     with pytest.raises(InputError, match="no preset 'calm'"):
         perform(session, "preset_load", {"name": "calm"})
 
@@ -195,6 +197,6 @@ def test_reloading_keeps_view_and_options(session: Session) -> None:
     view = session.view
     perform(session, "reload")
     assert session.view == view
-    assert session.tuned.simulator.options == dataclasses.replace(
-        session.tuned.simulator.options, lean=0.02
+    assert session.simulation.simulator.options == dataclasses.replace(
+        session.simulation.simulator.options, lean=0.02
     )

@@ -85,9 +85,9 @@ def test_a_script_run_again_gives_the_same_pictures(session: Session, tmp_path: 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("steps = 3", "begin each with"),
+        ("steps = 3", "start each step with"),
         ("[[steps]]\ndo = 'fly'", "step 1: no action 'fly'; valid: adjust"),
-        ("[[steps]]\ndo = 'zoom'", "step 1: zoom: no value for factor"),
+        ("[[steps]]\ndo = 'zoom'", "step 1: zoom: missing value of factor"),
         ("[[steps]]\ndo = 'wind'\nspeeed = 3", "step 1: wind: no option 'speeed'"),
         ("[[steps]]\ndo = 'wind'\nspeed = 'fast'", "step 1: wind: option speed is 'fast'"),
         ("size = [3, 3]", "size"),

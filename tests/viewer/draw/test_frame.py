@@ -13,7 +13,7 @@ from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.head import head_solid
 from hairkit.testing import bristle_groom
 from hairkit.types.camera import Camera
-from hairkit.viewer.draw.frame import Shot, Stage
+from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import HairLook
 from hairkit.viewer.draw.light_gpu import TURNS
@@ -26,31 +26,31 @@ LOOK = HairLook(3000, True, (0.4, 0.05, 0.05), (0.4, 0.05, 0.05))
 
 
 @pytest.fixture(scope="module", params=[True, False], ids=["processor", "shaders"])
-def stage(request: pytest.FixtureRequest) -> Iterator[Stage]:
-    """A stage with the ball head and 3000 bristles, drawn either way."""
+def frame_renderer(request: pytest.FixtureRequest) -> Iterator[FrameRenderer]:
+    """A frame renderer with the ball head and 3000 bristles, drawn either way."""
     with renderer() as gl:
-        stage = made_stage(gl, soft=request.param)
-        yield stage
-        stage.release()
+        frame_renderer = make_frame_renderer(gl, soft=request.param)
+        yield frame_renderer
+        frame_renderer.release()
 
 
-def made_stage(gl: Renderer, *, soft: bool) -> Stage:
-    """Return a stage with the ball head and 3000 bristles."""
+def make_frame_renderer(gl: Renderer, *, soft: bool) -> FrameRenderer:
+    """Return a frame renderer with the ball head and 3000 bristles."""
     body = HairBody.of(GROOM.strands, GROOM.head, GROOM.material, 3000)
-    return Stage(gl, head_solid(GROOM.head, GROOM.material), body, soft)
+    return FrameRenderer(gl, head_solid(GROOM.head, GROOM.material), body, soft)
 
 
-def shot(**changes: object) -> Shot:
-    """Return a still shot of the groom at rest."""
-    plain = Shot(CAMERA, np.eye(4), None, LOOK, whole_light=True)
+def inputs(**changes: object) -> FrameInputs:
+    """Return a still inputs of the groom at rest."""
+    plain = FrameInputs(CAMERA, np.eye(4), None, LOOK, whole_light=True)
     return replace(plain, **changes)  # type: ignore[arg-type]
 
 
-def picture(stage: Stage, wanted: Shot) -> UInt8Array:
-    """Return the picture of a shot."""
-    rows = stage.body.guide_rest if wanted.guide_rows is None else wanted.guide_rows
-    stage.draw(replace(wanted, guide_rows=rows))
-    return stage.read().copy()
+def picture(frame_renderer: FrameRenderer, wanted: FrameInputs) -> UInt8Array:
+    """Return the picture of a inputs."""
+    rows = frame_renderer.body.guide_rest if wanted.guide_rows is None else wanted.guide_rows
+    frame_renderer.draw(replace(wanted, guide_rows=rows))
+    return frame_renderer.read().copy()
 
 
 def changed(first: UInt8Array, second: UInt8Array) -> np.ndarray:
@@ -59,12 +59,18 @@ def changed(first: UInt8Array, second: UInt8Array) -> np.ndarray:
     return result
 
 
-def test_hair_is_drawn_where_the_camera_sees_it_and_nowhere_else(stage: Stage) -> None:
+def test_hair_is_drawn_where_the_camera_sees_it_and_nowhere_else(
+    frame_renderer: FrameRenderer,
+) -> None:
     """Pixels that change with the hair lie at projected hair; the front tips are covered."""
     with renderer():
-        plain = shot(show_head=False)
-        hair = changed(picture(stage, plain), picture(stage, replace(plain, hair=None)))
-    pixels = CAMERA.project(twin(stage.body, stage.body.guide_rest).reshape(-1, 3))
+        plain = inputs(show_head=False)
+        hair = changed(
+            picture(frame_renderer, plain), picture(frame_renderer, replace(plain, hair=None))
+        )
+    pixels = CAMERA.project(
+        twin(frame_renderer.body, frame_renderer.body.guide_rest).reshape(-1, 3)
+    )
     low, high = pixels.min(axis=0) - 4, pixels.max(axis=0) + 4
     rows, columns = np.nonzero(hair)
     assert len(rows) > 1000
@@ -76,72 +82,79 @@ def test_hair_is_drawn_where_the_camera_sees_it_and_nowhere_else(stage: Stage) -
     assert hair[int(upper[1]), int(upper[0])]
 
 
-def test_the_head_hides_hair_behind_it(stage: Stage) -> None:
+def test_the_head_hides_hair_behind_it(frame_renderer: FrameRenderer) -> None:
     """Hair whose every point lies behind the head leaves the picture as it is."""
-    behind = stage.body.guide_rest * 0.2 + CAMERA.forward.astype(np.float32) * 0.3
+    behind = frame_renderer.body.guide_rest * 0.2 + CAMERA.forward.astype(np.float32) * 0.3
     with renderer():
-        bare = picture(stage, shot(hair=None))
-        hidden = picture(stage, shot(guide_rows=behind, hair=replace(LOOK, hairs=80)))
+        bare = picture(frame_renderer, inputs(hair=None))
+        hidden = picture(frame_renderer, inputs(guide_rows=behind, hair=replace(LOOK, hairs=80)))
         seen = picture(
-            stage, shot(guide_rows=behind, hair=replace(LOOK, hairs=80), show_head=False)
+            frame_renderer, inputs(guide_rows=behind, hair=replace(LOOK, hairs=80), show_head=False)
         )
-        stage.draw(shot(guide_rows=stage.body.guide_rest))
+        frame_renderer.draw(inputs(guide_rows=frame_renderer.body.guide_rest))
     centre = np.s_[55:66, 75:86]
     assert not changed(hidden, bare)[centre].any()
     assert changed(seen, hidden)[centre].any()
 
 
-def test_the_head_is_drawn_in_the_first_picture_and_in_later_ones(stage: Stage) -> None:
+def test_the_head_is_drawn_in_the_first_picture_and_in_later_ones(
+    frame_renderer: FrameRenderer,
+) -> None:
     """Skin stands before the studio from the first picture on."""
     with renderer() as gl:
-        fresh = made_stage(gl, soft=bool(stage.soft))
-        first, without = (picture(fresh, shot(hair=None, show_head=s)) for s in (True, False))
-        again = picture(fresh, shot(hair=None))
+        fresh = make_frame_renderer(gl, soft=bool(frame_renderer.soft))
+        first, without = (picture(fresh, inputs(hair=None, show_head=s)) for s in (True, False))
+        again = picture(fresh, inputs(hair=None))
         fresh.release()
     assert changed(first, without)[60, 80]
     assert (first == again).all()
 
 
-def test_colour_is_the_materials(stage: Stage) -> None:
+def test_colour_is_the_materials(frame_renderer: FrameRenderer) -> None:
     """Red hair is red, green hair green."""
     green = replace(LOOK, root_colour=(0.05, 0.4, 0.05), tip_colour=(0.05, 0.4, 0.05))
     with renderer():
-        pictures = [picture(stage, shot(hair=look)) for look in (LOOK, green)]
-        bare = picture(stage, shot(hair=None))
+        pictures = [picture(frame_renderer, inputs(hair=look)) for look in (LOOK, green)]
+        bare = picture(frame_renderer, inputs(hair=None))
     where = changed(pictures[0], bare) & changed(pictures[1], bare)
     means = [image[where].mean(axis=0) for image in pictures]
     assert means[0][0] > means[0][1] + 20
     assert means[1][1] > means[1][0] + 20
 
 
-def test_a_head_and_its_camera_that_move_together_show_the_same_hair(stage: Stage) -> None:
+def test_a_head_and_its_camera_that_move_together_show_the_same_hair(
+    frame_renderer: FrameRenderer,
+) -> None:
     """Only their relation matters, studio apart: what moves with the head is drawn in its frame."""
     motion = rotation_about((0.0, 1.0, 0.0), 0.7, np.zeros(3))
     with_head = replace(CAMERA, camera_from_head=CAMERA.camera_from_head @ np.linalg.inv(motion))
     with renderer():
         still, moved = (
-            picture(stage, s) for s in (shot(), shot(camera=with_head, world_from_head=motion))
+            picture(frame_renderer, s)
+            for s in (inputs(), inputs(camera=with_head, world_from_head=motion))
         )
-        bare = picture(stage, shot(hair=None, show_head=False))
+        bare = picture(frame_renderer, inputs(hair=None, show_head=False))
     here = changed(still, bare)
     assert np.abs(still.astype(int) - moved)[here].mean() < 2
 
 
-def test_two_pictures_of_the_same_are_the_same(stage: Stage) -> None:
+def test_two_pictures_of_the_same_are_the_same(frame_renderer: FrameRenderer) -> None:
     """Sums are whole numbers: the order in which cores add them does not show."""
     with renderer():
-        assert (picture(stage, shot()) == picture(stage, shot())).all()
+        assert (picture(frame_renderer, inputs()) == picture(frame_renderer, inputs())).all()
 
 
-def test_thin_strands_are_calm(stage: Stage) -> None:
+def test_thin_strands_are_calm(frame_renderer: FrameRenderer) -> None:
     """What hair darkens in all does not change when the picture slides by parts of a pixel."""
     few = replace(LOOK, hairs=150)
     sums = []
     with renderer():
         for slide in np.linspace(0, 1, 5):
             camera = replace(CAMERA, centre=CAMERA.centre + slide)
-            bare = picture(stage, shot(camera=camera, hair=None)).astype(float)
-            sums.append(np.abs(picture(stage, shot(camera=camera, hair=few)) - bare).sum())
+            bare = picture(frame_renderer, inputs(camera=camera, hair=None)).astype(float)
+            sums.append(
+                np.abs(picture(frame_renderer, inputs(camera=camera, hair=few)) - bare).sum()
+            )
     assert np.ptp(sums) < 0.05 * np.mean(sums)
 
 
@@ -160,37 +173,37 @@ def twin(body: HairBody, rows: Float32Array) -> Float32Array:
     return course + turned
 
 
-def test_hair_is_placed_as_its_twin_says(stage: Stage) -> None:
+def test_hair_is_placed_as_its_twin_says(frame_renderer: FrameRenderer) -> None:
     """Hair keeps its offset from the guides' mix, turned as the nearest guide turns."""
-    t = np.linspace(0, 1, stage.body.points_each, dtype=np.float32)[None, :, None]
-    rows = stage.body.guide_rest + np.float32([0.02, -0.01, 0.0]) * t**2
+    t = np.linspace(0, 1, frame_renderer.body.points_each, dtype=np.float32)[None, :, None]
+    rows = frame_renderer.body.guide_rest + np.float32([0.02, -0.01, 0.0]) * t**2
     with renderer():
-        picture(stage, shot(guide_rows=rows))
-        places = stage.hair.places()
-        if not stage.soft:
+        picture(frame_renderer, inputs(guide_rows=rows))
+        places = frame_renderer.hair.places()
+        if not frame_renderer.soft:
             places = np.frombuffer(places.read(), np.float32).reshape(3000, -1, 3)
         placed = places.copy()
-        picture(stage, shot())
-    np.testing.assert_allclose(placed, twin(stage.body, rows), atol=2e-5)
+        picture(frame_renderer, inputs())
+    np.testing.assert_allclose(placed, twin(frame_renderer.body, rows), atol=2e-5)
 
 
-def test_lines_are_drawn_in_their_colour(stage: Stage) -> None:
+def test_lines_are_drawn_in_their_colour(frame_renderer: FrameRenderer) -> None:
     """A line across the picture before the head shows its colour at its middle."""
     ends = CAMERA.unproject(np.array([[20.0, 60.5], [140.0, 60.5]]), np.array([0.3, 0.3]))
     colours = np.tile(np.float32([0, 1, 0, 1]), (2, 1))
     line = LineSet(ends.astype(np.float32), np.array([0, 2]), colours)
     with renderer():
-        drawn = picture(stage, shot(hair=None, lines=((line, False),)))
+        drawn = picture(frame_renderer, inputs(hair=None, lines=((line, False),)))
     assert (np.abs(drawn[59:62, 80].astype(int) - [0, 255, 0]).max(axis=1) < 30).any()
 
 
-def test_light_made_in_turns_is_light_made_at_once(stage: Stage) -> None:
+def test_light_made_in_turns_is_light_made_at_once(frame_renderer: FrameRenderer) -> None:
     """After enough pictures of the same, a picture is that of a still."""
     with renderer():
-        once = picture(stage, shot())
-        picture(stage, shot(hair=None))  # other light
+        once = picture(frame_renderer, inputs())
+        picture(frame_renderer, inputs(hair=None))  # other light
         for _ in range(2 * TURNS + 1):
-            in_turns = picture(stage, shot(whole_light=False))
+            in_turns = picture(frame_renderer, inputs(whole_light=False))
     assert np.abs(once.astype(int) - in_turns).max() <= 1
 
 
@@ -198,31 +211,31 @@ def test_light_made_in_turns_is_light_made_at_once(stage: Stage) -> None:
 def test_hair_that_is_nowhere_harms_nothing(place: float) -> None:
     """Guides without a place leave a picture, and the next one is as if they had never been."""
     with renderer() as gl:
-        stage = made_stage(gl, soft=True)
-        before = picture(stage, shot())
-        lost = stage.body.guide_rest.copy()
+        frame_renderer = make_frame_renderer(gl, soft=True)
+        before = picture(frame_renderer, inputs())
+        lost = frame_renderer.body.guide_rest.copy()
         lost[::2, 3:] = place
-        assert picture(stage, shot(guide_rows=lost)).shape == before.shape
-        np.testing.assert_array_equal(picture(stage, shot()), before)
-        stage.release()
+        assert picture(frame_renderer, inputs(guide_rows=lost)).shape == before.shape
+        np.testing.assert_array_equal(picture(frame_renderer, inputs()), before)
+        frame_renderer.release()
 
 
 def test_guides_may_stay_on_the_card() -> None:
     """A buffer of guides gives the picture that the same array gives, and a box that holds them."""
     t = np.linspace(0, 1, 64, dtype=np.float32)[None, :, None]
     with renderer() as gl:
-        stage = made_stage(gl, soft=False)
-        rest = stage.body.guide_rest
+        frame_renderer = make_frame_renderer(gl, soft=False)
+        rest = frame_renderer.body.guide_rest
         rows = rest + np.float32([0.02, -0.01, 0.0]) * t[:, : rest.shape[1]] ** 2
         buffer = gl.context.buffer(np.ascontiguousarray(rows, np.float32))
-        by_array = picture(stage, shot(guide_rows=rows))
+        by_array = picture(frame_renderer, inputs(guide_rows=rows))
         for _ in range(2):  # the box of the second picture is that of the first
-            by_buffer = picture(stage, shot(guide_rows=buffer))
-            low, high = stage.cloud.min(axis=0), stage.cloud.max(axis=0)
+            by_buffer = picture(frame_renderer, inputs(guide_rows=buffer))
+            low, high = frame_renderer.cloud.min(axis=0), frame_renderer.cloud.max(axis=0)
             assert (low <= rows.min(axis=(0, 1))).all()
             assert (high >= rows.max(axis=(0, 1))).all()
             assert (high - low).max() < 2 * np.ptp(rows, axis=(0, 1)).max()
-        stage.release()
+        frame_renderer.release()
         buffer.release()
     off = np.abs(by_array.astype(int) - by_buffer)
     assert off.mean() < 1
@@ -234,13 +247,13 @@ def test_guides_may_stay_on_the_card() -> None:
 def test_processor_and_shaders_draw_the_same(smooth: bool, direction: bool) -> None:
     """Both ways to draw differ by roundings, and by how finely skin and shadows are sampled."""
     look = replace(LOOK, smooth=smooth, by_direction=direction, wider=2.0)
-    wanted = shot(hair=look)
+    wanted = inputs(hair=look)
     with renderer() as gl:
-        stages = [made_stage(gl, soft=soft) for soft in (True, False)]
-        first, second = (picture(stage, wanted).astype(int) for stage in stages)
-        bare = picture(stages[0], shot(hair=None))
-        for stage in stages:
-            stage.release()
+        stages = [make_frame_renderer(gl, soft=soft) for soft in (True, False)]
+        first, second = (picture(frame_renderer, wanted).astype(int) for frame_renderer in stages)
+        bare = picture(stages[0], inputs(hair=None))
+        for frame_renderer in stages:
+            frame_renderer.release()
     off = np.abs(first - second)
     hair = changed(first, bare)
     assert hair.sum() > 1000

@@ -11,7 +11,7 @@ from hairkit.viewer.draw.frame_budget import LEVELS, Budget
 def settle(budget: Budget, times: list[float], pictures: int = 400) -> None:
     """Draw pictures that take, at each level, so long."""
     for _ in range(pictures):
-        budget.spent(times[budget.level])
+        budget.record(times[budget.level])
 
 
 def test_slow_drawing_draws_less_until_it_fits() -> None:
@@ -56,7 +56,7 @@ def test_a_slow_simulator_does_not_take_all_the_time_from_drawing() -> None:
     """Drawing keeps half of the budget, however long the simulation takes."""
     budget = Budget(0.05)
     for _ in range(300):
-        budget.spent(0.02, simulated=1.0)
+        budget.record(0.02, simulated=1.0)
     assert budget.quality == LEVELS[1]
 
 
@@ -65,7 +65,7 @@ def test_a_busy_machine_does_not_make_pictures_pop() -> None:
     budget, changes, before = Budget(0.05), [], 1
     for number in range(6000):
         # fast for a while, until more is drawn; then the burst that takes it back
-        budget.spent(0.09 if budget.level < 4 else 0.01)
+        budget.record(0.09 if budget.level < 4 else 0.01)
         if budget.level != before:
             changes.append(number)
         before = budget.level

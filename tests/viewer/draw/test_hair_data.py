@@ -13,7 +13,7 @@ from hairkit.viewer.draw.hair_data import (
     COUNTS,
     GuideSampler,
     HairBody,
-    shares_needed,
+    choose_shares,
     split_guides,
 )
 
@@ -66,8 +66,8 @@ def test_straight_hair_needs_the_fewest_points_and_curls_more() -> None:
     straight = Strands.from_list([np.stack([0 * t, -0.3 * t, 0 * t], axis=1)])
     angle = 2 * np.pi * 6 * t
     curl = np.stack([0.01 * np.cos(angle), -0.3 * t, 0.01 * np.sin(angle)], axis=1)
-    assert len(shares_needed(straight)) == COUNTS[0]
-    assert len(shares_needed(Strands.from_list([curl]))) > 4 * COUNTS[0]
+    assert len(choose_shares(straight)) == COUNTS[0]
+    assert len(choose_shares(Strands.from_list([curl]))) > 4 * COUNTS[0]
 
 
 def test_marked_guides_are_the_guides_and_the_rest_follows() -> None:
@@ -97,5 +97,5 @@ def test_a_groom_without_strands_is_refused() -> None:
     """One line says what is missing."""
     groom = bristle_groom()
     nothing = groom.strands.select(np.zeros(0, int))
-    with pytest.raises(InputError, match="no strands"):
+    with pytest.raises(InputError, match="0 guides"):
         HairBody.of(nothing, groom.head, groom.material, 10)

@@ -15,7 +15,7 @@ import swaying
 
 from hairkit.manager import Manager
 from hairkit.viewer.session import Session
-from hairkit.viewer.window.window import Window, opened
+from hairkit.viewer.window.window import Window, open_window
 
 SIZE = (320, 240)
 
@@ -26,7 +26,7 @@ def main() -> None:
     manager = Manager()
     manager.register(swaying, "swaying")
     make = lambda size: Session(manager, groom, size=size, hairs=800)  # noqa: E731
-    with opened(make, SIZE, 0.0) as window:
+    with open_window(make, SIZE, 0.0) as window:
         window.session.shown.panel = window.session.shown.numbers = False
         window.session.message = ""  # the greeting, which goes with the first action
         drive(window, lambda name: keep(window, screen, out / f"{name}.xwd"))
@@ -71,7 +71,7 @@ def drive(window: Window, screen: Any) -> None:
 def grab(window: Window, screen: Any) -> None:
     """Take the front-most tip, drag it to the right, and tell where it went."""
     glfw, handle, session = window._glfw, window._window, window.session
-    camera, simulator = session.camera(), session.tuned.simulator
+    camera, simulator = session.camera(), session.simulation.simulator
     tips = simulator.strands.offsets[1:] - 1
     tip = tips[camera.depth(simulator.points[tips]).argmin()]
     x, y = camera.project(simulator.points[tip]).tolist()
@@ -79,8 +79,8 @@ def grab(window: Window, screen: Any) -> None:
     window.on_button(handle, glfw.MOUSE_BUTTON_LEFT, glfw.PRESS, glfw.MOD_CONTROL)
     window.on_move(handle, x + 60, y - 20)
     screen("grab")
-    assert session.hold is not None
-    seen = camera.project(simulator.points[session.hold.points]).tolist()
+    assert session.grabbed_lock is not None
+    seen = camera.project(simulator.points[session.grabbed_lock.points]).tolist()
     print("pulled:", min(abs(px - x - 60) + abs(py - y + 20) for px, py in seen) < 2)
     window.on_button(handle, glfw.MOUSE_BUTTON_LEFT, glfw.RELEASE, 0)
 

@@ -16,7 +16,7 @@ from hairkit.viewer.draw.colouring import COLOURINGS, legend, point_values
 from hairkit.viewer.session import Session
 from hairkit.viewer.window import hud, splash
 from hairkit.viewer.window.keyboard import CONTROL, SHIFT, key_name
-from hairkit.viewer.window.splash import AbandonedError, Waiting, warm_up
+from hairkit.viewer.window.splash import AbandonedError, WaitScreen, warm_up
 
 glfw = pytest.importorskip("glfw")
 
@@ -52,16 +52,16 @@ class Screen:
 @pytest.fixture
 def waiting(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Make what waits on a screen that draws nothing."""
-    monkeypatch.setattr(Waiting, "_show", lambda *_: None)
-    return lambda screen: Waiting(screen, None)
+    monkeypatch.setattr(WaitScreen, "_show", lambda *_: None)
+    return lambda screen: WaitScreen(screen, None)
 
 
 def test_work_is_done_aside_and_its_result_comes_back(waiting: Any) -> None:
     """In another thread; what it raises is raised here."""
     wait = waiting(Screen())
-    assert wait.until("counting", lambda: threading.current_thread()) is not threading.main_thread()
+    assert wait.run("counting", lambda: threading.current_thread()) is not threading.main_thread()
     with pytest.raises(InputError, match="no such file"):
-        wait.until("opening", lambda: (_ for _ in ()).throw(InputError("no such file")))
+        wait.run("opening", lambda: (_ for _ in ()).throw(InputError("no such file")))
 
 
 @pytest.mark.parametrize("way", ["close", "escape", "interrupt"])
@@ -77,13 +77,13 @@ def test_a_user_who_leaves_is_not_kept_waiting(waiting: Any, way: str) -> None:
 
     end = threading.Event()
     with pytest.raises(AbandonedError):
-        waiting(Screen(leave)).until("compiling", lambda: end.wait(60))
+        waiting(Screen(leave)).run("compiling", lambda: end.wait(60))
     end.set()
 
 
 def test_warming_up_leaves_the_hair_at_rest(session: Session) -> None:
     """Wind and a hand were felt once, so that nothing is compiled later; nothing of it is left."""
-    simulator = session.tuned.simulator
+    simulator = session.simulation.simulator
     rest, felt = simulator.points.copy(), []
     advance = simulator.advance
 
@@ -100,7 +100,7 @@ def test_warming_up_leaves_the_hair_at_rest(session: Session) -> None:
 def test_lines_break_where_the_window_ends() -> None:
     """No line is wider than asked for, and no word is lost."""
     text = "a long message of many words that does not fit into a window as narrow as this one"
-    lines = hud.wrapped(text, 200)
+    lines = hud.wrap_text(text, 200)
     assert len(lines) > 2
     assert " ".join(lines) == text
     assert all(hud._width(line, 1.0) <= 200 for line in lines)
@@ -126,7 +126,7 @@ def test_colours_of_guides_have_a_legend(session: Session) -> None:
 
 def test_confidence_is_not_shown_where_there_is_none(session: Session) -> None:
     """It is refused by name, and the key goes past it."""
-    with pytest.raises(InputError, match="no confidence is here"):
+    with pytest.raises(InputError, match="no confidence to show"):
         perform(session, "colours", {"by": "confidence"})
     seen = []
     for _ in range(2 * len(COLOURINGS)):
@@ -152,6 +152,6 @@ def test_the_waiting_window_says_how_long_it_waits(
     monkeypatch.setattr(splash, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
     end = threading.Event()
     screen._at_each_look = lambda one: end.set() if len(one.titles) > 2 else None
-    waiting(screen).until("compiling", lambda: end.wait(60))
+    waiting(screen).run("compiling", lambda: end.wait(60))
     assert screen.titles[0].startswith("hairkit: compiling, ")
     assert screen.titles[-1] == "hairkit"
