@@ -1,7 +1,15 @@
-"""Triangle meshes as they stand in OBJ and PLY files, with what may mark a scalp."""
+"""Triangle meshes of OBJ and PLY files, with what may mark a scalp.
+
+PLY is read by trimesh, whose reader neither hangs nor allocates more than a damaged file is worth;
+it accepts text files that end early, so that the counts are compared with the header here. OBJ is
+read here: trimesh (5.2.0) leaves out the vertices that no face uses, which renumbers the rest, and
+joins groups, so that landmarks and the scalp's group would be lost.
+STL files are not read, because nothing in them can mark a scalp.
+"""
 
 from __future__ import annotations
 
+import io
 import os
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,12 +25,9 @@ MAX_MESH_BYTES = 512 * 2**20
 MAX_VERTICES = 2_000_000
 MAX_FACES = 4_000_000
 
-_PLY_TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2",
-    "ushort": "u2", "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
-    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
-}  # fmt: skip
-_PLY_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+_MAX_PLY_HEADER = 2**16
+"""Bytes in which a PLY header ends; trimesh reads the lines of an endless one for minutes."""
+_MAX_REASON = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,134 +192,48 @@ def read_ply(path: str | os.PathLike[str]) -> FileMesh:
     Every scalar vertex property that is no position, normal, colour or texture coordinate becomes
     a group of that name, with values above 1 divided by 255. Raises `FormatError`.
     """
+    from trimesh.exchange.ply import load_ply
+
     data = read_bytes(path, MAX_MESH_BYTES)
     try:
-        elements, order, body = _ply_header(data)
-        tables = _ply_tables(elements, order, body)
-        mesh = _ply_mesh(tables)
-    except (ValueError, IndexError, KeyError, TypeError, OverflowError) as error:
-        raise FormatError(f"{path}: not a readable PLY mesh ({error})") from error
+        if not data.startswith(b"ply") or b"end_header" not in data[:_MAX_PLY_HEADER]:
+            raise ValueError("it has no header from 'ply' to 'end_header'")
+        with np.errstate(all="ignore"):  # damaged numbers are found by `checked_mesh`
+            mesh = _ply_mesh(load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True))
+    except Exception as error:  # trimesh raises almost anything on damaged files
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:_MAX_REASON]
+        raise FormatError(f"{path}: not a readable PLY mesh ({reason})") from error
     return checked_mesh(mesh, path)
 
 
-_Elements = list[tuple[str, int, list[tuple[str, ...]]]]
-
-
-def _ply_header(data: bytes) -> tuple[_Elements, str, bytes]:
-    if not data.startswith(b"ply"):
-        raise ValueError("it does not begin with 'ply'")
-    end = data.index(b"end_header")
-    body = data.index(b"\n", end) + 1
-    elements: _Elements = []
-    order = ""
-    for line in data[:end].decode("ascii", "replace").splitlines():
-        words = line.split()
-        if words[:1] == ["format"]:
-            order = _PLY_ORDERS[words[1]]
-        elif words[:1] == ["element"]:
-            if not 0 <= int(words[2]) <= len(data):
-                raise ValueError(f"{words[2]} of {words[1]} in {len(data)} bytes")
-            elements.append((words[1], int(words[2]), []))
-        elif words[:1] == ["property"]:
-            elements[-1][2].append(tuple(words[1:]))
-    if not order:
-        raise ValueError("its header names no format")
-    return elements, order, data[body:]
-
-
-def _ply_tables(elements: _Elements, order: str, body: bytes) -> dict[str, dict[str, Any]]:
-    """Per element name its columns: arrays for scalars, lists of tuples for lists."""
-    tables: dict[str, dict[str, Any]] = {}
-    words = body.split() if order == "=" else []
-    at = 0
-    for name, count, properties in elements:
-        lists = [item for item in properties if item[0] == "list"]
-        if order == "=":
-            tables[name], at = _ply_text(properties, count, words, at)
-        elif not lists:
-            kind = np.dtype([(item[1], order + _PLY_TYPES[item[0]]) for item in properties])
-            rows = np.frombuffer(body, kind, count, at)
-            tables[name] = {item[1]: rows[item[1]] for item in properties}
-            at += kind.itemsize * count
-        else:
-            tables[name], at = _ply_lists(properties, count, order, body, at)
-    return tables
-
-
-def _ply_text(
-    properties: list[tuple[str, ...]], count: int, words: list[bytes], at: int
-) -> tuple[dict[str, Any], int]:
-    if not any(item[0] == "list" for item in properties):
-        width = len(properties)
-        if at + width * count > len(words):
-            raise ValueError("it ends too early")
-        rows = np.array(words[at : at + width * count], np.float64).reshape(count, width)
-        return {item[1]: rows[:, k] for k, item in enumerate(properties)}, at + width * count
-    columns: dict[str, Any] = {item[-1]: [] for item in properties}
-    for _ in range(count):
-        for item in properties:
-            length = int(words[at]) if item[0] == "list" else 1
-            first = at + (item[0] == "list")
-            if length < 0 or first + length > len(words):
-                raise ValueError("it ends too early")
-            values = tuple(float(word) for word in words[first : first + length])
-            columns[item[-1]].append(values if item[0] == "list" else values[0])
-            at = first + length
-    return columns, at
-
-
-def _ply_lists(
-    properties: list[tuple[str, ...]], count: int, order: str, body: bytes, at: int
-) -> tuple[dict[str, Any], int]:
-    columns: dict[str, Any] = {item[-1]: [] for item in properties}
-    kinds = [
-        [
-            np.dtype(order + _PLY_TYPES[kind])
-            for kind in (item[1:3] if item[0] == "list" else item[:1])
-        ]
-        for item in properties
-    ]
-    for _ in range(count):
-        for item, kind in zip(properties, kinds, strict=True):
-            length = 1
-            if item[0] == "list":
-                length = int(np.frombuffer(body, kind[0], 1, at)[0])
-                at += kind[0].itemsize
-            values = np.frombuffer(body, kind[-1], length, at) if length > 0 else np.zeros(0)
-            at += kind[-1].itemsize * max(length, 0)
-            columns[item[-1]].append(tuple(values.tolist()) if item[0] == "list" else values[0])
-    return columns, at
-
-
-@np.errstate(invalid="ignore")  # damaged numbers are found by whoever reads on
-def _ply_mesh(tables: dict[str, dict[str, Any]]) -> FileMesh:
-    columns = {key.lower(): value for key, value in tables["vertex"].items()}
-    vertices = np.stack([np.asarray(columns.pop(axis), np.float64) for axis in "xyz"], axis=1)
-    polygons = tables["face"].get("vertex_indices", tables["face"].get("vertex_index"))
-    if polygons is None:
-        raise ValueError("its faces have no vertex_indices")
-    faces = [
-        (polygon[0], polygon[i], polygon[i + 1])
-        for polygon in polygons
-        for i in range(1, len(polygon) - 1)
-    ]
+def _ply_mesh(found: dict[str, Any]) -> FileMesh:
+    """Return the mesh of what trimesh read, which must be as much as the header says."""
+    elements = found["metadata"]["_ply_raw"]
+    for name in ("vertex", "face"):
+        wanted, rows = elements[name]["length"], elements[name]["data"]
+        if any(len(rows[column]) != wanted for column in elements[name]["properties"]):
+            raise ValueError(f"it ends before the last {name} of {wanted}")
+    table = elements["vertex"]
+    columns = {
+        name.lower(): np.asarray(table["data"][name], np.float64).reshape(-1)
+        for name in table["properties"]
+    }
+    vertices = np.stack([columns.pop(axis) for axis in "xyz"], axis=1)
     colours = _ply_columns(columns, [("red", "green", "blue"), ("r", "g", "b")])
     uv = _ply_columns(columns, [("s", "t"), ("u", "v"), ("texture_u", "texture_v")])
     for name in ("nx", "ny", "nz", "alpha", "a"):
         columns.pop(name, None)
-    groups = {name: np.asarray(value, np.float64) for name, value in columns.items()}
-    groups = {name: value / 255 if value.max() > 1 else value for name, value in groups.items()}
     return FileMesh(
         vertices,
-        np.array(faces, np.int64).reshape(-1, 3),
+        np.asarray(found["faces"], np.int64).reshape(-1, 3),
         uv,
         None if colours is None else _unit_colours(colours),
-        groups,
+        {name: _unit_colours(values) for name, values in columns.items()},
     )
 
 
 def _ply_columns(columns: dict[str, Any], names: list[tuple[str, ...]]) -> Float64Array | None:
     for wanted in names:
         if all(name in columns for name in wanted):
-            return np.stack([np.asarray(columns.pop(name), np.float64) for name in wanted], axis=1)
+            return np.stack([columns.pop(name) for name in wanted], axis=1)
     return None

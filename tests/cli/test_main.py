@@ -176,7 +176,7 @@ def test_ctrl_c_is_recognised_behind_another_error() -> None:
 
 def test_plugins_are_listed_without_what_only_their_work_needs() -> None:
     """SciPy's splines, the web and the exporters' libraries load when a stage runs."""
-    heavy = ("scipy.interpolate", "scipy.optimize", "urllib.request", "alembic3d", "pygltflib")
+    heavy = ("scipy.interpolate", "scipy.optimize", "urllib.request", "alembic3d")
     code = (
         "import sys; from hairkit.cli import main; main(['plugins']);"
         f"print('loaded', [m for m in {heavy} if m in sys.modules])"
