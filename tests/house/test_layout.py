@@ -170,3 +170,20 @@ def test_a_package_lists_its_modules(package: Path) -> None:
     found |= {path.parent.name for path in package.glob("*/__init__.py")}
     assert sorted(listed) == sorted(found - {"__init__", "__main__"})
     assert docstring.partition("\n")[0].endswith((".", ")"))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["-c", "import hairkit; print(hairkit.load_recipe('default').name)"],
+        ["-c", "import hairkit.simulation; print(hairkit.load_recipe('default').name)"],
+        ["-m", "hairkit", "reconstruct", "--help"],
+    ],
+)
+def test_python_runs_in_the_folder_above_the_clone(words: list[str], tmp_path: Path) -> None:
+    """A clone named `hairkit` does not hide the package inside it from `python` started above."""
+    (tmp_path / "hairkit").symlink_to(PROJECT)
+    done = subprocess.run(
+        [sys.executable, *words], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert "default" in done.stdout
