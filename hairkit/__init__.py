@@ -22,6 +22,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `cli`: the command line
 * `api`: the verbs of the front door
 * `arrays`: array types
+* `colour`: the sRGB curve
 * `errors`: errors that users can mend
 * `hookspecs`: the hooks that plugins implement
 * `manager`: plugins by name

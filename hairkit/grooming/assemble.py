@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
+from hairkit.colour import linear_from_srgb
 from hairkit.errors import InputError
 from hairkit.imaging.waves import Waves
 from hairkit.types.capture import View
@@ -100,18 +101,6 @@ def measure_colour(views: Sequence[View], masks: Sequence[Mask]) -> HairMaterial
         tips.append(pixels[-third - 1 :])
     root, tip = (_median(np.concatenate(part)) for part in (crowns, tips))
     return HairMaterial(root, tip)
-
-
-def linear_from_srgb(value: Float64Array) -> Float64Array:
-    """Return linear intensities of sRGB values, both in [0, 1] (IEC 61966-2-1).
-
-    >>> linear_from_srgb(np.array([0.0, 0.5, 1.0])).round(3).tolist()
-    [0.0, 0.214, 1.0]
-    """
-    result: Float64Array = np.where(
-        value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4
-    )
-    return result
 
 
 def _hair_pixels(view: View, mask: Mask) -> Float64Array:

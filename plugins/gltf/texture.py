@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from hairkit.arrays import Float64Array, UInt8Array
+from hairkit.colour import srgb_from_linear
 
 _SHORTEST = 0.72
 """Share of the strip's length that the shortest strand reaches."""
@@ -27,7 +28,7 @@ def strand_pictures(strands: int, opaque: bool, seed: int = 0) -> tuple[bytes, b
     width, height = (64, 256) if strands <= 8 else (256, 256)
     relief, shade = _strands_side_by_side(strands, width, height, seed)
     lit = shade * (0.75 + 0.25 * np.maximum(relief, 0))
-    colour = np.repeat(255 * _to_srgb(lit)[..., None], 4, axis=-1)
+    colour = np.repeat(255 * srgb_from_linear(lit)[..., None], 4, axis=-1)
     edge = 0.25  # of the relief: alpha goes from 0 to 1 there, so that the cut is smooth
     colour[..., 3] = 255 if opaque else 255 * np.clip(0.5 + relief / edge, 0, 1)
     return _png(colour), _png(_normals(np.maximum(relief, 0) * width / strands * 0.3))
@@ -64,11 +65,6 @@ def _normals(relief: Float64Array) -> Float64Array:
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     result: Float64Array = 127.5 * (normal + 1)
     return result
-
-
-def _to_srgb(linear: Float64Array) -> Float64Array:
-    """Return sRGB-encoded values of [0, 1] (IEC 61966-2-1)."""
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 def _png(picture: Float64Array) -> bytes:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Int64Array
+from hairkit.colour import linear_from_srgb, srgb_from_linear
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
@@ -61,9 +62,8 @@ _VERTEX = [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("thickness", "<f4")]
 _COLOUR = [("red", "u1"), ("green", "u1"), ("blue", "u1")]
 _EDGE = [("vertex1", "<i4"), ("vertex2", "<i4")]
 _STRAND = [("nsegs", "<u2"), ("u", "<f4"), ("v", "<f4"), ("group", "<i4"), ("guide", "u1")]
-_LEVEL = np.arange(256) / 255.0
-_LINEAR = np.where(_LEVEL <= 0.04045, _LEVEL / 12.92, ((_LEVEL + 0.055) / 1.055) ** 2.4)
-"""Linear intensities of the sRGB levels (IEC 61966-2-1)."""
+_LINEAR = linear_from_srgb(np.arange(256) / 255.0)
+"""Linear intensities of the 256 levels of sRGB."""
 _NAMES = {"<f4": "float", "u1": "uchar", "<i4": "int", "<u2": "ushort"}
 
 
@@ -184,10 +184,8 @@ def _with_strand_values(
 
 
 def _to_bytes(colours: Float32Array) -> npt.NDArray[np.uint8]:
-    """Return linear RGB as sRGB from 0 to 255 (IEC 61966-2-1)."""
-    linear = np.clip(colours, 0, 1)
-    bent = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.round(255 * bent).astype(np.uint8)
+    """Return linear RGB as sRGB from 0 to 255."""
+    return np.round(255 * srgb_from_linear(np.clip(colours, 0, 1))).astype(np.uint8)
 
 
 def _look(colours: npt.NDArray[np.generic] | None, strands: Strands) -> HairMaterial | None:

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hairkit.colour import linear_from_srgb
 from hairkit.errors import InputError
-from hairkit.grooming.assemble import assemble_groom, linear_from_srgb, measure_colour
+from hairkit.grooming.assemble import assemble_groom, measure_colour
 from hairkit.testing import ball_head, ball_mask, scalp_roots, striped_view, turn_scene
 from hairkit.types.head import Roots
 from hairkit.types.mask import Mask

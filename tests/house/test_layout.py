@@ -18,7 +18,7 @@ PACKAGES = sorted(path.parent for path in (PROJECT / "hairkit").rglob("__init__.
 PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins" / "__init__.py"})
 
 FLOORS = (
-    ("errors", "arrays", "options", "storage", "progress", "parallel"),
+    ("errors", "arrays", "colour", "options", "storage", "progress", "parallel"),
     ("types",),
     ("cameras", "imaging", "helices", "head_model", "rendering", "hookspecs"),
     ("field", "io"),

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 
 from hairkit.arrays import Float32Array
+from hairkit.colour import srgb_from_linear
 from hairkit.rendering.light import Lights
 from hairkit.types.camera import Camera
 from hairkit.types.volume import VoxelGrid
@@ -38,8 +39,7 @@ def tone_table() -> Float32Array:
     """Return the tone (TONES,) of radiance (k / (TONES - 1))^2 BRIGHTEST, as in tone.glsl."""
     x = (np.arange(TONES) / (TONES - 1)) ** 2 * BRIGHTEST
     film = np.clip(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0, 1)
-    curve = np.where(film < 0.0031308, 12.92 * film, 1.055 * film ** (1 / 2.4) - 0.055)
-    return curve.astype(np.float32)
+    return srgb_from_linear(film).astype(np.float32)
 
 
 def pack_shading(
