@@ -10,6 +10,7 @@ the packages named after the subject.
 * `mask`: labels: hair, person, background
 * `orientation`: 2D strand angle and confidence
 * `point_cache`: simulated frames of the guides
+* `preview`: the pictures of these types that a notebook shows
 * `scene`: cameras and fitted head
 * `strands`: packed polylines
 * `volume`: grid, hull and orientation field
