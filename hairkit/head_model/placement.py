@@ -1,4 +1,4 @@
-"""Put a head under strands: where the scalp must be, as the roots and the way they grow tell."""
+"""Place a head under strands: fit its scalp to the roots and their directions of growth."""
 
 from __future__ import annotations
 
@@ -13,21 +13,25 @@ from hairkit.types.head import Capsules, Head
 from hairkit.types.strands import Strands
 
 _ROUNDS, _STILL = 40, 1e-6
+"""Iterations of closest points at most, and the move in metres at which they end."""
 _INNERMOST = 0.9
-_SAMPLES = 600
+"""Share of the roots nearest to the scalp that an iteration fits; the others may be outliers."""
+_SAMPLES, _POINTS = 600, 5
+"""Strands at most that are fitted, and points of each."""
 _PATCH = 0.6
-"""Roots that spread over less than this share of the scalp tell nothing about the head's size."""
+"""Roots that spread over less than this share of the scalp leave the head's size unknown."""
 _SMALLEST, _LARGEST = 0.7, 1.4
+"""Least and greatest scale of a head."""
 _BURIED, _BURIED_COST = 0.003, 0.03
-"""Hair deeper than this in the head (m) counts as buried; wholly buried hair costs as much as
-roots this far (m) from the scalp."""
-_ASLANT_COST = 0.01
-"""Roots that grow into the head cost as much as roots this far (m) from the scalp."""
+"""Depth in the head, metres, from which hair counts as buried, and the cost of burying all hair, as
+a distance of the roots from the scalp in metres."""
+_INWARD_COST = 0.01
+"""Cost of roots that all grow into the head, as a distance of the roots in metres."""
 
 
 @dataclass(frozen=True)
 class Placing:
-    """A head's scale about its origin, then its move, and how well it fits."""
+    """A head's scale about its origin, its translation after that, and the quality of the fit."""
 
     scale: float
     shift: Float64Array
@@ -35,7 +39,7 @@ class Placing:
     distance: float
     """Mean distance of the roots from the scalp, metres."""
     cost: float
-    """Distance, and metres for hair that lies in the head or grows into it."""
+    """Distance plus the costs of hair in the head and of roots that grow into it, metres."""
 
 
 def placed(head: Head, scale: float, shift: Float64Array) -> Head:
@@ -52,17 +56,17 @@ def placed(head: Head, scale: float, shift: Float64Array) -> Head:
 
 
 def find_place(head: Head, strands: Strands, *, scaled: bool = True) -> Placing:
-    """Return where the head fits under the strands best; it is never turned.
+    """Return the best placing of the head under the strands, without rotation.
 
-    Iterated closest points with a similarity without turning (Zinsser et al. 2005), the farthest
-    tenth of the roots left out in each round, from several starts: as the head is, its scalp's
-    middle at the roots', and its scalp where it faces the way the strands grow. Of these the one
-    with the roots nearest and the least hair inside the head is taken. The size is kept where the
-    roots are only a patch, or `scaled` is false.
+    Iterative closest points with scale and translation (Zinsser et al. 2005), the farthest tenth of
+    the roots left out in each round, from several starts: the head as it is, the scalp's middle at
+    the roots', and the scalp's point that faces the growth there. The result with the least cost is
+    returned. The size is kept where the roots are only a patch, or if `scaled` is false.
     """
     sample = strands.select(np.unique(np.linspace(0, len(strands) - 1, _SAMPLES).astype(np.int64)))
-    fit = _Fit(head, sample.resampled(5).points.reshape(-1, 5, 3).astype(np.float64))
-    starts = [fit.improved(start, scaled) for start in fit.starts()]
+    hair = sample.resampled(_POINTS).points.reshape(-1, _POINTS, 3)
+    fit = _Fit(head, hair.astype(np.float64))
+    starts = [fit.improve(start, scaled) for start in fit.starts()]
     return min(starts, key=lambda place: place.cost)
 
 
@@ -89,8 +93,8 @@ class _Fit:
         facing = self.scalp_normals @ self.grown.mean(axis=0)
         yield 1.0, middle - self.scalp[facing.argmax()]
 
-    def improved(self, start: tuple[float, Float64Array], scaled: bool) -> Placing:
-        """Return where iterated closest points lead from a start."""
+    def improve(self, start: tuple[float, Float64Array], scaled: bool) -> Placing:
+        """Return the placing after iterative closest points from a start."""
         scale, shift = start
         patch = np.ptp(self.roots, axis=0).max() < _PATCH * np.ptp(self.scalp, axis=0).max()
         scale = 1.0 if patch or not scaled else scale
@@ -106,9 +110,10 @@ class _Fit:
             before, shift = shift, wanted.mean(axis=0) - scale * have.mean(axis=0)
             if np.abs(shift - before).max() < _STILL:
                 break
-        return self._judged(scale, shift)
+        return self._evaluate(scale, shift)
 
-    def _judged(self, scale: float, shift: Float64Array) -> Placing:
+    def _evaluate(self, scale: float, shift: Float64Array) -> Placing:
+        """Return a placing with its distance and cost."""
         distance, near = self.scalp_tree.query((self.roots - shift) / scale)
         off = scale * float(distance.mean())
         outward = (self.grown * self.scalp_normals[near]).sum(axis=1)
@@ -116,5 +121,5 @@ class _Fit:
         _, at = self.tree.query(local)
         depth = ((self.vertices[at] - local) * self.normals[at]).sum(axis=1)
         buried = float((depth > _BURIED).mean())
-        cost = off + _BURIED_COST * buried + _ASLANT_COST * float((outward < 0).mean())
+        cost = off + _BURIED_COST * buried + _INWARD_COST * float((outward < 0).mean())
         return Placing(scale, shift, off, cost)

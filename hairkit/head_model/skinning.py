@@ -1,9 +1,9 @@
-"""Skin weights of a head: how much of its three joints each vertex follows.
+"""Skin weights of a head: the shares of its three joints in each vertex's motion.
 
-The skull moves with the head joint, the lowest part of the neck stays with the root, and what lies
+The skull moves with the head joint, the lowest part of the neck stays with the root, and the neck
 between is blended by height. The height is measured along an axis that leans forward, because the
-base of the skull falls from the nape to the chin. Where hair grows the head is rigid, so that hair
-bound to the head joint alone never leaves the skin.
+base of the skull falls from the nape to the chin. The scalp is rigid, so that hair bound to the
+head joint alone stays on the skin.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ JOINT_NAMES = ("root", "neck", "head")
 HEAD_JOINT = 2
 """The joint that hair is bound to."""
 _LEAN = np.radians(20.0)
+"""Forward lean of the axis along which the neck is blended."""
 _SKULL = 0.5
-"""Share of the way from the neck joint to the head joint above which all is skull."""
+"""Share of the height from the neck joint to the head joint above which all is skull."""
 
 
 def head_weights(head: Head) -> Float32Array:
-    """Return (V, 3) the weights of the root, neck and head joint: not negative, sum 1 a row.
+    """Return (V, 3) the weights of root, neck and head joint: at least 0, each row with sum 1.
 
     A vertex with scalp of 0.5 or more follows the head joint alone.
 
@@ -45,7 +46,7 @@ def head_weights(head: Head) -> Float32Array:
 
 
 def _upward(spine: Float64Array) -> Float64Array:
-    """Return the unit direction of the spine, leant towards the face."""
+    """Return the unit direction of the spine, inclined towards the face."""
     length = np.linalg.norm(spine)
     up = spine / length if length > 1e-6 else np.array([0.0, 1.0, 0.0])
     ahead = np.array([0.0, 0.0, 1.0]) - up[2] * up

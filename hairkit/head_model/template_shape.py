@@ -92,7 +92,24 @@ _BUMPS = np.array(
 EAR_CENTRE = np.array([-58.0, -10.0])
 """Height and depth of the middle of the ear, mm."""
 _EAR_TILT = np.radians(12.0)
+"""Rotation of the ear's long axis backwards."""
 _EAR_HALF = np.array([27.0, 16.0])
+"""Half height and half depth of the ear, mm; the shape below is in units of them."""
+_LOBE = 0.45
+"""By which the ear gets narrower per half height below its middle."""
+_EAR_EDGE, _EAR_FADE = 1.3, 0.55
+"""Half heights from the middle at which the ear ends, and over which it rises to the full lift."""
+_BOWL_CENTRE, _BOWL_REACH = (-0.1, 0.15), (0.45, 0.4)
+"""Up and forward in half heights and half depths: middle and Gaussian sigma of the hollow."""
+_EAR_LIFT, _EAR_FORWARD, _BOWL_DEPTH, _EAR_BACK = 12.0, 9.0, 9.0, 5.0
+"""Millimetres that the ear stands off the head, less per half depth forward, less in the hollow,
+and that it is pulled back."""
+_SIDE = 40.0
+"""Millimetres from the median plane beyond which a point is at the side of the head."""
+_FACE = 40.0
+"""Millimetres in front of the origin beyond which a point is on the face and its nose."""
+_NOSE_EXPONENT = 2.2
+"""Of exp(-|x / half width|^e), the nose's cross-section: a little flatter than a Gaussian."""
 
 # Azimuth about the vertical through z = -10 mm in degrees, height of the hairline there.
 _HAIRLINE = np.array(
@@ -122,6 +139,10 @@ _HAIRLINE = np.array(
     ]
 )
 _HAIRLINE_FADE = 8.0
+"""Width of the hairline's transition, mm."""
+_AXIS_DEPTH, _LEAST_RADIUS = 10.0, 20.0
+"""Millimetres behind the origin of the hairline's axis, and the least distance from it at which the
+hairline's slope is measured."""
 
 
 def head_surface(polar: Float64Array, azimuth: Float64Array) -> Float64Array:
@@ -137,11 +158,12 @@ def head_surface(polar: Float64Array, azimuth: Float64Array) -> Float64Array:
 
 
 def scalp_weight(points: Float64Array) -> Float64Array:
-    """Return (N,) how surely hair grows at points (N, 3), metres: 1, 0.5 at the hairline, 0."""
+    """Return the scalp weight (N,) at points (N, 3), metres: 1 in hair, 0.5 at the hairline, 0."""
     x, y, z = points.T * 1e3
-    azimuth = np.degrees(np.arctan2(np.abs(x), z + 10.0))
+    azimuth = np.degrees(np.arctan2(np.abs(x), z + _AXIS_DEPTH))
     hairline = _hairline()
-    slope = np.degrees(hairline.derivative()(azimuth)) / np.maximum(np.hypot(x, z + 10.0), 20.0)
+    radius = np.maximum(np.hypot(x, z + _AXIS_DEPTH), _LEAST_RADIUS)
+    slope = np.degrees(hairline.derivative()(azimuth)) / radius
     beyond = (y - hairline(azimuth)) / np.sqrt(1 + slope**2)
     t = np.clip(0.5 + beyond / _HAIRLINE_FADE, 0, 1)
     result: Float64Array = t * t * (3 - 2 * t)
@@ -204,7 +226,8 @@ def _hairline() -> Any:
 def _nose(base: Float64Array) -> Float64Array:
     x, y, z = base.T
     height = _nose_curves()(np.clip(y, _NOSE[-1, 0], _NOSE[0, 0]))
-    out = np.where(z > 40, height[:, 0], 0) * np.exp(-((np.abs(x) / height[:, 1]) ** 2.2))
+    out = np.where(z > _FACE, height[:, 0], 0)
+    out = out * np.exp(-((np.abs(x) / height[:, 1]) ** _NOSE_EXPONENT))
     result: Float64Array = np.stack([np.zeros_like(out), np.zeros_like(out), out], axis=1)
     return result
 
@@ -224,13 +247,15 @@ def _ears(base: Float64Array) -> Float64Array:
     y, z = base[:, 1] - EAR_CENTRE[0], base[:, 2] - EAR_CENTRE[1]
     up = (np.cos(_EAR_TILT) * y - np.sin(_EAR_TILT) * z) / _EAR_HALF[0]
     forward = (np.sin(_EAR_TILT) * y + np.cos(_EAR_TILT) * z) / _EAR_HALF[1]
-    forward = forward * np.where(up < 0, 1 - 0.45 * up, 1.0)  # the lobe is narrower
+    forward = forward * np.where(up < 0, 1 - _LOBE * up, 1.0)
     distance = np.hypot(up, forward)
-    plateau = _smoothstep((1.3 - distance) / 0.55)
-    bowl = np.exp(-0.5 * (((up + 0.1) / 0.45) ** 2 + ((forward - 0.15) / 0.4) ** 2))
-    lift = plateau * (12.0 - 9.0 * forward.clip(-1, 1) - 9.0 * bowl)
-    side = np.sign(base[:, 0]) * (np.abs(base[:, 0]) > 40)
-    result: Float64Array = np.stack([lift * side, 0 * lift, -5.0 * plateau * side**2], axis=1)
+    plateau = _smoothstep((_EAR_EDGE - distance) / _EAR_FADE)
+    (up0, forward0), (up_reach, forward_reach) = _BOWL_CENTRE, _BOWL_REACH
+    away = ((up - up0) / up_reach) ** 2 + ((forward - forward0) / forward_reach) ** 2
+    bowl = np.exp(-0.5 * away)
+    lift = plateau * (_EAR_LIFT - _EAR_FORWARD * forward.clip(-1, 1) - _BOWL_DEPTH * bowl)
+    side = np.sign(base[:, 0]) * (np.abs(base[:, 0]) > _SIDE)
+    result: Float64Array = np.stack([lift * side, 0 * lift, -_EAR_BACK * plateau * side**2], axis=1)
     return result
 
 

@@ -1,14 +1,15 @@
-"""A torso by few numbers: superelliptic sections from the neck down, placed under a head."""
+"""A parametric torso under a head: superelliptic sections from the neck down."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit, prange
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
+from hairkit.parallel import compiled, parallel_for
 from hairkit.types.head import Head
 from hairkit.types.volume import VoxelGrid
 
@@ -29,12 +30,15 @@ RINGS = np.array(
 EXPONENT = 2.3
 """e of the sections' outlines |x / breadth|^e + |z / depth|^e = 1."""
 NECK, CHEST = 0.052, -0.038
-"""Heights between which the neck, which has the head's size, becomes the torso; metres."""
+"""Heights between which the neck, scaled with the head, turns into the torso; metres."""
 KNEE = -0.075
 """Height down to which `slope` stretches the shoulders, metres."""
 JOINTS_APART = 0.184
 """Metres from the root joint to the head joint of the head to which `RINGS` belong."""
 _TABLE = 256
+"""Levels of the sections that `inside` interpolates."""
+_THINNEST = 1e-6
+"""Metres; least half breadth and depth of a section that `depth` makes smaller."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +106,18 @@ class Torso:
         breadth, deep, ahead, left, level = self._sections(heights)
         even = np.linspace(level[0], level[-1], _TABLE)
         less = depth / self.scale
-        table = [np.interp(even, level, part) for part in (breadth, deep, ahead, left)]
-        table[:2] = [np.maximum(part - less, 1e-6) for part in table[:2]]
-        first = (grid.origin + 0.5 * grid.spacing - self.joint) / self.scale
-        turn = np.array([np.cos(self.yaw), np.sin(self.yaw), self.roll])
-        found: BoolArray = _inside(
-            first, grid.spacing / self.scale, grid.shape, turn, even - less, np.stack(table, 1)
+        sections = Sections(
+            even - less,
+            np.maximum(np.interp(even, level, breadth) - less, _THINNEST),
+            np.maximum(np.interp(even, level, deep) - less, _THINNEST),
+            np.interp(even, level, ahead),
+            np.interp(even, level, left),
         )
+        first = (grid.origin + 0.5 * grid.spacing - self.joint) / self.scale
+        turn = float(np.cos(self.yaw)), float(np.sin(self.yaw)), float(self.roll)
+        cells = Cells(first, float(grid.spacing / self.scale), *turn)
+        found = np.zeros(grid.shape, np.bool_)
+        parallel_for(_mark_inside, grid.shape[0], cells, sections, found)
         return found
 
     def _sections(self, height: Float64Array) -> tuple[Float64Array, ...]:
@@ -129,7 +138,7 @@ class Torso:
 
 def profile(height: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Return half breadth, half depth and backward shift of an adult at heights, millimetres."""
-    from scipy.interpolate import PchipInterpolator  # as slow to load as NumPy
+    from scipy.interpolate import PchipInterpolator  # here, since it takes as long to load as NumPy
 
     rings = RINGS[::-1].astype(np.float64)
     values = PchipInterpolator(rings[:, 0], rings[:, 1:])(height)
@@ -137,7 +146,7 @@ def profile(height: Float64Array) -> tuple[Float64Array, Float64Array, Float64Ar
 
 
 def power(wave: Float64Array) -> Float64Array:
-    """Return a sine or cosine as it runs around a superellipse instead of a circle."""
+    """Return the coordinate on a unit superellipse for a sine or cosine on the circle."""
     result: Float64Array = np.sign(wave) * np.abs(wave) ** (2 / EXPONENT)
     return result
 
@@ -152,27 +161,65 @@ def loft(rings: int, around: int) -> Int32Array:
     return faces.reshape(-1, 3).astype(np.int32)
 
 
-@njit(cache=True, parallel=True)
-def _inside(first, spacing, shape, turn, levels, table):  # type: ignore[no-untyped-def]
-    found = np.zeros(shape, np.bool_)
-    last = len(levels) - 1
-    rise = (levels[last] - levels[0]) / last
-    for i in prange(shape[0]):
-        for k in range(shape[2]):
-            x0, z0 = first[0] + i * spacing, first[2] + k * spacing
-            x = turn[0] * x0 - turn[1] * z0
-            z = turn[0] * z0 + turn[1] * x0
-            for j in range(shape[1]):
-                at = (first[1] + j * spacing - turn[2] * x - levels[0]) / rise
+class Sections(NamedTuple):
+    """Sections of a torso at even levels, in metres of an adult with the torso's shape."""
+
+    levels: Float64Array
+    """(T,) rising."""
+    breadth: Float64Array
+    """(T,) half breadth."""
+    depth: Float64Array
+    """(T,) half depth."""
+    ahead: Float64Array
+    """(T,) middle along z, in the chest's axes."""
+    left: Float64Array
+    """(T,) middle along x."""
+
+
+class Cells(NamedTuple):
+    """Where a grid's cells lie from the torso's joint, in the torso's size."""
+
+    first: Float64Array
+    """(3,) centre of the first cell."""
+    spacing: float
+    """Edge of a cell."""
+    cosine: float
+    """Of the yaw of the chest."""
+    sine: float
+    """Of the yaw."""
+    roll: float
+    """Rise of the shoulders per length to the left."""
+
+
+@compiled
+def _mark_inside(
+    begin: int, stop: int, cells: Cells, sections: Sections, inside: BoolArray
+) -> None:
+    """Mark the cells inside of the torso in the layers `begin` to `stop` along x."""
+    last = len(sections.levels) - 1
+    rise = (sections.levels[last] - sections.levels[0]) / last
+    for i in range(begin, stop):
+        for k in range(inside.shape[2]):
+            x0, z0 = cells.first[0] + i * cells.spacing, cells.first[2] + k * cells.spacing
+            x = cells.cosine * x0 - cells.sine * z0
+            z = cells.cosine * z0 + cells.sine * x0
+            for j in range(inside.shape[1]):
+                height = cells.first[1] + j * cells.spacing - cells.roll * x
+                at = (height - sections.levels[0]) / rise
                 if at > last:
                     break
                 at = min(max(at, 0.0), last - 1e-9)
                 low = int(at)
                 t = at - low
-                across = abs(x - table[low, 3] - t * (table[low + 1, 3] - table[low, 3]))
-                along = abs(z - table[low, 2] - t * (table[low + 1, 2] - table[low, 2]))
-                across /= table[low, 0] + t * (table[low + 1, 0] - table[low, 0])
-                along /= table[low, 1] + t * (table[low + 1, 1] - table[low, 1])
+                across = abs(x - _between(sections.left, low, t))
+                along = abs(z - _between(sections.ahead, low, t))
+                across /= _between(sections.breadth, low, t)
+                along /= _between(sections.depth, low, t)
                 if across < 1 and along < 1:
-                    found[i, j, k] = across**EXPONENT + along**EXPONENT < 1
-    return found
+                    inside[i, j, k] = across**EXPONENT + along**EXPONENT < 1
+
+
+@compiled
+def _between(values: Float64Array, low: int, t: float) -> float:
+    """Return the linear interpolation between `values[low]` and the next one."""
+    return float(values[low] + t * (values[low + 1] - values[low]))
