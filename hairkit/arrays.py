@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.errors import InputError
+from hairkit.errors import DataError
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -33,16 +33,16 @@ def frozen_array(
     """Return `value` as a read-only contiguous array; `None` in `shape` matches any size.
 
     An array that is read-only and owns its memory is shared, any other one copied. Raises
-    `InputError` naming the array when the shape differs or a float is not finite.
+    `DataError` naming the array when the shape differs or a float is not finite.
     """
     array = np.ascontiguousarray(value, dtype=dtype)
     if array.ndim != len(shape) or any(
         want is not None and want != have for want, have in zip(shape, array.shape, strict=True)
     ):
         wanted = "(" + ", ".join("n" if n is None else str(n) for n in shape) + ")"
-        raise InputError(f"{name} has shape {array.shape}, expected {wanted}")
+        raise DataError(f"{name} has shape {array.shape}, expected {wanted}")
     if array.dtype.kind == "f" and not _all_finite(array):
-        raise InputError(
+        raise DataError(
             f"{name} holds {np.count_nonzero(~np.isfinite(array))} values that are not finite"
         )
     if array.base is not None or (array is value and array.flags.writeable):

@@ -19,8 +19,16 @@ class OptionError(InputError):
     """An option is unknown, of the wrong type or out of bounds."""
 
 
+class DataError(InputError):
+    """A value or array breaks the rules of its type: shape, range, finiteness."""
+
+
 class PluginError(HairkitError, LookupError):
-    """A plugin is missing, broken or does not implement the stage asked of it."""
+    """A plugin is missing, fails, or does not implement the stage asked of it."""
+
+
+class ResultError(PluginError, InputError):
+    """A plugin made a value that breaks the rules of its type or of the stage."""
 
 
 class MissingExtraError(HairkitError, ImportError):

@@ -1,4 +1,4 @@
-"""The contract: every stage of the road from photos to a groom is a hook that a plugin implements.
+"""The contract: each step from photos to a groom and its motion is a hook for plugins.
 
 A plugin is a module (or object) with functions marked `@hairkit.hookimpl` and, if it has any
 settings, a frozen dataclass named `Options`. An implementation names only the arguments it needs;
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import pluggy
 
 if TYPE_CHECKING:
+    from hairkit.simulation.simulator import Simulator
     from hairkit.types.capture import Capture, View
     from hairkit.types.groom import Groom
     from hairkit.types.head import Head, Roots
@@ -85,13 +86,8 @@ def track(
 
 
 @hookspec(firstresult=True)
-def enhance_texture(texture: Any, options: Any) -> Any:
-    """Improve a texture (H, W, 3) uint8 RGB: more resolution or detail."""
-
-
-@hookspec(firstresult=True)
-def make_simulator(groom: Groom, options: Any) -> Any:
-    """Return a simulator of the groom's guides (see `hairkit.simulation`)."""
+def make_simulator(groom: Groom, options: Any) -> Simulator | None:
+    """Return a simulator of the groom's guides, at rest."""
 
 
 @hookspec(firstresult=True)

@@ -1,7 +1,7 @@
-"""A small made-up head with hair, for the tests of plugins: the arguments of every stage.
+"""A small synthetic head with hair, for tests of plugins: the arguments of every stage.
 
-The head is a ball of 10 cm, the hair a shell around its upper half, combed straight down, seen by
-eight cameras of the nominal turn. Nothing here is random.
+The head is a ball of 10 cm radius, the hair a shell around its upper half, combed straight down.
+Eight cameras see it, 45 degrees apart. Nothing here is random.
 """
 
 from __future__ import annotations
@@ -31,19 +31,20 @@ _BALL, _HAIR = 0.1, 0.125
 
 
 def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
-    """Return the arguments of a stage hook, `options` apart, all made from the same small head.
+    """Return the arguments of a stage hook without `options`, all of the same small head.
 
     Parameters
     ----------
     stage
         Name of the hook: `orient`.
     folder
-        An empty folder, for `export_groom` and `import_groom`, which read and write a file.
+        An empty folder for the file of `export_groom` or `import_groom`.
     """
     capture, scene = turn_capture(), turn_scene()
     masks = tuple(ball_mask(camera) for camera in scene.cameras)
-    if stage in ("enhance_texture", "make_simulator", "export_groom", "import_groom"):
+    if stage in ("make_simulator", "export_groom", "import_groom"):
         return _groom_arguments(stage, folder)
+    hull = shell_hull()
     every: dict[str, Any] = {
         "capture": capture,
         "view": capture.views[0],
@@ -52,8 +53,8 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
         "head": scene.head,
         "scene": scene,
         "orientations": tuple(combed_orientation(mask) for mask in masks),
-        "hull": shell_hull(),
-        "field": combed_field(),
+        "hull": hull,
+        "field": combed_field(hull.grid),
         "roots": scalp_roots(scene.head),
     }
     wanted = {
@@ -147,9 +148,8 @@ def shell_hull(spacing: float = 0.01) -> Hull:
     return Hull(grid, shell, _shell(grid, _HAIR + spacing)[1], distance)
 
 
-def combed_field(spacing: float = 0.01) -> OrientationField:
-    """Return the field of hair combed along the ball, straight down."""
-    grid = VoxelGrid.around(np.full(3, -0.15), np.full(3, 0.15), spacing)
+def combed_field(grid: VoxelGrid) -> OrientationField:
+    """Return the field of hair combed along the ball, straight down, on a hull's grid."""
     centres = grid.centres().astype(np.float64)
     out = centres / np.linalg.norm(centres, axis=-1, keepdims=True)
     down = np.array([0.0, -1.0, 0.0]) + out * out[..., 1:2]
@@ -190,8 +190,6 @@ def _shell(grid: VoxelGrid, radius: float) -> tuple[Float32Array, BoolArray]:
 
 
 def _groom_arguments(stage: str, folder: Path | None) -> dict[str, Any]:
-    if stage == "enhance_texture":
-        return {"texture": striped_view(90.0).image}
     groom = bristle_groom()
     if stage == "make_simulator":
         return {"groom": groom}

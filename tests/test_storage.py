@@ -30,7 +30,7 @@ ITEMS: dict[str, Stored] = {
     "mask": testing.ball_mask(testing.turn_scene().cameras[0]),
     "orientation": testing.combed_orientation(testing.ball_mask(testing.turn_scene().cameras[0])),
     "hull": testing.shell_hull(0.03),
-    "field": testing.combed_field(0.03),
+    "field": testing.combed_field(testing.shell_hull(0.03).grid),
     "strands": testing.bristle_groom().strands,
     "groom": testing.bristle_groom(),
 }

@@ -23,8 +23,6 @@ from hairkit.pipeline.work_folder import WorkFolder, digest_of
 from hairkit.storage import Stored
 from hairkit.types.capture import View
 from hairkit.types.groom import Groom
-from hairkit.types.mask import Mask
-from hairkit.types.orientation import OrientationMap
 
 _Value = TypeVar("_Value")
 _Result = TypeVar("_Result", bound=Stored)
@@ -103,24 +101,15 @@ class StageRunner:
         options = next(choice.options for choice in stage.choices if choice.plugin == plugin)
         started = time.perf_counter()
         self._log.started(plugin, 1)
-        try:
-            self._manager.call("export_groom", plugin, options, groom=groom, path=path)
-        except PluginError as error:
-            if isinstance(error.__cause__, OSError):  # the disk is at fault, not the plugin
-                raise error.__cause__ from None
-            raise
+        self._manager.call("export_groom", plugin, options, groom=groom, path=path)
         self._log.finished(plugin, time.perf_counter() - started, False)
 
     def call(self, stage: Stage, values: dict[str, Any]) -> Any:
         """Call the plugin of a stage, the first of several that has an answer."""
         choices = [(choice.plugin, choice.options) for choice in stage.choices]
         if len(choices) == 1:
-            plugin, result = choices[0][0], self._manager.call(stage.hook, *choices[0], **values)
-        else:
-            plugin, result = self._manager.call_first(stage.hook, choices, **values)
-        if isinstance(result, (Mask, OrientationMap)):
-            _check_size(plugin, values["view"], result)
-        return result
+            return self._manager.call(stage.hook, *choices[0], **values)
+        return self._manager.call_first(stage.hook, choices, **values)[1]
 
     def _stage(self, table: str) -> Stage:
         stage = self._recipe.stage(table)
@@ -184,15 +173,6 @@ def _ready(argument: Argument) -> Given[Any]:
         return argument
     parts = [future.result() for future in argument]
     return Given(tuple(part.value for part in parts), digest_of([part.digest for part in parts]))
-
-
-def _check_size(plugin: str, view: View, result: Mask | OrientationMap) -> None:
-    array = result.labels if isinstance(result, Mask) else result.angle
-    if array.shape != (view.height, view.width):
-        raise PluginError(
-            f"plugin {plugin!r} returned {array.shape[1]} x {array.shape[0]} pixels for view"
-            f" {view.name!r}, expected {view.width} x {view.height}"
-        )
 
 
 @cache

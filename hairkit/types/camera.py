@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, frozen_array
-from hairkit.errors import InputError
+from hairkit.errors import DataError, InputError
 from hairkit.storage import Stored
 
 CameraModel = Literal["perspective", "orthographic"]
@@ -43,15 +43,15 @@ class Camera(Stored):
             not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)
             or np.linalg.det(rotation) < 0
         ):
-            raise InputError(
+            raise DataError(
                 "camera_from_head is not a rigid transform (its 3x3 part is no rotation)"
             )
         if self.model not in get_args(CameraModel):
-            raise InputError(
+            raise DataError(
                 f"camera model is {self.model!r}, expected one of {get_args(CameraModel)}"
             )
         if not (np.isfinite(self.focal) and self.focal > 0 and self.width > 0 and self.height > 0):
-            raise InputError(
+            raise DataError(
                 f"camera needs focal, width and height above 0, got"
                 f" {self.focal}, {self.width}, {self.height}"
             )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.arrays import Float64Array, UInt8Array, frozen_array
-from hairkit.errors import InputError
+from hairkit.errors import DataError
 from hairkit.types.preview import PHOTO_HEIGHT, Previewed, row
 
 
@@ -72,7 +72,7 @@ class Capture(Previewed):
 
     def __post_init__(self) -> None:
         if not self.views:
-            raise InputError("a capture needs at least one view")
+            raise DataError("a capture needs at least one view")
         if self.head_pose is not None:
             pose = frozen_array(self.head_pose, np.float64, (4, 4), "head_pose")
             object.__setattr__(self, "head_pose", _similarity(pose))
@@ -87,11 +87,11 @@ class Capture(Previewed):
 
 
 def _similarity(matrix: Float64Array) -> Float64Array:
-    """Return a rotation, one scale and a shift as it is; `InputError` for anything else."""
+    """Return a rotation, one scale and a shift as it is; `DataError` for anything else."""
     square = matrix[:3, :3] @ matrix[:3, :3].T
     scale = float(np.trace(square)) / 3
     alike = np.allclose(square, scale * np.eye(3), atol=1e-6 * scale, rtol=0)
     upright = np.linalg.det(matrix[:3, :3]) > 0 and np.array_equal(matrix[3], [0, 0, 0, 1])
     if not (alike and upright):
-        raise InputError("head_pose is no similarity, expected rotation, one scale and a shift")
+        raise DataError("head_pose is no similarity, expected rotation, one scale and a shift")
     return matrix

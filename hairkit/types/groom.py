@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Self
 
 import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array, UInt8Array, frozen_array
-from hairkit.errors import FormatError, InputError
+from hairkit.errors import DataError, FormatError
 from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
 from hairkit.types.head import Head
 from hairkit.types.preview import Previewed, draw_turn
@@ -46,8 +46,11 @@ class HairMaterial(Stored):
         object.__setattr__(
             self, "tip_colour", frozen_array(self.tip_colour, np.float32, (3,), "tip_colour")
         )
-        if not self.width > 0:
-            raise InputError(f"hair width is {self.width}, expected metres above 0")
+        if not 0 < self.width < np.inf:
+            raise DataError(f"hair width is {self.width}, expected metres above 0")
+        for name in ("curl_radius", "curl_pitch"):
+            if not np.isfinite(getattr(self, name)):
+                raise DataError(f"{name} is {getattr(self, name)}, expected metres")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +64,11 @@ class HairPhysics(Stored):
     friction: float = 0.1
     gravity: float = 9.81
     """Metres per second squared, along -Y."""
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            if not np.isfinite(getattr(self, each.name)):
+                raise DataError(f"{each.name} is {getattr(self, each.name)}, expected a number")
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +88,7 @@ class Groom(Previewed, Stored):
         count = len(self.strands)
         triangle = frozen_array(self.root_triangle, np.int32, (count,), "root_triangle")
         if count and (triangle.min() < 0 or triangle.max() >= len(self.head.faces)):
-            raise InputError("root_triangle names faces that the head does not have")
+            raise DataError("root_triangle names faces that the head does not have")
         object.__setattr__(self, "root_triangle", triangle)
         barycentric = frozen_array(
             self.root_barycentric, np.float32, (count, 3), "root_barycentric"

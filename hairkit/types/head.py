@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array, frozen_array
-from hairkit.errors import InputError
+from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.preview import Previewed, draw_turn
 
@@ -56,10 +56,10 @@ class Head(Previewed, Stored):
         vertices = frozen_array(self.vertices, np.float32, (None, 3), "head vertices")
         faces = frozen_array(self.faces, np.int32, (None, 3), "head faces")
         if not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
-            raise InputError("head faces are missing or name vertices that do not exist")
+            raise DataError("head faces are missing or name vertices that do not exist")
         scalp = frozen_array(self.scalp, np.float32, (len(vertices),), "head scalp")
         if not (scalp > 0.5).any():
-            raise InputError(
+            raise DataError(
                 "the head has no scalp: mark it by a vertex group, a mask texture or vertex colours"
             )
         object.__setattr__(self, "vertices", vertices)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit.arrays import BoolArray, UInt8Array, frozen_array
-from hairkit.errors import InputError
+from hairkit.errors import DataError
 from hairkit.storage import Stored
 
 HAIR, PERSON, BACKGROUND = 255, 128, 0
@@ -26,9 +26,9 @@ class Mask(Stored):
         labels = frozen_array(self.labels, np.uint8, (None, None), "mask labels")
         stray = np.setdiff1d(np.unique(labels), [BACKGROUND, PERSON, HAIR])
         if stray.size:
-            raise InputError(f"mask holds the value {stray[0]}, expected only 0, 128 and 255")
+            raise DataError(f"mask holds the value {stray[0]}, expected only 0, 128 and 255")
         if not (labels == HAIR).any():
-            raise InputError("mask is empty: no pixel is marked as hair (255)")
+            raise DataError("mask is empty: no pixel is marked as hair (255)")
         object.__setattr__(self, "labels", labels)
 
     @property

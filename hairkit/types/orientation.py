@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, frozen_array
-from hairkit.errors import InputError
+from hairkit.errors import DataError
 from hairkit.storage import Stored
 
 
@@ -25,9 +25,9 @@ class OrientationMap(Stored):
         angle = frozen_array(self.angle, np.float32, (None, None), "angle")
         confidence = frozen_array(self.confidence, np.float32, angle.shape, "confidence")
         if angle.size and (angle.min() < 0 or angle.max() >= np.float32(np.pi)):
-            raise InputError(f"angles lie in [{angle.min()}, {angle.max()}], expected [0, pi)")
+            raise DataError(f"angles lie in [{angle.min()}, {angle.max()}], expected [0, pi)")
         if confidence.size and (confidence.min() < 0 or confidence.max() > 1):
-            raise InputError(
+            raise DataError(
                 f"confidences lie in [{confidence.min()}, {confidence.max()}], expected [0, 1]"
             )
         object.__setattr__(self, "angle", angle)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, frozen_array
-from hairkit.errors import InputError
+from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.groom import Groom
 
@@ -30,7 +30,7 @@ class PointCache(Stored):
         frames = len(points)
         times = frozen_array(self.times, np.float64, (frames,), "cache times")
         if not frames or (np.diff(times) <= 0).any():
-            raise InputError("a point cache needs at least one frame, at ascending times")
+            raise DataError("a point cache needs at least one frame, at ascending times")
         motion = frozen_array(self.head_from_rest, np.float64, (frames, 4, 4), "head_from_rest")
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "times", times)
@@ -58,11 +58,11 @@ def is_cache_file(path: str | os.PathLike[str]) -> bool:
 
 
 def read_cache(path: str | os.PathLike[str], groom: Groom) -> PointCache:
-    """Return the cache in an npz file; raises `InputError` when it is of another groom."""
+    """Return the cache in an npz file; raises `DataError` when it is of another groom."""
     cache = PointCache.load(path)
     have, want = cache.points.shape[1], len(groom.strands.points)
     if have != want:
-        raise InputError(
+        raise DataError(
             f"{path}: a cache of {have} points, the groom has {want}; simulate this groom again"
         )
     return cache

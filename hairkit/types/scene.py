@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass
 
 from hairkit.arrays import UInt8Array
-from hairkit.errors import FormatError, InputError
+from hairkit.errors import DataError, FormatError
 from hairkit.storage import Stored, read_text, write_text
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
@@ -26,7 +26,7 @@ class Scene(Previewed, Stored):
 
     def __post_init__(self) -> None:
         if len(self.names) != len(self.cameras) or not self.cameras:
-            raise InputError(
+            raise DataError(
                 f"scene has {len(self.cameras)} cameras for {len(self.names)} view names"
             )
 

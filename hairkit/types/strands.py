@@ -19,7 +19,7 @@ from hairkit.arrays import (
     UInt8Array,
     frozen_array,
 )
-from hairkit.errors import InputError
+from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.preview import Previewed, draw_turn
 
@@ -45,9 +45,9 @@ class Strands(Previewed, Stored):
         points = frozen_array(self.points, np.float32, (None, 3), "strand points")
         offsets = frozen_array(self.offsets, np.int64, (None,), "strand offsets")
         if not len(offsets) or offsets[0] != 0 or offsets[-1] != len(points):
-            raise InputError(f"strand offsets must run from 0 to {len(points)}")
+            raise DataError(f"strand offsets must run from 0 to {len(points)}")
         if (np.diff(offsets) < 2).any():
-            raise InputError(
+            raise DataError(
                 f"{np.count_nonzero(np.diff(offsets) < 2)} strands have fewer than two points"
             )
         count, total = len(offsets) - 1, len(points)
@@ -149,13 +149,13 @@ class Strands(Previewed, Stored):
     def resampled(self, count: int) -> Strands:
         """Return strands of `count` points at equal arc length; ends stay, widths are mixed."""
         if count < 2:
-            raise InputError(f"a strand needs at least 2 points, got {count}")
+            raise DataError(f"a strand needs at least 2 points, got {count}")
         return self._at(np.full(len(self), count))
 
     def resampled_by_length(self, step: float) -> Strands:
         """Return strands with points about `step` metres apart, equal in a strand; ends stay."""
         if not step > 0:
-            raise InputError(f"resampling step is {step}, expected metres above 0")
+            raise DataError(f"resampling step is {step}, expected metres above 0")
         return self._at(np.maximum(np.ceil(self.lengths() / step - 1e-9).astype(np.int64), 1) + 1)
 
     def _at(self, counts: Int64Array) -> Strands:

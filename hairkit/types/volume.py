@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, frozen_array
-from hairkit.errors import InputError
+from hairkit.errors import DataError
 from hairkit.storage import Stored
 
 MAX_CELLS = 256**3
@@ -32,12 +32,12 @@ class VoxelGrid(Stored):
             self, "origin", frozen_array(self.origin, np.float64, (3,), "grid origin")
         )
         object.__setattr__(self, "shape", tuple(int(n) for n in self.shape))
-        if not (self.spacing > 0 and len(self.shape) == 3 and min(self.shape) > 0):
-            raise InputError(
+        if not (0 < self.spacing < np.inf and len(self.shape) == 3 and min(self.shape) > 0):
+            raise DataError(
                 f"grid needs spacing and three sizes above 0, got {self.spacing}, {self.shape}"
             )
         if int(np.prod(np.array(self.shape, dtype=np.float64))) > MAX_CELLS:
-            raise InputError(
+            raise DataError(
                 f"grid {self.shape} has more than {MAX_CELLS} cells; use a larger voxel size"
             )
 
@@ -106,12 +106,12 @@ class Hull(Stored):
         dense = frozen_array(self.dense, np.bool_, shape, "hull dense")
         loose = frozen_array(self.loose, np.bool_, shape, "hull loose")
         if not dense.any():
-            raise InputError(
+            raise DataError(
                 "the hull is empty: the masks of the views do not overlap in space;"
                 " check masks and cameras"
             )
         if (dense & ~loose).any():
-            raise InputError("hull: every dense cell must be a loose cell")
+            raise DataError("hull: every dense cell must be a loose cell")
         object.__setattr__(self, "dense", dense)
         object.__setattr__(self, "loose", loose)
         distance = frozen_array(self.head_distance, np.float32, shape, "hull head_distance")
@@ -155,6 +155,11 @@ class OrientationField(Stored):
             self, "tensor", frozen_array(self.tensor, np.float32, (*shape, 6), "field tensor")
         )
         confidence = frozen_array(self.confidence, np.float32, shape, "field confidence")
+        if confidence.min() < 0 or confidence.max() > 1:
+            raise DataError(
+                f"field confidence lies in [{confidence.min()}, {confidence.max()}],"
+                " expected [0, 1]"
+            )
         object.__setattr__(self, "confidence", confidence)
         object.__setattr__(
             self, "growth", frozen_array(self.growth, np.float32, shape, "field growth")

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
+from ball import PLUGIN_FILE, RECIPE, write_capture
 
 from hairkit.cli import main
 from hairkit.cli.scaffold import new_plugin
 from hairkit.errors import InputError
 from hairkit.manager import STAGES, Manager
 from hairkit.pipeline.recipe import HOOKS
+from hairkit.testing import bristle_groom
+from hairkit.types.groom import Groom
+from hairkit.types.point_cache import PointCache
 
 
 def test_every_stage_gives_a_package_whose_test_passes(tmp_path: Path) -> None:
@@ -31,6 +37,80 @@ def test_every_stage_gives_a_package_whose_test_passes(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stdout
     assert f"{len(STAGES)} passed" in done.stdout
+
+
+@pytest.fixture(scope="module")
+def groom_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small groom on disk."""
+    path = tmp_path_factory.mktemp("groom") / "groom.npz"
+    bristle_groom().save(path)
+    return path
+
+
+def module_of(hook: str, folder: Path) -> Path:
+    """Write the package of a hook and return its module, as a user would give it to --plugin."""
+    return new_plugin(hook, f"my_{hook}", folder / hook) / f"hairkit_my_{hook}.py"
+
+
+@pytest.mark.parametrize("table", HOOKS)
+def test_the_plugin_of_a_stage_runs_in_a_reconstruction(
+    table: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`reconstruct --plugin FILE --set STAGE=NAME` makes a groom with it, and its export."""
+    module = module_of(HOOKS[table], tmp_path)
+    recipe = tmp_path / "ball.toml"
+    recipe.write_text(RECIPE)
+    capture, out = write_capture(tmp_path / "capture", masks=True), tmp_path / "out"
+    words = ["--recipe", recipe, "--plugin", PLUGIN_FILE, "--plugin", module, "--no-sheet"]
+    words += ["--set", f"{table}={module.stem}", "--guides", "30", "--json", "--quiet"]
+    code = main([str(word) for word in ["reconstruct", capture, "-o", out, *words]])
+    printed = capsys.readouterr()
+    assert (code, printed.err) == (0, "")
+    made = json.loads(printed.out)
+    assert f"{table:<12} {module.stem} of" in (out / "hairkit.log").read_text()
+    assert len(Groom.load(out / "groom.npz").strands) == made["strands"] > 0
+    for path in made["exports"].values():
+        assert Path(path).stat().st_size > 0
+
+
+def test_the_export_plugin_writes_files_of_its_ending(
+    tmp_path: Path, groom_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`export` finds it by the ending, `plugins --formats` lists it."""
+    module, target = module_of("export_groom", tmp_path), tmp_path / "hair.my_export_groom"
+    assert main(["export", str(groom_file), "-o", str(target), "--plugin", str(module)]) == 0
+    rows = np.loadtxt(target)
+    strands = Groom.load(groom_file).strands
+    assert np.array_equal(rows[:, 0], strands.strand_of_point)
+    assert np.allclose(rows[:, 1:], strands.points, atol=1e-6)
+    assert main(["plugins", "--formats", "--plugin", str(module)]) == 0
+    assert "`.my_export_groom`" in capsys.readouterr().out
+
+
+def test_the_import_plugin_reads_files_of_its_ending(
+    tmp_path: Path, groom_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`convert` finds it by the ending and takes its option."""
+    module = module_of("import_groom", tmp_path)
+    source, target = tmp_path / "hair.my_import_groom", tmp_path / "hair.npz"
+    source.write_bytes(groom_file.read_bytes())
+    words = [str(source), str(target), "--plugin", str(module), "--set", "reader.every=2"]
+    assert main(["convert", *words]) == 0
+    whole = Groom.load(groom_file).strands
+    assert len(Groom.load(target).strands) == (len(whole) + 1) // 2
+    assert main(["plugins", "--formats", "--plugin", str(module)]) == 0
+    assert "`.my_import_groom`" in capsys.readouterr().out
+
+
+def test_the_simulator_moves_the_groom(tmp_path: Path, groom_file: Path) -> None:
+    """`simulate --using NAME` writes a cache in which the guides go with the head."""
+    module, cache = module_of("make_simulator", tmp_path), tmp_path / "cache.npz"
+    words = [str(groom_file), "-o", str(cache), "--plugin", str(module), "--using", module.stem]
+    assert main(["simulate", *words, "--shake", "yaw:20:1.5", "--frames", "8", "--quiet"]) == 0
+    frames, points = PointCache.load(cache), Groom.load(groom_file).strands.points
+    for frame, head in zip(frames.points, frames.head_from_rest, strict=True):
+        assert np.allclose(frame, points @ head[:3, :3].T + head[:3, 3], atol=1e-6)
+    assert not np.allclose(frames.points[0], frames.points[-1], atol=1e-4)
 
 
 @pytest.mark.parametrize(("table", "hook"), HOOKS.items())

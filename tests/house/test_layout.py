@@ -20,9 +20,9 @@ PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins"
 FLOORS = (
     ("errors", "arrays", "colour", "options", "storage", "progress", "parallel"),
     ("types",),
-    ("cameras", "imaging", "helices", "head_model", "rendering", "hookspecs"),
+    ("cameras", "imaging", "helices", "head_model", "rendering"),
     ("field", "io"),
-    ("simulation", "grooming", "synth"),
+    ("simulation", "grooming", "synth", "hookspecs"),
     ("manager", "testing"),
     ("pipeline", "evaluation"),
     ("viewer", "api"),

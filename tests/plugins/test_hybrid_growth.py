@@ -88,7 +88,7 @@ def test_a_root_where_nothing_is_known_keeps_its_place() -> None:
 
 def follow_ball(options: Options, roots: Roots) -> Strands:
     scene = turn_scene()
-    return track(scene, (), (), shell_hull(), combed_field(), roots, options)
+    return track(scene, (), (), shell_hull(), combed_field(shell_hull().grid), roots, options)
 
 
 def test_a_field_without_signs_is_followed_along_its_growth() -> None:
@@ -177,7 +177,7 @@ def test_the_step_hardly_matters() -> None:
 def test_strands_can_be_smoothed_by_helix_arcs() -> None:
     """Noise in the field goes, within the tolerance; roots stay."""
     rng = np.random.default_rng(5)
-    field = combed_field()
+    field = combed_field(shell_hull().grid)
     noisy = replace(field, tensor=field.tensor + 0.15 * rng.standard_normal(field.tensor.shape))
     roots = scalp_roots(ball_head())
     scene, hull = turn_scene(), shell_hull()

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from hairkit import Groom, Mask, OrientationMap, Roots, Scene, Strands, View, hookimpl
+from hairkit import Groom, Hull, Mask, OrientationMap, Roots, Scene, Strands, View, hookimpl
+from hairkit.io.file_format import FileFormat
 from hairkit.options import option
 from hairkit.storage import write_bytes
 from hairkit.testing import (
@@ -21,7 +22,7 @@ from hairkit.testing import (
     turn_scene,
 )
 
-SUFFIXES = (".ball",)
+FORMAT = FileFormat("Ball", (".ball",))
 
 CALLS: list[str] = []
 """Every stage that was run, `stage` or `stage view`, in this process."""
@@ -71,9 +72,9 @@ def build_hull(options: Options) -> Any:
 
 
 @hookimpl
-def solve_field(options: Options) -> Any:
+def solve_field(hull: Hull, options: Options) -> Any:
     _begin("field", options)
-    return combed_field()
+    return combed_field(hull.grid)
 
 
 @hookimpl

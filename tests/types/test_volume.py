@@ -114,7 +114,7 @@ def test_a_hull_has_hair_and_its_dense_part_is_loose() -> None:
 
 def test_fields_must_fit_their_grid() -> None:
     """A tensor, confidence or growth of another shape is refused by name."""
-    field = testing.combed_field(0.03)
+    field = testing.combed_field(testing.shell_hull(0.03).grid)
     for name in ("tensor", "confidence", "growth"):
         with pytest.raises(InputError, match=name):
             replace(field, **{name: getattr(field, name)[1:]})

@@ -39,7 +39,7 @@ def results(tmp_path: Path) -> Path:
     work.mkdir()
     keep(work, "scene", SCENE)
     keep(work, "hull", shell_hull())
-    keep(work, "field", combed_field())
+    keep(work, "field", combed_field(shell_hull().grid))
     for name, camera in zip(SCENE.names, SCENE.cameras, strict=True):
         keep(work, f"segment-{name}", ball_mask(camera))
         keep(work, f"orient-{name}", combed_orientation(ball_mask(camera)))

@@ -1,0 +1,247 @@
+"""The simplest method for every stage hook, from which `hairkit new-plugin` writes a module."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """The simplest method that fulfils a stage's contract, in pieces of source text."""
+
+    summary: str
+    imports: tuple[str, ...]
+    option: str
+    signature: str
+    body: str
+    before: str = ""
+    """Code between the imports and the options."""
+
+
+STANDARD = ("from dataclasses", "from pathlib")
+"""How imports from the standard library begin."""
+ALWAYS = ("from hairkit.hookspecs import hookimpl", "from hairkit.options import option")
+_NUMPY = "import numpy as np"
+
+SKETCHES = {
+    "segment": Sketch(
+        "Everything dark is hair.",
+        (
+            _NUMPY,
+            "from hairkit.types.capture import View",
+            "from hairkit.types.mask import HAIR, Mask",
+        ),
+        'threshold: int = option(90, low=1, high=254, doc="Darker pixels are hair.")',
+        "view: View, options: Options) -> Mask | None",
+        """
+dark = view.image.mean(axis=-1) < options.threshold
+labels = np.where(dark, HAIR, 0).astype(np.uint8)
+return Mask(labels, person_known=False) if dark.any() else None""",
+    ),
+    "estimate_scene": Sketch(
+        "The nominal turn: every camera where the capture says, all at one distance.",
+        (
+            "from hairkit.types.camera import Camera",
+            "from hairkit.types.capture import Capture",
+            "from hairkit.types.head import Head",
+            "from hairkit.types.scene import Scene",
+        ),
+        'distance: float = option(0.8, low=0.3, high=5.0, doc="From the head.", unit="m")',
+        "capture: Capture, head: Head, options: Options) -> Scene",
+        """
+cameras = tuple(
+    Camera.on_turn(
+        view.azimuth_deg,
+        distance=options.distance,
+        focal=view.focal_px or 1.3 * view.height,
+        width=view.width,
+        height=view.height,
+    )
+    for view in capture.views
+)
+return Scene(tuple(view.name for view in capture.views), cameras, head)""",
+    ),
+    "fit_head": Sketch(
+        "Scale the head about its centre.",
+        (
+            "from dataclasses import dataclass, replace",
+            "from hairkit.types.scene import Scene",
+        ),
+        'scale: float = option(1.0, low=0.5, high=2.0, doc="Factor on the head\'s size.")',
+        "scene: Scene, options: Options) -> Scene",
+        """
+head = replace(scene.head, vertices=scene.head.vertices * options.scale)
+return replace(scene, head=head)""",
+    ),
+    "orient": Sketch(
+        "Strands run across the gradient of brightness.",
+        (
+            "import cv2",
+            _NUMPY,
+            "from hairkit.types.capture import View",
+            "from hairkit.types.mask import Mask",
+            "from hairkit.types.orientation import OrientationMap, wrap_angle",
+        ),
+        'sigma: float = option(2.0, low=0.5, high=20.0, doc="Blur before.", unit="px")',
+        "view: View, mask: Mask, options: Options) -> OrientationMap",
+        """
+grey = cv2.cvtColor(view.image, cv2.COLOR_RGB2GRAY).astype(np.float32)
+grey = cv2.GaussianBlur(grey, (0, 0), options.sigma)
+across_x, across_y = cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)
+strength = np.hypot(across_x, across_y) * mask.hair
+angle = np.arctan2(across_y, across_x) + np.pi / 2  # along the strand
+return OrientationMap(wrap_angle(angle), strength / max(float(strength.max()), 1e-6))""",
+    ),
+    "build_hull": Sketch(
+        "Cells outside the head that enough views see as hair.",
+        (
+            _NUMPY,
+            "from scipy.spatial import cKDTree",
+            "from hairkit.types.mask import Mask",
+            "from hairkit.types.scene import Scene",
+            "from hairkit.types.volume import Hull, VoxelGrid",
+        ),
+        'votes: int = option(4, low=1, high=8, doc="Views that must see hair.")',
+        "scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull",
+        """
+head = scene.head
+grid = VoxelGrid.around(head.vertices.min(axis=0) - 0.1, head.vertices.max(axis=0) + 0.1, 0.01)
+centres = grid.centres().astype(np.float64)
+votes = np.zeros(grid.shape, int)
+for camera, mask in zip(scene.cameras, masks, strict=True):
+    x, y = np.moveaxis(np.nan_to_num(np.floor(camera.project(centres)), nan=-1), -1, 0)
+    inside = (x >= 0) & (y >= 0) & (x < camera.width) & (y < camera.height)
+    votes[inside] += mask.hair[y[inside].astype(int), x[inside].astype(int)]
+_, nearest = cKDTree(head.vertices).query(centres)
+out = centres - head.vertices[nearest]  # signed by the nearest vertex's normal
+distance = np.einsum("xyzc,xyzc->xyz", out, head.normals()[nearest]).astype(np.float32)
+hair = (votes >= options.votes) & (distance > 0)
+return Hull(grid, hair, hair, distance)""",
+    ),
+    "solve_field": Sketch(
+        "All hair hangs straight down.",
+        (
+            _NUMPY,
+            "from hairkit.types.volume import Hull, OrientationField",
+        ),
+        'confidence: float = option(1.0, low=0.0, high=1.0, doc="Given to every cell.")',
+        "hull: Hull, options: Options) -> OrientationField",
+        """
+tensor = np.zeros((*hull.grid.shape, 6), np.float32)
+tensor[..., 1] = hull.loose  # yy: along the vertical
+confidence = (options.confidence * hull.loose).astype(np.float32)
+return OrientationField(hull.grid, tensor, confidence, np.maximum(hull.head_distance, 0))""",
+    ),
+    "track": Sketch(
+        "Straight bristles along the scalp's normals.",
+        (
+            _NUMPY,
+            "from hairkit.types.head import Roots",
+            "from hairkit.types.strands import Strands",
+        ),
+        'length: float = option(0.05, low=0.001, high=1.0, doc="Of a strand.", unit="m")',
+        "roots: Roots, options: Options) -> Strands",
+        """
+along = np.linspace(0.0, options.length, 10, dtype=np.float32)[None, :, None]
+points = roots.positions[:, None] + along * roots.normals[:, None]
+offsets = np.arange(len(roots) + 1) * 10
+return Strands(points.reshape(-1, 3), offsets, root_uv=roots.uv)""",
+    ),
+    "make_simulator": Sketch(
+        "Hair that goes rigidly with the head.",
+        (
+            _NUMPY,
+            "from hairkit.simulation import Measures, Surroundings",
+            "from hairkit.types.groom import Groom",
+        ),
+        'sink: float = option(0.0, low=0.0, high=1.0, doc="Speed of falling.", unit="m/s")',
+        "groom: Groom, options: Options) -> Rigid",
+        "return Rigid(groom, options)",
+        before='''
+
+class Rigid:
+    """Guides fixed to the head: every member that hairkit.simulation.Simulator asks for."""
+
+    def __init__(self, groom: Groom, options: Options) -> None:
+        self.strands = groom.strands
+        self.options = options
+        self.reset()
+
+    def reset(self, head_from_rest: np.ndarray | None = None) -> None:
+        """Put the guides at rest on the head."""
+        self.time = 0.0
+        self._move(np.eye(4) if head_from_rest is None else np.asarray(head_from_rest))
+
+    def advance(self, seconds: float, surroundings: Surroundings) -> None:
+        """Go on by some seconds; replace this by your method."""
+        self.time += seconds
+        self._move(surroundings.head_from_rest)
+
+    def retune(self, options: Options) -> None:
+        """Take other options; the positions stay."""
+        self.options = options
+
+    def measure(self) -> Measures:
+        """Return stretch and energies of the present state."""
+        return Measures(stretch=0.0, kinetic_energy=0.0, potential_energy=0.0)
+
+    def _move(self, head: np.ndarray) -> None:
+        down = np.array([0.0, -self.options.sink * self.time, 0.0])
+        moved = self.strands.points @ head[:3, :3].T + head[:3, 3] + down
+        self.points = moved.astype(np.float32)
+''',
+    ),
+    "export_groom": Sketch(
+        "One text line a point: strand, x, y, z.",
+        (
+            "from pathlib import Path",
+            _NUMPY,
+            "from hairkit.types.groom import Groom",
+            "from hairkit.io.file_format import Feature, FileFormat",
+            "from hairkit.storage import write_text",
+        ),
+        'digits: int = option(6, low=1, high=9, doc="Decimals of a coordinate in metres.")',
+        "groom: Groom, path: Path, options: Options) -> bool",
+        """
+strand = np.repeat(np.arange(len(groom.strands)), groom.strands.counts)
+rows = zip(strand, groom.strands.points.tolist(), strict=True)
+lines = (f"{s} " + " ".join(f"{c:.{options.digits}f}" for c in point) for s, point in rows)
+write_text(path, "\\n".join(lines) + "\\n")
+return True""",
+        before="""
+FORMAT = FileFormat(
+    "NAME",
+    (".NAME",),
+    written=frozenset({Feature.POINTS, Feature.COUNTS}),
+)
+""",
+    ),
+    "import_groom": Sketch(
+        "Read the native form and thin it out.",
+        (
+            "from dataclasses import dataclass, replace",
+            "from pathlib import Path",
+            "from hairkit.io.file_format import Feature, FileFormat",
+            "from hairkit.types.groom import Groom",
+        ),
+        'every: int = option(1, low=1, high=1000, doc="Keep one strand of so many.")',
+        "path: Path, options: Options) -> Groom",
+        """
+groom = Groom.load(path)
+keep = range(0, len(groom.strands), options.every)
+return replace(
+    groom,
+    strands=groom.strands.select(list(keep)),
+    root_triangle=groom.root_triangle[list(keep)],
+    root_barycentric=groom.root_barycentric[list(keep)],
+)""",
+        before="""
+FORMAT = FileFormat(
+    "NAME",
+    (".NAME",),
+    partial={Feature.POINTS: "one strand of `every`"},
+)
+""",
+    ),
+}
+"""The method of each hook."""

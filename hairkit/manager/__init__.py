@@ -1,0 +1,15 @@
+"""Plugins: found, loaded, called one at a time, and what they return checked at once.
+
+* `manager`: `Manager`, the plugins of this process, by name.
+* `loading`: installed plugins and plugin files, and what they must look like.
+* `results`: what each stage must return; the one table of checks.
+* `guard`: errors of plugins name the plugin; what plugins print does not reach stdout.
+"""
+
+from __future__ import annotations
+
+from hairkit.manager.loading import DISABLE_AUTOLOAD, PluginInfo
+from hairkit.manager.manager import Manager
+from hairkit.manager.results import RESULTS, STAGES
+
+__all__ = ["DISABLE_AUTOLOAD", "RESULTS", "STAGES", "Manager", "PluginInfo"]

@@ -1,0 +1,190 @@
+"""What each stage must return: the one table that the results of plugins are checked against.
+
+The types check their own arrays when they are made (shapes, ranges, finiteness). Here is what only
+the stage knows: that a mask has its photo's size, that strand s starts at root s.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairkit.errors import DataError
+from hairkit.types.groom import Groom
+from hairkit.types.mask import Mask
+from hairkit.types.orientation import OrientationMap
+from hairkit.types.scene import Scene
+from hairkit.types.strands import Strands
+from hairkit.types.volume import Hull, OrientationField, VoxelGrid
+
+ROOT_TOLERANCE = 1e-3
+"""Metres that a strand may start from its root."""
+CLOCK_STEP_S = 2.0
+"""Coarsest time stamps of files (FAT): two writes closer than this may carry the same one."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """A stage's call: its arguments, and the state before it."""
+
+    arguments: Mapping[str, Any]
+    old_file: tuple[int, int, int] | None
+    """Inode, size and time of the file that an export will replace; None where there is none, or
+    where it is too new for its time to tell whether it was replaced."""
+
+    @classmethod
+    def of(cls, arguments: Mapping[str, Any]) -> Call:
+        """Return the call that is about to be made."""
+        path = arguments.get("path")
+        state = None if path is None else _file_state(path)
+        fresh = state is not None and time.time() - state[2] / 1e9 < CLOCK_STEP_S
+        return cls(arguments, None if fresh else state)
+
+
+def check_result(hook: str, result: object, call: Call) -> None:
+    """Raise `DataError` when a plugin's result is not what the stage asks for."""
+    kind, checks = RESULTS[hook]
+    if not isinstance(result, kind):
+        raise DataError(f"returned {type(result).__name__}, expected {kind.__name__}")
+    for check in checks:
+        check(result, call)
+
+
+def _mask_has_photo_size(mask: Mask, call: Call) -> None:
+    _check_size("mask", mask.labels.shape, call.arguments["view"])
+
+
+def _angles_have_photo_size(orientation: OrientationMap, call: Call) -> None:
+    _check_size("orientation map", orientation.angle.shape, call.arguments["view"])
+
+
+def _check_size(what: str, shape: tuple[int, ...], view: Any) -> None:
+    if shape != (view.height, view.width):
+        raise DataError(
+            f"the {what} has {shape[1]} x {shape[0]} pixels,"
+            f" expected {view.width} x {view.height}, as the photo has"
+        )
+
+
+def _scene_has_a_camera_per_photo(scene: Scene, call: Call) -> None:
+    views = call.arguments["capture"].views
+    names = tuple(view.name for view in views)
+    if scene.names != names:
+        raise DataError(
+            f"the scene has the views {', '.join(scene.names)}, expected {', '.join(names)}"
+        )
+    for view, camera in zip(views, scene.cameras, strict=True):
+        _check_size(f"camera of view {view.name!r}", (camera.height, camera.width), view)
+
+
+def _head_keeps_its_mesh(scene: Scene, call: Call) -> None:
+    old, new = call.arguments["scene"].head, scene.head
+    for name in ("faces", "uv"):
+        if not np.array_equal(getattr(old, name), getattr(new, name)):
+            raise DataError(f"head {name} changed, expected those of the head that came in")
+
+
+def _field_is_on_the_hull(field: OrientationField, call: Call) -> None:
+    found, wanted = field.grid, call.arguments["hull"].grid
+    if (found.shape, found.spacing, *found.origin) != (
+        wanted.shape,
+        wanted.spacing,
+        *wanted.origin,
+    ):
+        raise DataError(f"the field has {_words(found)}, expected the hull's {_words(wanted)}")
+
+
+def _words(grid: VoxelGrid) -> str:
+    size, origin = " x ".join(map(str, grid.shape)), ", ".join(f"{x:.4g}" for x in grid.origin)
+    return f"{size} cells of {grid.spacing:.4g} m from ({origin})"
+
+
+def _a_strand_starts_at_each_root(strands: Strands, call: Call) -> None:
+    roots = call.arguments["roots"]
+    if len(strands) != len(roots):
+        raise DataError(
+            f"{len(strands)} strands for {len(roots)} roots, expected one for each, in their order"
+        )
+    gap = np.linalg.norm(strands.roots - roots.positions, axis=1)
+    if gap.max(initial=0.0) > ROOT_TOLERANCE:
+        worst = int(gap.argmax())
+        raise DataError(
+            f"strand {worst} starts {1000 * gap[worst]:.3g} mm from its root,"
+            f" expected at most {1000 * ROOT_TOLERANCE:.3g} mm"
+        )
+
+
+def _is_a_simulator(simulator: Any, call: Call) -> None:
+    from hairkit.simulation.simulator import Simulator  # not needed by most commands
+
+    kind = type(simulator).__name__
+    members = {name: value for name, value in vars(Simulator).items() if name[0] != "_"}
+    missing = [name for name in members if not hasattr(simulator, name)]
+    if missing:
+        raise DataError(
+            f"{kind} has no {', '.join(missing)}; expected the members of"
+            " hairkit.simulation.Simulator"
+        )
+    for name, value in members.items():
+        if not isinstance(value, property) and not callable(getattr(simulator, name)):
+            raise DataError(f"{kind}.{name} is not a method, expected one")
+    if not isinstance(simulator.strands, Strands):
+        raise DataError(f"{kind}.strands is {type(simulator.strands).__name__}, expected Strands")
+    check_points(simulator, simulator.points)
+    if not np.isfinite(simulator.time):
+        raise DataError(f"{kind}.time is {simulator.time}, expected seconds")
+
+
+def check_points(simulator: Any, points: Any) -> None:
+    """Raise `DataError` unless a simulator's points are finite and as many as its strands have."""
+    kind, wanted = type(simulator).__name__, simulator.strands.points.shape
+    if np.shape(points) != wanted:
+        raise DataError(f"{kind}.points has shape {np.shape(points)}, expected {wanted}")
+    if not np.isfinite(points).all():
+        raise DataError(f"{kind}.points holds numbers that are not finite")
+
+
+def _wrote_the_file(written: bool, call: Call) -> None:
+    path = call.arguments["path"]
+    if not written:
+        raise DataError("returned False, expected True after the file is written")
+    if not path.is_file():
+        raise DataError("no file was written")
+    if not path.stat().st_size:
+        raise DataError("the file that was written is empty")
+    if call.old_file is not None and _file_state(path) == call.old_file:
+        raise DataError("nothing was written; the file there is an older one")
+
+
+def _file_state(path: Path) -> tuple[int, int, int] | None:
+    """Return inode, size and time, which writing changes; None where there is no file."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns
+
+
+Check = Callable[[Any, Call], None]
+
+RESULTS: dict[str, tuple[type, tuple[Check, ...]]] = {
+    "segment": (Mask, (_mask_has_photo_size,)),
+    "estimate_scene": (Scene, (_scene_has_a_camera_per_photo,)),
+    "fit_head": (Scene, (_scene_has_a_camera_per_photo, _head_keeps_its_mesh)),
+    "orient": (OrientationMap, (_angles_have_photo_size,)),
+    "build_hull": (Hull, ()),
+    "solve_field": (OrientationField, (_field_is_on_the_hull,)),
+    "track": (Strands, (_a_strand_starts_at_each_root,)),
+    "make_simulator": (object, (_is_a_simulator,)),
+    "export_groom": (bool, (_wrote_the_file,)),
+    "import_groom": (Groom, ()),
+}
+"""Stage hook -> the type that it returns, and what holds besides."""
+
+STAGES = tuple(RESULTS)
+"""The stage hooks; each runs on the one plugin that a recipe or command names."""
