@@ -1,20 +1,59 @@
 """`hairkit` and `python -m hairkit` are the command line.
 
-Loads nothing at first: from here on Ctrl-C gets its one line, also while the rest loads.
+Nothing is loaded before Ctrl-C is answered in one line. The first Ctrl-C lets the steps that are
+running end, the second ends the process, whatever its threads do.
 """
 
+import os
 import sys
+
+ENDED_BY_CTRL_C = 130
+"""Exit code after the second Ctrl-C: 128 and the number of the signal, as shells have it."""
+SOON_S = 0.5
+"""Seconds in which a run that stops at once needs no message."""
 
 
 def main() -> int:
     """Run the command line and return its exit code."""
     try:
+        _end_at_second_interrupt()
         from hairkit.cli import main as run
 
         return run()
     except KeyboardInterrupt:
         print("hairkit: interrupted", file=sys.stderr)
         return 2
+
+
+def _end_at_second_interrupt() -> None:
+    """Start a thread that counts Ctrl-C: the main thread may wait for a plugin that hangs."""
+    import signal
+    import socket
+    import threading
+
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        return  # a background job ignores it
+
+    def wait() -> None:
+        while heard.recv(1) != bytes([signal.SIGINT]):
+            pass  # another signal that Python handles
+
+    def listen() -> None:
+        wait()
+        heard.settimeout(SOON_S)
+        try:
+            wait()
+        except TimeoutError:
+            os.write(2, b"hairkit: stopping; press Ctrl-C again to end at once\n")
+            heard.settimeout(None)
+            wait()
+        os.write(2, b"hairkit: ended at once\n")
+        os._exit(ENDED_BY_CTRL_C)
+
+    heard, pressed = socket.socketpair()
+    pressed.setblocking(False)
+    signal.set_wakeup_fd(pressed.detach(), warn_on_full_buffer=False)
+    threading.Thread(target=listen, name="ctrl-c", daemon=True).start()
 
 
 if __name__ == "__main__":

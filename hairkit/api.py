@@ -137,15 +137,17 @@ def simulate(
         raise InputError("the groom holds no strands, so there is nothing to simulate")
     base = read_motion(Path(motion)) if isinstance(motion, (str, os.PathLike)) else motion
     pull = None if gravity is None else np.array([0.0, -gravity, 0.0])
-    return run(
-        plugins.call("make_simulator", simulator, options, groom=opened),
-        add_shakes(shake, opened.head, base),
-        frames,
-        fps,
-        weather=Weather(np.asarray(wind, np.float64), turbulence, pull),
-        warm_up=warm_up,
-        progress=progress,
-    )
+    made = plugins.call("make_simulator", simulator, options, groom=opened)
+    with plugins.guard("make_simulator", simulator):
+        return run(
+            made,
+            add_shakes(shake, opened.head, base),
+            frames,
+            fps,
+            weather=Weather(np.asarray(wind, np.float64), turbulence, pull),
+            warm_up=warm_up,
+            progress=progress,
+        )
 
 
 def render(

@@ -136,7 +136,10 @@ def _run(words: list[str]) -> int:
     args, unknown = parser.parse_known_args(_vectors_joined(words))
     if unknown:
         _refuse(verb_parser or parser, unknown)
-    return int(module.run(args))
+    from hairkit.manager.guard import results_on_stdout
+
+    with results_on_stdout():
+        return int(module.run(args))
 
 
 def _vectors_joined(words: list[str]) -> list[str]:

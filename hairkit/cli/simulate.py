@@ -82,16 +82,19 @@ def _run(args: argparse.Namespace) -> int:
     motion = static_motion() if args.motion is None else read_motion(args.motion)
     motion = add_shakes(args.shake, groom.head, motion)
     simulator = manager.call("make_simulator", using, options, groom=groom)
-    with progress_for(sys.stderr, quiet=args.quiet) as progress:
+    with (
+        progress_for(sys.stderr, quiet=args.quiet) as progress,
+        manager.guard("make_simulator", using),
+    ):
         cache = simulated(
             simulator, motion, args.frames, args.fps,
             weather=weather, warm_up=args.warm_up, progress=progress,
         )  # fmt: skip
+        stretch = simulator.measure().stretch
     if exporter is None:
         cache.save(args.out)
     else:
         export(groom, args.out, cache=cache, plugin=exporter, manager=manager, **settings["writer"])
-    stretch = simulator.measure().stretch
     print(
         f"{args.out.name}: {len(cache)} frames of {len(simulator.strands)} guides,"
         f" stretch {100 * stretch:.2f} % at the end",

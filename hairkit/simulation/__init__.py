@@ -1,6 +1,7 @@
 """Simulation of guides: the protocol of simulators, head motion, wind, obstacles, and a runner.
 
-The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)` returns a `Simulator`.
+The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)` returns a
+`Simulator`.
 
 * `motion`: motion of the head: keyframes and shakes
 * `obstacles`: head and capsules as a signed distance on a grid

@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.errors import HairkitError, InputError
+from hairkit.errors import DataError, InputError
 from hairkit.progress import Progress, Silent
 from hairkit.simulation.motion import HeadMotion
 from hairkit.simulation.simulator import Simulator, Surroundings
@@ -60,8 +60,8 @@ def run(
 
     Raises
     ------
-    HairkitError
-        The simulator's points are no longer finite.
+    DataError
+        The simulator's points are no longer finite, or not as many as its strands have.
     """
     if frames < 1 or not frames_per_second > 0:
         raise InputError(f"{frames} frames at {frames_per_second} a second, expected both above 0")
@@ -80,8 +80,8 @@ def run(
             around = Surroundings(head, air.wind, air.turbulence, air.gravity)
             simulator.advance(1.0 / frames_per_second, around)
         if frame >= before:
+            _check_points(simulator.points, points.shape[1:], float(time))
             points[frame - before], heads[frame - before] = simulator.points, head
-            _check_finite(points[frame - before], float(time))
         told.stepped(STAGE)
     told.finished(STAGE, perf_counter() - began, False)
     return PointCache(points, times[:frames], heads)
@@ -106,8 +106,10 @@ def _physical_memory() -> float:
         return float("inf")
 
 
-def _check_finite(points: Float32Array, time: float) -> None:
+def _check_points(points: Float32Array, shape: tuple[int, ...], time: float) -> None:
+    if np.shape(points) != shape:
+        raise DataError(f"points has shape {np.shape(points)} at {time:.3f} s, expected {shape}")
     if not np.isfinite(points).all():
-        raise HairkitError(
+        raise DataError(
             f"the simulation is not finite at {time:.3f} s; take more substeps or less stiffness"
         )

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ball import PLUGIN_FILE, RECIPE, write_capture, write_grey
+from waiting import wait_for
 
 from hairkit.cli import main
 
@@ -200,11 +201,3 @@ def test_a_disk_that_is_really_full_is_one_line(
     assert printed.count("\n") == 1
     assert not list(small_disk.rglob("*.part"))
     assert not (small_disk / "out" / "groom.npz").exists()
-
-
-def wait_for(folder: Path, pattern: str, seconds: float = 30) -> None:
-    """Wait until a file appears."""
-    end = time.monotonic() + seconds
-    while not list(folder.glob(pattern)):
-        assert time.monotonic() < end, f"no {pattern} in {folder}"
-        time.sleep(0.01)

@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hairkit.testing import VIEW_NAMES, ball_mask, turn_capture, turn_scene
+from hairkit.testing import VIEW_NAMES, ball_mask, bristle_groom, turn_capture, turn_scene
 
 PLUGIN_FILE = Path(__file__).with_name("ball_plugin.py")
 TABLES = ("segment", "scene", "head", "orient", "hull", "field", "track", "export")
@@ -24,6 +24,12 @@ def write_capture(folder: Path, *, masks: bool = False) -> Path:
         for index, (name, camera) in enumerate(zip(VIEW_NAMES, turn_scene().cameras, strict=True)):
             write_grey(folder / "masks" / f"{index}_{name}.png", ball_mask(camera).labels)
     return folder
+
+
+def write_groom_file(path: Path) -> Path:
+    """Write the small groom of `hairkit.testing` and return the path."""
+    bristle_groom().save(path)
+    return path
 
 
 def write_grey(path: Path, values: np.ndarray) -> None:
