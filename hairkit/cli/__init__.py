@@ -15,6 +15,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `reconstruct`: photos to groom
 * `render`: pictures of a groom
 * `scaffold`: the files that `new-plugin` writes
+* `scaffold_sketches`: the simplest method for every hook, which it writes
 * `settings`: `--set` of all verbs
 * `simulate`: simulation to a cache
 * `synth`: procedural captures
