@@ -1,17 +1,20 @@
 """Signed distance to a head: on a grid for carving and tracking, or at single points.
 
-Heads of the world are open at the neck, the eyes and the mouth. Every hole is closed with a fan
-first; a place is then inside where lines through it along two of the three axes say so, by the sum
-of the signed crossings, which neither overlapping parts nor inward normals upset.
+Head meshes are often open at the neck, the eyes and the mouth. Every hole is closed with a fan
+first. A point is then inside if lines through it along at least two of the three axes have a sum of
+signed crossings other than 0 there, which holds for overlapping parts and for inward normals too.
+
+On the default head a grid of 25,000 cells takes 0.04 s of processor time, one of 890,000 cells
+0.24 s; `trimesh.proximity.signed_distance` would take 17 s for the first (1.3 s for 2,000 cells).
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
@@ -24,39 +27,70 @@ from hairkit.head_model.bvh import (
     nearest_on_surface,
     triangle_distance,
 )
+from hairkit.parallel import compiled
 from hairkit.types.head import Head
 from hairkit.types.volume import VoxelGrid
 
 _FAR = 1e30
+"""Beyond all coordinates."""
+_FAR_CELLS = 1e9
+"""Cells from the grid beyond which a coordinate is clamped, since integers cannot hold it."""
+BAND = 0.02
+"""Metres from the surface up to which cells are measured to the nearest triangle by default."""
+_WALK = 4
+"""Steps along the surface at most that look for a nearer foot."""
+_SAME_PLACE = 1e-12
+"""Metres along a line at which two feet are at one place."""
+
+
+class Cells(NamedTuple):
+    """The centres of a grid's cells."""
+
+    first: Float64Array
+    """(3,) centre of the first cell, metres, head frame."""
+    spacing: float
+    """Metres from one centre to the next."""
+    shape: Int64Array
+    """(3,) numbers of cells."""
+
+
+class Feet(NamedTuple):
+    """Surface points nearest to the cells at the surface."""
+
+    points: Float64Array
+    """(S, 3) metres, head frame."""
+    owner: Int32Array
+    """(S,) the face that each lies on."""
+    label: Int32Array
+    """(X, Y, Z) the foot of each cell at the surface, -1 elsewhere."""
 
 
 def signed_distance(head: Head, grid: VoxelGrid, band: float | None = None) -> Float32Array:
     """Return the signed distance to the head at the cell centres, (X, Y, Z), metres, inside < 0.
 
-    Cells at the surface find their nearest triangle; every cell inherits one of the points found
-    there by a separable transform (after Felzenszwalb and Huttenlocher 2012, with points in place
-    of cells). Up to `band` metres from the surface (`None`: 20 mm) a walk along the surface then
-    looks for the nearest one, and its triangle is measured: 0.01 mm off on average on a 3 mm grid,
-    a fifth of a cell at most. Beyond, distances are too large by up to half a cell.
+    Each cell at the surface gets the nearest point on its nearest triangle (its foot); every other
+    cell gets one of the feet by a separable transform (after Felzenszwalb and Huttenlocher 2012,
+    with points in place of cells). Up to `band` metres from the surface (`None`: `BAND`) a walk
+    along the surface then looks for the nearest foot, and the distance to its triangle is taken:
+    the error is 0.01 mm on average on a 3 mm grid and a fifth of a cell at most. Farther away,
+    distances are too large by up to half a cell.
     """
     vertices, faces = closed_surface(head)
     corners = vertices[faces]
-    centre0 = grid.origin + 0.5 * grid.spacing
-    shape = np.array(grid.shape, np.int64)
-    seed = _seed(corners, centre0, grid.spacing, shape)
+    first = grid.origin + 0.5 * grid.spacing
+    cells = Cells(first, grid.spacing, np.array(grid.shape, np.int64))
+    seed = _nearest_faces(corners, cells)
     if not (seed >= 0).any():
         return _far_from_surface(head, grid)
-    feet, owner, seeds = _feet(corners, centre0, grid.spacing, seed)
-    label = seeds
+    feet = _find_feet(corners, cells, seed)
+    label = feet.label
     for axis in range(3):
-        label = _nearest_along(label, feet, centre0, grid.spacing, axis)
-    reach = 0.02 if band is None else band
-    distance = _measured(label, seeds, feet, owner, corners, centre0, grid.spacing, reach)
+        label = _nearest_along(label, feet.points, cells, axis)
+    reach = BAND if band is None else band
+    distance = _measure(label, feet, corners, cells, reach)
     votes = np.zeros(grid.shape, np.int8)
     for axis in range(3):
-        votes += (
-            np.cumsum(_winding(corners, centre0, grid.spacing, shape, axis), axis, np.int8) != 0
-        )
+        votes += np.cumsum(_winding(corners, cells, axis), axis, np.int8) != 0
     np.negative(distance, out=distance, where=votes >= 2)
     return distance
 
@@ -72,8 +106,8 @@ def distance_to(head: Head, points: npt.ArrayLike) -> Float64Array:
 def closed_surface(head: Head) -> tuple[Float64Array, Int32Array]:
     """Return the head's vertices (V', 3) and faces (F', 3) with every hole closed by a fan.
 
-    Vertices repeated for texture seams are taken as one first. Each connected run of boundary edges
-    is then fanned to its mean, wound as the mesh around it.
+    Vertices that texture seams repeat are merged first. Each connected run of boundary edges then
+    gets a fan to its mean, wound like the mesh around it.
     """
     vertices, faces = head.vertices.astype(np.float64), head.faces
     start, end = _border(faces, len(vertices))
@@ -94,7 +128,7 @@ def closed_surface(head: Head) -> tuple[Float64Array, Int32Array]:
 
 
 def _border(faces: Int32Array, count: int) -> tuple[Int64Array, Int64Array]:
-    """Starts and ends of the directed edges that no other face runs along the other way."""
+    """Return starts and ends of the directed edges that no other face has in reverse."""
     start = faces.ravel().astype(np.int64)
     end = faces[:, [1, 2, 0]].ravel().astype(np.int64)
     border = ~np.isin(start * count + end, end * count + start)
@@ -107,15 +141,14 @@ def _closed_tree(head: Head) -> TriangleTree:
 
 
 def _far_from_surface(head: Head, grid: VoxelGrid) -> Float32Array:
-    """No cell is near the surface: the grid lies wholly inside or outside, and is small or far."""
+    """Return the distances of a grid of which no cell is at the surface, so that all are one side."""
     return distance_to(head, grid.centres().reshape(-1, 3)).reshape(grid.shape).astype(np.float32)
 
 
-@njit(cache=True)
-def _seed(
-    corners: Float64Array, centre0: Float64Array, spacing: float, shape: Int64Array
-) -> Int32Array:  # pragma: no cover - compiled
-    """(X, Y, Z) the nearest triangle if it is at most a cell away from the centre, else -1."""
+@compiled
+def _nearest_faces(corners: Float64Array, cells: Cells) -> Int32Array:
+    """Return (X, Y, Z) the nearest face if it is at most a cell away from the centre, else -1."""
+    centre0, spacing, shape = cells.first, cells.spacing, cells.shape
     seed = np.full((shape[0], shape[1], shape[2]), -1, np.int32)
     nearest = np.full((shape[0], shape[1], shape[2]), spacing * spacing, np.float32)
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
@@ -125,8 +158,8 @@ def _seed(
             a, b, c = corners[face, 0, k], corners[face, 1, k], corners[face, 2, k]
             bottom = (min(a, b, c) - centre0[k]) / spacing
             top = (max(a, b, c) - centre0[k]) / spacing
-            low[k] = max(int(np.ceil(max(bottom, -1e9) - 1)), 0)
-            high[k] = min(int(np.floor(min(top, 1e9) + 1)), shape[k] - 1)
+            low[k] = max(int(np.ceil(max(bottom, -_FAR_CELLS) - 1)), 0)
+            high[k] = min(int(np.floor(min(top, _FAR_CELLS) + 1)), shape[k] - 1)
         for i in range(low[0], high[0] + 1):
             at[0] = centre0[0] + i * spacing
             for j in range(low[1], high[1] + 1):
@@ -139,23 +172,19 @@ def _seed(
     return seed
 
 
-def _feet(
-    corners: Float64Array, centre0: Float64Array, spacing: float, seed: Int32Array
-) -> tuple[Float64Array, Int32Array, Int32Array]:
-    """Nearest surface points (S, 3) of the seeded cells, their faces (S,), and labels (X, Y, Z)."""
-    cells = np.argwhere(seed >= 0)
-    owner = seed[tuple(cells.T)]
-    centres = centre0 + cells * spacing
-    feet = _foot_points(corners, centres, owner)
-    label = np.full(seed.shape, -1, np.int32)
-    label[tuple(cells.T)] = np.arange(len(owner), dtype=np.int32)
-    return feet, owner, label
+def _find_feet(corners: Float64Array, cells: Cells, face: Int32Array) -> Feet:
+    """Return the feet of the cells whose nearest face (X, Y, Z) is known."""
+    at = np.argwhere(face >= 0)
+    owner = face[tuple(at.T)]
+    points = _foot_points(corners, cells.first + at * cells.spacing, owner)
+    label = np.full(face.shape, -1, np.int32)
+    label[tuple(at.T)] = np.arange(len(owner), dtype=np.int32)
+    return Feet(points, owner, label)
 
 
-@njit(cache=True)
-def _foot_points(
-    corners: Float64Array, points: Float64Array, owner: Int32Array
-) -> Float64Array:  # pragma: no cover - compiled
+@compiled
+def _foot_points(corners: Float64Array, points: Float64Array, owner: Int32Array) -> Float64Array:
+    """Return (S, 3) the point of each owner's triangle that is nearest to points (S, 3)."""
     feet = np.empty((len(points), 3))
     for i in range(len(points)):
         triangle = corners[owner[i]]
@@ -165,22 +194,24 @@ def _foot_points(
     return feet
 
 
-def _nearest_along(
-    label: Int32Array, feet: Float64Array, centre0: Float64Array, spacing: float, axis: int
-) -> Int32Array:
-    """For each cell the label, among those of its line along `axis`, whose foot is nearest."""
+def _nearest_along(label: Int32Array, feet: Float64Array, cells: Cells, axis: int) -> Int32Array:
+    """Return for each cell the label on its line along `axis` whose foot (S, 3) is nearest."""
     b, c = (axis + 1) % 3, (axis + 2) % 3
     lines = np.ascontiguousarray(label.transpose(b, c, axis))
     order = np.array([axis, b, c])
-    _sweep(lines, feet[:, order].copy(), centre0[order], spacing)
+    turned = Cells(cells.first[order], cells.spacing, cells.shape[order])
+    _sweep(lines, feet[:, order].copy(), turned)
     return lines.transpose(np.argsort([b, c, axis]))
 
 
-@njit(cache=True)
-def _sweep(
-    lines: Int32Array, feet: Float64Array, centre0: Float64Array, spacing: float
-) -> None:  # pragma: no cover - compiled
-    """Lower envelope of the parabolas (x - foot)^2 + rest^2 of each line (B, C, A), in place."""
+@compiled
+def _sweep(lines: Int32Array, feet: Float64Array, cells: Cells) -> None:
+    """Relabel each line (B, C, A) by the lower envelope of its parabolas (x - apex)^2 + rest.
+
+    A foot's parabola is its squared distance to the line's points: apex is its coordinate along the
+    line, rest its squared distance from the line. Axes of feet and cells are (A, B, C).
+    """
+    centre0, spacing = cells.first, cells.spacing
     length = lines.shape[2]
     apex, rest, begins = np.empty(length), np.empty(length), np.empty(length)
     name = np.empty(length, np.int32)
@@ -201,7 +232,7 @@ def _sweep(
                 line[k] = name[current]
 
 
-@njit(cache=True)
+@compiled
 def _parabolas(
     line: Int32Array,
     feet: Float64Array,
@@ -210,8 +241,8 @@ def _parabolas(
     apex: Float64Array,
     rest: Float64Array,
     name: Int32Array,
-) -> int:  # pragma: no cover - compiled
-    """Sort a line's feet by where they lie along it; they nearly are, so by insertion."""
+) -> int:
+    """Sort a line's parabolas by apex; return their number. Insertion, as they nearly are sorted."""
     count = 0
     for which in line:
         if which < 0 or (count and name[count - 1] == which):
@@ -227,18 +258,18 @@ def _parabolas(
     return count
 
 
-@njit(cache=True)
+@compiled
 def _envelope(
     count: int, apex: Float64Array, rest: Float64Array, name: Int32Array, begins: Float64Array
-) -> int:  # pragma: no cover - compiled
-    """Keep, in place, the parabolas that are lowest somewhere, and from where on each one is."""
+) -> int:
+    """Keep, in place, the parabolas that are lowest somewhere, and where each begins to be."""
     top = 0
     for m in range(count):
         begin = -_FAR
         while top > 0:
             gap = apex[m] - apex[top - 1]
-            if gap <= 1e-12:
-                # Feet at one place along the line: the nearer to it hides the other.
+            if gap <= _SAME_PLACE:
+                # feet at one place along the line: the one nearer to the line hides the other
                 begin = _FAR if rest[m] >= rest[top - 1] else -_FAR
             else:
                 begin = 0.5 * (apex[m] + apex[top - 1] + (rest[m] - rest[top - 1]) / gap)
@@ -252,18 +283,12 @@ def _envelope(
     return top
 
 
-@njit(cache=True)
-def _measured(
-    label: Int32Array,
-    seeds: Int32Array,
-    feet: Float64Array,
-    owner: Int32Array,
-    corners: Float64Array,
-    centre0: Float64Array,
-    spacing: float,
-    reach: float,
-) -> Float32Array:  # pragma: no cover - compiled
-    """Distance of each cell to its label's foot; within `reach` to the triangles thereabouts."""
+@compiled
+def _measure(
+    label: Int32Array, feet: Feet, corners: Float64Array, cells: Cells, reach: float
+) -> Float32Array:
+    """Return (X, Y, Z) distances to the labels' feet, within `reach` to the triangles around them."""
+    centre0, spacing, owner = cells.first, cells.spacing, feet.owner
     distance = np.empty(label.shape, np.float32)
     at = np.empty(3)
     for i in range(label.shape[0]):
@@ -273,9 +298,9 @@ def _measured(
             for k in range(label.shape[2]):
                 at[2] = centre0[2] + k * spacing
                 which = label[i, j, k]
-                squared = foot_distance(at, feet[which])
+                squared = foot_distance(at, feet.points[which])
                 if squared < (reach + spacing) ** 2:
-                    first, second = _nearer_feet(at, which, seeds, feet, centre0, spacing)
+                    first, second = _nearer_feet(at, which, feet, cells)
                     squared = min(squared, triangle_distance(at, corners[owner[first]])[0])
                     if owner[second] != owner[first]:
                         squared = min(squared, triangle_distance(at, corners[owner[second]])[0])
@@ -283,32 +308,29 @@ def _measured(
     return distance
 
 
-@njit(cache=True)
-def foot_distance(at: Float64Array, foot: Float64Array) -> float:  # pragma: no cover - compiled
+@compiled
+def foot_distance(at: Float64Array, foot: Float64Array) -> float:
     """Return the squared distance of two points (3,)."""
     return float((at[0] - foot[0]) ** 2 + (at[1] - foot[1]) ** 2 + (at[2] - foot[2]) ** 2)
 
 
-@njit(cache=True)
-def _nearer_feet(
-    at: Float64Array,
-    which: int,
-    seeds: Int32Array,
-    feet: Float64Array,
-    centre0: Float64Array,
-    spacing: float,
-) -> tuple[int, int]:  # pragma: no cover - compiled
-    """The nearest foot and the one before it, walking along the surface from seed to seed."""
-    best, second, nearest = which, which, foot_distance(at, feet[which])
-    for _ in range(4):
+@compiled
+def _nearer_feet(at: Float64Array, which: int, feet: Feet, cells: Cells) -> tuple[int, int]:
+    """Return the nearest foot to a point (3,), and the one before it, on a walk from `which`.
+
+    Each step looks at the feet of the 27 cells around the last one.
+    """
+    points, seeds = feet.points, feet.label
+    best, second, nearest = which, which, foot_distance(at, points[which])
+    for _ in range(_WALK):
         start = best
-        low = ((feet[start] - centre0) / spacing - 0.5).astype(np.int64)
+        low = ((points[start] - cells.first) / cells.spacing - 0.5).astype(np.int64)
         for x in range(max(low[0], 0), min(low[0] + 3, seeds.shape[0])):
             for y in range(max(low[1], 0), min(low[1] + 3, seeds.shape[1])):
                 for z in range(max(low[2], 0), min(low[2] + 3, seeds.shape[2])):
                     other = seeds[x, y, z]
                     if other >= 0 and other != best:
-                        squared = foot_distance(at, feet[other])
+                        squared = foot_distance(at, points[other])
                         if squared < nearest:
                             best, second, nearest = other, best, squared
         if best == start:
@@ -316,11 +338,10 @@ def _nearer_feet(
     return best, second
 
 
-@njit(cache=True)
-def _winding(
-    corners: Float64Array, centre0: Float64Array, spacing: float, shape: Int64Array, axis: int
-) -> npt.NDArray[np.int8]:  # pragma: no cover - compiled
-    """(X, Y, Z) signed crossings between a cell's centre and the one before it along `axis`."""
+@compiled
+def _winding(corners: Float64Array, cells: Cells, axis: int) -> npt.NDArray[np.int8]:
+    """Return (X, Y, Z) the signed crossings of `axis` between each centre and the one before it."""
+    centre0, spacing, shape = cells.first, cells.spacing, cells.shape
     crossed = np.zeros((shape[0], shape[1], shape[2]), np.int8)
     b, c = (axis + 1) % 3, (axis + 2) % 3
     cell = np.empty(3, np.int64)
@@ -329,9 +350,9 @@ def _winding(
         for k in (b, c):
             bottom = min(corners[face, 0, k], corners[face, 1, k], corners[face, 2, k])
             top = max(corners[face, 0, k], corners[face, 1, k], corners[face, 2, k])
-            low[k] = max(int(np.ceil(max((bottom - centre0[k]) / spacing, -1e9) - 1e-6)), 0)
+            low[k] = max(int(np.ceil(max((bottom - centre0[k]) / spacing, -_FAR_CELLS) - 1e-6)), 0)
             high[k] = min(
-                int(np.floor(min((top - centre0[k]) / spacing, 1e9) + 1e-6)), shape[k] - 1
+                int(np.floor(min((top - centre0[k]) / spacing, _FAR_CELLS) + 1e-6)), shape[k] - 1
             )
         for i in range(low[b], high[b] + 1):
             for j in range(low[c], high[c] + 1):
@@ -340,7 +361,9 @@ def _winding(
                 )
                 if sign == 0:
                     continue
-                first = max(int(np.floor(min((height - centre0[axis]) / spacing, 1e9))) + 1, 0)
+                first = max(
+                    int(np.floor(min((height - centre0[axis]) / spacing, _FAR_CELLS))) + 1, 0
+                )
                 if first < shape[axis]:
                     cell[axis], cell[b], cell[c] = first, i, j
                     crossed[cell[0], cell[1], cell[2]] += sign
