@@ -141,7 +141,7 @@ def _closed_tree(head: Head) -> TriangleTree:
 
 
 def _far_from_surface(head: Head, grid: VoxelGrid) -> Float32Array:
-    """Return the distances of a grid of which no cell is at the surface, so that all are one side."""
+    """Return the distances of a grid without cells at the surface: wholly inside or outside."""
     return distance_to(head, grid.centres().reshape(-1, 3)).reshape(grid.shape).astype(np.float32)
 
 
@@ -242,7 +242,7 @@ def _parabolas(
     rest: Float64Array,
     name: Int32Array,
 ) -> int:
-    """Sort a line's parabolas by apex; return their number. Insertion, as they nearly are sorted."""
+    """Sort a line's parabolas by apex, by insertion since most are in order; return how many."""
     count = 0
     for which in line:
         if which < 0 or (count and name[count - 1] == which):
@@ -287,7 +287,7 @@ def _envelope(
 def _measure(
     label: Int32Array, feet: Feet, corners: Float64Array, cells: Cells, reach: float
 ) -> Float32Array:
-    """Return (X, Y, Z) distances to the labels' feet, within `reach` to the triangles around them."""
+    """Return (X, Y, Z) distances to the labels' feet, within `reach` to triangles around them."""
     centre0, spacing, owner = cells.first, cells.spacing, feet.owner
     distance = np.empty(label.shape, np.float32)
     at = np.empty(3)
