@@ -1,4 +1,4 @@
-"""Cameras from landmarks alone, at the nominal angles of the turn, as in the thesis.
+"""Cameras fixed at the nominal turntable angles; only the head's pose is fitted, to landmarks.
 
 Landmarks of two or more views are intersected in space by least squares, with cameras exactly on
 the nominal turn (orthographic as in the thesis, or perspective); a weighted similarity (Umeyama
@@ -16,10 +16,9 @@ from hairkit.arrays import Float64Array
 from hairkit.cameras.similarity import fit_similarity, triangulate
 from hairkit.cameras.turntable import Turn
 from hairkit.errors import InputError
+from hairkit.io.photos import focal_from_equivalent
 from hairkit.options import option
-
-JAW = 17
-"""The first landmarks trace the jaw."""
+from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 
 
 @dataclass(frozen=True)
@@ -48,14 +47,14 @@ class Options:
 def estimate_scene(
     capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
 ) -> Scene:
-    """Return the nominal turn seen from the head that the landmarks place in it."""
+    """Return the nominal turn in the frame of the head, which landmarks place in it."""
     pixels, known = _seen(capture)
     if head.landmark_vertices is None:
         raise InputError(
             "the head has no landmark_vertices for the plugin 'landmarks'; use the plugin 'manual'"
         )
     cameras = _nominal(capture, options)
-    weights = np.where(np.arange(68) < JAW, options.jaw_weight, 1.0)
+    weights = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, options.jaw_weight, 1.0)
     points = triangulate(cameras, pixels, np.broadcast_to(known[:, None], pixels.shape[:2]))
     scene_from_head = fit_similarity(head.vertices[head.landmark_vertices], points, weights)
     to_head = scene_from_head.inverse()
@@ -72,7 +71,7 @@ def _seen(capture: Capture) -> tuple[Float64Array, Float64Array]:
             f"landmarks are known in {int(known.sum())} views, the plugin 'landmarks' needs 2"
             " or more; add landmarks.json or use the plugin 'silhouette'"
         )
-    pixels = np.zeros((len(known), 68, 2))
+    pixels = np.zeros((len(known), LANDMARKS, 2))
     for index, view in enumerate(capture.views):
         if view.landmarks is not None:
             pixels[index] = view.landmarks
@@ -80,10 +79,10 @@ def _seen(capture: Capture) -> tuple[Float64Array, Float64Array]:
 
 
 def _nominal(capture: Capture, options: Options) -> tuple[Camera, ...]:
-    """Return the nominal turn at a scale that only has to be plausible: the similarity finds it."""
+    """Return the nominal turn at a usual scale; the similarity finds the true one."""
     turn = Turn.of(capture)
     view = capture.views[0]
-    usual = options.focal_equivalent / np.hypot(36, 24) * np.hypot(view.width, view.height)
+    usual = focal_from_equivalent(options.focal_equivalent, view.width, view.height)
     focal = view.focal_px or usual
     perspective = 1 / options.distance if options.model == "perspective" else 0.0
     return turn.nominal(focal / options.distance, perspective)

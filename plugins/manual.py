@@ -10,13 +10,13 @@ from hairkit import Capture, Head, Mask, Scene, hookimpl
 from hairkit.cameras.similarity import Similarity
 from hairkit.cameras.turntable import Turn
 from hairkit.errors import InputError
+from hairkit.io.photos import focal_from_equivalent
 from hairkit.options import option
 
 
 @dataclass(frozen=True)
 class Options:
-    """Settings of the nominal cameras; EXIF or capture.toml's focal length goes before
-    `focal_equivalent`."""
+    """Settings of the nominal cameras."""
 
     model: str = option(
         "perspective", choices=("orthographic", "perspective"), doc="Kind of the nominal cameras."
@@ -25,7 +25,7 @@ class Options:
         42.0,
         low=10,
         high=1000,
-        doc="Focal length where the photos do not tell, full frame.",
+        doc="Focal length without EXIF or capture.toml, full frame.",
         unit="mm",
     )
     distance: float = option(
@@ -44,7 +44,7 @@ def estimate_scene(
             " add [head] to capture.toml or use the plugin 'silhouette'"
         )
     view = capture.views[0]
-    usual = options.focal_equivalent / np.hypot(36, 24) * np.hypot(view.width, view.height)
+    usual = focal_from_equivalent(options.focal_equivalent, view.width, view.height)
     orthographic = options.model == "orthographic" or capture.orthographic
     perspective = 0.0 if orthographic else 1 / options.distance
     cameras = Turn.of(capture).nominal((view.focal_px or usual) / options.distance, perspective)

@@ -2,11 +2,11 @@
 
 A 2D orientation and the ray through its pixel span a plane that holds the strand; with plane
 normals N_i the direction D minimises `sum w_i (N_i . D)^2` (Wei et al. 2005; thesis 5.3 with the
-weights the right way round). Every view may speak about a cell, with a weight that falls with the
+weights the right way round). Every view contributes to a cell with a weight that falls with the
 cell's depth behind the first hair the view sees ("see-through"). D D^T is diffused with its
-certainty (Paris et al. 2008; thesis 5.4); near the scalp, where photos say nothing, a weak combing
-prior says how hair leaves the head. A potential that grows with the way through the hair from the
-scalp settles later which end of a strand is the tip.
+certainty (Paris et al. 2008; thesis 5.4); near the scalp, where photos show little, a weak prior
+gives the direction in which hair leaves the head. A potential that grows with the distance from the
+scalp through the hair later tells a strand's root from its tip.
 """
 
 from __future__ import annotations
@@ -61,8 +61,7 @@ def solve_field(
     hull: Hull,
     options: Options,
 ) -> OrientationField:
-    """Fuse, add the scalp prior, diffuse over the loose hull, and measure the way from the
-    scalp."""
+    """Fuse views, add the scalp prior, diffuse over the loose hull, find the growth potential."""
     growth = growth_potential(scene.head, hull, options.tip_share)
     fused = fuse_views(scene.cameras, masks, orientations, hull, options, options.min_views)
     prior = ScalpPrior(

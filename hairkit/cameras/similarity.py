@@ -58,8 +58,7 @@ class Similarity:
 def fit_similarity(
     source: npt.ArrayLike, target: npt.ArrayLike, weights: npt.ArrayLike | None = None
 ) -> Similarity:
-    """Return the similarity that brings `source` (N, 3) to `target` (N, 3) with least weighted
-    squares.
+    """Return the similarity from `source` (N, 3) to `target` (N, 3) of least weighted squares.
 
     Umeyama, "Least-squares estimation of transformation parameters between two point patterns"
     (1991), with weights. Raises `InputError` for fewer than three points, points on one line, or
@@ -96,8 +95,7 @@ def _check_spread(centred: Float64Array) -> None:
 def triangulate(
     cameras: Sequence[Camera], pixels: npt.ArrayLike, weights: npt.ArrayLike | None = None
 ) -> Float64Array:
-    """Return the points (N, 3) nearest to the rays through `pixels` (V, N, 2), least squares over
-    views.
+    """Return the points (N, 3) nearest to the rays through `pixels` (V, N, 2) of all views.
 
     `weights` (V, N) is 0 where a view does not know the point. A point that fewer than two views
     know is NaN.

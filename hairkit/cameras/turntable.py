@@ -1,7 +1,7 @@
-"""Poses from points and a turn of cameras: similarity fit, triangulation, and a turn's parameters.
+"""The parameters of a turn of cameras around the head.
 
 `Turn` maps a short vector to the cameras of a turn around the head: what all views share (the
-rig's tilt and place, magnification, perspective) and how each one strays from its nominal place.
+rig's tilt and place, magnification, perspective) and how each one deviates from its nominal place.
 Refinement methods solve for that vector.
 """
 
@@ -21,14 +21,14 @@ SHARED, PER_VIEW = 8, 6
 LOG_MAGNIFICATION, PERSPECTIVE = 6, 7
 """Where the shared numbers hold log(pixels per metre at the turn's centre) and 1 / distance."""
 MIN_PERSPECTIVE = 0.01
-"""Cameras are put no farther away than 1 / this, metres: there the picture is orthographic to a
-tenth of a pixel."""
+"""Cameras are at most 1 / this away, metres: there pictures are orthographic to 0.1 pixels."""
 
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """The family of cameras of a turn around the head, over a vector of `SHARED + PER_VIEW * V`
-    numbers.
+    """The cameras of a turn around the head as functions of a vector of numbers.
+
+    The vector has `SHARED + PER_VIEW * V` numbers.
 
     Shared: rotation vector of the head in the rig (3, radians), the turn's centre in the head
     frame (3, metres), log of the pixels per metre there, and 1 / distance (0 is orthographic). Per
@@ -45,8 +45,7 @@ class Turn:
 
     @classmethod
     def of(cls, capture: Capture) -> Turn:
-        """Return the turn of a capture: its nominal azimuths and sizes, focal lengths from EXIF or
-        by size."""
+        """Return the turn of a capture: nominal azimuths, sizes, focal lengths by EXIF or size."""
         sizes = np.array([(view.width, view.height) for view in capture.views])
         focal = np.hypot(*sizes.T)
         known = [view.focal_px for view in capture.views if view.focal_px is not None]
@@ -91,8 +90,7 @@ class Turn:
         return result
 
     def _tangent(self, vector: Float64Array, moved: Float64Array) -> Float64Array:
-        """Return (V, 7) the small motions from the cameras of one vector to those of another close
-        by."""
+        """Return (V, 7) the small motions from the cameras of one vector to another's."""
         rotation, translation, focal = self.unpack(vector)
         turned, shifted, zoomed = self.unpack(moved)
         spin = (turned - rotation) @ rotation.transpose(0, 2, 1)
@@ -101,8 +99,10 @@ class Turn:
         return np.concatenate([w, move, np.log(zoomed / focal)[:, None]], axis=1)
 
     def nominal(self, magnification: float, perspective: float) -> tuple[Camera, ...]:
-        """Return level cameras on the nominal turn about the origin: pixels per metre there, and 1
-        / distance."""
+        """Return level cameras on the nominal turn about the origin.
+
+        `magnification` is in pixels per metre there, `perspective` is 1 / distance.
+        """
         vector = np.zeros(self.size)
         vector[LOG_MAGNIFICATION], vector[PERSPECTIVE] = np.log(magnification), perspective
         return self.cameras(vector)

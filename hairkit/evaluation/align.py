@@ -21,6 +21,8 @@ from hairkit.types.strands import Strands
 
 ALIGNMENT_POINTS = 2000
 """How many strand points, and how many head points, the similarity is fitted to at most."""
+_SCALES = (0.1, 0.1, 0.1, 0.1, 0.01, 0.01, 0.01)
+"""Usual size of log scale, rotation vector (radians) and shift (metres), for the solver's steps."""
 _LOST_PX = 1e4
 """Residual of a point that a camera cannot see because it lies behind it."""
 
@@ -190,9 +192,7 @@ def _fit(
         gaps = [c.project(moved) - w for c, w in zip(true, wanted, strict=True)]
         return np.nan_to_num(np.concatenate(gaps).ravel(), nan=_LOST_PX)
 
-    solution = least_squares(
-        residuals, start, method="lm", x_scale=[0.1, 0.1, 0.1, 0.1, *[0.01] * 3]
-    )
+    solution = least_squares(residuals, start, method="lm", x_scale=_SCALES)
     scale = float(np.exp(solution.x[0]))
     rotation = Rotation.from_rotvec(solution.x[1:4]).as_matrix()
     translation = middle + solution.x[4:] - scale * rotation @ middle

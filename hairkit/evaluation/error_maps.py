@@ -21,6 +21,11 @@ LEVEL_COLOURS = ((20, 120, 20), (130, 190, 60), (240, 190, 40), (200, 30, 30))
 """Within 2 mm/20, 3 mm/30, 4 mm/40 degrees, and farther off."""
 _RIGHT, _WRONG = (60, 210, 90), (235, 60, 60)
 _BACKDROP = 24
+_FOUND, _TOO_MUCH, _MISSING = (200, 200, 200), (230, 60, 60), (60, 110, 240)
+"""RGB of silhouettes: drawn and true, only drawn, only true."""
+_NO_HAIR = (30, 40, 60)
+"""RGB where the truth has no orientation."""
+_PHOTO_BRIGHTNESS = 0.4
 _WORST_DEG = 45.0
 
 
@@ -72,9 +77,9 @@ def _silhouette(evaluation: Evaluation, truth: Truth, view: int) -> UInt8Array:
     drawn = evaluation.evidence.silhouettes[view]
     hair = truth.hair_mask(view) == HAIR
     picture = np.full((*hair.shape, 3), _BACKDROP, np.uint8)
-    picture[drawn & hair] = 200
-    picture[drawn & ~hair] = (230, 60, 60)
-    picture[~drawn & hair] = (60, 110, 240)
+    picture[drawn & hair] = _FOUND
+    picture[drawn & ~hair] = _TOO_MUCH
+    picture[~drawn & hair] = _MISSING
     return picture
 
 
@@ -83,12 +88,12 @@ def _orientation(orientation: OrientationMap, truth: Truth, view: int) -> UInt8A
     gap = np.clip(orientation_gap(orientation, true) / _WORST_DEG, 0, 1)
     heat = cv2.applyColorMap((255 * gap).astype(np.uint8), cv2.COLORMAP_HOT)
     picture = np.ascontiguousarray(heat[..., ::-1])
-    picture[true == 0] = (30, 40, 60)
+    picture[true == 0] = _NO_HAIR
     return np.asarray(picture, np.uint8)
 
 
 def _photo(truth: Truth, view: int) -> UInt8Array:
-    """Return the photo at 40 % brightness, or a plain ground where there is none."""
+    """Return the darkened photo, or a plain ground where there is none."""
     camera = truth.cameras[view]
     plain = np.full((camera.height, camera.width, 3), _BACKDROP, np.uint8)
     photos = sorted(path for path in (truth.folder.parent / "photos").glob("*") if path.is_file())
@@ -99,7 +104,7 @@ def _photo(truth: Truth, view: int) -> UInt8Array:
     except HairkitError:
         return plain  # the picture is only a ground; the scores never needed the photo
     sized = cv2.resize(photo, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
-    return (sized * 0.4).astype(np.uint8)
+    return (sized * _PHOTO_BRIGHTNESS).astype(np.uint8)
 
 
 def _small(picture: npt.NDArray[np.uint8], height: int) -> UInt8Array:

@@ -21,6 +21,8 @@ INSIDE_DEPTH = 0.002
 """Points deeper than this under the head's surface count as inside, metres."""
 _CELL = 0.005
 """Edge of the cells that are skipped together when they lie wholly outside the head, metres."""
+ROOT_PERCENTILE = 95
+"""Percentile that `root_distance_95_mm` is."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def head_measures(strands: Strands, samples: Samples, head: Head) -> HeadMeasure
     roots = 1000 * np.abs(distance_to(head, strands.roots))
     return HeadMeasures(
         root_distance_mean_mm=float(roots.mean()),
-        root_distance_95_mm=float(np.percentile(roots, 95)),
+        root_distance_95_mm=float(np.percentile(roots, ROOT_PERCENTILE)),
         root_distance_max_mm=float(roots.max()),
         points_inside=int(deeper_than(head, strands.points, INSIDE_DEPTH).sum()),
         samples_inside=int(deeper_than(head, samples.points, INSIDE_DEPTH).sum()),

@@ -109,8 +109,7 @@ def _coarse_guess(
 
 
 def cell_neighbours(occupied: BoolArray) -> Int32Array:
-    """Return (N, 6) the row of each occupied cell's face neighbours (-x, +x, -y, +y, -z, +z), -1
-    for none."""
+    """Return (N, 6) rows of the neighbours -x, +x, -y, +y, -z, +z of occupied cells, or -1."""
     number = np.full(np.add(occupied.shape, 2), -1, np.int32)
     inner = number[1:-1, 1:-1, 1:-1]
     inner[occupied] = np.arange(np.count_nonzero(occupied), dtype=np.int32)

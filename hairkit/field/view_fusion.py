@@ -2,7 +2,7 @@
 
 A 2D orientation and the ray through its pixel span a plane that holds the strand; with plane
 normals N_i the direction D minimises `sum w_i (N_i . D)^2` (Wei et al. 2005; thesis 5.3 with the
-weights the right way round). Every view may speak about a cell, with a weight that falls with the
+weights the right way round). Every view contributes to a cell, with a weight that falls with the
 cell's depth behind the first hair the view sees.
 """
 
@@ -33,7 +33,7 @@ DEPTH_SHRINK = 3
 POOL_CELLS = 2
 """Planes are pooled on cells this many times as large."""
 LEAST_WEIGHT = 1e-4
-"""Views that fading leaves less weight than this do not speak about a cell."""
+"""Views whose weight fades below this do not contribute to a cell."""
 MIN_CELLS = 4096
 """Least number of cells that are worth another thread."""
 
@@ -65,10 +65,10 @@ class FusionOptions:
 
 @dataclass(frozen=True, eq=False)
 class FusedViews:
-    """What all views say together."""
+    """Orientations of all views, fused."""
 
     orientations: tuple[OrientationMap, ...]
-    """The maps, the waves' slant taken off where it was asked for."""
+    """The maps, corrected for the slant of waves if enabled."""
     tensor: Float32Array
     """(N, 6) D D^T of every loose cell."""
     certainty: Float32Array
@@ -90,7 +90,7 @@ def fuse_views(
     if options.unslant:
         maps = tuple(without_slant(found, waves) for found in orientations)
     planes, views = fuse_planes(cameras, masks, maps, hull, options.see_through, options.free_depth)
-    planes = pooled_planes(planes, hull, options.pool * waves.pitch)
+    planes = pool_planes(planes, hull, options.pool * waves.pitch)
     return FusedViews(maps, *plane_directions(planes, views, min_views))
 
 
@@ -102,7 +102,7 @@ def fuse_planes(
     see_through: float,
     free_depth: float,
 ) -> tuple[Float64Array, Int64Array]:
-    """Return `sum w N N^T` (N, 6) of every loose cell and the number of views that spoke (N,).
+    """Return `sum w N N^T` (N, 6) of every loose cell and the number of contributing views (N,).
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def front_depths(
     return fronts
 
 
-def pooled_planes(planes: Float64Array, hull: Hull, sigma: float) -> Float64Array:
+def pool_planes(planes: Float64Array, hull: Hull, sigma: float) -> Float64Array:
     """Return the planes (N, 6) averaged over a Gaussian neighbourhood of `sigma` metres.
 
     Planes of two views 45 degrees apart amplify disagreement into depth, and strands that wave out
@@ -163,7 +163,7 @@ def pooled_planes(planes: Float64Array, hull: Hull, sigma: float) -> Float64Arra
 
 
 class OrientedView(NamedTuple):
-    """What one view says about the hair's direction."""
+    """One view's evidence for the direction of hair."""
 
     camera: PackedCamera
     angle: Float32Array
@@ -189,7 +189,7 @@ class LooseCells(NamedTuple):
     points: Float32Array
     """(N, 3) centres, metres."""
     dense: BoolArray
-    """(N,) cells that views may speak about."""
+    """(N,) cells in the dense hull; views contribute to no others."""
 
 
 @compiled
@@ -262,7 +262,7 @@ def plane_directions(
     """Return D D^T (N, 6) of the smallest eigenvector and its certainty (N,).
 
     Certainty is the gap between the two smallest eigenvalues: 0 when all views share one plane;
-    cells that fewer than `min_views` views speak about have none.
+    cells to which fewer than `min_views` views contribute have none.
     """
     tensor = np.zeros(planes.shape, np.float32)
     certainty = np.zeros(len(planes), np.float32)

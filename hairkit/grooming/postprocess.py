@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from hairkit.grooming.head_collision import kept_outside
+from hairkit.grooming.head_collision import push_out_of_head
 from hairkit.grooming.wind_waves import add_waves
 from hairkit.helices import smoothed
 from hairkit.imaging.waves import measure_waves
@@ -48,4 +48,4 @@ def finished(
         strands = smoothed(strands, options.helix_tolerance)
     if options.waves:
         strands = add_waves(strands, measure_waves(orientations, masks, scene.cameras))
-    return kept_outside(strands, hull, options.clearance)
+    return push_out_of_head(strands, hull, options.clearance)

@@ -21,6 +21,12 @@ UNMERGED = 0.8
 TOLERANCE = 0.00025
 """Mean distance in metres that `adaptive_counts` allows by default."""
 MOST_ADAPTIVE, ROUNDS = 64, 4
+"""Most arcs of a strand, and how often the count is raised."""
+ERROR_POWER = 0.7
+"""The count grows with this power of the error over the tolerance: arcs are never taken away, so
+a strand must not get more of them than it needs."""
+LEAST_GROWTH, MOST_GROWTH = 1.15, 3.0
+"""Bounds of the growth in a round."""
 _SAMPLES = (0.25, 0.5, 0.75, 1.0)
 
 
@@ -49,8 +55,8 @@ def adaptive_counts(
 ) -> Int64Array:
     """Return (S,) arcs a strand that keep it within `tolerance`, metres, on average along it.
 
-    Starts from `patent_counts`, or near its count by length where it merged most arcs of long
-    straight hair, which leaves too few, and adds arcs where the curve is too far off, up to `most`.
+    Starts from `patent_counts`, or near its count by length where that merged nearly all
+    arcs of long straight hair, and adds arcs where the curve is too far off, up to `most`.
     """
     if not tolerance > 0:
         raise InputError(f"tolerance of the helices is {tolerance}, expected metres above 0")
@@ -64,7 +70,7 @@ def adaptive_counts(
         error = mean_error(path, fit_arcs(path, counts[open_])) / tolerance
         bad = (error > 1) & (counts[open_] < most)
         open_ = open_[bad]
-        factor = np.clip(error[bad] ** 0.7, 1.15, 3.0)
+        factor = np.clip(error[bad] ** ERROR_POWER, LEAST_GROWTH, MOST_GROWTH)
         counts[open_] = np.minimum(np.ceil(counts[open_] * factor), most).astype(np.int64)
     return counts
 

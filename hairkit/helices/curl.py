@@ -23,7 +23,7 @@ STEP = 0.001
 NOISE = 0.0006
 """Strands are first put on helix arcs within this mean distance, metres, which takes off noise."""
 LONGEST_PITCH, SHORTEST_PITCH = 0.12, 0.006
-"""Metres along the strand of one turn; what is slower belongs to the strand's course."""
+"""Metres along the strand of one turn; slower swings belong to the strand's course."""
 ROOT_PART = 0.03
 """Metres from the root, where curls have not grown in yet, that are left out."""
 FEWEST_TURNS = 1.2
@@ -32,6 +32,16 @@ SMALLEST = 0.0018
 """Metres; swings below this radius are frizz."""
 CLEAR = 0.35
 """Share of the swing's power that the turning frequency must hold."""
+SAME_TURN = 0.03
+"""Change of a turn's length, as a share of it, below which the course is not measured again."""
+MOST_ROUNDS = 4
+"""Times that the course is measured: it is what is slower than a turn, which is found by it."""
+FEWEST_SAMPLES = 8
+"""A swing of fewer samples has no frequency."""
+PADDING = 8
+"""Length of the transform over that of the swing: frequencies between whole numbers of turns."""
+PEAK_BINS = 2 * PADDING
+"""Half width of the spectrum's peak, in bins: a Hann window's main lobe."""
 ONE_SIDED = 0.4
 """Difference of right and left turning power, as a share of both, from which curls have a hand."""
 
@@ -102,15 +112,15 @@ def _curl_of(points: Float64Array) -> tuple[float, float, int]:
     points = points[min(skip, len(points) // 4) :]
     window = LONGEST_PITCH
     found = (0.0, 0.0, 0)
-    for _ in range(4):  # the course is what is slower than a turn, whose length is found by it
-        found, turn = _measured(points, step, window)
-        if not turn or abs(turn - window) < 0.03 * window:
+    for _ in range(MOST_ROUNDS):
+        found, turn = _measure(points, step, window)
+        if not turn or abs(turn - window) < SAME_TURN * window:
             break
         window = turn
     return found
 
 
-def _measured(
+def _measure(
     points: Float64Array, step: float, window: float
 ) -> tuple[tuple[float, float, int], float]:
     """Return radius, pitch, handedness and the strand's length of a turn (0: none).
@@ -124,11 +134,11 @@ def _measured(
     edge = size // 2
     inner = slice(edge, count - edge)
     swing, course = (points - course)[inner], course[inner]
-    if len(swing) < 8:
+    if len(swing) < FEWEST_SAMPLES:
         return (0.0, 0.0, 0), 0.0
     along = np.gradient(course, axis=0)
     pace = np.linalg.norm(along, axis=1)
-    first, second = _untwisted(along / np.maximum(pace, 1e-12)[:, None])
+    first, second = _parallel_frame(along / np.maximum(pace, 1e-12)[:, None])
     place = (swing * first).sum(1) + 1j * (swing * second).sum(1)
     rate, share, side = _turning(place)
     turn = 1 / rate * step if rate > 0 else 0.0
@@ -148,14 +158,14 @@ def _measured(
 
 def _turning(place: np.ndarray[tuple[int], np.dtype[np.complex128]]) -> tuple[float, float, float]:
     """Return cycles a sample, the share of power there, and right minus left power over both."""
-    padded = 8 * len(place)
+    padded = PADDING * len(place)
     window = np.hanning(len(place))
     power = np.abs(np.fft.fft((place - place.mean()) * window, padded)) ** 2
     half = padded // 2
     right, left = power[1:half], power[-1:-half:-1]
     both = right + left
     peak = int(np.argmax(both))
-    near = slice(max(0, peak - 16), peak + 17)
+    near = slice(max(0, peak - PEAK_BINS), peak + PEAK_BINS + 1)
     total = both.sum()
     if total <= 0:
         return 0.0, 0.0, 0.0
@@ -163,7 +173,7 @@ def _turning(place: np.ndarray[tuple[int], np.dtype[np.complex128]]) -> tuple[fl
     return (peak + 1) / padded, float((a + b) / total), float((a - b) / (a + b))
 
 
-def _untwisted(tangents: Float64Array) -> tuple[Float64Array, Float64Array]:
+def _parallel_frame(tangents: Float64Array) -> tuple[Float64Array, Float64Array]:
     """Return two normals (N, 3) that do not turn about the tangents (parallel transport)."""
     first = np.empty_like(tangents)
     spare = np.eye(3)[np.argmin(np.abs(tangents[0]))]

@@ -38,6 +38,8 @@ LIMIT_STEPS = 4
 FARTHEST = 0.5
 """Radians that a chord can ask for in one step."""
 _COINCIDENT = 1e-9
+LEAST_ALONG = 0.3
+"""Least part of a chord along the mean tangent, share of its length, by which slopes are taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +152,7 @@ def _excess(
 
 def _along(chord: Float64Array, m: Float64Array) -> Float64Array:
     """Return the chords' parts along m, kept away from 0, by which slopes are taken."""
-    least = np.maximum(0.3 * np.sqrt(dot(chord, chord)), 1e-12)
+    least = np.maximum(LEAST_ALONG * np.sqrt(dot(chord, chord)), 1e-12)
     result: Float64Array = np.maximum(dot(chord, m), least)
     return result
 

@@ -1,4 +1,4 @@
-"""Shoulders under a head: a lofted torso, so that long hair has something to fall on."""
+"""Shoulders under a head: a lofted torso, on which long hair lies."""
 
 from __future__ import annotations
 
@@ -15,11 +15,14 @@ from hairkit.types.volume import VoxelGrid
 
 _AROUND, _RINGS_DRAWN = 96, 72
 _CELL = 0.006
+"""Edge of the obstacle's cells, metres."""
+_MARGIN = 0.06
+"""Metres around head and torso in which the distance is known; strands farther off are free."""
 
 
 @dataclass(frozen=True)
 class Bust:
-    """A torso: a mesh to draw and a body to bump into."""
+    """A torso: a mesh to draw and an obstacle for hair."""
 
     vertices: Float32Array
     """(V, 3) metres, head frame."""
@@ -66,7 +69,7 @@ class Obstacle:
     def of(cls, head: Head, bust: Bust) -> Obstacle:
         """Return the distance to both bodies on a grid of 6 mm cells."""
         points = np.concatenate([head.vertices, bust.vertices])
-        grid = VoxelGrid.around(points.min(axis=0) - 0.06, points.max(axis=0) + 0.06, _CELL)
+        grid = VoxelGrid.around(points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN, _CELL)
         inside = bust.contains(grid.centres().astype(np.float64))
         outer = distance_transform_edt(~inside) - 0.5
         inner = distance_transform_edt(inside) - 0.5

@@ -1,4 +1,4 @@
-"""Procedural grooms: strands grown from the scalp under combing, gravity and bodies in the way.
+"""Procedural grooms: strands grown from the scalp under combing, gravity and collision.
 
 Meant for tests and for users without photos; `hairkit.synth.photograph` takes pictures of them.
 """
@@ -92,6 +92,33 @@ SKIN_GAP = 0.001
 """Hair keeps this far off the skin."""
 MOST_STRANDS = 200_000
 
+PARTING_REACH = 0.08
+"""Behind the head's origin, the way from combing at the parting to combing from the crown."""
+PARTING_DROP, PARTING_BACK = 0.25, 0.45
+"""Combing down and back at the parting, over that to the side."""
+COMB_JITTER = 0.12
+"""Standard deviation of first directions, of a unit vector."""
+LAYER_PARTS = (0.1, 0.6, 0.3)
+"""Shares of the layer's thickness: least, by the root's height, at random."""
+START_PULL = 0.6
+"""Pull along the first direction at the root, over that of gravity."""
+CUT_SPREAD = 0.008
+"""Standard deviation of the height at which hair is cut."""
+CLUMP_REACH = 0.03
+"""Clumps gather strands by where they are after this length along their first direction."""
+PHASE_SLOPE = np.array([30.0, 20.0, 40.0])
+"""Radians of a wave's phase per metre between roots: neighbouring clumps wave nearly together."""
+CLUMP_PHASE, STRAND_PHASE = 0.9, 0.35
+"""Standard deviations of a wave's phase, radians."""
+PITCH_SPREAD, RADIUS_SPREAD = 0.12, 0.2
+"""Standard deviations between clumps, shares of a wave's pitch and radius."""
+FLYAWAYS, FLYAWAY_FRIZZ = 0.02, 5.0
+"""Share of strands that fly away, and how many times the frizz of others they have."""
+FRIZZ_TURNS = (1.5, 4.0, 9.0)
+"""Waves over a strand whose sum is its frizz."""
+TIP_LIGHTNESS = 1.25
+"""Reflectance at the tips over that at the roots."""
+
 _DOWN = np.array([0, -1, 0], np.float32)
 _LEVEL = np.array([1, 0, 1], np.float32)
 
@@ -116,9 +143,9 @@ def grow(style: StyleName, head: Head, strands: int = 10_000, seed: int = 0) -> 
     paths = _grow_paths(look, roots, start, obstacle, generator)
     paths = _cut(look, paths, generator)
     clump = _clumps(look, roots, start, generator)
-    paths = _gathered(look, paths, clump, generator)
-    paths = _waved(look, paths, clump, generator) + _frizz(look, strands, generator)
-    paths = _kept_off(paths, obstacle)
+    paths = _gather_clumps(look, paths, clump, generator)
+    paths = _wind_waves(look, paths, clump, generator) + _frizz(look, strands, generator)
+    paths = _push_out(paths, obstacle)
     paths[:, 0] = roots.positions
     return Groom(
         Strands(paths.reshape(-1, 3), np.arange(strands + 1) * look.points, root_uv=roots.uv),
@@ -139,13 +166,13 @@ def _start_directions(
     if look.parting is not None:
         from_parting = roots.positions[:, 0] - look.parting
         side = np.where(from_parting >= 0, 1.0, -1.0)
-        behind = np.clip(
-            -roots.positions[:, 2] / 0.08, 0, 1
-        )  # at the back hair falls from the crown
-        parted = np.stack([side, np.full_like(side, -0.25), np.full_like(side, -0.45)], axis=1)
+        # at the back hair falls from the crown
+        behind = np.clip(-roots.positions[:, 2] / PARTING_REACH, 0, 1)
+        drop, back = np.full_like(side, -PARTING_DROP), np.full_like(side, -PARTING_BACK)
+        parted = np.stack([side, drop, back], axis=1)
         away = (1 - behind[:, None]) * parted + behind[:, None] * _unit(away)
     along = away - (away * roots.normals).sum(axis=1, keepdims=True) * roots.normals
-    jitter = 0.12 * generator.standard_normal((len(roots), 3))
+    jitter = COMB_JITTER * generator.standard_normal((len(roots), 3))
     return _unit(look.lift * roots.normals + _unit(along) + jitter)
 
 
@@ -164,13 +191,14 @@ def _grow_paths(
     # hair from higher roots lies over hair from lower ones
     height = roots.positions[:, 1:2]
     rank = (height - height.min()) / max(float(np.ptp(height)), 1e-6)
-    layer = look.layer * (0.1 + 0.6 * rank + 0.3 * generator.random((count, 1)))
+    least, by_height, chance = LAYER_PARTS
+    layer = look.layer * (least + by_height * rank + chance * generator.random((count, 1)))
     paths = np.empty((count, m, 3), np.float32)
     paths[:, 0] = roots.positions
     direction = start
     for i in range(1, m):
         arc = step * i
-        pull = _DOWN + 0.6 * np.exp(-arc / COMB_REACH) * start
+        pull = _DOWN + START_PULL * np.exp(-arc / COMB_REACH) * start
         direction = _unit(direction + step / look.bend * pull)
         ahead = paths[:, i - 1] + step * direction
         distance, outward = obstacle.at(ahead.astype(np.float32))
@@ -186,7 +214,7 @@ def _cut(look: Style, paths: Float32Array, generator: np.random.Generator) -> Fl
     if look.cut is None:
         return paths
     count, m, _ = paths.shape
-    line = look.cut + 0.008 * generator.standard_normal((count, 1))
+    line = look.cut + CUT_SPREAD * generator.standard_normal((count, 1))
     below = paths[..., 1] < line
     last = np.where(below.any(axis=1), np.maximum(below.argmax(axis=1), 2), m - 1)
     place = np.linspace(0, 1, m)[None, :] * last[:, None]
@@ -201,13 +229,13 @@ def _clumps(
     look: Style, roots: Roots, start: Float32Array, generator: np.random.Generator
 ) -> Int64Array:
     """Return (N,) the strand that leads each strand's clump: near, and combed to the same side."""
-    place = roots.positions + 0.03 * start
+    place = roots.positions + CLUMP_REACH * start
     leaders = generator.permutation(len(roots))[: min(look.clumps, len(roots))]
     nearest: Int64Array = leaders[cKDTree(place[leaders]).query(place)[1]]
     return nearest
 
 
-def _gathered(
+def _gather_clumps(
     look: Style, paths: Float32Array, clump: Int64Array, generator: np.random.Generator
 ) -> Float32Array:
     t = np.linspace(0, 1, look.points, dtype=np.float32)[None, :, None]
@@ -215,7 +243,7 @@ def _gathered(
     return paths + strength * t * (paths[clump] - paths)
 
 
-def _waved(
+def _wind_waves(
     look: Style, paths: Float32Array, clump: Int64Array, generator: np.random.Generator
 ) -> Float32Array:
     """Return strands wound about their paths; a clump waves together."""
@@ -225,11 +253,11 @@ def _waved(
     first, second = _frames(paths)
     step = np.linalg.norm(np.diff(paths, axis=1), axis=2)
     arc = np.concatenate([np.zeros((count, 1)), np.cumsum(step, axis=1)], axis=1)
-    # neighbouring clumps wave nearly together, as hair does that lies in layers
-    phase = paths[clump, 0] @ np.array([30.0, 20.0, 40.0])
-    phase += 0.9 * generator.standard_normal(count)[clump] + 0.35 * generator.standard_normal(count)
-    pitch = look.wave_pitch * (1 + 0.12 * generator.standard_normal(count)[clump])
-    radius = look.wave_radius * (1 + 0.2 * generator.standard_normal(count)[clump])
+    phase = paths[clump, 0] @ PHASE_SLOPE
+    phase += CLUMP_PHASE * generator.standard_normal(count)[clump]
+    phase += STRAND_PHASE * generator.standard_normal(count)
+    pitch = look.wave_pitch * (1 + PITCH_SPREAD * generator.standard_normal(count)[clump])
+    radius = look.wave_radius * (1 + RADIUS_SPREAD * generator.standard_normal(count)[clump])
     turn = phase[:, None] + 2 * np.pi * arc / pitch[:, None]
     swell = radius[:, None] * np.minimum(arc / (2 * ROOT_REACH), 1)
     wave = np.cos(turn)[..., None] * first + look.coil * np.sin(turn)[..., None] * second
@@ -249,16 +277,16 @@ def _frames(paths: Float32Array) -> tuple[Float32Array, Float32Array]:
 def _frizz(look: Style, count: int, generator: np.random.Generator) -> Float32Array:
     """Return (N, m, 3) small random offsets, a few strands flying away further."""
     t = np.linspace(0, 1, look.points)[None, :, None]
-    amount = look.frizz * np.where(generator.random((count, 1, 1)) < 0.02, 5.0, 1.0)
+    amount = look.frizz * np.where(generator.random((count, 1, 1)) < FLYAWAYS, FLYAWAY_FRIZZ, 1.0)
     total = np.zeros((count, look.points, 3))
-    for turns in (1.5, 4.0, 9.0):
+    for turns in FRIZZ_TURNS:
         axis = generator.standard_normal((count, 1, 3))
         phase = 2 * np.pi * generator.random((count, 1, 1))
         total += axis * np.sin(phase + 2 * np.pi * turns * t) / turns
     return np.asarray(amount * np.sqrt(t) * total, np.float32)
 
 
-def _kept_off(paths: Float32Array, obstacle: Obstacle) -> Float32Array:
+def _push_out(paths: Float32Array, obstacle: Obstacle) -> Float32Array:
     """Return the strands with every point pushed out of head and torso."""
     points = paths.reshape(-1, 3)
     for _ in range(2):
@@ -269,9 +297,8 @@ def _kept_off(paths: Float32Array, obstacle: Obstacle) -> Float32Array:
 
 def _material(look: Style) -> HairMaterial:
     root = np.array(look.colour)
-    return HairMaterial(
-        root, np.minimum(root * 1.25, 1), curl_radius=look.wave_radius, curl_pitch=look.wave_pitch
-    )
+    tip = np.minimum(root * TIP_LIGHTNESS, 1)
+    return HairMaterial(root, tip, curl_radius=look.wave_radius, curl_pitch=look.wave_pitch)
 
 
 def _unit(vectors: npt.NDArray[np.floating]) -> Float32Array:

@@ -32,7 +32,7 @@ from hairkit.storage import write_bytes, write_npz, write_text
 from hairkit.synth.bust import Bust
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
-from hairkit.types.head import Head
+from hairkit.types.head import LANDMARKS, Head
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 DISTANCE = 0.756
@@ -53,6 +53,28 @@ SENSOR_NOISE = 2.2
 """Standard deviation of a pixel's noise, of 255."""
 CLOTHS = ((0.045, 0.075, 0.16), (0.21, 0.03, 0.04), (0.32, 0.31, 0.29), (0.05, 0.13, 0.09))
 """Linear RGB of the clothes."""
+KEY_AZIMUTHS, KEY_ELEVATION = (-50, 50), 42.0
+"""Where the key light stands, degrees."""
+RIM_AZIMUTHS, RIM_ELEVATION = (110, 250), 48.0
+"""Where the rim light stands, degrees."""
+SKY_COLOUR = (1.1, 1.12, 1.18)
+"""Linear RGB of the light from all around: overcast."""
+LENS_BLUR = 0.45
+"""Standard deviation of the lens' blur, pixels."""
+WALL_GREYS, WALL_TINT = (140, 190), 12
+"""Brightness of the wall behind and its colours' largest deviation, of 255."""
+FURNITURE_PIECES = (5, 10)
+"""Number of rectangles that stand for furniture: at least, and fewer than."""
+FURNITURE_CORNERS, FURNITURE_SIZES = (-0.2, 0.9), (0.1, 0.6)
+"""Their upper left corners and sizes, shares of the picture."""
+FURNITURE_GREYS, FURNITURE_TINT = (70, 200), 40
+"""Their brightness and colours' largest deviation, of 255."""
+WINDOWS, WINDOW_COLOUR = 0.15, np.array([228.0, 234.0, 242.0])
+"""Share of the rectangles that are windows, and their RGB."""
+ROOM_BLUR = 0.028
+"""Standard deviation of the background's blur, share of the picture's width."""
+JPEG_QUALITY, PNG_COMPRESSION = 94, 4
+"""Of OpenCV's encoders: a phone's, and fast."""
 SMALLEST, LARGEST = 64, 8192
 """Pixels along a photo's edge."""
 
@@ -89,7 +111,7 @@ def photograph(
     for name in ("photos", "masks", "truth/orientation"):
         (base / name).mkdir(parents=True, exist_ok=True)
     generator = np.random.default_rng([seed, 7])
-    shoot = _Shoot.prepared(groom, generator)
+    shoot = _Shoot.prepare(groom, generator)
     cameras = _cameras(size, jitter, orthographic, generator)
     stems = [f"{index}_{name}" for index, name in enumerate(TURN)]
     photos = shoot.photos(cameras, generator)
@@ -107,22 +129,22 @@ def photograph(
 
 @dataclass(frozen=True)
 class _Shoot:
-    """What stays the same in all photos."""
+    """Hair, clothes and lights, the same in all photos."""
 
     groom: Groom
     torso: Solid
     lights: Lights
 
     @classmethod
-    def prepared(cls, groom: Groom, generator: np.random.Generator) -> _Shoot:
+    def prepare(cls, groom: Groom, generator: np.random.Generator) -> _Shoot:
         bust = Bust.under(groom.head)
         cloth = np.array(CLOTHS[generator.integers(len(CLOTHS))], np.float32)
         colours = np.broadcast_to(cloth, bust.vertices.shape).copy()
         torso = Solid(bust.vertices, bust.faces, bust.normals, colours, scatter=0.0)
-        key = np.radians([generator.uniform(-50, 50), 42.0])
-        rim = np.radians([generator.uniform(110, 250), 48.0])
+        key = np.radians([generator.uniform(*KEY_AZIMUTHS), KEY_ELEVATION])
+        rim = np.radians([generator.uniform(*RIM_AZIMUTHS), RIM_ELEVATION])
         lights = Lights.studio(_direction(*key), _direction(*rim))
-        return cls(groom, torso, replace(lights, sky_colour=(1.1, 1.12, 1.18)))
+        return cls(groom, torso, replace(lights, sky_colour=SKY_COLOUR))
 
     def photos(self, cameras: list[Camera], generator: np.random.Generator) -> list[UInt8Array]:
         """Return the photos (H, W, 3) RGB: room, person, sensor noise."""
@@ -182,7 +204,7 @@ def _direction(azimuth: float, elevation: float) -> Float64Array:
 
 def _as_sensed(picture: UInt8Array, generator: np.random.Generator) -> UInt8Array:
     """Return a picture (H, W, 3) with a lens' blur and a sensor's noise."""
-    soft = cv2.GaussianBlur(picture, (0, 0), 0.45).astype(np.float32)
+    soft = cv2.GaussianBlur(picture, (0, 0), LENS_BLUR).astype(np.float32)
     noisy = soft + SENSOR_NOISE * generator.standard_normal(soft.shape, dtype=np.float32)
     return np.asarray(np.clip(np.rint(noisy), 0, 255), np.uint8)
 
@@ -190,17 +212,18 @@ def _as_sensed(picture: UInt8Array, generator: np.random.Generator) -> UInt8Arra
 def _cluttered_room(camera: Camera, generator: np.random.Generator) -> UInt8Array:
     """Return an out-of-focus background (H, W, 3): a wall, furniture, now and then a window."""
     size = np.array([camera.width, camera.height])
-    wall = generator.uniform(140, 190) + generator.uniform(-12, 12, 3)
+    wall = generator.uniform(*WALL_GREYS) + generator.uniform(-WALL_TINT, WALL_TINT, 3)
     room = np.broadcast_to(wall, (camera.height, camera.width, 3)).astype(np.float32).copy()
-    for _ in range(generator.integers(5, 10)):
-        corner = generator.uniform(-0.2, 0.9, 2) * size
-        other = corner + generator.uniform(0.1, 0.6, 2) * size
-        colour = generator.uniform(70, 200) + generator.uniform(-40, 40, 3)
-        if generator.random() < 0.15:
-            colour = np.array([228.0, 234.0, 242.0])
+    for _ in range(generator.integers(*FURNITURE_PIECES)):
+        corner = generator.uniform(*FURNITURE_CORNERS, 2) * size
+        other = corner + generator.uniform(*FURNITURE_SIZES, 2) * size
+        grey, tint = generator.uniform(*FURNITURE_GREYS), FURNITURE_TINT
+        colour = grey + generator.uniform(-tint, tint, 3)
+        if generator.random() < WINDOWS:
+            colour = WINDOW_COLOUR
         first, second = np.rint(corner).astype(int).tolist(), np.rint(other).astype(int).tolist()
         cv2.rectangle(room, first, second, colour.tolist(), cv2.FILLED)
-    blurred = cv2.GaussianBlur(room, (0, 0), camera.width * 0.028)
+    blurred = cv2.GaussianBlur(room, (0, 0), camera.width * ROOM_BLUR)
     return np.clip(blurred, 0, 255).astype(np.uint8)
 
 
@@ -217,7 +240,7 @@ def _write_landmarks(
     points = head.vertices[head.landmark_vertices]
     views = {}
     for index in LANDMARK_VIEWS:
-        noise = LANDMARK_NOISE * cameras[index].width * generator.standard_normal((68, 2))
+        noise = LANDMARK_NOISE * cameras[index].width * generator.standard_normal((LANDMARKS, 2))
         views[stems[index]] = np.round(cameras[index].project(points) + noise, 2).tolist()
     document = {"scheme": "68 points, iBUG/Multi-PIE order", "views": views}
     write_text(base / "landmarks.json", json.dumps(document) + "\n")
@@ -260,11 +283,11 @@ def _write_truth(folder: Path, groom: Groom, cameras: list[Camera], seen: UInt8A
 
 
 def _jpeg(picture: UInt8Array) -> bytes:
-    return _encoded(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 94])
+    return _encoded(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
 
 
 def _png(picture: UInt8Array) -> bytes:
-    return _encoded(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 4])
+    return _encoded(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
 
 
 def _encoded(kind: str, picture: UInt8Array, settings: list[int]) -> bytes:

@@ -11,6 +11,11 @@ from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.preview import Previewed, draw_turn
 
+LANDMARKS = 68
+"""Landmarks of a face, in the order of iBUG (Sagonas et al. 2013)."""
+JAW_LANDMARKS = 17
+"""The first landmarks trace the jaw; detectors place them less surely."""
+
 
 @dataclass(frozen=True, eq=False)
 class Capsules(Stored):
@@ -72,7 +77,9 @@ class Head(Previewed, Stored):
             self, "joints", frozen_array(self.joints, np.float32, (3, 3), "head joints")
         )
         if self.landmark_vertices is not None:
-            index = frozen_array(self.landmark_vertices, np.int32, (68,), "head landmark_vertices")
+            index = frozen_array(
+                self.landmark_vertices, np.int32, (LANDMARKS,), "head landmark_vertices"
+            )
             object.__setattr__(self, "landmark_vertices", index)
 
     def __repr__(self) -> str:

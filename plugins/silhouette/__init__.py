@@ -26,9 +26,9 @@ from hairkit.cameras.turntable import LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPE
 from hairkit.errors import InputError
 from hairkit.imaging.masked_filters import picture_scale
 from hairkit.options import option
+from hairkit.types.head import LANDMARKS
 
 from .landmark_equations import (
-    COUNT,
     CameraArrays,
     LandmarkEquations,
     LandmarkFit,
@@ -36,7 +36,7 @@ from .landmark_equations import (
     shape_precision,
     soft_l1_weight,
 )
-from .landmark_transfer import PatchSettings, carry_landmarks
+from .landmark_transfer import PatchSettings, transfer_landmarks
 
 USUAL_DISTANCE = 0.7
 """Distance of head portraits, metres."""
@@ -83,10 +83,13 @@ class Options:
     model: str = option(
         "auto",
         choices=("auto", "perspective", "orthographic"),
-        doc="Kind of cameras; auto takes what fits better.",
+        doc="Kind of cameras; auto takes the kind that fits better.",
     )
     carries: int = option(
-        2, low=0, high=9, doc="Rounds that carry landmarks to neighbours by patches of skin."
+        2,
+        low=0,
+        high=9,
+        doc="Rounds that transfer landmarks to neighbouring views by patches of skin.",
     )
     iterations: int = option(20, low=1, high=100, doc="Most rounds of Gauss-Newton.")
 
@@ -105,14 +108,14 @@ def estimate_scene(
         fits.append(_solve(problem, problem.start(True), min(options.iterations, TRIAL)))
     best = min(fits, key=lambda fit: fit.cost)
     for _ in range(options.carries if problem.landmarks is not None else 0):
-        best = _solve(problem.with_carried(capture, best), best, options.iterations)
+        best = _solve(problem.with_transferred(capture, best), best, options.iterations)
     names = tuple(view.name for view in capture.views)
     return Scene(names, problem.turn.cameras(best.vector), head, problem.residual_px(best))
 
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Where the solution stands."""
+    """A solution."""
 
     vector: Float64Array
     """Numbers of the turn."""
@@ -127,7 +130,7 @@ class _Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Round:
-    """The problem made linear at one place."""
+    """The problem linearised at one vector."""
 
     cost: float
     normal: Float64Array
@@ -209,13 +212,12 @@ class _Problem:
         focal = None if None in focals else focals[0]
         return cls(turn, outlines, head, landmarks, noise, spread, focal)
 
-    def with_carried(self, capture: Capture, fit: _Fit) -> _Problem:
-        """Return the problem with the landmarks that patches carry to other views, given a
-        solution."""
+    def with_transferred(self, capture: Capture, fit: _Fit) -> _Problem:
+        """Return the problem with landmarks transferred to other views by a solution."""
         assert self.landmarks is not None
         places = self.landmarks.landmarks + fit.offset
         cameras = self.turn.cameras(fit.vector)
-        more = carry_landmarks(capture, cameras, self.head, places, PatchSettings())
+        more = transfer_landmarks(capture, cameras, self.head, places, PatchSettings())
         sights = self.landmarks.sights.joined(more)
         return replace(self, landmarks=replace(self.landmarks, sights=sights))
 
@@ -233,7 +235,7 @@ class _Problem:
             vector[PERSPECTIVE] = max(magnification / self.focal, MIN_PERSPECTIVE)
         if flat:
             vector[PERSPECTIVE] = MIN_PERSPECTIVE
-        return _Fit(vector, np.zeros((COUNT, 3)), flat, vector)
+        return _Fit(vector, np.zeros((LANDMARKS, 3)), flat, vector)
 
     def cameras(self, vector: Float64Array) -> CameraArrays:
         """Return the cameras as arrays."""

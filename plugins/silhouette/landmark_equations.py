@@ -14,17 +14,18 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.types.capture import Capture
+from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 from hairkit.types.mask import HAIR, Mask
 
-COUNT = 68
-JAW = 17
-"""The first landmarks trace the jaw, which detectors place less surely."""
+JAW_NOISE, COVERED_NOISE = 2.0, 3.0
+"""Times the noise of landmarks of the jaw, and of those under hair: detectors guess them."""
 MIDLINE = np.array([27, 28, 29, 30, 33, 51, 57, 8])
 """Nose, lips and chin: they lie on the outline of a view from the side."""
 AFFINE_SPREAD, SMOOTH_SPREAD, SMOOTH_LENGTH = 0.004, 0.004, 0.04
 PLACE_SPREAD, LOOSE_SPREAD = 0.004, 0.0015
-"""How heads differ, metres: stretch per 0.1 m, smooth bends and their reach, place of the face,
-single points."""
+"""How heads differ, metres: stretch over `AFFINE_LENGTH`, smooth bends and their reach, place of
+the face, single points."""
+AFFINE_LENGTH = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +43,7 @@ class Sights:
 
     @classmethod
     def of(cls, capture: Capture, masks: tuple[Mask, ...], noise: float) -> Sights:
-        """Collect the landmarks; those of the jaw, or under hair, are only guesses of the
-        detector."""
+        """Return the landmarks of all views; `noise` is in pixels."""
         rows = []
         for index, (view, mask) in enumerate(zip(capture.views, masks, strict=True)):
             if view.landmarks is None:
@@ -51,7 +51,9 @@ class Sights:
             for point, (x, y) in enumerate(view.landmarks):
                 inside = 0 <= x < view.width and 0 <= y < view.height
                 covered = inside and mask.labels[int(y), int(x)] == HAIR
-                trust = (2.0 if point < JAW else 1.0) * (3.0 if covered else 1.0)
+                trust = (JAW_NOISE if point < JAW_LANDMARKS else 1.0) * (
+                    COVERED_NOISE if covered else 1.0
+                )
                 rows.append((index, point, x, y, noise * trust))
         return cls.of_rows(rows)
 
@@ -77,8 +79,7 @@ class Sights:
 
 @dataclass(frozen=True, eq=False)
 class LandmarkEquations:
-    """What landmarks say about P numbers of the cameras, after the shape of the head is
-    marginalised."""
+    """Normal equations of landmarks for P camera numbers, the head's shape marginalised."""
 
     normal: Float64Array
     """(P, P)."""
@@ -90,10 +91,9 @@ class LandmarkEquations:
     _shape: Float64Array
 
     def offsets(self, move: Float64Array) -> Float64Array:
-        """Return the landmarks' offsets (68, 3) from the head's that go best with a step of the
-        cameras, metres."""
+        """Return the best landmark offsets (68, 3) after a step of the cameras, metres."""
         best = np.linalg.solve(self._shape, self._pull - self._coupling @ move)
-        return np.asarray(best.reshape(COUNT, 3), np.float64)
+        return np.asarray(best.reshape(LANDMARKS, 3), np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,8 +117,7 @@ class LandmarkFit:
     def project(
         self, point: Int64Array, view: Int64Array, offset: Float64Array, cameras: CameraArrays
     ) -> tuple[Float64Array, Float64Array, Float64Array]:
-        """Return pixels (N, 2), their slopes by camera motion (N, 2, 7) and by the point (N, 2,
-        3)."""
+        """Return pixels (N, 2), slopes by camera motion (N, 2, 7) and by the point (N, 2, 3)."""
         rotation, translation, focal, centre = cameras
         place = (self.landmarks + offset)[point]
         local = np.einsum("nij,nj->ni", rotation[view], place) + translation[view]
@@ -142,8 +141,7 @@ class LandmarkFit:
     def equations(
         self, offset: Float64Array, cameras: CameraArrays, tangents: Float64Array
     ) -> LandmarkEquations:
-        """Return the cameras' normal equations; `tangents` (V, 7, P) says how cameras follow the
-        unknowns."""
+        """Return the cameras' normal equations, by `tangents` (V, 7, P) of cameras by unknowns."""
         sights = self.sights
         pixels, by_camera, by_point = self.project(sights.point, sights.view, offset, cameras)
         residual = (sights.pixel - pixels) / sights.noise[:, None]
@@ -164,12 +162,11 @@ class LandmarkFit:
     def _outline_rows(
         self, offset: Float64Array, cameras: CameraArrays, tangents: Float64Array
     ) -> tuple[Float64Array, Float64Array, Float64Array, Int64Array]:
-        """Return rows that bring the midline of the face on to the outline of views from the
-        side."""
+        """Return rows that bring the face's midline on to the outline of views from the side."""
         view = np.repeat(self.profiles, len(MIDLINE))
         point = np.tile(MIDLINE, len(self.profiles))
         pixels, by_camera, by_point = self.project(point, view, offset, cameras)
-        value, slope = _sampled(self.fields, self.scale, view, pixels)
+        value, slope = _sample(self.fields, self.scale, view, pixels)
         residual = -value / self.profile_noise
         weight = np.sqrt(soft_l1_weight(residual)) / self.profile_noise
         weight = np.where(np.abs(residual) < GATE, weight, 0.0)
@@ -189,16 +186,16 @@ class LandmarkFit:
         """Eliminate the offsets: the Schur complement of their block."""
         unknowns = rows.shape[1]
         residual = residual + (by_shape * offset[point]).sum(1)
-        blocks = np.zeros((COUNT, 3, 3))
+        blocks = np.zeros((LANDMARKS, 3, 3))
         np.add.at(blocks, point, by_shape[:, :, None] * by_shape[:, None, :])
-        coupling = np.zeros((COUNT, 3, unknowns))
+        coupling = np.zeros((LANDMARKS, 3, unknowns))
         np.add.at(coupling, point, by_shape[:, :, None] * rows[:, None, :])
-        pull = np.zeros((COUNT, 3))
+        pull = np.zeros((LANDMARKS, 3))
         np.add.at(pull, point, by_shape * residual[:, None])
         shape = self.precision.copy()
-        diagonal = np.arange(COUNT)
-        shape.reshape(COUNT, 3, COUNT, 3)[diagonal, :, diagonal] += blocks
-        flat = coupling.reshape(3 * COUNT, unknowns)
+        diagonal = np.arange(LANDMARKS)
+        shape.reshape(LANDMARKS, 3, LANDMARKS, 3)[diagonal, :, diagonal] += blocks
+        flat = coupling.reshape(3 * LANDMARKS, unknowns)
         solved = np.linalg.solve(shape, np.column_stack([flat, pull.ravel()]))
         normal = rows.T @ rows - flat.T @ solved[:, :-1]
         right = rows.T @ residual - flat.T @ solved[:, -1]
@@ -210,13 +207,16 @@ CameraArrays = tuple[Float64Array, Float64Array, Float64Array, Float64Array]
 """Rotations (V, 3, 3), translations (V, 3), focal lengths (V,) and principal points (V, 2)."""
 GATE = 8.0
 """Outlines farther off than this many spreads are of something else."""
+SOFT_L1_BEND = 2.0
+"""Residual, in standard deviations, where the loss turns from squared to linear."""
+OUTSIDE = 1e6
+"""Signed distance outside of the picture, pixels."""
 
 
 def shape_precision(landmarks: Float64Array) -> Float64Array:
-    """Return (204, 204), per metre squared: the inverse covariance of people's landmarks about
-    these."""
+    """Return (204, 204), 1 / m^2: the inverse covariance of people's landmarks about these."""
     squared = ((landmarks[:, None] - landmarks[None]) ** 2).sum(2)
-    kernel = AFFINE_SPREAD**2 * (landmarks @ landmarks.T) / 0.1**2
+    kernel = AFFINE_SPREAD**2 * (landmarks @ landmarks.T) / AFFINE_LENGTH**2
     kernel += SMOOTH_SPREAD**2 * np.exp(-squared / (2 * SMOOTH_LENGTH**2))
     kernel += PLACE_SPREAD**2 + LOOSE_SPREAD**2 * np.eye(len(landmarks))
     precision: Float64Array = np.kron(np.linalg.inv(kernel), np.eye(3))
@@ -224,16 +224,18 @@ def shape_precision(landmarks: Float64Array) -> Float64Array:
 
 
 def soft_l1_weight(scaled: Float64Array) -> Float64Array:
-    """Return the weights of soft-L1 for residuals over their noise, with the bend at 2."""
-    weights: Float64Array = 1 / np.sqrt(1 + (scaled / 2) ** 2)
+    """Return the weights of soft-L1 for residuals over their noise."""
+    weights: Float64Array = 1 / np.sqrt(1 + (scaled / SOFT_L1_BEND) ** 2)
     return weights
 
 
-def _sampled(
+def _sample(
     fields: Float32Array, scale: float, view: Int64Array, pixels: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
-    """Return signed distances (N,) and their slopes by the pixel (N, 2); far outside where off the
-    picture."""
+    """Return signed distances (N,) and their slopes by the pixel (N, 2).
+
+    `OUTSIDE`, without slope, off the picture.
+    """
     height, width = fields.shape[1:]
     place = pixels * scale - 0.5
     below = place < np.array([width - 1, height - 1])
@@ -245,4 +247,4 @@ def _sampled(
     c, d = fields[view, i + 1, j], fields[view, i + 1, j + 1]
     value = (a * (1 - x) + b * x) * (1 - y) + (c * (1 - x) + d * x) * y
     slope = np.stack([(b - a) * (1 - y) + (d - c) * y, (c - a) * (1 - x) + (d - b) * x], axis=1)
-    return np.where(inside, value, 1e6), slope * scale * inside[:, None]
+    return np.where(inside, value, OUTSIDE), slope * scale * inside[:, None]

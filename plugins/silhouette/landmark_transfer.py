@@ -1,5 +1,4 @@
-"""Carrying landmarks from views that have them to neighbours that have none, by matching small
-patches of skin.
+"""Transfer landmarks to neighbouring views by template matching (normalised cross-correlation).
 
 A patch around a landmark is drawn as the neighbour would see it (through the plane that touches
 the head there) and looked up in the neighbour near the expected place by normalised correlation.
@@ -17,12 +16,16 @@ from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.imaging.masked_filters import picture_scale
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
-from hairkit.types.head import Head
+from hairkit.types.head import JAW_LANDMARKS, LANDMARKS, Head
 
-from .landmark_equations import COUNT, JAW, Sights
+from .landmark_equations import Sights
 
 FACING = 0.3
 """Cosine below which a landmark turns too far away from a camera to be matched."""
+NEIGHBOUR = 0.5
+"""Least cosine between the axes of views that are matched: 60 degrees."""
+SMALLEST_PATCH = 3
+"""Least half edge of a patch, and least reach of the search, pixels."""
 
 
 @dataclass(frozen=True)
@@ -42,15 +45,14 @@ class PatchSettings:
     """Standard deviation of a match."""
 
 
-def carry_landmarks(
+def transfer_landmarks(
     capture: Capture,
     cameras: tuple[Camera, ...],
     head: Head,
     landmarks: Float64Array,
     settings: PatchSettings,
 ) -> Sights:
-    """Return landmarks found in views without, from the nearest view that has them (at most 60
-    degrees away).
+    """Return landmarks found in views without, from the nearest view that has them.
 
     `landmarks` (68, 3) are their places as far as known; `head` gives the normals there.
     """
@@ -61,10 +63,10 @@ def carry_landmarks(
         pixel = picture_scale(capture.views[0].height)
         for index in range(len(cameras)):
             source = max(seen, key=lambda other: _facing(cameras, other, index))
-            if index in seen or _facing(cameras, source, index) < 0.5:
+            if index in seen or _facing(cameras, source, index) < NEIGHBOUR:
                 continue
             pair = _Pair(capture, cameras, source, index, settings, pixel)
-            for point in range(JAW, COUNT):
+            for point in range(JAW_LANDMARKS, LANDMARKS):
                 found = pair.find(point, landmarks[point], normals[point])
                 if found is not None:
                     rows.append((index, point, found[0], found[1], settings.noise * pixel))
@@ -91,8 +93,8 @@ class _Pair:
         self.landmarks = capture.views[source].landmarks
         self.from_image = _smooth_grey(capture.views[source].image, settings.blur * pixel)
         self.to_image = _smooth_grey(capture.views[target].image, settings.blur * pixel)
-        self.half = max(3, round(settings.half * pixel))
-        self.search = max(3, round(settings.search * pixel))
+        self.half = max(SMALLEST_PATCH, round(settings.half * pixel))
+        self.search = max(SMALLEST_PATCH, round(settings.search * pixel))
         self.settings = settings
 
     def find(
@@ -109,7 +111,7 @@ class _Pair:
         height, width = self.to_image.shape
         if left < 0 or top < 0 or left + edge > width or top + edge > height:
             return None
-        patch = self._drawn(point, place, normal)
+        patch = self._warp_patch(point, place, normal)
         window = self.to_image[top : top + edge, left : left + edge]
         score = cv2.matchTemplate(window, patch, cv2.TM_CCOEFF_NORMED)
         _, best, _, (x, y) = cv2.minMaxLoc(score)
@@ -118,7 +120,7 @@ class _Pair:
             return None
         return float(middle[0] + x - self.search), float(middle[1] + y - self.search)
 
-    def _drawn(self, point: int, place: Float64Array, normal: Float64Array) -> Float32Array:
+    def _warp_patch(self, point: int, place: Float64Array, normal: Float64Array) -> Float32Array:
         """Return the landmark's patch as the neighbour sees it, in its pixels."""
         assert self.landmarks is not None
         exact = self.target.project(place)

@@ -11,6 +11,10 @@ from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled
 
 _TERMS = 10
+"""Terms of the series below x = 1: the next is below rounding."""
+_SMALL, _SMALL_TERMS = 0.02, 5
+_MIDDLE, _MIDDLE_TERMS = 0.25, 7
+"""Squared angles below which fewer terms reach rounding."""
 _SINE, _VERSINE, _REST = (
     np.array([(-1) ** k / math.factorial(2 * k + order) for k in range(_TERMS)])
     for order in (1, 2, 3)
@@ -33,7 +37,7 @@ def _sum(series: npt.NDArray[np.float64], x: float, terms: int) -> float:
 def coefficients(x: float) -> tuple[float, float, float, float, float]:
     """Return sin(a)/a, (1 - cos a)/a^2, (a - sin a)/a^3 and slopes of the last two, x = a^2."""
     if x < 1.0:
-        terms = 5 if x < 0.02 else 7 if x < 0.25 else _TERMS - 1  # enough for rounding
+        terms = _SMALL_TERMS if x < _SMALL else _MIDDLE_TERMS if x < _MIDDLE else _TERMS - 1
         return (
             _sum(_SINE, x, terms + 1),
             _sum(_VERSINE, x, terms),

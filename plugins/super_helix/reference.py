@@ -18,6 +18,9 @@ from .kinematics import Placed, place
 from .rods import NODES, Rods
 from .state import CLOSE, FAR, Loads, Motion, Step
 
+_MOST_ROUNDS = 40
+"""Conjugate gradient steps per unknown: without rounding one would do."""
+
 
 def mass_matrix(rod: Rods, placed: Placed) -> Float64Array:
     """Return M (3n, 3n), kilograms square metres: 1/2 q' M q' is the kinetic energy."""
@@ -73,7 +76,9 @@ def change(matrix: Float64Array, gradient: Float64Array) -> Float64Array:
     """Return dq (3n,) by conjugate gradients, preconditioned by the diagonal."""
     scale = 1 / np.diag(matrix)
     precondition = LinearOperator(matrix.shape, lambda v: scale * v)
-    found, _ = cg(matrix, -gradient, rtol=1e-12, maxiter=40 * len(gradient), M=precondition)
+    found, _ = cg(
+        matrix, -gradient, rtol=1e-12, maxiter=_MOST_ROUNDS * len(gradient), M=precondition
+    )
     return np.asarray(found)
 
 

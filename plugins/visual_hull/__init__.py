@@ -1,12 +1,12 @@
 """Visual hull of the hair: votes of silhouettes, or a carve that cuts out head and body too.
 
 `votes` is the thesis's hull (5.2, after Laurentini 1994): a cell is hair when at least `min_views`
-views see hair there, then erosions and dilations. `labels` uses all that a mask says: a view
-empties a cell where it sees background, and where it sees the person *behind* the cell; a surface
-in front of the cell says nothing. Where the views show clothes, a torso is fitted to their outlines
-and is taken out as the head is. Hair that a view shows only as wisps does not fill a volume:
-`dense` is carved with opened masks, `loose` with the masks as they are. Cells that are empty in at
-most `forgive` views are kept, which survives camera errors.
+views see hair there, then erosions and dilations. `labels` uses all labels of the masks: a view
+votes a cell empty where it sees background, and where it sees the person *behind* the cell; it has
+no vote behind a surface. Where the views show clothes, a torso is fitted to their outlines and
+removed, as the head is. Hair that a view shows only as wisps does not fill a volume: `dense` is
+carved with opened masks, `loose` with the masks as they are. Cells that are empty in at most
+`forgive` views are kept, which survives camera errors.
 """
 
 from __future__ import annotations

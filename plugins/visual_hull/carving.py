@@ -1,4 +1,4 @@
-"""Votes of views on cells: each says hair, empty or nothing, and the hull keeps what most allow."""
+"""Votes of views on cells: hair, empty or none; the hull keeps cells by a rule on their numbers."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from hairkit.cameras.projection_kernels import PackedCamera, project
 from hairkit.parallel import compiled, parallel_for
 
 EMPTY, PERSON, HAIR = 0, 1, 2
-"""Labels of pixels; as a vote, PERSON says nothing."""
+"""Labels of pixels; as votes, PERSON means none."""
 
 
 class LabelledView(NamedTuple):
-    """What one view says about cells."""
+    """The pictures by which a view votes."""
 
     camera: PackedCamera
     labels: UInt8Array
@@ -65,7 +65,7 @@ def carve(
 ) -> BoolArray:
     """Return the candidate cells (X, Y, Z) that the views' votes keep.
 
-    Beyond a picture only cells `near` (X, Y, Z) the person may hold hair.
+    Outside of a picture only cells `near` (X, Y, Z) the person may hold hair.
     """
     cells = Cells(grid.origin, float(grid.spacing), candidates, near)
     hair, empty = (np.zeros(grid.shape, np.int16) for _ in range(2))
@@ -107,7 +107,7 @@ def add_votes(
 
 @compiled
 def _vote(view: LabelledView, u: float, v: float, depth: float, margin: float, near: bool) -> int:
-    """Return a view's vote on a cell at pixel u, v: EMPTY, HAIR or, saying nothing, PERSON.
+    """Return a view's vote on a cell at pixel u, v: EMPTY, HAIR, or PERSON for no vote.
 
     Where the view sees the person, a cell farther than `margin` in front of the surface is empty.
     """

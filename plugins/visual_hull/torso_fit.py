@@ -48,6 +48,14 @@ USUAL = {
 RATIOS = ("breadth", "depth", "slope")
 PULL = 0.002
 """Metres of misfit of every outline point that weigh as much as one standard deviation."""
+SMALLEST_WIDTH = 8
+"""Least columns of the pictures in which outlines are looked up."""
+OUTLINE_SMOOTHING = 1.0
+"""Gaussian over masks and misfits, pixels of those pictures."""
+FAR = 1e4
+"""Distance to an outline where a picture has none, pixels."""
+DIFFERENCE, TOLERANCE, MOST_STEPS = 1e-3, 1e-4, 40
+"""Of the solver: relative step of derivatives, relative change at which it stops, evaluations."""
 FEWEST_VIEWS, LEAST_CLOTHES = 3, 0.01
 """Views that must show clothes below the head, and on which share of their pixels."""
 COVERED, STRAY = 0.75, 0.1
@@ -79,10 +87,10 @@ def fit_torso(head: Head, cameras: Sequence[Camera], masks: Sequence[Mask]) -> T
         np.zeros(len(USUAL)),
         loss="soft_l1",
         f_scale=SOFT,
-        diff_step=1e-3,
-        xtol=1e-4,
-        ftol=1e-4,
-        max_nfev=40,
+        diff_step=DIFFERENCE,
+        xtol=TOLERANCE,
+        ftol=TOLERANCE,
+        max_nfev=MOST_STEPS,
     )
     found = _torso(usual, solved.x)
     return found if _agrees(found, views) else None
@@ -104,7 +112,7 @@ class _View:
     def of(cls, head: Head, usual: Torso, camera: Camera, mask: Mask) -> _View | None:
         """Return the view, or None where it shows no clothes."""
         height, width = mask.labels.shape
-        size = (max(round(width * FIELD_HEIGHT / height), 8), FIELD_HEIGHT)
+        size = (max(round(width * FIELD_HEIGHT / height), SMALLEST_WIDTH), FIELD_HEIGHT)
         camera = camera.resized(*size)
         hair, person = (_share(mask, label, size) for label in (HAIR, PERSON))
         clothes = (person > 0.5) & ~np.isfinite(head_depth(head, camera))
@@ -127,28 +135,30 @@ def _share(mask: Mask, label: int, size: tuple[int, int]) -> Float32Array:
 def _misfit_field(hair: Float32Array, person: Float32Array, thickness: float) -> Float32Array:
     """Return pixels (H, W) by which a body's outline misses the silhouette's, outside positive.
 
-    An outline that is hair hides how far in the body ends: only `thickness` is asked for.
+    Behind an outline of hair the body may end anywhere from `thickness` inwards.
     """
-    hairs, whole = (cv2.GaussianBlur(part, (0, 0), 1.0) for part in (hair, hair + person))
+    hairs, whole = (
+        cv2.GaussianBlur(part, (0, 0), OUTLINE_SMOOTHING) for part in (hair, hair + person)
+    )
     within = whole > 0.5
     rim = within & (cv2.dilate((~within).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
     hairy = hairs > 0.5 * whole
-    to_hair, to_body = _way_to(rim & hairy), _way_to(rim & ~hairy)
+    to_hair, to_body = _distance_to(rim & hairy), _distance_to(rim & ~hairy)
     if not rim.any():
         return np.zeros(hair.shape, np.float32)
     by_hair = to_hair < to_body
     inner = np.where(by_hair, np.maximum(thickness - to_hair, 0), -to_body)
     outer = np.minimum(to_hair, to_body) + np.where(by_hair, thickness, 0)
     field = np.where(within, inner, outer).astype(np.float32)
-    return np.asarray(cv2.GaussianBlur(field, (0, 0), 1.0), np.float32)
+    return np.asarray(cv2.GaussianBlur(field, (0, 0), OUTLINE_SMOOTHING), np.float32)
 
 
-def _way_to(pixels: BoolArray) -> Float32Array:
+def _distance_to(pixels: BoolArray) -> Float32Array:
     """Return the distance (H, W) to the nearest of the pixels, very far where there is none."""
     if not pixels.any():
-        return np.full(pixels.shape, 1e4, np.float32)
+        return np.full(pixels.shape, FAR, np.float32)
     others = (~pixels).astype(np.uint8)
-    return np.asarray(cv2.distanceTransform(others, cv2.DIST_L2, 5), np.float32)
+    return np.asarray(cv2.distanceTransform(others, cv2.DIST_L2, cv2.DIST_MASK_5), np.float32)
 
 
 def _torso(usual: Torso, numbers: Float64Array) -> Torso:
@@ -165,7 +175,7 @@ def _misfits(torso: Torso, numbers: Float64Array, views: Sequence[_View]) -> Flo
     surface = torso.surface(HEIGHTS, AROUND)
     around = np.roll(surface, -1, axis=1) - np.roll(surface, 1, axis=1)
     normal = np.cross(np.gradient(surface, axis=0), around)
-    parts = [_looked_up(view, *_outline(surface, normal, view.camera)) for view in views]
+    parts = [_look_up(view, *_outline(surface, normal, view.camera)) for view in views]
     weight = PULL * np.sqrt(sum(len(part) for part in parts))
     return np.concatenate([*parts, weight * numbers])
 
@@ -173,8 +183,7 @@ def _misfits(torso: Torso, numbers: Float64Array, views: Sequence[_View]) -> Flo
 def _outline(
     surface: Float64Array, normal: Float64Array, camera: Camera
 ) -> tuple[Float64Array, BoolArray]:
-    """Return points (2 R, 3) where the sections (R, A, 3) turn away on either side, and which of
-    them there are (2 R,)."""
+    """Return points (2 R, 3) where the sections (R, A, 3) turn away, and which exist (2 R,)."""
     facing = (normal * camera.view_direction(surface)).sum(axis=-1)
     after = np.roll(facing, -1, axis=1)
     rows = np.arange(len(surface))
@@ -189,7 +198,7 @@ def _outline(
     return np.concatenate(points), np.concatenate(there)
 
 
-def _looked_up(view: _View, points: Float64Array, there: BoolArray) -> Float64Array:
+def _look_up(view: _View, points: Float64Array, there: BoolArray) -> Float64Array:
     """Return the misfits (N,) of outline points (N, 3), 0 beyond the picture's edge."""
     pixels = np.nan_to_num(view.camera.project(points), nan=-1.0)
     size = np.array([view.camera.width, view.camera.height])
@@ -199,7 +208,7 @@ def _looked_up(view: _View, points: Float64Array, there: BoolArray) -> Float64Ar
 
 
 def _agrees(torso: Torso, views: Sequence[_View]) -> bool:
-    """Tell whether the torso covers the clothes and little else."""
+    """Return whether the torso covers the clothes and little else."""
     vertices, faces = torso.mesh()
     clothes = covered = shown = stray = 0
     for view in views:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hairkit.field.growth_prior import gradient
-from hairkit.grooming.head_collision import ROUNDS, kept_outside
+from hairkit.grooming.head_collision import ROUNDS, push_out_of_head
 from hairkit.testing import shell_hull
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
@@ -32,7 +32,7 @@ def test_the_kernel_does_what_its_twin_does(seed: int, clearance: float) -> None
     """Random strands through the ball, some points outside of the grid too."""
     points = np.random.default_rng(seed).uniform(-0.17, 0.17, (40, 3)).astype(np.float32)
     strands = Strands(points, np.arange(9) * 5)
-    found = kept_outside(strands, HULL, clearance)
+    found = push_out_of_head(strands, HULL, clearance)
     np.testing.assert_allclose(found.points, twin(strands, HULL, clearance), atol=2e-6)
 
 
@@ -40,7 +40,7 @@ def test_points_keep_the_clearance_and_roots_stay(rng: np.random.Generator) -> N
     """Every point but the first of each strand ends outside; free points do not move."""
     points = rng.uniform(-0.11, 0.11, (600, 3)).astype(np.float32)
     strands = Strands(points, np.arange(121) * 5)
-    found = kept_outside(strands, HULL, 0.002)
+    found = push_out_of_head(strands, HULL, 0.002)
     np.testing.assert_array_equal(found.roots, strands.roots)
     rest = np.setdiff1d(np.arange(600), strands.offsets[:-1])
     away = np.linalg.norm(found.points[rest], axis=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from hairkit_plugins.silhouette.landmark_transfer import PatchSettings, carry_landmarks
+from hairkit_plugins.silhouette.landmark_transfer import PatchSettings, transfer_landmarks
 from turntable import turntable
 
 from hairkit import Camera, Capture, Head, View
@@ -52,7 +52,7 @@ def test_landmarks_are_found_where_the_neighbour_sees_them(error_deg: float) -> 
     """Matches lie within a few pixels of the truth although the neighbour's camera is off."""
     capture, cameras, places = _pair(landmarks=True)
     believed = (cameras[0], _turned(cameras[1], error_deg), cameras[2])
-    found = carry_landmarks(capture, believed, default_head(), places, PatchSettings())
+    found = transfer_landmarks(capture, believed, default_head(), places, PatchSettings())
     assert len(found) >= 2
     assert set(found.view) == {1}
     assert (found.point >= 17).all()
@@ -69,12 +69,12 @@ def _turned(camera: Camera, degrees: float) -> Camera:
 def test_nothing_is_carried_without_landmarks() -> None:
     """A capture without landmarks gives none."""
     capture, cameras, places = _pair(landmarks=False)
-    assert not len(carry_landmarks(capture, cameras, default_head(), places, PatchSettings()))
+    assert not len(transfer_landmarks(capture, cameras, default_head(), places, PatchSettings()))
 
 
 def test_pictures_without_texture_match_nothing(rng: np.random.Generator) -> None:
     """Uniform pictures have no clear peak, so no landmark is made up."""
     table = turntable(rng)
     places = table.head.vertices[table.head.landmark_vertices].astype(np.float64)
-    found = carry_landmarks(table.capture, table.cameras, table.head, places, PatchSettings())
+    found = transfer_landmarks(table.capture, table.cameras, table.head, places, PatchSettings())
     assert not len(found)
