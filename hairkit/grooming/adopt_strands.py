@@ -167,7 +167,9 @@ def adopt(
     if strands.root_uv is None:
         _log.warning("%s: no root uv; that of the head is taken", source)
         strands = replace(strands, root_uv=roots_at(head, triangle, barycentric).uv)
-    return Groom(strands, head, triangle, barycentric, material)
+    groom = Groom(strands, head, triangle, barycentric, material)
+    groom.check_reach(source)
+    return groom
 
 
 def reversed_strands(strands: Strands) -> Strands:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float32Array, Float64Array, Int32Array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, check_reach
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.template import default_head
 from hairkit.io.glb_mesh import read_glb
@@ -65,6 +65,7 @@ def read_head(
     mesh = _file_mesh(file, units, up)
     weight = _scalp_weight(mesh, file, scalp)
     vertices = _in_metres(mesh.vertices, units, up)
+    check_reach(vertices, file, "vertices")
     faces = _wound_outward(vertices, mesh.faces.astype(np.int32))
     used = np.unique(faces)
     breadth, middle = _breadth_and_middle(vertices[used], weight[used], file)

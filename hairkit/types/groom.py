@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Int32Array, UInt8Array, frozen_array
+from hairkit.arrays import Float32Array, Int32Array, UInt8Array, check_reach, frozen_array
 from hairkit.errors import DataError, FormatError
 from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
 from hairkit.types.head import Head
@@ -123,4 +123,17 @@ class Groom(Previewed, Stored):
         if version.shape != () or version != _NEWEST:
             raise FormatError(f"{path}: a groom of version {version}, this hairkit reads {_NEWEST}")
         named = {_STRANDS + name if name in _AT_TOP else name: arrays[name] for name in arrays}
-        return from_arrays(cls, named, str(path))
+        groom = from_arrays(cls, named, str(path))
+        groom.check_reach(path)
+        return groom
+
+    def check_reach(self, source: object) -> None:
+        """Raise `FormatError` naming the file where a length is beyond `MAX_REACH`."""
+        strands, capsules = self.strands, self.head.capsules
+        check_reach(strands.points, source, "points")
+        if strands.widths is not None:
+            check_reach(strands.widths, source, "widths")
+        check_reach(self.head.vertices, source, "the head's vertices")
+        check_reach(self.head.joints, source, "the head's joints")
+        for lengths in (capsules.first, capsules.second, capsules.radius):
+            check_reach(lengths, source, "the head's capsules")

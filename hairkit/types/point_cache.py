@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, frozen_array
+from hairkit.arrays import Float32Array, Float64Array, check_reach, frozen_array
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.groom import Groom
@@ -60,6 +60,7 @@ def is_cache_file(path: str | os.PathLike[str]) -> bool:
 def read_cache(path: str | os.PathLike[str], groom: Groom) -> PointCache:
     """Return the cache in an npz file; raises `DataError` when it is of another groom."""
     cache = PointCache.load(path)
+    check_reach(cache.points, path, "points")
     have, want = cache.points.shape[1], len(groom.strands.points)
     if have != want:
         raise DataError(

@@ -81,6 +81,7 @@ def read_gltf_groom(path: str | os.PathLike[str], options: ReaderOptions) -> Gro
     if head is not None and options.head is None and material is not None:
         triangle, barycentric = bind(strands.roots, head)
         groom = Groom(strands, head, triangle, barycentric, material)
+        groom.check_reach(path)
     else:
         groom = adopt(strands, ImportOptions(options.head), path, material, head)
     return groom if physics is None else replace(groom, physics=physics)

@@ -95,6 +95,7 @@ def import_groom(path: Path, options: Options) -> Groom:
         groom = asset_to_groom(asset)
     except InputError as error:
         raise FormatError(f"{path}: {error}") from error
+    groom.check_reach(path)
     if options.head is None:
         return groom
     bound = adopt(groom.strands, ImportOptions(options.head), path, groom.material)

@@ -8,13 +8,15 @@ import signal
 import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rich_groom import rich_groom
 
-from hairkit.errors import HairkitError
+from hairkit.errors import FormatError, HairkitError
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import read_capture, sample_folder
 from hairkit.io.head_reader import read_head, write_head_obj
@@ -22,7 +24,7 @@ from hairkit.io.strokes import read_strokes
 from hairkit.manager import Manager
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.simulation.motion import read_motion
-from hairkit.storage import write_bytes
+from hairkit.storage import read_npz, write_bytes, write_npz
 from hairkit.types.groom import Groom
 from hairkit.types.scene import read_cameras
 from hairkit.viewer.actions.presets import read_presets
@@ -222,3 +224,47 @@ def test_one_function_opens_what_users_name() -> None:
     others = [path for path in sources if str(path.relative_to(PROJECT)) not in OWN_FILES]
     assert [call for path in others for call in _reading_calls(path)] == []
     assert np.all([(PROJECT / name).is_file() for name in OWN_FILES])
+
+
+FAR = [1e30, -1e30, 1001.0]
+"""Metres where no hair or head is."""
+
+
+@pytest.mark.parametrize("far", FAR)
+@pytest.mark.parametrize(
+    "name", ["points", "widths", "head.vertices", "head.joints", "head.capsules.first"]
+)
+def test_grooms_of_absurd_size_are_refused(tmp_path: Path, name: str, far: float) -> None:
+    """A single length beyond a kilometre is named with its file."""
+    path = tmp_path / "groom.npz"
+    rich_groom(4).save(path)
+    arrays = read_npz(path)
+    arrays[name].reshape(-1)[3] = abs(far) if name == "widths" else far
+    write_npz(path, arrays)
+    with pytest.raises(FormatError, match=r"groom\.npz: .* expected at most 1000 m"):
+        Groom.load(path)
+
+
+@pytest.mark.parametrize("far", FAR)
+def test_heads_of_absurd_size_are_refused(tmp_path: Path, far: float) -> None:
+    """A vertex beyond a kilometre is named with its file."""
+    path = tmp_path / "head.obj"
+    write_head_obj(path, default_head())
+    path.write_text(path.read_text().replace("v ", f"v {far:g} 0 0\nv ", 1))
+    with pytest.raises(FormatError, match=r"head\.obj: "):
+        read_head(path)
+
+
+@pytest.mark.parametrize(
+    "name", ["obj", "cyhair", "ply", "usc_data", "alembic", "gltf", "hairworks", "tressfx"]
+)
+def test_strands_of_absurd_size_are_refused(manager: Manager, tmp_path: Path, name: str) -> None:
+    """One tip a few kilometres off is refused by every reader of bare strands."""
+    groom = rich_groom(40)
+    points = groom.strands.points.copy()
+    points[-1] = 3000.0
+    groom = replace(groom, strands=replace(groom.strands, points=points))
+    path = tmp_path / f"hair{manager.info(name).suffixes[0]}"
+    manager.call("export_groom", name, groom=groom, path=path)
+    with pytest.raises(FormatError, match=r"hair\..* m"):
+        manager.call("import_groom", name, path=path)
