@@ -61,14 +61,13 @@ def main() -> int:
     """Run the combinations and print the table."""
     args = _arguments()
     tests = ["tests", "--ignore", "tests/clients"] if args.all else list(QUICK)
-    rows = []
+    failed = False
+    print("| Python | NumPy | OpenCV | result |\n|---|---|---|---|", flush=True)
     for names in itertools.product(args.only, args.numpy, args.opencv):
-        print(f"Python {names[0]}, NumPy {names[1]}, OpenCV {names[2]}", file=sys.stderr)
-        rows.append(_run(Combination(*names), [*tests, *args.pytest]))
-    print("| Python | NumPy | OpenCV | result |\n|---|---|---|---|")
-    for row in rows:
-        print(f"| {row.python} | {row.numpy} | {row.opencv} | {row.result} |")
-    return int(any(row.failed for row in rows))
+        row = _run(Combination(*names), [*tests, *args.pytest])
+        print(f"| {row.python} | {row.numpy} | {row.opencv} | {row.result} |", flush=True)
+        failed = failed or row.failed
+    return int(failed)
 
 
 def _arguments() -> argparse.Namespace:

@@ -1,8 +1,8 @@
 """mkdocs hook: pages written from what the code declares, so that they cannot go stale.
 
-Each plugin gets a page from its docstring, its `Options` and its `FORMAT`; `<!-- formats -->` in a
-page becomes the format table; each script or notebook of examples/gallery becomes a page, and so do
-CHANGELOG.md and CONTRIBUTING.md.
+Each plugin gets a page from its docstring, its `Options` and its `FORMAT`. `<!-- formats -->` in a
+page becomes the format table, `<!-- front door -->` the public names. Each script or notebook of
+examples/gallery becomes a page, and so do CHANGELOG.md and CONTRIBUTING.md.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
+import hairkit
 from hairkit.cli.format_table import format_table
 from hairkit.io.file_format import Feature
 from hairkit.manager import Manager, PluginInfo
@@ -47,10 +48,26 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Return the page with the format table in the place of its marker."""
-    if "<!-- formats -->" not in markdown:
-        return markdown
-    return markdown.replace("<!-- formats -->", format_table(_manager()))
+    """Return the page with generated text in the place of its markers."""
+    for marker, made in (("formats", format_table_text), ("front door", front_door)):
+        if f"<!-- {marker} -->" in markdown:
+            markdown = markdown.replace(f"<!-- {marker} -->", made())
+    return markdown
+
+
+def format_table_text() -> str:
+    """Return the table of what each file format carries."""
+    return format_table(_manager())
+
+
+def front_door() -> str:
+    """Return the public names of hairkit: links to types and decorators, then the functions."""
+    homes = {name: f"{hairkit._HOME_OF[name]}.{name}" for name in hairkit.__all__}
+    functions = [name for name in homes if inspect.isfunction(getattr(hairkit, name))]
+    links = [name for name in homes if name not in functions or name == "option"]
+    others = [f"[`{name}`][{homes[name]}]" for name in links]
+    blocks = [f"::: {homes[name]}" for name in functions if name != "option"]
+    return "\n\n".join(["Types and decorators: " + ", ".join(others) + ".", *blocks])
 
 
 def plugin_page(info: PluginInfo) -> str:
