@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from functools import cache
@@ -17,6 +17,7 @@ import numpy as np
 import hairkit
 from hairkit.errors import PluginError
 from hairkit.manager import Manager
+from hairkit.pipeline.module_digest import module_digest
 from hairkit.pipeline.recipe import Recipe, Stage, stage_digest
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.work_folder import WorkFolder, digest_of
@@ -68,12 +69,16 @@ class StageRunner:
 
     def once(self, table: str, kind: type[_Result], **arguments: Argument) -> Given[_Result]:
         """Return the result of a stage that sees all views; waits for its arguments."""
-        ready = {name: _ready(argument) for name, argument in arguments.items()}
-        stage = self._stage(table)
-        step = _Steps(self, stage, 1)
-        digest = self._digest(stage, [given.digest for given in ready.values()])
-        values = {name: given.value for name, given in ready.items()}
-        return step.run(0, kind, digest, "", values)
+        ready, stage = _all_ready(arguments), self._stage(table)
+        return self._steps_of(stage, 1).run(0, kind, self._code(stage), "", ready)
+
+    def derive(
+        self, name: str, kind: type[_Result], make: Callable[..., _Result], **arguments: Argument
+    ) -> Given[_Result]:
+        """Return what a function of hairkit makes of other results, kept as a stage's result is."""
+        ready, code = _all_ready(arguments), module_digest(make.__module__)
+        steps = _Steps(self, name, 1, lambda values: make(**values))
+        return steps.run(0, kind, code, "", ready)
 
     def every_view(
         self,
@@ -84,14 +89,13 @@ class StageRunner:
     ) -> list[Future[Given[_Result]]]:
         """Start a stage on every view; a view's step waits only for that view's arguments."""
         stage = self._stage(table)
-        steps = _Steps(self, stage, len(views))
+        steps = self._steps_of(stage, len(views))
+        code = self._code(stage)
 
         def run(index: int, view: Given[View]) -> Given[_Result]:
             # tasks start in the order of submission, so what is waited for is already running
             own = {name: futures[index].result() for name, futures in arguments.items()}
-            digest = self._digest(stage, [view.digest, *(given.digest for given in own.values())])
-            values = {"view": view.value} | {name: given.value for name, given in own.items()}
-            return steps.run(index, kind, digest, view.value.name, values)
+            return steps.run(index, kind, code, view.value.name, {"view": view} | own)
 
         return [self._pool.submit(run, index, view) for index, view in enumerate(views)]
 
@@ -117,34 +121,52 @@ class StageRunner:
             raise PluginError(f"recipe {self._recipe.name} has no stage {table!r}")
         return stage
 
-    def _digest(self, stage: Stage, inputs: list[str]) -> str:
-        return digest_of(_own_digest(), stage_digest(self._manager, stage), inputs)
+    def _steps_of(self, stage: Stage, count: int) -> _Steps:
+        return _Steps(self, stage.table, count, lambda values: self.call(stage, values), stage.hook)
+
+    def _code(self, stage: Stage) -> str:
+        return stage_digest(self._manager, stage)
 
 
 class _Steps:
-    """The steps of one stage: runs them, counts them, and tells when the last has ended."""
+    """The steps of one stage: runs them, counts them, and reports the end of the last."""
 
-    def __init__(self, runner: StageRunner, stage: Stage, count: int) -> None:
+    def __init__(
+        self,
+        runner: StageRunner,
+        table: str,
+        count: int,
+        call: Callable[[dict[str, Any]], Any],
+        hook: str | None = None,
+    ) -> None:
         self._runner = runner
-        self._stage = stage
+        self._table = table
+        self._call = call
+        self._hook = hook
         self._results: list[Any] = [None] * count
         self._left = count
         self._reused = True
         self._began: float | None = None
         self._guard = threading.Lock()
-        runner._log.started(stage.table, count)
+        runner._log.started(table, count)
 
     def run(
-        self, index: int, kind: type[_Result], digest: str, view: str, values: dict[str, Any]
+        self,
+        index: int,
+        kind: type[_Result],
+        code: str,
+        view: str,
+        arguments: dict[str, Given[Any]],
     ) -> Given[_Result]:
-        """Return the step's result, from the work folder or from its plugin."""
-        runner, table = self._runner, self._stage.table
+        """Return the step's result, from the work folder or newly made by `code`, a digest."""
+        runner, table = self._runner, self._table
+        digest = digest_of(_own_digest(), code, [given.digest for given in arguments.values()])
         with self._guard:
             self._began = self._began or time.perf_counter()
         result = runner._work.get(kind, digest, table, view)
         reused = result is not None
         if result is None:
-            made: _Result = runner.call(self._stage, values)
+            made: _Result = self._call({name: given.value for name, given in arguments.items()})
             runner._work.put(made, digest, table, view)
             result = made
         self._ended(index, result, reused)
@@ -156,15 +178,20 @@ class _Steps:
             self._reused &= reused
             self._left -= 1
             last = not self._left
-        runner, table = self._runner, self._stage.table
+        runner, table = self._runner, self._table
         runner._log.stepped(table)
         if last:
             seconds = time.perf_counter() - (self._began or 0.0)
             runner._log.finished(table, seconds, self._reused)
             whole = tuple(self._results) if len(self._results) > 1 else self._results[0]
-            runner._manager.notify(
-                "stage_finished", stage=self._stage.hook, seconds=seconds, result=whole
-            )
+            if self._hook is not None:
+                runner._manager.notify(
+                    "stage_finished", stage=self._hook, seconds=seconds, result=whole
+                )
+
+
+def _all_ready(arguments: dict[str, Argument]) -> dict[str, Given[Any]]:
+    return {name: _ready(argument) for name, argument in arguments.items()}
 
 
 def _ready(argument: Argument) -> Given[Any]:
