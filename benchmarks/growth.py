@@ -15,12 +15,14 @@ import time
 from pathlib import Path
 from typing import Any
 
+from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.head_model.scalp import sample_roots
 from hairkit.hookspecs import hookimpl
 from hairkit.io.capture_reader import read_capture, sample_folder
 from hairkit.manager import Manager
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
+from hairkit.types.waves import Waves
 
 TRACKERS = ("hybrid_growth", "certainty_tracker")
 
@@ -51,8 +53,16 @@ def main() -> int:
     roots = sample_roots(scene.head, args.strands)
     print(f"{args.strands} roots spread over the scalp in {time.perf_counter() - began:.2f} s\n")
     print("| tracker | strands | seconds, best round | longest |\n|---|---|---|---|")
+    given = {
+        "scene": scene,
+        "masks": (),
+        "orientations": (),
+        "hull": hull,
+        "field": field,
+        "waves": Waves(),
+        "scalp_distance": measure_scalp_distance(scene.head, hull),
+    }
     for name in TRACKERS:
-        given = {"scene": scene, "masks": (), "orientations": (), "hull": hull, "field": field}
         options = manager.options(name, {"waves": False})
         times = []
         for _ in range(args.rounds):

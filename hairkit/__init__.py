@@ -65,7 +65,8 @@ if TYPE_CHECKING:
     from hairkit.types.point_cache import PointCache
     from hairkit.types.scene import Scene
     from hairkit.types.strands import Strands
-    from hairkit.types.volume import Hull, OrientationField, VoxelGrid
+    from hairkit.types.volume import Hull, OrientationField, ScalpDistance, VoxelGrid
+    from hairkit.types.waves import Waves
 
 __version__ = "0.2.0"
 
@@ -86,10 +87,12 @@ __all__ = [
     "PointCache",
     "Recipe",
     "Roots",
+    "ScalpDistance",
     "Scene",
     "Strands",
     "View",
     "VoxelGrid",
+    "Waves",
     "evaluate",
     "export",
     "hookimpl",
@@ -133,7 +136,8 @@ _HOMES = {
     "types.point_cache": ("PointCache",),
     "types.scene": ("Scene",),
     "types.strands": ("Strands",),
-    "types.volume": ("Hull", "OrientationField", "VoxelGrid"),
+    "types.volume": ("Hull", "OrientationField", "ScalpDistance", "VoxelGrid"),
+    "types.waves": ("Waves",),
 }
 """Public names by the module that defines them, the same as in the imports for type checkers.
 

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from hairkit.types.orientation import OrientationMap
     from hairkit.types.scene import Scene
     from hairkit.types.strands import Strands
-    from hairkit.types.volume import Hull, OrientationField
+    from hairkit.types.volume import Hull, OrientationField, ScalpDistance
+    from hairkit.types.waves import Waves
 
 PROJECT = "hairkit"
 hookspec = pluggy.HookspecMarker(PROJECT)
@@ -67,6 +68,8 @@ def solve_field(
     masks: tuple[Mask, ...],
     orientations: tuple[OrientationMap, ...],
     hull: Hull,
+    waves: Waves,
+    scalp_distance: ScalpDistance,
     options: Any,
 ) -> OrientationField | None:
     """Fuse the 2D orientations of all views into 3D and fill the rest of the hull."""
@@ -80,6 +83,8 @@ def track(
     hull: Hull,
     field: OrientationField,
     roots: Roots,
+    waves: Waves,
+    scalp_distance: ScalpDistance,
     options: Any,
 ) -> Strands | None:
     """Grow one strand from every root; strand s belongs to root s."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array
+from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.io.capture_reader import TURN
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
@@ -22,6 +23,7 @@ from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_products
+from hairkit.types.waves import Waves
 
 VIEW_NAMES = tuple(TURN)
 """Views of the nominal turn, 45 degrees apart, towards the subject's left."""
@@ -55,16 +57,19 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
         "orientations": tuple(combed_orientation(mask) for mask in masks),
         "hull": hull,
         "field": combed_field(hull.grid),
+        "waves": Waves(),
+        "scalp_distance": measure_scalp_distance(scene.head, hull),
         "roots": scalp_roots(scene.head),
     }
+    seen, derived = ("scene", "masks", "orientations"), ("waves", "scalp_distance")
     wanted = {
         "segment": ("view",),
         "estimate_scene": ("capture", "masks", "head"),
         "fit_head": ("capture", "masks", "scene"),
         "orient": ("view", "mask"),
         "build_hull": ("scene", "masks"),
-        "solve_field": ("scene", "masks", "orientations", "hull"),
-        "track": ("scene", "masks", "orientations", "hull", "field", "roots"),
+        "solve_field": (*seen, "hull", *derived),
+        "track": (*seen, "hull", "field", "roots", *derived),
     }
     return {name: every[name] for name in wanted[stage]}
 

@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, Strands, hookimpl
+from hairkit import Hull, OrientationField, Roots, ScalpDistance, Strands, Waves, hookimpl
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
-from hairkit.field.growth_prior import hair_length, scalp_way
 from hairkit.field.sampling_kernels import gradient_at, make_unit, sample_at
-from hairkit.grooming.postprocess import FinishOptions, finished
+from hairkit.grooming.postprocess import FinishOptions, finish
 from hairkit.options import option
 from hairkit.parallel import compiled, parallel_for
 from hairkit.types.volume import cell_slopes, symmetric_matrices
@@ -68,18 +67,17 @@ class Options(FinishOptions):
 
 @hookimpl
 def track(
-    scene: Scene,
-    masks: tuple[Mask, ...],
-    orientations: tuple[OrientationMap, ...],
     hull: Hull,
     field: OrientationField,
     roots: Roots,
+    waves: Waves,
+    scalp_distance: ScalpDistance,
     options: Options,
 ) -> Strands:
     """Grow one strand from every root."""
-    way = hair_length(hull, scalp_way(scene.head, hull))
+    way = scalp_distance.hair_length
     strands = grow(field, _signed(field), _distance(field, hull), roots.positions, way, options)
-    return finished(replace(strands, root_uv=roots.uv), scene, masks, orientations, hull, options)
+    return finish(replace(strands, root_uv=roots.uv), waves, hull, options)
 
 
 def grow(

@@ -15,9 +15,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
+from hairkit import (
+    Hull,
+    Mask,
+    OrientationField,
+    OrientationMap,
+    ScalpDistance,
+    Scene,
+    Waves,
+    hookimpl,
+)
 from hairkit.field.diffusion import solve_screened
-from hairkit.field.growth_prior import ScalpPrior, growth_potential, with_scalp_prior
+from hairkit.field.growth_prior import ScalpPrior, add_scalp_prior, growth_potential
 from hairkit.field.view_fusion import FusionOptions, fuse_views
 from hairkit.options import option
 
@@ -59,15 +68,17 @@ def solve_field(
     masks: tuple[Mask, ...],
     orientations: tuple[OrientationMap, ...],
     hull: Hull,
+    waves: Waves,
+    scalp_distance: ScalpDistance,
     options: Options,
 ) -> OrientationField:
-    """Fuse views, add the scalp prior, diffuse over the loose hull, find the growth potential."""
-    growth = growth_potential(scene.head, hull, options.tip_share)
-    fused = fuse_views(scene.cameras, masks, orientations, hull, options, options.min_views)
+    """Fuse the views, add the scalp prior, diffuse over the loose hull."""
+    growth = growth_potential(hull, scalp_distance, options.tip_share)
+    fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options, options.min_views)
     prior = ScalpPrior(
         options.scalp_weight, options.scalp_reach, options.scalp_lift, options.scalp == "normal"
     )
-    data, weight = with_scalp_prior(scene.head, hull, growth, fused.tensor, fused.certainty, prior)
+    data, weight = add_scalp_prior(scene.head, hull, growth, fused.tensor, fused.certainty, prior)
     if options.hard:
         weight = np.where(weight > 0, HARD_WEIGHT, 0).astype(np.float32)
     solved = solve_screened(

@@ -1,14 +1,12 @@
-"""How hair flows where photos say little: ways through the hair from the scalp and to its tips.
+"""Growth-direction prior: distances through the hair from the scalp and to the tips.
 
-The way from the scalp and the way to the tips are chamfer distances through the hull (Borgefors
-1986), so hair flows from every root along the shortest way to where it ends: partings and bare
-faces appear by themselves.
+Both are chamfer distances through the hull (Borgefors 1986). Hair is assumed to grow from each root
+along the shortest path to where the hair ends; partings and bare faces follow from that.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -17,25 +15,24 @@ from scipy import ndimage
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.types.head import Head
-from hairkit.types.volume import Hull, VoxelGrid, outer_products
+from hairkit.types.volume import Hull, ScalpDistance, VoxelGrid, outer_products
 
 WHORL_BEHIND = 0.03
-"""Metres behind the highest point of the head where the vertical axis of the crown's whorl
-stands."""
+"""Metres from the head's highest point back to the vertical axis of the crown's whorl."""
 SHORT_HAIR, LONG_HAIR = 0.03, 0.1
-"""Ways to the tips in metres below which hair is combed from the crown, and above which by the
-flow."""
+"""Lengths in metres: shorter hair is combed from the crown, longer hair along the potential."""
 TIP_SLOPE = 0.2
 """Slope of the growth potential among the tips; 1 before them."""
 FLOW_SMOOTHING = 2.0
 """Standard deviation in cells that makes the chamfer distance's gradient smooth."""
+LENGTH_PERCENTILE = 98
+"""Percentile of the scalp distance that is taken as the hair's length."""
 
 
 def combing_direction(
     head: Head, hull: Hull, growth: Float32Array, points: npt.ArrayLike, lift: float
 ) -> Float64Array:
-    """Return unit directions (N, 3), root to tip, in which hair leaves the scalp near `points` (N,
-    3).
+    """Return unit directions (N, 3), root to tip, of hair on the scalp near points (N, 3).
 
     Long hair: the tangential part of the growth potential's gradient. Hair shorter than
     `SHORT_HAIR`, which ends everywhere: "0.7 away from the crown's axis + 1 down". In between a
@@ -58,7 +55,7 @@ def combing_direction(
 
 @dataclass(frozen=True)
 class ScalpPrior:
-    """How strongly, and how far from the scalp, combing speaks for photos that say little."""
+    """Weight and range of the combing direction near the scalp."""
 
     weight: float
     """Against the certainty of fused cells, which is at most 1 for each view."""
@@ -67,10 +64,10 @@ class ScalpPrior:
     lift: float
     """Outward part against the tangential one."""
     normal: bool = False
-    """True: hair stands along the head's normal instead of being combed."""
+    """True: hair grows along the head's normal instead of being combed."""
 
 
-def with_scalp_prior(
+def add_scalp_prior(
     head: Head,
     hull: Hull,
     growth: Float32Array,
@@ -78,7 +75,7 @@ def with_scalp_prior(
     certainty: Float32Array,
     prior: ScalpPrior,
 ) -> tuple[Float32Array, Float32Array]:
-    """Return wanted tensors (N, 6) and weights (N,) of the loose cells with the prior added."""
+    """Add the prior to tensors (N, 6) and certainty (N,) of the loose cells; return new ones."""
     distance = hull.head_distance[hull.loose]
     near = distance < prior.reach
     if not prior.weight or not near.any():
@@ -107,8 +104,7 @@ def _from_crown(head: Head, at: Float64Array, outward: Float64Array) -> Float64A
 
 
 def gradient(grid: VoxelGrid, values: Float32Array, points: npt.ArrayLike) -> Float64Array:
-    """Return the unit gradient (N, 3) of values (X, Y, Z) at points (N, 3); zero where it
-    vanishes."""
+    """Return the unit gradient of values (X, Y, Z) at points (N, 3); zero where it vanishes."""
     at, h = np.asarray(points, np.float64), grid.spacing
     slope = np.stack(
         [
@@ -122,21 +118,31 @@ def gradient(grid: VoxelGrid, values: Float32Array, points: npt.ArrayLike) -> Fl
     return result
 
 
-def growth_potential(head: Head, hull: Hull, tip_share: float) -> Float32Array:
-    """Return (X, Y, Z) minus the way to the tips through the hair, metres, smoothed; it grows root
-    to tip.
+def measure_scalp_distance(head: Head, hull: Hull) -> ScalpDistance:
+    """Return the shortest paths from the scalp through loose cells."""
+    start = np.zeros(hull.grid.shape, bool)
+    cells = hull.grid.nearest_cell(head.vertices[head.scalp > 0.5])
+    start[tuple(cells.T)] = True
+    start = ndimage.binary_dilation(start, iterations=2)
+    distance = chamfer_distance(hull.loose, start & hull.loose, hull.grid.spacing)
+    distance = np.where(np.isfinite(distance), distance, 0).astype(np.float32)
+    return ScalpDistance(distance, float(np.percentile(distance[hull.dense], LENGTH_PERCENTILE)))
 
-    Tips are the dense cells whose way from the scalp is at least `tip_share` of the hair's length.
-    In long hair the potential grows on among them, slowly, with the way from the scalp: so strands
-    know their sign up to their ends.
+
+def growth_potential(hull: Hull, from_scalp: ScalpDistance, tip_share: float) -> Float32Array:
+    """Return minus the distance to the tips through the hair (X, Y, Z), metres, smoothed.
+
+    It grows from root to tip. Tips are the dense cells whose distance from the scalp is at least
+    `tip_share` of the hair's length. In long hair the potential also grows among the tips, slowly,
+    with the distance from the scalp, so that strands have a sign up to their ends.
     """
-    way = scalp_way(head, hull)
-    length = hair_length(hull, way)
-    tips = hull.dense & (way >= tip_share * length)
-    left = chamfer_way(hull.loose, tips, hull.grid.spacing)
+    length = from_scalp.hair_length
+    tips = hull.dense & (from_scalp.values >= tip_share * length)
+    left = chamfer_distance(hull.loose, tips, hull.grid.spacing)
     known = np.isfinite(left)
     weight = ndimage.gaussian_filter(known.astype(np.float32), FLOW_SMOOTHING)
-    left -= _long_share(length) * TIP_SLOPE * np.maximum(way - tip_share * length, 0)
+    beyond = np.maximum(from_scalp.values - tip_share * length, 0)
+    left -= _long_share(length) * TIP_SLOPE * beyond
     total = ndimage.gaussian_filter(np.where(known, left, 0).astype(np.float32), FLOW_SMOOTHING)
     smooth = total / np.maximum(weight, 1e-6)
     growth: Float32Array = np.where(weight > 1e-3, -smooth, -smooth.max()).astype(np.float32)
@@ -148,44 +154,25 @@ def _long_share(length: float) -> float:
     return float(np.clip((length - SHORT_HAIR) / (LONG_HAIR - SHORT_HAIR), 0.0, 1.0))
 
 
-def hair_length(hull: Hull, way: Float32Array) -> float:
-    """Return how long hair can be: nearly the longest way (its 98th percentile) from the scalp,
-    metres."""
-    return float(np.percentile(way[hull.dense], 98))
+def chamfer_distance(occupied: BoolArray, start: BoolArray, spacing: float) -> Float32Array:
+    """Return the shortest paths through occupied cells from the start cells, (X, Y, Z).
 
-
-@lru_cache(maxsize=1)
-def scalp_way(head: Head, hull: Hull) -> Float32Array:
-    """Return (X, Y, Z) the shortest way from the scalp through loose cells, metres; 0 where
-    there is none."""
-    start = np.zeros(hull.grid.shape, bool)
-    cells = hull.grid.nearest_cell(head.vertices[head.scalp > 0.5])
-    start[tuple(cells.T)] = True
-    start = ndimage.binary_dilation(start, iterations=2)
-    way = chamfer_way(hull.loose, start & hull.loose, hull.grid.spacing)
-    return np.where(np.isfinite(way), way, 0).astype(np.float32)
-
-
-def chamfer_way(occupied: BoolArray, start: BoolArray, spacing: float) -> Float32Array:
-    """Return (X, Y, Z) the shortest way through occupied cells from the start cells; infinite where
-    none.
-
-    Sweeps in the eight diagonal orders until nothing changes, steps along edges and diagonals of
-    cells.
+    Infinite where no path leads. Steps go along edges and diagonals of cells; sweeps in the eight
+    diagonal orders are repeated until nothing changes.
     """
-    way: Float32Array = _chamfer(occupied, start, np.float32(spacing))
-    return way
+    distance: Float32Array = _chamfer(occupied, start, np.float32(spacing))
+    return distance
 
 
 @njit(cache=True)
 def _chamfer(occupied, start, spacing):  # type: ignore[no-untyped-def]
     nx, ny, nz = occupied.shape
-    way = np.full(occupied.shape, np.inf, np.float32)
+    distance = np.full(occupied.shape, np.inf, np.float32)
     for ix in range(nx):
         for iy in range(ny):
             for iz in range(nz):
                 if start[ix, iy, iz]:
-                    way[ix, iy, iz] = 0
+                    distance[ix, iy, iz] = 0
     cost = np.array([0.0, 1.0, np.sqrt(2.0), np.sqrt(3.0)], np.float32) * spacing
     for _ in range(12):
         changed = False
@@ -201,17 +188,17 @@ def _chamfer(occupied, start, spacing):  # type: ignore[no-untyped-def]
                         iz = kz if sz > 0 else nz - 1 - kz
                         if not occupied[ix, iy, iz]:
                             continue
-                        best = way[ix, iy, iz]
+                        best = distance[ix, iy, iz]
                         for corner in range(1, 8):
                             a, b, c = corner & 1, corner >> 1 & 1, corner >> 2 & 1
                             jx, jy, jz = ix - sx * a, iy - sy * b, iz - sz * c
                             if jx < 0 or jy < 0 or jz < 0 or jx >= nx or jy >= ny or jz >= nz:
                                 continue
                             if occupied[jx, jy, jz]:
-                                best = min(best, way[jx, jy, jz] + cost[a + b + c])
-                        if best < way[ix, iy, iz] - 1e-7:
-                            way[ix, iy, iz] = best
+                                best = min(best, distance[jx, jy, jz] + cost[a + b + c])
+                        if best < distance[ix, iy, iz] - 1e-7:
+                            distance[ix, iy, iz] = best
                             changed = True
         if not changed:
             break
-    return way
+    return distance

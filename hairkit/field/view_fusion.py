@@ -20,13 +20,14 @@ from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.cameras.depth_raster import SPLAT_CELLS, splat_depth
 from hairkit.cameras.projection_kernels import PackedCamera, Vector, pack_camera, project
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
-from hairkit.imaging.waves import Waves, measure_waves, without_slant
+from hairkit.imaging.waves import remove_slant
 from hairkit.options import option
 from hairkit.parallel import compiled, parallel_for
 from hairkit.types.camera import Camera
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ, Hull, outer_products
+from hairkit.types.waves import Waves
 
 DEPTH_SHRINK = 3
 """Depth maps of the hull are this much smaller than the pictures: cells are larger than pixels."""
@@ -80,15 +81,14 @@ def fuse_views(
     masks: Sequence[Mask],
     orientations: Sequence[OrientationMap],
     hull: Hull,
+    waves: Waves,
     options: FusionOptions,
     min_views: int = 1,
 ) -> FusedViews:
     """Return the directions of all loose cells, waves measured and taken into account."""
-    wavy = options.unslant or options.pool > 0
-    waves = measure_waves(orientations, masks, cameras) if wavy else Waves()
     maps = tuple(orientations)
     if options.unslant:
-        maps = tuple(without_slant(found, waves) for found in orientations)
+        maps = tuple(remove_slant(found, waves) for found in orientations)
     planes, views = fuse_planes(cameras, masks, maps, hull, options.see_through, options.free_depth)
     planes = pool_planes(planes, hull, options.pool * waves.pitch)
     return FusedViews(maps, *plane_directions(planes, views, min_views))

@@ -1,4 +1,4 @@
-"""The last step of the pipeline: strands, head and photos put together as a groom."""
+"""Last step of the pipeline: assemble strands, head and the photos' colours as a groom."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.colour import linear_from_srgb
 from hairkit.errors import InputError
-from hairkit.imaging.waves import Waves
 from hairkit.types.capture import View
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head, Roots
 from hairkit.types.mask import Mask
 from hairkit.types.strands import Strands
+from hairkit.types.waves import Waves
 
 SHORTEST = 1e-3
 """Strands shorter than this are no strands, metres."""

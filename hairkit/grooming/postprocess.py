@@ -1,21 +1,16 @@
-"""The last steps of every tracker: smooth what was grown, wind it into waves, keep it out of the
-head."""
+"""Last steps of every tracker: smooth the strands, wind them into waves, push them outside."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hairkit.grooming.head_collision import push_out_of_head
 from hairkit.grooming.wind_waves import add_waves
 from hairkit.helices import smoothed
-from hairkit.imaging.waves import measure_waves
 from hairkit.options import option
-from hairkit.types.mask import Mask
-from hairkit.types.orientation import OrientationMap
-from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
+from hairkit.types.waves import Waves
 
 
 @dataclass(frozen=True)
@@ -30,22 +25,17 @@ class FinishOptions:
         unit="m",
         doc="Smooth strands by helix arcs within this mean distance; 0: leave them.",
     )
-    waves: bool = option(True, doc="Wind the strands as the photos' waves do.")
+    waves: bool = option(True, doc="Wind the strands into the waves measured in the photos.")
     points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
 
 
-def finished(
-    strands: Strands,
-    scene: Scene,
-    masks: Sequence[Mask],
-    orientations: Sequence[OrientationMap],
-    hull: Hull,
-    options: FinishOptions,
-) -> Strands:
-    """Return the strands smoothed by helices and wound as the photos' waves, where the options ask
-    for it, and out of the head; `options.points` are the tracker's own affair."""
+def finish(strands: Strands, waves: Waves, hull: Hull, options: FinishOptions) -> Strands:
+    """Smooth strands by helices, wind them into waves and push them out of the head.
+
+    The first two only where the options ask for it; `options.points` is used by the tracker.
+    """
     if options.helix_tolerance > 0:
         strands = smoothed(strands, options.helix_tolerance)
     if options.waves:
-        strands = add_waves(strands, measure_waves(orientations, masks, scene.cameras))
+        strands = add_waves(strands, waves)
     return push_out_of_head(strands, hull, options.clearance)

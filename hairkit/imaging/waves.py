@@ -1,20 +1,18 @@
-"""Waves of the hair: measured in the orientation maps of the photos, and put back on tracked axes.
+"""Measure the waves of the hair in the orientation maps of the photos.
 
-Strands of wavy hair are helices whose neighbours are out of step. Eight photos cannot resolve them
-one by one, but they show three numbers. Along the average direction the angle swings, so its
-autocorrelation has a trough at half a turn: that is the pitch. The near half of a helix faces the
-camera and slants all one way, in every view alike, by `tan(slant) = 4 radius / pitch` on average
-(the mean of a cosine over its half turn is 2 / pi): where hair turns one way, the slant gives
-radius and handedness, and it must be taken off before views are fused, since it is no direction
-that hair grows in. Where hair turns both ways the slants cancel, and the swing's rms gives the
+Strands of wavy hair are helices, and neighbours differ in phase. Eight photos cannot resolve them
+one by one, but they show three numbers. Along the average direction the angle oscillates, so its
+autocorrelation has a minimum at half a turn, which gives the pitch. The near half of a helix slants
+to one side, the same in every view, by `tan(slant) = 4 radius / pitch` on average (the mean of a
+cosine over its half turn is 2 / pi). Where all hair turns one way, the slant gives radius and
+handedness; `remove_slant` subtracts it before views are fused, because hair does not grow in that
+direction. Where hair turns both ways the slants cancel, and the rms of the oscillation gives the
 radius.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -24,11 +22,12 @@ from hairkit.arrays import Float64Array
 from hairkit.types.camera import Camera
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.waves import Waves
 
 HEIGHT = 540
 """Waves are measured on maps of this height, where they still span tens of pixels."""
 HIGH_PASS = 12.5
-"""Gaussian in pixels of such a map that tells the average direction from the swing."""
+"""Gaussian in pixels of such a map that separates the average direction from the swing."""
 LONGEST_LAG, LINE_LENGTH, LINES = 55, 120, 500
 """Pixels of the autocorrelation and of the lines it is taken on; lines a view."""
 SHORTEST_LAG = 5
@@ -42,39 +41,10 @@ SURE_SLANT = 2.5
 """Standard errors by which the views' mean slant must differ from 0."""
 
 
-@dataclass(frozen=True)
-class Waves:
-    """What the photos show of the hair's waves; radius 0 means straight hair."""
-
-    radius: float = 0.0
-    """Radius of the helix about its axis, metres."""
-    pitch: float = 0.0
-    """Length of one turn along the axis, metres."""
-    slant: float = 0.0
-    """Mean slant of the visible strands in the pictures, radians; 0 when hair turns both ways."""
-
-    @property
-    def handedness(self) -> int:
-        """1 or -1 when all hair turns one way, 0 when it turns both ways or not at all."""
-        return int(np.sign(self.slant))
-
-
 def measure_waves(
     orientations: Sequence[OrientationMap], masks: Sequence[Mask], cameras: Sequence[Camera]
 ) -> Waves:
-    """Measure pitch, radius and slant of the waves in all views together.
-
-    The field, the tracker and the groom's material ask the same; the last answer is kept.
-    """
-    return _measured(tuple(orientations), tuple(masks), tuple(cameras))
-
-
-@lru_cache(maxsize=1)
-def _measured(
-    orientations: tuple[OrientationMap, ...],
-    masks: tuple[Mask, ...],
-    cameras: tuple[Camera, ...],
-) -> Waves:
+    """Measure pitch, radius and slant of the waves in all views together."""
     correlation = np.zeros(LONGEST_LAG)
     squares, slants, metres = [], [], []
     for found, mask, camera in zip(orientations, masks, cameras, strict=True):
@@ -101,16 +71,15 @@ def _measured(
     return Waves(float(max(from_swing, from_slant)), pitch, slant)
 
 
-def without_slant(found: OrientationMap, waves: Waves) -> OrientationMap:
-    """Return the map with the slant of the helices' near halves taken off."""
+def remove_slant(found: OrientationMap, waves: Waves) -> OrientationMap:
+    """Return the map without the slant of the helices' near halves."""
     if waves.slant == 0:
         return found
     return OrientationMap(wrap_angle(found.angle - waves.slant), found.confidence)
 
 
 def _swing(found: OrientationMap, mask: Mask) -> tuple[float, Float64Array]:
-    """Return the mean square of the angle's swing, radians squared, and its autocorrelation
-    (LAGS,)."""
+    """Return the mean square of the angle's swing, radians squared, and its autocorrelation."""
     size = (round(found.angle.shape[1] * HEIGHT / found.angle.shape[0]), HEIGHT)
     inside = cv2.resize(mask.hair.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     inside = cv2.erode(inside, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7)))
@@ -161,8 +130,7 @@ def _autocorrelation(average, swing, weight, starts, length, lags):  # type: ign
 
 
 def _mean_slant(found: OrientationMap, mask: Mask) -> float:
-    """Return the mean angle of the strands off the vertical, radians, positive from +y towards
-    -x."""
+    """Return the mean angle off the vertical, radians, positive from +y towards -x."""
     weight = found.confidence * mask.hair
     turned = 2 * (found.angle - np.float32(np.pi / 2))
     return 0.5 * float(np.arctan2((weight * np.sin(turned)).sum(), (weight * np.cos(turned)).sum()))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hairkit.errors import InputError, RenderError
+from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
@@ -29,7 +30,8 @@ from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
-from hairkit.types.volume import Hull, OrientationField
+from hairkit.types.volume import Hull, OrientationField, ScalpDistance
+from hairkit.types.waves import Waves
 
 MAX_GUIDES = 100_000
 PHOTOS = "photos in "
@@ -150,15 +152,22 @@ def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int
     if run.has("head"):
         scene = run.once("head", Scene, capture=photos, masks=masks, scene=scene)
     hull = run.once("hull", Hull, scene=scene, masks=masks)
-    seen: dict[str, Argument] = {"scene": scene, "masks": masks, "orientations": orientations}
-    field = run.once("field", OrientationField, **seen, hull=hull)
+    cameras, shape = Given.of(scene.value.cameras), Given.of(scene.value.head)
+    waves = run.derive(
+        "waves", Waves, measure_waves, orientations=orientations, masks=masks, cameras=cameras
+    )
+    distance = run.derive("distance", ScalpDistance, measure_scalp_distance, head=shape, hull=hull)
+    seen: dict[str, Argument] = {
+        "scene": scene, "masks": masks, "orientations": orientations,
+        "hull": hull, "waves": waves, "scalp_distance": distance,
+    }  # fmt: skip
+    field = run.once("field", OrientationField, **seen)
     roots = Given.of(sample_roots(scene.value.head, guides, seed, rest=head))
-    strands = run.once("track", Strands, **seen, hull=hull, field=field, roots=roots)
+    strands = run.once("track", Strands, **seen, field=field, roots=roots)
     labels = tuple(mask.result().value for mask in masks)
     angles = tuple(orientation.result().value for orientation in orientations)
-    waves = measure_waves(angles, labels, scene.value.cameras)
     groom = assemble_groom(
-        capture.views, labels, scene.value.head, roots.value, strands.value, waves
+        capture.views, labels, scene.value.head, roots.value, strands.value, waves.value
     )
     return _Made(labels, angles, hull.value, scene.value, groom)
 

@@ -118,6 +118,20 @@ class Hull(Stored):
         object.__setattr__(self, "head_distance", distance)
 
 
+@dataclass(frozen=True, eq=False)
+class ScalpDistance(Stored):
+    """How far the cells of a hull are from the scalp along paths through the hair."""
+
+    values: Float32Array
+    """(X, Y, Z) length of the shortest path, metres; 0 where there is none."""
+    hair_length: float
+    """Longest such path but for outliers, metres: how long hair can be."""
+
+    def __post_init__(self) -> None:
+        values = frozen_array(self.values, np.float32, (None, None, None), "scalp distance")
+        object.__setattr__(self, "values", values)
+
+
 TENSOR_INDICES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Order of the six stored components of a symmetric 3x3 tensor: xx, yy, zz, xy, xz, yz."""
 XX, YY, ZZ, XY, XZ, YZ = range(len(TENSOR_INDICES))

@@ -15,10 +15,19 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from hairkit import Hull, Mask, OrientationField, OrientationMap, Roots, Scene, Strands, hookimpl
+from hairkit import (
+    Hull,
+    OrientationField,
+    Roots,
+    ScalpDistance,
+    Scene,
+    Strands,
+    Waves,
+    hookimpl,
+)
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
-from hairkit.field.growth_prior import combing_direction, hair_length, scalp_way
-from hairkit.grooming.postprocess import FinishOptions, finished
+from hairkit.field.growth_prior import combing_direction
+from hairkit.grooming.postprocess import FinishOptions, finish
 from hairkit.options import option
 from hairkit.parallel import parallel_for
 
@@ -83,16 +92,16 @@ class Options(FinishOptions):
 @hookimpl
 def track(
     scene: Scene,
-    masks: tuple[Mask, ...],
-    orientations: tuple[OrientationMap, ...],
     hull: Hull,
     field: OrientationField,
     roots: Roots,
+    waves: Waves,
+    scalp_distance: ScalpDistance,
     options: Options,
 ) -> Strands:
     """Grow one strand from every root, trim, smooth and wave it, and keep it out of the head."""
     directions = _start_directions(scene, hull, field, roots, options)
-    points, counts = _grow(scene, hull, field, roots, directions, options)
+    points, counts = _grow(hull, field, roots, directions, scalp_distance.hair_length, options)
     points, counts = trim_u_turns(points, counts, options.u_share)
     offsets = np.concatenate([[0], np.cumsum(counts)])
     rows = np.arange(points.shape[1])[None, :] < counts[:, None]
@@ -100,7 +109,7 @@ def track(
     even = strands.points.reshape(len(roots), options.points, 3)
     smooth = smooth_strands(even, options.smoothing)
     result = Strands(smooth.reshape(-1, 3), strands.offsets, root_uv=roots.uv)
-    return finished(result, scene, masks, orientations, hull, options)
+    return finish(result, waves, hull, options)
 
 
 def _start_directions(
@@ -121,11 +130,11 @@ def _start_directions(
 
 
 def _grow(
-    scene: Scene,
     hull: Hull,
     field: OrientationField,
     roots: Roots,
     directions: Float64Array,
+    hair_length: float,
     options: Options,
 ) -> tuple[Float32Array, Int64Array]:
     """Return padded points (N, M, 3) and how many of each strand are real (N,), at least two."""
@@ -148,7 +157,7 @@ def _grow(
         options.blind_steps,
         options.inertia,
         options.slide_sine,
-        options.slide_share * hair_length(hull, scalp_way(scene.head, hull)),
+        options.slide_share * hair_length,
         options.clearance,
     )
     steps = max(int(options.max_length / step + _WHOLE), 1)

@@ -20,8 +20,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit import Hull, Mask, OrientationField, OrientationMap, Scene, hookimpl
-from hairkit.field.growth_prior import ScalpPrior, growth_potential, with_scalp_prior
+from hairkit import (
+    Hull,
+    Mask,
+    OrientationField,
+    OrientationMap,
+    ScalpDistance,
+    Scene,
+    Waves,
+    hookimpl,
+)
+from hairkit.field.growth_prior import ScalpPrior, add_scalp_prior, growth_potential
 from hairkit.field.view_fusion import FusionOptions, fuse_views
 from hairkit.options import option
 
@@ -91,16 +100,16 @@ def solve_field(
     masks: tuple[Mask, ...],
     orientations: tuple[OrientationMap, ...],
     hull: Hull,
+    waves: Waves,
+    scalp_distance: ScalpDistance,
     options: Options,
 ) -> OrientationField:
-    """Return the blend field with its signs and the internal distance."""
-    growth = growth_potential(scene.head, hull, options.tip_share)
-    fused = fuse_views(scene.cameras, masks, orientations, hull, options)
+    """Return the blended field with its signs and the internal distance."""
+    growth = growth_potential(hull, scalp_distance, options.tip_share)
+    fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options)
     segments = find_segments(scene.cameras, masks, fused, hull, growth, options)
     prior = ScalpPrior(options.scalp_weight, options.scalp_reach, options.scalp_lift)
-    wanted, weight = with_scalp_prior(
-        scene.head, hull, growth, fused.tensor, fused.certainty, prior
-    )
+    wanted, weight = add_scalp_prior(scene.head, hull, growth, fused.tensor, fused.certainty, prior)
     band = ribbons(segments, hull, options.ribbon)
     signs = growth_direction(scene.head, hull, growth, band, options)
     inner = internal_direction(hull, wanted, weight, band, options)

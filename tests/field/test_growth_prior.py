@@ -1,4 +1,4 @@
-"""Laws of the ways through the hair and of how hair leaves the scalp."""
+"""Laws of distances through the hair and of the direction in which hair leaves the scalp."""
 
 from __future__ import annotations
 
@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from hairkit.arrays import BoolArray, Float64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.field.growth_prior import (
-    chamfer_way,
+    chamfer_distance,
     combing_direction,
     gradient,
     growth_potential,
-    hair_length,
-    scalp_way,
+    measure_scalp_distance,
 )
 from hairkit.testing import ball_head, scalp_roots
 from hairkit.types.volume import Hull, VoxelGrid
@@ -36,6 +35,11 @@ def curtain(spacing: float = 0.01, hem: float = -0.3, thickness: float = 0.03) -
     gap = np.where(centres[..., 1] > 0, distance, tube)
     hair = (gap > 0) & (gap < thickness) & (centres[..., 1] > hem)
     return Hull(grid, hair, hair, distance.astype(np.float32))
+
+
+def potential(hull: Hull) -> Float32Array:
+    """The growth potential of hair on the ball."""
+    return growth_potential(hull, measure_scalp_distance(ball_head(), hull), 0.6)
 
 
 def graph_way(occupied: BoolArray, start: BoolArray) -> Float64Array:
@@ -68,7 +72,7 @@ def test_the_way_along_a_straight_corridor_is_its_length(axis: int) -> None:
     start = np.zeros_like(occupied)
     start.flat[10] = True
     wanted = 0.003 * np.abs(np.arange(30) - 10)
-    np.testing.assert_allclose(chamfer_way(occupied, start, 0.003).ravel(), wanted, atol=1e-6)
+    np.testing.assert_allclose(chamfer_distance(occupied, start, 0.003).ravel(), wanted, atol=1e-6)
 
 
 def test_the_way_goes_round_a_wall() -> None:
@@ -77,10 +81,10 @@ def test_the_way_goes_round_a_wall() -> None:
     occupied[5, :10] = False
     start = np.zeros_like(occupied)
     start[4, 0] = True
-    way = chamfer_way(occupied, start, 1.0)
+    way = chamfer_distance(occupied, start, 1.0)
     assert way[6, 0, 0] == pytest.approx(2 * (8 + np.sqrt(2)) + 2, abs=1e-4)
     occupied[5, 10] = False
-    assert np.isinf(chamfer_way(occupied, start, 1.0)[6:]).all()
+    assert np.isinf(chamfer_distance(occupied, start, 1.0)[6:]).all()
 
 
 def test_a_maze_is_followed_to_its_end() -> None:
@@ -90,7 +94,7 @@ def test_a_maze_is_followed_to_its_end() -> None:
     occupied[1::4, 8] = occupied[3::4, 0] = True
     start = np.zeros_like(occupied)
     start[0, 0] = True
-    way = chamfer_way(occupied, start, 1.0)
+    way = chamfer_distance(occupied, start, 1.0)
     np.testing.assert_allclose(way, graph_way(occupied, start), rtol=1e-5)
     assert way[24].max() > 12 * 8
 
@@ -103,7 +107,7 @@ def test_the_way_is_that_of_dijkstra(seed: int, filled: float) -> None:
     occupied = rng.random((7, 6, 8)) < filled
     start = occupied & (rng.random(occupied.shape) < 0.03)
     np.testing.assert_allclose(
-        chamfer_way(occupied, start, 1.0), graph_way(occupied, start), rtol=1e-5
+        chamfer_distance(occupied, start, 1.0), graph_way(occupied, start), rtol=1e-5
     )
 
 
@@ -122,18 +126,18 @@ def test_hair_is_as_long_as_the_way_along_the_curtain() -> None:
     """From the edge of the scalp to the hem; 15 cm less of curtain are 15 cm less of way."""
     head = ball_head()
     long, short = curtain(hem=-0.3), curtain(hem=-0.15)
-    way = scalp_way(head, long)
-    length = hair_length(long, way)
-    assert 0.25 < length < 0.35
-    assert length - hair_length(short, scalp_way(head, short)) == pytest.approx(0.15, abs=0.02)
+    distance = measure_scalp_distance(head, long)
+    assert 0.25 < distance.hair_length < 0.35
+    shorter = measure_scalp_distance(head, short).hair_length
+    assert distance.hair_length - shorter == pytest.approx(0.15, abs=0.02)
     roots = long.grid.nearest_cell(head.vertices[head.scalp > 0.5] * 1.06)
-    assert way[tuple(roots.T)].max() <= 3 * 0.01 * np.sqrt(3)
+    assert distance.values[tuple(roots.T)].max() <= 3 * 0.01 * np.sqrt(3)
 
 
 def test_hair_grows_towards_its_tips() -> None:
     """The potential rises all the way down the curtain and is highest at the hem."""
-    head, hull = ball_head(), curtain()
-    growth = growth_potential(head, hull, 0.6)
+    hull = curtain()
+    growth = potential(hull)
     assert np.isfinite(growth).all()
     angle = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     for y in (0.03, -0.03, -0.08):
@@ -156,7 +160,7 @@ def test_combed_hair_leaves_the_scalp_at_the_angle_of_the_lift(hull: Hull, lift:
     head = ball_head()
     at = scalp_roots(head).positions * 1.05
     at = at[at[:, 1] < 0.08]
-    growth = growth_potential(head, hull, 0.6)
+    growth = potential(hull)
     combed = combing_direction(head, hull, growth, at, lift)
     np.testing.assert_allclose(np.linalg.norm(combed, axis=1), 1, atol=1e-6)
     outward = gradient(hull.grid, hull.head_distance, at)
@@ -191,14 +195,14 @@ def test_without_hair_on_the_scalp_the_way_is_nothing() -> None:
     hull = curtain()
     below = hull.dense & (hull.grid.centres()[..., 1] < -0.15)
     apart = replace(hull, dense=below, loose=below)
-    np.testing.assert_array_equal(scalp_way(ball_head(), apart), 0)
-    assert np.isfinite(growth_potential(ball_head(), apart, 0.6)).all()
+    np.testing.assert_array_equal(measure_scalp_distance(ball_head(), apart).values, 0)
+    assert np.isfinite(potential(apart)).all()
 
 
 def test_the_potential_of_long_hair_grows_up_to_its_hem() -> None:
     """Among the tips, too, the potential leads down the curtain: signs are not left to chance."""
     hull = curtain()
-    growth = growth_potential(ball_head(), hull, 0.6)
+    growth = potential(hull)
     height = np.arange(-0.1, -0.27, -0.02)
     down = np.stack([np.full_like(height, 0.115), height, np.zeros_like(height)], axis=1)
     assert (np.diff(hull.grid.sample(growth, down)) > 0.1 * 0.02).all()

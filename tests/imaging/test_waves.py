@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 from hairkit.arrays import Float64Array
 from hairkit.grooming.wind_waves import add_waves
-from hairkit.imaging.waves import Waves, measure_waves, without_slant
+from hairkit.imaging.waves import measure_waves, remove_slant
 from hairkit.types.camera import Camera
 from hairkit.types.mask import HAIR, Mask
 from hairkit.types.orientation import OrientationMap, angle_between, wrap_angle
 from hairkit.types.strands import Strands
+from hairkit.types.waves import Waves
 
 HEIGHT, WIDTH = 540, 360
 METRES_PER_PIXEL = 0.001
@@ -116,12 +117,12 @@ def test_taking_off_the_slant_turns_every_angle_by_it(slant: float) -> None:
     """Putting it back gives the map again; confidence stays, and 0 changes nothing."""
     angle = wrap_angle(np.linspace(0, 3.1, 35).reshape(5, 7))
     found = OrientationMap(angle, np.linspace(0, 1, 35, dtype=np.float32).reshape(5, 7))
-    without = without_slant(found, Waves(0.01, 0.03, slant))
+    without = remove_slant(found, Waves(0.01, 0.03, slant))
     np.testing.assert_allclose(angle_between(without.angle, angle - slant), 0, atol=1e-5)
-    again = without_slant(without, Waves(0.01, 0.03, -slant))
+    again = remove_slant(without, Waves(0.01, 0.03, -slant))
     np.testing.assert_allclose(angle_between(again.angle, angle), 0, atol=1e-5)
     np.testing.assert_array_equal(without.confidence, found.confidence)
-    assert without_slant(found, Waves(0.01, 0.03, 0.0)) is found
+    assert remove_slant(found, Waves(0.01, 0.03, 0.0)) is found
 
 
 def hanging(
@@ -201,17 +202,25 @@ def test_a_camera_sees_wound_strands_slant_as_measured(
     )
 
 
-def test_hair_is_out_of_step_and_guides_are_not() -> None:
-    """Neighbours 1 mm apart have phases of their own, those 2 cm apart vary smoothly with place."""
+def test_the_phase_changes_from_wisp_to_wisp() -> None:
+    """Hair 0.2 mm apart is nearly in phase, hair 6 mm apart is not."""
 
     def spread(spacing: float) -> float:
         _, azimuth = about_axes(add_waves(hanging(spacing, rows=10), Waves(0.005, 0.04, 0.3)))
         phase = np.exp(1j * azimuth[:, 100]).reshape(10, 10)
         return float(np.abs(np.diff(phase, axis=1)).mean())
 
-    assert spread(0.001) > 1.0
-    jump = spread(0.0061)
-    assert 0.05 < jump < 0.75 * spread(0.001)
+    assert spread(0.0002) < 0.5
+    assert spread(0.0061) > 1.0
+
+
+@pytest.mark.parametrize("slant", [0.3, 0.0])
+def test_a_strand_does_not_depend_on_how_many_others_there_are(slant: float) -> None:
+    """Some of many strands, wound alone, are exactly those wound among all."""
+    every, waves = hanging(0.001, rows=20), Waves(0.005, 0.04, slant)
+    some = np.random.default_rng(0).permutation(len(every))[:30]
+    alone, among = add_waves(every.select(some), waves), add_waves(every, waves).select(some)
+    np.testing.assert_array_equal(alone.points, among.points)
 
 
 def test_the_seed_alone_decides() -> None:
@@ -233,6 +242,6 @@ def test_no_radius_no_pitch_or_no_strands_is_no_change() -> None:
 
 
 def test_a_single_strand_is_wound_too() -> None:
-    """There is no neighbour to ask for the spacing of roots."""
+    """One strand needs no neighbours."""
     distance, _ = about_axes(add_waves(hanging(rows=1), Waves(0.005, 0.04, 0.3)))
     assert distance[0, -1] == pytest.approx(0.005, abs=1e-5)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from ball import RECIPE
 
-from hairkit import Capture, Groom, Mask, hookimpl
+from hairkit import Capture, Groom, Mask, Roots, ScalpDistance, Strands, Waves, hookimpl
 from hairkit.errors import InputError, PluginError, RenderError
 from hairkit.manager import Manager
 from hairkit.pipeline.recipe import parse_recipe
@@ -107,6 +107,26 @@ def test_unchanged_stages_are_not_run_again(tmp_path: Path) -> None:
     assert ran(tmp_path, reuse=False) == sorted([*STAGES, "export"])
 
 
+def test_what_stages_share_is_kept_and_handed_to_them(tmp_path: Path) -> None:
+    """Waves and the scalp distance are results in the work folder, made once for all stages."""
+    handed = {}
+
+    class Tracker:
+        @hookimpl
+        def track(self, roots: Roots, waves: Waves, scalp_distance: ScalpDistance) -> Strands:
+            handed.update(waves=waves, distance=scalp_distance)
+            return ball_plugin.track(roots, ball_plugin.Options())
+
+    run(tmp_path, "track=tracker", extra={"tracker": Tracker()})
+    for name, value in handed.items():
+        kept, given = np.load(tmp_path / "work" / f"{name}.npz"), to_arrays(value)
+        assert all(np.array_equal(kept[key], given[key]) for key in given)
+    record = Recorder(Silent())
+    run(tmp_path, "track=tracker", extra={"tracker": Tracker()}, guides=50, progress=record)
+    again = {stage["stage"] for stage in record.stages if not stage["reused"]}
+    assert again == {"track", "ball_plugin"}
+
+
 def test_what_depends_on_a_change_is_run_again(tmp_path: Path) -> None:
     """Roots change the strands only; a photo changes all; an option all stages of its plugin."""
     run(tmp_path)
@@ -135,7 +155,7 @@ def test_the_plugins_own_file_is_part_of_the_digest(tmp_path: Path) -> None:
             turn_capture(), tmp_path / "out", recipe, manager,
             head=ball_head(), guides=40, progress=record, sheet=False,
         )  # fmt: skip
-        assert [stage["reused"] for stage in record.stages] == [False] * 8
+        assert [stage["reused"] for stage in record.stages] == [False] * 10
 
 
 @pytest.mark.parametrize("stage", [*STAGES, "export"])

@@ -9,20 +9,21 @@ import pytest
 from hairkit_plugins.hybrid_growth import Options, grow, track
 
 from hairkit.arrays import Float32Array
-from hairkit.grooming import postprocess
-from hairkit.imaging.waves import Waves
-from hairkit.testing import ball_head, combed_field, scalp_roots, shell_hull, turn_scene
+from hairkit.field.growth_prior import measure_scalp_distance
+from hairkit.testing import (
+    ball_head,
+    combed_field,
+    scalp_roots,
+    shell_hull,
+)
 from hairkit.types.head import Roots
 from hairkit.types.strands import Strands
 from hairkit.types.volume import OrientationField, VoxelGrid
+from hairkit.types.waves import Waves
 
 FREE = Options(slide_sine=0.0, waves=False, clearance=0.0)
+DISTANCE = measure_scalp_distance(ball_head(), shell_hull())
 GRID = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.01)
-
-
-@pytest.fixture(autouse=True)
-def _straight_hair(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(postprocess, "measure_waves", lambda *_: Waves())
 
 
 def constant(way: tuple[float, float, float]) -> OrientationField:
@@ -87,8 +88,8 @@ def test_a_root_where_nothing_is_known_keeps_its_place() -> None:
 
 
 def follow_ball(options: Options, roots: Roots) -> Strands:
-    scene = turn_scene()
-    return track(scene, (), (), shell_hull(), combed_field(shell_hull().grid), roots, options)
+    hull = shell_hull()
+    return track(hull, combed_field(hull.grid), roots, Waves(), DISTANCE, options)
 
 
 def test_a_field_without_signs_is_followed_along_its_growth() -> None:
@@ -180,10 +181,10 @@ def test_strands_can_be_smoothed_by_helix_arcs() -> None:
     field = combed_field(shell_hull().grid)
     noisy = replace(field, tensor=field.tensor + 0.15 * rng.standard_normal(field.tensor.shape))
     roots = scalp_roots(ball_head())
-    scene, hull = turn_scene(), shell_hull()
+    hull = shell_hull()
     options = replace(FREE, inertia=0.0, reach=2.0)
     rough, calm = (
-        track(scene, (), (), hull, noisy, roots, replace(options, helix_tolerance=t))
+        track(hull, noisy, roots, Waves(), DISTANCE, replace(options, helix_tolerance=t))
         for t in (0.0, 0.0005)
     )
 

@@ -10,15 +10,16 @@ from hairkit_plugins.tensor_diffusion import Options, solve_field
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.cameras.projection_kernels import pack_camera
-from hairkit.field import view_fusion
+from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.field.view_fusion import Fading, LooseCells, OrientedView, add_planes
-from hairkit.imaging.waves import Waves, measure_waves
+from hairkit.imaging.waves import measure_waves
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera, CameraModel
 from hairkit.types.mask import HAIR, Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.scene import Scene
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid, symmetric_matrices
+from hairkit.types.waves import Waves
 
 RADIUS = 0.06
 CENTRE = np.array([0.0, 0.16, 0.0])
@@ -27,12 +28,6 @@ SPACING = 0.008
 ALONG = np.array([0.5, -0.75, 0.433])
 PLAIN = Options(scalp_weight=0.0, pool=0.0, unslant=False, smoothness=1e-3)
 """Fusion and nothing else."""
-
-
-@pytest.fixture(autouse=True)
-def _straight_hair(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Measuring waves takes longer than all the rest, and `PLAIN` has no use for them."""
-    monkeypatch.setattr(view_fusion, "measure_waves", lambda *_: Waves())
 
 
 def turn(model: CameraModel = "perspective") -> tuple[Camera, ...]:
@@ -86,15 +81,19 @@ def solve(
     maps: tuple[OrientationMap, ...] | None = None,
     masks: tuple[Mask, ...] | None = None,
     hull: Hull | None = None,
+    waves: Waves | None = None,
 ) -> OrientationField:
-    """Solve the bun's field."""
+    """Solve the bun's field, of straight hair by default."""
     cameras = turn() if cameras is None else cameras
+    hull = bun() if hull is None else hull
     scene = Scene(tuple("abcdefgh"[: len(cameras)]), cameras, ball_head())
     return solve_field(
         scene,
         tuple(all_hair(camera) for camera in cameras) if masks is None else masks,
         tuple(seen(camera) for camera in cameras) if maps is None else maps,
-        bun() if hull is None else hull,
+        hull,
+        waves or Waves(),
+        measure_scalp_distance(scene.head, hull),
         options,
     )
 
@@ -127,26 +126,26 @@ def test_exact_angles_give_the_true_direction(along: Float64Array, model: Camera
     assert off_deg(main_directions(field, hull.dense), along).max() < 2
 
 
-def test_straight_hair_survives_the_default_options(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_straight_hair_survives_the_default_options() -> None:
     """Pooling, slant and prior leave a straight field away from the scalp as it is."""
-    monkeypatch.setattr(view_fusion, "measure_waves", measure_waves)
-    field = solve(Options())
+    cameras = turn()
+    maps = [seen(camera) for camera in cameras]
+    waves = measure_waves(maps, [all_hair(camera) for camera in cameras], cameras)
+    field = solve(Options(), waves=waves)
     far = bun().dense & (bun().head_distance > 0.05)
     assert np.median(off_deg(main_directions(field, far))) < 2
 
 
-def test_the_slant_of_waves_is_taken_off_before_views_are_fused(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_slant_of_waves_is_removed_before_views_are_fused() -> None:
     """Views that all show the same slant beside the truth give the truth; untreated they do not."""
     slant = 0.3
-    monkeypatch.setattr(view_fusion, "measure_waves", lambda *_: Waves(0.005, 0.03, slant))
+    waves = Waves(0.005, 0.03, slant)
     upright = np.array([0.0, 1.0, 0.0])
     maps = tuple(seen(camera, upright) for camera in turn("orthographic"))
     slanted = tuple(OrientationMap(wrap_angle(m.angle + slant), m.confidence) for m in maps)
     for unslant in (True, False):
         options = replace(PLAIN, unslant=unslant, see_through=0.0)
-        field = solve(options, cameras=turn("orthographic"), maps=slanted)
+        field = solve(options, cameras=turn("orthographic"), maps=slanted, waves=waves)
         shallow = bun().dense & (field.confidence > 0.3)
         error = np.median(off_deg(main_directions(field, shallow), upright))
         assert error < 1 if unslant else error > 5

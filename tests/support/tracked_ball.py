@@ -8,10 +8,12 @@ import numpy as np
 from hairkit_plugins.certainty_tracker import Options, track
 
 from hairkit.arrays import BoolArray, Float64Array
+from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.testing import scalp_roots, turn_scene
 from hairkit.types.head import Roots
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_products
+from hairkit.types.waves import Waves
 
 BALL = 0.1
 SPACING = 0.01
@@ -66,9 +68,13 @@ def constant(direction: Float64Array) -> OrientationField:
     return field_along(unit, CENTRES @ unit)
 
 
-def run(field: OrientationField, hull: Hull, roots: Roots, options: Options) -> Strands:
-    """Track; no photos are needed without waves."""
-    return track(turn_scene(), (), (), hull, field, roots, options)
+def run(
+    field: OrientationField, hull: Hull, roots: Roots, options: Options, waves: Waves | None = None
+) -> Strands:
+    """Track; straight hair unless waves are given."""
+    scene = turn_scene()
+    distance = measure_scalp_distance(scene.head, hull)
+    return track(scene, hull, field, roots, waves or Waves(), distance, options)
 
 
 def polylines(strands: Strands) -> Float64Array:

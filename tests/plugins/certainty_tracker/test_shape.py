@@ -25,9 +25,8 @@ from tracked_ball import (
 )
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.grooming import postprocess
-from hairkit.imaging.waves import Waves
 from hairkit.testing import scalp_roots, turn_scene
+from hairkit.types.waves import Waves
 
 
 def bent_starts(normals: Float64Array, bend_deg: float) -> Float64Array:
@@ -156,15 +155,12 @@ def test_smoothing_leaves_straight_strands() -> None:
 
 @pytest.mark.parametrize("clearance", [0.0, 0.001, 0.004])
 @pytest.mark.parametrize("wound", [False, True])
-def test_strands_stay_out_of_the_head(
-    clearance: float, wound: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_strands_stay_out_of_the_head(clearance: float, wound: bool) -> None:
     """Where the field leads through the head they go round, at the clearance; also when wound."""
     waves = Waves(0.008, 0.04, 0.3)
-    monkeypatch.setattr(postprocess, "measure_waves", lambda *_: waves)
     roots = scalp_roots(turn_scene().head)
     options = Options(clearance=clearance, waves=wound, max_length=0.4)
-    strands = run(constant(np.array([0.1, -1.0, 0.2])), filled(), roots, options)
+    strands = run(constant(np.array([0.1, -1.0, 0.2])), filled(), roots, options, waves)
     free = np.ones(len(strands.points), bool)
     free[strands.offsets[:-1]] = False
     distance = np.linalg.norm(strands.points[free], axis=1) - BALL
@@ -173,14 +169,13 @@ def test_strands_stay_out_of_the_head(
     assert np.median(strands.tips[:, 1]) < -0.1
 
 
-def test_waves_are_wound_unless_the_option_says_no(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_waves_are_wound_unless_the_option_says_no() -> None:
     """Wound strands start at the same roots and are longer by about the length of the helix."""
     waves = Waves(0.006, 0.04, 0.3)
-    monkeypatch.setattr(postprocess, "measure_waves", lambda *_: waves)
     roots = roots_where(crown)
     options = replace(FREE, max_length=0.15, points=200)
     plain, wound = (
-        run(constant(UP), filled(), roots, replace(options, waves=w)) for w in (False, True)
+        run(constant(UP), filled(), roots, replace(options, waves=w), waves) for w in (False, True)
     )
     np.testing.assert_array_equal(plain.roots, wound.roots)
     helix = np.hypot(1, 2 * np.pi * waves.radius / waves.pitch)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hairkit_plugins.hybrid_field import Options, solve_field
 from hairkit_plugins.hybrid_field.four_fields import internal_distance, surface_structure
 from hairkit_plugins.hybrid_field.photo_lines import (
@@ -24,10 +23,8 @@ from hairkit_plugins.hybrid_field.segments import find_segments, orient_segments
 from scipy import ndimage
 
 from hairkit.arrays import Float64Array
-from hairkit.field import view_fusion
-from hairkit.field.growth_prior import growth_potential
+from hairkit.field.growth_prior import growth_potential, measure_scalp_distance
 from hairkit.field.view_fusion import DEPTH_SHRINK, fuse_views
-from hairkit.imaging.waves import Waves
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera
 from hairkit.types.mask import HAIR, Mask
@@ -35,17 +32,12 @@ from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull, VoxelGrid, cell_slopes, outer_products
+from hairkit.types.waves import Waves
 
 CENTRE = np.array([0.0, 0.16, 0.0])
 ALONG = np.array([0.5, -0.75, 0.433])
 SPACING = 0.006
 PLAIN = Options(scalp_weight=0.0, pool=0.0, unslant=False, outward=0.0)
-
-
-@pytest.fixture(autouse=True)
-def _straight_hair(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Measuring waves takes longer than all the rest, and these heads have none."""
-    monkeypatch.setattr(view_fusion, "measure_waves", lambda *_: Waves())
 
 
 def cameras() -> tuple[Camera, ...]:
@@ -99,8 +91,8 @@ def off_deg(directions: Float64Array) -> Float64Array:
 def segments(options: Options = PLAIN) -> tuple[Strands, Hull]:
     views, masks, maps = photos()
     hull = bun()
-    growth = growth_potential(ball_head(), hull, 0.6)
-    fused = fuse_views(views, masks, maps, hull, options)
+    growth = growth_potential(hull, measure_scalp_distance(ball_head(), hull), 0.6)
+    fused = fuse_views(views, masks, maps, hull, Waves(), options)
     return find_segments(views, masks, fused, hull, growth, options), hull
 
 
@@ -215,7 +207,9 @@ def test_one_direction_everywhere_comes_back_signed() -> None:
     views, masks, maps = photos()
     scene = Scene(tuple("abcdefgh"), views, ball_head())
     hull = bun()
-    field = solve_field(scene, masks, maps, hull, PLAIN)
+    field = solve_field(
+        scene, masks, maps, hull, Waves(), measure_scalp_distance(scene.head, hull), PLAIN
+    )
     assert field.direction is not None
     direction = field.direction[hull.dense].astype(np.float64)
     assert np.median(off_deg(direction)) < 4
@@ -229,7 +223,10 @@ def test_without_segments_the_inner_field_alone_speaks() -> None:
     views, masks, maps = photos()
     blank = tuple(OrientationMap(found.angle, 0 * found.confidence) for found in maps)
     scene = Scene(tuple("abcdefgh"), views, ball_head())
-    field = solve_field(scene, masks, blank, bun(), Options(pool=0.0, unslant=False))
+    hull = bun()
+    distance = measure_scalp_distance(scene.head, hull)
+    options = Options(pool=0.0, unslant=False)
+    field = solve_field(scene, masks, blank, hull, Waves(), distance, options)
     assert field.direction is not None
     assert np.isfinite(field.direction).all()
     assert field.internal_distance is not None
