@@ -36,6 +36,9 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 from __future__ import annotations
 
 import importlib
+import os
+import stat
+import tempfile
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -157,3 +160,30 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+def _choose_kernel_cache() -> None:
+    """Let Numba keep compiled code in the folder for temporary files, if nowhere else.
+
+    Numba keeps it beside the sources or in the user's cache; where it can write to neither, its
+    cached functions cannot even be imported. Others must not be able to write to the folder,
+    because Numba runs what it finds there.
+    """
+    cache = os.path.expanduser("~/.cache")
+    while not os.path.exists(cache) and cache != os.path.dirname(cache):
+        cache = os.path.dirname(cache)
+    if "NUMBA_CACHE_DIR" in os.environ or any(os.access(p, os.W_OK) for p in (__path__[0], cache)):
+        return
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = os.path.join(tempfile.gettempdir(), f"hairkit-kernels-{user}")
+    try:
+        os.makedirs(folder, stat.S_IRWXU, exist_ok=True)
+        found = os.lstat(folder)
+    except OSError:
+        return
+    private = stat.S_ISDIR(found.st_mode) and not stat.S_IMODE(found.st_mode) & ~stat.S_IRWXU
+    if private and found.st_uid == user:
+        os.environ["NUMBA_CACHE_DIR"] = folder  # Numba reads it when it is first imported
+
+
+_choose_kernel_cache()

@@ -29,6 +29,9 @@ Check Python, the packages, OpenGL, caches and plugins, and say what to install.
 _MODULES = {"opencv-contrib-python-headless": "cv2"}
 """Distributions whose module has another name."""
 
+_NO_CACHE = "no locator available"
+"""What Numba says where it has no folder for compiled code."""
+
 _GL_CURE = "on Debian: apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6"
 
 # Each backend gets a process of its own: only one can be loaded in a process, and drivers crash.
@@ -165,8 +168,8 @@ def _kernel_cache() -> Finding:
                 return Finding("compiled kernels", "ok", f"can be kept under {folder}")
         except OSError:
             continue
-    cure = "every start compiles anew; set NUMBA_CACHE_DIR to a folder that can be written"
-    return Finding("compiled kernels", "note", f"{folders[0]} cannot be written: {cure}")
+    cure = "so Numba refuses to compile; set NUMBA_CACHE_DIR to a folder that can be written"
+    return Finding("compiled kernels", "FAIL", f"{folders[0]} cannot be written, {cure}")
 
 
 def _plugins() -> Iterator[Finding]:
@@ -174,7 +177,7 @@ def _plugins() -> Iterator[Finding]:
     working = [info.name for info in infos if not info.broken]
     yield Finding("plugins", "ok" if working else "FAIL", ", ".join(working) or "none works")
     for info in infos:
-        if info.broken:
+        if info.broken and _NO_CACHE not in info.broken:  # which `_kernel_cache` says once
             own = info.distribution == "hairkit"
             text = f"{info.broken}; pip install --force-reinstall {info.distribution}"
             yield Finding(f"plugin {info.name}", "FAIL" if own else "note", text)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
+from pathlib import Path
 
 import pytest
 
+import hairkit
 from hairkit.cli import doctor, main
 from hairkit.cli.doctor import Finding
 
@@ -55,3 +58,21 @@ def test_a_backend_that_does_not_exist_is_reported() -> None:
     success, text = doctor._try_backend("no-such-backend")
     assert not success
     assert "no-such-backend" in text
+
+
+@pytest.mark.parametrize("open_to_others", [False, True])
+def test_kernels_are_kept_in_the_temporary_folder_if_nowhere_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, open_to_others: bool
+) -> None:
+    """With a read-only installation and home, Numba gets a folder that nobody else can write to."""
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    hairkit._choose_kernel_cache()
+    assert "NUMBA_CACHE_DIR" not in os.environ
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    folder = tmp_path / f"hairkit-kernels-{os.getuid()}"
+    if open_to_others:
+        folder.mkdir()
+        folder.chmod(0o777)
+    hairkit._choose_kernel_cache()
+    assert os.environ.pop("NUMBA_CACHE_DIR", None) == (None if open_to_others else str(folder))
