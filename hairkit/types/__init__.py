@@ -13,5 +13,6 @@ the packages named after the subject.
 * `preview`: the pictures of these types that a notebook shows
 * `scene`: cameras and fitted head
 * `strands`: packed polylines
-* `volume`: grid, hull and orientation field
+* `volume`: grid, hull, orientation field, distance from the scalp
+* `waves`: radius, pitch and slant of wavy hair
 """
