@@ -7,6 +7,7 @@ import importlib.util
 import inspect
 import re
 import sys
+import types
 import typing
 from collections.abc import Iterator
 from dataclasses import MISSING, dataclass
@@ -191,7 +192,7 @@ def _check_options(kind: Any) -> tuple[OptionInfo, ...]:
 
 
 def _is_option_type(kind: Any) -> bool:
-    parts = [part for part in typing.get_args(kind) if part not in (type(None), Ellipsis)]
-    if not parts:
-        return kind in OPTION_TYPES
-    return all(_is_option_type(part) for part in parts)
+    if typing.get_origin(kind) in (tuple, typing.Union, types.UnionType):
+        parts = [part for part in typing.get_args(kind) if part not in (type(None), Ellipsis)]
+        return all(_is_option_type(part) for part in parts)
+    return kind in OPTION_TYPES

@@ -136,7 +136,9 @@ class Manager:
             raise
         except ValueError as error:  # its __post_init__ refuses values that do not go together
             raise OptionError(f"{place}: {one_line(error)}") from error
-        except Exception as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             raise OptionError(f"{place}: its Options failed: {named(error)}") from error
 
     def call(self, stage: str, plugin: str, options: Any = None, **arguments: Any) -> Any:
