@@ -36,9 +36,12 @@ class VoxelGrid(Stored):
             raise DataError(
                 f"grid needs spacing and three sizes above 0, got {self.spacing}, {self.shape}"
             )
-        if int(np.prod(np.array(self.shape, dtype=np.float64))) > MAX_CELLS:
+        cells = float(np.prod(np.array(self.shape, dtype=np.float64)))
+        if cells > MAX_CELLS:
+            fitting = self.spacing * (cells / MAX_CELLS) ** (1 / 3)
             raise DataError(
-                f"grid {self.shape} has more than {MAX_CELLS} cells; use a larger voxel size"
+                f"grid {self.shape} has more than {MAX_CELLS} cells; use a larger voxel size,"
+                f" above {fitting:.2g} m"
             )
 
     @classmethod

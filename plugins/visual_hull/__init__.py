@@ -53,13 +53,17 @@ SHELL_CELLS = 2
 SCALP_REACH_CELLS = 3
 """Cells from the scalp's vertices within which the shell lies: they are up to 8 mm apart."""
 
+FINEST = 0.002
+"""Metres of the smallest cell: hair 45 cm wide and deep and 65 cm long then fits into a grid, so
+that an allowed size is not refused when the cameras are found."""
+
 
 @dataclass(frozen=True)
 class Options:
     """Settings of the hull."""
 
     mode: str = option("labels", choices=("labels", "votes"), doc="How views decide on a cell.")
-    voxel_size: float = option(0.003, low=0.001, high=0.02, doc="Edge length of a cell.", unit="m")
+    voxel_size: float = option(0.003, low=FINEST, high=0.02, doc="Edge length of a cell.", unit="m")
     min_views: int = option(2, low=1, high=64, doc="Views that must see hair in a cell.")
     forgive: int = option(
         -1,

@@ -13,12 +13,13 @@ from hairkit_plugins.visual_hull import Options, build_hull
 from scipy import ndimage
 
 from hairkit.arrays import BoolArray, Float64Array
-from hairkit.errors import InputError
+from hairkit.errors import InputError, OptionError
+from hairkit.options import describe, make_options
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera, CameraModel
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 from hairkit.types.scene import Scene
-from hairkit.types.volume import Hull
+from hairkit.types.volume import Hull, VoxelGrid
 
 BALL = 0.1
 HEIGHT, WIDTH = 162, 130
@@ -319,6 +320,14 @@ def test_pictures_of_several_sizes_carve_together() -> None:
     one = build_hull(scene, masks, COARSE)
     other = build_hull(replace(scene, cameras=cameras), mixed, COARSE)
     assert other.dense.sum() == pytest.approx(one.dense.sum(), rel=0.03)
+
+
+def test_the_finest_cells_allowed_fit_long_hair() -> None:
+    """What can be judged before any stage runs is refused there: no allowed size is too fine."""
+    (finest,) = (each.low for each in describe(Options) if each.name == "voxel_size")
+    VoxelGrid.around([-0.225, -0.55, -0.225], [0.225, 0.1, 0.225], finest)
+    with pytest.raises(OptionError, match=r"voxel_size is '0\.001', expected a number from 0\.002"):
+        make_options(Options, {"voxel_size": "0.001"}, "visual_hull")
 
 
 def test_masks_that_do_not_overlap_in_space_are_an_error() -> None:
