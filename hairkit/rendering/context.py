@@ -1,4 +1,4 @@
-"""The one place that makes OpenGL contexts: offscreen, EGL first, OSMesa second, one a process."""
+"""The OpenGL context of the process, offscreen: EGL, or OSMesa if EGL fails."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from hairkit.errors import RenderError
 from hairkit.rendering.osmesa import OSMesaContext
 
 REQUIRED_VERSION = 430
-"""OpenGL 4.3, for buffers read by vertex shaders."""
+"""OpenGL 4.3, for compute shaders and storage buffers."""
 
 _CARDS = ("dri/renderD*", "nvidia[0-9]*")
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr")
-"""Words in the names of renderers that run on the processor."""
+"""Words in the names of renderers that run on the CPU."""
 
 Compiled = TypeVar("Compiled")
 
@@ -40,7 +40,7 @@ class Renderer:
         self.backend = backend
         """Which of `BACKENDS` made the context."""
         self.home = context.simple_framebuffer((1, 1))
-        """Bound between pictures: moderngl goes back to the last bound one, released or not."""
+        """Bound between pictures, since moderngl rebinds the last one, even if released."""
         self.home.use()
         self._programs: dict[str, moderngl.Program] = {}
         self._computes: dict[str, moderngl.ComputeShader] = {}
@@ -53,7 +53,7 @@ class Renderer:
 
     @property
     def software(self) -> bool:
-        """Whether the renderer runs on the processor."""
+        """True if the renderer runs on the CPU."""
         name = str(self.context.info["GL_RENDERER"]).lower()
         return any(word in name for word in _SOFTWARE)
 
@@ -71,10 +71,10 @@ class Renderer:
         return self._programs[key]
 
     def recompile_programs(self) -> None:
-        """Compile every shader in use anew, as its file now is.
+        """Recompile all shaders in use from their files.
 
-        Raises `RenderError` when one does not compile; all stay as they are then. Old ones are not
-        released: others may still draw with them.
+        Raises `RenderError` if one does not compile; then all stay as they are. Old programs are
+        not released, since they may still be in use.
         """
         programs, computes = self._programs, self._computes
         self._programs, self._computes = {}, {}
@@ -90,7 +90,7 @@ class Renderer:
             raise
 
     def compute(self, name: str, **definitions: int) -> moderngl.ComputeShader:
-        """Return the compute shader `name.comp`, with numbers that its text leaves open."""
+        """Return the compute shader `name.comp`, with `#define`s for `definitions`."""
         key = " ".join([name, *(f"{word}={value}" for word, value in definitions.items())])
         if key not in self._computes:
             source = shader_source(f"{name}.comp")
@@ -103,11 +103,10 @@ class Renderer:
 
 @contextlib.contextmanager
 def renderer() -> Iterator[Renderer]:
-    """Give the process's renderer to the calling thread until the block ends.
+    """Make the process's renderer current in the calling thread for a block.
 
-    A block may stand in another one of the same thread.
-
-    Raises `RenderError` when no context can be made, or when the block left an OpenGL error.
+    Blocks of one thread can be nested. Raises `RenderError` if no context can be made, or if the
+    block leaves an OpenGL error.
     """
     global _renderer, _depth
     with _lock:
@@ -115,18 +114,18 @@ def renderer() -> Iterator[Renderer]:
             _renderer, _depth = _create(), 0
         _depth += 1
         try:
-            # an inner block would leave no context behind for the outer one
+            # an inner block must not release the context of the outer one
             with _renderer.context if _depth == 1 else contextlib.nullcontext():
                 yield _renderer
                 error = _renderer.context.error
         finally:
             _depth -= 1
         if error != "GL_NO_ERROR":
-            raise RenderError(f"drawing failed: OpenGL reports {error} ({_renderer.backend})")
+            raise RenderError(f"drawing failed with OpenGL error {error} ({_renderer.backend})")
 
 
 def on_graphics_card() -> bool:
-    """Return whether this process draws with a graphics card, or could; false for software."""
+    """Return whether this process draws, or would draw, with a graphics card."""
     made = _renderer is not None and _owner == os.getpid()
     if not made and not any(found for pattern in _CARDS for found in Path("/dev").glob(pattern)):
         return False
@@ -138,20 +137,22 @@ def on_graphics_card() -> bool:
 
 
 def install(context: moderngl.Context, backend: str) -> Renderer:
-    """Make a context, such as a window's, the one that this process draws with.
+    """Make `context`, such as a window's, the renderer of this process.
 
-    Raises `RenderError` when the process draws with another one already.
+    Raises `RenderError` if the process has another one already.
     """
     global _renderer, _owner
     with _lock:
         if _renderer is not None and _owner == os.getpid():
-            raise RenderError(f"this process draws by {_renderer.backend} already; open a new one")
+            raise RenderError(
+                f"this process already has a context ({_renderer.backend}); start a new process"
+            )
         _renderer, _owner = Renderer(context, backend), os.getpid()
         return _renderer
 
 
 def shader_source(name: str) -> str:
-    """Return the text of a shader; lines `#include "other.glsl"` are replaced by that file."""
+    """Return the source of a shader with each `#include "other.glsl"` expanded."""
     text = resources.files("hairkit.shaders").joinpath(name).read_text()
     lines = [
         shader_source(line.split('"')[1]) if line.startswith("#include") else line
@@ -182,7 +183,7 @@ def _create() -> Renderer:
     for backend in BACKENDS if asked is None else (asked,):
         try:
             context = _open(backend)
-        except Exception as error:  # any failure of a driver: the next backend may work
+        except Exception as error:  # drivers fail in many ways; try the next backend
             failures.append(f"{backend}: {' '.join(str(error).split())}")
         else:
             _owner = os.getpid()

@@ -1,4 +1,4 @@
-"""Where pictures are drawn: a colour and a depth buffer, supersampled and read back as an array."""
+"""Frame buffers: a colour and a depth buffer, supersampling, and read-back as an array."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from hairkit.types.camera import Camera
 Sample = TypeVar("Sample", np.uint8, np.float32)
 
 SUPERSAMPLE = 2
-"""Samples along each edge of a pixel: measured faster and better here than multisampling."""
+"""Samples along each edge of a pixel; faster and better than multisampling for thin ribbons."""
 
 
 class Target:
-    """A frame buffer of the camera's size; rows run down the picture."""
+    """A frame buffer of the camera's size; the first row is the top of the picture."""
 
     def __init__(self, framebuffer: moderngl.Framebuffer, kind: Literal["f1", "f4"]) -> None:
         self._framebuffer = framebuffer
@@ -40,12 +40,12 @@ class Target:
 
 @contextlib.contextmanager
 def target(gl: Renderer, camera: Camera, kind: Literal["f1", "f4"] = "f1") -> Iterator[Target]:
-    """Make a cleared target the current one; depth testing is on."""
+    """Bind a cleared target for a block, with depth testing; raises `RenderError` if too large."""
     size = (camera.width, camera.height)
     limit = int(gl.context.info["GL_MAX_VIEWPORT_DIMS"][0])
     if max(size) > limit:
         raise RenderError(
-            f"picture of {size[0]} x {size[1]} samples, at most {limit}: draw smaller"
+            f"picture of {size[0]} x {size[1]} samples, expected at most {limit}; draw it smaller"
         )
     colour = gl.context.renderbuffer(size, 4, dtype=kind)
     depth = gl.context.depth_renderbuffer(size)
@@ -68,7 +68,7 @@ def supersample_camera(camera: Camera, factor: int) -> Camera:
 
 
 def average_samples(samples: npt.NDArray[Sample], camera: Camera) -> npt.NDArray[Sample]:
-    """Return samples (k H, k W, C), uint8 or float32, averaged over each pixel, (H, W, C)."""
+    """Average samples (k H, k W, C), uint8 or float32, over each pixel; return (H, W, C)."""
     if samples.shape[:2] == (camera.height, camera.width):
         return samples
     size = (camera.width, camera.height)

@@ -1,7 +1,7 @@
-"""From a `Camera` to OpenGL matrices, such that drawing lands where `Camera.project` says.
+"""OpenGL matrices of a `Camera`, consistent with `Camera.project`.
 
-The picture's first row is OpenGL's lowest row (y in clip space runs down the picture), so that a
-target read back from the first byte on is already an array [row, column].
+The top row of the picture is OpenGL's bottom row (y in clip space points down), so that a target is
+read back as an array [row, column] without flipping.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ Program = moderngl.Program | moderngl.ComputeShader
 
 @dataclass(frozen=True)
 class DepthRange:
-    """Axial depths between which something is drawn, metres."""
+    """Near and far plane, axial depth in metres."""
 
     near: float
     far: float
 
     @classmethod
     def around(cls, camera: Camera, *point_sets: npt.ArrayLike) -> DepthRange:
-        """Return a range that holds all point sets (N, 3), in front of a perspective camera."""
+        """Return a range that contains all point sets (N, 3), in front of a perspective camera."""
         depths = [camera.depth(points) for points in point_sets if len(np.asarray(points))]
         low = min((float(depth.min()) for depth in depths), default=0.1)
         high = max((float(depth.max()) for depth in depths), default=1.0)
@@ -57,7 +57,7 @@ def clip_from_camera(camera: Camera, depth: DepthRange) -> Float64Array:
 
 
 def set_camera(program: Program, camera: Camera, depth: DepthRange) -> None:
-    """Set those of the camera uniforms that a program has."""
+    """Set the camera uniforms that a program uses."""
     set_uniforms(
         program,
         u_clip_from_head=_columns(clip_from_camera(camera, depth) @ camera.camera_from_head),
@@ -70,7 +70,7 @@ def set_camera(program: Program, camera: Camera, depth: DepthRange) -> None:
 
 
 def set_uniforms(program: Program, **values: object) -> None:
-    """Set uniforms by name, passing over those the compiler dropped because nothing reads them."""
+    """Set uniforms by name; skip those that the compiler removed as unused."""
     for name, value in values.items():
         if name in program:
             program[name] = value

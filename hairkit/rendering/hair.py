@@ -1,4 +1,4 @@
-"""Strands as ribbons on the GPU: one buffer of points, one triangle strip a strand."""
+"""Strands as camera-facing ribbons on the GPU, one triangle strip for each."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SHAPED_BYTES = 32  # a RibbonPoint of ribbon.glsl
 
 @dataclass(frozen=True)
 class RibbonBuffers:
-    """A strand set on the GPU."""
+    """Strands on the GPU."""
 
     points: moderngl.Buffer
     shaped: moderngl.Buffer
@@ -36,9 +36,9 @@ class RibbonBuffers:
 def ribbons(
     gl: Renderer, strands: Strands, width: float | npt.ArrayLike
 ) -> Iterator[RibbonBuffers | None]:
-    """Keep strands on the GPU for a block, `width` metres wide (a number or (P,)).
+    """Upload strands for a block, `width` metres wide (a number or (P,)).
 
-    Yields `None`, which draws nothing, when there is no strand.
+    Yields `None`, which draws nothing, if there are no strands.
     """
     if not len(strands):
         yield None
@@ -85,7 +85,7 @@ def draw_ribbons(
 
 
 def strand_numbers(count: int) -> Float32Array:
-    """Return one random-looking number in [0, 1) a strand, the same in every run (golden ratio)."""
+    """Return a quasi-random number in [0, 1) for each strand (golden-ratio sequence)."""
     golden = 0.6180339887498949
     numbers: Float32Array = np.mod(np.arange(count) * golden, 1.0).astype(np.float32)
     return numbers
@@ -95,7 +95,7 @@ def _point_records(strands: Strands, width: float | npt.ArrayLike) -> Float32Arr
     arc = strands.arc_lengths()
     length = np.repeat(arc[strands.offsets[1:] - 1], strands.counts)
     fraction = arc / np.maximum(length, 1e-9)
-    # ribbon_shape.glsl tells roots and tips by exactly 0 and 1
+    # ribbon_shape.glsl detects roots and tips by exactly 0 and 1
     fraction = np.clip(fraction, 1e-6, 1 - 1e-6)
     fraction[strands.offsets[:-1]] = 0
     fraction[strands.offsets[1:] - 1] = 1

@@ -1,4 +1,4 @@
-"""The head and other meshes on the GPU."""
+"""Head and other meshes on the GPU."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from hairkit.types.head import Head
 SKIN = (0.42, 0.24, 0.17)
 """Linear RGB of skin."""
 SCALP_TINT = 0.75
-"""How much of the hair's colour the scalp takes on."""
+"""Weight of the hair colour on the scalp."""
 
 
 class Mesh(Protocol):
-    """What is drawn as a solid: a `Head`, or anything else with vertices and faces."""
+    """A triangle mesh: a `Head`, or anything else with vertices and faces."""
 
     @property
     def vertices(self) -> Float32Array:
@@ -46,11 +46,11 @@ class Solid:
     colours: Float32Array
     """(V, 3) linear RGB."""
     scatter: float = 1.0
-    """1 for skin, under whose surface light travels, 0 for cloth."""
+    """Subsurface scattering: 1 for skin, 0 for cloth."""
 
 
 def head_solid(head: Head, material: HairMaterial) -> Solid:
-    """Return the head with skin, its scalp tinted so that gaps between strands do not glare."""
+    """Return the head with skin colours and a scalp tinted with the colour of the hair."""
     colours = np.tile(np.array(SKIN, np.float32), (len(head.vertices), 1))
     scalp = np.clip(head.scalp, 0, 1)[:, None] * np.float32(SCALP_TINT)
     colours = (1 - scalp) * colours + scalp * (0.5 * material.root_colour)

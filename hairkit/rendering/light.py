@@ -1,7 +1,7 @@
-"""Lights, and how much of each reaches every place: hair and head dim it, summed up in a volume.
+"""Lights, and a volume of their transmittance through hair and head.
 
-Optical depth is summed through a grid of hair density along each light's direction, a coarse form
-of opacity shadow maps (Kim and Neumann 2001) that needs no pass on the GPU.
+Optical depth is integrated through a grid of hair density along each light's direction: a coarse
+form of opacity shadow maps (Kim and Neumann 2001), computed on the CPU.
 """
 
 from __future__ import annotations
@@ -26,15 +26,17 @@ CELL = 0.005
 MAX_EDGE = 128
 """Cells along the longest side at most; hair that is longer gets larger cells."""
 FULL_HEAD = 100_000
-"""Hairs on a head: fewer strands stand for as many."""
+"""Hairs on a head; fewer strands absorb as much light as this many."""
 HAIR_WIDTH = 8e-5
 """Diameter of a hair for the shadows, metres."""
 ABSORBED_SHARE = 0.3
-"""Share of the light that meets a hair and goes no further: the rest scatters on (dark hair)."""
+"""Share of the light at a hair that is absorbed; the rest scatters forward (dark hair)."""
 STEPS = 28
-"""Samples on the way to a light."""
+"""Samples along the ray to a light."""
+STEP_GROWTH, FIRST_STEP = 1.08, 0.9
+"""Ratio of successive steps along that ray, and the first sample in cells."""
 SOLID = 250.0
-"""Optical depth of the head, per metre."""
+"""Optical depth of meshes, per metre."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +53,13 @@ class Lights:
 
     @classmethod
     def at_camera(cls, camera: Camera) -> Lights:
-        """Return lights that go with the camera: key above its left, rim behind on the right."""
+        """Return lights fixed to a camera: key above on the left, rim behind on the right."""
         key, rim = np.array([-0.45, -0.6, -0.75]), np.array([0.55, -0.6, 0.55])
         return cls.studio(key @ camera.rotation, rim @ camera.rotation)
 
     @classmethod
     def studio(cls, key: npt.ArrayLike, rim: npt.ArrayLike, exposure: float = 0.7) -> Lights:
-        """Return warm key and cool rim light from directions (3,), towards the light, and a sky."""
+        """Return a sky, a warm key and a cool rim light from directions (3,) towards the lights."""
         return cls(_unit(key), _unit(rim), exposure=exposure)
 
     def uniforms(self) -> dict[str, Any]:
@@ -67,7 +69,7 @@ class Lights:
 
 @dataclass(frozen=True)
 class Density:
-    """What hair and solids take from light per metre of way."""
+    """Extinction coefficient of hair and meshes on a grid."""
 
     grid: VoxelGrid
     extinction: Float32Array
@@ -76,7 +78,7 @@ class Density:
 
 @dataclass(frozen=True)
 class LightVolume:
-    """What reaches each cell."""
+    """Transmittance of the lights in each cell."""
 
     grid: VoxelGrid
     transmittance: Float32Array
@@ -102,7 +104,7 @@ class LightVolume:
 
 
 def hair_density(strands: Strands, solids: Sequence[Mesh]) -> Density:
-    """Return how dense hair and solids are around them."""
+    """Return the extinction of hair and meshes on a grid around them."""
     points = [strands.points, *[solid.vertices for solid in solids]]
     low = np.min([p.min(axis=0) for p in points if len(p)], axis=0) - 3 * CELL
     high = np.max([p.max(axis=0) for p in points if len(p)], axis=0) + 3 * CELL
@@ -116,7 +118,7 @@ def hair_density(strands: Strands, solids: Sequence[Mesh]) -> Density:
 
 
 def light_volume(density: Density, lights: Lights) -> LightVolume:
-    """Return how much light reaches each place."""
+    """Return the transmittance of the lights through `density`."""
     grid, extinction = density.grid, density.extinction
     transmittance = np.ones((*grid.shape, 3), np.float32)
     inside = uniform_filter(extinction, 3, mode="constant") > 0
@@ -136,14 +138,14 @@ def _hair_extinction(grid: VoxelGrid, strands: Strands) -> Float32Array:
     cell = np.ravel_multi_index(tuple(grid.nearest_cell(middle).T), grid.shape)
     cells = int(np.prod(grid.shape))
     length = np.bincount(cell, np.linalg.norm(vectors, axis=1), cells).reshape(grid.shape)
-    # strands cross the light at all angles: their shadow is pi / 4 of length times width on average
+    # mean projected area over all directions: pi / 4 of length times width
     stands_for = max(FULL_HEAD / len(strands), 1.0) * HAIR_WIDTH * np.pi / 4
     extinction = length * stands_for * ABSORBED_SHARE / grid.spacing**3
     return np.asarray(uniform_filter(extinction.astype(np.float32), 3), np.float32)
 
 
 def _mark_below_surface(marks: Float32Array, grid: VoxelGrid, solid: Mesh) -> None:
-    """Set the cells just under a mesh to 1."""
+    """Set the cells just below the surface of a mesh to 1."""
     corners = solid.vertices[solid.faces].astype(np.float64)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
@@ -160,9 +162,9 @@ def _optical_depth_towards(
     inside: npt.NDArray[np.bool_],
     direction: npt.NDArray[np.float64],
 ) -> Float32Array:
-    """Return (N,) the optical depth from each cell of `inside` on, in growing steps."""
+    """Return the optical depth (N,) from each cell of `inside` to the light, in growing steps."""
     start = np.argwhere(inside).astype(np.float32)
-    edges = np.cumsum(1.08 ** np.arange(STEPS + 1)) * 0.9
+    edges = np.cumsum(STEP_GROWTH ** np.arange(STEPS + 1)) * FIRST_STEP
     limit = np.array(grid.shape)
     total = np.zeros(len(start), np.float32)
     padded = np.pad(extinction, 1)
@@ -174,7 +176,7 @@ def _optical_depth_towards(
 
 
 def _sky_visibility(extinction: Float32Array, spacing: float) -> Float32Array:
-    """Return (X, Y, Z) the mean transmittance along the six axes, upward counting double."""
+    """Return the mean transmittance (X, Y, Z) along the six axes, with double weight upwards."""
     total = np.zeros_like(extinction)
     for axis, weight_up in ((0, 1.0), (1, 2.0), (2, 1.0)):
         before = np.cumsum(extinction, axis=axis) * spacing

@@ -1,4 +1,4 @@
-"""Pictures to measure with: what hair covers, which way the visible hair runs, what is seen."""
+"""Buffers to measure with: coverage, direction, depth and visibility of hair."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from hairkit.types.orientation import wrap_angle
 from hairkit.types.strands import Strands
 
 Solids = Mesh | Sequence[Mesh] | None
-"""What hides hair behind it: a head, several meshes, or nothing."""
+"""Occluders of hair: a head, several meshes, or None."""
 
 HEAD_PUSH = 0.002
-"""Solids are drawn this much behind their surface, metres, so that they never hide roots."""
+"""Meshes are drawn this far behind their surface, metres, so that they never hide roots."""
 SEEN_TOLERANCE = 0.001
-"""A point this far behind the first strand at its pixel still counts as seen, metres."""
+"""A point up to this far behind the front strand of its pixel is visible, metres."""
 
 _NOTHING, _HAIR, _SOLID = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)
 
@@ -37,10 +37,9 @@ def draw_layers(
     min_width_px: float = 1.0,
     supersample: int = SUPERSAMPLE,
 ) -> tuple[Float32Array, Float32Array]:
-    """Return the shares (H, W) in [0, 1] of each pixel that visible hair and bare solids cover.
+    """Return the coverage (H, W) of each pixel, 0 to 1, by visible hair and by bare meshes.
 
-    `width` is the drawn diameter in metres, one for all or (P,) one a point; `min_width_px` its
-    least in pixels.
+    `width` is the drawn diameter in metres, a number or (P,); `min_width_px` its minimum in pixels.
     """
     fine = supersample_camera(camera, supersample)
     meshes = _meshes(solids)
@@ -58,14 +57,14 @@ def draw_layers(
 
 @dataclass(frozen=True)
 class Measurements:
-    """What is known at every pixel's centre about the strand seen there."""
+    """Direction and depth of the visible strand at each pixel centre."""
 
     angle: Float32Array
     """(H, W) radians in [0, pi), as in `OrientationMap`; 0 without hair."""
     depth: Float32Array
     """(H, W) axial depth in metres, infinity without hair."""
     seen: BoolArray
-    """(H, W) true where hair is the first thing seen."""
+    """(H, W) true where hair is the front-most surface."""
 
 
 def draw_measurements(
@@ -76,7 +75,7 @@ def draw_measurements(
     width: float | Float32Array = 2e-4,
     min_width_px: float = 1.0,
 ) -> Measurements:
-    """Return direction and depth of the strand seen at each pixel, in one drawing."""
+    """Return direction and depth of the visible strand at each pixel, in one pass."""
     meshes = _meshes(solids)
     depth = DepthRange.around(camera, strands.points, *[mesh.vertices for mesh in meshes])
     with renderer() as gl, target(gl, camera, "f4") as picture:
@@ -102,7 +101,7 @@ def draw_coverage(
     width: float | Float32Array = 5e-4,
     min_width_px: float = 1.0,
 ) -> Float32Array:
-    """Return the share (H, W) in [0, 1] of each pixel that hair in front of the head covers."""
+    """Return the coverage (H, W) of each pixel, 0 to 1, by hair in front of the head."""
     return draw_layers(strands, head, camera, width=width, min_width_px=min_width_px)[0]
 
 
@@ -114,7 +113,7 @@ def draw_directions(
     width: float | Float32Array = 2e-4,
     min_width_px: float = 1.0,
 ) -> tuple[Float32Array, BoolArray]:
-    """Return the 2D angle (H, W) of the strand seen at each pixel, and where one is seen.
+    """Return the 2D angle (H, W) of the visible strand at each pixel, and where there is one.
 
     Angles are undirected, in [0, pi), from +x towards +y, as in `OrientationMap`; 0 without hair.
     """
@@ -130,17 +129,17 @@ def draw_depth(
     width: float | Float32Array = 2e-4,
     min_width_px: float = 1.0,
 ) -> Float32Array:
-    """Return the axial depth (H, W) in metres of the strand seen at each pixel, else infinity."""
+    """Return the axial depth (H, W) of the visible strand at each pixel, metres, else infinity."""
     return draw_measurements(strands, head, camera, width=width, min_width_px=min_width_px).depth
 
 
 def visible_points(strands: Strands, head: Solids, camera: Camera) -> BoolArray:
-    """Return (P,) which points of the strands the camera sees before other hair and the head."""
+    """Return which points (P,) are visible: not behind other hair or the head."""
     return points_at_depth(strands, draw_depth(strands, head, camera), camera)
 
 
 def points_at_depth(strands: Strands, depth: Float32Array, camera: Camera) -> BoolArray:
-    """Return (P,) which points lie no further than the `depth` (H, W) that `draw_depth` gave."""
+    """Return which points (P,) are not behind the `depth` (H, W) of `draw_depth`."""
     pixels = camera.project(strands.points)
     inside = np.all((pixels >= 0) & (pixels < [camera.width, camera.height]), axis=1)
     column, row = np.where(inside[:, None], pixels, 0).astype(np.int64).T

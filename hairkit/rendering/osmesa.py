@@ -1,4 +1,4 @@
-"""An OSMesa context in the form that moderngl takes: for machines without EGL."""
+"""An OSMesa context for moderngl, for machines without EGL."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _RGBA, _UNSIGNED_BYTE = 0x1908, 0x1401
 
 
 class OSMesaContext:
-    """Off-screen Mesa: draws into memory of this process, needs neither a display nor a device."""
+    """Off-screen Mesa: renders into memory, without display or device."""
 
     def __init__(self) -> None:
         self._library = _open_library()
@@ -23,13 +23,13 @@ class OSMesaContext:
         attributes = (ctypes.c_int * len(wanted))(*wanted)
         self._context = self._library.OSMesaCreateContextAttribs(attributes, None)
         if not self._context:
-            raise RenderError("OSMesa offers no OpenGL 4.3 core context")
+            raise RenderError("OSMesa has no OpenGL 4.3 core context; install a newer Mesa")
         self._pixel = (ctypes.c_ubyte * 4)()
         self._depth = 0
         self._make_current()
 
     def load(self, name: str) -> int:
-        """Return the address of an OpenGL function, 0 when there is none."""
+        """Return the address of an OpenGL function, 0 if there is none."""
         return self._library.OSMesaGetProcAddress(name.encode()) or 0
 
     def release(self) -> None:
@@ -45,7 +45,7 @@ class OSMesaContext:
 
     def __exit__(self, *exception: object) -> None:
         self._depth -= 1
-        if self._depth:  # an outer block goes on drawing
+        if self._depth:  # an outer block still draws
             return
         self._library.OSMesaMakeCurrent(None, None, 0, 0, 0)
 

@@ -26,11 +26,11 @@ from hairkit.types.strands import Strands
 BACKDROP_TOP, BACKDROP_BOTTOM = (176, 180, 184), (214, 216, 218)
 """sRGB of the neutral backdrop."""
 HEAD_PUSH = 0.0015
-"""Solids are drawn this much behind their surface, metres, so that they do not hide roots."""
+"""Meshes are drawn this far behind their surface, metres, so that they do not hide roots."""
 SHOWN_HAIRS = 50_000
 """Fewer strands are drawn wider, so that they cover the head as this many would."""
 WIDEST = 4.0
-"""Strands are drawn at most this many times wider than they are."""
+"""Largest factor of that widening."""
 
 
 def draw(
@@ -53,19 +53,19 @@ def draw(
     hair
         A groom or strands, drawn as they are: `densify` guides first.
     head
-        Hides what is behind it; None: a groom's own head, no head for bare strands.
+        None: the head of the groom, or no head for `Strands`.
     camera
-        Where from. A drawn point lands where `camera.project` says.
+        The camera; a point is drawn at its `camera.project`.
     width, height
         Size of the picture; the camera is scaled to it. By default the camera's own.
     material
         Colour and width of the hair; None: the groom's, or the default.
     lights
-        None: lights that go with the camera.
+        None: lights fixed to the camera.
     background
         (H, W, 3) picture behind; None: a neutral grey.
     solids
-        Other shaded things, such as shoulders.
+        Other shaded meshes, such as shoulders.
     supersample
         Samples along each edge of a pixel.
     """
@@ -94,7 +94,7 @@ def draw_views(
     supersample: int = SUPERSAMPLE,
     show_direction: bool = False,
 ) -> list[UInt8Array]:
-    """Return one picture a camera, as `draw` makes them, preparing hair and head only once.
+    """Return one picture for each camera, as `draw` does, but upload hair and head once.
 
     With `show_direction` strands are coloured by their direction as in tractography: red runs left
     and right, green front and back, blue up and down.
@@ -155,14 +155,14 @@ def _resize_camera(camera: Camera, width: int | None, height: int | None) -> Cam
         height = round(camera.height * width / camera.width)
     if abs(width * camera.height - height * camera.width) > max(camera.width, camera.height):
         raise InputError(
-            f"a picture of {width} x {height} has not the camera's aspect"
-            f" ({camera.width} x {camera.height}); give one of width and height"
+            f"picture size {width} x {height}, expected the aspect of the camera"
+            f" ({camera.width} x {camera.height}); pass only width or only height"
         )
     return camera.resized(width, height)
 
 
 def display_width(strands: Strands, material: HairMaterial) -> float | Float32Array:
-    """Return the width in metres, or (P,) widths, that strands have in pictures."""
+    """Return the width, or widths (P,), of strands in pictures, metres."""
     wider = float(np.clip(np.sqrt(SHOWN_HAIRS / max(len(strands), 1)), 1.0, WIDEST))
     return wider * (material.width if strands.widths is None else strands.widths)
 

@@ -1,4 +1,4 @@
-"""How the head moves: keyframes and shakes, as one rigid motion at any time."""
+"""Head motion: keyframes with shakes on top, as a rigid motion at any time."""
 
 from __future__ import annotations
 
@@ -17,48 +17,59 @@ from hairkit.storage import read_text
 from hairkit.types.head import Head
 
 AXES = {"pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.0), "roll": (0.0, 0.0, 1.0)}
-"""Nod, turn and tilt: about +X, +Y and +Z of the head frame."""
+"""Rotation axes of nod, turn and tilt, head frame."""
 EASE = 0.25
-"""A shake grows to its full swing over this many seconds, so that nothing jerks at its start."""
+"""Ease-in and ease-out time of a shake, seconds, which avoids a jerk at its start."""
+RIGID_TOLERANCE = 1e-3
+"""Largest deviation of R R^T from the identity in a key."""
 _LARGEST_FILE = 64 * 2**20
+"""Bytes."""
 
 
 @dataclass(frozen=True)
 class Shake:
-    """One swinging of the head about its pivot."""
+    """A sinusoidal rotation of the head about its pivot."""
 
     axis: str
     """A name of `AXES`."""
     degrees: float
-    """How far to each side."""
+    """Amplitude."""
     hertz: float
-    """Swings per second."""
+    """Frequency."""
     until: float | None = None
-    """Seconds after which it stops, eased out likewise; None never."""
+    """Time at which it has stopped, seconds; None: never."""
 
 
 @dataclass(frozen=True, eq=False)
 class HeadMotion:
-    """The head's rigid motion since rest, at any time: keyframes with shakes on top."""
+    """The rigid motion of the head since rest: interpolated keyframes and shakes."""
 
     times: Float64Array
-    """(K,) ascending seconds of the keyframes."""
+    """(K,) ascending times of the keyframes, seconds."""
     keys: Float64Array
     """(K, 4, 4) `head_from_rest` at these times."""
     shakes: tuple[Shake, ...] = ()
     pivot: Float64Array | None = None
-    """(3,) about what the shakes turn, head frame; None the origin."""
+    """(3,) centre of the shakes, head frame; None: the origin."""
 
     def __post_init__(self) -> None:
         times = frozen_array(self.times, np.float64, (None,), "motion times")
         if not len(times) or (np.diff(times) <= 0).any():
-            raise InputError("a head motion needs at least one key, at ascending times")
+            raise InputError(
+                f"{len(times)} keys of a head motion, expected one or more at ascending times"
+            )
         keys = frozen_array(self.keys, np.float64, (len(times), 4, 4), "motion keys")
         turn = keys[:, :3, :3]
         off = np.abs(np.einsum("kij,klj->kil", turn, turn) - np.eye(3)).max(initial=0.0)
-        if off > 1e-3 or (np.linalg.det(turn) < 0).any() or (keys[:, 3] != [0, 0, 0, 1]).any():
+        if (
+            off > RIGID_TOLERANCE
+            or (np.linalg.det(turn) < 0).any()
+            or (keys[:, 3] != [0, 0, 0, 1]).any()
+        ):
             raise InputError(
-                f"head motion keys are not rigid (off by {off:.3g}); bake scale and shear away"
+                f"keys of a head motion are not rigid: error {off:.3g}, expected at most"
+                f" {RIGID_TOLERANCE:g};"
+                " remove scale and shear"
             )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "keys", keys)
@@ -68,7 +79,7 @@ class HeadMotion:
             object.__setattr__(self, "pivot", pivot)
 
     def __call__(self, time: float) -> Float64Array:
-        """Return (4, 4) `head_from_rest` at `time`; before and after the keys the head is still."""
+        """Return `head_from_rest` (4, 4) at `time`; constant outside the times of the keys."""
         motion = self._interpolate_keys(time)
         if not self.shakes:
             return motion
@@ -81,7 +92,7 @@ class HeadMotion:
         return float(self.times[-1])
 
     def _interpolate_keys(self, time: float) -> Float64Array:
-        """Cubic through the keys (Catmull-Rom with the keys' own times), turns and places alike."""
+        """Interpolate rotations and translations by a non-uniform Catmull-Rom spline."""
         count = len(self.times)
         if count == 1 or time <= self.times[0]:
             return np.array(self.keys[0])
@@ -120,7 +131,7 @@ def static_motion() -> HeadMotion:
 def add_shakes(
     texts: Sequence[str], head: Head | None = None, base: HeadMotion | None = None
 ) -> HeadMotion:
-    """Return a motion with shakes.
+    """Return `base`, or a head at rest, with shakes added.
 
     Parameters
     ----------
@@ -128,14 +139,14 @@ def add_shakes(
         `yaw:20:1.5` is yaw (or pitch, roll) by 20 degrees to each side, 1.5 times a second;
         `yaw:20:1.5:2` stops after 2 seconds.
     head
-        Its neck joint is what the shakes turn about.
+        The shakes rotate about its neck joint; None: about the origin.
     base
-        Motion that the shakes come on top of.
+        Motion to add them to; None: the head rests.
 
     Raises
     ------
     InputError
-        A text is none of that form.
+        A text does not have that form.
     """
     start = base if base is not None else static_motion()
     pivot = None if head is None else head.joints[1].astype(np.float64)
@@ -151,7 +162,9 @@ def read_motion(path: Path) -> HeadMotion:
     Raises
     ------
     FormatError
-        The file is anything else.
+        The content is not a head motion.
+    InputError
+        The file does not exist or has another suffix.
     """
     if path.suffix.lower() in (".glb", ".gltf"):
         from hairkit.io.glb_motion import read_head_motion
@@ -159,7 +172,9 @@ def read_motion(path: Path) -> HeadMotion:
         times, keys = read_head_motion(path)
         return HeadMotion(times, keys)
     if path.suffix.lower() != ".json":
-        raise InputError(f"{path}: a head motion is a .json, .glb or .gltf file")
+        raise InputError(
+            f"{path}: a head motion with suffix {path.suffix!r}; expected .json, .glb or .gltf"
+        )
     return _read_json(path)
 
 
@@ -183,7 +198,7 @@ def _read_json(path: Path) -> HeadMotion:
 
 
 def _parse_key(frame: dict[str, object]) -> Float64Array:
-    """Turn by pitch, then roll, then yaw, then move."""
+    """Return a key: rotation by pitch, then roll, then yaw, then translation."""
     pitch, yaw, roll = np.radians(np.array(frame.get("turn_deg", (0, 0, 0)), np.float64))
     key = np.eye(4)
     turns = [("yaw", yaw), ("roll", roll), ("pitch", pitch)]
@@ -215,7 +230,7 @@ def _ease_in_out(time: float, until: float | None) -> float:
 
 
 def _align_signs(turns: Float64Array) -> Float64Array:
-    """Choose the quaternions' signs so that neighbours are near each other."""
+    """Choose the signs of quaternions so that neighbours are close."""
     sign = np.sign((turns[1:] * turns[:-1]).sum(axis=1))
     sign[sign == 0] = 1.0
     near: Float64Array = turns * np.concatenate([[1.0], np.cumprod(sign)])[:, None]

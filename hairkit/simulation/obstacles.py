@@ -1,4 +1,4 @@
-"""What hair may not go into: the head's surface and capsules as one distance on a grid."""
+"""Obstacles of hair: the head and capsules as one signed distance on a grid."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from hairkit.types.head import Capsules, Head
 from hairkit.types.volume import VoxelGrid
 
 SPACING = 0.005
-"""Metres between the grid's values."""
-ROOM = 0.03
-"""How far the grid goes beyond what it holds, metres."""
+"""Spacing of the grid, metres."""
+MARGIN = 0.03
+"""Margin of the grid around head and capsules, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class Obstacles(Stored):
-    """Signed distance to what hair may not go into, inside below 0, in the head frame."""
+    """Signed distance to the obstacles, head frame, negative inside."""
 
     grid: VoxelGrid
     distance: Float32Array
@@ -34,8 +34,8 @@ class Obstacles(Stored):
     def at(self, points: npt.ArrayLike) -> tuple[Float64Array, Float64Array]:
         """Return distance (N,) and outward unit direction (N, 3) at points (N, 3), head frame.
 
-        Trilinear between the grid's values, the direction its exact gradient; far outside the grid
-        the distance is large.
+        The distance is trilinear, the direction its exact gradient; outside the grid the distance
+        is 1 m.
         """
         at = (np.asarray(points, np.float64) - self.grid.origin) / self.grid.spacing - 0.5
         top = np.array(self.grid.shape) - 1
@@ -57,15 +57,15 @@ class Obstacles(Stored):
 
 
 def head_obstacles(head: Head, spacing: float = SPACING) -> Obstacles:
-    """Return the obstacles of a head: its surface with holes closed, and its capsules.
+    """Return the obstacles of a head: its surface, closed over holes, and its capsules.
 
-    The capsules stand for the shoulders where the mesh ends; they move with the head.
+    The capsules model the shoulders below the mesh; they move with the head.
     """
     shapes = head.capsules
     balls = np.concatenate([shapes.first, shapes.second])
     radius = shapes.radius.T.reshape(-1, 1)
-    low = np.concatenate([head.vertices, balls - radius]).min(axis=0) - ROOM
-    high = np.concatenate([head.vertices, balls + radius]).max(axis=0) + ROOM
+    low = np.concatenate([head.vertices, balls - radius]).min(axis=0) - MARGIN
+    high = np.concatenate([head.vertices, balls + radius]).max(axis=0) + MARGIN
     grid = VoxelGrid.around(low, high, spacing)
     distance = signed_distance(head, grid)
     centres = grid.centres().reshape(-1, 3)
@@ -80,9 +80,9 @@ def head_obstacles(head: Head, spacing: float = SPACING) -> Obstacles:
 
 
 def capsule_distance(capsules: Capsules, points: npt.ArrayLike) -> Float32Array:
-    """Return the distance (N,) of points (N, 3) to the nearest capsule, inside below 0.
+    """Return the distance (N,) of points (N, 3) to the nearest capsule, negative inside.
 
-    A capsule of two radii is taken as the union of the balls between: radius linear along its axis.
+    The radius of a capsule is linear along its axis.
     """
     at = np.asarray(points, np.float32)
     best = np.full(len(at), np.inf, np.float32)

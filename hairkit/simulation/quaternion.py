@@ -1,6 +1,6 @@
-"""Unit quaternions (w, x, y, z) as arrays (..., 4): what motion and orientation-carrying rods need.
+"""Unit quaternions (w, x, y, z) as arrays (..., 4).
 
-A quaternion turns the axes of a frame into the world: `rotate(q, e)` are its directors.
+A quaternion rotates the axes e of a frame into the world: `rotate(q, e)` are its directors.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from hairkit.arrays import Float64Array
 
 
 def product(a: Float64Array, b: Float64Array) -> Float64Array:
-    """Return the Hamilton product: first turn by `b`, then by `a`."""
+    """Return the Hamilton product: rotation by `b`, then by `a`."""
     w, x, y, z = np.moveaxis(a, -1, 0)
     s, u, v, t = np.moveaxis(b, -1, 0)
     return np.stack(
@@ -27,20 +27,20 @@ def product(a: Float64Array, b: Float64Array) -> Float64Array:
 
 
 def inverse(q: Float64Array) -> Float64Array:
-    """Return the turn back."""
+    """Return the conjugate, which is the inverse of a unit quaternion."""
     back: Float64Array = q * np.array([1.0, -1.0, -1.0, -1.0])
     return back
 
 
 def normalize(q: Float64Array) -> Float64Array:
-    """Return quaternions or vectors of length 1; zero stays zero."""
+    """Return quaternions or vectors scaled to length 1; zero stays zero."""
     length = np.linalg.norm(q, axis=-1, keepdims=True)
     result: Float64Array = q / np.maximum(length, 1e-300)
     return result
 
 
 def rotate(q: Float64Array, vector: npt.ArrayLike) -> Float64Array:
-    """Return vectors (..., 3) turned by unit quaternions."""
+    """Rotate vectors (..., 3) by unit quaternions."""
     v = np.asarray(vector, np.float64)
     along = 2.0 * np.cross(q[..., 1:], v)
     result: Float64Array = v + q[..., :1] * along + np.cross(q[..., 1:], along)
@@ -54,9 +54,9 @@ def third_axis(q: Float64Array) -> Float64Array:
 
 
 def shortest_arc(start: Float64Array, end: Float64Array) -> Float64Array:
-    """Return the smallest turns that bring unit vectors `start` to `end`; half turns pick an axis.
+    """Return the smallest rotations of unit vectors `start` to `end`; half turns pick any axis.
 
-    This is parallel transport along the great circle between the two.
+    This is parallel transport along the great circle between them.
     """
     cosine = (start * end).sum(axis=-1)
     axis = np.cross(start, end)
@@ -70,15 +70,17 @@ def shortest_arc(start: Float64Array, end: Float64Array) -> Float64Array:
 
 
 def from_axis(axis: npt.ArrayLike, angle: npt.ArrayLike) -> Float64Array:
-    """Return turns by `angle` (...) radians about unit axes (..., 3)."""
+    """Return rotations by `angle` (...) radians about unit axes (..., 3)."""
     half = np.asarray(angle, np.float64)[..., None] / 2
     return np.concatenate([np.cos(half), np.sin(half) * np.asarray(axis, np.float64)], axis=-1)
 
 
 def from_matrix(matrix: npt.ArrayLike) -> Float64Array:
-    """Return the quaternions (..., 4) of rotation matrices (..., 3, 3), w not negative."""
+    """Return the quaternions (..., 4) of rotation matrices (..., 3, 3), with w >= 0."""
     m = np.asarray(matrix, np.float64)
-    if m.ndim == 2 and m[0, 0] + m[1, 1] + m[2, 2] > 0:  # one turn of less than 120 degrees
+    if (
+        m.ndim == 2 and m[0, 0] + m[1, 1] + m[2, 2] > 0
+    ):  # a single rotation of less than 120 degrees
         w = 0.5 * float(np.sqrt(1.0 + m[0, 0] + m[1, 1] + m[2, 2]))
         x, y, z = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
         return np.array([w, x / (4 * w), y / (4 * w), z / (4 * w)])
@@ -117,7 +119,7 @@ def to_matrix(q: npt.ArrayLike) -> Float64Array:
 
 
 def slerp(start: Float64Array, end: Float64Array, share: float) -> Float64Array:
-    """Return the turn a share of the way from `start` to `end`, along the shorter way."""
+    """Interpolate at fraction `share` between `start` and `end`, along the shorter arc."""
     if (start == end).all():
         return start
     step = product(end, inverse(start))

@@ -1,4 +1,4 @@
-"""Runs a simulator without a window and keeps its frames."""
+"""Run a simulator without a window and record its frames."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ STAGE = "simulate"
 
 @dataclass(frozen=True, eq=False)
 class Weather:
-    """What acts on the hair besides the head, the same at all times."""
+    """Constant wind and gravity of a run."""
 
     wind: Float64Array = field(default_factory=lambda: np.zeros(3))
-    """(3,) metres per second, world."""
+    """(3,) mean velocity, world, metres per second."""
     turbulence: float = 0.0
-    """Gusts as a share of the wind."""
+    """RMS speed of gusts over the mean speed."""
     gravity: Float64Array | None = None
-    """(3,) metres per second squared; None takes the groom's."""
+    """(3,) world, metres per second squared; None: the groom's."""
 
 
 def run(
@@ -41,30 +41,34 @@ def run(
     warm_up: float = 0.0,
     progress: Progress | None = None,
 ) -> PointCache:
-    """Return `frames` frames of the simulator's points; without warm-up the first is the rest.
+    """Return `frames` frames of the simulator's points; without warm-up the first is at rest.
 
     Parameters
     ----------
     simulator
-        What `make_simulator` made; it is reset first.
+        The simulator; it is reset first.
     motion
-        The head's motion; frame i is at `i / frames_per_second` of it, after the warm-up.
+        Motion of the head; frame i is at time `warm_up + i / frames_per_second`.
     frames, frames_per_second
-        How many and how dense; the method takes as many substeps between as it needs.
+        Number and rate; the simulator divides the time between two frames into substeps.
     weather
-        Wind and gravity; None: still air, the groom's gravity.
+        Wind and gravity; None: no wind, the groom's gravity.
     warm_up
-        Seconds simulated before the first frame, which are not kept: hair that already moves.
+        Seconds simulated before the first frame and not recorded.
     progress
-        Told of every frame.
+        Notified of each frame.
 
     Raises
     ------
     DataError
-        The simulator's points are no longer finite, or not as many as its strands have.
+        A point is not finite, or there are not as many points as in `simulator.strands`.
+    InputError
+        `frames` or `frames_per_second` is not positive, or the frames do not fit into memory.
     """
     if frames < 1 or not frames_per_second > 0:
-        raise InputError(f"{frames} frames at {frames_per_second} a second, expected both above 0")
+        raise InputError(
+            f"{frames} frames at {frames_per_second} per second, expected both above 0"
+        )
     told, air = progress or Silent(), weather or Weather()
     began = perf_counter()
     before = round(warm_up * frames_per_second)
@@ -88,18 +92,18 @@ def run(
 
 
 def _allocate_frames(frames: int, points: int) -> Float32Array:
-    """Return room for all frames; says that there is none before hours are spent."""
+    """Allocate all frames; raises `InputError` if they do not fit into memory."""
     size, memory = frames * points * 12, _physical_memory()
     if size > memory:
         raise InputError(
-            f"{frames} frames of {points} points take {size / 2**30:.0f} GiB of memory,"
-            f" here are {memory / 2**30:.0f}; ask for fewer frames"
+            f"{frames} frames of {points} points take {size / 2**30:.0f} GiB of memory, expected at"
+            f" most {memory / 2**30:.0f}; record fewer frames"
         )
     return np.empty((frames, points, 3), np.float32)
 
 
 def _physical_memory() -> float:
-    """Return the bytes of this machine's memory, infinity where it does not tell."""
+    """Return the memory of this machine in bytes, infinity if unknown."""
     try:
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     except (AttributeError, ValueError, OSError):
@@ -111,5 +115,5 @@ def _check_points(points: Float32Array, shape: tuple[int, ...], time: float) -> 
         raise DataError(f"points has shape {np.shape(points)} at {time:.3f} s, expected {shape}")
     if not np.isfinite(points).all():
         raise DataError(
-            f"the simulation is not finite at {time:.3f} s; take more substeps or less stiffness"
+            f"the simulation diverged at {time:.3f} s; use more substeps or less stiffness"
         )

@@ -1,4 +1,4 @@
-"""What every simulator of guides can do, whatever its method."""
+"""The protocol of simulators of guides."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from hairkit.types.strands import Strands
 
 @dataclass(frozen=True)
 class Grab:
-    """A point of a strand that the user holds."""
+    """A point of a strand that is pulled to a target."""
 
     point: int
-    """Its number in the strands' points."""
+    """Index in `Strands.points`."""
     target: tuple[float, float, float]
-    """Where it is pulled to, world, metres."""
+    """World, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What acts on the hair during one `advance`: the state at its end; motion is interpolated."""
+    """Head motion and forces of one `advance`, at its end; the head motion is interpolated."""
 
     head_from_rest: Float64Array = field(default_factory=lambda: np.eye(4))
     """(4, 4) rigid motion of the head since rest, in the world."""
     wind: Float64Array = field(default_factory=lambda: np.zeros(3))
     """(3,) velocity of the air, metres per second, world."""
     turbulence: float = 0.0
-    """How far gusts go beyond the mean wind, as a share of it."""
+    """RMS speed of gusts over the mean wind speed."""
     gravity: Float64Array | None = None
-    """(3,) metres per second squared, world; None takes the groom's, along -Y."""
+    """(3,) metres per second squared, world; None: the groom's, along -Y."""
     grabs: tuple[Grab, ...] = ()
+    """Points that are pulled during the step; empty: none."""
 
     def __post_init__(self) -> None:
         motion = frozen_array(self.head_from_rest, np.float64, (4, 4), "head_from_rest")
@@ -47,55 +48,70 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class Measures:
-    """Read-outs of a simulator's present state."""
+    """Measurements of a simulator's present state."""
 
     stretch: float
-    """Largest relative change of a segment's length, 0.01 for 1 %."""
+    """Largest relative change of a segment's length since rest, 0.01 for 1 %."""
     kinetic_energy: float
     """Joules, all guides."""
     potential_energy: float
-    """Joules of gravity and elastic energy; 0 is the rest state."""
+    """Gravitational and elastic energy, joules, relative to the rest state."""
 
 
 @runtime_checkable
 class Simulator(Protocol):
-    """Simulated guides; `advance` is the only thing that moves them.
+    """Simulated guides of one groom; only `advance`, `reset` and `retune` change the state.
 
-    A simulator is made at rest: the captured shape, which stays still under gravity.
+    `make_simulator(groom, options)` returns one at rest: time 0, the head at `np.eye(4)`, and the
+    guides in their captured shape, which is an equilibrium under gravity. Points are finite after
+    each `advance`, or a later call raises `HairkitError`.
     """
 
     @property
     def strands(self) -> Strands:
-        """The guides at rest, head frame."""
+        """The guides at rest, head frame, metres; the same object for the simulator's life."""
         ...
 
     @property
     def options(self) -> Any:
-        """The plugin's options in force: those that were None are resolved by the groom."""
+        """The options in force, with None replaced by the groom's value; None without options."""
         ...
 
     @property
     def time(self) -> float:
-        """Seconds since the start or the last reset."""
+        """Simulated seconds since the start or the last reset."""
         ...
 
     @property
     def points(self) -> Float32Array:
-        """(P, 3) present positions in the world, metres, in the order of `strands`."""
+        """(P, 3) float32 positions, world, metres, in the order of `strands.points`.
+
+        The array stays valid: later steps write to another one.
+        """
         ...
 
     def advance(self, seconds: float, surroundings: Surroundings) -> None:
-        """Go on by `seconds`, in as many substeps as the method needs."""
+        """Advance by `seconds`, in as many substeps as the method needs.
+
+        `seconds` of 0 or less changes nothing. Raises `InputError` if a grab names no point of
+        `strands`, and `HairkitError` if the method cannot go on.
+        """
         ...
 
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
-        """Put the guides at rest on a head at `head_from_rest` (4, 4), without velocity."""
+        """Reset time to 0 and the guides to rest, with zero velocity.
+
+        `head_from_rest` (4, 4) is the rigid motion of the head, world; None: the identity.
+        """
         ...
 
     def retune(self, options: Any) -> None:
-        """Take other values of the plugin's options from now on; positions stay."""
+        """Change the options; positions stay unless the number of nodes changes.
+
+        `options` is an instance of the plugin's options class.
+        """
         ...
 
     def measure(self) -> Measures:
-        """Return the present read-outs."""
+        """Return stretch and energies of the present state; the state does not change."""
         ...

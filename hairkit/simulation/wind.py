@@ -1,4 +1,4 @@
-"""Wind with gusts: a mean, and turbulence as a function of place and time."""
+"""Wind: a mean velocity and turbulent gusts as a function of position and time."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from hairkit.arrays import Float64Array
 
 MODES = 16
-"""Waves that the gusts are made of."""
+"""Number of plane waves in the gusts."""
 LONGEST, SHORTEST = 0.8, 0.08
-"""Wavelengths of the gusts, metres: from a head's height to a lock's."""
+"""Longest and shortest wavelength, metres: a few heads, and a lock."""
 LIFETIME = 0.5
-"""How fast a gust changes while it is carried along: turns of phase per second, of the longest."""
+"""Rate of change of the longest gust in the moving air, cycles per second."""
 
 
 def air_velocity(
@@ -21,23 +21,23 @@ def air_velocity(
 ) -> Float64Array:
     """Return the velocity of the air (N, 3) at points (N, 3) in the world, metres per second.
 
-    The gusts are a sum of plane waves whose amplitudes are square to their wave vectors, so that
-    they are free of divergence (Kraichnan 1970), with an energy that falls as Kolmogorov's spectrum
-    does; they are carried along by the mean wind (Taylor's hypothesis) and change slowly. The root
-    mean square of a component is `turbulence` times the mean wind over the square root of three.
+    The gusts are a sum of plane waves with amplitudes perpendicular to their wave vectors, which
+    makes them divergence-free (Kraichnan 1970), and with Kolmogorov's energy spectrum. They move
+    with the mean wind (Taylor's hypothesis) and change slowly. The RMS of a component is
+    `turbulence` times the mean speed over the square root of three.
 
     Parameters
     ----------
     points
-        Where, world, metres.
+        World, metres.
     time
-        When, seconds.
+        Seconds.
     wind
-        (3,) mean velocity.
+        (3,) mean velocity, metres per second.
     turbulence
-        Root mean square of the gusts as a share of the mean wind's speed.
+        RMS speed of the gusts over the mean speed.
     seed
-        Of the gusts; equal seeds give equal gusts.
+        Seed of the gusts.
     """
     mean = np.broadcast_to(wind, points.shape)
     waves, amplitudes, phases = gust_waves(time, wind, turbulence, seed)
@@ -50,10 +50,10 @@ def air_velocity(
 def gust_waves(
     time: float, wind: Float64Array, turbulence: float, seed: int = 0
 ) -> tuple[Float64Array, Float64Array, Float64Array]:
-    """Return what gusts are made of at a time: the sum of `amplitudes` cos(waves . x + phases).
+    """Return the waves of the gusts at a time: the sum of `amplitudes` cos(waves . x + phases).
 
     Wave vectors (M, 3) in radians a metre, amplitudes (M, 3) in metres per second, phases (M,) in
-    radians; parameters as of `air_velocity`. For those who evaluate gusts elsewhere.
+    radians; parameters as of `air_velocity`. For simulators that evaluate gusts themselves.
     """
     waves, amplitudes, rates, phases = _modes(seed)
     strength = turbulence * float(np.linalg.norm(wind))
@@ -62,7 +62,7 @@ def gust_waves(
 
 @lru_cache(maxsize=8)
 def _modes(seed: int) -> tuple[Float64Array, Float64Array, Float64Array, Float64Array]:
-    """Wave vectors (M, 3), amplitudes (M, 3) of mean square 1, rates (M,) and phases (M,)."""
+    """Return wave vectors (M, 3), amplitudes (M, 3) of mean square 1, rates and phases (M,)."""
     rng = np.random.default_rng(seed)
     length = LONGEST * (SHORTEST / LONGEST) ** (np.arange(MODES) / (MODES - 1))
     direction = rng.normal(size=(MODES, 3))
