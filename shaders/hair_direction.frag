@@ -1,5 +1,5 @@
 #version 430
-// The strand's direction in the picture (y down), its axial depth in metres, and 1 where hair is.
+// 2D direction of the strand (y down), its axial depth in metres, and 1 where there is hair.
 
 in vec2 v_direction;
 in float v_depth;

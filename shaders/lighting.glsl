@@ -1,4 +1,4 @@
-// Two directional lights and a sky, dimmed by the hair in their way (a volume made on the CPU).
+// Two directional lights and a sky, attenuated by hair (light volume).
 
 uniform vec3 u_key_direction;   // towards the light, head frame, unit
 uniform vec3 u_key_colour;
@@ -6,7 +6,7 @@ uniform vec3 u_rim_direction;
 uniform vec3 u_rim_colour;
 uniform vec3 u_sky_colour;
 uniform vec3 u_ground_colour;
-uniform sampler3D u_light;      // transmittance towards key, towards rim, share of the sky that is seen
+uniform sampler3D u_light;      // transmittance towards key and rim light, visible share of the sky
 uniform vec3 u_volume_origin;   // lowest corner, metres
 uniform vec3 u_volume_size;     // metres
 

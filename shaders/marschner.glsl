@@ -1,6 +1,6 @@
 // Light from a hair fibre, a cheap form of Marschner et al. 2003, Light Scattering from Human Hair Fibers:
 // R off the surface, TT through the fibre, TRT off its inner back, each a Gaussian about the tilted
-// cone; what scatters on from fibre to fibre is Kajiya and Kay's (1989) diffuse term.
+// cone; multiple scattering is the diffuse term of Kajiya and Kay (1989).
 
 const float TILT = 0.0524;            // cuticle tilt of 3 degrees; R leans -2, TT 1, TRT 3 times it
 const float ROUGHNESS_R = 0.14;       // longitudinal widths in radians; TT half, TRT twice (Marschner)

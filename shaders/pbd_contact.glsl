@@ -1,13 +1,13 @@
-// Nodes out of the obstacles with friction, then the lengths again. Part of pbd_substeps.comp.
+// Contact: penetration, Coulomb friction, restoring the lengths. Part of pbd_substeps.comp.
 #include "pbd_distance.glsl"
-const float FURTHER = 1.05;       // slack wears off a little faster than the way that a node goes
+const float FURTHER = 1.05;       // safety factor on the distance that a node has moved
 
-vec3 normal[NODE_ROOM];           // of what a node touches, else 0
-float grip[NODE_ROOM];            // change of velocity, m/s, that friction may still make
+vec3 normal[NODE_ROOM];           // contact normal, 0 for free nodes
+float grip[NODE_ROOM];            // largest change of velocity by friction, m/s
 
-// Restore the lengths; a node at an obstacle moves only along it, square to its normal, and what
-// presses it there grips.
-void relengthen() {
+// Restore the lengths; a node in contact moves only perpendicular to its normal, and its pressure adds
+// friction.
+void restore_lengths() {
     vec3 end_before = vec3(0.0);
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec3 way = place[j + 1] - place[j];
@@ -35,35 +35,35 @@ void relengthen() {
     }
 }
 
-// Coulomb: the change along the obstacle is at most the grip.
-vec3 braked(int j, vec3 slide) {
+// Coulomb: the tangential change of velocity is at most the grip.
+vec3 friction_part(int j, vec3 slide) {
     float size = length(slide), brake = clamp(grip[j], 0.0, size);
     grip[j] -= brake;
     return slide * (brake / max(size, 1e-12));
 }
 
-void brake_again(int k) {
+void apply_friction(int k) {
     for (int j = 1; j < EACH_NODE; j++) {
         vec3 relative = speed[j] - drift(k, place[j]);
-        vec3 brake = braked(j, relative - dot(relative, normal[j]) * normal[j]);
+        vec3 brake = friction_part(j, relative - dot(relative, normal[j]) * normal[j]);
         speed[j] -= brake;
         place[j] -= u_seconds * brake;
     }
 }
 
-// Bring a node out of the obstacles; return their normal where it touches, else 0. A node is looked
-// up again only when it may have gone as far as it was away the last time.
-vec3 touched(int k, int j) {
+// Push a node out of the obstacles; return the contact normal, else 0. The grid is read only after the
+// node may have moved by its distance at the last lookup.
+vec3 contact_normal(int k, int j) {
     vec3 p = place[j], relative = speed[j] - drift(k, p), way = vec3(0.0);
     float clear = rates(j).z, left = slack[j] - FURTHER * u_seconds * length(relative);
     if (left <= 0.0) {
         left = obstacle_distance(p, clear, way) - clear;
         float across = dot(relative, way), inward = max(-across, 0.0);
-        // what came in during this substep goes out again; older depth leaves at a limited speed
+        // depth of this substep is removed at once, older depth at a limited speed
         float depth = min(-left, (inward + u_fastest) * u_seconds);
         if (left < 0.0) {
             grip[j] = u_friction * inward;
-            vec3 brake = braked(j, relative - across * way);
+            vec3 brake = friction_part(j, relative - across * way);
             speed[j] += inward * way - brake;
             place[j] += depth * way - u_seconds * brake;
         } else {
@@ -74,13 +74,13 @@ vec3 touched(int k, int j) {
     return way;
 }
 
-void touch(int k) {
+void resolve_contacts(int k) {
     for (int j = 0; j < EACH_NODE; j++) {
         grip[j] = 0.0;
-        normal[j] = j > 0 ? touched(k, j) : vec3(0.0);
+        normal[j] = j > 0 ? contact_normal(k, j) : vec3(0.0);
     }
     for (int round = 0; round <= u_rounds; round++) {
-        if (round > 0) brake_again(k);
-        relengthen();
+        if (round > 0) apply_friction(k);
+        restore_lengths();
     }
 }

@@ -3,13 +3,13 @@ uniform sampler3D u_distances; // along z, y, x
 uniform bool u_obstacles;      // false: there are none
 uniform ivec3 u_cells;         // of the distances
 uniform vec4 u_grid;           // place of the first distance, 1/spacing
-uniform float u_room;          // m, around the grid without obstacles
-const float DIAGONAL = 1.8;    // a distance changes by less within a cell, in cells
+uniform float u_room;          // least distance outside the grid, m
+const float DIAGONAL = 1.8;    // bound of the change of distance within a cell, in cells
 
 // Distances at the four corners of a cell's face across x, along (z, y): a texel holds them all.
 vec4 face(ivec3 cell) { return texelFetch(u_distances, cell.zyx, 0); }
 
-// Trilinear distance and its direction; one look tells most nodes that they are far.
+// Trilinear distance and its direction; one lookup rejects most far nodes.
 float obstacle_distance(vec3 p, float clear, out vec3 normal) {
     vec3 at = (p - u_grid.xyz) * u_grid.w;
     normal = vec3(0.0);

@@ -1,7 +1,7 @@
-// The guides' points in the head's axes: they ride on the rods (see plugins/pbd/resampling.py).
+// Guide points embedded in the rods, head axes (see plugins/pbd/resampling.py).
 #include "pbd_quaternion.glsl"
 #include "pbd_distance.glsl"
-layout(std430, binding = 0) readonly buffer Riders { ivec2 riders[]; };  // 64 rod + segment; least distance
+layout(std430, binding = 0) readonly buffer Embedding { ivec2 embedding[]; };  // 64 rod + segment; least distance
 layout(std430, binding = 1) readonly buffer Offsets { vec4 offsets[]; }; // in the frame; share of segment
 
 vec3 place(int rod, int j) { return node_place(rod, j).xyz; }
@@ -22,12 +22,12 @@ vec4 frame_at(int rod, int j, float t) {
     return normalize((1.0 - part) * here + (dot(here, there) < 0.0 ? -part : part) * there);
 }
 
-// Where point i is, out of the obstacles where it lies too deep between nodes that are out of them.
+// Position of point i, pushed out of the obstacles to its least distance.
 vec3 guide_point(int i) {
-    int rod = riders[i].x >> 6, j = riders[i].x & 63;
+    int rod = embedding[i].x >> 6, j = embedding[i].x & 63;
     vec4 offset = offsets[i];
-    vec3 p = on_rod(rod, j, offset.w) + turned(frame_at(rod, j, offset.w), offset.xyz), normal;
+    vec3 p = on_rod(rod, j, offset.w) + rotate(frame_at(rod, j, offset.w), offset.xyz), normal;
     if (!u_obstacles) return p;
-    float least = intBitsToFloat(riders[i].y), depth = least - obstacle_distance(p, least, normal);
+    float least = intBitsToFloat(embedding[i].y), depth = least - obstacle_distance(p, least, normal);
     return p + max(depth, 0.0) * normal;
 }

@@ -1,6 +1,6 @@
 #version 430
-// Pulls of held points in one substep (see plugins/pbd/grab.py), one grab an invocation; the
-// first of those of a node adds them up. Forces are over the rod's mean mass.
+// Forces on grabbed points in one substep (see plugins/pbd/grab.py), one grab per invocation; the first
+// grab of a node adds all of them. Forces are divided by the rod's mean mass.
 #include "pbd_layout.glsl"
 #include "pbd_quaternion.glsl"
 #include "pbd_constants.glsl"
@@ -22,15 +22,15 @@ const float LEAST_SIZE = 1e-30;
 vec3 expected[MANY], carried_place;
 float column[MANY];        // how the node's force moves each node, of A^-1
 
-vec3 shortened(vec3 v, float most) { return v * min(1.0, most / max(length(v), LEAST_SIZE)); }
+vec3 clamp_length(vec3 v, float most) { return v * min(1.0, most / max(length(v), LEAST_SIZE)); }
 float segment_length(int rod, int i) { return constant(rod, ELEMENT_ROW + 3 * i).w; }
 
-// Where the nodes come without a pull.
+// Predicted nodes without a pull.
 void expect(int rod, int node) {
     for (int j = 0; j < u_nodes; j++) {
-        vec3 place = ridden(u_step, vec4(node_place(rod, j).xyz, 1.0));
+        vec3 place = to_new_axes(u_step, vec4(node_place(rod, j).xyz, 1.0));
         if (j == node) carried_place = place;
-        expected[j] = place + u_seconds * ridden(u_step, vec4(node_speed(rod, j).xyz, 0.0));
+        expected[j] = place + u_seconds * to_new_axes(u_step, vec4(node_speed(rod, j).xyz, 0.0));
     }
 }
 
@@ -51,7 +51,7 @@ void respond(int rod, int node) {
     }
 }
 
-// What the lengths take away of a free node's compliance: C^T M^-1 C with M = L D L^T, row by row.
+// The part of a free node's compliance that the length constraints remove: C^T M^-1 C with M = L D L^T, row by row.
 mat3 held_back(int rod) {
     float factor[MANY * (MANY - 1) / 2], scaled[MANY], pivot[MANY];
     vec3 solved[MANY];
@@ -70,7 +70,7 @@ mat3 held_back(int rod) {
             if (j < i) right -= factor[row + j] * solved[j];
             last = here;
         }
-        // scaled[j] has lost what stands before it, the last one with itself
+        // all columns before are eliminated from scaled[j]
         pivot[i] = 1.0 / max(last, LEAST_SIZE);
         solved[i] = right;
         sum += pivot[i] * outerProduct(right, right);
@@ -78,12 +78,12 @@ mat3 held_back(int rod) {
     return sum;
 }
 
-// The place nearest to the target that the strand's length allows.
+// The point nearest to the target that the strand's length allows.
 vec3 reachable(vec3 target, int rod, int node) {
     float reach = 0.0;
     for (int i = 0; i < node; i++) reach += segment_length(rod, i);
     vec3 root = constant(rod, NODE_ROW).xyz;
-    return root + shortened(target - root, u_taut * reach);
+    return root + clamp_length(target - root, u_taut * reach);
 }
 
 vec3 pull(int i, mat3 stiff, float free) {
@@ -91,13 +91,13 @@ vec3 pull(int i, mat3 stiff, float free) {
     vec4 target = vec4(grabs[i].target[0], grabs[i].target[1], grabs[i].target[2], 1.0);
     target.xyz = rows(u_back[0], u_back[1], u_back[2], target);
     vec3 wanted = reachable(target.xyz, grabs[i].rod, node) - expected[node];
-    wanted = shortened(wanted, u_speed * u_seconds);
+    wanted = clamp_length(wanted, u_speed * u_seconds);
     Learnt before = known[i];
     vec3 missed = before.hoped.w * (before.hoped.xyz - carried_place);
-    vec3 standing = u_kept * before.standing.xyz + u_learnt / free * shortened(missed, u_most);
+    vec3 standing = u_kept * before.standing.xyz + u_learnt / free * clamp_length(missed, u_most);
     known[i].standing = vec4(standing, 0.0);
     known[i].hoped = vec4(expected[node] + wanted, 1.0);
-    return shortened(stiff * wanted + standing, u_strongest * u_speed * u_seconds / free);
+    return clamp_length(stiff * wanted + standing, u_strongest * u_speed * u_seconds / free);
 }
 
 bool same_node(int i, int other) {

@@ -1,5 +1,5 @@
 #version 430
-// Places between the guides' points, head axes: what is drawn of a guide at shares of its length.
+// Samples between guide points, head axes: guides resampled at shares of their length.
 #include "pbd_layout.glsl"
 #include "pbd_embedding.glsl"
 layout(std430, binding = 2) writeonly buffer Rows { float rows[]; };  // x, y, z

@@ -1,19 +1,19 @@
-// The grid of hair among hair (see plugins/pbd/hair_grid.py): sums in whole numbers, so that their
-// order does not matter. Mass is in units that all hair together does not overflow.
+// The hair grid (see plugins/pbd/hair_grid.py): integer sums, which do not depend on their order. The
+// unit of mass is such that all hair together does not overflow.
 layout(std430, binding = 0) buffer Filled { int filled[]; };  // mass and momentum of a cell
 
 uniform ivec3 u_cells;
 uniform vec4 u_grid;          // place of the first cell, 1/spacing
-uniform vec4 u_drift[3];      // velocity of a point that rides on the head
+uniform vec4 u_drift[3];      // velocity of a point fixed to the head
 uniform float u_momentum;     // units of momentum in a unit of mass at 1 m/s
-const float FASTEST = 10.0;   // m/s that a component of velocity counts for
+const float FASTEST = 10.0;   // bound of a velocity component, m/s
 
 vec3 drift(vec3 p) {
     vec4 at = vec4(p, 1.0);
     return vec3(dot(u_drift[0], at), dot(u_drift[1], at), dot(u_drift[2], at));
 }
 
-// The cell of a place and how far it is within.
+// The cell of a point and the fractions within it.
 ivec3 corner_of(vec3 p, out vec3 share) {
     vec3 at = clamp((p - u_grid.xyz) * u_grid.w, vec3(0.0), vec3(u_cells) - 1.001);
     ivec3 low = ivec3(at);

@@ -1,13 +1,13 @@
 #version 430
-// Hair among hair, third: nodes take on their neighbours' velocity and leave crowded places.
+// Hair-hair interaction, pass 3: nodes relax to the mean velocity and leave crowded cells.
 #include "pbd_layout.glsl"
 #include "pbd_hair_grid.glsl"
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
 uniform sampler3D u_means;    // mean velocity and crowding of cells, along z, y, x
-uniform vec2 u_rates;         // share of velocity taken on, push in m/s
+uniform vec2 u_rates;         // relaxed share of velocity, push in m/s
 
 void main() {
-    int i = invocation(), rod = i % u_rods, j = 1 + i / u_rods;  // roots keep theirs
+    int i = invocation(), rod = i % u_rods, j = 1 + i / u_rods;  // roots keep their velocity
     if (j >= NODES) return;
     vec3 p = node_place(rod, j).xyz, speed = node_speed(rod, j).xyz, share;
     vec3 mean = vec3(0.0), slope = vec3(0.0);

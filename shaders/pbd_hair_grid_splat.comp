@@ -1,5 +1,5 @@
 #version 430
-// Hair among hair, first: spreads mass and momentum of all nodes to the grid.
+// Hair-hair interaction, pass 1: splat mass and momentum of all nodes to the grid.
 #include "pbd_layout.glsl"
 #include "pbd_hair_grid.glsl"
 uniform sampler2D u_masses;

@@ -1,17 +1,17 @@
-// How rods lie in textures of four floats a texel: a rod a column, what it consists of row by row;
-// rods beyond u_width stand below. NODES is defined by the program that compiles.
+// Layout of rods in RGBA float textures: one column per rod, its values row by row; rods beyond u_width
+// follow below. NODES is a #define of the host program.
 // Software renderers read textures many times faster than buffers.
 const int SEGMENTS = NODES - 1;
 const int STATE_ROWS = 2 * NODES + SEGMENTS;  // place and slack, velocity of nodes; frames (x, y, z, w)
 layout(local_size_x = 64) in;
 
-// Which one this is of all that were asked for; work groups beyond what x holds stand along y.
+// Global index of this invocation; work groups beyond the limit of x continue along y.
 int invocation() {
     return int(gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * gl_WorkGroupSize.x);
 }
 
-// Loops over few nodes have bounds that compilers know: they unroll them and keep arrays in
-// registers. Over many that takes minutes, and bounds are hidden from them.
+// Loops over few nodes have constant bounds, so that compilers unroll them and keep arrays in
+// registers. For many nodes that takes minutes, so the bounds are uniforms.
 uniform int u_nodes;
 #if NODES <= 16
 #define EACH_NODE NODES
@@ -20,7 +20,7 @@ const int NODE_ROOM = NODES;
 #else
 #define EACH_NODE u_nodes
 #define EACH_SEGMENT (u_nodes - 1)
-const int NODE_ROOM = 64;  // access to shorter arrays becomes a ladder of conditions
+const int NODE_ROOM = 64;  // indexing shorter arrays compiles to a chain of branches
 #endif
 const int SEGMENT_ROOM = NODE_ROOM - 1;
 #define FOURS(count) (((count) + 3) / 4)

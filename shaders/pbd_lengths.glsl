@@ -1,4 +1,4 @@
-// The pull along the segments that brings them to their lengths, written to `value`: the factor
+// The tension that restores the segments' lengths, written to `value`: the factor
 // L D L^T of metric * (d d^T), row by row, with its forward substitution. Part of pbd_substeps.comp.
 // For loops that are not unrolled: four entries at a time.
 vec4 factor[FOURS(SEGMENTS) * (SEGMENTS + 4) / 2], scaled[FOURS(SEGMENT_ROOM)];

@@ -1,4 +1,4 @@
-// The pull along the segments that brings them to their lengths, written to `value`: the factor
+// The tension that restores the segments' lengths, written to `value`: the factor
 // L D L^T of metric * (d d^T), row by row, with its forward substitution. Part of pbd_substeps.comp.
 // For loops that are unrolled: entries stay in registers.
 float factor[SEGMENTS * (SEGMENTS - 1) / 2], scaled[SEGMENTS];

@@ -5,22 +5,22 @@ vec4 product(vec4 a, vec4 b) {
     return vec4(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));
 }
 
-vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
+vec3 rotate(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
 
 vec3 third_axis(vec4 q) {
     return vec3(2.0 * (q.x * q.z + q.w * q.y), 2.0 * (q.y * q.z - q.w * q.x),
                 1.0 - 2.0 * (q.x * q.x + q.y * q.y));
 }
 
-// The frame turned the shortest way so that its third axis is `direction`.
-vec4 swung(vec4 q, vec3 direction) {
+// Rotate a frame by the shortest arc that brings its third axis to `direction`.
+vec4 transport_frame(vec4 q, vec3 direction) {
     vec3 axis = third_axis(q);
     vec4 turn = vec4(cross(axis, direction), max(1.0 + dot(axis, direction), LEAST));
     return normalize(product(turn, q));
 }
 
-// The frame half way between neighbours, and the axis of the turn between them times the tangent
-// of a quarter of its angle.
+// The midpoint frame of neighbours, and the axis of the rotation between them times the tangent of a
+// quarter of its angle.
 vec4 half_way(vec4 before, vec4 after, out vec3 quarter) {
     float cosine = dot(before, after), sign_ = cosine < 0.0 ? -1.0 : 1.0;
     vec3 turn = before.w * after.xyz - after.w * before.xyz + cross(before.xyz, after.xyz);

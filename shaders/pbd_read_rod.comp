@@ -1,5 +1,5 @@
 #version 430
-// The state of one rod, to be read back.
+// Copies the state of one rod to a buffer for read-back.
 #include "pbd_layout.glsl"
 layout(std430, binding = 0) writeonly buffer One { vec4 one[]; };
 uniform int u_rod;

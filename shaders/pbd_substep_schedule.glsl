@@ -1,13 +1,13 @@
 const int MOST_STEPS = 64;
 
-// What holds for all rods in one substep, head axes after it.
+// Head motion and gravity of one substep, head axes after it.
 struct Step {
-    vec4 ride[3];     // rows of turn and shift from the axes before
+    vec4 head_step[3];     // rows of turn and shift from the axes before
     vec4 drift[3];    // rows of velocity of a point that rides on the head: matrix and minus shift
     vec4 air[3];      // rows of the turn from the world's axes, and gravity
-    vec4 ride_turn;   // as a quaternion
+    vec4 head_turn;   // as a quaternion
 };
 layout(std140, binding = 0) uniform Steps { Step steps[MOST_STEPS]; };
 
 vec3 rows(vec4 a, vec4 b, vec4 c, vec4 v) { return vec3(dot(a, v), dot(b, v), dot(c, v)); }
-vec3 ridden(int k, vec4 v) { return rows(steps[k].ride[0], steps[k].ride[1], steps[k].ride[2], v); }
+vec3 to_new_axes(int k, vec4 v) { return rows(steps[k].head_step[0], steps[k].head_step[1], steps[k].head_step[2], v); }

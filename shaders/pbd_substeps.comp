@@ -1,7 +1,7 @@
 #version 430
-// Substeps of rods, one rod an invocation: the steps of plugins/pbd/reference.py in their order.
-// Masses are shares of the rod's mean, so that stiffness is in 1/s^2. Loops go over whole arrays, a
-// condition within instead of other bounds: then compilers unroll them.
+// Substeps of rods, one rod per invocation: the steps of plugins/pbd/reference.py in their order. Masses
+// are relative to the rod's mean, so that stiffness is in 1/s^2. Loops run over whole arrays with
+// conditions inside, so that compilers can unroll them.
 #include "pbd_layout.glsl"
 #include "pbd_quaternion.glsl"
 #include "pbd_constants.glsl"
@@ -21,7 +21,7 @@ uniform vec3 u_air;            // m/s, world, where u_gusts is false
 uniform bool u_gusts;
 uniform bool u_forced;
 uniform float u_friction;
-uniform int u_rounds;             // of friction under the strands' own tension
+uniform int u_rounds;             // friction iterations under the strands' tension
 uniform float u_fastest;       // m/s
 
 int rod;
@@ -32,14 +32,14 @@ vec4 frame[SEGMENT_ROOM];
 vec3 edge[SEGMENT_ROOM], direction[SEGMENT_ROOM];
 float pivot[SEGMENT_ROOM], beside[SEGMENT_ROOM], value[NODE_ROOM];
 
-// Constants are read where they are used: kept, they would only fill the memory of local arrays.
+// Constants are read where they are used, which saves local memory.
 vec4 rest_and_mass(int j) { return constant(rod, NODE_ROW + 2 * j); }
 vec4 rates(int j) { return constant(rod, NODE_ROW + 2 * j + 1); }          // drag, pull, clearance, 1/mass
 vec4 banded(int j) { return constant(rod, ELEMENT_ROW + 3 * j); }          // two lower entries, 1/pivot; length
 vec4 stiffness(int j) { return constant(rod, ELEMENT_ROW + 3 * j + 1); }   // bend, twist, natural twist, 1/length
 vec3 curvature(int j) { return constant(rod, ELEMENT_ROW + 3 * j + 2).xyz; }
 vec4 metrics;
-float next_metric(int pair) {  // one after the other
+float next_metric(int pair) {  // called with consecutive pairs
     if (pair % 4 == 0) metrics = constant(rod, METRIC_ROW + pair / 4);
     return metrics[pair % 4];
 }
@@ -48,11 +48,11 @@ vec3 drift(int k, vec3 p) {
     return rows(steps[k].drift[0], steps[k].drift[1], steps[k].drift[2], vec4(p, 1.0));
 }
 
-// Carry a node into the new axes, go on straight, and add up what acts on it.
+// Transform a node to the new axes, extrapolate it, and sum the forces on it.
 void predict(int k, int j) {
     vec4 rest = rest_and_mass(j), rate = rates(j);
-    vec3 p = ridden(k, vec4(place[j], 1.0));
-    vec3 u = j == 0 ? (rest.xyz - p) / u_seconds : ridden(k, vec4(speed[j], 0.0));
+    vec3 p = to_new_axes(k, vec4(place[j], 1.0));
+    vec3 u = j == 0 ? (rest.xyz - p) / u_seconds : to_new_axes(k, vec4(speed[j], 0.0));
     p += u_seconds * u;
     vec4 wind = vec4(u_gusts ? texelFetch(u_wind, texel(rod, j, NODES), 0).xyz : u_air, 0.0);
     vec3 drawn = rows(steps[k].air[0], steps[k].air[1], steps[k].air[2], wind) - u;
@@ -78,13 +78,13 @@ void solve_tridiagonal() {
     }
 }
 
-// Spin frames about their segments until torques balance: one Newton step.
-void untwist() {
+// Rotate frames about their segments until torques balance: one Newton step.
+void relax_twist() {
     vec4 before = constant(rod, 0);
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
-        vec3 natural = turned(half_way(before, after, quarter), curvature(j));
+        vec3 natural = rotate(half_way(before, after, quarter), curvature(j));
         vec3 turn = direction[j] - axis;
         vec4 firmness = stiffness(j);
         float bend = firmness.x, twist = firmness.y;
@@ -108,14 +108,14 @@ void untwist() {
     }
 }
 
-// Bending and twist as forces on the nodes, minus the energy's slope.
+// Add the node forces of bending and twist: the negative gradient of the energy.
 void add_elastic() {
     vec4 before = constant(rod, 0);
     vec3 reach_before = third_axis(before), pull = vec3(0.0);
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
-        vec3 natural = turned(half_way(before, after, quarter), curvature(j));
+        vec3 natural = rotate(half_way(before, after, quarter), curvature(j));
         vec4 firmness = stiffness(j);
         float bend = firmness.x, over = firmness.w;
         vec3 reach = edge[j] * over, turn = reach - reach_before;
@@ -163,8 +163,8 @@ void solve_banded() {
 #include "pbd_lengths.glsl"
 #endif
 
-// Go on by the solution of forces under the lengths: solve for the forces, then in turns for the
-// lengths and their pulls, about the directions of the last solution.
+// Solve for the forces, then alternate between lengths and their tensions, linearised about the
+// directions of the last solution; move the nodes.
 void go_on() {
     for (int turn = 0; turn <= u_iterations; turn++) {
         solve_banded();
@@ -207,12 +207,12 @@ void main() {
         for (int j = 0; j < EACH_SEGMENT; j++) {
             edge[j] = place[j + 1] - place[j];
             direction[j] = normalize(edge[j]);
-            frame[j] = swung(product(steps[k].ride_turn, frame[j]), direction[j]);
+            frame[j] = transport_frame(product(steps[k].head_turn, frame[j]), direction[j]);
         }
-        untwist();
+        relax_twist();
         add_elastic();
         go_on();
-        if (u_obstacles) touch(k);
+        if (u_obstacles) resolve_contacts(k);
     }
     for (int j = 0; j < EACH_NODE; j++) {
         imageStore(u_new_state, texel(rod, 2 * j, STATE_ROWS), vec4(place[j], slack[j]));

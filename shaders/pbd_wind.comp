@@ -1,6 +1,6 @@
 #version 430
 // Velocity of gusty air at the nodes, world: the mean and plane waves (see hairkit/simulation/wind.py),
-// found at every fourth node and mixed between.
+// evaluated at every fourth node and interpolated between.
 #include "pbd_layout.glsl"
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_wind;
 uniform vec3 u_mean;             // m/s

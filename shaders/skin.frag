@@ -8,6 +8,6 @@ out vec4 out_colour;
 
 void main() {
     vec3 normal = normalize(v_normal);
-    normal *= gl_FrontFacing ? -1.0 : 1.0;   // pictures are drawn upside down: fronts turn clockwise
+    normal *= gl_FrontFacing ? -1.0 : 1.0;   // pictures are drawn upside down, which swaps the winding
     out_colour = vec4(skin(v_position, normal, v_albedo), 1.0);
 }

@@ -1,4 +1,4 @@
-// Wrapped diffuse light whose edge is redder, as light that travelled under the skin is; a soft sheen.
+// Wrapped diffuse light with a redder terminator, for subsurface scattering, and a soft sheen.
 #include "lighting.glsl"
 #include "tone.glsl"
 
@@ -10,7 +10,7 @@ uniform float u_scatter;   // 1 skin, 0 cloth
 const vec3 WRAP = vec3(0.28, 0.18, 0.14);   // how far red, green and blue reach past the terminator
 const float SHEEN_POWER = 18.0;
 const float SHEEN = 0.12;
-const float LIFT = 0.007;   // metres off the skin, out of its own shadow in the coarse volume
+const float LIFT = 0.007;   // metres above the skin, to avoid self-shadowing in the coarse volume
 
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 direction, vec3 light) {
     vec3 wrap = WRAP * u_scatter;

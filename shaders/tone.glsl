@@ -1,4 +1,4 @@
-// From linear light to the picture: Narkowicz's fit of the ACES film curve, then the sRGB curve.
+// From linear radiance to sRGB: Narkowicz's fit of the ACES film curve, then the sRGB curve.
 
 uniform float u_exposure;
 

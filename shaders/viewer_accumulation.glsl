@@ -1,4 +1,4 @@
-// Sums of colour and weight, two words a pixel; blocks of 2 x 4 pixels share a line of the cache.
+// Sums of colour and weight, two words for each pixel; blocks of 2 x 4 pixels share a cache line.
 
 const float SUM_UNIT = 1024.0;
 

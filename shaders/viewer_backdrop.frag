@@ -1,5 +1,5 @@
 #version 430
-// A small picture, spread over the whole one.
+// Scales a small picture up to the whole frame.
 
 uniform sampler2D u_studio;
 uniform vec2 u_size;

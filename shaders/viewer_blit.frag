@@ -1,5 +1,5 @@
 #version 430
-// The drawn picture, its first row on top, under the text.
+// The drawn picture, top row first, with the text over it.
 
 uniform sampler2D u_picture;
 uniform sampler2D u_text;

@@ -1,5 +1,5 @@
 #version 430
-// Hair that was drawn elsewhere, over what stands behind it: pixel on pixel.
+// Composites hair drawn into another texture over the picture.
 
 uniform sampler2D u_hair;
 

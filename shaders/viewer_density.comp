@@ -1,5 +1,5 @@
 #version 430
-// How much hair lies in each cell of the light volume.
+// Length of hair in each cell of the light volume.
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 3) readonly buffer Places { float places[]; };

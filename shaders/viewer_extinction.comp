@@ -1,5 +1,5 @@
 #version 430
-// What hair and solids in each cell take from light per metre.
+// Extinction of hair and meshes in each cell, per metre.
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(std430, binding = 0) readonly buffer Dense { uint dense[]; };
@@ -7,7 +7,7 @@ layout(std430, binding = 1) readonly buffer Solids { float solids[]; };
 layout(r32f, binding = 0) writeonly uniform image3D u_taken_image;
 
 uniform ivec3 u_cells;
-uniform float u_hair_extinction;  // optical depth a metre, of a micrometre of hair in a cell
+uniform float u_hair_extinction;  // optical depth per metre, for a micrometre of hair in a cell
 
 void main() {
     ivec3 cell = ivec3(gl_GlobalInvocationID);

@@ -1,11 +1,10 @@
 #version 430
-// Where each point of the guides is, and how far the guide has turned there since rest; and a box
-// around them all.
+// Position of each guide point and rotation of the guide there since rest; bounding box of all.
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Rest { float rest[]; };
 layout(std430, binding = 1) readonly buffer Now { float now[]; };
-layout(std430, binding = 2) writeonly buffer Guides { uint guides[]; };   // 5 words a point
+layout(std430, binding = 2) writeonly buffer Guides { uint guides[]; };   // 5 words per point
 layout(std430, binding = 3) buffer Bounds { int bounds[]; };    // lowest and highest x, y, z
 
 shared int low[3];
@@ -22,7 +21,7 @@ vec4 quaternion_between(vec3 a, vec3 b) {
     return dot(q, q) > 1e-8 ? normalize(q) : vec4(0.0, 0.0, 1.0, 0.0);
 }
 
-// Whole numbers in the order of the numbers whose bits they are.
+// Maps the bits of floats to integers of the same order.
 int ordered(float x) {
     int bits = floatBitsToInt(x);
     return bits < 0 ? bits ^ 0x7FFFFFFF : bits;

@@ -1,8 +1,8 @@
-// Hair of `u_points` points a strand in the head frame, one invocation a strand. Buffers are packed:
-// software renderers fetch them word by word.
+// Hair with `u_points` points per strand, head frame; one invocation per strand. Buffers are packed,
+// since software renderers fetch them word by word.
 
-const int SLICES = 32;          // of the view's depth, for the hair's opacity
-const int TILE = 8;             // pixels along an edge of a cell of that opacity
+const int SLICES = 32;          // depth slices of the view cells
+const int TILE = 8;             // edge of a view cell, pixels
 const float OPACITY_UNIT = 4096.0;
 
 uniform mat4 u_clip_from_head;
@@ -11,17 +11,17 @@ uniform float u_depth_offset;
 uniform vec2 u_size_px;
 uniform float u_focal_px;
 uniform float u_perspective;
-uniform float u_wider;          // fewer hairs than on a head are drawn wider
+uniform float u_wider;          // drawn over true width, above 1 for few strands
 uniform int u_points;
 uniform int u_count;            // of strands
 uniform ivec2 u_tiles;
-uniform vec2 u_slice_range;     // nearest depth of hair, and slices a metre
+uniform vec2 u_slice_range;     // nearest depth of hair, and slices per metre
 
 struct Seen {
     vec3 place;     // metres
     vec3 pixel;     // x, y (down) in pixels, and depth as in the depth buffer
     float depth;    // along the optical axis, metres; below 0 behind the camera
-    float scale;    // pixels a metre there
+    float scale;    // pixels per metre at that depth
 };
 
 Seen seen_from(vec3 place) {

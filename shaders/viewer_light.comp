@@ -1,12 +1,11 @@
 #version 430
-// What reaches each cell of the light volume: transmittance towards key and rim light, share of the
-// sky; hairkit/rendering/light.py is the slow twin. A call does every `u_turns`-th layer, and of it only
-// cells at hair or solids: nothing is lit elsewhere.
+// Light volume: transmittance towards key and rim light, visible share of the sky; light_cpu.py is its
+// twin. A dispatch computes every `u_turns`-th layer, and only cells near hair or meshes.
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(rgba16f, binding = 0) writeonly uniform image3D u_reached;
+layout(rgba16f, binding = 0) writeonly uniform image3D u_transmittance;
 
-uniform sampler3D u_extinction;      // optical depth a metre
+uniform sampler3D u_extinction;      // optical depth per metre
 uniform ivec3 u_cells;
 uniform float u_spacing;        // metres
 uniform vec3 u_key_direction;
@@ -19,12 +18,12 @@ const float GROWTH = 1.35;
 const int SKY_STEPS = 5;
 const float SKY_GROWTH = 1.7;
 
-float taken(vec3 cell) { return textureLod(u_extinction, (cell + 0.5) / vec3(u_cells), 0.0).r; }
+float extinction(vec3 cell) { return textureLod(u_extinction, (cell + 0.5) / vec3(u_cells), 0.0).r; }
 
 float towards(vec3 cell, vec3 direction, float growth, int steps) {
     float near = 0.8, length = 1.0, depth = 0.0;
     for (int i = 0; i < steps; i++) {
-        depth += taken(cell + (near + 0.5 * length) * direction) * length;
+        depth += extinction(cell + (near + 0.5 * length) * direction) * length;
         near += length;
         length *= growth;
     }
@@ -35,11 +34,11 @@ void main() {
     ivec3 cell = ivec3(gl_GlobalInvocationID.xy, int(gl_GlobalInvocationID.z) * u_turns + u_turn);
     if (any(greaterThanEqual(cell, u_cells))) return;
     vec3 at = vec3(cell);
-    float near = taken(at) + taken(at + vec3(1, 1, 0)) + taken(at - vec3(1, 1, 0))
-               + taken(at + vec3(1, -1, 1)) + taken(at - vec3(1, -1, 1))
-               + taken(at + vec3(0, 1, -1)) + taken(at - vec3(0, 1, -1));
+    float near = extinction(at) + extinction(at + vec3(1, 1, 0)) + extinction(at - vec3(1, 1, 0))
+               + extinction(at + vec3(1, -1, 1)) + extinction(at - vec3(1, -1, 1))
+               + extinction(at + vec3(0, 1, -1)) + extinction(at - vec3(0, 1, -1));
     if (near <= 0.0) {
-        imageStore(u_reached, cell, vec4(1.0));
+        imageStore(u_transmittance, cell, vec4(1.0));
         return;
     }
     float sky = 2.0 * towards(at, vec3(0, 1, 0), SKY_GROWTH, SKY_STEPS)
@@ -47,6 +46,6 @@ void main() {
               + towards(at, vec3(-1, 0, 0), SKY_GROWTH, SKY_STEPS)
               + towards(at, vec3(0, 0, 1), SKY_GROWTH, SKY_STEPS)
               + towards(at, vec3(0, 0, -1), SKY_GROWTH, SKY_STEPS);
-    imageStore(u_reached, cell, vec4(towards(at, u_key_direction, GROWTH, STEPS),
+    imageStore(u_transmittance, cell, vec4(towards(at, u_key_direction, GROWTH, STEPS),
                                      towards(at, u_rim_direction, GROWTH, STEPS), sky / 6.0, 1.0));
 }

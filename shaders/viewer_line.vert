@@ -1,7 +1,7 @@
 #version 430
 
 uniform mat4 u_clip_from_head;
-uniform float u_pull;       // moves lines this share of the depth range towards the camera
+uniform float u_pull;       // depth bias of lines, as a share of the depth range
 
 in vec3 in_position;
 in vec4 in_colour;

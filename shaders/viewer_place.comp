@@ -1,13 +1,13 @@
 #version 430
-// Places hair: each point keeps its offset from the mix of three guides, turned as the nearest one
-// turns. Also puts the pieces into cells of the view, which `viewer_opacity.comp` sums up.
+// Interpolates hair: each point keeps its offset from the mean of three guides, rotated with the nearest
+// one. Also splats the segments into view cells, which `viewer_opacity.comp` accumulates.
 #include "viewer_hair.glsl"
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Guides { uint guides[]; };
-layout(std430, binding = 1) readonly buffer Hairs { uint hairs[]; };        // 3 words a strand
-layout(std430, binding = 2) readonly buffer Offsets { uint offsets[]; };    // 2 words a point
-layout(std430, binding = 3) writeonly buffer Places { float places[]; };    // 3 words a point
+layout(std430, binding = 1) readonly buffer Hairs { uint hairs[]; };        // 3 words per strand
+layout(std430, binding = 2) readonly buffer Offsets { uint offsets[]; };    // 2 words per point
+layout(std430, binding = 3) writeonly buffer Places { float places[]; };    // 3 words per point
 layout(std430, binding = 4) buffer Filled { uint filled[]; };
 
 vec3 guide_place(uint guide, int k) {

@@ -1,8 +1,7 @@
 #version 430
-// Shades hair at its points and draws the pieces between them into sums a pixel, in any order: colour
-// times weight, and weight, where the weight is the coverage of the pixel times the share of light
-// that hair in front lets by. Compute shaders run on all cores of a software renderer; triangle
-// set-up runs on one.
+// Shades hair at its points and rasterises the segments into weighted sums for each pixel, in any
+// order: colour times weight, and weight, which is the coverage of the pixel times the transmittance of
+// the hair before it. Software renderers run compute shaders on all cores, triangle set-up on one.
 #include "viewer_hair.glsl"
 #include "viewer_accumulation.glsl"
 #include "lighting.glsl"
@@ -13,7 +12,7 @@ layout(local_size_x = 64) in;
 layout(std430, binding = 1) readonly buffer Hairs { uint hairs[]; };
 layout(std430, binding = 2) readonly buffer Offsets { uint offsets[]; };
 layout(std430, binding = 3) readonly buffer Places { float places[]; };
-layout(std430, binding = 7) buffer Sums { uint sums[]; };   // two a pixel, two 16-bit numbers each
+layout(std430, binding = 7) buffer Sums { uint sums[]; };   // two per pixel, two 16-bit numbers each
 
 uniform vec3 u_eye;
 uniform vec3 u_root_colour;
@@ -24,9 +23,9 @@ uniform sampler3D u_opacity;
 uniform ivec2 u_picture;
 uniform float u_smooth;         // 1: partial coverage across the stroke; 0: whole pixels, faster
 
-const float BOUNCED = 0.1;      // of the sky's light, that comes through hair on all ways
-const float HIDDEN = 0.14;      // a piece of which less arrives is not drawn
-const float DENSE = 0.4;       // of the opacity of a whole tile: locks are denser than the gaps beside them
+const float BOUNCED = 0.1;      // share of the sky's light that scatters through hair
+const float HIDDEN = 0.14;      // segments with a lower transmittance are not drawn
+const float DENSE = 0.4;       // share of a tile's mean optical depth: locks are denser than gaps
 const float WIDEST = 64.0;      // pixels
 
 vec3 place_at(int index) { return vec3(places[3 * index], places[3 * index + 1], places[3 * index + 2]); }
@@ -68,7 +67,7 @@ void stroke(vec3 a, vec3 b, vec4 from, vec4 to, float width, float dither) {
     vec3 middle = mix(a, b, 0.5);
     int hidden = int(hidden_by_solid(a)) + int(hidden_by_solid(middle)) + int(hidden_by_solid(b));
     if (hidden == 3) return;
-    bool test = hidden > 0;     // pixel by pixel only where a solid's outline is crossed
+    bool test = hidden > 0;     // depth test each pixel only across a mesh's outline
 
     vec2 along = b.xy - a.xy;
     bool steep = abs(along.y) > abs(along.x);

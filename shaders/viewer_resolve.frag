@@ -1,6 +1,6 @@
 #version 430
 #include "viewer_accumulation.glsl"
-// Hair over what stands behind it; the sums are left empty for the next picture.
+// Hair over the picture; clears the sums for the next frame.
 
 layout(std430, binding = 7) buffer Sums { uint sums[]; };
 

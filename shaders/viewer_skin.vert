@@ -1,5 +1,5 @@
 #version 430
-// Skin lit at its vertices: software renderers have many pixels and a fine mesh.
+// Skin lit at its vertices, which is faster on software renderers and fine enough for this mesh.
 #include "skin.glsl"
 
 uniform mat4 u_clip_from_head;

@@ -1,9 +1,9 @@
 #version 430
-// The studio around the head: a grey sweep with a floor on which the head throws a soft shadow.
+// The studio: a grey background with a floor and a soft shadow of the head.
 
 uniform vec2 u_size;            // pixels of this picture
 uniform vec3 u_eye;             // world
-uniform mat3 u_ray_from_place;  // world direction of the ray through (x, y, 1) in shares of the picture
+uniform mat3 u_ray_from_place;  // world direction of the ray through (x, y, 1) as fractions of the picture
 uniform vec3 u_wall_top;        // sRGB
 uniform vec3 u_wall_bottom;
 uniform float u_floor;          // height of the floor, world

@@ -35,6 +35,6 @@ def open_path(path: Path, manager: Manager, settings: Mapping[str, object] | Non
     path = groom_path(path)
     groom = load_groom(manager, path, settings)
     if not len(groom.strands):
-        raise InputError(f"{path}: holds 0 strands, expected at least 1; open another file")
+        raise InputError(f"{path}: holds no strands, expected at least one; open another file")
     results = path.parent if (path.parent / "work").is_dir() else None
     return Opened(groom, path, results)

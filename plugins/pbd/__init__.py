@@ -1,10 +1,11 @@
-"""Position-based rods: inextensible guides that bend, twist, collide and rub, solved directly.
+"""Implicit Cosserat rods with direct length constraints: inextensible guides with contact.
 
-Each guide is a Cosserat rod that carries orientations (Kugelstadt and Schoemer 2016). A substep is
-implicit: bending, drag and the pull to the captured shape by one banded matrix, all lengths of a
-strand by one direct solve (after Han and Harada 2013, here with the implicit metric), so that
-stiffness depends neither on iterations nor on the frame rate. The natural shape is found by inverse
-statics: captured hair stays where it is under gravity.
+Each guide is a discrete Cosserat rod with orientations (Kugelstadt and Schoemer 2016). A substep is
+implicit Euler: one banded system for bending, drag and the pull to the captured shape, and one
+direct solve for all segment lengths of a strand (after Han and Harada 2013, here with the metric of
+the implicit system). Stiffness depends neither on iterations nor on the frame rate. The natural
+shape comes from inverse statics, so that captured hair stays in place under gravity. Despite the
+plugin's name this is not position-based dynamics.
 """
 
 from __future__ import annotations
@@ -24,20 +25,20 @@ __all__ = ["Options"]
 
 @dataclass(frozen=True)
 class Options:
-    """Settings of the simulation; those that are None take the groom's own value."""
+    """Options of the simulation; None takes the value of the groom."""
 
     stiffness: float | None = option(
         None,
         low=0.0,
         high=1.0,
-        doc="Pull to the captured place, strongest at the root: 0 none, 0.5 about 6 Hz, 1 stiff;"
-        " none takes the groom's.",
+        doc="Pull to the captured shape, strongest at the root: 0 off, 0.5 about 6 Hz, 1 stiff;"
+        " by default the groom's.",
     )
     bend: float | None = option(
         None,
         low=0.0,
         high=1.0,
-        doc="Bending stiffness: 0 a single hair, 1 a thousand times that, as locks have; none takes"
+        doc="Bending stiffness: 0 a single hair, 1 a thousand times that, like a lock; by default"
         " the groom's.",
     )
     twist: float = option(
@@ -47,56 +48,67 @@ class Options:
         None,
         low=0.0,
         high=0.9,
-        doc="Share of the motion relative to the head that is lost in 1/60 s; none takes the"
-        " groom's.",
+        doc="Share of the velocity relative to the head lost in 1/60 s; by default the groom's.",
     )
     drag: float = option(
-        2.0, low=0.0, high=100.0, unit="1/s", doc="How fast air takes hair of mean width along."
+        2.0, low=0.0, high=100.0, unit="1/s", doc="Air drag rate of hair of mean width."
     )
     friction: float | None = option(
         None,
         low=0.0,
         high=2.0,
-        doc="Coulomb's coefficient of hair on the head; none takes the groom's.",
+        doc="Coulomb friction coefficient of hair on the head; by default the groom's.",
     )
     cohesion: float = option(
-        2.0, low=0.0, high=60.0, unit="1/s", doc="How fast hair takes on its neighbours' velocity."
+        2.0,
+        low=0.0,
+        high=60.0,
+        unit="1/s",
+        doc="Rate at which hair relaxes to the velocity of its neighbours.",
     )
     pressure: float = option(
         2.0,
         low=0.0,
         high=50.0,
         unit="m/s^2",
-        doc="Push out of places that are twice as dense as captured.",
+        doc="Acceleration out of cells twice as dense as in the captured hair.",
     )
     rounds: int = option(
         2,
         low=0,
         high=8,
-        doc="Rounds of friction under the strands' own tension: 0 as if slack, 4 as ropes.",
+        doc="Friction iterations under strand tension: 0 ignores it, 4 meets Euler-Eytelwein.",
     )
     clearance: float = option(
-        0.002, low=0.0, high=0.02, unit="m", doc="Distance that hair keeps from the head."
+        0.002, low=0.0, high=0.02, unit="m", doc="Least distance between hair and head."
     )
     depenetration: float = option(
-        0.5, low=0.01, high=10.0, unit="m/s", doc="Fastest way out of the head after a jump."
+        0.5,
+        low=0.01,
+        high=10.0,
+        unit="m/s",
+        doc="Highest speed at which penetrations are resolved.",
     )
     grab_speed: float = option(
-        5.0, low=0.1, high=50.0, unit="m/s", doc="Fastest pull of a grabbed point."
+        5.0, low=0.1, high=50.0, unit="m/s", doc="Highest speed of a grabbed point."
     )
-    nodes: int = option(16, low=4, high=64, doc="Nodes of every guide; finer points ride on them.")
+    nodes: int = option(
+        16, low=4, high=64, doc="Nodes of each rod; finer guide points are embedded."
+    )
     substeps: int = option(4, low=1, high=64, doc="Substeps in 1/60 s.")
-    iterations: int = option(1, low=1, high=8, doc="Linearisations of the lengths in a substep.")
+    iterations: int = option(
+        1, low=1, high=8, doc="Linearisations of the length constraints in a substep."
+    )
     seed: int = option(0, low=0, doc="Seed of the gusts.")
     backend: str = option(
         "auto",
         choices=("auto", "reference", "fast", "compute"),
-        doc="What computes: plain NumPy in float64, compiled float32, or compute shaders; auto"
-        " takes shaders where there is a graphics card, else the compiled one.",
+        doc="reference: NumPy, float64; fast: compiled, float32; compute: shaders; auto: compute"
+        " on a graphics card, else fast.",
     )
 
     def resolved(self, physics: HairPhysics) -> Options:
-        """Return options without None, what lacks taken from the groom and kept within bounds."""
+        """Return the options with None replaced by the groom's value, clamped to its bounds."""
         own: dict[str, Any] = {
             "stiffness": min(max(physics.stiffness, 0.0), 1.0),
             "bend": min(max(physics.bend_stiffness, 0.0), 1.0),
@@ -107,20 +119,20 @@ class Options:
         return dataclasses.replace(self, **missing)
 
     def pull(self) -> float:
-        """Return the squared frequency of the pull to the captured place at the root, 1/s^2."""
+        """Return the squared frequency of the pull to the captured shape at the root, 1/s^2."""
         share = self.stiffness or 0.0
         return (40.0 * share / (1.001 - share)) ** 2
 
     def firmness(self) -> float:
-        """Return bending stiffness over that of a single hair of the same mass."""
+        """Return the bending stiffness over that of a single hair of the same mass."""
         return float(1000.0 ** (self.bend or 0.0))
 
     def damping_share(self) -> float:
-        """Return the share of relative motion lost in a sixtieth of a second."""
+        """Return the share of relative velocity lost in 1/60 s."""
         return self.damping or 0.0
 
-    def rubbing(self) -> float:
-        """Return Coulomb's coefficient."""
+    def friction_coefficient(self) -> float:
+        """Return the Coulomb friction coefficient."""
         return self.friction or 0.0
 
 

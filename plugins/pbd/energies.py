@@ -1,4 +1,4 @@
-"""Read-outs of rods: stretch and elastic energy."""
+"""Stretch and elastic energy of rods."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
 
-from .reference import State, swung
-from .rods import Rods, half_way, twist_between
+from .reference import State, transport_frames
+from .rods import Rods, midpoint_frame, twist_between
 
 
 def largest_stretch(rods: Rods, state: State) -> float:
@@ -18,17 +18,17 @@ def largest_stretch(rods: Rods, state: State) -> float:
 
 
 def elastic_energy(rods: Rods, state: State, shape: Float64Array | None = None) -> float:
-    """Return joules of bending, twist and the pull to the captured place.
+    """Return the energy of bending, twist and the pull to the captured shape, joules.
 
     `shape` (S, n): squared frequencies of that pull, 1/s^2.
     """
     edge = np.diff(state.position, axis=1)
-    frames = swung(state.frames, quaternion.normalize(edge))
+    frames = transport_frames(state.frames, quaternion.normalize(edge))
     before = rods.before(frames)
     reach = edge / rods.length[..., None]
     held = quaternion.third_axis(rods.root_frame)[:, None]
     turn = reach - np.concatenate([held, reach[:, :-1]], axis=1)
-    off = turn - quaternion.rotate(half_way(before, frames), rods.curvature)
+    off = turn - quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
     energy = 0.5 * float((rods.bend[..., None] * off**2).sum())
     twist = twist_between(before, frames) - rods.natural_twist
     energy += 0.5 * float((rods.twist * twist**2).sum())

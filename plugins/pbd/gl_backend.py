@@ -1,8 +1,8 @@
 """The compute backend: rods in GLSL compute shaders, float32, on a graphics card or Mesa's CPU.
 
-One rod is one invocation with its work in local arrays. State stays in textures between steps: what
-is read back is what is asked for, and what a step costs the processor does not grow with the number
-of rods. Hair among hair is summed up in whole numbers, so that equal input gives equal motion.
+Each invocation simulates one rod in local arrays. The state stays in textures between steps; only
+requested values are read back, so that the CPU time of a step does not depend on the number of
+rods. The hair grid sums integers, so that equal input gives equal motion.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from hairkit.simulation import Grab, quaternion
 
 from .gl_buffers import Store
 from .gl_constants import constant_rows, offset_words, rider_words, share_words
-from .gl_grab import Held
+from .gl_grab import GpuGrabs
 from .gl_obstacles import contact_uniforms, faces
 from .gl_uniforms import MOST_STEPS, AirWaves, Units, air_uniforms, step_words, steps_at_once
-from .hair_grid import Crowd
+from .hair_grid import HairGrid
 from .linear_system import System
-from .reference import Contact, Load, State, at_rest
-from .resampling import Riders
+from .reference import Contact, Load, State, rest_state
+from .resampling import Embedding
 from .rods import Rods
 
 _STILL = (0.0, 0.0, 0.0)
@@ -41,7 +41,7 @@ class ComputeEngine:
         self._unit = rods.mass.mean(axis=1)
         self._system: System | None = None
         self._units: Units | None = None
-        self._riders: Riders | None = None
+        self._embedding: Embedding | None = None
         self._before: npt.NDArray[np.integer[Any]] | None = None
         self._gusty = False
         with renderer() as gl:
@@ -49,13 +49,13 @@ class ComputeEngine:
             self._store.put_grid("u_distances", faces(contact))
             for name in ("u_wind", "u_force"):
                 self._store.put_rods(name, np.zeros((self._count, 1, 3)))
-        self._held = Held(self._store)
-        self.state = at_rest(rods)
+        self._held = GpuGrabs(self._store)
+        self.state = rest_state(rods)
         weakref.finalize(self, self._store.release).atexit = False
 
     @property
     def state(self) -> State:
-        """The present state, read back; setting it moves the rods and lets go of held ones."""
+        """The present state, read back; setting it moves the rods and releases grabbed points."""
         with renderer():
             rows = self._store.rods("u_state")
         ends = 2 * self._nodes
@@ -69,12 +69,12 @@ class ComputeEngine:
         rows[:, ends:] = np.roll(value.frames, -1, axis=-1)
         with renderer():
             self._store.put_rods("u_state", rows)
-        self._held.let_go()
+        self._held.clear()
 
-    def blow(self, waves: AirWaves | None, wind: Float64Array, head: Float64Array) -> None:
-        """Find the gusty air at the nodes, of rods on a head at `head`, for the following runs.
+    def set_gusts(self, waves: AirWaves | None, wind: Float64Array, head: Float64Array) -> None:
+        """Compute the gusts at the nodes, for a head at `head`, for the following runs.
 
-        `waves` are those of `hairkit.simulation.wind.gust_waves`; None: loads tell of the air.
+        `waves` are those of `hairkit.simulation.wind.gust_waves`; None: loads hold the air.
         """
         self._gusty = waves is not None
         if waves is None:
@@ -85,15 +85,15 @@ class ComputeEngine:
             uniforms = air_uniforms(waves, wind, head)
             self._store.dispatch("pbd_wind", self._count, uniforms, WAVES=len(waves[0]))
 
-    def hold(
-        self, grabs: tuple[Grab, ...], riders: Riders, back: Float64Array, speed: float
+    def set_grabs(
+        self, grabs: tuple[Grab, ...], embedding: Embedding, back: Float64Array, speed: float
     ) -> None:
-        """Pull these points in the following runs, at most at `speed`, m/s.
+        """Pull these points in the following runs, at no more than `speed`, m/s.
 
         `back` (4, 4) brings the world to the head axes before the first substep of the next run.
         """
         with renderer():
-            self._held.take(grabs, riders, back, speed)
+            self._held.take(grabs, embedding, back, speed)
 
     def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
         """Do one substep for each load."""
@@ -109,21 +109,23 @@ class ComputeEngine:
                 self._store.put_words("steps", step_words(some, system.step))
                 self._store["steps"].bind_to_uniform_block(0)
                 if self._held:
-                    self._run_held(some, settings)
+                    self._run_with_grabs(some, settings)
                     continue
                 for first in range(0, len(some), most):
                     self._step(first, min(most, len(some) - first), settings)
 
-    def rub(self, crowd: Crowd, ride: Float64Array, rates: tuple[float, float, float]) -> None:
-        """Let hair act on hair."""
+    def apply_hair_grid(
+        self, hair_grid: HairGrid, head_step: Float64Array, rates: tuple[float, float, float]
+    ) -> None:
+        """Apply hair-hair interaction."""
         with renderer():
-            if self._units is None or self._units.crowd is not crowd:
-                self._units = self._put_crowd(crowd)
-            uniforms = self._units.uniforms(ride, rates)
+            if self._units is None or self._units.hair_grid is not hair_grid:
+                self._units = self._upload_hair_grid(hair_grid)
+            uniforms = self._units.uniforms(head_step, rates)
             self._store.read_by("filled")
             self._store.dispatch("pbd_hair_grid_splat", self._count * self._nodes, uniforms)
             self._store.written_by("u_means")
-            self._store.dispatch("pbd_hair_grid_average", int(np.prod(crowd.shape)), uniforms)
+            self._store.dispatch("pbd_hair_grid_average", int(np.prod(hair_grid.shape)), uniforms)
             self._store.written_by("u_state")
             self._store.dispatch("pbd_hair_grid_apply", self._count * (self._nodes - 1), uniforms)
 
@@ -137,10 +139,10 @@ class ComputeEngine:
             found = self._store.words("one").reshape(-1, 4)[:ends, :3].astype(np.float64)
         return found[0::2], found[1::2]
 
-    def measured(self, gravity: Float64Array) -> tuple[float, float, float, float] | None:
-        """Return the largest stretch, and kinetic, gravity's and elastic energy in joules.
+    def measure_energies(self, gravity: Float64Array) -> tuple[float, float, float, float] | None:
+        """Return the largest stretch, and kinetic, gravitational and elastic energy, joules.
 
-        `gravity` (3,) m/s^2 is in head axes. None before the first run, when constants lack.
+        `gravity` (3,) m/s^2 is in head axes. None before the first run.
         """
         if self._system is None:
             return None
@@ -152,52 +154,52 @@ class ComputeEngine:
         kinetic, weight, elastic = sums[:, 1:].sum(axis=0).tolist()
         return float(sums[:, 0].max()), kinetic, weight, elastic
 
-    def points(self, riders: Riders, head: Float64Array) -> Float32Array:
+    def points(self, embedding: Embedding, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
         with renderer():
-            self.points_buffer(riders, head)
+            self.points_buffer(embedding, head)
             return self._store.words("points").reshape(-1, 3)
 
-    def points_buffer(self, riders: Riders, head: Float64Array) -> Any:
+    def points_buffer(self, embedding: Embedding, head: Float64Array) -> Any:
         """Return the moderngl buffer of the guides' points: (P, 3) float32, world, metres.
 
-        It is written by this call and stays the engine's; use it inside `renderer()`.
+        This call writes it and the engine owns it; use it inside `renderer()`.
         """
-        count = len(riders.rod)
+        count = len(embedding.rod)
         with renderer():
-            uniforms = self._ridden(riders)
+            uniforms = self._upload_embedding(embedding)
             if "points" not in self._store:
                 self._store.make_words("points", 3 * count)
-            self._store.read_by("riders", "offsets", "points")
+            self._store.read_by("embedding", "offsets", "points")
             uniforms |= {"u_count": count, "u_head": [tuple(row) for row in head[:3]]}
             self._store.dispatch("pbd_points", count, uniforms)
             return self._store["points"]
 
     def rows_buffer(
         self,
-        riders: Riders,
+        embedding: Embedding,
         before: npt.NDArray[np.integer[Any]],
         part: npt.NDArray[np.floating[Any]],
     ) -> Any:
-        """Return the moderngl buffer (*before.shape, 3) of places between points, head axes.
+        """Return the moderngl buffer (*before.shape, 3) of samples between points, head axes.
 
-        Each is `part` of the way from point `before` to the next one; both are looked at when
-        `before` is another array than the last time. The buffer is as that of `points_buffer`.
+        Each is at fraction `part` between point `before` and the next one; both arrays are uploaded
+        when `before` is another object than in the last call. Otherwise as `points_buffer`.
         """
         with renderer():
-            uniforms = self._ridden(riders)
+            uniforms = self._upload_embedding(embedding)
             if self._before is not before:
                 self._store.put_words("between", share_words(before, part))
                 self._store.make_words("rows", 3 * before.size)
                 self._before = before
-            self._store.read_by("riders", "offsets", "rows", "between")
+            self._store.read_by("embedding", "offsets", "rows", "between")
             self._store.dispatch(
                 "pbd_guide_samples", before.size, uniforms | {"u_count": before.size}
             )
             return self._store["rows"]
 
     def _settings(self, system: System, load: Load, iterations: int) -> dict[str, Any]:
-        """Return the uniforms of substeps; put what the load tells of every node."""
+        """Return the uniforms of substeps; upload the per-node values of the load."""
         everywhere, force = load.air.ndim == 1 and not self._gusty, load.force
         if load.air.ndim > 1:
             self._store.put_rods("u_wind", load.air)
@@ -212,10 +214,10 @@ class ComputeEngine:
             "u_forced": force is not None or bool(self._held),
         } | contact_uniforms(self._contact)
 
-    def _run_held(self, loads: Sequence[Load], settings: dict[str, Any]) -> None:
-        """Find pulls, then step, load by load: a pull depends on where the node is."""
+    def _run_with_grabs(self, loads: Sequence[Load], settings: dict[str, Any]) -> None:
+        """Compute pulls and step, load by load: a pull depends on the node's position."""
         for k, load in enumerate(loads):
-            self._held.pull(k, load.ride, settings["u_seconds"])
+            self._held.pull(k, load.head_step, settings["u_seconds"])
             self._step(k, 1, settings)
 
     def _step(self, first: int, count: int, settings: dict[str, Any]) -> None:
@@ -223,26 +225,28 @@ class ComputeEngine:
         uniforms = settings | {"u_first": first, "u_substeps": count}
         self._store.dispatch("pbd_substeps", self._count, uniforms)
 
-    def _put_crowd(self, crowd: Crowd) -> Units:
-        units = Units.of(crowd)
+    def _upload_hair_grid(self, hair_grid: HairGrid) -> Units:
+        units = Units.of(hair_grid)
         self._store.put_rods("u_masses", (self._rods.mass * units.mass)[..., None])
-        self._store.put_grid("u_usual", (crowd.usual * units.mass).astype(np.float32))
-        self._store.put_grid("u_means", np.zeros((*crowd.shape, 4), np.float32))
-        self._store.make_words("filled", 4 * int(np.prod(crowd.shape)))
+        self._store.put_grid(
+            "u_uncrowded_mass", (hair_grid.uncrowded_mass * units.mass).astype(np.float32)
+        )
+        self._store.put_grid("u_means", np.zeros((*hair_grid.shape, 4), np.float32))
+        self._store.make_words("filled", 4 * int(np.prod(hair_grid.shape)))
         return units
 
-    def _ridden(self, riders: Riders) -> dict[str, Any]:
-        """Put the riders where they are not yet; return the uniforms of their points."""
+    def _upload_embedding(self, embedding: Embedding) -> dict[str, Any]:
+        """Upload the embedding unless it is there; return the uniforms of its points."""
         deepest = None if self._contact is None else self._contact.deepest
-        if self._riders is not riders:
-            self._store.put_words("riders", rider_words(riders, deepest))
-            self._store.put_words("offsets", offset_words(riders))
-            self._riders = riders
-        if deepest is None or riders.identity:
+        if self._embedding is not embedding:
+            self._store.put_words("embedding", rider_words(embedding, deepest))
+            self._store.put_words("offsets", offset_words(embedding))
+            self._embedding = embedding
+        if deepest is None or embedding.identity:
             return {"u_obstacles": False}
         return contact_uniforms(self._contact)
 
 
 def _quaternions(frames: Float64Array) -> Float64Array:
-    """(x, y, z, w) of the shaders as unit (w, x, y, z)."""
+    """Convert (x, y, z, w) of the shaders to unit (w, x, y, z)."""
     return quaternion.normalize(np.roll(frames, 1, axis=-1))

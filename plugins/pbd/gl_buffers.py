@@ -1,5 +1,4 @@
-"""Where the compute backend keeps its numbers, textures of rods and of grids and buffers, and how
-its shaders are run on them."""
+"""Textures and buffers of the compute backend, and the dispatch of its shaders."""
 
 from __future__ import annotations
 
@@ -14,11 +13,11 @@ from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.gl_camera import set_uniforms
 
 WIDTH = 4096
-"""Rods side by side in a texture; more of them stand below."""
+"""Rods in a row of a texture; further rods go into further rows."""
 GROUP = 64
 """Invocations of a work group."""
 MOST_GROUPS = 65535
-"""Work groups that every OpenGL 4.3 runs along an axis."""
+"""Work groups along an axis that every OpenGL 4.3 supports."""
 
 
 class Store:
@@ -27,7 +26,7 @@ class Store:
     def __init__(self, gl: Renderer, count: int, nodes: int) -> None:
         self._gl, self._count, self._nodes = gl, count, nodes
         self.width = min(1 << (count - 1).bit_length(), WIDTH)
-        """Rods side by side: powers of two, for which drivers compile once."""
+        """Rods in a row of a texture, a power of two, so that drivers compile few variants."""
         self._named: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
@@ -38,7 +37,7 @@ class Store:
         return name in self._named
 
     def groups(self, invocations: int) -> tuple[int, int]:
-        """Return how many work groups are run along x and y."""
+        """Return the number of work groups along x and y."""
         count = -(-invocations // GROUP)
         deep = -(-count // MOST_GROUPS)
         return -(-count // deep), deep
@@ -46,7 +45,7 @@ class Store:
     def dispatch(
         self, shader: str, invocations: int, uniforms: dict[str, Any], **definitions: int
     ) -> None:
-        """Run a shader so many times; its samplers are the textures of their names."""
+        """Run a shader; its samplers are bound to the textures of the same names."""
         program = self._gl.compute(shader, NODES=self._nodes, **definitions)
         own = {"u_rods": self._count, "u_nodes": self._nodes, "u_width": self.width}
         set_uniforms(program, **own, **uniforms)
@@ -58,7 +57,7 @@ class Store:
         self._gl.context.memory_barrier()
 
     def read_by(self, *names: str) -> None:
-        """Bind buffers for the next shader, in this order."""
+        """Bind buffers to the next shader, in this order."""
         for binding, name in enumerate(names):
             self._named[name].bind_to_storage_buffer(binding)
 
@@ -67,13 +66,13 @@ class Store:
         self._named[name].bind_to_image(0, read=False, write=True)
 
     def make_rods(self, name: str, rows: int) -> None:
-        """Make a texture of `rows` rows a rod for a shader to write, where it is not there yet."""
+        """Make a texture of `rows` rows per rod for a shader to write, unless it exists."""
         size = self._size(rows)
         if name not in self._named or self._named[name].size != size:
             self._texture(name, size, 4, None)
 
     def clear_rods(self, name: str) -> None:
-        """Write zeros to a texture of a row a node."""
+        """Fill a texture of one row per node with zeros."""
         self.put_rods(name, np.zeros((self._count, self._nodes, 1), np.float32))
 
     def put_rods(self, name: str, values: npt.ArrayLike) -> None:
@@ -87,7 +86,7 @@ class Store:
         self._texture(name, self._size(rows), 4, words)
 
     def rods(self, name: str) -> Float64Array:
-        """Return what `put_rods` wrote, or shaders since, (S, R, 4)."""
+        """Read back values (S, R, 4) that `put_rods` or a shader wrote."""
         words = np.frombuffer(self._named[name].read(), np.float32)
         tall = -(-self._count // self.width)
         rows = np.moveaxis(words.reshape(tall, -1, self.width, 4), 2, 1)
@@ -100,29 +99,29 @@ class Store:
         self._texture(name, (z, y, x), parts, np.ascontiguousarray(values, np.float32))
 
     def make_words(self, name: str, count: int) -> None:
-        """Make a buffer of `count` words of four bytes for a shader to write; its words are 0."""
+        """Make a buffer of `count` zeroed words of four bytes for a shader to write."""
         old = self._named.get(name)
         if old is None or old.size != 4 * count:
             self._buffer(name, 4 * count)
         self._named[name].clear()
 
     def put_words(self, name: str, values: npt.NDArray[Any]) -> None:
-        """Write values to a buffer, made anew where the size is another one."""
+        """Write values to a buffer, which is reallocated if its size differs."""
         old = self._named.get(name)
         if old is None or old.size != values.nbytes:
             self._buffer(name, values.nbytes)
         else:
-            old.orphan()  # a shader may still read it: nobody waits
+            old.orphan()  # a shader may still read the old storage
         self._named[name].write(np.ascontiguousarray(values))
 
     def words(self, name: str) -> Float32Array:
-        """Return the float32 words of a buffer, read back."""
+        """Read back the float32 words of a buffer."""
         found = np.empty(self._named[name].size // 4, np.float32)
         self._named[name].read_into(found)
         return found
 
     def release(self) -> None:
-        """Free everything, if its context is still the process's."""
+        """Free all GPU objects, if their context is still that of the process."""
         with renderer() as gl:
             for name in list(self._named):
                 if gl is self._gl:
@@ -155,7 +154,7 @@ class Store:
         most = int(self._gl.context.info[limit])
         if size > most:
             raise RenderError(
-                f"{what} for {name} of the hair would be {size}, the renderer has at most {most};"
+                f"{what} for {name} would be {size}, expected at most {most} on this renderer;"
                 " simulate fewer guides, or with pbd.backend=fast"
             )
 
@@ -165,5 +164,6 @@ class Store:
 
 
 _SAMPLERS = (
-    "u_state", "u_constants", "u_wind", "u_force", "u_distances", "u_masses", "u_usual", "u_means",
+    "u_state", "u_constants", "u_wind", "u_force", "u_distances", "u_masses",
+    "u_uncrowded_mass", "u_means",
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What rods and the points on them are to the shaders: numbers that stay until options change."""
+"""Constants of rods and embedded points in the layout of the shaders."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from hairkit.arrays import Float32Array, Float64Array
 from .factor_layout import banded_factor
 from .linear_system import System
 from .reference import Contact
-from .resampling import Riders
+from .resampling import Embedding
 from .rods import Rods
 
 NOWHERE = -1e9
-"""Metres: a least distance that every point has."""
+"""Least distance of points without a limit, metres."""
 
 
 def constant_rows(
@@ -48,24 +48,24 @@ def constant_rows(
     return rows
 
 
-def rider_words(riders: Riders, deepest: Float64Array | None) -> npt.NDArray[np.int32]:
-    """Return (P, 2): 64 times the rod and the segment; the least distance's float32 as it is."""
-    least = np.full(len(riders.rod), NOWHERE) if deepest is None else deepest
-    words = np.empty((len(riders.rod), 2), np.int32)
-    words[:, 0] = 64 * riders.rod + riders.segment
+def rider_words(embedding: Embedding, deepest: Float64Array | None) -> npt.NDArray[np.int32]:
+    """Return (P, 2): 64 rod + segment; the bits of the float32 least distance."""
+    least = np.full(len(embedding.rod), NOWHERE) if deepest is None else deepest
+    words = np.empty((len(embedding.rod), 2), np.int32)
+    words[:, 0] = 64 * embedding.rod + embedding.segment
     words[:, 1] = least.astype(np.float32).view(np.int32)
     return words
 
 
-def offset_words(riders: Riders) -> Float32Array:
-    """Return (P, 4): the offset in the rod's frame, and the share of the segment."""
-    _, _, share, offset = riders.packed()
+def offset_words(embedding: Embedding) -> Float32Array:
+    """Return (P, 4): offset in the rod's frame, fraction of the segment."""
+    _, _, share, offset = embedding.packed()
     return np.concatenate([offset, share[:, None]], axis=1)
 
 
 def share_words(
     before: npt.NDArray[np.integer[Any]], part: npt.NDArray[np.floating[Any]]
 ) -> npt.NDArray[np.int32]:
-    """Return (N, 2): the point before; the part of the way as float32, as it is."""
+    """Return (N, 2): the point before; the bits of the float32 fraction."""
     parts = np.ascontiguousarray(part, np.float32).view(np.int32)
     return np.stack([before.ravel().astype(np.int32), parts.ravel()], axis=1)

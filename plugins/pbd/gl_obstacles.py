@@ -1,4 +1,4 @@
-"""The obstacles as the compute backend's shaders look them up."""
+"""The obstacles in the layout of the compute backend's shaders."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hairkit.arrays import Float32Array
 from .reference import Contact
 
 ROOM = 0.02
-"""Metres around the grid of distances in which nothing is looked up."""
+"""Least distance outside the grid, metres."""
 
 
 def contact_uniforms(contact: Contact | None) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Pulls of held points: the force that brings a node to the hand within one substep."""
+"""Forces on grabbed points that bring their nodes to the targets within one substep."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ from hairkit.simulation import Grab, quaternion
 
 from .backend import Engine
 from .linear_system import System
-from .reference import Load, moved
-from .resampling import Riders
+from .reference import Load, transform_points
+from .resampling import Embedding
 from .rods import Rods
 
 SOFTEST = 0.3
-"""Compliance added, as a share of a free node's: where a taut strand cannot go, the pull ends."""
+"""Compliance added, as a share of a free node's: limits the force along a taut strand."""
 LEARNT, KEPT = 0.3, 0.99
-"""Of what a node fell short by, the share that is added to the standing force; what stays of it."""
+"""Gain of the integral term on the remaining error, and its decay in a substep."""
 MOST = 0.005
-"""Metres fallen short that are learnt from at once: a blocked node does not wind the hand up."""
+"""Largest error that the integral term sees in a substep, metres: anti-windup."""
 STRONGEST = 1.5
-"""Times the force that would bring a free node to the fastest pull within a substep."""
+"""Largest force over the one that accelerates a free node to full speed in a substep."""
 TAUT = 0.999
-"""A target is taken as at most this share of the strand's length away from its root."""
+"""Largest distance of a target from the root, as a share of the strand's length."""
 
 
-class Hand:
-    """Pulls of all held points; it learns the force that holds each where it is wanted."""
+class GrabForces:
+    """Forces of all grabbed points: a proportional and an integral term for each."""
 
     def __init__(self) -> None:
         self._held: dict[int, tuple[Float64Array, Float64Array]] = {}
 
-    def pulls(
+    def compute(
         self,
         grabs: tuple[Grab, ...],
         engine: Engine,
         rods: Rods,
-        riders: Riders,
+        embedding: Embedding,
         system: System,
         load: Load,
         back: Float64Array,
@@ -44,20 +44,21 @@ class Hand:
     ) -> Float64Array:
         """Return the force (S, n, 3) on the nodes nearest to the held points, newtons.
 
-        `back` (4, 4) brings the world to the head axes after the substep; a node is drawn at most
-        at `speed`, m/s. The force sees the lengths: it is the target's distance through the
-        compliance of the rod as its segments allow it to move, and a standing part that carries
-        what else acts on the node.
+        `back` (4, 4) transforms the world to the head axes after the substep; a node moves at no
+        more than `speed`, m/s. The force is the distance to the target over the compliance of the
+        rod with its length constraints, plus an integral term for other forces on the node.
         """
         force = np.zeros_like(rods.points)
         held: dict[int, tuple[Float64Array, Float64Array]] = {}
         for grab in grabs:
-            rod = int(riders.rod[grab.point])
-            node = max(int(riders.segment[grab.point] + (riders.share[grab.point] >= 0.5)), 1)
+            rod = int(embedding.rod[grab.point])
+            node = max(int(embedding.segment[grab.point] + (embedding.share[grab.point] >= 0.5)), 1)
             place, velocity = engine.rod(rod)
-            carried = moved(load.ride, place)
-            expected = carried + system.step * velocity @ load.ride[:3, :3].T
-            target = _reachable(moved(back, np.asarray(grab.target, np.float64)), rods, rod, node)
+            carried = transform_points(load.head_step, place)
+            expected = carried + system.step * velocity @ load.head_step[:3, :3].T
+            target = _reachable(
+                transform_points(back, np.asarray(grab.target, np.float64)), rods, rod, node
+            )
             wanted = target - expected[node]
             far = float(np.linalg.norm(wanted))
             wanted *= min(1.0, speed * system.step / max(far, 1e-12))
@@ -76,7 +77,7 @@ class Hand:
 
 
 def _reachable(target: Float64Array, rods: Rods, rod: int, node: int) -> Float64Array:
-    """Return the target, or the place nearest to it that the strand's length allows."""
+    """Return the target, or the nearest point that the strand's length allows."""
     root = rods.points[rod, 0]
     away = target - root
     most = TAUT * float(rods.length[rod, :node].sum())
@@ -85,7 +86,7 @@ def _reachable(target: Float64Array, rods: Rods, rod: int, node: int) -> Float64
 
 
 def _compliance(system: System, position: Float64Array, rod: int, node: int) -> Float64Array:
-    """(3, 3) metres per newton of a node whose rod keeps its lengths."""
+    """Return the compliance (3, 3), m/N, of a node whose rod keeps its lengths."""
     inverse = system.inverse[rod]
     way = quaternion.normalize(np.diff(position, axis=0))
     free = inverse[node - 1, node - 1]

@@ -1,9 +1,9 @@
-"""Hair among hair: density and velocity of all nodes on a grid around the head.
+"""Hair-hair interaction: density and velocity of all nodes on a grid around the head.
 
-Nodes are spread to a grid in the head frame and read back (Petrovic, Henne and Anderson 2005;
-particle-in-cell): velocities are drawn to those of the neighbours, which is friction between hairs,
-and where hair is denser than it was when captured, nodes are pushed to thinner places. At rest the
-grid has no say: nothing moves, and nothing is denser than captured.
+Nodes are splatted to a grid in the head frame and interpolated back (Petrovic, Henne and Anderson
+2005; particle-in-cell): velocities relax to the local mean, which models friction between hairs,
+and nodes move out of cells that are denser than in the captured hair. At rest the grid has no
+effect: nothing moves, and no cell is denser than captured.
 """
 
 from __future__ import annotations
@@ -14,51 +14,51 @@ import numpy as np
 
 from hairkit.arrays import Float64Array, Int64Array
 
-from .reference import State, moved
+from .reference import State, transform_points
 
 SPACING = 0.02
-"""Metres between the grid's values: some distances between guides."""
+"""Edge of a cell, metres: several distances between guides."""
 ROOM = 0.1
-"""How far the grid goes beyond the captured hair, metres."""
+"""Margin around the captured hair, metres."""
 _BITS = np.array([[i >> 2 & 1, i >> 1 & 1, i & 1] for i in range(8)])
 
 
 @dataclass(frozen=True, eq=False)
-class Crowd:
-    """The grid and what it held at rest."""
+class HairGrid:
+    """The grid and its mass at rest."""
 
     origin: Float64Array
-    """(3,) place of the first value, head frame."""
+    """(3,) position of the first cell, head frame."""
     shape: tuple[int, int, int]
     density: Float64Array
-    """(C,) kilograms a value at rest."""
+    """(C,) mass of each cell at rest, kilograms."""
 
     @property
-    def usual(self) -> Float64Array:
-        """(X, Y, Z) what counts as not crowded: as captured, or a quarter of the densest."""
+    def uncrowded_mass(self) -> Float64Array:
+        """(X, Y, Z) mass up to which a cell is not crowded: at rest, or 1/4 of the densest cell."""
         least = max(0.25 * float(self.density.max(initial=0.0)), 1e-30)
         return np.maximum(self.density, least).reshape(self.shape)
 
-    def rubbed(
+    def mix_velocities(
         self,
         state: State,
         mass: Float64Array,
-        ride: Float64Array,
+        head_step: Float64Array,
         rates: tuple[float, float, float],
     ) -> State:
-        """Return the state with velocities after hair has acted on hair; roots keep theirs.
+        """Return the state after hair-hair interaction; roots keep their velocity.
 
-        `ride` (4, 4) is how the head moves meanwhile, `rates` are cohesion, pressure, seconds.
+        `head_step` (4, 4) is the head motion of the step, `rates` are cohesion, pressure, seconds.
         """
         cohesion, pressure, seconds = rates
-        riding = (state.position - moved(ride, state.position)) / seconds
-        relative = state.velocity - riding
+        head_velocity = (state.position - transform_points(head_step, state.position)) / seconds
+        relative = state.velocity - head_velocity
         new = self.velocities(
             state.position.reshape(-1, 3), relative.reshape(-1, 3), mass.reshape(-1),
             cohesion, pressure, seconds,
         ).reshape(relative.shape)  # fmt: skip
         new[:, 0] = relative[:, 0]
-        return replace(state, velocity=new + riding)
+        return replace(state, velocity=new + head_velocity)
 
     def velocities(
         self,
@@ -69,35 +69,35 @@ class Crowd:
         pressure: float,
         seconds: float,
     ) -> Float64Array:
-        """Return velocities (N, 3) after `seconds` among each other.
+        """Return velocities (N, 3) after `seconds` of interaction.
 
         Parameters
         ----------
         position, velocity, mass
             (N, 3), (N, 3) relative to the head, and (N,) of the nodes.
         cohesion
-            1/s, at which a node takes on its neighbours' velocity.
+            1/s, rate of relaxation to the mean velocity around.
         pressure
-            m/s^2 of push at twice the captured density, over one cell's distance.
+            m/s^2 at twice the captured density, over the distance of one cell.
         seconds
-            How long.
+            Duration.
         """
         corner, weight = self._corners(position)
         share = weight * mass[:, None]
-        filled = self._summed(corner, share)
+        filled = self._splat(corner, share)
         result = velocity
         if cohesion > 0:
             cells = (
                 np.stack(
-                    [self._summed(corner, share * velocity[:, k, None]) for k in range(3)], axis=-1
+                    [self._splat(corner, share * velocity[:, k, None]) for k in range(3)], axis=-1
                 )
                 / np.maximum(filled, 1e-30)[:, None]
             )
             mean = np.einsum("nc,nck->nk", weight, cells[corner])
             result = velocity + (1 - np.exp(-cohesion * seconds)) * (mean - velocity)
         if pressure > 0:
-            usual = self.usual.reshape(-1)
-            crowded = np.maximum(filled - usual, 0.0) / usual
+            uncrowded_mass = self.uncrowded_mass.reshape(-1)
+            crowded = np.maximum(filled - uncrowded_mass, 0.0) / uncrowded_mass
             field = np.minimum(crowded, 4.0).reshape(self.shape)
             push = np.einsum("nck,nc->nk", self._slopes(position), field.reshape(-1)[corner])
             result = result - pressure * seconds * push
@@ -124,16 +124,16 @@ class Crowd:
         stride = np.array([self.shape[1] * self.shape[2], self.shape[2], 1])
         return (low[:, None] + _BITS) @ stride, weight
 
-    def _summed(self, corner: Int64Array, value: Float64Array) -> Float64Array:
+    def _splat(self, corner: Int64Array, value: Float64Array) -> Float64Array:
         cells = int(np.prod(self.shape))
         return np.bincount(corner.ravel(), value.ravel(), cells).astype(np.float64)
 
 
-def crowd_of(position: Float64Array, mass: Float64Array) -> Crowd:
+def make_hair_grid(position: Float64Array, mass: Float64Array) -> HairGrid:
     """Return the grid of nodes (N, 3) at rest."""
     origin = position.min(axis=0) - ROOM
     size = np.ceil((position.max(axis=0) + ROOM - origin) / SPACING).astype(int) + 1
     shape = (int(size[0]), int(size[1]), int(size[2]))
-    empty = Crowd(origin, shape, np.zeros(int(np.prod(size))))
+    empty = HairGrid(origin, shape, np.zeros(int(np.prod(size))))
     corner, weight = empty._corners(position)
-    return Crowd(origin, shape, empty._summed(corner, weight * mass[:, None]))
+    return HairGrid(origin, shape, empty._splat(corner, weight * mass[:, None]))

@@ -1,4 +1,4 @@
-"""How a head goes from one place to another: rigid motions between two."""
+"""Interpolation between two rigid motions of the head."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from hairkit.simulation import quaternion
 _IDENTITY = np.eye(4)
 
 
-def between(start: Float64Array, end: Float64Array, share: float) -> Float64Array:
-    """Return the rigid motion a share of the way from `start` to `end`."""
+def interpolate_motion(start: Float64Array, end: Float64Array, share: float) -> Float64Array:
+    """Return the rigid motion at fraction `share` between `start` and `end`."""
     if share <= 0.0 or (start == end).all():
         return start
     if share >= 1.0:
@@ -27,12 +27,12 @@ def between(start: Float64Array, end: Float64Array, share: float) -> Float64Arra
     return result
 
 
-def course(
+def motion_steps(
     start: Float64Array, end: Float64Array, count: int
 ) -> list[tuple[Float64Array, Float64Array]]:
-    """Return the motion (4, 4) after each of `count` equal steps, and what leads there.
+    """Return the motion (4, 4) after each of `count` equal steps, and the change of axes of each.
 
-    The latter brings points in the axes of the motion before the step to those after it.
+    The latter transforms points from the axes before the step to those after it.
     """
     if (start == end).all():
         return [(end, _IDENTITY)] * count
@@ -45,14 +45,14 @@ def course(
     heads[:, :3, 3] = start[:3, 3] + share[:, 0] * (end[:3, 3] - start[:3, 3])
     heads[0], heads[-1] = start, end
     back = heads[1:, :3, :3].swapaxes(1, 2)
-    rides = np.tile(_IDENTITY, (count, 1, 1))
-    rides[:, :3, :3] = back @ heads[:-1, :3, :3]
-    rides[:, :3, 3:] = back @ (heads[:-1] - heads[1:])[:, :3, 3:]
-    return list(zip(heads[1:], rides, strict=True))
+    head_steps = np.tile(_IDENTITY, (count, 1, 1))
+    head_steps[:, :3, :3] = back @ heads[:-1, :3, :3]
+    head_steps[:, :3, 3:] = back @ (heads[:-1] - heads[1:])[:, :3, 3:]
+    return list(zip(heads[1:], head_steps, strict=True))
 
 
 def _screw(turn: Float64Array) -> tuple[Float64Array, float]:
-    """Return the cross product (3, 3) of a rotation's axis, and its angle; 0 where it is none."""
+    """Return the cross-product matrix (3, 3) of a rotation's axis, and the angle."""
     w, x, y, z = quaternion.from_matrix(turn).tolist()
     sine = math.sqrt(x * x + y * y + z * z)
     if sine < 1e-12:

@@ -1,27 +1,27 @@
-"""The rows of a substep: what is done to one node or element of all strands of a block."""
+"""Steps of a substep on one node or element of all strands of a block."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .simd import at, lane_root, pick
+from .simd import lane_root, load, pick
 from .simd_math import (
-    carry,
     cross,
     dot,
-    four,
     half_way,
+    load_four,
+    load_three,
     minus,
     plus,
     product,
-    put_four,
-    put_three,
+    rotate_rows,
     row,
     rows_of,
+    store_four,
+    store_three,
     swing_frame,
-    three,
     times,
-    turned,
+    transform_rows,
     twist_angle,
 )
 
@@ -36,90 +36,93 @@ SHARPEST, LARGEST_SPIN = np.float32(0.3), np.float32(0.3)
 
 
 @row
-def constants_of(ride, turn, gravity, settings):  # type: ignore[no-untyped-def] # pragma: no cover
-    """Return the substep's scalars: motion, what it moves by, its turn, world to head, pull, step.
+def constants_of(head_step, turn, gravity, settings):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Return the substep's scalars: motion, displacement, rotation, world to head, gravity, step.
 
     See `kernels.run_substeps` for the arguments.
     """
     world = rows_of(turn, 0)
     return (
-        rows_of(ride, 0),
-        rows_of(ride, 4),
-        (ride[0, 8], ride[0, 9], ride[0, 10], ride[0, 11]),
+        rows_of(head_step, 0),
+        rows_of(head_step, 4),
+        (head_step[0, 8], head_step[0, 9], head_step[0, 10], head_step[0, 11]),
         world,
-        turned(world, (gravity[0], gravity[1], gravity[2])),
+        rotate_rows(world, (gravity[0], gravity[1], gravity[2])),
         (settings[0], settings[1], ONE / settings[0]),
     )
 
 
 @row
-def predict(x, node, air, constants, force, j) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Carry a node into the new head axes, go on straight, and write what acts on it."""
-    ride, shift, _, world, gravity, step = constants
+def predict_node(x, node, air, constants, force, j) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Transform a node to the new head axes, extrapolate it, and write the force on it."""
+    head_step, shift, _, world, gravity, step = constants
     h, damping, over = step
-    rest = three(node, j, REST)
-    place, speed = carry(ride, three(x, j, PLACE)), turned(ride, three(x, j, SPEED))
+    rest = load_three(node, j, REST)
+    place, speed = (
+        transform_rows(head_step, load_three(x, j, PLACE)),
+        rotate_rows(head_step, load_three(x, j, SPEED)),
+    )
     if j == 0:
         speed = times(over, minus(rest, place))
     place = plus(place, times(h, speed))
-    put_three(x, j, PLACE, place)
-    put_three(x, j, SPEED, speed)
-    blown = minus(turned(world, three(air, min(j, air.shape[0] - 1), 0)), speed)
+    store_three(x, j, PLACE, place)
+    store_three(x, j, SPEED, speed)
+    blown = minus(rotate_rows(world, load_three(air, min(j, air.shape[0] - 1), 0)), speed)
     # velocity of a point that rides on the head, against that of the node
-    riding = plus(times(over, carry(shift, place)), speed)
+    head_velocity = plus(times(over, transform_rows(shift, place)), speed)
     apart = minus(rest, place)
-    mass, drag, shape = at(node, (j, MASS)), at(node, (j, DRAG)), at(node, (j, SHAPE))
+    mass, drag, shape = load(node, (j, MASS)), load(node, (j, DRAG)), load(node, (j, SHAPE))
     pull = plus(plus(times(drag, blown), times(shape, apart)), gravity)
-    put_three(force, j, 0, times(mass, minus(pull, times(damping, riding))))
+    store_three(force, j, 0, times(mass, minus(pull, times(damping, head_velocity))))
 
 
 @row
-def swing(x, q, constants, segment, j) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """A segment as predicted, and its frame transported on to it."""
-    edge = minus(three(x, j + 1, PLACE), three(x, j, PLACE))
+def transport_frame(x, q, constants, segment, j) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Write a predicted segment, and transport its frame to the new direction."""
+    edge = minus(load_three(x, j + 1, PLACE), load_three(x, j, PLACE))
     direction = times(ONE / lane_root(dot(edge, edge)), edge)
-    put_three(segment, j, EDGE, edge)
-    put_three(segment, j, DIRECTION, direction)
-    put_four(q, j, swing_frame(product(constants[2], four(q, j)), direction))
+    store_three(segment, j, EDGE, edge)
+    store_three(segment, j, DIRECTION, direction)
+    store_four(q, j, swing_frame(product(constants[2], load_four(q, j)), direction))
 
 
 @row
-def twist(before, after, away, here, element, j):  # type: ignore[no-untyped-def] # pragma: no cover
-    """Torque of an element's twist, what its bending turns the frames at its ends with, firmness.
+def twist_torque(before, after, away, here, element, j):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Return an element's twist torque, its bending torques on both frames, and their stiffness.
 
     `away` and `here` are the directions before and after it.
     """
-    natural, quarter = half_way(before, after, three(element, j, CURVE))
+    natural, quarter = half_way(before, after, load_three(element, j, CURVE))
     turn = minus(here, away)
-    bend = HALF * at(element, (j, BEND))
+    bend = HALF * load(element, (j, BEND))
     spun = cross(natural, turn)
     aside = cross(quarter, spun)
     curved = dot(natural, turn)
-    torque = at(element, (j, TWIST)) * (twist_angle(before, after) - at(element, (j, NATURAL)))
+    torque = load(element, (j, TWIST)) * (twist_angle(before, after) - load(element, (j, NATURAL)))
     firm = HALF * bend * pick(curved, ZERO, ZERO, curved)
     return torque, bend * dot(away, minus(spun, aside)), bend * dot(here, plus(spun, aside)), firm
 
 
 @row
-def spin(q, segment, angle, j):  # type: ignore[no-untyped-def] # pragma: no cover
-    """Spin a frame about its segment; return the angle (the series of the arc tangent)."""
+def spin_frame(q, segment, angle, j):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Rotate a frame about its segment; return the angle, by the series of the arc tangent."""
     angle = pick(angle, LARGEST_SPIN, angle, LARGEST_SPIN)
     half = HALF * pick(angle, -LARGEST_SPIN, -LARGEST_SPIN, angle)
     cosine = ONE / lane_root(ONE + half * half)
-    axis = times(half * cosine, three(segment, j, DIRECTION))
-    put_four(q, j, product((cosine, axis[0], axis[1], axis[2]), four(q, j)))
+    axis = times(half * cosine, load_three(segment, j, DIRECTION))
+    store_four(q, j, product((cosine, axis[0], axis[1], axis[2]), load_four(q, j)))
     return TWO * half * (ONE - half * half * (THIRD - FIFTH * half * half))
 
 
 @row
-def bow(before, after, away, here, turn, torque, element, j):  # type: ignore[no-untyped-def] # pragma: no cover
-    """Pull of an element on the direction after it and on the one before it.
+def bending_force(before, after, away, here, turn, torque, element, j):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Return the generalised force of an element on the directions after and before it.
 
     `away` and `here` are those directions, `turn` the difference of the segments' reaches,
     `torque` that of the twist.
     """
-    natural, quarter = half_way(before, after, three(element, j, CURVE))
-    bend = at(element, (j, BEND))
+    natural, quarter = half_way(before, after, load_three(element, j, CURVE))
+    bend = load(element, (j, BEND))
     spun = times(HALF * bend, cross(natural, turn))
     aside = cross(quarter, spun)
     cosine = ONE + dot(away, here)

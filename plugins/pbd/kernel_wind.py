@@ -1,4 +1,4 @@
-"""Gusts in the kernels: what `hairkit.simulation.wind.air_velocity` does, float32."""
+"""Gusts in the kernels: the float32 twin of `hairkit.simulation.wind.air_velocity`."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 from numba import njit
 
 from .simd import pick, whole
-from .simd_math import ZERO, dot, minus, plus, put_three, row, three, times
+from .simd_math import ZERO, dot, load_three, minus, plus, row, store_three, times
 
 PLACE = 0
 ONE, HALF, QUARTER = np.float32(1), np.float32(0.5), np.float32(0.25)
 APART = 4
-"""Gusts are mixed between every so many nodes."""
+"""Gusts are evaluated at every so many nodes and interpolated between."""
 # cos(2 pi t) for |t| <= 1/4 in powers of t^2 (Taylor's series): off by less than 1e-7
 _C = [np.float32((-1) ** k * (2 * np.pi) ** (2 * k) / math.factorial(2 * k)) for k in range(7)]
 _C1, _C2, _C3, _C4, _C5, _C6 = _C[1:]
 
 
 @njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
-def blow_nodes(first, last, x, waves, amplitudes, wind, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def sample_gusts(first, last, x, waves, amplitudes, wind, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write the velocity of the air at the nodes of some blocks, world.
 
     Parameters
@@ -35,22 +35,22 @@ def blow_nodes(first, last, x, waves, amplitudes, wind, out) -> None:  # type: i
         (B, n, 3, W).
     """
     for block in range(first, last):
-        _blow(x[block], waves, amplitudes, wind, out[block])
+        _sample_block(x[block], waves, amplitudes, wind, out[block])
 
 
 @row
-def _blow(x, waves, amplitudes, wind, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Do it for a block: gusts at some nodes, the others between them."""
+def _sample_block(x, waves, amplitudes, wind, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Evaluate gusts at some nodes of a block and interpolate the others."""
     last = x.shape[0] - 1
     j = 0
-    before = _gust(three(x, 0, PLACE), waves, amplitudes, wind)
-    put_three(out, 0, 0, before)
+    before = _gust(load_three(x, 0, PLACE), waves, amplitudes, wind)
+    store_three(out, 0, 0, before)
     while j < last:
         next = min(j + APART, last)
-        after = _gust(three(x, next, PLACE), waves, amplitudes, wind)
+        after = _gust(load_three(x, next, PLACE), waves, amplitudes, wind)
         change = times(ONE / np.float32(next - j), minus(after, before))
         for k in range(j + 1, next + 1):
-            put_three(out, k, 0, plus(before, times(np.float32(k - j), change)))
+            store_three(out, k, 0, plus(before, times(np.float32(k - j), change)))
         j, before = next, after
 
 

@@ -1,9 +1,8 @@
 """The fast backend's kernels: the reference's substep, float32, strands side by side.
 
-Strands stand in blocks of `LANES`; the last axis of every array is the strand in its block, and a
-row of it goes through registers as one (see `kernel_lanes`). A block does all substeps of a call
-while it is in the cache. Masses are shares of the strand's mean node mass, so that stiffness is in
-1/s^2.
+Strands are packed in blocks of `LANES`; the last axis of every array is the strand in its block, so
+that a row is one SIMD register (see `simd`). A block does all substeps of a call while it is in the
+cache. Masses are relative to the strand's mean node mass, so that stiffness is in 1/s^2.
 """
 
 from __future__ import annotations
@@ -16,11 +15,18 @@ from numba import njit
 
 from hairkit.arrays import Float32Array
 
-from .kernel_contact import GRIP, LINES, brake_again, relengthen, touch
-from .kernel_rows import bow, constants_of, predict, spin, swing, twist
-from .kernel_solve import banded_solve, excess_of, lengths_solve, pull_back
-from .simd import LANES, at, lane_root, put
-from .simd_math import dot, four, minus, plus, put_three, row, three, times
+from .kernel_contact import GRIP, LINES, apply_friction, resolve_contacts, restore_lengths
+from .kernel_rows import (
+    bending_force,
+    constants_of,
+    predict_node,
+    spin_frame,
+    transport_frame,
+    twist_torque,
+)
+from .kernel_solve import excess_of, solve_banded, solve_lengths, tension_to_force
+from .simd import LANES, lane_root, load, store
+from .simd_math import dot, load_four, load_three, minus, plus, row, store_three, times
 
 LENGTH, OVER, BEND, TWIST, CURVE, NATURAL, FIRST, SECOND, PIVOT = 0, 1, 2, 3, 4, 7, 8, 9, 10
 """Rows of an element's constants: length, 1/length, stiffnesses, natural turn (3), natural twist,
@@ -30,7 +36,7 @@ REST, MASS, DRAG, SHAPE, CLEAR, EASE = 0, 3, 4, 5, 6, 7
 """Rows of a node's constants: rest place (3), mass, rates, clearance, 1/mass (root 0)."""
 NODE = 8
 PLACE, SPEED, SLACK = 0, 3, 6
-"""Rows of a node's state: place (3), velocity (3), and how far it may go before it is looked up."""
+"""Rows of a node's state: position (3), velocity (3), and how far it may move before a lookup."""
 STATE = 7
 EDGE, DIRECTION = 0, 3
 
@@ -47,7 +53,7 @@ def run_substeps(  # type: ignore[no-untyped-def]
     node,
     element,
     metric,
-    rides,
+    head_steps,
     turns,
     gravity,
     air,
@@ -84,10 +90,10 @@ def run_substeps(  # type: ignore[no-untyped-def]
     corners = np.zeros((12, LANES), np.float32)
     for block in range(first, last):
         wind, extra = air[min(block, air.shape[0] - 1)], force[min(block, force.shape[0] - 1)]
-        for k in range(rides.shape[0]):
+        for k in range(head_steps.shape[0]):
             _substep(
                 x[block], q[block], root[block], node[block], element[block], metric[block],
-                constants_of(rides[k], turns[k], gravity, settings), wind, extra, grid,
+                constants_of(head_steps[k], turns[k], gravity, settings), wind, extra, grid,
                 settings, segment, vector, line, factor, corners,
             )  # fmt: skip
 
@@ -101,51 +107,53 @@ def _substep(  # type: ignore[no-untyped-def]
     n = x.shape[0]
     force, free, change, normals = vector[0], vector[1], vector[2], vector[3]
     for j in range(n):
-        predict(x, node, air, constants, force, j)
+        predict_node(x, node, air, constants, force, j)
     if extra.shape[0] == n:
         for j in range(n):
-            put_three(force, j, 0, plus(three(force, j, 0), three(extra, j, 0)))
+            store_three(force, j, 0, plus(load_three(force, j, 0), load_three(extra, j, 0)))
     for j in range(n - 1):
-        swing(x, q, constants, segment, j)
+        transport_frame(x, q, constants, segment, j)
     _untwist(q, root, segment, element, line)
     _elastic(q, root, segment, element, line, force)
-    banded_solve(element, force, free)
+    solve_banded(element, force, free)
     iterations = int(settings[4])
     for iteration in range(iterations):
         excess_of(segment, free, element, line[0])
-        lengths_solve(metric, segment, factor, line[1], line[4], line[0])
-        pull_back(line[0], segment, force)
-        banded_solve(element, force, change)
+        solve_lengths(metric, segment, factor, line[1], line[4], line[0])
+        tension_to_force(line[0], segment, force)
+        solve_banded(element, force, change)
         if iteration + 1 < iterations:
             _redirect(segment, free, change)
     over = constants[5][2]
     for j in range(1, n):
-        move = minus(three(free, j, 0), three(change, j, 0))
-        put_three(x, j, PLACE, plus(three(x, j, PLACE), move))
-        put_three(x, j, SPEED, plus(three(x, j, SPEED), times(over, move)))
+        move = minus(load_three(free, j, 0), load_three(change, j, 0))
+        store_three(x, j, PLACE, plus(load_three(x, j, PLACE), move))
+        store_three(x, j, SPEED, plus(load_three(x, j, SPEED), times(over, move)))
     if settings[5] > ZERO:
-        touching = touch(x, node, constants, grid, settings, corners, normals, line[GRIP])
-        relengthen(x, node, element, segment, normals, line, settings)
-        # where nothing is touched, the second round finds the lengths as they should be
+        touching = resolve_contacts(
+            x, node, constants, grid, settings, corners, normals, line[GRIP]
+        )
+        restore_lengths(x, node, element, segment, normals, line, settings)
+        # without contact, one more iteration is enough
         for _ in range(int(settings[6] if touching else min(settings[6], ONE))):
-            brake_again(x, constants, settings, normals, line[GRIP])
-            relengthen(x, node, element, segment, normals, line, settings)
+            apply_friction(x, constants, settings, normals, line[GRIP])
+            restore_lengths(x, node, element, segment, normals, line, settings)
 
 
 @row
 def _untwist(q, root, segment, element, line) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Spin frames about their segments until torques balance: one Newton step, tridiagonal.
+    """Rotate frames about their segments until torques balance: one Newton step, tridiagonal.
 
-    Elimination runs along with the torques; a frame's row is whole once the next element is known.
+    Elimination runs along with the torques; a frame's row is complete after the next element.
     """
     m = segment.shape[0]
-    before, away = four(root, 0), three(root, 0, 4)
+    before, away = load_four(root, 0), load_three(root, 0, 4)
     own = coupled = value = angle = ZERO * before[0]
     for j in range(m):
-        after, here = four(q, j), three(segment, j, DIRECTION)
-        torque, to_before, to_after, firm = twist(before, after, away, here, element, j)
-        stiff = at(element, (j, TWIST))
-        put(line, (3, j), torque)
+        after, here = load_four(q, j), load_three(segment, j, DIRECTION)
+        torque, to_before, to_after, firm = twist_torque(before, after, away, here, element, j)
+        stiff = load(element, (j, TWIST))
+        store(line, (3, j), torque)
         if j > 0:
             _eliminate(line, own + stiff + firm, coupled, value + to_before + torque, j - 1)
         own, coupled, value = stiff + firm, firm - stiff, to_after - torque
@@ -153,44 +161,44 @@ def _untwist(q, root, segment, element, line) -> None:  # type: ignore[no-untype
     _eliminate(line, own, coupled, value, m - 1)
     spun = angle
     for j in range(m - 1, -1, -1):
-        angle = (at(line, (1, j)) - coupled * angle) * at(line, (0, j))
-        turn = spin(q, segment, angle, j)
+        angle = (load(line, (1, j)) - coupled * angle) * load(line, (0, j))
+        turn = spin_frame(q, segment, angle, j)
         if j + 1 < m:
             _twist_more(line, element, spun - turn, j + 1)
-        spun, coupled = turn, at(line, (2, j))
+        spun, coupled = turn, load(line, (2, j))
     _twist_more(line, element, spun, 0)
 
 
 @row
 def _twist_more(line, element, angle, j) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Spinning frames about their own segments adds to the twist between them, exactly."""
-    put(line, (3, j), at(line, (3, j)) + angle * at(element, (j, TWIST)))
+    """Update the twist torque for frames rotated about their own segments, which is exact."""
+    store(line, (3, j), load(line, (3, j)) + angle * load(element, (j, TWIST)))
 
 
 @row
 def _eliminate(line, diagonal, beside, value, j) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Write row j of a tridiagonal system as elimination leaves it: 1/pivot, value, beside."""
+    """Eliminate row j of a tridiagonal system: write 1/pivot, value, off-diagonal."""
     if j > 0:
-        factor = beside * at(line, (0, j - 1))
+        factor = beside * load(line, (0, j - 1))
         diagonal = diagonal - factor * beside
-        value = value - factor * at(line, (1, j - 1))
-    put(line, (0, j), ONE / diagonal)
-    put(line, (1, j), value)
-    put(line, (2, j), beside)
+        value = value - factor * load(line, (1, j - 1))
+    store(line, (0, j), ONE / diagonal)
+    store(line, (1, j), value)
+    store(line, (2, j), beside)
 
 
 @row
 def _elastic(q, root, segment, element, line, force) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Add bending and twist as forces on the nodes."""
+    """Add the node forces of bending and twist."""
     m = segment.shape[0]
-    before, away = four(root, 0), three(root, 0, 4)
+    before, away = load_four(root, 0), load_three(root, 0, 4)
     reach, pull, over = away, times(ZERO, away), ZERO * away[0]
     for j in range(m):
-        after, here = four(q, j), three(segment, j, DIRECTION)
-        next_over = at(element, (j, OVER))
-        next_reach = times(next_over, three(segment, j, EDGE))
-        to_after, to_before = bow(
-            before, after, away, here, minus(next_reach, reach), at(line, (3, j)), element, j
+        after, here = load_four(q, j), load_three(segment, j, DIRECTION)
+        next_over = load(element, (j, OVER))
+        next_reach = times(next_over, load_three(segment, j, EDGE))
+        to_after, to_before = bending_force(
+            before, after, away, here, minus(next_reach, reach), load(line, (3, j)), element, j
         )
         if j > 0:
             _act(force, times(over, plus(pull, to_before)), j - 1)
@@ -200,24 +208,24 @@ def _elastic(q, root, segment, element, line, force) -> None:  # type: ignore[no
 
 @row
 def _act(force, pull, j) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Add what a segment's moments do to its two nodes."""
-    put_three(force, j, 0, minus(three(force, j, 0), pull))
-    put_three(force, j + 1, 0, plus(three(force, j + 1, 0), pull))
+    """Add the forces of a segment's moments on its two nodes."""
+    store_three(force, j, 0, minus(load_three(force, j, 0), pull))
+    store_three(force, j + 1, 0, plus(load_three(force, j + 1, 0), pull))
 
 
 @row
 def _redirect(segment, free, change) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Turn the directions to where the solution leads, for another round."""
+    """Update the directions from the solution, for another iteration."""
     for j in range(segment.shape[0]):
-        start = minus(three(free, j, 0), three(change, j, 0))
-        end = minus(three(free, j + 1, 0), three(change, j + 1, 0))
-        edge = plus(three(segment, j, EDGE), minus(end, start))
+        start = minus(load_three(free, j, 0), load_three(change, j, 0))
+        end = minus(load_three(free, j + 1, 0), load_three(change, j + 1, 0))
+        edge = plus(load_three(segment, j, EDGE), minus(end, start))
         size = ONE / lane_root(dot(edge, edge))
-        put_three(segment, j, DIRECTION, times(size, edge))
+        store_three(segment, j, DIRECTION, times(size, edge))
 
 
-def tell_of_compiling() -> None:
-    """Warn where nothing compiled is kept yet: the first step will take half a minute."""
+def warn_of_compilation() -> None:
+    """Warn if no compiled kernels are cached: the first step then takes half a minute."""
     if run_substeps.signatures:
         return
     if not any(Path(run_substeps.stats.cache_path or ".").glob("kernels.run_substeps-*.nbi")):
@@ -226,8 +234,8 @@ def tell_of_compiling() -> None:
         )
 
 
-def padded(values: Float32Array, lanes: int = LANES) -> Float32Array:
-    """Return values (S, ...) as blocks (B, ..., W); the last strand fills the last block."""
+def pack_lanes(values: Float32Array, lanes: int = LANES) -> Float32Array:
+    """Pack values (S, ...) into blocks (B, ..., W), padded with the last strand."""
     count = len(values)
     blocks = -(-count // lanes)
     rows = np.minimum(np.arange(blocks * lanes), count - 1)

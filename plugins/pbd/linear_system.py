@@ -1,12 +1,12 @@
-"""The linear system of one substep: constant as long as the substep's length is.
+"""The linear system of a substep, constant for a constant time step.
 
-Implicit Euler of nodes with mass, drag, bending and shape springs asks for `A delta = force`, with
+Implicit Euler for nodes with mass, drag, bending and shape springs solves `A delta = force`, with
 
     A = M / h^2 + C / h + K_bend + K_shape,
 
-one banded matrix for all three coordinates since bending is quadratic. Lengths are constraints on
-top: with multipliers along the directions d the Schur complement is (D A^-1 D^T) * (d d^T), element
-by element, so that only the directions change from substep to substep.
+one banded matrix for all three coordinates, since the bending energy is quadratic. Lengths are
+constraints with multipliers along the directions d; their Schur complement is the elementwise
+product (D A^-1 D^T) * (d d^T), of which only d changes between substeps.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ from hairkit.arrays import Float64Array
 from .rods import Rods
 
 COMPLIANCE = 1e-6
-"""Share of itself added to the diagonal of the length system: keeps it definite in float32."""
+"""Relative increase of the diagonal of the length system, which keeps it definite in float32."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """What pulls on nodes besides the rods' own stiffness."""
+    """Drag, damping and shape stiffness of the nodes."""
 
     drag: Float64Array
-    """(S, n) 1/s, at which air takes a node along."""
+    """(S, n) rate of air drag, 1/s."""
     damping: float
-    """1/s, at which motion relative to the head dies."""
+    """Rate of damping of motion relative to the head, 1/s."""
     shape: Float64Array
-    """(S, n) 1/s^2, squared frequency of the pull to the captured place."""
+    """(S, n) squared frequency of the pull to the captured shape, 1/s^2."""
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """Matrices of one substep for every rod."""
+    """Matrices of a substep for each rod."""
 
     step: float
     """Seconds."""
     banded: Float64Array
-    """(S, n - 1, 3) diagonal and the two below it of A, kg/s^2, rows of the free nodes 1 to n."""
+    """(S, n - 1, 3) diagonal and two lower bands of A, kg/s^2, for the free nodes 1 to n - 1."""
     inverse: Float64Array
     """(S, n - 1, n - 1) of A."""
     metric: Float64Array

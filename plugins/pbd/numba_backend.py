@@ -14,13 +14,13 @@ from hairkit.simulation import quaternion
 
 from . import kernels
 from .factor_layout import banded_factor
-from .hair_grid import Crowd
-from .kernel_embedding import ride_points
+from .hair_grid import HairGrid
+from .kernel_embedding import embed_points
 from .kernel_hair_grid import draw_nodes, settle_cells, spread_nodes
-from .kernel_wind import blow_nodes
+from .kernel_wind import sample_gusts
 from .linear_system import System
-from .reference import Contact, Load, State, at_rest
-from .resampling import Riders
+from .reference import Contact, Load, State, rest_state
+from .resampling import Embedding
 from .rods import Rods
 from .simd import LANES
 
@@ -30,47 +30,49 @@ NOWHERE = np.zeros(0, np.float32)
 WORTH = 64 // LANES
 """Blocks that are worth another thread's while."""
 FEW, GRIDS = 2000, 4
-"""Of fewer rods the nodes are spread to one grid, of more to so many at a time."""
+"""Up to FEW rods are splatted to one grid, more rods to GRIDS grids in parallel."""
 
 
 class FastEngine:
     """Rods in blocks of lanes."""
 
     def __init__(self, rods: Rods, contact: Contact | None) -> None:
-        kernels.tell_of_compiling()
+        kernels.warn_of_compilation()
         self._rods = rods
         self._count = len(rods.points)
         self._unit = rods.mass.mean(axis=1)
         self._contact = contact
         held = quaternion.third_axis(rods.root_frame)
-        self._root = kernels.padded(np.concatenate([rods.root_frame, held], axis=1)[:, None])
+        self._root = kernels.pack_lanes(np.concatenate([rods.root_frame, held], axis=1)[:, None])
         self._packed: tuple[System, Float32Array, Float32Array, Float32Array] | None = None
         self._grid = _grid(contact)
         deepest = None if contact is None else contact.deepest
         self._deepest = NOWHERE if deepest is None else deepest.astype(np.float32)
         clear = np.zeros(rods.mass.shape) if contact is None else contact.clearance
-        self._clear = kernels.padded(clear.astype(np.float32))
-        self._mass = kernels.padded(rods.mass.astype(np.float32))
+        self._clear = kernels.pack_lanes(clear.astype(np.float32))
+        self._mass = kernels.pack_lanes(rods.mass.astype(np.float32))
         self._mass[-1, :, (self._count - 1) % LANES + 1 :] = 0.0
         self._cells = np.zeros((1, 0, 4), np.float32)
         self._usual = np.zeros(0, np.float32)
         self._blown: Float32Array | None = None
-        self._air_work = kernels.padded(np.zeros(rods.points.shape, np.float32))
-        self._riding: tuple[Riders, tuple[Array, ...]] | None = None
-        self.state = at_rest(rods)
+        self._air_work = kernels.pack_lanes(np.zeros(rods.points.shape, np.float32))
+        self._packed_embedding: tuple[Embedding, tuple[Array, ...]] | None = None
+        self.state = rest_state(rods)
 
     @property
     def state(self) -> State:
         """The present state as float64; setting it moves the rods."""
-        nodes = self._unpacked(self._x)
-        return State(nodes[..., :3], nodes[..., 3:6], quaternion.normalize(self._unpacked(self._q)))
+        nodes = self._unpack_lanes(self._x)
+        return State(
+            nodes[..., :3], nodes[..., 3:6], quaternion.normalize(self._unpack_lanes(self._q))
+        )
 
     @state.setter
     def state(self, value: State) -> None:
         slack = np.zeros_like(value.position[..., :1])
         nodes = np.concatenate([value.position, value.velocity, slack], axis=-1)
-        self._x = kernels.padded(nodes.astype(np.float32))
-        self._q = kernels.padded(value.frames.astype(np.float32))
+        self._x = kernels.pack_lanes(nodes.astype(np.float32))
+        self._q = kernels.pack_lanes(value.frames.astype(np.float32))
 
     def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
         """Do one substep for each load."""
@@ -91,7 +93,7 @@ class FastEngine:
             node,
             element,
             metric,
-            *_motions(loads),
+            *_pack_motions(loads),
             loads[0].gravity.astype(np.float32),
             self._air(loads[0].air),
             self._force(loads[0].force),
@@ -100,14 +102,19 @@ class FastEngine:
             min_chunk=WORTH,
         )
 
-    def rub(self, crowd: Crowd, ride: Float64Array, rates: tuple[float, float, float]) -> None:
-        """Let hair act on hair."""
-        size = int(np.prod(crowd.shape))
+    def apply_hair_grid(
+        self, hair_grid: HairGrid, head_step: Float64Array, rates: tuple[float, float, float]
+    ) -> None:
+        """Apply hair-hair interaction."""
+        size = int(np.prod(hair_grid.shape))
         if self._cells.shape[1] != size:
             grids = 1 if self._count < FEW else GRIDS
             self._cells = np.zeros((grids, size, 4), np.float32)
-            self._usual = crowd.usual.astype(np.float32).reshape(-1)
-        shift, origin = (ride - np.eye(4))[:3].astype(np.float32), crowd.origin.astype(np.float32)
+            self._usual = hair_grid.uncrowded_mass.astype(np.float32).reshape(-1)
+        shift, origin = (
+            (head_step - np.eye(4))[:3].astype(np.float32),
+            hair_grid.origin.astype(np.float32),
+        )
         parallel_for(
             spread_nodes,
             len(self._cells),
@@ -115,7 +122,7 @@ class FastEngine:
             self._mass,
             shift,
             origin,
-            crowd.shape,
+            hair_grid.shape,
             np.float32(rates[2]),
             self._cells,
         )
@@ -126,14 +133,14 @@ class FastEngine:
             self._x,
             shift,
             origin,
-            crowd.shape,
+            hair_grid.shape,
             np.array(rates, np.float32),
             self._cells[0],
             min_chunk=4 * WORTH,
         )
 
-    def blow(self, waves: AirWaves | None, wind: Float64Array, head: Float64Array) -> None:
-        """Take gusts (see `wind.gust_waves`) for the substeps to come; None: the wind alone."""
+    def set_gusts(self, waves: AirWaves | None, wind: Float64Array, head: Float64Array) -> None:
+        """Evaluate gusts (see `wind.gust_waves`) for the next substeps; None: the mean wind."""
         self._blown = None
         if waves is None:
             return
@@ -141,7 +148,7 @@ class FastEngine:
         phases = np.remainder((phases + vectors @ head[:3, 3]) / (2 * np.pi), 1.0)
         turns = np.column_stack([vectors @ head[:3, :3] / (2 * np.pi), phases])
         parallel_for(
-            blow_nodes,
+            sample_gusts,
             len(self._x),
             self._x,
             turns.astype(np.float32),
@@ -153,8 +160,8 @@ class FastEngine:
         self._blown = self._air_work
 
     def air(self) -> Float64Array:
-        """Return the air's velocity (S, n, 3) at the nodes, world, as gusts were last taken."""
-        return self._unpacked(self._air_work)
+        """Return the air velocity (S, n, 3) at the nodes, world, of the last gusts."""
+        return self._unpack_lanes(self._air_work)
 
     def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
         """Return places and velocities (n, 3) of one rod, head axes."""
@@ -162,16 +169,19 @@ class FastEngine:
         nodes = self._x[block, :, :, lane].astype(np.float64)
         return nodes[:, :3], nodes[:, 3:6]
 
-    def points(self, riders: Riders, head: Float64Array) -> Float32Array:
+    def points(self, embedding: Embedding, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
-        if self._riding is None or self._riding[0] is not riders:
-            self._riding = (riders, _riding(riders, self._count, self._x.shape[1]))
-        out = np.empty((len(self._riding[1][0]), 3), np.float32)
-        deepest = NOWHERE if riders.identity else self._deepest
+        if self._packed_embedding is None or self._packed_embedding[0] is not embedding:
+            self._packed_embedding = (
+                embedding,
+                _pack_embedding(embedding, self._count, self._x.shape[1]),
+            )
+        out = np.empty((len(self._packed_embedding[1][0]), 3), np.float32)
+        deepest = NOWHERE if embedding.identity else self._deepest
         motion = head[:3].astype(np.float32)
-        rod, segment, weight, offset = self._riding[1]
+        rod, segment, weight, offset = self._packed_embedding[1]
         parallel_for(
-            ride_points,
+            embed_points,
             len(out),
             self._x,
             self._q,
@@ -188,7 +198,7 @@ class FastEngine:
         )
         return out
 
-    def _unpacked(self, values: Float32Array) -> Float64Array:
+    def _unpack_lanes(self, values: Float32Array) -> Float64Array:
         spread = np.moveaxis(values, -1, 1).reshape(-1, *values.shape[1:-1])
         return spread[: self._count].astype(np.float64)
 
@@ -197,12 +207,12 @@ class FastEngine:
             return self._blown
         if air.ndim == 1:
             return np.repeat(air.astype(np.float32)[None, None, :, None], LANES, axis=3)
-        return kernels.padded(air.astype(np.float32))
+        return kernels.pack_lanes(air.astype(np.float32))
 
     def _force(self, force: Float64Array | None) -> Float32Array:
         if force is None:
             return np.zeros((1, 1, 3, LANES), np.float32)
-        return kernels.padded((force / self._unit[:, None, None]).astype(np.float32))
+        return kernels.pack_lanes((force / self._unit[:, None, None]).astype(np.float32))
 
 
 def _constants(
@@ -226,36 +236,36 @@ def _constants(
     element[..., kernels.FIRST :] = banded_factor(system.banded / unit[:, None, None])
     row, column = np.tril_indices(nodes - 1)
     metric = system.metric[:, row, column] * unit[:, None]
-    packed = [kernels.padded(part.astype(np.float32)) for part in (node, element, metric)]
+    packed = [kernels.pack_lanes(part.astype(np.float32)) for part in (node, element, metric)]
     return packed[0], packed[1], packed[2]
 
 
-def _motions(loads: Sequence[Load]) -> tuple[Float32Array, Float32Array]:
+def _pack_motions(loads: Sequence[Load]) -> tuple[Float32Array, Float32Array]:
     """Pack rides and turns as `kernels.run_substeps` takes them."""
-    rides, turns = np.zeros((len(loads), 3, 12)), np.zeros((len(loads), 3, 4))
+    head_steps, turns = np.zeros((len(loads), 3, 12)), np.zeros((len(loads), 3, 4))
     for k, load in enumerate(loads):
-        rides[k, :, :4] = load.ride[:3]
-        rides[k, :, 4:8] = load.ride[:3] - np.eye(
+        head_steps[k, :, :4] = load.head_step[:3]
+        head_steps[k, :, 4:8] = load.head_step[:3] - np.eye(
             3, 4
-        )  # in float64: hardly moved heads keep digits
-        rides[k, 0, 8:] = quaternion.from_matrix(load.ride[:3, :3])
+        )  # in float64: small motions keep their digits
+        head_steps[k, 0, 8:] = quaternion.from_matrix(load.head_step[:3, :3])
         turns[k, :, :3] = load.turn
-    return rides.astype(np.float32), turns.astype(np.float32)
+    return head_steps.astype(np.float32), turns.astype(np.float32)
 
 
-def _riding(riders: Riders, rods: int, nodes: int) -> tuple[Array, ...]:
+def _pack_embedding(embedding: Embedding, rods: int, nodes: int) -> tuple[Array, ...]:
     """Return rod, segment, weights (P, 6) of four nodes and two frames, and offset of points."""
-    if riders.identity:
+    if embedding.identity:
         rod = np.repeat(np.arange(rods, dtype=np.int32), nodes)
         segment = np.tile(np.minimum(np.arange(nodes, dtype=np.int32), nodes - 2), rods)
         weight = np.zeros((len(rod), 6), np.float32)
         weight[:, 1] = np.tile(np.arange(nodes) < nodes - 1, rods)
         weight[:, 2] = 1.0 - weight[:, 1]
         return rod, segment, weight, np.zeros((len(rod), 3), np.float32)
-    t, last = riders.share, nodes - 2
+    t, last = embedding.share, nodes - 2
     one, two = t * t * (3 - 2 * t), t * (1 - t)
     start, end = two * (1 - t), -two * t  # of the slopes, per segment
-    first, final = riders.segment == 0, riders.segment == last
+    first, final = embedding.segment == 0, embedding.segment == last
     weight = np.stack(
         [
             np.where(first, 0.0, -0.5 * start),
@@ -268,8 +278,8 @@ def _riding(riders: Riders, rods: int, nodes: int) -> tuple[Array, ...]:
         axis=1,
     )
     return (
-        riders.rod.astype(np.int32), riders.segment.astype(np.int32), weight.astype(np.float32),
-        riders.offset.astype(np.float32),
+        embedding.rod.astype(np.int32), embedding.segment.astype(np.int32),
+        weight.astype(np.float32), embedding.offset.astype(np.float32),
     )  # fmt: skip
 
 
@@ -278,6 +288,6 @@ def _grid(contact: Contact | None) -> tuple[Float32Array, Float32Array]:
         return np.zeros((2, 2, 2), np.float32), np.ones(5, np.float32)
     grid = contact.obstacles.grid
     first = grid.origin + 0.5 * grid.spacing
-    # outside the grid nothing is nearer than its room; a node looks again after that way
+    # least distance outside the grid, metres
     place = np.array([*first, 1.0 / grid.spacing, 0.02], np.float32)
     return contact.obstacles.distance.copy(), place

@@ -1,8 +1,8 @@
 """The reference backend: one substep in plain NumPy float64, in the order of the method.
 
-Everything is in the axes of the moving head, velocities are those in the world: the head's surface,
-the roots and the captured places then stand still, and float32 keeps its digits wherever the head
-goes. The faster backends do the same steps and are held to this one.
+Positions are in the axes of the moving head, velocities are those in the world: the head's surface,
+the roots and the captured shape are then constant, and float32 keeps its precision wherever the
+head is. The faster backends do the same steps; tests compare them with this one.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from hairkit.simulation import quaternion
 from hairkit.simulation.obstacles import Obstacles
 
 from .linear_system import System
-from .rods import Rods, half_binormal, half_way, shares, shifted, twist_between
+from .rods import Rods, half_binormal, midpoint_frame, next_element, split_torque, twist_between
 
 SOFTEST = 1e-3
-"""Compliance of lengths between nodes that an obstacle holds, as a share of the free one's."""
+"""Compliance added to the lengths of nodes in contact, as a share of a free one's."""
 LARGEST_SPIN = 0.3
-"""Radians that torsion may turn a segment in a substep; Newton's step is no good beyond."""
+"""Largest rotation of a frame by torsion in a substep, radians; limits the Newton step."""
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Where rods are; head axes."""
+    """Positions, velocities and frames of rods; head axes."""
 
     position: Float64Array
     """(S, n, 3) metres."""
@@ -38,27 +38,27 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """How nodes meet the obstacles."""
+    """Parameters of contact between nodes and obstacles."""
 
     obstacles: Obstacles
     clearance: Float64Array
-    """(S, n) metres that a node keeps from them; less where the captured hair is nearer."""
+    """(S, n) least distance of the nodes, metres; less where the captured hair is nearer."""
     friction: float
     """Coulomb's coefficient."""
     fastest: float
-    """m/s, at which a node deep inside is brought out."""
+    """Highest speed at which a penetration is resolved, m/s."""
     deepest: Float64Array | None = None
-    """(P,) least distance, metres, of the guides' own points where they are drawn; None: any."""
+    """(P,) least distance of the embedded points, metres; None: no limit."""
     rounds: int = 0
-    """Rounds of friction under the tension that restores the lengths. Without, taut strands rub too
-    little around bends; with 4 the rope's law holds."""
+    """Friction iterations under the tension that restores the lengths. With 0 taut strands have too
+    little friction around bends; with 4 the Euler-Eytelwein equation holds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """What acts in one substep."""
+    """Head motion and external forces of one substep."""
 
-    ride: Float64Array
+    head_step: Float64Array
     """(4, 4) from the head axes before the substep to those after it."""
     turn: Float64Array
     """(3, 3) from the world's axes to the head's after it."""
@@ -70,8 +70,8 @@ class Load:
     """(S, n, 3) further force, newtons, head axes after the substep."""
 
 
-def at_rest(rods: Rods) -> State:
-    """Return the captured state, without velocity."""
+def rest_state(rods: Rods) -> State:
+    """Return the captured state with zero velocity."""
     return State(rods.points.copy(), np.zeros_like(rods.points), rods.frames.copy())
 
 
@@ -89,7 +89,11 @@ def substep(
     default substeps, since positions and directions are predicted to second order.
     """
     new, _ = pulled(rods, system, state, load, iterations)
-    return new if contact is None else collided(rods, new, contact, load.ride, system.step)[0]
+    return (
+        new
+        if contact is None
+        else resolve_contacts(rods, new, contact, load.head_step, system.step)[0]
+    )
 
 
 def pulled(
@@ -100,19 +104,19 @@ def pulled(
     The tension (S, n - 1) of the segments is what kept their lengths in this substep.
     """
     h, rates = system.step, system.rates
-    old = carried(state, load.ride, rods, h)
+    old = to_new_head_axes(state, load.head_step, rods, h)
     predicted = old.position + h * old.velocity
     edge = np.diff(predicted, axis=1)
     direction = quaternion.normalize(edge)
-    frames = swung(old.frames, direction)
-    frames = untwisted(rods, frames)
+    frames = transport_frames(old.frames, direction)
+    frames = relax_twist(rods, frames)
     force = elastic_force(rods, edge, frames)
     # Velocity of a point that rides on the head, in the world: where it is less where it was.
-    riding = (predicted - moved(load.ride, predicted)) / h
+    head_velocity = (predicted - transform_points(load.head_step, predicted)) / h
     force += rods.mass[..., None] * (
         load.turn @ load.gravity
         + rates.drag[..., None] * (load.air @ load.turn.T - old.velocity)
-        + rates.damping * (riding - old.velocity)
+        + rates.damping * (head_velocity - old.velocity)
         + rates.shape[..., None] * (rods.points - predicted)
     )
     if load.force is not None:
@@ -121,8 +125,8 @@ def pulled(
     change = free
     pull = np.zeros_like(rods.length)
     for _ in range(iterations):
-        pull = tension(system, edge + _edges(free), direction, rods.length)
-        change = free - system.inverse @ _edges_transposed(pull[..., None] * direction)
+        pull = solve_tension(system, edge + _edges(free), direction, rods.length)
+        change = free - system.inverse @ _apply_edges_transposed(pull[..., None] * direction)
         direction = quaternion.normalize(edge + _edges(change))
     position, velocity = predicted.copy(), old.velocity.copy()
     position[:, 1:] += change
@@ -130,43 +134,45 @@ def pulled(
     return State(position, velocity, frames), pull
 
 
-def moved(motion: Float64Array, points: Float64Array) -> Float64Array:
+def transform_points(motion: Float64Array, points: Float64Array) -> Float64Array:
     """Return points (..., 3) under a rigid motion (4, 4)."""
     result: Float64Array = points @ motion[:3, :3].T + motion[:3, 3]
     return result
 
 
-def carried(state: State, ride: Float64Array, rods: Rods, step: float) -> State:
-    """Return the same state in the head axes at the substep's end; roots go with the head."""
-    position = moved(ride, state.position)
-    velocity = state.velocity @ ride[:3, :3].T
-    frames = quaternion.product(quaternion.from_matrix(ride[:3, :3]), state.frames)
+def to_new_head_axes(state: State, head_step: Float64Array, rods: Rods, step: float) -> State:
+    """Return the state in the head axes at the end of the substep; roots follow the head."""
+    position = transform_points(head_step, state.position)
+    velocity = state.velocity @ head_step[:3, :3].T
+    frames = quaternion.product(quaternion.from_matrix(head_step[:3, :3]), state.frames)
     velocity[:, 0] = (rods.points[:, 0] - position[:, 0]) / step
     return State(position, velocity, frames)
 
 
-def swung(frames: Float64Array, direction: Float64Array) -> Float64Array:
-    """Return frames transported in time on to new directions, without spin about them."""
+def transport_frames(frames: Float64Array, direction: Float64Array) -> Float64Array:
+    """Return frames parallel-transported in time to new directions."""
     turn = quaternion.shortest_arc(quaternion.third_axis(frames), direction)
     return quaternion.normalize(quaternion.product(turn, frames))
 
 
-def untwisted(rods: Rods, frames: Float64Array) -> Float64Array:
-    """Return frames spun about their segments so that torques balance (one Newton step).
+def relax_twist(rods: Rods, frames: Float64Array) -> Float64Array:
+    """Return frames rotated about their segments so that torques balance (one Newton step).
 
-    Torsion is far faster than the hair's motion, so that it is always in equilibrium (Bergou et al.
-    2008); the system is tridiagonal.
+    Torsional waves are much faster than the hair, so twist is quasi-static (Bergou et al. 2008);
+    the system is tridiagonal.
     """
     before = rods.before(frames)
     torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
-    natural = quaternion.rotate(half_way(before, frames), rods.curvature)
+    natural = quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
     direction = quaternion.third_axis(frames)
     turn = direction - quaternion.third_axis(before)
     spun = rods.bend[..., None] * np.cross(natural, turn)
-    first, second = shares(before, frames, spun)
-    gradient = torque - shifted(torque) - (direction * (second + shifted(first))).sum(axis=-1)
+    first, second = split_torque(before, frames, spun)
+    gradient = (
+        torque - next_element(torque) - (direction * (second + next_element(first))).sum(axis=-1)
+    )
     firm = 0.25 * rods.bend * np.maximum((natural * turn).sum(axis=-1), 0.0)
-    diagonal = rods.twist + shifted(rods.twist) + firm + shifted(firm)
+    diagonal = rods.twist + next_element(rods.twist) + firm + next_element(firm)
     beside = firm[:, 1:] - rods.twist[:, 1:]
     if rods.tip_held:
         gradient[:, -1], beside[:, -1] = 0.0, 0.0
@@ -180,20 +186,20 @@ def untwisted(rods: Rods, frames: Float64Array) -> Float64Array:
 
 
 def elastic_force(rods: Rods, edge: Float64Array, frames: Float64Array) -> Float64Array:
-    """Return the force (S, n, 3) of bending and twist on the nodes, minus the energy's slope."""
+    """Return the node force (S, n, 3) of bending and twist, minus the energy gradient."""
     before = rods.before(frames)
     reach = edge / rods.length[..., None]
     held = quaternion.third_axis(rods.root_frame)[:, None]
     turn = reach - np.concatenate([held, reach[:, :-1]], axis=1)
-    natural = quaternion.rotate(half_way(before, frames), rods.curvature)
+    natural = quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
     moment = rods.bend[..., None] * (natural - turn)
     spun = rods.bend[..., None] * np.cross(natural, turn)
     torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
     twisting = torque[..., None] * half_binormal(before, frames)
-    first, second = shares(before, frames, spun)
+    first, second = split_torque(before, frames, spun)
     direction = quaternion.third_axis(frames)
-    pull = moment - twisting - shifted(moment + twisting)
-    pull += np.cross(second + shifted(first), direction)
+    pull = moment - twisting - next_element(moment + twisting)
+    pull += np.cross(second + next_element(first), direction)
     pull /= rods.length[..., None]
     force = np.zeros((*edge.shape[:1], edge.shape[1] + 1, 3))
     force[:, 1:] += pull
@@ -201,47 +207,49 @@ def elastic_force(rods: Rods, edge: Float64Array, frames: Float64Array) -> Float
     return force
 
 
-def tension(
+def solve_tension(
     system: System, edge: Float64Array, direction: Float64Array, length: Float64Array
 ) -> Float64Array:
-    """Return the pull (S, n - 1) along the segments that brings them to their lengths, newtons."""
+    """Return the tension (S, n - 1) that restores the segments' lengths, newtons."""
     excess = (edge * direction).sum(axis=-1) - length
     matrix = system.metric * (direction @ direction.transpose(0, 2, 1))
     result: Float64Array = np.linalg.solve(matrix, excess[..., None])[..., 0]
     return result
 
 
-def collided(
-    rods: Rods, state: State, contact: Contact, ride: Float64Array, step: float
+def resolve_contacts(
+    rods: Rods, state: State, contact: Contact, head_step: Float64Array, step: float
 ) -> tuple[State, Float64Array]:
-    """Return the state with nodes brought out of the obstacles, with Coulomb friction.
+    """Return the state with penetrations resolved, with Coulomb friction, and a tension.
 
-    Beside it the tension (S, n - 1), newtons, that brings the lengths back, on top of what the
-    substep has had before: a strand that lies taut around an obstacle is pressed on it by both.
+    The tension (S, n - 1), newtons, restores the lengths, in addition to that of the substep
+    before: both press a taut strand onto an obstacle.
     """
     shape = state.position.shape
     distance, normal = contact.obstacles.at(state.position.reshape(-1, 3))
     depth = contact.clearance - distance.reshape(shape[:2])
     depth[:, 0] = 0.0
     normal = (depth > 0)[..., None] * normal.reshape(shape)
-    riding = (state.position - moved(ride, state.position)) / step
-    inward = np.maximum(-((state.velocity - riding) * normal).sum(axis=-1), 0.0)
-    # What came in during this substep goes out again; older depth leaves at a limited speed.
+    head_velocity = (state.position - transform_points(head_step, state.position)) / step
+    inward = np.maximum(-((state.velocity - head_velocity) * normal).sum(axis=-1), 0.0)
+    # Depth of this substep is removed at once, older depth at a limited speed.
     out = np.clip(depth, 0.0, (inward + contact.fastest) * step)
     velocity = state.velocity + inward[..., None] * normal
     position = state.position + out[..., None] * normal
     grip, taut = contact.friction * inward, np.zeros_like(rods.length)
     for _ in range(1 + contact.rounds):
-        brake = braking(velocity - riding, normal, grip)
+        brake = friction_change(velocity - head_velocity, normal, grip)
         position, velocity = position + step * brake, velocity + brake
-        fixed, pull, pressed = relengthened(rods, position, normal)
+        fixed, pull, pressed = restore_lengths(rods, position, normal)
         velocity, position = velocity + (fixed - position) / step, fixed
         taut += pull / step**2
         grip += contact.friction * pressed / step - np.linalg.norm(brake, axis=-1)
     return replace(state, position=position, velocity=velocity), taut
 
 
-def braking(relative: Float64Array, normal: Float64Array, grip: Float64Array) -> Float64Array:
+def friction_change(
+    relative: Float64Array, normal: Float64Array, grip: Float64Array
+) -> Float64Array:
     """Return the change (S, n, 3) of velocities along the obstacle, at most `grip` (S, n), m/s.
 
     Coulomb: the change along is at most the coefficient times the change across.
@@ -253,8 +261,8 @@ def braking(relative: Float64Array, normal: Float64Array, grip: Float64Array) ->
     return result
 
 
-def uncovered(points: Float64Array, contact: Contact) -> Float64Array:
-    """Return the guides' points (P, 3), head axes, with those out that lie too deep."""
+def push_out_points(points: Float64Array, contact: Contact) -> Float64Array:
+    """Return embedded points (P, 3), head axes, pushed out to their least distance."""
     if contact.deepest is None:
         return points
     distance, normal = contact.obstacles.at(points)
@@ -263,15 +271,14 @@ def uncovered(points: Float64Array, contact: Contact) -> Float64Array:
     return result
 
 
-def relengthened(
+def restore_lengths(
     rods: Rods, position: Float64Array, normal: Float64Array
 ) -> tuple[Float64Array, Float64Array, Float64Array]:
-    """Return positions with the lengths restored that contacts have changed, and what it takes.
+    """Return positions with restored lengths, the pulls used and their contact pressure.
 
-    One tridiagonal solve (Han and Harada 2013) in which a node at an obstacle moves only along it,
-    square to `normal` (S, n, 3), which is 0 where a node is free; the root does not move. What it
-    takes: the pulls (S, n - 1) of the segments, kg m, and how far they would press the nodes (S, n)
-    into the obstacles, metres.
+    One tridiagonal solve (Han and Harada 2013). A node in contact moves only perpendicular to
+    `normal` (S, n, 3), which is 0 for free nodes; the root does not move. The pulls (S, n - 1) are
+    in kg m; the pressure (S, n) is how far they would press nodes into the obstacles, metres.
     """
     ease = 1.0 / rods.mass
     ease[:, 0] = 0.0
@@ -280,7 +287,7 @@ def relengthened(
     direction = edge / reach[..., None]
 
     def eased(nodes: slice) -> Float64Array:
-        """What each segment's pull does to the node at its start or its end."""
+        """Displacement of the start or end node by a unit pull of each segment."""
         across = (normal[:, nodes] * direction).sum(axis=-1, keepdims=True) * normal[:, nodes]
         moved_by: Float64Array = ease[:, nodes, None] * (direction - across)
         return moved_by
@@ -293,20 +300,20 @@ def relengthened(
     fixed = position.copy()
     fixed[:, :-1] += pull[..., None] * start
     fixed[:, 1:] -= pull[..., None] * end
-    push = _edges_transposed(pull[..., None] * direction)
+    push = _apply_edges_transposed(pull[..., None] * direction)
     pressed = np.zeros_like(ease)
     pressed[:, 1:] = ease[:, 1:] * (push * normal[:, 1:]).sum(axis=-1)
     return fixed, pull, pressed
 
 
 def _edges(change: Float64Array) -> Float64Array:
-    """Change of the segments for a change of the free nodes."""
+    """Return the change of the segments' vectors for a change of the free nodes."""
     return np.diff(change, axis=1, prepend=np.zeros_like(change[:, :1]))
 
 
-def _edges_transposed(pull: Float64Array) -> Float64Array:
-    """Force on the free nodes of forces on the segments."""
-    return pull - shifted(pull)
+def _apply_edges_transposed(pull: Float64Array) -> Float64Array:
+    """Return the force on the free nodes for forces on the segments."""
+    return pull - next_element(pull)
 
 
 def _tridiagonal(diagonal: Float64Array, beside: Float64Array, right: Float64Array) -> Float64Array:

@@ -1,8 +1,8 @@
-"""Between guides of any number of points and rods of one number of nodes.
+"""Resampling of guides to rods, and the embedding of guide points in rods.
 
-Rods have equally many nodes, so that they can be solved side by side. Finer points of a guide ride
-on the rod: each keeps its offset in the frame of the rod at its own place, so that curls finer than
-the rod's nodes are carried along, turned, and kept exactly at rest.
+All rods have the same number of nodes, so that they can be solved in parallel. Each guide point
+keeps its offset in the rod's frame at its arc length, so that curls finer than the nodes move and
+rotate with the rod and are exact at rest.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from hairkit.simulation import quaternion
 from hairkit.types.strands import Strands
 
 SHORTEST = 1e-4
-"""Metres: shorter guides are simulated as if they were this long, along their root's direction."""
+"""Length at which shorter guides are simulated, straight from the root, metres."""
 LARGEST_TURN = 0.7
-"""Radians between segments at rest: beyond, the explicit coupling of bend and twist is stiff."""
+"""Largest angle between segments at rest, radians; beyond, the coupling to twist is stiff."""
 _ROUNDS = 60
 FOLLOWED = 10.0
 """Bending of curled rods is stable in steps of h up to EI / (rho A) h^2 c^3 / l^4 of 10 to 20; here
@@ -28,12 +28,12 @@ l is a segment's length and c the turn from one to the next: measured on coils o
 def node_points(strands: Strands, nodes: int) -> Float64Array:
     """Return (S, n, 3) nodes at equal distances along the guides.
 
-    Where nodes would turn more than rods can (a fold, or curls finer than the nodes), they go along
-    the guide's smoothed middle; roots stay.
+    If the turn at a node exceeds `LARGEST_TURN` (a fold, or curls finer than the nodes), the guide
+    is smoothed; roots stay.
     """
     points = strands.resampled(nodes).points.reshape(len(strands), nodes, 3).astype(np.float64)
     for _ in range(_ROUNDS):
-        sharp = _sharpest(points) > LARGEST_TURN
+        sharp = _largest_turn(points) > LARGEST_TURN
         if not sharp.any():
             break
         some = points[sharp]
@@ -42,7 +42,7 @@ def node_points(strands: Strands, nodes: int) -> Float64Array:
         even = Strands(some.reshape(-1, 3).astype(np.float32), offsets).resampled(nodes)
         points[sharp] = even.points.reshape(some.shape)
     length = np.linalg.norm(np.diff(points, axis=1), axis=-1)
-    bad = (length.min(axis=1) < SHORTEST / nodes) | (_sharpest(points) > LARGEST_TURN)
+    bad = (length.min(axis=1) < SHORTEST / nodes) | (_largest_turn(points) > LARGEST_TURN)
     if bad.any():
         step = np.maximum(length.mean(axis=1), SHORTEST / nodes)[bad, None, None]
         way = points[bad, -1] - points[bad, 0]
@@ -52,20 +52,20 @@ def node_points(strands: Strands, nodes: int) -> Float64Array:
     return points
 
 
-def stiffest(points: Float64Array, step: float) -> Float64Array:
-    """Return (S,) the largest EI over mass per length, m^4/s^2, that rods take in steps so long.
+def max_stiffness(points: Float64Array, step: float) -> Float64Array:
+    """Return the largest stable EI over mass per length (S,), m^4/s^2, for a time step.
 
-    Only short, stiff and sharply curled rods reach it: natural curvature goes with the frames of
-    the step before. Their first tone is well above what hair shows.
+    Natural curvature uses the frames of the previous step, which limits short, stiff and sharply
+    curled rods only; their lowest mode is far above visible motion of hair.
     """
     length = np.linalg.norm(np.diff(points, axis=1), axis=-1).mean(axis=1)
-    curl = np.maximum(_sharpest(points), 1e-3)
+    curl = np.maximum(_largest_turn(points), 1e-3)
     result: Float64Array = FOLLOWED * length**4 / (step**2 * curl**3)
     return result
 
 
-def _sharpest(points: Float64Array) -> Float64Array:
-    """Largest turn (S,) at a node, radians."""
+def _largest_turn(points: Float64Array) -> Float64Array:
+    """Return the largest turn (S,) at a node, radians."""
     direction = quaternion.normalize(np.diff(points, axis=1))
     cosine = (direction[:, 1:] * direction[:, :-1]).sum(axis=-1)
     result: Float64Array = np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1)
@@ -73,19 +73,19 @@ def _sharpest(points: Float64Array) -> Float64Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Riders:
-    """Points of guides on rods."""
+class Embedding:
+    """Guide points embedded in rods."""
 
     identity: bool
     """True where the guides' points are the nodes themselves."""
     rod: Int64Array
-    """(P,) which rod."""
+    """(P,) rod index."""
     segment: Int64Array
-    """(P,) which segment of it."""
+    """(P,) segment index in the rod."""
     share: Float64Array
-    """(P,) how far along the segment."""
+    """(P,) fraction along the segment."""
     offset: Float64Array
-    """(P, 3) from the place on the rod, in the frame there."""
+    """(P, 3) offset from the rod, in its frame there, metres."""
     _cast: tuple[Int64Array, Int64Array, Float32Array, Float32Array] | None = None
 
     def packed(self) -> tuple[Int64Array, Int64Array, Float32Array, Float32Array]:
@@ -97,7 +97,7 @@ class Riders:
         return self._cast
 
     def points(self, position: Float64Array, frames: Float64Array) -> Float32Array:
-        """Return (P, 3) where the points are, of rods at `position` (S, n, 3)."""
+        """Return the points (P, 3) for rods at `position` (S, n, 3)."""
         if self.identity:
             return position.reshape(-1, 3).astype(np.float32)
         place, frame = _places(position, frames, self.rod, self.segment, self.share)
@@ -105,8 +105,8 @@ class Riders:
         return moved
 
 
-def riders(strands: Strands, position: Float64Array, frames: Float64Array) -> Riders:
-    """Bind the guides' points to rods at rest, (S, n, 3) with segment frames (S, n - 1, 4)."""
+def embed_points(strands: Strands, position: Float64Array, frames: Float64Array) -> Embedding:
+    """Embed guide points in rods at rest, (S, n, 3) with segment frames (S, n - 1, 4)."""
     segments = position.shape[1] - 1
     rod = strands.strand_of_point
     arc = strands.arc_lengths()
@@ -117,7 +117,7 @@ def riders(strands: Strands, position: Float64Array, frames: Float64Array) -> Ri
     place, frame = _places(position, frames, rod, segment, share)
     apart = strands.points - place
     same = (strands.counts == segments + 1).all() and float(np.abs(apart).max(initial=0)) < 1e-7
-    return Riders(same, rod, segment, share, quaternion.rotate(quaternion.inverse(frame), apart))
+    return Embedding(same, rod, segment, share, quaternion.rotate(quaternion.inverse(frame), apart))
 
 
 def _places(
@@ -127,7 +127,7 @@ def _places(
     segment: Int64Array,
     share: Float64Array,
 ) -> tuple[Float64Array, Float64Array]:
-    """Places on a smooth curve through the nodes (Catmull-Rom), and frames mixed along the rod."""
+    """Return positions on the Catmull-Rom curve through the nodes, and interpolated frames."""
     last = position.shape[1] - 1
     t = share[:, None]
     a, b = position[rod, segment], position[rod, segment + 1]

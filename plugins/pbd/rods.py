@@ -1,10 +1,10 @@
-"""Rods that carry orientations: the discrete model, its rest state, and inverse statics.
+"""Discrete Cosserat rods: the model, its rest state, and inverse statics.
 
 A rod has n nodes and n - 1 segments; each segment carries a frame (a quaternion) whose third axis
-is its direction (Cosserat rods after Kugelstadt and Schoemer 2016; transport in time after Bergou
-et al. 2010). Element i joins segments i - 1 and i; element 0 joins the root frame, which the head
-holds at half a segment's distance, to segment 0. With unit directions d, rest directions c and
-twists t, the energy is
+is its direction (Kugelstadt and Schoemer 2016; parallel transport in time after Bergou et al.
+2010). Element i joins segments i - 1 and i; element 0 joins the root frame, which the head holds at
+half a segment's distance, to segment 0. With unit directions d, natural turns c and twists t, the
+energy is
 
     sum_i bend_i / 2 |(d_i - d_{i-1}) - c_i|^2 + twist_i / 2 (t_i - rest_i)^2,
 
@@ -24,7 +24,7 @@ from hairkit.errors import InputError
 from hairkit.simulation import quaternion
 
 SHARPEST = 0.3
-"""1 + the cosine of a turn is not taken as less: beyond 134 degrees twist no longer follows."""
+"""Lower bound of 1 + cosine of a turn, which limits the twist coupling beyond 134 degrees."""
 _ROUNDS = 20
 
 
@@ -33,26 +33,26 @@ class Rods:
     """S rods of n nodes each, at rest; metres, kilograms, newtons, head frame."""
 
     points: Float64Array
-    """(S, n, 3) where the nodes are at rest."""
+    """(S, n, 3) nodes at rest."""
     mass: Float64Array
-    """(S, n) of the nodes."""
+    """(S, n) mass of the nodes."""
     length: Float64Array
-    """(S, n - 1) of the segments."""
+    """(S, n - 1) length of the segments."""
     bend: Float64Array
     """(S, n - 1) bending stiffness of the elements, EI / l; element 0 at 0 is a hinge."""
     twist: Float64Array
     """(S, n - 1) torsional stiffness of the elements, GJ / l."""
     root_frame: Float64Array
-    """(S, 4) what the head holds."""
+    """(S, 4) frame that the head holds."""
     frames: Float64Array
-    """(S, n - 1, 4) of the segments at rest."""
+    """(S, n - 1, 4) frames of the segments at rest."""
     curvature: Float64Array
-    """(S, n - 1, 3) natural turn c of each element, in the frame half way."""
+    """(S, n - 1, 3) natural turn c of each element, in its midpoint frame."""
     natural_twist: Float64Array
     """(S, n - 1) natural twist of each element, radians."""
     tip_held: bool = False
-    """True keeps the last segments from spinning: clamped tips, whose last two nodes something else
-    holds. Only the reference knows them."""
+    """True fixes the last frames: clamped tips, whose last two nodes the caller holds. Only the
+    reference backend supports it."""
 
     @property
     def nodes(self) -> int:
@@ -73,7 +73,7 @@ def make_rods(
     root_direction: npt.ArrayLike | None = None,
     straight: bool = False,
 ) -> Rods:
-    """Return rods whose nodes are at `points`, without load.
+    """Return unloaded rods with nodes at `points`.
 
     Parameters
     ----------
@@ -85,15 +85,17 @@ def make_rods(
         EI and GJ, N m^2: numbers or (S, n - 1) of the elements; GJ is EI / 1.3 where None (a round
         fibre of Poisson's ratio 0.3).
     root_direction
-        (3,) or (S, 3) direction that the root holds; the first segment's where None.
+        (3,) or (S, 3) direction that the root holds; None: that of the first segment.
     straight
-        True makes the natural shape straight; else it is the shape given.
+        True: the natural shape is straight; False: it is `points`.
     """
     nodes = np.array(points, np.float64)
     edge = np.diff(nodes, axis=1)
     length = np.linalg.norm(edge, axis=-1)
     if nodes.ndim != 3 or nodes.shape[1] < 3 or not (length > 0).all():
-        raise InputError(f"rods need (S, n, 3) points, n >= 3, none alike; got {nodes.shape}")
+        raise InputError(
+            f"rods need (S, n, 3) points, n >= 3, no two neighbours equal; got {nodes.shape}"
+        )
     segments = np.broadcast_to(np.asarray(density, np.float64), length.shape) * length
     mass = np.zeros(nodes.shape[:2])
     mass[:, :-1] += segments / 2
@@ -105,7 +107,7 @@ def make_rods(
     gj = ei / 1.3 if torsion is None else np.broadcast_to(torsion, length.shape)
     direction = edge / length[..., None]
     held = direction[:, 0] if root_direction is None else np.asarray(root_direction, np.float64)
-    frames = transported(
+    frames = parallel_frames(
         np.broadcast_to(quaternion.normalize(held), direction[:, 0].shape), direction
     )
     rods = Rods(
@@ -115,8 +117,8 @@ def make_rods(
     return rods if straight else _with_moments(rods, np.zeros_like(direction), 0 * length)
 
 
-def transported(held: Float64Array, direction: Float64Array) -> Float64Array:
-    """Return frames (S, n, 4) without twist: of the root, then of the segments (Bishop 1975)."""
+def parallel_frames(held: Float64Array, direction: Float64Array) -> Float64Array:
+    """Return twist-free frames (S, n, 4) of the root and the segments (Bishop 1975)."""
     first = np.broadcast_to([0.0, 0.0, 1.0], held.shape)
     frames = [quaternion.shortest_arc(first, held)]
     before = held
@@ -127,12 +129,12 @@ def transported(held: Float64Array, direction: Float64Array) -> Float64Array:
     return np.stack(frames, axis=1)
 
 
-def loaded(rods: Rods, force: npt.ArrayLike) -> Rods:
-    """Return rods that stay where they are under a force (S, n, 3) on their nodes, newtons.
+def balance_load(rods: Rods, force: npt.ArrayLike) -> Rods:
+    """Return rods in equilibrium at their present shape under node forces (S, n, 3), newtons.
 
-    Inverse statics: from the tip inwards, the moment in each element that balances the load beyond
-    it; the natural shape is what gives this moment at the present shape. Tension carries the part
-    along the rod, so that moments are square to it.
+    Inverse statics: from the tip to the root, each element's moment balances the load beyond it;
+    the natural shape gives this moment at the present shape. Tension carries the load along the
+    rod, so that moments are perpendicular to it.
     """
     weight = np.broadcast_to(np.asarray(force, np.float64), rods.points.shape)
     beyond = np.cumsum(weight[:, ::-1], axis=1)[:, ::-1][:, 1:]
@@ -146,10 +148,10 @@ def loaded(rods: Rods, force: npt.ArrayLike) -> Rods:
     binormal = half_binormal(before, rods.frames)
     moment, torque = np.zeros_like(direction), np.zeros_like(rods.length)
     for _ in range(_ROUNDS * rods.nodes):
-        first, second = shares(before, rods.frames, np.cross(turn, moment))
-        turning = second + shifted(first)
+        first, second = split_torque(before, rods.frames, np.cross(turn, moment))
+        turning = second + next_element(first)
         twisting = torque[..., None] * binormal
-        total = load + np.cross(turning, direction) - twisting - shifted(twisting)
+        total = load + np.cross(turning, direction) - twisting - next_element(twisting)
         new = total
         for j in range(direction.shape[1] - 1, -1, -1):
             if j + 1 < direction.shape[1]:
@@ -165,13 +167,13 @@ def loaded(rods: Rods, force: npt.ArrayLike) -> Rods:
 
 
 def _with_moments(rods: Rods, moment: Float64Array, torque: Float64Array) -> Rods:
-    """Choose the natural shape so that the elements carry these moments at the present shape."""
+    """Return rods whose elements have these moments at the present shape."""
     direction = quaternion.third_axis(rods.frames)
     before = rods.before(rods.frames)
     turn = direction - quaternion.third_axis(before)
     soft = np.where(rods.bend > 0, rods.bend, np.inf)[..., None]
     natural = turn - moment / soft
-    middle = half_way(before, rods.frames)
+    middle = midpoint_frame(before, rods.frames)
     twisting = np.where(rods.twist > 0, rods.twist, np.inf)
     return replace(
         rods,
@@ -180,8 +182,8 @@ def _with_moments(rods: Rods, moment: Float64Array, torque: Float64Array) -> Rod
     )
 
 
-def half_way(before: Float64Array, after: Float64Array) -> Float64Array:
-    """Return the frames half way between neighbours."""
+def midpoint_frame(before: Float64Array, after: Float64Array) -> Float64Array:
+    """Return the midpoint frames of neighbours."""
     sign = np.where((before * after).sum(axis=-1, keepdims=True) < 0, -1.0, 1.0)
     return quaternion.normalize(before + sign * after)
 
@@ -195,20 +197,20 @@ def twist_between(before: Float64Array, after: Float64Array) -> Float64Array:
 
 
 def half_binormal(before: Float64Array, after: Float64Array) -> Float64Array:
-    """Return a x b / (1 + a.b) of directions a, b: how twist follows a change of either."""
+    """Return a x b / (1 + a.b) of directions a, b: the gradient of twist with respect to either."""
     first, second = quaternion.third_axis(before), quaternion.third_axis(after)
     cosine = (first * second).sum(axis=-1, keepdims=True)
     result: Float64Array = np.cross(first, second) / np.maximum(1.0 + cosine, SHARPEST)
     return result
 
 
-def shares(
+def split_torque(
     before: Float64Array, after: Float64Array, torque: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
-    """Split a torque on the frames half way into torques on the frames before and after.
+    """Split a torque on the midpoint frames into torques on the frames before and after.
 
-    The frame half way turns by half the sum of both turns, and by the tangent of a quarter of the
-    angle between them for their difference.
+    The midpoint frame rotates by half the sum of both rotations, plus the tangent of a quarter of
+    the angle between them times their difference.
     """
     step = quaternion.product(after, quaternion.inverse(before))
     sign = np.where(step[..., :1] < 0, -1.0, 1.0)
@@ -217,6 +219,6 @@ def shares(
     return 0.5 * (torque - aside), 0.5 * (torque + aside)
 
 
-def shifted(values: Float64Array) -> Float64Array:
-    """Return the values of the next element; 0 beyond the tip."""
+def next_element(values: Float64Array) -> Float64Array:
+    """Return the values of the next element, 0 beyond the tip."""
     return np.concatenate([values[:, 1:], np.zeros_like(values[:, :1])], axis=1)

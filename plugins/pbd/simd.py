@@ -1,10 +1,9 @@
-"""Lanes: numbers side by side in a register, as types of Numba's.
+"""SIMD lanes as Numba types: arithmetic on eight (or four) float32 at a time.
 
-`at` takes up the row of an array's last axis that holds one number of each of `LANES` strands, and
-`put` lays it down; in between, lanes are added, multiplied and compared like numbers. `quad_at` and
-`put_quad` do the same with four numbers that belong together. What is written so becomes straight
-vector code whatever the compiler finds out about loops, which it has to guard against rows that
-overlap: it is faster, and compiled sooner.
+`load` reads the `LANES` numbers of a row of an array's last axis, one for each strand of a block,
+and `store` writes them; lanes support arithmetic and comparison like numbers. `load_quad` and
+`store_quad` do the same with four numbers. The result is vector code without the overlap checks
+that loop vectorisers insert: it runs faster and compiles sooner.
 """
 
 from __future__ import annotations
@@ -19,20 +18,20 @@ from numba.core.typing import templates as numba_templates
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
 LANES = 8
-"""Strands side by side: as many as a register of AVX2 holds."""
+"""Strands in a block: the float32 lanes of an AVX2 register."""
 
 # Numba's own functions are not annotated.
 templates: Any = numba_templates
 lower: Any = lower_builtin
 primitive: Any = models.PrimitiveModel
 word: Callable[[Any], Any] = intrinsic
-"""Makes a word that compiled functions know, out of what builds it."""
+"""Declares an intrinsic of compiled functions from its code builder."""
 
 _FAST = ("fast",)
 
 
 class Lanes(types.Type):
-    """The type of `count` numbers of 32 bits side by side."""
+    """The type of a vector of `count` float32."""
 
     def __init__(self, count: int) -> None:
         self.count, self.row = count, ir.VectorType(ir.FloatType(), count)
@@ -50,7 +49,7 @@ quad: Any = Lanes(4)
 
 
 def _spread(builder: Any, value: Any, kind: Any, wanted: Lanes) -> Any:
-    """Return the value in all lanes; lanes as they are."""
+    """Broadcast a number to all lanes; return lanes unchanged."""
     if isinstance(kind, Lanes):
         return value
     void = ir.Constant(wanted.row, ir.Undefined)
@@ -61,7 +60,7 @@ def _spread(builder: Any, value: Any, kind: Any, wanted: Lanes) -> Any:
 
 
 def _declare(symbol: Any, instruction: str) -> None:
-    """Let lanes be what two operands are, or one of them."""
+    """Declare a binary operator where both operands or one of them are lanes."""
     cases = [
         templates.signature(kind, *operands)
         for kind in (lanes, quad)
@@ -86,7 +85,7 @@ _declare(operator.truediv, "fdiv")
 
 
 def _address(context: Any, builder: Any, sig: Any, args: Any, kind: Lanes) -> Any:
-    """Return where the row of lanes is that the index, args[1], names in the array, args[0]."""
+    """Return the address of the row with index args[1] in the array args[0]."""
     made = context.make_array(sig.args[0])(context, builder, args[0])
     parts, kinds = [args[1]], [sig.args[1]]
     if getattr(sig.args[1], "count", 0):
@@ -103,8 +102,8 @@ def _address(context: Any, builder: Any, sig: Any, args: Any, kind: Lanes) -> An
     return builder.bitcast(builder.gep(made.data, [first], inbounds=True), kind.row.as_pointer())
 
 
-def _taking(kind: Any) -> Any:
-    """Make the word that takes lanes of a kind up."""
+def _make_load(kind: Any) -> Any:
+    """Make the intrinsic that loads lanes of a kind."""
 
     def take(context: Any, array: Any, index: Any) -> Any:
         def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -117,8 +116,8 @@ def _taking(kind: Any) -> Any:
     return word(take)
 
 
-def _laying(kind: Any) -> Any:
-    """Make the word that lays lanes of a kind down."""
+def _make_store(kind: Any) -> Any:
+    """Make the intrinsic that stores lanes of a kind."""
 
     def lay(context: Any, array: Any, index: Any, value: Any) -> Any:
         def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -131,15 +130,15 @@ def _laying(kind: Any) -> Any:
     return word(lay)
 
 
-at, quad_at = _taking(lanes), _taking(quad)
-"""Row of a contiguous array (..., W) or (..., 4); the index is a number or a tuple of them."""
-put, put_quad = _laying(lanes), _laying(quad)
-"""The same row written: array, index, value."""
+load, load_quad = _make_load(lanes), _make_load(quad)
+"""Load a row of a contiguous array (..., W) or (..., 4); the index is an integer or a tuple."""
+store, store_quad = _make_store(lanes), _make_store(quad)
+"""Store a row: array, index, value."""
 
 
 @word
-def number_at(context: Any, array: Any, index: Any) -> Any:
-    """Return a number of a contiguous array, counted from its first one; never from the end."""
+def load_number(context: Any, array: Any, index: Any) -> Any:
+    """Return a number of a contiguous array by its flat index; negative ones are not supported."""
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         made = context.make_array(sig.args[0])(context, builder, args[0])
@@ -162,7 +161,7 @@ def lane_root(context: Any, value: Any) -> Any:
 
 @word
 def whole(context: Any, value: Any) -> Any:
-    """Return lanes without what is behind the point."""
+    """Truncate lanes to integers."""
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         cut = builder.fptosi(args[0], ir.VectorType(ir.IntType(32), LANES))
@@ -196,7 +195,7 @@ def any_below(context: Any, a: Any, b: Any) -> Any:
 
 @word
 def part_of(context: Any, value: Any, number: Any) -> Any:
-    """Return one of four numbers."""
+    """Return one number of a quad."""
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.extract_element(args[0], args[1])
@@ -206,7 +205,7 @@ def part_of(context: Any, value: Any, number: Any) -> Any:
 
 @word
 def quad_of(context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-    """Return four numbers side by side."""
+    """Return a quad of four numbers."""
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         made = ir.Constant(quad.row, ir.Undefined)

@@ -1,4 +1,4 @@
-"""Vectors and quaternions for the kernels: tuples of numbers, or of lanes of them."""
+"""Vectors and quaternions of the kernels: tuples of numbers or of lanes."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from .simd import at, lane_root, pick, put
+from .simd import lane_root, load, pick, store
 
 _HOW: dict[str, Any] = {
     "fastmath": True, "error_model": "numpy", "_nrt": False,
 }  # fmt: skip
 row: Callable[[Any], Any] = njit(**_HOW)
-"""Compiles a function that allocates nothing: views are then not counted, which halves the time of
-short rows and of compiling."""
+"""Compiles a function that allocates nothing. Array views are then not reference-counted, which
+halves the run time of short rows and the compile time."""
 
 ZERO, ONE, TWO, TINY = np.float32(0), np.float32(1), np.float32(2), np.float32(1e-4)
 _C1, _C3, _C5 = np.float32(0.9998660), np.float32(-0.3302995), np.float32(0.1801410)
@@ -25,32 +25,32 @@ _HALF_PI, _SMALL = np.float32(np.pi / 2), np.float32(0.04)
 
 
 @row
-def three(array, j, c):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the lanes of three parts of row j, from part c."""
-    return at(array, (j, c)), at(array, (j, c + 1)), at(array, (j, c + 2))
+def load_three(array, j, c):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Load three components of row j, from component c."""
+    return load(array, (j, c)), load(array, (j, c + 1)), load(array, (j, c + 2))
 
 
 @row
-def four(array, j):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the lanes of the first four parts of row j."""
-    return at(array, (j, 0)), at(array, (j, 1)), at(array, (j, 2)), at(array, (j, 3))
+def load_four(array, j):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Load the first four components of row j."""
+    return load(array, (j, 0)), load(array, (j, 1)), load(array, (j, 2)), load(array, (j, 3))
 
 
 @row
-def put_three(array, j, c, v) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Lay a vector down in three parts of row j, from part c."""
-    put(array, (j, c), v[0])
-    put(array, (j, c + 1), v[1])
-    put(array, (j, c + 2), v[2])
+def store_three(array, j, c, v) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Store a vector into three components of row j, from component c."""
+    store(array, (j, c), v[0])
+    store(array, (j, c + 1), v[1])
+    store(array, (j, c + 2), v[2])
 
 
 @row
-def put_four(array, j, q) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Lay a quaternion down in row j."""
-    put(array, (j, 0), q[0])
-    put(array, (j, 1), q[1])
-    put(array, (j, 2), q[2])
-    put(array, (j, 3), q[3])
+def store_four(array, j, q) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Store a quaternion into row j."""
+    store(array, (j, 0), q[0])
+    store(array, (j, 1), q[1])
+    store(array, (j, 2), q[2])
+    store(array, (j, 3), q[3])
 
 
 @row
@@ -94,14 +94,14 @@ def rows_of(motion, c):  # type: ignore[no-untyped-def] # pragma: no cover - com
 
 
 @row
-def turned(rows, a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return a vector under the linear part of a motion."""
+def rotate_rows(rows, a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Rotate a vector by a motion given by rows."""
     return dot(rows[0], a), dot(rows[1], a), dot(rows[2], a)
 
 
 @row
-def carry(rows, a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return a point under a motion; the rows' fourth numbers are the shift."""
+def transform_rows(rows, a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Transform a point by a motion given by rows, whose fourth components are the translation."""
     return dot(rows[0], a) + rows[0][3], dot(rows[1], a) + rows[1][3], dot(rows[2], a) + rows[2][3]
 
 
@@ -118,15 +118,15 @@ def product(r, q):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
 
 @row
 def rotate(q, v):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return a vector turned by a unit quaternion."""
+    """Rotate a vector by a unit quaternion."""
     axis = (q[1], q[2], q[3])
     a = times(TWO, cross(axis, v))
     return plus(plus(v, times(q[0], a)), cross(axis, a))
 
 
 @row
-def mixed(v, share):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the value and its slope between eight corners (trilinear), the last axis fastest."""
+def trilinear(v, share):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the trilinear value between eight corners and its gradient, last axis fastest."""
     a, b, c = share
     d0, d2, d4, d6 = v[1] - v[0], v[3] - v[2], v[5] - v[4], v[7] - v[6]
     v0, v2, v4, v6 = v[0] + c * d0, v[2] + c * d2, v[4] + c * d4, v[6] + c * d6
@@ -138,20 +138,20 @@ def mixed(v, share):  # type: ignore[no-untyped-def] # pragma: no cover - compil
 
 @row
 def absolute(a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return lanes without their sign."""
+    """Return absolute values."""
     return pick(a, ZERO, ZERO - a, a)
 
 
 @row
 def unit_four(q):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return lanes of quaternions at length one."""
+    """Normalise quaternions."""
     size = ONE / lane_root(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return q[0] * size, q[1] * size, q[2] * size, q[3] * size
 
 
 @row
 def swing_frame(q, d):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the frame turned the shortest way so that its third axis is d."""
+    """Rotate a frame by the shortest arc that brings its third axis to d."""
     t = (
         TWO * (q[1] * q[3] + q[0] * q[2]),
         TWO * (q[2] * q[3] - q[0] * q[1]),

@@ -1,4 +1,4 @@
-"""The simulator: a groom's guides as rods, options as physics, time in substeps."""
+"""The simulator: builds rods from a groom's guides and advances them in substeps."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from hairkit.types.strands import Strands
 
 from .backend import Engine, ReferenceEngine
 from .energies import elastic_energy, largest_stretch
-from .grab import Hand
-from .hair_grid import Crowd, crowd_of
-from .head_interpolation import between, course, inverse_motion
+from .grab import GrabForces
+from .hair_grid import HairGrid, make_hair_grid
+from .head_interpolation import interpolate_motion, inverse_motion, motion_steps
 from .linear_system import Rates, System, assemble
-from .reference import Contact, Load, at_rest, moved
-from .resampling import node_points, riders, stiffest
-from .rods import Rods, loaded, make_rods
+from .reference import Contact, Load, rest_state, transform_points
+from .resampling import embed_points, max_stiffness, node_points
+from .rods import Rods, balance_load, make_rods
 
 if TYPE_CHECKING:
     from . import Options
 
 FRAME = 1 / 60
-"""Seconds that the option `substeps` counts for; air and other hair are looked at this often."""
+"""Seconds of `substeps` substeps; wind and the hair grid are updated at this interval."""
 HAIR_DENSITY = 1300.0
-"""kg/m^3 of keratin."""
+"""Density of keratin, kg/m^3."""
 SINGLE_HAIR = 1.2e-3
 """m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""
 _KEPT_SYSTEMS = 4
@@ -50,7 +50,7 @@ class PbdSimulator:
         self._obstacles: Obstacles = head_obstacles(guides.head)
         self._points: Float32Array | None = None
         self._head: Float64Array = np.eye(4)
-        self._hand = Hand()
+        self._grab_forces = GrabForces()
         self._rest_energy: float | None = None
         self._tune(options)
         self.reset()
@@ -62,7 +62,7 @@ class PbdSimulator:
 
     @property
     def options(self) -> Options:
-        """The options in force; those that were None are the groom's."""
+        """The options in force; None is replaced by the groom's value."""
         return self._options
 
     @property
@@ -72,41 +72,39 @@ class PbdSimulator:
 
     @property
     def rods(self) -> Rods:
-        """The rods that stand for the guides, at rest."""
+        """The rods of the guides, at rest."""
         return self._rods
 
     @property
     def points(self) -> Float32Array:
         """(P, 3) present positions in the world, metres, in the order of `strands`."""
         if self._points is None:
-            self._points = self._engine.points(self._riders, self._head)
+            self._points = self._engine.points(self._embedding, self._head)
             self._points.setflags(write=False)
         return self._points
 
     @property
     def points_buffer(self) -> Any:
-        """The same as a moderngl buffer of (P, 3) float32, for drawing without a way back.
+        """The points as a moderngl buffer of (P, 3) float32, for drawing without read-back.
 
-        Written anew each time it is asked for; only inside `renderer()`. None where the backend is
-        not `compute`.
+        Each access updates it; use it inside `renderer()`. None unless the backend is `compute`.
         """
         made = getattr(self._engine, "points_buffer", None)
-        return None if made is None else made(self._riders, self._head)
+        return None if made is None else made(self._embedding, self._head)
 
     def rows_buffer(
         self, before: npt.NDArray[np.integer[Any]], part: npt.NDArray[np.floating[Any]]
     ) -> Any:
-        """Return places between the points, head axes, as a moderngl buffer (*before.shape, 3).
+        """Return samples between the points, head axes, as a moderngl buffer (*before.shape, 3).
 
-        Each is `part` of the way from the point of number `before` to the next one: guides at any
-        shares of their lengths. Both arrays are looked at when `before` is another object than the
-        last time. Otherwise as `points_buffer`.
+        Each is at fraction `part` between point `before` and the next one. Both arrays are uploaded
+        when `before` is another object than in the last call. Otherwise as `points_buffer`.
         """
         made = getattr(self._engine, "rows_buffer", None)
-        return None if made is None else made(self._riders, before, part)
+        return None if made is None else made(self._embedding, before, part)
 
     def advance(self, seconds: float, surroundings: Surroundings) -> None:
-        """Go on by `seconds`, in pieces of at most a sixtieth of a second, each in substeps."""
+        """Advance by `seconds`, in pieces of at most `FRAME`, each in substeps."""
         if not seconds > 0:
             return
         start, end = self._head, surroundings.head_from_rest
@@ -115,22 +113,22 @@ class PbdSimulator:
             self._piece(
                 seconds / pieces,
                 surroundings,
-                between(start, end, piece / pieces),
-                between(start, end, (piece + 1) / pieces),
+                interpolate_motion(start, end, piece / pieces),
+                interpolate_motion(start, end, (piece + 1) / pieces),
             )
         self._head = end
         self._points = None
 
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
-        """Put the guides at rest on a head at `head_from_rest` (4, 4), without velocity."""
+        """Reset the guides to rest on a head at `head_from_rest` (4, 4), with zero velocity."""
         self._head = np.eye(4) if head_from_rest is None else np.asarray(head_from_rest, np.float64)
-        self._engine.state = at_rest(self._rods)
-        self._hand = Hand()
+        self._engine.state = rest_state(self._rods)
+        self._grab_forces = GrabForces()
         self._time = 0.0
         self._points = None
 
     def retune(self, options: Options) -> None:
-        """Take other options from now on; positions and velocities stay."""
+        """Change the options; positions and velocities stay."""
         before, nodes = self._engine.state, self._rods.nodes
         self._tune(options)
         if self._rods.nodes == nodes:
@@ -141,7 +139,7 @@ class PbdSimulator:
         """Return the present stretch and energies; potential energy is 0 at rest."""
         rods, shape = self._rods, self._rates.shape
         if self._rest_energy is None:
-            self._rest_energy = elastic_energy(rods, at_rest(rods), shape)
+            self._rest_energy = elastic_energy(rods, rest_state(rods), shape)
         down = self._head[:3, :3].T @ self._gravity(None)
         measured = getattr(self._engine, "measured", None)
         found = None if measured is None else measured(down)
@@ -156,19 +154,19 @@ class PbdSimulator:
         return Measures(stretch, kinetic, weight + elastic - self._rest_energy)
 
     def _tune(self, options: Options) -> None:
-        """Take options; what those that changed say nothing of stays."""
+        """Set the options; rebuild only what the changed ones affect."""
         resolved = options.resolved(self._groom.physics)
         before: Options | None = getattr(self, "_options", None)
         new = before is None or before.nodes != resolved.nodes
         stiff = before is None or _stiffness(before) != _stiffness(resolved)
         if new:
-            self._lay(resolved.nodes)
+            self._place_nodes(resolved.nodes)
         if new or stiff:
             self._stiffen(resolved)
         if new:
-            self._riders = riders(self._groom.strands, self._laid, self._rods.frames)
+            self._embedding = embed_points(self._groom.strands, self._nodes, self._rods.frames)
             mass = self._rods.mass.reshape(-1)
-            self._crowd: Crowd = crowd_of(self._laid.reshape(-1, 3), mass)
+            self._hair_grid: HairGrid = make_hair_grid(self._nodes.reshape(-1, 3), mass)
         self._options = resolved
         self._rates = _rates(resolved, self._rods, self._width)
         self._systems: dict[float, System] = {}
@@ -176,27 +174,27 @@ class PbdSimulator:
         self._contact = _contact(resolved, self._obstacles, self._near, self._deepest)
         self._engine = _engine(resolved.backend, self._rods, self._contact)
 
-    def _lay(self, nodes: int) -> None:
-        """Put nodes along the guides, and look how near to the obstacles hair was captured."""
+    def _place_nodes(self, nodes: int) -> None:
+        """Place nodes along the guides; measure the captured distance to the obstacles."""
         strands, width = self._groom.strands, self._groom.strands.widths
-        self._laid = node_points(strands, nodes)
+        self._nodes = node_points(strands, nodes)
         self._width = np.full(len(strands), self._groom.material.width)
         if width is not None:
             mean = np.add.reduceat(width, strands.offsets[:-1]) / strands.counts
             self._width = np.maximum(mean, 1e-6)
-        near = self._obstacles.at(self._laid.reshape(-1, 3))[0]
-        self._near: Float64Array = near.reshape(self._laid.shape[:2])
-        # finer points ride between nodes that are out of the head and may cut through it
+        near = self._obstacles.at(self._nodes.reshape(-1, 3))[0]
+        self._near: Float64Array = near.reshape(self._nodes.shape[:2])
+        # embedded points between nodes outside the head may still cut through it
         self._deepest = np.minimum(self._obstacles.at(strands.points)[0], 0.001) - 1e-5
 
     def _stiffen(self, options: Options) -> None:
-        """Make the rods, whose natural shape is what carries them as captured."""
+        """Make the rods, whose natural shape balances gravity at the captured shape."""
         density = HAIR_DENSITY * np.pi / 4 * self._width[:, None] ** 2
-        most = stiffest(self._laid, FRAME / options.substeps)[:, None]
+        most = max_stiffness(self._nodes, FRAME / options.substeps)[:, None]
         bending = density * np.minimum(SINGLE_HAIR * options.firmness(), most)
-        rods = make_rods(self._laid, density, bending, bending * options.twist)
+        rods = make_rods(self._nodes, density, bending, bending * options.twist)
         down = np.array([0.0, -self._groom.physics.gravity, 0.0])
-        self._rods = loaded(rods, rods.mass[..., None] * down)
+        self._rods = balance_load(rods, rods.mass[..., None] * down)
 
     def _system(self, step: float) -> System:
         key = round(step, 9)
@@ -209,21 +207,21 @@ class PbdSimulator:
     def _piece(
         self, seconds: float, around: Surroundings, start: Float64Array, end: Float64Array
     ) -> None:
-        """Advance by up to a sixtieth of a second: look at air and neighbours once, then step."""
+        """Advance by up to `FRAME`: update wind and hair grid once, then do substeps."""
         count = max(1, math.ceil(self._options.substeps * seconds / FRAME - 1e-6))
         step = seconds / count
         system = self._system(step)
         gravity, air = self._gravity(around), self._air(around, start)
         if self._options.cohesion > 0 or self._options.pressure > 0:
             rates = (self._options.cohesion, self._options.pressure, seconds)
-            self._engine.rub(self._crowd, inverse_motion(end) @ start, rates)
-        held = self._held(around, start)
+            self._engine.apply_hair_grid(self._hair_grid, inverse_motion(end) @ start, rates)
+        held = self._grabs_on_engine(around, start)
         loads = []
-        for after, ride in course(start, end, count):
-            load = Load(ride, after[:3, :3].T, gravity, air)
-            if around.grabs and not held:  # a pull depends on where the node is
-                force = self._hand.pulls(
-                    around.grabs, self._engine, self._rods, self._riders, system, load,
+        for after, head_step in motion_steps(start, end, count):
+            load = Load(head_step, after[:3, :3].T, gravity, air)
+            if around.grabs and not held:  # a pull depends on the node's position
+                force = self._grab_forces.compute(
+                    around.grabs, self._engine, self._rods, self._embedding, system, load,
                     inverse_motion(after), self._options.grab_speed,
                 )  # fmt: skip
                 self._engine.run(system, [replace(load, force=force)], self._options.iterations)
@@ -233,12 +231,12 @@ class PbdSimulator:
             self._engine.run(system, loads, self._options.iterations)
         self._time += seconds
 
-    def _held(self, around: Surroundings, head: Float64Array) -> bool:
-        """Return whether the engine pulls held points by itself; if so, tell it of them."""
+    def _grabs_on_engine(self, around: Surroundings, head: Float64Array) -> bool:
+        """Pass the grabs to the engine; return False if it cannot pull points itself."""
         hold = getattr(self._engine, "hold", None)
         if hold is None:
             return False
-        hold(around.grabs, self._riders, inverse_motion(head), self._options.grab_speed)
+        hold(around.grabs, self._embedding, inverse_motion(head), self._options.grab_speed)
         return True
 
     def _gravity(self, around: Surroundings | None) -> Float64Array:
@@ -247,11 +245,11 @@ class PbdSimulator:
         return around.gravity
 
     def _air(self, around: Surroundings, head: Float64Array) -> Float64Array:
-        """Velocity of the air at the nodes, world; gusts are mixed between every fourth node."""
+        """Return the air velocity at the nodes, world; gusts are evaluated at every fourth node."""
         wind, gusty = np.asarray(around.wind, np.float64), around.turbulence != 0.0
         gusty = gusty and bool(wind.any())
         blow = getattr(self._engine, "blow", None)
-        if blow is not None:  # shaders find the gusts where the rods are
+        if blow is not None:  # the engine evaluates the gusts itself
             seed = self._options.seed
             waves = gust_waves(self._time, wind, around.turbulence, seed) if gusty else None
             blow(waves, wind, head)
@@ -259,7 +257,7 @@ class PbdSimulator:
             return wind
         nodes = self._rods.nodes
         some = np.unique(np.append(np.arange(0, nodes, 4), nodes - 1))
-        where = moved(head, self._engine.state.position[:, some])
+        where = transform_points(head, self._engine.state.position[:, some])
         found = air_velocity(
             where.reshape(-1, 3), self._time, around.wind, around.turbulence, self._options.seed
         ).reshape(where.shape)
@@ -287,7 +285,7 @@ def _engine(name: str, rods: Rods, contact: Contact) -> Engine:
 
 
 def _rates(options: Options, rods: Rods, width: Float64Array) -> Rates:
-    """Turn options into rates; air takes thin hair along faster: area over mass goes as 1/width."""
+    """Convert options to rates; drag goes as area over mass, which is 1 / width."""
     share = np.linspace(0.0, 1.0, rods.nodes)
     drag = options.drag * width.mean() / width
     shape = options.pull() * (1 - share) ** 2
@@ -301,7 +299,7 @@ def _rates(options: Options, rods: Rods, width: Float64Array) -> Rates:
 def _contact(
     options: Options, obstacles: Obstacles, near: Float64Array, deepest: Float64Array
 ) -> Contact:
-    """Captured hair that is nearer (S, n) than the clearance keeps its own distance."""
+    """Return the contact parameters; hair captured nearer (S, n) keeps its own distance."""
     clearance = np.minimum(options.clearance, near)
-    rub, fastest = options.rubbing(), options.depenetration
-    return Contact(obstacles, clearance, rub, fastest, deepest, options.rounds)
+    apply_hair_grid, fastest = options.friction_coefficient(), options.depenetration
+    return Contact(obstacles, clearance, apply_hair_grid, fastest, deepest, options.rounds)

@@ -7,8 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 from hairkit_plugins.pbd.linear_system import Rates, System, assemble
-from hairkit_plugins.pbd.reference import Load, State, at_rest, substep, swung, untwisted
-from hairkit_plugins.pbd.rods import Rods, loaded, make_rods
+from hairkit_plugins.pbd.reference import (
+    Load,
+    State,
+    relax_twist,
+    rest_state,
+    substep,
+    transport_frames,
+)
+from hairkit_plugins.pbd.rods import Rods, balance_load, make_rods
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
@@ -42,10 +49,10 @@ def load_of(
     gravity: Float64Array = NOTHING,
     air: Float64Array = NOTHING,
     force: Float64Array | None = None,
-    ride: Float64Array | None = None,
+    head_step: Float64Array | None = None,
 ) -> Load:
     """Return what acts on rods; the head stands still unless it rides."""
-    return Load(np.eye(4) if ride is None else ride, np.eye(3), gravity, air, force)
+    return Load(np.eye(4) if head_step is None else head_step, np.eye(3), gravity, air, force)
 
 
 def settled(
@@ -63,7 +70,7 @@ def settled(
 ) -> State:
     """Return the state after so long that thick air has stopped all motion."""
     system = system_of(rods, step, drag, pinned_tip)
-    state = at_rest(rods) if start is None else start
+    state = rest_state(rods) if start is None else start
     load = load_of(gravity, air, force)
     for _ in range(steps):
         state = substep(rods, system, state, load, None, iterations)
@@ -73,7 +80,7 @@ def settled(
 def displaced(rods: Rods, shift: Float64Array) -> State:
     """Return rods at rest with their nodes shifted a little."""
     position = rods.points + shift
-    frames = swung(rods.frames, quaternion.normalize(np.diff(position, axis=1)))
+    frames = transport_frames(rods.frames, quaternion.normalize(np.diff(position, axis=1)))
     return State(position, np.zeros_like(position), frames)
 
 
@@ -82,18 +89,18 @@ def tangled(rng: np.random.Generator) -> tuple[Rods, State]:
     s = np.linspace(0, 1, 12)
     points = 0.2 * np.stack([s, 0.3 * np.sin(5 * s), 0.3 * np.cos(4 * s)], axis=-1)[None]
     rods = make_rods(points, DENSITY, DENSITY * 0.05)
-    rods = loaded(rods, rods.mass[..., None] * DOWN)
+    rods = balance_load(rods, rods.mass[..., None] * DOWN)
     way = quaternion.normalize(np.diff(points, axis=1) + 0.003 * rng.normal(size=(1, 11, 3)))
     moved = points[:, :1] + np.cumsum(way * rods.length[..., None], axis=1)
     position = np.concatenate([points[:, :1], moved], axis=1)
-    frames = balanced(rods, swung(rods.frames, way))
+    frames = balanced(rods, transport_frames(rods.frames, way))
     return rods, State(position, np.zeros_like(position), frames)
 
 
 def balanced(rods: Rods, frames: Float64Array) -> Float64Array:
     """Return frames spun until torsion is in balance."""
     for _ in range(200):
-        before, frames = frames, untwisted(rods, frames)
+        before, frames = frames, relax_twist(rods, frames)
         if np.abs(frames - before).max() < 1e-14:
             break
     return frames

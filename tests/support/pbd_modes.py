@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from hairkit_plugins.pbd.reference import State, elastic_force, swung
+from hairkit_plugins.pbd.reference import State, elastic_force, transport_frames
 from hairkit_plugins.pbd.rods import Rods
 from pbd_bench import balanced
 from scipy.linalg import eigh, null_space
@@ -100,7 +100,7 @@ def balanced_force(rods: Rods, frames: Float64Array, position: Float64Array) -> 
     """Return the elastic forces (S, n, 3) of one rod at other places (S, n, 3) of its nodes."""
     many = copies(rods, len(position))
     edge = np.diff(position, axis=1)
-    carried = swung(np.repeat(frames, len(position), axis=0), quaternion.normalize(edge))
+    carried = transport_frames(np.repeat(frames, len(position), axis=0), quaternion.normalize(edge))
     return elastic_force(many, edge, balanced(many, carried))
 
 

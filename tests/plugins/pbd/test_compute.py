@@ -13,8 +13,8 @@ from hairkit_plugins.pbd import Options
 from hairkit_plugins.pbd.backend import ReferenceEngine
 from hairkit_plugins.pbd.gl_backend import ComputeEngine
 from hairkit_plugins.pbd.gl_uniforms import Units
-from hairkit_plugins.pbd.hair_grid import crowd_of
-from hairkit_plugins.pbd.reference import at_rest
+from hairkit_plugins.pbd.hair_grid import make_hair_grid
+from hairkit_plugins.pbd.reference import rest_state
 from hairkit_plugins.pbd.simulator import PbdSimulator
 from shader_rods import AGREE, SHAKE, STILL_AIR, WIND, apart, bent_groom, both, skip_without_shaders
 
@@ -74,19 +74,19 @@ def test_capsules_hold_hair_off_as_in_the_reference(groom: Groom) -> None:
     """A ball in a tip's way: wind blows it elsewhere, by both backends to the same place."""
     soft = {"stiffness": 0.0, "bend": 0.1}
 
-    def blow(*simulators: PbdSimulator) -> None:
+    def set_gusts(*simulators: PbdSimulator) -> None:
         for simulator in simulators:
             for _ in range(15):
                 simulator.advance(1 / 60, Surroundings(wind=np.array([8.0, 0.0, 0.0])))
 
     free = both(groom, **soft)[0]
-    blow(free)
+    set_gusts(free)
     away = free.points - groom.strands.points
     tip = int(np.linalg.norm(away, axis=1).argmax())
     centre = (groom.strands.points[tip] + 0.9 * away[tip])[None].astype(np.float64)
     ball = Capsules(centre, centre + 1e-3, np.full((1, 2), 0.02))
     pair = both(replace(groom, head=replace(groom.head, capsules=ball)), **soft)
-    blow(*pair)
+    set_gusts(*pair)
     assert np.abs(pair[0].points - free.points).max() > 1e-3
     assert apart(pair) < AGREE
 
@@ -163,7 +163,7 @@ def test_a_state_comes_back_as_it_was_given(groom: Groom) -> None:
     arrays = {name: value for name, value in vars(rods).items() if isinstance(value, np.ndarray)}
     fields = {name: value[many] for name, value in arrays.items()}
     engine = ComputeEngine(replace(rods, **fields), None)
-    wanted = at_rest(replace(rods, **fields))
+    wanted = rest_state(replace(rods, **fields))
     wanted.position[:, 1:] += np.linspace(0, 1, 5000)[:, None, None]
     engine.state = wanted
     np.testing.assert_allclose(engine.state.position, wanted.position, atol=1e-7)
@@ -174,15 +174,15 @@ def test_a_state_comes_back_as_it_was_given(groom: Groom) -> None:
 def test_hair_in_one_place_stays_finite(groom: Groom) -> None:
     """Fuller cells than the grid counts momentum for neither overflow nor throw hair about."""
     rods = PbdSimulator(groom, Options(backend="reference", nodes=8)).rods
-    crowd = crowd_of(rods.points.reshape(-1, 3), rods.mass.reshape(-1))
-    heap = at_rest(rods)
+    hair_grid = make_hair_grid(rods.points.reshape(-1, 3), rods.mass.reshape(-1))
+    heap = rest_state(rods)
     heap.position[:] = heap.position.mean(axis=(0, 1))
     heap.velocity[:] = [3.0, -2.0, 1.0]
     engines = (ReferenceEngine(rods, None), ComputeEngine(rods, None))
     for engine in engines:
         engine.state = heap
-        engine.rub(crowd, np.eye(4), (20.0, 5.0, 1 / 60))
-    assert Units.of(crowd).capacity > 0
+        engine.apply_hair_grid(hair_grid, np.eye(4), (20.0, 5.0, 1 / 60))
+    assert Units.of(hair_grid).capacity > 0
     change = engines[1].state.velocity - engines[0].state.velocity
     assert np.abs(change).max() < 1e-3
 

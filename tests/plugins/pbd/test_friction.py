@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hairkit_plugins.pbd.backend import ReferenceEngine
 from hairkit_plugins.pbd.numba_backend import FastEngine
-from hairkit_plugins.pbd.reference import Contact, at_rest, collided, pulled, substep
+from hairkit_plugins.pbd.reference import Contact, pulled, resolve_contacts, rest_state, substep
 from hairkit_plugins.pbd.rods import make_rods
 from pbd_bench import DENSITY, LENGTH, G, load_of, straight, system_of
 
@@ -31,7 +31,7 @@ def test_hair_on_a_slope_slides_when_the_slope_beats_friction(rounds: int) -> No
     rods = make_rods(straight(1, 12), DENSITY, 1e-16, straight=True)
     for share in (1.1, 0.9):
         contact = Contact(plane, np.zeros_like(rods.mass), share * np.tan(alpha), 0.5, None, rounds)
-        system, state = system_of(rods, 1 / 240), at_rest(rods)
+        system, state = system_of(rods, 1 / 240), rest_state(rods)
         for _ in range(48):
             state = substep(rods, system, state, load_of(gravity), contact)
         moved.append(-state.position[0, -1, 2])
@@ -85,7 +85,7 @@ def slipping(wrap: Float64Array, speed: Float64Array, friction: float, rounds: i
     points = around(wrap, np.linspace(0, LENGTH, nodes))
     rods = make_rods(points, DENSITY, 1e-16, straight=True)
     along = quaternion.normalize(np.gradient(points, axis=1))
-    state = replace(at_rest(rods), velocity=-speed[:, None, None] * along)
+    state = replace(rest_state(rods), velocity=-speed[:, None, None] * along)
     force = np.zeros_like(points)
     force[:, -1] = pull * np.stack([np.cos(wrap), -np.sin(wrap), 0 * wrap], axis=1)
     system, load, found = system_of(rods, step), load_of(force=force), []
@@ -93,7 +93,7 @@ def slipping(wrap: Float64Array, speed: Float64Array, friction: float, rounds: i
     for _ in range(100):
         points[:, 0, 0] -= speed * step
         state, before = pulled(replace(rods, points=points), system, state, load)
-        state, after = collided(rods, state, contact, load.ride, step)
+        state, after = resolve_contacts(rods, state, contact, load.head_step, step)
         found.append((before + after)[:, 0] / pull)
     return np.mean(found[25:], axis=0)
 

@@ -11,9 +11,9 @@ from hairkit_plugins.pbd.linear_system import Rates, assemble
 from hairkit_plugins.pbd.reference import (
     Load,
     State,
-    at_rest,
     elastic_force,
     pulled,
+    rest_state,
     substep,
 )
 from hairkit_plugins.pbd.rods import Rods, make_rods
@@ -124,13 +124,13 @@ def test_a_head_that_moves_in_still_air_has_wind_against_it(rng: np.random.Gener
     """A head at constant speed in still air and wind on a still head: the same motion."""
     rods, _ = tangled(rng)
     speed, step = np.array([1.5, -0.5, 2.0]), 1 / 240
-    ride = np.eye(4)
-    ride[:3, 3] = -speed * step  # what stood still in the world goes back in the head's axes
-    system, standing, going = system_of(rods, step, 4.0), at_rest(rods), at_rest(rods)
+    head_step = np.eye(4)
+    head_step[:3, 3] = -speed * step  # what stood still in the world goes back in the head's axes
+    system, standing, going = system_of(rods, step, 4.0), rest_state(rods), rest_state(rods)
     going = replace(going, velocity=going.velocity + speed)
     for _ in range(60):
         standing = substep(rods, system, standing, load_of(DOWN, -speed))
-        going = substep(rods, system, going, load_of(DOWN, ride=ride))
+        going = substep(rods, system, going, load_of(DOWN, head_step=head_step))
     assert np.abs(standing.position - rods.points).max() > 1e-3
     np.testing.assert_allclose(going.position, standing.position, atol=1e-9)
 
@@ -139,12 +139,12 @@ def test_hair_that_sinks_at_its_terminal_speed_has_no_weight() -> None:
     """A head that sinks at g / c with its hair: the air bears a level limp strand, to 1e-9 m."""
     drag, step = 4.0, 1 / 240
     rods = make_rods(straight(1, 12), DENSITY, 1e-14, straight=True)
-    ride = np.eye(4)
-    ride[:3, 3] = -DOWN / drag * step
-    system, state = system_of(rods, step, drag), at_rest(rods)
+    head_step = np.eye(4)
+    head_step[:3, 3] = -DOWN / drag * step
+    system, state = system_of(rods, step, drag), rest_state(rods)
     state = replace(state, velocity=state.velocity + DOWN / drag)
     for _ in range(120):
-        state = substep(rods, system, state, load_of(DOWN, ride=ride))
+        state = substep(rods, system, state, load_of(DOWN, head_step=head_step))
     np.testing.assert_allclose(state.position, rods.points, atol=1e-9)
 
 
@@ -155,10 +155,10 @@ def test_a_chain_on_a_turning_hook_keeps_its_plane() -> None:
     system, still, turning = system_of(rods, step), start, start
     for k in range(120):
         before, after = (turn_about_y(spin * step * (k + j)) for j in (0, 1))
-        ride = np.eye(4)
-        ride[:3, :3] = after.T @ before
+        head_step = np.eye(4)
+        head_step[:3, :3] = after.T @ before
         still = substep(rods, system, still, load_of(DOWN))
-        turning = substep(rods, system, turning, Load(ride, after.T, DOWN, NOTHING))
+        turning = substep(rods, system, turning, Load(head_step, after.T, DOWN, NOTHING))
     np.testing.assert_allclose(turning.position @ after.T, still.position, atol=1e-7)
 
 
@@ -169,12 +169,14 @@ def test_a_whirling_strand_is_taut_by_its_mass_further_out() -> None:
     """
     nodes, spin, step = 25, 20.0, 1e-4
     rods = make_rods(straight(1, nodes), DENSITY, 1e-6, straight=True)
-    ride = np.eye(4)
-    ride[:3, :3] = quaternion.to_matrix(quaternion.from_axis(np.array([0, 0, 1.0]), -spin * step))
-    system, state = system_of(rods, step), at_rest(rods)
+    head_step = np.eye(4)
+    head_step[:3, :3] = quaternion.to_matrix(
+        quaternion.from_axis(np.array([0, 0, 1.0]), -spin * step)
+    )
+    system, state = system_of(rods, step), rest_state(rods)
     state = replace(state, velocity=np.cross([0.0, 0.0, spin], rods.points))
     for _ in range(20):
-        state, tension = pulled(rods, system, state, load_of(ride=ride))
+        state, tension = pulled(rods, system, state, load_of(head_step=head_step))
     s = (np.arange(nodes - 1) + 0.5) * LENGTH / (nodes - 1)
     law = DENSITY * spin**2 * (LENGTH**2 - s**2) / 2
     np.testing.assert_allclose(tension[0], law, atol=0.01 * law[0])
@@ -207,7 +209,7 @@ def test_motion_turns_with_the_axes(rng: np.random.Generator) -> None:
     results = []
     for r in (np.eye(3), turn):
         free = make_rods(rods.points @ r.T, DENSITY, 1e-8)
-        state, system = at_rest(free), system_of(free, 1 / 240, 2.0)
+        state, system = rest_state(free), system_of(free, 1 / 240, 2.0)
         for _ in range(60):
             state = substep(free, system, state, load_of(r @ DOWN, r @ wind))
         results.append(state.position @ r)
@@ -217,7 +219,7 @@ def test_motion_turns_with_the_axes(rng: np.random.Generator) -> None:
 def test_a_free_swing_never_gains_energy() -> None:
     """Kinetic, elastic and potential energy together only fall, for stiff and soft rods."""
     rods = cantilevers(np.array([2.0, 50.0]), 16)
-    system, state, before = system_of(rods, 1 / 240), at_rest(rods), np.inf
+    system, state, before = system_of(rods, 1 / 240), rest_state(rods), np.inf
     rounding = 1e-9 * float(rods.mass.sum()) * G * LENGTH
     for _ in range(150):
         state = substep(rods, system, state, load_of(DOWN))

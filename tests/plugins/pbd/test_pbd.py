@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd import Options
-from hairkit_plugins.pbd.head_interpolation import between, course, inverse_motion
-from hairkit_plugins.pbd.reference import at_rest
+from hairkit_plugins.pbd.head_interpolation import interpolate_motion, inverse_motion, motion_steps
+from hairkit_plugins.pbd.reference import rest_state
 from hairkit_plugins.pbd.simulator import PbdSimulator
 
 from hairkit.head_model.signed_distance import distance_to
@@ -253,7 +253,7 @@ def test_compiled_gusts_are_the_law_of_the_wind(groom: Groom) -> None:
     head[:3, 3] += [4.0, 1.0, -2.0]
     rods = PbdSimulator(groom, Options(backend="reference")).rods
     engine = FastEngine(rods, None)
-    engine.blow(gust_waves(time, wind, 0.4), wind, head)
+    engine.set_gusts(gust_waves(time, wind, 0.4), wind, head)
     found = engine.air()
     points = rods.points[:, [0, 4, 8, 12, 15]] @ head[:3, :3].T + head[:3, 3]
     wanted = air_velocity(points.reshape(-1, 3), time, wind, 0.4).reshape(points.shape)
@@ -265,7 +265,7 @@ def test_compiled_gusts_are_the_law_of_the_wind(groom: Groom) -> None:
 @pytest.mark.parametrize("copies", [1, 60])
 def test_compiled_hair_among_hair_is_that_of_the_reference(groom: Groom, copies: int) -> None:
     """Crowded and moving, on a moving head: velocities of metres a second agree to 0.01 mm/s."""
-    from hairkit_plugins.pbd.hair_grid import crowd_of
+    from hairkit_plugins.pbd.hair_grid import make_hair_grid
     from hairkit_plugins.pbd.numba_backend import FastEngine
 
     rods = PbdSimulator(groom, Options(backend="reference")).rods
@@ -273,32 +273,34 @@ def test_compiled_hair_among_hair_is_that_of_the_reference(groom: Groom, copies:
     arrays = {name: values for name, values in vars(rods).items() if isinstance(values, np.ndarray)}
     rods = replace(rods, **{name: values[pick] for name, values in arrays.items()})
     rng = np.random.default_rng(3)
-    state = at_rest(rods)
+    state = rest_state(rods)
     state = replace(
         state,
         position=0.7 * state.position + rng.normal(0, 1e-3, state.position.shape),
         velocity=rng.normal(0, 1, state.position.shape),
     )
-    ride = add_shakes(["yaw:40:1"], groom.head)(0.01)
-    crowd = crowd_of(rods.points.reshape(-1, 3), rods.mass.reshape(-1))
+    head_step = add_shakes(["yaw:40:1"], groom.head)(0.01)
+    hair_grid = make_hair_grid(rods.points.reshape(-1, 3), rods.mass.reshape(-1))
     engine = FastEngine(rods, None)
     engine.state = state
-    engine.rub(crowd, ride, (5.0, 4.0, 1 / 60))
-    wanted = crowd.rubbed(state, rods.mass, ride, (5.0, 4.0, 1 / 60)).velocity
+    engine.apply_hair_grid(hair_grid, head_step, (5.0, 4.0, 1 / 60))
+    wanted = hair_grid.mix_velocities(state, rods.mass, head_step, (5.0, 4.0, 1 / 60)).velocity
     assert np.abs(wanted - state.velocity).max() > 0.05
     np.testing.assert_allclose(engine.state.velocity, wanted, atol=1e-5)
 
 
 @pytest.mark.parametrize("count", [1, 4])
 def test_a_course_goes_evenly_from_start_to_end(groom: Groom, count: int) -> None:
-    """Each step ends on the motion between, and its ride leads there from the one before."""
+    """Steps end at the interpolated motion; transforms map the axes before to those after."""
     motion = add_shakes(["yaw:40:1", "pitch:20:2"], groom.head)
     start, end = motion(0.1), motion(0.15)
     before = start
-    for k, (after, ride) in enumerate(course(start, end, count)):
-        np.testing.assert_allclose(after, between(start, end, (k + 1) / count), atol=1e-12)
-        np.testing.assert_allclose(after @ ride, before, atol=1e-12)
-        np.testing.assert_allclose(inverse_motion(after) @ before, ride, atol=1e-12)
+    for k, (after, head_step) in enumerate(motion_steps(start, end, count)):
+        np.testing.assert_allclose(
+            after, interpolate_motion(start, end, (k + 1) / count), atol=1e-12
+        )
+        np.testing.assert_allclose(after @ head_step, before, atol=1e-12)
+        np.testing.assert_allclose(inverse_motion(after) @ before, head_step, atol=1e-12)
         before = after
     assert (before == end).all()
-    assert all((ride == np.eye(4)).all() for _, ride in course(end, end, 3))
+    assert all((head_step == np.eye(4)).all() for _, head_step in motion_steps(end, end, 3))

@@ -97,7 +97,7 @@ def test_fine_points_do_not_cut_through_the_head(groom: Groom) -> None:
     bare = replace(pair[0]._contact, deepest=None)
     uncovered = ComputeEngine(pair[0].rods, bare)
     uncovered.state = pair[1]._engine.state
-    found = uncovered.points(pair[1]._riders, np.eye(4))
+    found = uncovered.points(pair[1]._embedding, np.eye(4))
     assert np.abs(found - pair[1].points).max() > 5e-4
 
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd.linear_system import Rates, assemble
-from hairkit_plugins.pbd.reference import State, at_rest, substep, swung
-from hairkit_plugins.pbd.rods import Rods, loaded, make_rods, twist_between
+from hairkit_plugins.pbd.reference import State, rest_state, substep, transport_frames
+from hairkit_plugins.pbd.rods import Rods, balance_load, make_rods, twist_between
 from pbd_bench import (
     DENSITY,
     DOWN,
@@ -66,7 +66,7 @@ def test_a_column_buckles_under_eulers_load() -> None:
         rods = make_rods(straight(1, 25, (0, 1, 0)), DENSITY, EI, straight=True)
         force = np.zeros((25, 3))
         force[-1, 1] = -load * EI / LENGTH**2
-        return linearised(rods, at_rest(rods), force).lowest()
+        return linearised(rods, rest_state(rods), force).lowest()
 
     assert critical(lowest, np.pi**2 / 4) == pytest.approx(np.pi**2 / 4, rel=0.002)
 
@@ -84,7 +84,7 @@ def test_a_level_strand_turns_aside_under_prandtls_load(order: float, factor: fl
 
     def lowest(share: float) -> float:
         rods, force = borne_straight(np.array([share]), factor == 2, 21)
-        return linearised(rods, at_rest(rods), force[0]).lowest()
+        return linearised(rods, rest_state(rods), force[0]).lowest()
 
     assert law == pytest.approx(4.0126 if factor == 2 else 12.854, abs=1e-3)
     assert critical(lowest, law) == pytest.approx(law, rel=0.003)
@@ -119,7 +119,7 @@ def test_a_twisted_taut_rod_coils_up_as_greenhill_says(taut: float) -> None:
         force[-1, 0] = taut * EI / free_length**2
         along[[-6, -3]] = 1.0
         free = np.hstack([np.eye(3 * nodes)[:, 6:-6], along])
-        return linearised(rods, replace(at_rest(rods), frames=frames), force, free).lowest()
+        return linearised(rods, replace(rest_state(rods), frames=frames), force, free).lowest()
 
     law = greenhill(taut)
     assert 1.0 < law / (2 * np.sqrt(taut)) < (1.1 if taut > 50 else 1.3)
@@ -201,7 +201,7 @@ def test_a_curved_strand_leaves_its_plane_where_its_linear_theory_says() -> None
     rods = make_rods(straight(6, 33), weights[:, None] / G, EI, torsion, straight=True)
     rods = naturally_bent(rods, np.full(6, 4.0))
     state = settled(rods, DOWN, drag=10.0, step=1 / 100, steps=300)
-    frames = swung(state.frames, quaternion.normalize(np.diff(state.position, axis=1)))
+    frames = transport_frames(state.frames, quaternion.normalize(np.diff(state.position, axis=1)))
     stiffness = np.empty(6)
     for k in range(6):
         one = State(*(array[k : k + 1] for array in (state.position, state.velocity, frames)))
@@ -248,7 +248,7 @@ def borne_straight(load: Float64Array, at_tip: bool, nodes: int) -> tuple[Rods, 
     share = np.where(np.arange(nodes) == nodes - 1, 1.0, 0.0) if at_tip else rods.mass[0]
     total = load[:, None, None] * np.sqrt(EI * GJ) / LENGTH**2
     force = total * share[:, None] / share.sum() * DOWN / G
-    return loaded(rods, force), force
+    return balance_load(rods, force), force
 
 
 def ring(segments: int, twist: float) -> tuple[Rods, State]:
@@ -257,7 +257,7 @@ def ring(segments: int, twist: float) -> tuple[Rods, State]:
     points = LENGTH / (2 * np.pi) * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1)
     rods = clamped(make_rods(points[None], DENSITY, EI, GJ, straight=True))
     even = spun(rods.frames, twist * np.arange(segments + 1.0)[None] / segments)
-    return rods, replace(at_rest(rods), frames=balanced(rods, even))
+    return rods, replace(rest_state(rods), frames=balanced(rods, even))
 
 
 def writhe(corner: Float64Array) -> float:

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd.numba_backend import FastEngine
-from hairkit_plugins.pbd.reference import State, at_rest, pulled, substep, swung
-from hairkit_plugins.pbd.resampling import stiffest
-from hairkit_plugins.pbd.rods import loaded, make_rods, twist_between
+from hairkit_plugins.pbd.reference import State, pulled, rest_state, substep, transport_frames
+from hairkit_plugins.pbd.resampling import max_stiffness
+from hairkit_plugins.pbd.rods import balance_load, make_rods, twist_between
 from pbd_bench import (
     DENSITY,
     DOWN,
@@ -126,7 +126,7 @@ def test_a_cable_hangs_as_a_catenary() -> None:
 def test_a_hanging_strand_carries_the_weight_below() -> None:
     """Tension w (L - s) at the middles of the segments, to 2e-4 of the weight."""
     rods = make_rods(straight(1, 16, (0, -1, 0)), DENSITY, 1e-10, straight=True)
-    _, tension = pulled(rods, system_of(rods, 1 / 240), at_rest(rods), load_of(DOWN))
+    _, tension = pulled(rods, system_of(rods, 1 / 240), rest_state(rods), load_of(DOWN))
     below = LENGTH - (np.arange(15) + 0.5) * LENGTH / 15
     np.testing.assert_allclose(tension[0], WEIGHT * below, atol=2e-4 * WEIGHT * LENGTH)
 
@@ -148,7 +148,11 @@ def test_an_end_moment_makes_an_arc() -> None:
     """A pure moment M at the tip: curvature M / EI everywhere, the tip to 0.3 % of the length."""
     bending, angle = 1e-8, np.array([np.pi / 2, np.pi])
     rods = make_rods(straight(2, 33), DENSITY, bending, straight=True)
-    system, state, force = system_of(rods, 1 / 200, 8.0), at_rest(rods), np.zeros_like(rods.points)
+    system, state, force = (
+        system_of(rods, 1 / 200, 8.0),
+        rest_state(rods),
+        np.zeros_like(rods.points),
+    )
     for k in range(400):
         # a couple on the last segment that turns with it, brought up slowly
         way = quaternion.normalize(state.position[:, -1] - state.position[:, -2])
@@ -194,8 +198,8 @@ def test_a_coil_is_a_helical_spring() -> None:
         along_axis[[-4, -1]] = 1.0
         pull = np.zeros((rods.nodes, 3))
         pull[-1, 2] = 1.0
-        led = linearised(rods, at_rest(rods), None, np.hstack([held[:, :-6], along_axis]))
-        free = linearised(replace(rods, tip_held=False), at_rest(rods), None, held)
+        led = linearised(rods, rest_state(rods), None, np.hstack([held[:, :-6], along_axis]))
+        free = linearised(replace(rods, tip_held=False), rest_state(rods), None, held)
         errors.append(np.array([way.yielding(pull)[-1, 2] for way in (led, free)]) / laws - 1)
     assert (np.abs(errors[1]) < 0.03).all()
     np.testing.assert_allclose((4 * errors[1] - errors[0]) / 3, 0.0, atol=0.005)
@@ -219,7 +223,7 @@ def test_natural_curls_come_back() -> None:
     edge = np.diff(helix, axis=1)
     flat = quaternion.normalize(0.3 * edge + 0.7 * edge[:, :1]) * rods.length[..., None]
     position = np.concatenate([helix[:, :1], helix[:, :1] + np.cumsum(flat, axis=1)], axis=1)
-    frames = swung(rods.frames, quaternion.normalize(flat))
+    frames = transport_frames(rods.frames, quaternion.normalize(flat))
     start = State(position, np.zeros_like(position), frames)
     state = settled(rods, NOTHING, start=start, drag=5.0, steps=300)
     np.testing.assert_allclose(state.position, helix, atol=1e-4)
@@ -228,7 +232,7 @@ def test_natural_curls_come_back() -> None:
 def test_the_natural_shape_rests_to_rounding(rng: np.random.Generator) -> None:
     """Without load a curled rod stays as it is made: 1e-12 m in a quarter of a second."""
     rods = make_rods(tangled(rng)[0].points, DENSITY, DENSITY * 0.05)
-    state, system = at_rest(rods), system_of(rods, 1 / 240)
+    state, system = rest_state(rods), system_of(rods, 1 / 240)
     for _ in range(60):
         state = substep(rods, system, state, load_of())
     assert np.abs(state.position - rods.points).max() < 1e-12
@@ -237,7 +241,7 @@ def test_the_natural_shape_rests_to_rounding(rng: np.random.Generator) -> None:
 def test_inverse_statics_keeps_any_shape(rng: np.random.Generator) -> None:
     """A curled rod loaded by gravity stays where it is for a second, to 0.1 micrometres."""
     rods, _ = tangled(rng)
-    state, system = at_rest(rods), system_of(rods, 1 / 240)
+    state, system = rest_state(rods), system_of(rods, 1 / 240)
     for _ in range(240):
         state = substep(rods, system, state, load_of(DOWN))
     assert np.abs(state.position - rods.points).max() < 1e-7
@@ -246,13 +250,13 @@ def test_inverse_statics_keeps_any_shape(rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("curl", [0.1, 0.3, 0.7])
 @pytest.mark.parametrize("spacing", [1e-3, 6e-3])
 def test_short_stiff_coils_stay_at_rest(curl: float, spacing: float) -> None:
-    """As stiff as `stiffest` lets them be, coils of any size and turn keep their shape."""
+    """As stiff as `max_stiffness` lets them be, coils of any size and turn keep their shape."""
     angle = curl * np.arange(15)
     edges = spacing * np.stack([np.sin(angle), -np.cos(angle), 0.2 + 0 * angle], axis=1)
     points = np.concatenate([np.zeros((1, 3)), np.cumsum(edges, axis=0)])[None]
-    bending = stiffest(points, 1 / 240)[:, None] * np.ones((1, 15))
+    bending = max_stiffness(points, 1 / 240)[:, None] * np.ones((1, 15))
     plain = make_rods(points, 1.0, bending)
-    rods = loaded(plain, plain.mass[..., None] * DOWN)
+    rods = balance_load(plain, plain.mass[..., None] * DOWN)
     engine = FastEngine(rods, None)
     engine.run(system_of(rods, 1 / 240), [load_of(DOWN)] * 240, 1)
     assert np.abs(engine.state.position - points).max() < 1e-3 * spacing

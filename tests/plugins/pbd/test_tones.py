@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from hairkit_plugins.pbd.reference import at_rest
+from hairkit_plugins.pbd.reference import rest_state
 from hairkit_plugins.pbd.rods import Rods, make_rods
 from pbd_bench import DENSITY, DOWN, LENGTH, G, straight
 from pbd_modes import linearised
@@ -18,7 +18,7 @@ NODES = 41
 
 def tones(rods: Rods, force: Float64Array | None, free: Float64Array | None = None) -> Float64Array:
     """Return the lowest three angular frequencies; each stands for two planes."""
-    small = linearised(rods, at_rest(rods), force, free)
+    small = linearised(rods, rest_state(rods), force, free)
     return np.sqrt(small.squares(rods.mass[0])[:6:2])
 
 
