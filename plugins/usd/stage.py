@@ -45,14 +45,18 @@ def write_stage(ready: PreparedGroom, path: Path, options: StageOptions) -> None
             " turn USD files themselves as upAxis and metersPerUnit say"
         )
     try:
-        from pxr import Usd
+        from pxr import Tf, Usd
     except ImportError as error:
         raise MissingExtraError(MISSING) from error
     stage = Usd.Stage.CreateInMemory(f"groom{path.suffix.lower()}")
     _describe(stage, ready, space)
     _fill(stage, ready, space, options)
     with replaced_file(path, path.suffix.lower()) as part:
-        stage.GetRootLayer().Export(utf8_name(part))
+        try:
+            stage.GetRootLayer().Export(utf8_name(part))
+        except Tf.ErrorException as error:
+            reason = " ".join(str(error).split()).partition("'Error occurred ")[2].partition("'")[0]
+            raise InputError(f"{path}: the USD library fails {reason or 'to write it'}") from error
 
 
 def _describe(stage: Any, ready: PreparedGroom, space: FileSpace) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import resource
 import signal
 import socket
 from collections.abc import Callable, Iterator
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 from rich_groom import rich_groom
 
+from hairkit.cli import explain
 from hairkit.errors import FormatError, HairkitError
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import read_capture, sample_folder
@@ -200,6 +202,31 @@ def test_writing_replaces_files_alone(tmp_path: Path, place: str) -> None:
         write_bytes(path, b"data")
     assert os.lstat(path).st_mode == before
     assert [each.name for each in tmp_path.iterdir()] == ["target"]
+
+
+@pytest.mark.parametrize("room", [0, 4096])
+@pytest.mark.parametrize("name", Manager.loaded(autoload=False).names("export_groom"))
+def test_a_full_disk_leaves_nothing(manager: Manager, tmp_path: Path, name: str, room: int) -> None:
+    """Where there is no room the old file stays, no part is left, and one line names the file."""
+    if name == "usd":
+        pytest.importorskip("pxr")
+    path = tmp_path / f"hair{manager.info(name).suffixes[0]}"
+    path.write_bytes(b"old")
+    groom = rich_groom(60)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, before[1]))
+    try:
+        with pytest.raises((HairkitError, OSError)) as caught:
+            manager.call("export_groom", name, groom=groom, path=path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    line, code = explain(caught.value)
+    assert code == 2
+    assert path.name in line
+    assert "\n" not in line
+    assert len(line) < 300 + len(str(path))
+    assert path.read_bytes() == b"old"
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
 
 
 def _reading_calls(path: Path) -> list[str]:
