@@ -1,4 +1,4 @@
-"""Names of array types, and the check that arrays of frozen types pass once."""
+"""Array type aliases, and the validation of arrays in frozen types."""
 
 from __future__ import annotations
 
@@ -10,20 +10,10 @@ import numpy.typing as npt
 from hairkit.errors import DataError, FormatError
 
 Float32Array = npt.NDArray[np.float32]
-
-
 Float64Array = npt.NDArray[np.float64]
-
-
 Int32Array = npt.NDArray[np.int32]
-
-
 Int64Array = npt.NDArray[np.int64]
-
-
 UInt8Array = npt.NDArray[np.uint8]
-
-
 BoolArray = npt.NDArray[np.bool_]
 
 MAX_REACH = 1000.0
@@ -49,7 +39,7 @@ def frozen_array(
         raise DataError(f"{name} has shape {array.shape}, expected {wanted}")
     if array.dtype.kind == "f" and not _all_finite(array):
         raise DataError(
-            f"{name} holds {np.count_nonzero(~np.isfinite(array))} values that are not finite"
+            f"{name} has {np.count_nonzero(~np.isfinite(array))} values that are not finite"
         )
     if array.base is not None or (array is value and array.flags.writeable):
         array = array.copy()
@@ -67,6 +57,6 @@ def check_reach(values: npt.NDArray[np.floating[Any]], source: object, name: str
 
 
 def _all_finite(array: npt.NDArray[np.floating[Any]]) -> bool:
-    """Return whether all numbers are finite; their sum tells without a mask, if it is finite."""
+    """Return whether all numbers are finite; a finite sum proves it without a mask."""
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(array.sum()) or np.isfinite(array).all())

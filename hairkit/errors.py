@@ -1,4 +1,4 @@
-"""Errors a user can meet: one line each, saying what is wrong, what was wanted and what to do."""
+"""Errors for users: one line that says what is wrong, what was expected and what to do."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ class HairkitError(Exception):
 
 
 class InputError(HairkitError, ValueError):
-    """A file, value or array that the user gave cannot be used as it is."""
+    """A file, value or array from the user cannot be used."""
 
 
 class FormatError(InputError):
-    """A file is not, or not wholly, in the format its name or header claims."""
+    """A file is not, or not entirely, in the format that its name or header claims."""
 
 
 class OptionError(InputError):
@@ -36,4 +36,4 @@ class MissingExtraError(HairkitError, ImportError):
 
 
 class RenderError(HairkitError, RuntimeError):
-    """No OpenGL context could be made, or drawing failed."""
+    """No OpenGL context could be created, or drawing failed."""

@@ -1,4 +1,4 @@
-"""Options of plugins: one description that recipes, `--set`, help texts and sliders are made from.
+"""Options of plugins: one declaration serves recipes, `--set`, help texts and sliders.
 
 >>> @dataclasses.dataclass(frozen=True)
 ... class Options:
@@ -26,14 +26,14 @@ _WORDS: dict[Any, str] = {
     bool: "true or false",
     int: "a whole number",
     float: "a number",
-    str: "a text",
+    str: "text",
     Path: "a path",
 }
 
 
 @dataclasses.dataclass(frozen=True)
 class OptionInfo:
-    """What is known about one option of a plugin."""
+    """Name, type, bounds and meaning of one option of a plugin."""
 
     name: str
     type: Any
@@ -54,7 +54,7 @@ class OptionInfo:
 
     @property
     def wanted(self) -> str:
-        """The values allowed, in words: `a whole number from 3 to 31 (px)`."""
+        """The allowed values in words: `a whole number from 3 to 31 (px)`."""
         words = _words(self.type)
         if self.choices is not None:
             words = "one of " + ", ".join(str(choice) for choice in self.choices)
@@ -76,14 +76,14 @@ def option(
     doc: str,
     unit: str | None = None,
 ) -> Any:
-    """Return a dataclass field that knows its bounds, its choices, its unit and what it means.
+    """Return a dataclass field with bounds, choices, unit and documentation.
 
     Parameters
     ----------
     default
-        Value when a recipe says nothing.
+        Value if neither recipe nor user sets it.
     low, high
-        Smallest and largest allowed number, both included; for a tuple they hold for every item.
+        Smallest and largest allowed number, both included; for a tuple, of every item.
     choices
         The only values allowed.
     doc
@@ -99,7 +99,7 @@ def option(
 
 
 def describe(kind: type[Any]) -> tuple[OptionInfo, ...]:
-    """Return what is known about every option of the dataclass `kind`, in order of declaration."""
+    """Return the options of the dataclass `kind`, in order of declaration."""
     hints = typing.get_type_hints(kind)
     infos = []
     for field in dataclasses.fields(kind):
@@ -131,14 +131,14 @@ def make_options(kind: type[_T], values: Mapping[str, object], where: str) -> _T
     kind
         A plugin's `Options` class.
     values
-        Option values by name, as TOML gives them or as texts from the command line.
+        Option values by name, from TOML or as text from the command line.
     where
-        What the values belong to, which error messages start with: `gabor`.
+        Prefix of error messages: `gabor`.
 
     Raises
     ------
     OptionError
-        An option is unknown, of the wrong type, out of bounds or none of the choices.
+        An option is unknown, has the wrong type, is out of bounds or not among the choices.
     """
     infos = {info.name: info for info in describe(kind)}
     checked = {}
@@ -197,7 +197,7 @@ def _in_bounds(number: float, info: OptionInfo) -> bool:
 
 
 def _convert(kind: Any, value: Any) -> Any:
-    """Bring a TOML value or a text to `kind`; `ValueError` when it says anything else."""
+    """Convert a TOML value or a text to `kind`; raises `ValueError` if it cannot be."""
     if typing.get_origin(kind) is tuple:
         return _convert_tuple(typing.get_args(kind), value)
     if isinstance(value, kind) and not (kind is int and isinstance(value, bool)):
@@ -216,7 +216,7 @@ def _convert(kind: Any, value: Any) -> Any:
 def _convert_tuple(kinds: tuple[Any, ...], value: Any) -> tuple[Any, ...]:
     items = value.strip("()[] ").split(",") if isinstance(value, str) else value
     if not isinstance(items, (list, tuple)):
-        raise ValueError(f"{value!r} is no list")
+        raise ValueError(f"{value!r} is not a list")
     items = [item for item in items if item != ""]
     if len(kinds) == 2 and kinds[1] is Ellipsis:
         kinds = (kinds[0],) * len(items)

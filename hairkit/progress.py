@@ -1,4 +1,4 @@
-"""How the pipeline tells that it moves on: a small protocol, in bars, in lines or not at all."""
+"""Progress reporting: a protocol with rich, plain-text and silent implementations."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from typing import Any, Protocol, Self, TextIO
 
 
 class Progress(Protocol):
-    """What the pipeline calls; stages of several steps may overlap, calls come from any thread."""
+    """Receives progress; stages may overlap, and calls may come from any thread."""
 
     def started(self, stage: str, steps: int) -> None:
-        """Tell that a stage of so many steps has begun."""
+        """Report that a stage with this number of steps has started."""
 
     def stepped(self, stage: str) -> None:
-        """Tell that one step of a stage is done."""
+        """Report that one step of a stage is done."""
 
     def finished(self, stage: str, seconds: float, reused: bool) -> None:
-        """Tell that a stage has ended; `reused` when its result was kept from an earlier run."""
+        """Report that a stage has ended; `reused` if its result came from an earlier run."""
 
     def message(self, text: str) -> None:
-        """Tell the user one line."""
+        """Show one line to the user."""
 
 
 class Silent:
-    """Tells nothing."""
+    """Reports nothing."""
 
     def started(self, stage: str, steps: int) -> None:
-        """Tell nothing."""
+        """Do nothing."""
 
     def stepped(self, stage: str) -> None:
-        """Tell nothing."""
+        """Do nothing."""
 
     def finished(self, stage: str, seconds: float, reused: bool) -> None:
-        """Tell nothing."""
+        """Do nothing."""
 
     def message(self, text: str) -> None:
-        """Tell nothing."""
+        """Do nothing."""
 
     def __enter__(self) -> Self:
         return self
@@ -46,7 +46,7 @@ class Silent:
 
 
 class Lines(Silent):
-    """Writes one line a finished stage, for logs and pipes."""
+    """Writes one line for each finished stage, for logs and pipes."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         """Write to `stream`, stderr by default."""
@@ -62,7 +62,7 @@ class Lines(Silent):
 
 
 class Bars:
-    """Draws a bar a stage on a terminal; used as a context manager."""
+    """Draws one bar per stage on a terminal; used as a context manager."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         """Draw on `stream`, stderr by default."""
@@ -96,11 +96,11 @@ class Bars:
         self._tasks[stage] = self._rich.add_task(stage, total=steps, note="")
 
     def stepped(self, stage: str) -> None:
-        """Move the stage's bar on."""
+        """Advance the stage's bar."""
         self._rich.advance(self._tasks[stage])
 
     def finished(self, stage: str, seconds: float, reused: bool) -> None:
-        """Fill the stage's bar and write the time beside it."""
+        """Fill the stage's bar and show the time beside it."""
         task = self._tasks[stage]
         steps = next(t.total for t in self._rich.tasks if t.id == task)
         self._rich.update(task, completed=steps, note="kept" if reused else f"{seconds:.2f} s")
@@ -118,27 +118,27 @@ def progress_for(stream: TextIO, *, quiet: bool) -> Silent | Lines | Bars:
 
 
 class Recorder:
-    """Passes everything on and keeps the times of the stages."""
+    """Forwards progress and records the duration of each stage."""
 
     def __init__(self, progress: Progress) -> None:
-        """Pass everything on to `progress`."""
+        """Forward to `progress`."""
         self._progress = progress
         self.stages: list[dict[str, object]] = []
-        """What has ended: `stage`, `seconds` and whether it was `reused`."""
+        """Finished stages: name (`stage`), `seconds` and whether the result was `reused`."""
 
     def started(self, stage: str, steps: int) -> None:
-        """Pass on that a stage has begun."""
+        """Forward the start of a stage."""
         self._progress.started(stage, steps)
 
     def stepped(self, stage: str) -> None:
-        """Pass on that a step is done."""
+        """Forward one step."""
         self._progress.stepped(stage)
 
     def finished(self, stage: str, seconds: float, reused: bool) -> None:
-        """Keep and pass on that a stage has ended."""
+        """Record and forward the end of a stage."""
         self.stages.append({"stage": stage, "seconds": round(seconds, 4), "reused": reused})
         self._progress.finished(stage, seconds, reused)
 
     def message(self, text: str) -> None:
-        """Pass one line on."""
+        """Forward one line."""
         self._progress.message(text)

@@ -51,10 +51,10 @@ VERBS = {
     "export": "write a groom in an engine's format",
     "convert": "read hair of one format, write another",
     "simulate": "simulate a groom, its head shaken and in wind",
-    "info": "say what a file holds",
-    "plugins": "list the plugins, or tell about one",
+    "info": "print what a file contains",
+    "plugins": "list the plugins, or describe one",
     "new-plugin": "start a plugin of your own",
-    "doctor": "check this machine and say what to install",
+    "doctor": "check this machine and print what to install",
 }
 
 _EXAMPLE = "Example: hairkit reconstruct photos/ -o out/"
@@ -108,10 +108,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def explain(error: BaseException) -> tuple[str, int]:
-    """Return the one line that tells a user about an error, and the exit code."""
+    """Return one line that explains an error to a user, and the exit code."""
     if _interrupted(error):
         said = str(error) if isinstance(error, KeyboardInterrupt) else ""
-        return f"interrupted; {said or 'run it again to go on where it stopped'}", 2
+        return f"interrupted; {said or 'run it again to continue where it stopped'}", 2
     if isinstance(error, HairkitError):
         return _one_line(error), 2
     if isinstance(error, MemoryError):
@@ -196,7 +196,7 @@ def _log_to_stderr(level: int) -> None:
 
 
 def _interrupted(error: BaseException | None) -> bool:
-    """Say whether Ctrl-C is behind an error: a library may make an ImportError of it."""
+    """Return whether Ctrl-C caused an error: a library may turn it into an ImportError."""
     if error is None or isinstance(error, KeyboardInterrupt):
         return error is not None
     return _interrupted(error.__cause__ or error.__context__)

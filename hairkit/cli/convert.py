@@ -22,8 +22,8 @@ from hairkit.types.groom import Groom
 _DESCRIPTION = """\
 Example: hairkit convert a.tfx b.abc --scale 0.0023 --up y
 
-Read a file of one format and write it in another; the names' endings say which. What the file lacks
-(head, widths, root uv) is made by stated defaults, and said. `hairkit plugins --formats` says what
+Read a file of one format and write it in another; suffixes choose the formats. What the input lacks
+(head, widths, root uv) gets default values, with a message. `hairkit plugins --formats` lists what
 each format carries."""
 
 UP = {"y": "y_up_metres", "z": "z_up_metres"}
@@ -53,17 +53,17 @@ def register(subparsers: Any) -> None:
         action="store_true",
         help="measure the strands' waves or coils for the material (HairWorks draws them)",
     )
-    add("--to", metavar="PLUGIN", help="export plugin; by default the one of the ending")
+    add("--to", metavar="PLUGIN", help="export plugin (default: by suffix)")
     add_setting(add)
 
 
 def add_reader_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what may be said about a file that is read."""
+    """Add options about the file to read."""
     add = parser.add_argument
-    add("--scale", metavar="M", help="metres in one unit of the file that is read")
-    add("--up", choices=tuple(UP), help="axis that points up in the file that is read")
+    add("--scale", metavar="M", help="metres per unit of the input file")
+    add("--up", choices=tuple(UP), help="up axis of the input file")
     add("--head", metavar="FILE", help="head to put under the strands")
-    add("--from", dest="reader", metavar="PLUGIN", help="import plugin; else that of the ending")
+    add("--from", dest="reader", metavar="PLUGIN", help="import plugin (default: by suffix)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
 
 
@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     options = manager.options(writer, settings["writer"])
     check_target(target)
     if target.exists() and target.samefile(source):
-        raise InputError(f"{target}: is the file that is read; name another to write")
+        raise InputError(f"{target}: is the input file; choose another output")
     groom = load_groom(manager, source, reading, reader)
     if args.guides is not None:
         groom = simplified(groom, args.guides)
@@ -103,7 +103,7 @@ def _with_curl(groom: Groom) -> Groom:
 
 
 def reader_settings(manager: Manager, reader: str, args: argparse.Namespace) -> dict[str, object]:
-    """Return the reader's options that --scale, --up and --head stand for."""
+    """Return the reader's options for --scale, --up and --head."""
     known = {option.name for option in manager.info(reader).options}
     wanted = {
         "scale": ("--scale", args.scale),
@@ -114,7 +114,7 @@ def reader_settings(manager: Manager, reader: str, args: argparse.Namespace) -> 
     missing = [word for name, word in given.items() if name not in known]
     if missing:
         raise OptionError(
-            f"{missing[0]}: files of plugin {reader!r} say that themselves; leave it out"
+            f"{missing[0]}: files of plugin {reader!r} define it themselves; leave it out"
         )
     return {name: wanted[name][1] for name in given}
 

@@ -1,4 +1,4 @@
-"""`hairkit doctor`: say what works on this machine and what to install for the rest."""
+"""`hairkit doctor`: check what works on this machine and print how to fix the rest."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _DESCRIPTION = """\
 Example: hairkit doctor
 
 Check Python, the packages, OpenGL, caches and plugins, and say what to install. The exit code is
-0 when hairkit's core works; what is only optional gets a note."""
+0 if hairkit's core works; problems with optional parts are notes."""
 
 _MODULES = {"opencv-contrib-python-headless": "cv2"}
 """Distributions whose module has another name."""
@@ -44,7 +44,7 @@ with renderer() as found:
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at."""
+    """The result of one check."""
 
     topic: str
     verdict: Literal["ok", "note", "FAIL"]
@@ -54,11 +54,11 @@ class Finding:
 def register(subparsers: Any) -> None:
     """Add the verb to the command line."""
     parser = subparsers.add_parser("doctor", help="check this machine", description=_DESCRIPTION)
-    parser.add_argument("--json", action="store_true", help="print for machines")
+    parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what was found; 2 when something that hairkit cannot do without is broken."""
+    """Print the findings; return 2 if something that hairkit needs is broken."""
     findings = list(examine())
     if args.json:
         print(json.dumps([asdict(finding) for finding in findings], indent=1))
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def examine() -> Iterator[Finding]:
-    """Look at everything, one finding after the other."""
+    """Run all checks, one finding each."""
     system = f"{platform.python_version()} at {sys.executable} on {platform.platform()}"
     yield Finding("python", "ok" if sys.version_info >= (3, 11) else "FAIL", system)
     yield Finding("hairkit", "ok", f"{__version__} at {Path(__file__).parents[1]}")
@@ -104,7 +104,7 @@ def _package(name: str) -> Finding:
 
 
 def _opencv_wheels(installed: list[str]) -> Finding:
-    """Look for several wheels that share the folder cv2: the last one installed broke the first."""
+    """Check for several OpenCV wheels: they overwrite each other in the folder cv2."""
     wheels = sorted({name.lower() for name in installed if name.lower().startswith("opencv-")})
     if len(wheels) > 1:
         cure = f"pip uninstall -y {' '.join(wheels)} && pip install opencv-contrib-python-headless"
@@ -157,7 +157,7 @@ def _installed(name: str) -> bool:
 
 
 def _kernel_cache() -> Finding:
-    """Look whether Numba can keep what it compiles: beside the sources or in its own folder."""
+    """Check whether Numba can cache compiled kernels: beside the sources or in its own folder."""
     named = os.environ.get("NUMBA_CACHE_DIR")
     beside = Path(__file__).parents[1]
     folders = [Path(named)] if named else [beside, Path.home() / ".cache"]
@@ -165,10 +165,10 @@ def _kernel_cache() -> Finding:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
-                return Finding("compiled kernels", "ok", f"can be kept under {folder}")
+                return Finding("compiled kernels", "ok", f"cached under {folder}")
         except OSError:
             continue
-    cure = "so Numba refuses to compile; set NUMBA_CACHE_DIR to a folder that can be written"
+    cure = "so Numba refuses to compile; set NUMBA_CACHE_DIR to a writable folder"
     return Finding("compiled kernels", "FAIL", f"{folders[0]} cannot be written, {cure}")
 
 

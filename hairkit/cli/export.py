@@ -14,8 +14,8 @@ from hairkit.pipeline.open_groom import load_groom, plugin_for
 _DESCRIPTION = """\
 Example: hairkit export out/groom.npz -o hair.apx
 
-Write a groom in the format that the file's ending names. `hairkit plugins --formats` says what each
-format carries; `hairkit convert` has more to say about the file that is read."""
+Write a groom in the format of the file's suffix. `hairkit plugins --formats` lists what each format
+carries; `hairkit convert` has more options for the input file."""
 
 
 def register(subparsers: Any) -> None:
@@ -27,7 +27,7 @@ def register(subparsers: Any) -> None:
     add("groom", metavar="GROOM", help="groom.npz, or a file that an import plugin reads")
     add("-o", "--out", required=True, metavar="FILE", help="file to write")
     add_setting(add)
-    add("--using", metavar="NAME", help="export plugin; by default the one of the file's ending")
+    add("--using", metavar="NAME", help="export plugin (default: by suffix)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
 
 
@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def check_target(path: Path) -> None:
-    """Raise `InputError` when a file cannot be put there, before any work is done."""
+    """Raise `InputError` if a file cannot be written there, before any work is done."""
     if not path.parent.is_dir():
         raise InputError(f"{path.parent}: no such folder; make it first")
     if path.is_dir():

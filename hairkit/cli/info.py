@@ -1,4 +1,4 @@
-"""`hairkit info FILE`: say what a groom, a capture, a scene or a head file holds."""
+"""`hairkit info FILE`: print what a groom, capture, scene, simulation or head contains."""
 
 from __future__ import annotations
 
@@ -21,27 +21,29 @@ from hairkit.types.point_cache import PointCache, is_cache_file
 _DESCRIPTION = """\
 Example: hairkit info out/groom.npz
 
-Say what a file holds: a groom (.npz or what an import plugin reads; --scale, --up and --set say
-what bare strands leave open), a simulation (.npz), a scene.json, a head (.obj, .ply, .glb), or a
-capture's folder. Lengths are in metres."""
+Print what a file contains: a groom (.npz or what an import plugin reads; --scale, --up and --set
+give what bare strands do not define), a simulation (.npz), a scene.json, a head (.obj, .ply, .glb),
+or a capture's folder. Lengths are in metres."""
 
 _HEADS = (".obj", ".ply", ".glb")
 
 
 def register(subparsers: Any) -> None:
     """Add the verb to the command line."""
-    parser = subparsers.add_parser("info", help="say what a file holds", description=_DESCRIPTION)
+    parser = subparsers.add_parser(
+        "info", help="print what a file contains", description=_DESCRIPTION
+    )
     parser.add_argument("file", metavar="FILE", help="a file, or the folder of a capture")
     parser.add_argument(
         "--head-units", default="m", metavar="U", help="units of a head file (default m)"
     )
     add_reader_arguments(parser)
     add_setting(parser.add_argument)
-    parser.add_argument("--json", action="store_true", help="print for machines")
+    parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print what the file holds."""
+    """Print what the file contains."""
     facts = _facts(Path(args.file), args)
     print(json.dumps(facts, indent=1) if args.json else "\n".join(_lines(facts)))
     return 0

@@ -29,7 +29,7 @@ def register(subparsers: Any) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the package and say what to do with it."""
+    """Write the package and print how to install and test it."""
     folder = new_plugin(args.stage, args.name, args.output)
     print(f"wrote {folder}")
     print(f"install it: pip install -e {folder}")

@@ -1,4 +1,4 @@
-"""`hairkit plugins [NAME]`: list the plugins by stage, or tell about one and its options."""
+"""`hairkit plugins [NAME]`: list the plugins by stage, or describe one and its options."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from hairkit.options import OptionInfo
 _DESCRIPTION = """\
 Example: hairkit plugins gabor
 
-List the installed plugins by stage, or tell about one: where it comes from, what it does, and
-its options with their defaults and bounds. --formats prints what each file format carries, as a
+List the installed plugins by stage, or describe one: its distribution, what it does, and its
+options with their defaults and bounds. --formats prints what each file format carries, as a
 Markdown table."""
 
 
@@ -26,7 +26,7 @@ def register(subparsers: Any) -> None:
         "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
     )
     parser.add_argument("--formats", action="store_true", help="print the table of file formats")
-    parser.add_argument("--json", action="store_true", help="print for machines")
+    parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -18,8 +18,8 @@ Example: hairkit reconstruct photos/ -o out/
 Turn eight photos into a groom. PHOTOS is a folder with the photos of the turn: front, then every
 45 degrees towards the subject's left; or a folder with photos/ and, where present, masks/, strokes/
 and landmarks.json, matched by name, and a capture.toml. OUT gets groom.npz, scene.json, the
-recipe's exports, contact_sheet.png and hairkit.log. Run it again after an interruption: it goes on
-where it stopped.
+recipe's exports, contact_sheet.png and hairkit.log. After an interruption, run it again: it
+continues where it stopped.
 """
 
 
@@ -32,7 +32,7 @@ def register(subparsers: Any) -> None:
     )
     add = parser.add_argument
     add("photos", nargs="?", metavar="PHOTOS", help="folder of the capture")
-    add("-o", "--out", required=True, metavar="OUT", help="folder for what is made")
+    add("-o", "--out", required=True, metavar="OUT", help="output folder")
     add("--sample", action="store_true", help="use the capture that ships with hairkit")
     recipes = f"{', '.join(recipe_names())} or a .toml file"
     add("--recipe", default="default", metavar="R", help=recipes)
@@ -47,12 +47,12 @@ def register(subparsers: Any) -> None:
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--no-cache", action="store_true", help="run every stage again")
     add("--no-sheet", action="store_true", help="draw no contact sheet")
-    add("--quiet", action="store_true", help="say nothing on stderr but errors")
-    add("--json", action="store_true", help="print what was made for machines")
+    add("--quiet", action="store_true", help="print only errors on stderr")
+    add("--json", action="store_true", help="print a summary as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Reconstruct, and print what was made."""
+    """Reconstruct, and print a summary."""
     from hairkit.io.capture_reader import WORKING_EDGE, read_capture
     from hairkit.manager import Manager
     from hairkit.pipeline.recipe import load_recipe
@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         "stages": record.stages,
         "seconds": round(time.perf_counter() - began, 3),
     }
-    print(json.dumps(summary, indent=1) if args.json else _told(summary))
+    print(json.dumps(summary, indent=1) if args.json else _summary_text(summary))
     return 0
 
 
@@ -120,7 +120,7 @@ def _head(args: argparse.Namespace) -> Any:
     return read_head(args.head, units=args.head_units, scalp=args.head_scalp, up=args.head_up)
 
 
-def _told(summary: dict[str, Any]) -> str:
+def _summary_text(summary: dict[str, Any]) -> str:
     files = [summary["groom"], summary["scene"], *summary["exports"].values()]
     files += [summary["contact_sheet"]] if summary["contact_sheet"] else []
     return "\n".join(

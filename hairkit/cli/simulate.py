@@ -1,4 +1,4 @@
-"""`hairkit simulate GROOM -o cache.npz`: shake and blow the guides, without a window."""
+"""`hairkit simulate GROOM -o cache.npz`: simulate the guides without a window."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def register(subparsers: Any) -> None:
     add("--turbulence", type=float, default=0.0, metavar="T", help="gusts over the wind (0)")
     add("--gravity", type=float, metavar="G", help="m/s^2 downwards; the groom's by default")
     add_setting(add)
-    add("--preset", metavar="NAME", help="options kept by hairkit view beside the groom")
+    add("--preset", metavar="NAME", help="options saved by hairkit view beside the groom")
     add("--using", metavar="NAME", help=f"simulator plugin ({SIMULATOR}, or the preset's)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--quiet", action="store_true", help="no progress")
@@ -136,7 +136,7 @@ def _gravity(down: float | None) -> Float64Array | None:
 
 
 def _preset(args: argparse.Namespace) -> tuple[str, dict[str, object]]:
-    """Return the simulator, and the options that `hairkit view` has kept for it."""
+    """Return the simulator, and its options saved by `hairkit view`."""
     from hairkit.pipeline.open_groom import groom_path
     from hairkit.viewer.actions.presets import presets_path, read_preset
 

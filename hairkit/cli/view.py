@@ -29,15 +29,15 @@ def register(subparsers: Any) -> None:
     add("--capture", type=Path, metavar="FOLDER", help="the photos, to show them in space")
     add("--simulator", metavar="NAME", help="simulator plugin (pbd), or none")
     add_setting(add)
-    add("--preset", metavar="NAME", help="the simulator's options kept beside the groom")
+    add("--preset", metavar="NAME", help="simulator options saved beside the groom")
     add("--hairs", type=int, metavar="N", help="strands drawn (10000)")
     add("--size", metavar="WxH", help="pixels (1280x720)")
     add("--budget", type=float, metavar="MS", help="milliseconds a picture may take (50)")
     add("--headless", action="store_true", help="no window: run --script")
-    add("--script", type=Path, metavar="FILE", help="actions to do (TOML)")
+    add("--script", type=Path, metavar="FILE", help="actions to run (TOML)")
     add("--out", type=Path, metavar="FOLDER", help="where a script's pictures go (.)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
-    add("--actions", action=_ListActions, nargs=0, help="list what scripts can do, and leave")
+    add("--actions", action=_ListActions, nargs=0, help="list the actions of scripts, and exit")
 
 
 class _ListActions(argparse.Action):
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> None:
-    """Refuse what cannot be shown before a window opens for nothing."""
+    """Check the arguments before a window opens."""
     from hairkit.pipeline.open_groom import groom_path
 
     groom_path(args.groom)

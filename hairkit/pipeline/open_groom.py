@@ -1,4 +1,4 @@
-"""Opening what the user names as a groom: any file that a plugin reads, or a folder of results."""
+"""Open a groom from any file that a plugin reads, or from a folder of results."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def load_groom(
     Raises
     ------
     InputError
-        There is no such file, or nothing that reads it.
+        The file does not exist, or no plugin reads it.
     """
     path = groom_path(path)
     if is_cache_file(path):
@@ -46,8 +46,8 @@ def load_groom(
     name = plugin or plugin_for(manager, "import_groom", path)
     options = manager.options(name, settings or {})
     groom = manager.call("import_groom", name, options, path=path)
-    if not isinstance(groom, Groom):  # the manager has checked it; this tells the type
-        raise InputError(f"{path}: {name} made no groom of it")
+    if not isinstance(groom, Groom):  # the manager has checked it; this is for mypy
+        raise InputError(f"{path}: {name} returned no groom")
     return groom
 
 
@@ -63,7 +63,7 @@ def groom_path(path: Path) -> Path:
 
 
 def plugin_for(manager: Manager, stage: str, path: Path) -> str:
-    """Return the plugin of the longest ending that fits the file's name."""
+    """Return the plugin whose longest suffix matches the file's name."""
     fitting = [
         (len(suffix), name)
         for name in manager.names(stage)
@@ -72,5 +72,7 @@ def plugin_for(manager: Manager, stage: str, path: Path) -> str:
     ]
     if not fitting:
         known = sorted({s for name in manager.names(stage) for s in manager.info(name).suffixes})
-        raise InputError(f"{path}: no plugin for files of this name; known: {', '.join(known)}")
+        raise InputError(
+            f"{path}: no plugin reads or writes this suffix; known: {', '.join(known)}"
+        )
     return str(max(fitting)[1])

@@ -1,4 +1,4 @@
-"""What a run leaves for whoever asks how it went: versions, options and times."""
+"""The log file of a run: versions, options and times."""
 
 from __future__ import annotations
 
@@ -20,47 +20,47 @@ from hairkit.storage import write_text
 
 
 class RunLog:
-    """Passes progress on and keeps a record of it."""
+    """Forwards progress and records it for `hairkit.log`."""
 
     def __init__(self, progress: Progress) -> None:
-        """Pass everything on to `progress`."""
+        """Forward to `progress`."""
         self._progress = progress
         self._began = time.perf_counter()
         self._lines: list[str] = []
         self._guard = threading.Lock()
 
     def started(self, stage: str, steps: int) -> None:
-        """Pass on that a stage has begun."""
+        """Forward the start of a stage."""
         with self._guard:
             self._progress.started(stage, steps)
 
     def stepped(self, stage: str) -> None:
-        """Pass on that a step of a stage is done."""
+        """Forward one step of a stage."""
         with self._guard:
             self._progress.stepped(stage)
 
     def finished(self, stage: str, seconds: float, reused: bool) -> None:
-        """Record and pass on that a stage has ended."""
+        """Record and forward the end of a stage."""
         with self._guard:
             self._lines.append(f"{stage:<12} {seconds:8.3f} s{' (kept)' if reused else ''}")
             self._progress.finished(stage, seconds, reused)
 
     def message(self, text: str) -> None:
-        """Record and pass on one line."""
+        """Record and forward one line."""
         with self._guard:
             self._lines.append(text)
             self._progress.message(text)
 
     def noted(self, text: str) -> None:
-        """Record one line without telling it."""
+        """Record one line without showing it."""
         with self._guard:
             self._lines.append(text)
 
     def write(self, path: str | os.PathLike[str], recipe: Recipe, manager: Manager) -> None:
-        """Write the record."""
+        """Write the log file."""
         total = time.perf_counter() - self._began
         lines = [*_versions(), "", *_settings(recipe, manager), "", *self._lines]
-        write_text(path, "\n".join([*lines, f"{'in all':<12} {total:8.3f} s"]) + "\n")
+        write_text(path, "\n".join([*lines, f"{'total':<12} {total:8.3f} s"]) + "\n")
 
 
 def _versions() -> list[str]:
@@ -78,7 +78,7 @@ def _settings(recipe: Recipe, manager: Manager) -> list[str]:
         for choice in stage.choices:
             options = manager.options(choice.plugin, choice.options)
             values = dataclasses.asdict(options) if options is not None else {}
-            said = ", ".join(f"{name}={value}" for name, value in values.items())
+            shown = ", ".join(f"{name}={value}" for name, value in values.items())
             origin = manager.info(choice.plugin).origin
-            lines.append(f"{stage.table:<12} {choice.plugin} of {origin}: {said or 'no options'}")
+            lines.append(f"{stage.table:<12} {choice.plugin} of {origin}: {shown or 'no options'}")
     return lines

@@ -1,7 +1,7 @@
-"""The work folder: what every stage found, kept under a digest of all that it was made from.
+"""The work folder: the result of every stage, stored with a digest of its inputs.
 
-A stage file is `STAGE.npz` or `STAGE-VIEW.npz`. It is used again only when its digest is the one
-wanted, so a run that was interrupted goes on where it stopped, with the same result.
+A stage file is `STAGE.npz` or `STAGE-VIEW.npz`. It is reused only if its digest matches, so an
+interrupted run continues where it stopped, with the same result.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ import numpy as np
 from hairkit.errors import HairkitError, InputError
 from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
 
-_Found = TypeVar("_Found", bound=Stored)
+_Result = TypeVar("_Result", bound=Stored)
 _DIGEST = "work_digest"
 _LOCK_POLL_S = 0.2
 
 
 def digest_of(*values: Any) -> str:
-    """Return a hex digest of the values: equal content, equal digest, on every run.
+    """Return a hex digest of the values: equal content gives equal digests in every run.
 
     Takes numbers, strings, None, arrays, tuples and dataclasses of these; a path counts with the
     content of its file, not with its name.
@@ -71,16 +71,16 @@ class WorkFolder:
         reuse: bool = True,
         waiting: Callable[[], None] = lambda: None,
     ) -> None:
-        """Name the folder; it is made and locked on entering.
+        """Set the folder; it is created and locked on entering.
 
         Parameters
         ----------
         path
             The work folder.
         reuse
-            False ignores what an earlier run has left.
+            False ignores results of earlier runs.
         waiting
-            Called once when another run holds the folder and this one has to wait.
+            Called once if another run has locked the folder.
         """
         self.path = Path(path)
         self._reuse = reuse
@@ -96,7 +96,7 @@ class WorkFolder:
         except (FileExistsError, NotADirectoryError) as error:
             raise InputError(f"{self.path}: not a folder; choose another for the output") from error
         self._lock = _lock(self.path / ".lock", self._waiting)
-        for leftover in self.path.glob(".*.part"):  # of a run that was killed
+        for leftover in self.path.glob(".*.part"):  # left by a killed run
             leftover.unlink(missing_ok=True)
         return self
 
@@ -106,16 +106,16 @@ class WorkFolder:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._writer.shutdown(wait=True)  # what is done stays done, whatever ended the run
+        self._writer.shutdown(wait=True)  # finished results are kept, however the run ended
         if self._lock is not None:
             os.close(self._lock)
         if kind is None:
             self.flush()
 
-    def get(self, kind: type[_Found], digest: str, stage: str, view: str = "") -> _Found | None:
-        """Return what is kept under this digest, or None; a damaged file counts as none."""
+    def get(self, kind: type[_Result], digest: str, stage: str, view: str = "") -> _Result | None:
+        """Return the stored result with this digest; None if there is none or it is damaged."""
         path = self._file(stage, view)
-        if not self._reuse or _kept_digest(path) != digest:
+        if not self._reuse or _stored_digest(path) != digest:
             return None
         try:
             arrays = read_npz(path)
@@ -125,7 +125,7 @@ class WorkFolder:
             return None
 
     def put(self, value: Stored, digest: str, stage: str, view: str = "") -> None:
-        """Keep a stage's result; it is written in the background, `flush` waits for it."""
+        """Store a stage's result; it is written in the background, `flush` waits for it."""
         path = self._file(stage, view)
         with self._guard:
             self._writes.append(self._writer.submit(_write, path, value, digest))
@@ -147,8 +147,8 @@ def _write(path: Path, value: Stored, digest: str) -> None:
     write_npz(path, arrays, packed=False, durable=False)
 
 
-def _kept_digest(path: Path) -> str | None:
-    """Return the digest that a stage file was kept under, without reading the rest of it."""
+def _stored_digest(path: Path) -> str | None:
+    """Return the digest of a stage file without reading the rest of it."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             return str(data[_DIGEST])
@@ -157,22 +157,22 @@ def _kept_digest(path: Path) -> str | None:
 
 
 def _lock(path: Path, waiting: Callable[[], None]) -> int | None:
-    """Wait for the lock and return its open file; the system frees it when the process dies."""
+    """Wait for the lock and return its open file; the system releases it when the process ends."""
     try:
         import fcntl
-    except ImportError:  # no such locks on this system: the files are atomic all the same
+    except ImportError:  # no file locks on this system; files are still written atomically
         return None
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    told = False
+    reported = False
     try:
         while True:
             try:
                 fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 return handle
             except BlockingIOError:
-                if not told:
+                if not reported:
                     waiting()
-                told = True
+                reported = True
                 time.sleep(_LOCK_POLL_S)
     except BaseException:
         os.close(handle)

@@ -68,11 +68,11 @@ def test_options_go_to_reader_and_writer(folder: Path) -> None:
     ("words", "reason"),
     [
         (["none.data", "b.npz"], "none.data: no such file"),
-        (["bare.data", "b.xyz"], "no plugin for files of this name; known: "),
+        (["bare.data", "b.xyz"], "no plugin reads or writes this suffix; known: "),
         (["bare.xyz", "b.npz"], "no such file"),
         (["bare.data", "none/b.npz"], "no such folder"),
-        (["bare.data", "."], "no plugin for files of this name"),
-        (["bare.data", "bare.data", "--scale", "0.01"], "is the file that is read"),
+        (["bare.data", "."], "no plugin reads or writes this suffix"),
+        (["bare.data", "bare.data", "--scale", "0.01"], "is the input file"),
         (["bare.data", "b.npz"], "give metres per unit of the file: scale=0.0"),
         (["bare.data", "b.npz", "--scale", "-1"], "scale is '-1', expected a number"),
         (["bare.data", "b.npz", "--up", "x"], "invalid choice: 'x'"),
@@ -107,7 +107,7 @@ def test_a_link_to_the_source_is_the_source(
     (folder / "link.data").symlink_to(folder / "bare.data")
     before = (folder / "bare.data").read_bytes()
     assert main(["convert", "bare.data", "link.data", "--scale", "0.01"]) == 2
-    assert "is the file that is read" in capsys.readouterr().err
+    assert "is the input file" in capsys.readouterr().err
     assert (folder / "bare.data").read_bytes() == before
 
 

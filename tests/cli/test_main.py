@@ -36,7 +36,7 @@ def outcome(words: list[str]) -> int:
     ("error", "line", "code"),
     [
         (InputError("bad\nphoto"), "bad photo", 2),
-        (KeyboardInterrupt(), "interrupted; run it again to go on where it stopped", 2),
+        (KeyboardInterrupt(), "interrupted; run it again to continue where it stopped", 2),
         (KeyboardInterrupt("c.npz was not written"), "interrupted; c.npz was not written", 2),
         (
             OSError(errno.ENOSPC, "No space left on device", "out/groom.npz"),
