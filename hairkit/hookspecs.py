@@ -44,12 +44,12 @@ def segment(view: View, options: Any) -> Mask | None:
 def estimate_scene(
     capture: Capture, masks: tuple[Mask, ...], head: Head, options: Any
 ) -> Scene | None:
-    """Find the cameras of all views and the head's size and place; `head` is not fitted yet."""
+    """Estimate the cameras of all views and the head's size and pose; `head` is not fitted yet."""
 
 
 @hookspec(firstresult=True)
 def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: Any) -> Scene | None:
-    """Bend the scene's head to the photos, touch up the cameras; the topology stays as it is."""
+    """Fit the shape of the scene's head to the photos, refine the cameras; its mesh is kept."""
 
 
 @hookspec(firstresult=True)
@@ -59,7 +59,7 @@ def orient(view: View, mask: Mask, options: Any) -> OrientationMap | None:
 
 @hookspec(firstresult=True)
 def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Any) -> Hull | None:
-    """Carve the volume that hair fills out of the masks of all views."""
+    """Carve the volume that hair fills from the masks of all views."""
 
 
 @hookspec(firstresult=True)

@@ -141,7 +141,7 @@ def ball_mask(camera: Camera) -> Mask:
 
 
 def combed_orientation(mask: Mask) -> OrientationMap:
-    """Return upright strands, certain wherever hair is."""
+    """Return vertical strands, with confidence 1 on all hair."""
     upright = np.full(mask.labels.shape, np.pi / 2)
     return OrientationMap(wrap_angle(upright), mask.hair.astype(np.float32))
 

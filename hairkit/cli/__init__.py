@@ -2,7 +2,8 @@
 
 `register(subparsers)` adds the verb's parser, its description beginning with an example;
 `run(args)` does the work and returns the exit code. Only the verb that is asked for is imported.
-Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 2 one line says why.
+Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 2 one line says why,
+130 ended by a second Ctrl-C.
 
 * `convert`: read hair of one format, write another
 * `doctor`: check this machine

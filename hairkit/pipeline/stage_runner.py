@@ -1,4 +1,4 @@
-"""Runs the stages of a recipe, each once or once a view, and keeps what they give."""
+"""Runs the stages of a recipe, each once or once per view, and keeps their results."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ class Given(Generic[_Value]):
 
     @classmethod
     def of(cls, value: _Value) -> Self:
-        """Return a value that comes from outside, with the digest of its content."""
+        """Return an input of the run, with the digest of its content."""
         return cls(value, digest_of(value))
 
 
 Argument = Given[Any] | Sequence[Future[Given[Any]]]
-"""One value, or one a view that may still be in the making."""
+"""One value, or one per view that may still be computed."""
 
 
 class StageRunner:
-    """Calls the recipe's plugins; a result that is in the work folder already is not made again."""
+    """Calls the recipe's plugins; results that are valid in the work folder are read from there."""
 
     def __init__(
         self,
@@ -64,7 +64,7 @@ class StageRunner:
         self._pool = pool
 
     def has(self, table: str) -> bool:
-        """Tell whether the recipe has the stage."""
+        """Return whether the recipe has the stage."""
         return self._recipe.stage(table) is not None
 
     def once(self, table: str, kind: type[_Result], **arguments: Argument) -> Given[_Result]:
@@ -195,7 +195,7 @@ def _all_ready(arguments: dict[str, Argument]) -> dict[str, Given[Any]]:
 
 
 def _ready(argument: Argument) -> Given[Any]:
-    """Return the argument as one value, waiting for what is still in the making."""
+    """Return the argument as one value, after waiting for views that are not done."""
     if isinstance(argument, Given):
         return argument
     parts = [future.result() for future in argument]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import os
 from pathlib import Path
 from typing import Any
 
@@ -191,14 +190,14 @@ def test_a_full_disk_leaves_nothing_half_written(
 ) -> None:
     """Wherever the disk fills up, an error names a file, and the next run is whole."""
     run(tmp_path / "whole")
-    count, original = iter(range(1000)), os.fdopen
+    count, original = iter(range(1000)), Path.open
 
-    def nearly_full(handle: int, mode: str) -> Any:
-        file = original(handle, mode)
-        return file if next(count) < writes else FullFile(file)
+    def nearly_full(path: Path, mode: str = "r", *rest: Any, **words: Any) -> Any:
+        file = original(path, mode, *rest, **words)
+        return file if "w" not in mode or next(count) < writes else FullFile(file)
 
     with monkeypatch.context() as patch:
-        patch.setattr(os, "fdopen", nearly_full)
+        patch.setattr(Path, "open", nearly_full)
         with pytest.raises(OSError, match="No space left") as caught:
             run(tmp_path / "out")
     assert str(tmp_path / "out") in str(caught.value.filename)
