@@ -252,7 +252,7 @@ def loose() -> object:
     ],
 )
 def test_a_plugin_that_breaks_the_contract_is_refused(plugin: object, said: str) -> None:
-    """Misspelt hooks, unknown arguments, broken Options and empty plugins are refused, and not kept."""
+    """Misspelt hooks, unknown arguments, broken Options, empty plugins: refused and not kept."""
     manager = Manager()
     with pytest.raises(PluginError, match=said):
         manager.register(plugin, "x")
