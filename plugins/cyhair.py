@@ -146,7 +146,7 @@ def _counts(reader: ByteReader, header: Any) -> Int64Array:
 def _material(
     header: Any, strands: Strands, colours: Float32Array | None, space: FileSpace
 ) -> HairMaterial:
-    """Return the look; the header's thickness of 1 and white colour mean that nobody set them."""
+    """Return the look; the header's thickness of 1 and white colour mean that they were not set."""
     width = float(header["thickness"]) * space.metres
     if not 0 < width <= _WIDEST:
         known = strands.widths[strands.widths > 0] if strands.widths is not None else ()

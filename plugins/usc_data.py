@@ -93,7 +93,7 @@ def _is_count(counts: Int64Array, width: int) -> BoolArray:
 def _counts(words: npt.NDArray[np.int32], width: int, reader: ByteReader) -> Int64Array:
     """Return the points (S,) of each strand.
 
-    Each count says where the next one stands, so this is a walk, if not all strands are equal.
+    Each count gives the position of the next one, so unequal strands are read one after the other.
     """
     strands = int(words[0])
     if not 0 < strands < len(words):

@@ -1,6 +1,6 @@
-"""A groom from bare strands, as files without head or roots hold them.
+"""Make a groom of bare strands, from files without a head or roots.
 
-What lacks is made by stated defaults, and said in warnings. Importers inherit `ImportOptions` and
+Missing parts get stated defaults, each with a warning. Importers inherit `ImportOptions` and
 return what `adopt` makes of the strands they read.
 """
 

@@ -1,4 +1,4 @@
-"""Guides from full hair: strands are clustered by root and shape, one strand of each is a guide.
+"""Choose guides from full hair: cluster strands by root and shape, one guide per cluster.
 
 Clusters are those of k-means (Lloyd 1982; seeds spread out after Arthur & Vassilvitskii 2007) over
 the root and the points relative to it; the guide is the strand nearest to its cluster's mean, so
@@ -30,7 +30,7 @@ class Clusters:
     """Strands that belong together."""
 
     guides: Int64Array
-    """(K,) the strand of each cluster that stands for it, ascending."""
+    """(K,) the strand that represents each cluster, ascending."""
     cluster: Int64Array
     """(S,) the cluster of every strand."""
 

@@ -1,8 +1,8 @@
-"""Full hair from guides: every new strand is mixed from the guides around its root.
+"""Interpolate full hair from guides: each new strand blends the guides around its root.
 
-Shapes are mixed relative to the root at equal share of the arc length, only among guides that agree
-with the nearest one, so that hair does not fill a parting. What is finer than the guides' overall
-course (waves, frizz) is taken from the nearest guide alone: the mean of waves out of phase is none.
+Shapes are blended relative to the root at equal arc-length fractions, only among guides that agree
+with the nearest one, so that partings stay clear. Detail finer than the guides' overall shape
+(waves, frizz) is copied from the nearest guide, because waves out of phase average to nothing.
 """
 
 from __future__ import annotations

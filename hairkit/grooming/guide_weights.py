@@ -1,4 +1,4 @@
-"""Hair that follows guides: which guides each hair is nearest to, and how it moves with them."""
+"""Attach hair to guides: the nearest guides of each strand, and motion interpolated from them."""
 
 from __future__ import annotations
 

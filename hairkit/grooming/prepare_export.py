@@ -63,9 +63,9 @@ class PreparedGroom:
 
 
 def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
-    """Return the chosen strands, complete; strands without length are dropped, and counted aloud.
+    """Return the chosen strands, complete; strands without length are dropped with a warning.
 
-    Options that also inherit `AnimationOptions` bring the cache along.
+    The cache comes from options that also inherit `AnimationOptions`.
 
     Raises
     ------

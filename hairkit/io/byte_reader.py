@@ -1,4 +1,4 @@
-"""Binary files read with every size checked before memory is asked for."""
+"""Parse binary files, with every size checked before memory is allocated."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hairkit.errors import FormatError
 
 
 class ByteReader:
-    """A place in a file's bytes that moves on as numbers are read."""
+    """A cursor over a file's bytes."""
 
     def __init__(self, data: bytes, source: str | os.PathLike[str], at: int = 0) -> None:
         self.data, self.source, self.at = data, source, at

@@ -1,4 +1,4 @@
-"""Arrays as the bytes of binary files."""
+"""Convert arrays to the bytes of binary files."""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ def _listed(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> li
     for thing in ([place.photo.name for place in places], [place.name for place in places]):
         twice = next((item for item in thing if thing.count(item) > 1), None)
         if twice is not None:
-            raise InputError(f"{settings.source}: {twice!r} stands for two views")
+            raise InputError(f"{settings.source}: {twice!r} is named for two views")
     return places
 
 

@@ -1,4 +1,4 @@
-"""`capture.toml`: what photos alone do not tell. Every entry may be left out.
+"""`capture.toml`: camera and head settings of a capture. Every entry is optional.
 
 orthographic = false             # true: no perspective
 focal_mm_equivalent = 47.8       # 35 mm equivalent, by the diagonal; or focal_px, of the photo

@@ -1,4 +1,4 @@
-"""Axes and unit of length of a file: the only place where hair leaves the head frame.
+"""Axes and unit of length of files: every conversion from and to the head frame.
 
 The head frame is right-handed, +X the subject's left, +Y up, +Z out of the face, in metres.
 """
@@ -35,7 +35,7 @@ SPACES = {
 
 @dataclass(frozen=True)
 class FileSpace:
-    """How a file's coordinates stand to the head frame."""
+    """Transform between a file's coordinates and the head frame."""
 
     axes: str = "y_up"
     """`y_up`, `z_up` (both right-handed) or `unreal` (left-handed, Z up)."""
@@ -81,7 +81,7 @@ def _turned(vectors: npt.ArrayLike, turn: Float64Array, factor: float) -> Float3
     with np.errstate(over="ignore"):  # readers refuse what is not finite, in their own words
         source = np.asarray(vectors, np.float32)
         if np.array_equal(turn, np.eye(3)):
-            # nobody can write to what is read-only, so it may be shared
+            # a read-only array may be shared
             alike = factor == 1.0 and not source.flags.writeable
             return source if alike else source * np.float32(factor)
         result = np.empty_like(source)

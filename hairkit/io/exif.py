@@ -1,6 +1,6 @@
-"""The few EXIF facts that reconstruction needs, read so that no file can do harm.
+"""Read the EXIF tags that reconstruction needs: orientation, focal length, sensor size.
 
-EXIF is a TIFF directory (CIPA DC-008); everything that does not make sense is ignored.
+EXIF is a TIFF directory (CIPA DC-008); invalid entries are ignored.
 """
 
 from __future__ import annotations

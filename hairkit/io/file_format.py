@@ -1,4 +1,4 @@
-"""What a file format carries, as its plugin declares it: the format matrix is made from this."""
+"""Declarations of what file formats support; the format matrix is generated from them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 
 class Feature(StrEnum):
-    """What a groom holds, as far as files may carry it; the value is the matrix's heading."""
+    """A part of a groom that a format may support; the value is its heading in the matrix."""
 
     POINTS = "points"
     COUNTS = "points differ per strand"
@@ -31,8 +31,8 @@ class Feature(StrEnum):
 class FileFormat:
     """One format: the plugin module's `FORMAT`.
 
-    Every feature stands in at most one of `exact`, `partial` and `written`; what stands in none is
-    lost. Tests write a groom with everything and hold each format to its declaration.
+    Every feature is in at most one of `exact`, `partial` and `written`, or it is lost.
+    Tests export a groom with all features and compare the result with the declaration.
     """
 
     title: str

@@ -1,4 +1,4 @@
-"""Numbers in text files, read and written without a Python step for each."""
+"""Read and write numbers in text files with array operations instead of Python loops."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ _STEPS = np.clip(_BINARY - _LOWEST, 0, _HIGHEST - _LOWEST).astype(np.int64)
 
 
 def read_numbers(text: str, source: str | os.PathLike[str], name: str) -> Float64Array:
-    """Return all numbers (N,) of a text, parted by white space.
+    """Return all numbers (N,) of a text, separated by white space.
 
-    Raises `FormatError` naming the source when something else stands between them, or a number is
+    Raises `FormatError` naming the source when there is anything else between them, or a number is
     not finite.
 
     >>> read_numbers("1 2e1", "a.txt", "points")

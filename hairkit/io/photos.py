@@ -1,4 +1,4 @@
-"""Photos read safely: the header is checked before anything is decoded, EXIF is obeyed.
+"""Read photos: check the header before decoding, apply the EXIF orientation.
 
 Sizes and focal lengths are those of the upright picture, after EXIF rotation.
 """

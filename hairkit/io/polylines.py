@@ -1,4 +1,4 @@
-"""Strands out of loose edges, as mesh formats keep them."""
+"""Assemble strands from the unordered edges of mesh formats."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _next_half_edge(edges: Int64Array, vertices: int) -> Int64Array:
 def _ends(after: Int64Array) -> tuple[Int64Array, Int64Array]:
     """Return (2E,) the half-edge at the end of each one's way, and the steps there.
 
-    The way is doubled log2 of all times, after which only what is closed has not arrived.
+    Pointer doubling: after log2(E) rounds only closed loops have not reached an end.
     """
     is_end = after == np.arange(len(after))
     steps = (~is_end).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Large grooms block by block: what is written of many points never stands in memory at once.
+"""Write large grooms in blocks, so that the output is never in memory as a whole.
 
 A block is small enough for the processor's cache, so that converting it costs little more than
 writing it.
@@ -18,8 +18,8 @@ from hairkit.types.groom import HairMaterial
 from hairkit.types.strands import Strands
 
 _POINTS = 32_000
-"""Points of a block, unless one strand alone has more. No power of two: rows so far apart share
-their places in the processor's cache, and turning rows to columns is then six times as slow."""
+"""Points of a block, unless one strand has more. Not a power of two: rows at such a distance share
+cache lines, and transposing them is then six times as slow."""
 _ROW = 1024
 
 
@@ -43,9 +43,9 @@ def blocks(strands: Strands) -> Iterator[Block]:
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Values that depend on nothing but a point's place in its strand: a row for each place.
+    """Values that depend only on a point's index in its strand and the strand's number of points.
 
-    Strands of equal counts share their rows, so that dear functions are worked out on few.
+    Strands of equal counts share their rows, so that expensive functions run once per count.
     """
 
     rows: npt.NDArray[Any]

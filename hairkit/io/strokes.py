@@ -141,7 +141,7 @@ def _shape(entry: Any, where: str) -> tuple[Any, str, Float64Array]:
 
 
 def _outline(kind: str, points: Float64Array) -> Float64Array:
-    """Return a rectangle or circle as the polygon it stands for, anything else as it is."""
+    """Return a rectangle or circle as a polygon, any other shape unchanged."""
     if kind == "rectangle":
         (left, top), (right, bottom) = points.min(axis=0), points.max(axis=0)
         return np.array([[left, top], [right, top], [right, bottom], [left, bottom]])

@@ -42,7 +42,7 @@ class GroomCurves:
     group: Int32Array
     """(S,)."""
     guide: BoolArray | None
-    """(S,) or None where guides and hair are not told apart."""
+    """(S,) or None where guides and hair are not distinguished."""
     closest: GuideWeights | None
     """Guides of each curve; None where there are none to follow."""
     attributes: bool

@@ -35,7 +35,7 @@ class Baked:
 
 
 def bake(cache: PointCache, rest: Float32Array, step: int, morphs: int, deform: bool) -> Baked:
-    """Return the motion in at most `morphs` shapes; what that loses is said aloud.
+    """Return the motion in at most `morphs` shapes; a warning states the error.
 
     Parameters
     ----------

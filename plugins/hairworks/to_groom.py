@@ -70,11 +70,11 @@ def _root_uv(asset: ApxAsset) -> Float64Array:
 
 
 def _binding(faces: Int64Array, guides: int) -> tuple[Int32Array, Float32Array]:
-    """Return the first face (G,) at whose corner each guide stands, and its weights (G, 3)."""
+    """Return the first face (G,) at whose corner each guide is rooted, and its weights (G, 3)."""
     corner, first = np.unique(faces.reshape(-1), return_index=True)
     if len(corner) != guides:
         idle = np.setdiff1d(np.arange(guides), corner)
-        raise FormatError(f"guide {idle[0]} stands on no face of the growth mesh")
+        raise FormatError(f"guide {idle[0]} is rooted on no face of the growth mesh")
     return (first // 3).astype(np.int32), np.eye(3, dtype=np.float32)[first % 3]
 
 

@@ -79,14 +79,14 @@ def _space(found: Contents, options: ReadOptions, path: Path) -> FileSpace:
     return FileSpace(axes, metres)
 
 
-def _curves(found: Contents, told: dict[str, Any], space: FileSpace, path: Path) -> _Curves:
-    where, name = f"{path}: {told['path']}", told["name"]
+def _curves(found: Contents, description: dict[str, Any], space: FileSpace, path: Path) -> _Curves:
+    where, name = f"{path}: {description['path']}", description["name"]
     counts = found.arrays.get(name + "curveVertexCounts", np.zeros(0)).astype(np.int64)
     points = found.arrays.get(name + "points", np.zeros((0, 3), np.float32))
     if (counts < 0).any() or counts.sum() != len(points):
         raise FormatError(f"{where} has {len(points)} points, its curves {counts.sum()}")
-    _say_what_changes(told, where)
-    matrix = np.array(told["to_stage"], np.float64)
+    _say_what_changes(description, where)
+    matrix = np.array(description["to_stage"], np.float64)
     if not (np.isfinite(points).all() and np.isfinite(matrix).all()):
         raise FormatError(f"{where} has points or transforms that are not finite numbers")
     if not np.array_equal(matrix, np.eye(4)):
@@ -94,7 +94,7 @@ def _curves(found: Contents, told: dict[str, Any], space: FileSpace, path: Path)
     placed = space.points_to_head(points)
     if not np.isfinite(placed).all():
         raise FormatError(f"{where} has points too far away")
-    values = _Values(found, told, counts, where)
+    values = _Values(found, description, counts, where)
     growth = float(np.cbrt(abs(np.linalg.det(matrix[:3, :3])))) * space.metres
     widths = values.of_points("widths")
     colour = values.of_points("groom_color", 3)
@@ -115,22 +115,24 @@ def _curves(found: Contents, told: dict[str, Any], space: FileSpace, path: Path)
     )
 
 
-def _say_what_changes(told: dict[str, Any], where: str) -> None:
-    if told["shape"] != "linear":
+def _say_what_changes(description: dict[str, Any], where: str) -> None:
+    if description["shape"] != "linear":
         _log.warning(
-            "%s: cubic (%s) curves are read as lines between control points", where, told["shape"]
+            "%s: cubic (%s) curves are read as lines between control points",
+            where,
+            description["shape"],
         )
-    if told["frames"] > 1:
-        _log.warning("%s: animated, %d frames; only one is read", where, told["frames"])
+    if description["frames"] > 1:
+        _log.warning("%s: animated, %d frames; only one is read", where, description["frames"])
 
 
 class _Values:
     """Widths and primvars of one prim, brought to one value a point or a strand."""
 
     def __init__(
-        self, found: Contents, told: dict[str, Any], counts: Int64Array, where: str
+        self, found: Contents, description: dict[str, Any], counts: Int64Array, where: str
     ) -> None:
-        self.found, self.told, self.counts, self.where = found, told, counts, where
+        self.found, self.description, self.counts, self.where = found, description, counts, where
 
     def of_points(self, name: str, columns: int = 1) -> Any:
         """Return (P,) or (P, columns) float32, or None where there is no such value."""
@@ -164,8 +166,8 @@ class _Values:
         return None
 
     def _array(self, name: str, columns: int) -> tuple[Any, str]:
-        array = self.found.arrays.get(self.told["name"] + name)
-        interpolation = self.told["interpolation"].get(name, "")
+        array = self.found.arrays.get(self.description["name"] + name)
+        interpolation = self.description["interpolation"].get(name, "")
         if array is None or array.ndim < 1:
             return None, interpolation
         shape = (len(array),) if columns == 1 else (len(array), columns)

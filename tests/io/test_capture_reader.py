@@ -160,7 +160,7 @@ WRONG = {
     "no view 'xx'.*or give its azimuth_deg": lambda f: (f / "capture.toml").write_text(
         '[[views]]\nname="xx"\n' + "[[views]]\n" * 7
     ),
-    "'0_front.png' stands for two views": lambda f: (f / "capture.toml").write_text(
+    "'0_front.png' is named for two views": lambda f: (f / "capture.toml").write_text(
         "[[views]]\n" * 7 + '[[views]]\nphoto="0_front.png"'
     ),
 }
