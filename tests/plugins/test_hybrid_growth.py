@@ -196,3 +196,21 @@ def test_strands_can_be_smoothed_by_helix_arcs() -> None:
     np.testing.assert_allclose(calm.roots, rough.roots, atol=1e-7)
     apart = np.linalg.norm(calm.points - rough.points, axis=1)
     assert apart.mean() < 0.0007
+
+
+def test_a_strand_does_not_depend_on_how_many_others_are_grown() -> None:
+    """Some of the roots, grown alone, give exactly the strands that they give among all."""
+    roots, hull = scalp_roots(ball_head()), shell_hull()
+    some = np.random.default_rng(0).permutation(len(roots))[:15]
+    few = Roots(
+        roots.positions[some],
+        roots.normals[some],
+        roots.uv[some],
+        roots.triangle[some],
+        roots.barycentric[some],
+    )
+    among, alone = (
+        track(hull, combed_field(hull.grid), r, Waves(0.006, 0.04, 0.0), DISTANCE, Options())
+        for r in (roots, few)
+    )
+    np.testing.assert_array_equal(among.select(some).points, alone.points)

@@ -26,6 +26,7 @@ from tracked_ball import (
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.testing import scalp_roots, turn_scene
+from hairkit.types.head import Roots
 from hairkit.types.waves import Waves
 
 
@@ -181,3 +182,21 @@ def test_waves_are_wound_unless_the_option_says_no() -> None:
     helix = np.hypot(1, 2 * np.pi * waves.radius / waves.pitch)
     ratio = (wound.lengths() / plain.lengths()).mean()
     assert 1 + 0.75 * (helix - 1) < ratio < helix
+
+
+def test_a_strand_does_not_depend_on_how_many_others_are_tracked() -> None:
+    """Some of the roots, tracked alone, give exactly the strands that they give among all."""
+    roots, waves = scalp_roots(turn_scene().head), Waves(0.006, 0.04, 0.0)
+    some = np.random.default_rng(0).permutation(len(roots))[:15]
+    few = Roots(
+        roots.positions[some],
+        roots.normals[some],
+        roots.uv[some],
+        roots.triangle[some],
+        roots.barycentric[some],
+    )
+    among, alone = (
+        run(constant(np.array([0.1, -1.0, 0.2])), filled(), r, Options(max_length=0.2), waves)
+        for r in (roots, few)
+    )
+    np.testing.assert_array_equal(among.select(some).points, alone.points)
