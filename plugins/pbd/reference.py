@@ -88,7 +88,7 @@ def substep(
     `iterations` linearise the lengths anew about the last solution; the default is enough at the
     default substeps, since positions and directions are predicted to second order.
     """
-    new, _ = pulled(rods, system, state, load, iterations)
+    new, _ = solve_substep(rods, system, state, load, iterations)
     return (
         new
         if contact is None
@@ -96,7 +96,7 @@ def substep(
     )
 
 
-def pulled(
+def solve_substep(
     rods: Rods, system: System, state: State, load: Load, iterations: int = 1
 ) -> tuple[State, Float64Array]:
     """Return the state one substep later where nothing is touched, and the tension in newtons.
@@ -286,13 +286,13 @@ def restore_lengths(
     reach = np.linalg.norm(edge, axis=-1)
     direction = edge / reach[..., None]
 
-    def eased(nodes: slice) -> Float64Array:
+    def mobility(nodes: slice) -> Float64Array:
         """Displacement of the start or end node by a unit pull of each segment."""
         across = (normal[:, nodes] * direction).sum(axis=-1, keepdims=True) * normal[:, nodes]
         moved_by: Float64Array = ease[:, nodes, None] * (direction - across)
         return moved_by
 
-    start, end = eased(slice(None, -1)), eased(slice(1, None))
+    start, end = mobility(slice(None, -1)), mobility(slice(1, None))
     diagonal = (direction * (start + end)).sum(axis=-1)
     diagonal += SOFTEST * (ease[:, :-1] + ease[:, 1:])
     beside = -(end[:, :-1] * direction[:, 1:]).sum(axis=-1)

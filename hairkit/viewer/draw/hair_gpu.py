@@ -106,7 +106,7 @@ class HairPass:
 
     def place(self, view: HairView, look: HairLook) -> None:
         """Interpolate the hair from the guides and accumulate its opacity by depth."""
-        buffers = self._sized(view.camera)
+        buffers = self._resize_buffers(view.camera)
         near, far = view.hair_depth.near, view.hair_depth.far
         self._shared: dict[str, Any] = {
             "u_tiles": buffers.tiles,
@@ -126,7 +126,7 @@ class HairPass:
     def draw(self, scene: HairScene) -> None:
         """Draw the hair over the picture, behind nearer meshes."""
         view, look = scene.view, scene.look
-        buffers = self._sized(view.camera)
+        buffers = self._resize_buffers(view.camera)
         scene.solid_depth.use(1)
         buffers.opacity.use(2)
         self._hairs.bind_to_storage_buffer(1)
@@ -176,7 +176,7 @@ class HairPass:
         program.run(max(-(-count // _GROUP), 1))
         self._gl.context.memory_barrier()
 
-    def _sized(self, camera: Camera) -> _ViewBuffers:
+    def _resize_buffers(self, camera: Camera) -> _ViewBuffers:
         size = (camera.width, camera.height)
         if self._view is None or self._view.size != size:
             if self._view is not None:

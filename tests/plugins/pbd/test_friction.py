@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 from hairkit_plugins.pbd.backend import ReferenceEngine
 from hairkit_plugins.pbd.numba_backend import FastEngine
-from hairkit_plugins.pbd.reference import Contact, pulled, resolve_contacts, rest_state, substep
+from hairkit_plugins.pbd.reference import (
+    Contact,
+    resolve_contacts,
+    rest_state,
+    solve_substep,
+    substep,
+)
 from hairkit_plugins.pbd.rods import make_rods
 from pbd_bench import DENSITY, LENGTH, G, load_of, straight, system_of
 
@@ -92,7 +98,7 @@ def slipping(wrap: Float64Array, speed: Float64Array, friction: float, rounds: i
     contact = Contact(bollard(), np.zeros_like(rods.mass), friction, 0.5, None, rounds)
     for _ in range(100):
         points[:, 0, 0] -= speed * step
-        state, before = pulled(replace(rods, points=points), system, state, load)
+        state, before = solve_substep(replace(rods, points=points), system, state, load)
         state, after = resolve_contacts(rods, state, contact, load.head_step, step)
         found.append((before + after)[:, 0] / pull)
     return np.mean(found[25:], axis=0)

@@ -12,8 +12,8 @@ from hairkit_plugins.pbd.reference import (
     Load,
     State,
     elastic_force,
-    pulled,
     rest_state,
+    solve_substep,
     substep,
 )
 from hairkit_plugins.pbd.rods import Rods, make_rods
@@ -176,7 +176,7 @@ def test_a_whirling_strand_is_taut_by_its_mass_further_out() -> None:
     system, state = system_of(rods, step), rest_state(rods)
     state = replace(state, velocity=np.cross([0.0, 0.0, spin], rods.points))
     for _ in range(20):
-        state, tension = pulled(rods, system, state, load_of(head_step=head_step))
+        state, tension = solve_substep(rods, system, state, load_of(head_step=head_step))
     s = (np.arange(nodes - 1) + 0.5) * LENGTH / (nodes - 1)
     law = DENSITY * spin**2 * (LENGTH**2 - s**2) / 2
     np.testing.assert_allclose(tension[0], law, atol=0.01 * law[0])
