@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache
 from itertools import pairwise
 from typing import Any, TypeVar, cast
@@ -32,6 +33,20 @@ def thread_count() -> int:
     """Return the number of threads that share a loop: Numba's, which `NUMBA_NUM_THREADS` sets."""
     settings: Any = config
     return int(settings.NUMBA_NUM_THREADS)
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Let matrix products of NumPy and SciPy run on one thread; also a function's decorator.
+
+    The matrices here are small: threads of the BLAS library cost more than they bring, and sums in
+    another order give other results on machines with other numbers of cores.
+    """
+    import scipy.linalg  # noqa: F401 - SciPy has a BLAS of its own, found only when it is loaded
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1, "blas"):
+        yield
 
 
 def parallel_for(

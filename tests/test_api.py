@@ -14,11 +14,13 @@ import cv2
 import numpy as np
 import pytest
 from ball import PLUGIN_FILE, RECIPE, write_capture
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import hairkit
 from hairkit.errors import InputError
+from hairkit.pipeline.recipe import parse_recipe
 from hairkit.storage import to_arrays
-from hairkit.testing import ball_head, bristle_groom, turn_scene
+from hairkit.testing import ball_head, bristle_groom, turn_capture, turn_scene
 
 FAST = {"backend": "reference", "substeps": 1}
 """Options of the simulator that need no compiled kernels."""
@@ -74,6 +76,33 @@ def test_photos_become_a_groom_in_one_call(tmp_path: Path) -> None:
     first, second = to_arrays(groom), to_arrays(again)
     assert all(np.array_equal(first[name], second[name]) for name in first)
     assert len(hairkit.read_groom(tmp_path / "a").strands) == 20
+
+
+def blas_threads() -> set[int]:
+    """Return the numbers of threads of the loaded BLAS libraries."""
+    return {info["num_threads"] for info in threadpool_info() if info["user_api"] == "blas"}
+
+
+def test_reconstruct_limits_the_threads_of_matrix_products(tmp_path: Path) -> None:
+    """While it runs BLAS has one thread, wherever it was called from; afterwards all it had."""
+    manager = hairkit.Manager.loaded([PLUGIN_FILE], autoload=False)
+    seen: list[set[int]] = []
+
+    class Listener:
+        """Notes the threads at the end of every stage."""
+
+        @hairkit.hookimpl
+        def stage_finished(self) -> None:
+            seen.append(blas_threads())
+
+    manager.register(Listener(), "listener")
+    recipe = parse_recipe(RECIPE.encode(), "ball", "ball.toml")
+    choices = {"head": ball_head(), "guides": 4, "sheet": False}
+    with threadpool_limits(2, "blas"):
+        hairkit.reconstruct(turn_capture(), tmp_path / "out", recipe, manager, **choices)
+        assert blas_threads() == {2}
+    assert seen
+    assert all(threads == {1} for threads in seen)
 
 
 def test_a_groom_goes_through_files_and_comes_back(tmp_path: Path) -> None:

@@ -39,10 +39,6 @@ from typing import Any, NoReturn
 
 from hairkit.errors import HairkitError
 
-# Matrices here are small: OpenBLAS threads cost more than they bring, and sums in another order
-# differ from machine to machine. It reads this once, when NumPy is first imported.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 VERBS = {
     "reconstruct": "turn eight photos into a groom",
     "evaluate": "score a groom against the truth",

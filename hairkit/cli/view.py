@@ -55,9 +55,12 @@ class _ListActions(argparse.Action):
 
 def run(args: argparse.Namespace) -> int:
     """Show the groom until the window is closed, or play the script."""
+    from hairkit.parallel import one_blas_thread
+
     _check(args)
     try:
-        return _headless(args) if args.headless else _window(args)
+        with one_blas_thread():
+            return _headless(args) if args.headless else _window(args)
     except KeyboardInterrupt as error:
         raise KeyboardInterrupt("what was written so far is kept") from error
 

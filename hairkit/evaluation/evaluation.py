@@ -43,6 +43,7 @@ from hairkit.evaluation.strand_statistics import (
 )
 from hairkit.evaluation.truth import Truth
 from hairkit.grooming.densify import densify
+from hairkit.parallel import one_blas_thread
 from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR, PERSON
 from hairkit.types.strands import Strands
@@ -125,6 +126,7 @@ class Evaluation:
         return figures | {name: getattr(self, name) for name in means}
 
 
+@one_blas_thread()
 def evaluate(
     prediction: Prediction,
     truth: Truth,

@@ -18,6 +18,7 @@ from hairkit.imaging.waves import measure_waves
 from hairkit.io.capture_reader import read_capture
 from hairkit.io.head_reader import read_head
 from hairkit.manager import Manager
+from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.recipe import Recipe, load_recipe
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.stage_runner import Argument, Given, StageRunner
@@ -40,6 +41,7 @@ SHEET = "contact_sheet.png"
 """Name of the picture that shows what every stage has found."""
 
 
+@one_blas_thread()
 def reconstruct(
     photos: Capture | str | os.PathLike[str],
     out: str | os.PathLike[str],

@@ -10,6 +10,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import DataError, InputError
+from hairkit.parallel import one_blas_thread
 from hairkit.progress import Progress, Silent
 from hairkit.simulation.motion import HeadMotion
 from hairkit.simulation.simulator import Simulator, Surroundings
@@ -31,6 +32,7 @@ class Weather:
     """(3,) world, metres per second squared; None: the groom's."""
 
 
+@one_blas_thread()
 def run(
     simulator: Simulator,
     motion: HeadMotion,
