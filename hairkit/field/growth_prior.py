@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from scipy import ndimage
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.parallel import compiled
 from hairkit.types.head import Head
 from hairkit.types.volume import Hull, ScalpDistance, VoxelGrid, outer_products
 
@@ -27,6 +27,10 @@ FLOW_SMOOTHING = 2.0
 """Standard deviation in cells that makes the chamfer distance's gradient smooth."""
 LENGTH_PERCENTILE = 98
 """Percentile of the scalp distance that is taken as the hair's length."""
+MOST_SWEEPS = 12
+"""Rounds of eight sweeps; paths round more corners than this are left too long."""
+LEAST_CHANGE = 1e-7
+"""Metres by which a distance must fall to count as changed: rounding."""
 
 
 def combing_direction(
@@ -164,41 +168,54 @@ def chamfer_distance(occupied: BoolArray, start: BoolArray, spacing: float) -> F
     return distance
 
 
-@njit(cache=True)
-def _chamfer(occupied, start, spacing):  # type: ignore[no-untyped-def]
-    nx, ny, nz = occupied.shape
+@compiled
+def _chamfer(occupied: BoolArray, start: BoolArray, spacing: np.float32) -> Float32Array:
+    """Return the result of `chamfer_distance`: sweeps in eight directions until none changes."""
     distance = np.full(occupied.shape, np.inf, np.float32)
-    for ix in range(nx):
-        for iy in range(ny):
-            for iz in range(nz):
+    for ix in range(occupied.shape[0]):
+        for iy in range(occupied.shape[1]):
+            for iz in range(occupied.shape[2]):
                 if start[ix, iy, iz]:
                     distance[ix, iy, iz] = 0
-    cost = np.array([0.0, 1.0, np.sqrt(2.0), np.sqrt(3.0)], np.float32) * spacing
-    for _ in range(12):
+    cost = np.sqrt(np.arange(4)).astype(np.float32) * spacing
+    for _ in range(MOST_SWEEPS):
         changed = False
-        for turn in range(8):
-            sx = 1 if turn & 1 else -1
-            sy = 1 if turn & 2 else -1
-            sz = 1 if turn & 4 else -1
-            for kx in range(nx):
-                ix = kx if sx > 0 else nx - 1 - kx
-                for ky in range(ny):
-                    iy = ky if sy > 0 else ny - 1 - ky
-                    for kz in range(nz):
-                        iz = kz if sz > 0 else nz - 1 - kz
-                        if not occupied[ix, iy, iz]:
-                            continue
-                        best = distance[ix, iy, iz]
-                        for corner in range(1, 8):
-                            a, b, c = corner & 1, corner >> 1 & 1, corner >> 2 & 1
-                            jx, jy, jz = ix - sx * a, iy - sy * b, iz - sz * c
-                            if jx < 0 or jy < 0 or jz < 0 or jx >= nx or jy >= ny or jz >= nz:
-                                continue
-                            if occupied[jx, jy, jz]:
-                                best = min(best, distance[jx, jy, jz] + cost[a + b + c])
-                        if best < distance[ix, iy, iz] - 1e-7:
-                            distance[ix, iy, iz] = best
-                            changed = True
+        for octant in range(8):
+            changed |= _sweep(occupied, cost, octant, distance)
         if not changed:
             break
     return distance
+
+
+@compiled
+def _sweep(occupied: BoolArray, cost: Float32Array, octant: int, distance: Float32Array) -> bool:
+    """Lower distances (X, Y, Z) in one sweep of the grid; returns whether any changed.
+
+    The bits of `octant` give the direction along x, y and z; `cost` (4,) are metres of a step to a
+    cell across a face, an edge and a corner.
+    """
+    nx, ny, nz = occupied.shape
+    sx = 1 if octant & 1 else -1
+    sy = 1 if octant & 2 else -1
+    sz = 1 if octant & 4 else -1
+    changed = False
+    for kx in range(nx):
+        ix = kx if sx > 0 else nx - 1 - kx
+        for ky in range(ny):
+            iy = ky if sy > 0 else ny - 1 - ky
+            for kz in range(nz):
+                iz = kz if sz > 0 else nz - 1 - kz
+                if not occupied[ix, iy, iz]:
+                    continue
+                best = distance[ix, iy, iz]
+                for corner in range(1, 8):
+                    a, b, c = corner & 1, corner >> 1 & 1, corner >> 2 & 1
+                    jx, jy, jz = ix - sx * a, iy - sy * b, iz - sz * c
+                    if jx < 0 or jy < 0 or jz < 0 or jx >= nx or jy >= ny or jz >= nz:
+                        continue
+                    if occupied[jx, jy, jz]:
+                        best = min(best, distance[jx, jy, jz] + cost[a + b + c])
+                if best < distance[ix, iy, iz] - LEAST_CHANGE:
+                    distance[ix, iy, iz] = best
+                    changed = True
+    return changed

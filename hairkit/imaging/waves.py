@@ -16,9 +16,9 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numba import njit
 
-from hairkit.arrays import Float64Array
+from hairkit.arrays import Float32Array, Float64Array
+from hairkit.parallel import compiled
 from hairkit.types.camera import Camera
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
@@ -26,6 +26,8 @@ from hairkit.types.waves import Waves
 
 HEIGHT = 540
 """Waves are measured on maps of this height, where they still span tens of pixels."""
+LEAST_WEIGHT = 0.05
+"""Lines end where the map's weight falls to this."""
 HIGH_PASS = 12.5
 """Gaussian in pixels of such a map that separates the average direction from the swing."""
 LONGEST_LAG, LINE_LENGTH, LINES = 55, 120, 500
@@ -83,11 +85,12 @@ def _swing(found: OrientationMap, mask: Mask) -> tuple[float, Float64Array]:
     size = (round(found.angle.shape[1] * HEIGHT / found.angle.shape[0]), HEIGHT)
     inside = cv2.resize(mask.hair.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     inside = cv2.erode(inside, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7)))
-    weight = cv2.resize(found.confidence, size, interpolation=cv2.INTER_AREA) * inside
+    weight = cv2.resize(found.confidence, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    weight = weight * inside
     vector = np.stack([np.cos(2 * found.angle), np.sin(2 * found.angle)], axis=-1)
     vector = cv2.resize(vector, size, interpolation=cv2.INTER_AREA) * weight[..., None]
     smooth = cv2.GaussianBlur(vector, (0, 0), HIGH_PASS)
-    average = 0.5 * np.arctan2(smooth[..., 1], smooth[..., 0])
+    average = (0.5 * np.arctan2(smooth[..., 1], smooth[..., 0])).astype(np.float32)
     angle = 0.5 * np.arctan2(vector[..., 1], vector[..., 0])
     swing = np.mod(angle - average + np.pi / 2, np.pi) - np.pi / 2
     rows, columns = np.nonzero(weight > 0.3)
@@ -100,8 +103,15 @@ def _swing(found: OrientationMap, mask: Mask) -> tuple[float, Float64Array]:
     return float(mean[0]), np.where(count > LINES, mean, 0)
 
 
-@njit(cache=True)
-def _autocorrelation(average, swing, weight, starts, length, lags):  # type: ignore[no-untyped-def]
+@compiled
+def _autocorrelation(
+    average: Float32Array,
+    swing: Float32Array,
+    weight: Float32Array,
+    starts: Float64Array,
+    length: int,
+    lags: int,
+) -> tuple[Float64Array, Float64Array]:
     """Sum swing[i] * swing[i + lag] along lines that follow `average`; and the number of terms."""
     height, width = swing.shape
     total, count = np.zeros(lags), np.zeros(lags)
@@ -112,7 +122,7 @@ def _autocorrelation(average, swing, weight, starts, length, lags):  # type: ign
         n = 0
         while n < length:
             ix, iy = int(x), int(y)
-            if ix < 0 or iy < 0 or ix >= width or iy >= height or weight[iy, ix] <= 0.05:
+            if ix < 0 or iy < 0 or ix >= width or iy >= height or weight[iy, ix] <= LEAST_WEIGHT:
                 break
             line[n] = swing[iy, ix]
             n += 1

@@ -7,7 +7,6 @@ cannot make it unstable; friction takes the normal force and the sliding speed o
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,13 +14,15 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled
 
+from .state import Step
+
 _SLOW = 1e-3
 """Sliding speeds below this, metres per second, are held by friction without slipping."""
 
 
 @compiled
 def touch(
-    step: Any,
+    step: Step,
     mass: float,
     h: float,
     gap: float,

@@ -9,6 +9,9 @@ import numpy as np
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled
 
+TWIST = 6
+"""Coordinates of a twist (turn, move); those of the element's own change dq follow them."""
+
 
 @compiled
 def eliminate(
@@ -31,7 +34,7 @@ def eliminate(
         for i in range(9):
             for j in range(i):
                 a[i, j] = a[j, i]
-        _invert(a)
+        _invert(a[TWIST:, TWIST:])
         _take_out(a, b, tip, pull)
     twist, turned = np.zeros(6), np.zeros(6)
     for k in range(count):
@@ -43,9 +46,9 @@ def eliminate(
             d[i] = ends[k + 1, i] - ends[k, i]
         for i in range(6):
             turned[i] = twist[i]
-        turned[3] += twist[1] * d[2] - twist[2] * d[1]
-        turned[4] += twist[2] * d[0] - twist[0] * d[2]
-        turned[5] += twist[0] * d[1] - twist[1] * d[0]
+        for i in range(3):
+            j, m = (i + 1) % 3, (i + 2) % 3
+            turned[3 + i] += twist[j] * d[m] - twist[m] * d[j]
         for i in range(3):
             for j in range(3):
                 turned[i] -= spin[k, i, j] * b[6 + j]
@@ -107,9 +110,9 @@ def _join(
 
 @compiled
 def _invert(a: Float64Array) -> None:
-    """Put the inverse of the symmetric block [6:, 6:] in its place."""
-    p, q, r = a[6, 6], a[6, 7], a[6, 8]
-    s, t, u = a[7, 7], a[7, 8], a[8, 8]
+    """Put the inverse of a symmetric matrix (3, 3) in its place."""
+    p, q, r = a[0, 0], a[0, 1], a[0, 2]
+    s, t, u = a[1, 1], a[1, 2], a[2, 2]
     # Cholesky, since the forms of twist and bending differ by many orders of magnitude
     l0 = math.sqrt(p)
     l1, l2 = q / l0, r / l0
@@ -120,30 +123,31 @@ def _invert(a: Float64Array) -> None:
     i1 = -l1 * i0 * i3
     i4 = -l4 * i3 * i5
     i2 = -(l2 * i0 + l4 * i1) * i5
-    a[6, 6] = i0 * i0 + i1 * i1 + i2 * i2
-    a[7, 7] = i3 * i3 + i4 * i4
-    a[8, 8] = i5 * i5
-    a[6, 7] = a[7, 6] = i1 * i3 + i2 * i4
-    a[6, 8] = a[8, 6] = i2 * i5
-    a[7, 8] = a[8, 7] = i4 * i5
+    a[0, 0] = i0 * i0 + i1 * i1 + i2 * i2
+    a[1, 1] = i3 * i3 + i4 * i4
+    a[2, 2] = i5 * i5
+    a[0, 1] = a[1, 0] = i1 * i3 + i2 * i4
+    a[0, 2] = a[2, 0] = i2 * i5
+    a[1, 2] = a[2, 1] = i4 * i5
 
 
 @compiled
 def _take_out(a: Float64Array, b: Float64Array, tip: Float64Array, pull: Float64Array) -> None:
     """Take dq out: the joint's form in `tip`, A_qq^-1 A_qV in a[6:, :6], A_qq^-1 g in b[6:]."""
-    x, y, z = b[6], b[7], b[8]
+    inverse, across, below, own = a[TWIST:, TWIST:], a[:TWIST, TWIST:], a[TWIST:, :TWIST], b[TWIST:]
+    x, y, z = own[0], own[1], own[2]
     for i in range(3):
-        b[6 + i] = a[6 + i, 6] * x + a[6 + i, 7] * y + a[6 + i, 8] * z
-    for j in range(6):
-        x, y, z = a[j, 6], a[j, 7], a[j, 8]
+        own[i] = inverse[i, 0] * x + inverse[i, 1] * y + inverse[i, 2] * z
+    for j in range(TWIST):
+        x, y, z = across[j, 0], across[j, 1], across[j, 2]
         for i in range(3):
-            a[6 + i, j] = a[6 + i, 6] * x + a[6 + i, 7] * y + a[6 + i, 8] * z
-    for i in range(6):
+            below[i, j] = inverse[i, 0] * x + inverse[i, 1] * y + inverse[i, 2] * z
+    for i in range(TWIST):
         pull[i] = b[i]
         for k in range(3):
-            pull[i] -= a[i, 6 + k] * b[6 + k]
-        for j in range(i, 6):
+            pull[i] -= across[i, k] * own[k]
+        for j in range(i, TWIST):
             total = a[i, j]
             for k in range(3):
-                total -= a[i, 6 + k] * a[6 + k, j]
+                total -= across[i, k] * below[k, j]
             tip[i, j] = tip[j, i] = total

@@ -19,9 +19,12 @@ from hairkit.parallel import compiled
 
 from .contact import touch
 from .element_kernels import carried, node, onward, product, times, turns
-from .elimination import eliminate
+from .elimination import TWIST, eliminate
 from .rods import NODES, SHARES, WEIGHTS, Rods
 from .state import CLOSE, FAR, Loads, Motion, Step
+
+POINTS, ARMS, TOUCH, SCRATCH = 3, 4, 5, 7
+"""Rows of the scratch space that hold points, levers and what contact needs, and their number."""
 
 
 @compiled
@@ -98,7 +101,7 @@ def newton(
     frames, ends = np.empty((count + 1, 3, 3)), np.empty((count + 1, 3))
     spin, shift = np.empty((count, 3, 3)), np.empty((count, 3, 3))
     form, gradient = np.zeros((count, 9, 9)), np.zeros((count, 9))
-    scratch = np.empty((7, 3, 3))
+    scratch = np.empty((SCRATCH, 3, 3))
     frames[0], ends[0] = frame, root
     for k in range(count):
         e = first + k
@@ -120,9 +123,8 @@ def newton(
     most = 0.0
     for k in range(count):
         # no element turns by more than a radian in one iteration
-        size = rods.lengths[first + k] * math.sqrt(
-            gradient[k, 6] ** 2 + gradient[k, 7] ** 2 + gradient[k, 8] ** 2
-        )
+        dq = gradient[k, TWIST:]
+        size = rods.lengths[first + k] * math.sqrt(dq[0] ** 2 + dq[1] ** 2 + dq[2] ** 2)
         most = max(most, size)
         damp = 1.0 if size < 1.0 else 1.0 / size
         for j in range(3):
@@ -147,8 +149,8 @@ def _element(
 ) -> None:
     """Add the Gauss points of element e to its form in (turn, move, dq) and its gradient."""
     slope, by_change, weight = scratch[0], scratch[1], scratch[2]
-    local, pull, point = scratch[3, 0], scratch[3, 1], scratch[3, 2]
-    before, arm = scratch[4, 0], scratch[4, 1]
+    local, pull, point = scratch[POINTS, 0], scratch[POINTS, 1], scratch[POINTS, 2]
+    before, arm = scratch[ARMS, 0], scratch[ARMS, 1]
     for g in range(NODES):
         node(motion.q[e], rods.lengths[e] * SHARES[g], local, slope)
         mass = rods.density[e] * rods.lengths[e] * WEIGHTS[g]
@@ -183,7 +185,7 @@ def _element(
                 before,
                 weight,
                 pull,
-                scratch[5:7].reshape(6, 3)[:4],
+                scratch[TOUCH:].reshape(-1, 3),
             )
         if touched:
             _add(form, gradient, arm, by_change, weight, pull)
@@ -263,7 +265,7 @@ def _onward(
     scratch: Float64Array,
 ) -> None:
     """Place the end of element k and how it moves with dq."""
-    slope, turn, mean, local = scratch[0], scratch[1], scratch[2], scratch[3, 0]
+    slope, turn, mean, local = scratch[0], scratch[1], scratch[2], scratch[POINTS, 0]
     node(q, length, local, slope)
     turns(q, length, turn, mean)
     product(frames[k], turn, frames[k + 1])

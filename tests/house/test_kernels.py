@@ -6,36 +6,108 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-
-def stores_through_fields(source: str) -> Iterator[tuple[str, str]]:
-    """Yield name and target of what parallel kernels write through attributes: `rod.point[i]`."""
-    for kernel in ast.walk(ast.parse(source)):
-        if isinstance(kernel, ast.FunctionDef) and any(map(_parallel, kernel.decorator_list)):
-            places = (node for node in ast.walk(kernel) if isinstance(node, ast.Subscript))
-            for place in places:
-                if isinstance(place.ctx, ast.Store) and isinstance(place.value, ast.Attribute):
-                    yield kernel.name, ast.unparse(place)
+REBUILT = ("plugins/pbd/", "hairkit/viewer/draw/")
+"""Kernels of the dynamics and of the viewer's hair, which keep their own layout of arrays."""
+LARGEST_COMPONENT = 3
+"""Subscripts up to this are coordinates: of points, colours, and of rigid motions (4, 4)."""
+COMPILERS = {"njit", "jit", "vectorize", "guvectorize", "compiled"}
 
 
-def _parallel(decorator: ast.expr) -> bool:
-    settings = decorator.keywords if isinstance(decorator, ast.Call) else []
-    return any(k.arg == "parallel" and ast.unparse(k.value) == "True" for k in settings)
+def kernels(source: str) -> Iterator[ast.FunctionDef]:
+    """Yield the compiled functions of a module."""
+    for function in ast.walk(ast.parse(source)):
+        if isinstance(function, ast.FunctionDef) and any(
+            _last_name(decorator) in COMPILERS for decorator in function.decorator_list
+        ):
+            yield function
 
 
-def test_no_parallel_kernel_writes_through_a_tuples_field(project: Path) -> None:
-    """Numba loses such writes without a word (its issues 5872 and 7135, open in 0.68).
+def untyped_arguments(kernel: ast.FunctionDef) -> list[str]:
+    """Return the parameters, and `return`, that have no type or one that says nothing."""
+    arguments = [*kernel.args.posonlyargs, *kernel.args.args, *kernel.args.kwonlyargs]
+    types = [(one.arg, one.annotation) for one in arguments] + [("return", kernel.returns)]
+    return [name for name, type_ in types if type_ is None or ast.unparse(type_) == "Any"]
 
-    Reading through a field is right, and so is writing in a function that the kernel calls.
+
+def column_numbers(kernel: ast.FunctionDef) -> list[str]:
+    """Return the subscripts that pick a column of packed numbers by a literal: `row[12]`.
+
+    Coordinates of points (`p[2]`, `centre[view, 1]`), the ends (`p[-1]`) and slices are left alone:
+    only whole literals above `LARGEST_COMPONENT` count, in any place of the subscript.
     """
+    found = []
+    for node in ast.walk(kernel):
+        if isinstance(node, ast.Subscript):
+            places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+            for place in places:
+                number = place.value if isinstance(place, ast.Constant) else 0
+                if isinstance(number, int) and number > LARGEST_COMPONENT:
+                    found.append(ast.unparse(node))
+    return found
+
+
+def _last_name(node: ast.expr) -> str:
+    """Return `njit` for `@njit`, `@numba.njit` and `@njit(cache=True)`."""
+    node = node.func if isinstance(node, ast.Call) else node
+    return node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
+
+
+def all_kernels(project: Path) -> list[tuple[str, ast.FunctionDef]]:
+    """Return name and tree of all kernels but those of `REBUILT`."""
+    found = []
+    for folder in ("hairkit", "plugins"):
+        for file in sorted((project / folder).rglob("*.py")):
+            name = file.relative_to(project).as_posix()
+            if not name.startswith(REBUILT):
+                found += [(f"{name}:{k.name}", k) for k in kernels(file.read_text())]
+    return found
+
+
+def test_kernels_are_typed(project: Path) -> None:
+    """Every parameter and result of a compiled function has a type."""
+    found = all_kernels(project)
+    assert len(found) > 100
+    assert [(name, left) for name, kernel in found if (left := untyped_arguments(kernel))] == []
+
+
+def test_kernels_pick_no_columns_by_number(project: Path) -> None:
+    """What is not a coordinate is a named field, or a column with a named number."""
+    found = all_kernels(project)
+    assert [(name, hits) for name, kernel in found if (hits := column_numbers(kernel))] == []
+
+
+def test_loops_are_shared_in_one_way(project: Path) -> None:
+    """No kernel of the project asks Numba for threads: `hairkit.parallel` shares all loops."""
     files = [*(project / "hairkit").rglob("*.py"), *(project / "plugins").rglob("*.py")]
-    found = [(file.name, *hit) for file in files for hit in stores_through_fields(file.read_text())]
     assert len(files) > 100
-    assert found == []
+    names = [
+        (file.name, node.id)
+        for file in files
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.Name) and node.id == "prange"
+    ]
+    assert names == []
 
 
-def test_a_write_through_a_field_is_found() -> None:
-    """Plain and augmented, inside of loops; what is read, and plain kernels, are left alone."""
-    body = "\n    for i in prange(9):\n        rod.x[i] += rod.v[i]\n        y[i] = rod.x[i]\n"
-    parallel = f"@njit(cache=True, parallel=True)\ndef move(rod, y):{body}"
-    assert list(stores_through_fields(parallel)) == [("move", "rod.x[i]")]
-    assert list(stores_through_fields(f"@njit(cache=True)\ndef move(rod, y):{body}")) == []
+def test_numba_is_used_by_its_public_names(project: Path) -> None:
+    """No module but that of the vector lanes imports the insides of Numba or llvmlite."""
+    inside = []
+    for folder in ("hairkit", "plugins"):
+        for file in (project / folder).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                modules = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+                modules += [n.name for n in node.names] if isinstance(node, ast.Import) else []
+                if any(m.startswith(("numba.", "llvmlite")) for m in modules):
+                    inside.append(file.relative_to(project).as_posix())
+    assert {*inside} <= {"plugins/pbd/simd.py"}
+
+
+def test_faults_of_kernels_are_found() -> None:
+    """Untyped parameters and results, and columns of numbers; points and slices are left alone."""
+    [kernel] = kernels("@numba.njit(cache=True)\ndef f(p, i: int):\n    return p[i, 12] + p[15]")
+    assert untyped_arguments(kernel) == ["p", "return"]
+    assert column_numbers(kernel) == ["p[i, 12]", "p[15]"]
+    [kernel] = kernels("@compiled\ndef f(p: A) -> float:\n    return p[0, 2] + p[-1] + p[3:6]")
+    assert untyped_arguments(kernel) == []
+    assert column_numbers(kernel) == []
+    assert list(kernels("def plain(p):\n    return p[12]")) == []
