@@ -125,9 +125,10 @@ def _fill(nav: Any, pages: dict[str, list[dict[str, str]]]) -> None:
 
 
 def _docstring(info: PluginInfo) -> str:
-    """Return the docstring of a plugin's module as Markdown."""
+    """Return the docstring of a plugin as Markdown, without the list of its modules."""
     module = sys.modules[f"hairkit_plugins.{info.name}"]
-    text = re.sub(r"(?<=[^\n])\n(?=\* |\d+\. )", "\n\n", inspect.getdoc(module) or info.summary)
+    text = re.sub(r"\n+(\* `\w+`: .*\n?)+$", "", inspect.getdoc(module) or info.summary)
+    text = re.sub(r"(?<=[^\n])\n(?=\* |\d+\. )", "\n\n", text)
     return re.sub(r"\n {2,3}(?=\S)", "\n    ", text)  # continued list items, as Markdown wants them
 
 

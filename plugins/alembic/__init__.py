@@ -7,6 +7,15 @@ into an FBX file.
 Written through the Alembic library (alembic3d), whose arrays are filled from NumPy's memory. Read
 by the plugin itself, because that library's reader ends the process at some damaged files.
 Sources: Alembic 1.8 AbcGeom and Ogawa; Epic's "Alembic for Grooms Specification", version 1.5.
+
+* `archive`: objects and properties of an archive
+* `curve_sets`: curves objects of a file: world points, widths, attributes
+* `curves`: a groom's curves in the file's space, within Unreal's limits
+* `ogawa`: the Ogawa container: groups and data blocks
+* `options`: settings
+* `to_groom`: a groom from curves of a file
+* `transforms`: transforms of objects
+* `writer`: writing through the Alembic library
 """
 
 from __future__ import annotations

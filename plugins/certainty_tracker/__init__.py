@@ -6,6 +6,8 @@ straight on and ends after `max_score` uncertain steps in a row (the rules of th
 field sampling is replaced by trilinear tensors and midpoint steps). Strands are pushed out of the
 head, may slide along the surface of the hull where they meet it at a small angle, are cut where
 they turn up into a U, resampled, and smoothed by averaging their edge vectors.
+
+* `walk`: compiled steps of a strand through the field
 """
 
 from __future__ import annotations

@@ -7,6 +7,11 @@ Coordinates are Y up and centimetres unless `axis` says otherwise. `axis=unreal`
 Unreal turns it on import into the space that the Alembic groom of `axis=unreal` has, where the face
 looks along +Y.
 Source: the layout of Blender's documentation of FBX binary files (Campbell Barton, 2013).
+
+* `body`: head mesh, skeleton, skin and bind pose
+* `curves`: strands as NURBS curves of degree 1
+* `records`: binary records of FBX 7.4
+* `scene`: the document: header, objects, connections
 """
 
 from __future__ import annotations

@@ -3,6 +3,18 @@
 Khronos glTF 2.0, written so that the Khronos validator has nothing to say. glTF has no curves:
 strands stand in the file twice, as one LINES primitive with custom attributes, which is read back,
 and as triangles for viewers, which is not.
+
+* `baking`: a point cache as morph targets
+* `document`: JSON objects and buffer under construction
+* `extras`: `extras.hairkit`
+* `joining`: line segments joined to strands
+* `meshes`: head, lines and strips as meshes
+* `reader`: strands from the lines of a file
+* `ribbons`: hair as ribbons or cards
+* `scene`: the document of a groom
+* `streamed`: arrays made while they are written
+* `strips`: ribbons and cards at several levels of detail
+* `texture`: strand and relief pictures for strips
 """
 
 from __future__ import annotations

@@ -4,6 +4,13 @@ NVIDIA HairWorks 1.1, the text form that FurViewer, the Unity plugin and the Unr
 HairWorks grows render hair between guides over a growth mesh with exactly one vertex a guide, so
 the mesh is made from the roots. Lost on the way: the head's own mesh (the growth mesh is the head
 of a groom read back), groups, widths along the strand, and points beyond `points_per_strand`.
+
+* `asset`: the content of an .apx file
+* `from_groom`: groom to asset
+* `reader`: strict reader of .apx files
+* `schema`: classes, fields and defaults of HairWorks 1.1
+* `to_groom`: asset to groom
+* `writer`: writer of .apx files
 """
 
 from __future__ import annotations

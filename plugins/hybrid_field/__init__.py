@@ -12,6 +12,11 @@ The patent's first stage, on the cells of the hull: `H = a_s S + a_v V + a_i gra
 5. O, growth direction: the signed tangents of segments and the scalp prior, diffused.
 
 Weights differ from cell to cell: S counts near strands, V away from them, grad(I) at the scalp.
+
+* `four_fields`: the four fields and their weighted sum
+* `photo_lines`: lines through orientation maps, lifted onto the hull
+* `ribbons`: segments widened along the surface
+* `segments`: oriented 3D segments
 """
 
 from __future__ import annotations

@@ -6,6 +6,34 @@ direct solve for all segment lengths of a strand (after Han and Harada 2013, her
 the implicit system). Stiffness depends neither on iterations nor on the frame rate. The natural
 shape comes from inverse statics, so that captured hair stays in place under gravity. Despite the
 plugin's name this is not position-based dynamics.
+
+* `backend`: what all backends provide
+* `energies`: stretch and elastic energy
+* `factor_layout`: the factorised matrix in the order of the float32 backends
+* `gl_backend`: substeps in compute shaders
+* `gl_buffers`: textures and buffers of the compute backend
+* `gl_constants`: data of rods and points that stay on the GPU
+* `gl_grab`: held points in the compute backend
+* `gl_obstacles`: obstacles as textures
+* `gl_uniforms`: a substep's inputs packed for the shaders
+* `grab`: forces on held points
+* `hair_grid`: hair-hair contact: density and velocity on a grid
+* `head_interpolation`: head motion between two poses
+* `kernel_contact`: contact and friction, compiled
+* `kernel_embedding`: the guides' own points, compiled
+* `kernel_hair_grid`: hair-hair contact, compiled
+* `kernel_rows`: one node or element of all strands of a block
+* `kernel_solve`: banded, tridiagonal and dense solvers, compiled
+* `kernel_wind`: gusts, compiled
+* `kernels`: a substep, compiled
+* `linear_system`: the banded matrix of a substep
+* `numba_backend`: substeps in compiled kernels on all cores
+* `reference`: a substep in NumPy float64
+* `resampling`: guides to rods and back
+* `rods`: the discrete rod, its rest state, inverse statics
+* `simd`: vector registers as Numba types
+* `simd_math`: vectors and quaternions of registers
+* `simulator`: the simulator
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ Binary little-endian. `element vertex` has x, y, z, thickness (the diameter) and
 colour; `element edge` lets mesh programs show the strands; `element strand` with `nsegs`, as
 hairutil writes it, parts them, with root uv, group and guide flag. Read: ascii and both binary
 orders, with strands or with edges alone.
+
+* `elements`: header and rows of PLY elements
 """
 
 from __future__ import annotations

@@ -11,6 +11,9 @@ Unknown are the turn's shared place, tilt, magnification and perspective, and si
 * a prior that keeps to the nominal turn.
 
 Perspective and orthographic cameras are both tried unless the capture or the options say which.
+
+* `landmark_equations`: landmark residuals, marginalised over the head's shape
+* `landmark_transfer`: landmarks matched in neighbouring views
 """
 
 from __future__ import annotations

@@ -5,6 +5,19 @@ taken from the groom by floating tangents and inverse statics, so that it rests 
 each implicit step solved in linear time (Bertails, "Linear time super-helices", 2009) or densely by
 conjugate gradients as in the patent. Contact with the head has Coulomb friction; hair around a
 point drags and pushes it. Nothing stretches.
+
+* `binding`: guides to rods and back
+* `contact`: contact with the head and friction
+* `element_kernels`: compiled kinematics of one element
+* `elimination`: solve from tip to root in linear time
+* `hair_contact`: hair-hair contact on a grid
+* `kinematics`: kinematics of a rod in NumPy
+* `linear_time_step`: an implicit step of all strands
+* `reference`: the same step by a dense matrix
+* `rods`: elements, natural curvatures, masses
+* `simulator`: the simulator
+* `state`: inputs of a step
+* `statics`: natural shape by inverse statics
 """
 
 from __future__ import annotations

@@ -4,6 +4,11 @@ Version 4 (TressFXFileFormat.h): a header of 160 bytes, then a position and inve
 every point, a texture coordinate and a thickness for every strand and a colour (4 f32) for every
 point. The first two points of a strand are fixed to the head. The .tfxbone binds each strand to
 the joints. The text files of version 1 and 2 are read.
+
+* `binary`: .tfx of version 4
+* `bones`: .tfxbone files
+* `text`: .tfx of versions 1 and 2
+* `writer`: blocks of a .tfx in order
 """
 
 from __future__ import annotations

@@ -10,6 +10,16 @@ Read are the BasisCurves of any program, cubic ones as the polylines of their co
 USD library (usd-core) reads in a process of its own, because damaged crate files crash it; files
 that refer to other files are refused.
 Source: OpenUSD, UsdGeomBasisCurves and UsdSkel schemas; Epic's groom attributes.
+
+* `body`: skeleton, motion and skinned head
+* `body_reading`: the head of a file by hairkit
+* `curves`: strands as BasisCurves
+* `guarded`: the reading process, guarded against crashes
+* `look`: materials
+* `reading_child`: the program that reads in a process of its own
+* `settings`: groom settings as custom data
+* `stage`: metadata and parts of the stage
+* `to_groom`: a groom from what was read
 """
 
 from __future__ import annotations

@@ -7,6 +7,9 @@ no vote behind a surface. Where the views show clothes, a torso is fitted to the
 removed, as the head is. Hair that a view shows only as wisps does not fill a volume: `dense` is
 carved with opened masks, `loose` with the masks as they are. Cells that are empty in at most
 `forgive` views are kept, which survives camera errors.
+
+* `carving`: votes of views on cells, compiled
+* `torso_fit`: a torso fitted to the outlines of clothes
 """
 
 from __future__ import annotations

@@ -15,6 +15,7 @@ import pytest
 PROJECT = Path(__file__).parents[2]
 SOURCES = sorted((PROJECT / "hairkit").rglob("*.py"))
 PACKAGES = sorted(path.parent for path in (PROJECT / "hairkit").rglob("__init__.py"))
+PACKAGES += sorted(path.parent for path in (PROJECT / "plugins").glob("*/__init__.py"))
 PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins" / "__init__.py"})
 
 FLOORS = (
