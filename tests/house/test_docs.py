@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import hairkit
 from hairkit import hookspecs
 from hairkit.manager import STAGES, Manager
 from hairkit.pipeline.recipe import HOOKS, parse_recipe
@@ -71,6 +72,24 @@ def test_recipes_in_the_guide_can_be_run(number: int, manager: Manager) -> None:
     recipe = parse_recipe(blocks(plugins_page(), "toml")[number].encode(), "x", "x")
     recipe.check(manager)
     assert {stage.table for stage in recipe.stages} == set(HOOKS)
+
+
+def test_the_readme_needs_one_import() -> None:
+    """README stays short, and its snippet is one import whose names exist."""
+    readme = (PROJECT / "README.md").read_text()
+    assert len(readme.splitlines()) < 150
+    (snippet,) = blocks(readme, "python")
+    compile(snippet, "README.md", "exec")
+    assert re.findall(r"^(?:import|from) .*$", snippet, re.MULTILINE) == ["import hairkit"]
+    for name in re.findall(r"hairkit\.(\w+)", snippet):
+        assert name in hairkit.__all__
+
+
+def test_every_file_that_the_readme_links_to_exists() -> None:
+    """Links and pictures of README and CONTRIBUTING lead to files of the project."""
+    for page in ("README.md", "CONTRIBUTING.md"):
+        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", (PROJECT / page).read_text()):
+            assert (PROJECT / target).exists(), f"{page}: {target}"
 
 
 def test_the_conventions_name_every_view_and_file() -> None:
