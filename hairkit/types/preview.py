@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
+from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -85,7 +86,9 @@ def draw_turn(head: Head | None, strands: Strands | None) -> UInt8Array | None:
     return row([draw_view(camera, head, strands) for camera in _turn(np.concatenate(clouds))])
 
 
-def draw_view(camera: Camera, head: Head | None, strands: Strands | None = None) -> UInt8Array:
+def draw_view(
+    camera: Camera | _TurnView, head: Head | None, strands: Strands | None = None
+) -> UInt8Array:
     """Return a picture (H, W, 3) of a head and strands as a camera sees them."""
     parts = [_faces(camera, head)] if head is not None else []
     parts += [_segments(camera, strands)] if strands is not None else []
@@ -98,32 +101,51 @@ def draw_view(camera: Camera, head: Head | None, strands: Strands | None = None)
     return picture
 
 
-def _turn(points: npt.NDArray[np.float32]) -> list[Camera]:
-    """Return orthographic cameras around points (N, 3) that show them all."""
-    from hairkit.types.camera import Camera
+@dataclass(frozen=True)
+class _TurnView:
+    """An orthographic camera on the turn; types without cameras need not import `Camera`."""
 
+    azimuth: float
+    """Radians."""
+    middle: npt.NDArray[np.floating]
+    """(3,) point in the picture's middle, metres."""
+    scale: float
+    """Pixels per metre."""
+    width: int = WIDTH
+    height: int = HEIGHT
+
+    def project(self, points: npt.ArrayLike) -> Float64Array:
+        """Return pixels (..., 2) of points (..., 3)."""
+        local = np.asarray(points, np.float64) - self.middle
+        right = np.array([np.cos(self.azimuth), 0.0, -np.sin(self.azimuth)])
+        pixels = np.stack([local @ right, -local[..., 1]], axis=-1) * self.scale
+        centred: Float64Array = pixels + np.array([self.width, self.height]) / 2
+        return centred
+
+    def view_direction(self, points: npt.ArrayLike) -> Float64Array:
+        """Return the unit direction (..., 3) of view at points (..., 3)."""
+        forward = -np.array([np.sin(self.azimuth), 0.0, np.cos(self.azimuth)])
+        return np.broadcast_to(forward, np.shape(points))
+
+    def depth(self, points: npt.ArrayLike) -> Float64Array:
+        """Return the distance (...,) of points (..., 3) along the view."""
+        along: Float64Array = (np.asarray(points, np.float64) * self.view_direction(points)).sum(-1)
+        return along
+
+
+def _turn(points: npt.NDArray[np.float32]) -> list[_TurnView]:
+    """Return views around points (N, 3) that show them all."""
     low, high = points.min(axis=0), points.max(axis=0)
     half = np.maximum((high - low) / 2, 1e-6) * _MARGIN
-    scale = min(WIDTH / 2 / max(half[0], half[2]), HEIGHT / 2 / half[1])
-    return [
-        Camera.on_turn(
-            azimuth,
-            distance=10.0,
-            target=(low + high) / 2,
-            focal=float(scale),
-            width=WIDTH,
-            height=HEIGHT,
-            model="orthographic",
-        )
-        for azimuth in AZIMUTHS
-    ]
+    scale = float(min(WIDTH / 2 / max(half[0], half[2]), HEIGHT / 2 / half[1]))
+    return [_TurnView(np.radians(azimuth), (low + high) / 2, scale) for azimuth in AZIMUTHS]
 
 
 _Primitives = tuple[npt.NDArray[np.int32], Float64Array, Float64Array]
 """Corners (N, K, 2) in fixed-point pixels, depths (N,) and sRGB colours (N, 3)."""
 
 
-def _faces(camera: Camera, head: Head) -> _Primitives:
+def _faces(camera: Camera | _TurnView, head: Head) -> _Primitives:
     """Return the faces that look at the camera, brighter the more they do."""
     corners = head.vertices.astype(np.float64)[head.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -135,7 +157,7 @@ def _faces(camera: Camera, head: Head) -> _Primitives:
     return _fixed(camera.project(corners[seen])), camera.depth(middle[seen]), colours
 
 
-def _segments(camera: Camera, strands: Strands) -> _Primitives:
+def _segments(camera: Camera | _TurnView, strands: Strands) -> _Primitives:
     """Return the segments of strands, darker along the view than across it."""
     if len(strands) > MOST_STRANDS:
         strands = strands.select(np.linspace(0, len(strands) - 1, MOST_STRANDS).astype(np.int64))

@@ -90,10 +90,10 @@ def test_colours_are_dark_enough_on_the_backdrop() -> None:
 
 
 def test_a_picture_needs_no_opengl() -> None:
-    """Showing a groom loads neither moderngl nor Numba."""
+    """Showing a groom does not load moderngl."""
     code = (
         "import sys; from hairkit.testing import bristle_groom; bristle_groom()._repr_png_();"
-        "print([m for m in ('moderngl', 'numba') if m in sys.modules])"
+        "print('moderngl' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
+    assert done.stdout.strip() == "False"
