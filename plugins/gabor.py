@@ -11,8 +11,8 @@ waves along t, so the strand runs at t + pi / 2. The confidence, over its 99th p
 filtered as if it was the photo, three times. The thesis prints the carrier on the unturned u
 (`carrier = "as_printed"`) and leaves the kernel's mean in (`zero_mean = false`).
 
-Where this differs: beyond the hair the picture is filled, not black, so that the silhouette makes
-no response. Kernel sizes are in pixels of the picture as it comes, whatever its size.
+One difference: outside the hair the picture is filled, not black, so that the silhouette makes no
+response. Kernel sizes are in pixels of the given picture, whatever its size.
 """
 
 from __future__ import annotations
@@ -38,10 +38,16 @@ from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
 
 _CHUNK = 4096
-"""Pixels handled at a time: their responses fit the cache."""
+"""Pixels handled at a time, so that their responses fit into the cache."""
 
 _BASIS_TOLERANCE = 1e-4
 """Relative error allowed when the bank is written in fewer basis kernels."""
+
+_TOP_QUANTILE = 0.99
+"""Quantile of the confidence that becomes 1, so that outliers do not dim the rest."""
+
+_EDGE_SIGMA = 1.0
+"""Gaussian in pixels by which the mask's edge, which mixes hair and backdrop, is left out."""
 
 _LEAST_RIPPLE = 0.5 / 255
 """Amplitude of stripes below which a picture counts as constant: half a grey level."""
@@ -58,14 +64,16 @@ class Options:
     supersampling: int = option(10, low=1, high=32, doc="Samples per kernel pixel and axis.")
     angles: int = option(32, low=4, high=256, doc="Number of filter directions.")
     iterations: int = option(
-        3, low=0, high=10, doc="How often the confidence is filtered again as if it was the photo."
+        3, low=0, high=10, doc="Times that the confidence is filtered again as if it was the photo."
     )
     carrier: str = option(
         "rotated",
         choices=("rotated", "as_printed"),
         doc="Axis of the wave: turned with the envelope, or as the thesis prints it.",
     )
-    zero_mean: bool = option(True, doc="Take the kernel's mean out: brightness makes no response.")
+    zero_mean: bool = option(
+        True, doc="Subtract the kernel's mean: constant brightness makes no response."
+    )
     quadrature: bool = option(
         False, doc="Add the sine kernel: the response no longer depends on the stripe's phase."
     )
@@ -85,7 +93,7 @@ def orient(view: View, mask: Mask, options: Options) -> OrientationMap:
     hair = hair_of(view, mask)
     radius = options.kernel_size // 2
     box = bounding_box(hair, 2 * radius)
-    core = well_inside(hair[box], 1.0)
+    core = well_inside(hair[box], _EDGE_SIGMA)
     picture = luminance(view.image[box])
     if options.difference_of_gaussians:
         picture = _band(fill_beyond(picture, core, options.dog_wide), options)
@@ -97,7 +105,7 @@ def orient(view: View, mask: Mask, options: Options) -> OrientationMap:
     for _ in range(options.iterations + 1):
         filled = fill_beyond(picture, core, radius)
         angle, weight = _strongest(filled, hair[box], bases, options)
-        top = float(np.quantile(weight[core], 0.99))
+        top = float(np.quantile(weight[core], _TOP_QUANTILE))
         strength *= min(top / least, 1.0)
         picture = np.minimum(weight / max(top, 1e-12), 1).astype(np.float32)
 
@@ -135,13 +143,14 @@ def gabor_kernels(options: Options) -> Float64Array:
 
 
 def _band(picture: Float32Array, options: Options) -> Float32Array:
+    """Return the picture's difference of Gaussians."""
     return blur(picture, options.dog_fine) - blur(picture, options.dog_wide)
 
 
 def _basis(bank: Float64Array) -> tuple[Float32Array, Float32Array]:
-    """Return few kernels (rank, size, size) and the factors (rank, angles) that make up the bank.
+    """Return few kernels (rank, size, size) and factors (rank, angles) whose products are the bank.
 
-    Turned copies of one smooth kernel span few dimensions (Perona 1995), so a third of the
+    Rotated copies of one smooth kernel span few dimensions (Perona 1995), so a third of the
     convolutions are enough.
     """
     angles, size, _ = bank.shape
@@ -157,7 +166,7 @@ def _strongest(
     bases: list[tuple[Float32Array, Float32Array]],
     options: Options,
 ) -> tuple[Float32Array, Float32Array]:
-    """Return the strand angle of the strongest response and Paris's confidence, 0 beyond hair."""
+    """Return the strand angle of the strongest response and Paris's confidence, 0 off the hair."""
     inputs = [
         np.stack([cv2.filter2D(picture, cv2.CV_32F, k)[hair] for k in kernels], axis=1)
         for kernels, _ in bases
@@ -177,7 +186,7 @@ def _strongest(
 def angle_and_confidence(
     response: Float32Array, interpolate: bool = False
 ) -> tuple[Float32Array, Float32Array]:
-    """Return the strand angle of the largest of the responses F and how far it stands out.
+    """Return the strand angle of the largest of the responses F and its confidence.
 
     The confidence is `w = sum over t of sqrt(d(t, t~) (F(t) - F(t~))^2)`, d the angle on the half
     circle between t and the strongest direction t~ (Paris et al. 2004).
@@ -210,5 +219,5 @@ def angle_and_confidence(
 
 
 def _share_inside(core: BoolArray, radius: int) -> Float32Array:
-    """Return how much of the kernel around a pixel lies well inside the hair, in [0, 1]."""
+    """Return the share in [0, 1] of the kernel around a pixel that lies well inside the hair."""
     return np.minimum(blur(core.astype(np.float32), max(radius / 2, 0.5)), 1)

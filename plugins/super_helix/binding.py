@@ -1,4 +1,4 @@
-"""Between the groom's points and super-helices: rods made from guides, guides drawn on rods."""
+"""Bind guides to super-helices: rods from the guides' points, and points from the rods."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from hairkit.helices.helix_strands import travelling
 from hairkit.parallel import compiled
 from hairkit.types.strands import Strands
 
-from .element_kernels import carried, node, onward, times, turns
+from .element_kernels import advance_frame, node, place_clamped_end, times, turns
 from .rods import Rods
 
 SHAPE, FEWEST, MOST = 0.0015, 8, 32
-"""Elements as a guide's shape needs: mean distance in metres, and bounds of the number."""
+"""Mean distance in metres to which elements fit a guide's shape, and bounds of their number."""
 SHORTEST = 1e-4
 """Guides shorter than this, metres, are refused."""
 
 
 class Binding(NamedTuple):
-    """How the guides' points ride on the elements."""
+    """Where the guides' points are on the elements."""
 
     element: Int64Array
     """(P,) element of each point, counted over all strands."""
@@ -39,15 +39,15 @@ class Binding(NamedTuple):
     """(P,) metres from each point's predecessor to it."""
 
 
-def rods_of(strands: Strands, elements: int) -> tuple[Rods, Binding]:
-    """Return rods of unit stiffness and density through guides, and how the guides ride on them.
+def bind_rods(strands: Strands, elements: int) -> tuple[Rods, Binding]:
+    """Return rods of unit stiffness and density through the guides, and their binding to the rods.
 
     Parameters
     ----------
     strands
         The guides.
     elements
-        Elements a strand; 0 takes as many as each strand's shape needs.
+        Elements a strand; 0 for as many as each strand's shape needs.
     """
     short = np.flatnonzero(strands.lengths() < SHORTEST)
     if len(short):
@@ -110,11 +110,11 @@ def draw(
     frame, root = np.empty((3, 3)), np.empty(3)
     next_frame, next_root = np.empty((3, 3)), np.empty(3)
     for strand in range(begin, stop):
-        carried(head, rods.roots[strand], rods.frames[strand], root, frame)
+        place_clamped_end(head, rods.roots[strand], rods.frames[strand], root, frame)
         e = rods.offsets[strand]
         for p in range(binding.bounds[strand], binding.bounds[strand + 1]):
             while e < binding.element[p]:
-                onward(q[e], rods.lengths[e], frame, root, next_frame, next_root)
+                advance_frame(q[e], rods.lengths[e], frame, root, next_frame, next_root)
                 frame[:], root[:] = next_frame, next_root
                 e += 1
             node(q[e], binding.arc[p], local, slope)

@@ -114,7 +114,7 @@ def product(a: Float64Array, b: Float64Array, result: Float64Array) -> None:
 
 
 @compiled
-def onward(
+def advance_frame(
     q: Float64Array,
     length: float,
     frame: Float64Array,
@@ -133,14 +133,14 @@ def onward(
 
 
 @compiled
-def carried(
+def place_clamped_end(
     head: Float64Array,
     point: Float64Array,
     axes: Float64Array,
     moved: Float64Array,
     turned: Float64Array,
 ) -> None:
-    """Write a clamped end's point and frame on a head moved by a rigid motion (4, 4)."""
+    """Write the point and frame of a clamped end on a head moved by a rigid motion (4, 4)."""
     times(head, point, moved)
     product(head, axes, turned)
     for i in range(3):

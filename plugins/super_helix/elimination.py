@@ -1,4 +1,4 @@
-"""Solving a chain's step from the tip to the root and back, in time linear in its elements."""
+"""Solve a chain's linear system from the tip to the root and back, in time linear in its size."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def eliminate(
     spin: Float64Array,
     shift: Float64Array,
 ) -> None:
-    """Eliminate from the tip to the root, then go back; leaves -dq in `gradient[:, 6:]`."""
+    """Eliminate from tip to root, then substitute back; leaves -dq in `gradient[:, 6:]`."""
     count = len(form)
     tip, pull, d = np.zeros((6, 6)), np.zeros(6), np.empty(3)
     moved, carried = np.empty((3, 3)), np.empty((6, 3))
@@ -35,7 +35,7 @@ def eliminate(
             for j in range(i):
                 a[i, j] = a[j, i]
         _invert(a[TWIST:, TWIST:])
-        _take_out(a, b, tip, pull)
+        _condense(a, b, tip, pull)
     twist, turned = np.zeros(6), np.zeros(6)
     for k in range(count):
         a, b = form[k], gradient[k]
@@ -69,7 +69,7 @@ def _join(
     moved: Float64Array,
     carried: Float64Array,
 ) -> None:
-    """Add what hangs on an element's end to the upper triangle of its form.
+    """Add the form of the chain behind an element's end to the upper triangle of its own.
 
     The end's twist is X (turn, move) + S dq, X = [[1, 0], [-[d]x, 1]] and S = [spin; shift]; the
     form of the end is [[A, B], [B', C]].
@@ -110,7 +110,7 @@ def _join(
 
 @compiled
 def _invert(a: Float64Array) -> None:
-    """Put the inverse of a symmetric matrix (3, 3) in its place."""
+    """Replace a symmetric matrix (3, 3) by its inverse."""
     p, q, r = a[0, 0], a[0, 1], a[0, 2]
     s, t, u = a[1, 1], a[1, 2], a[2, 2]
     # Cholesky, since the forms of twist and bending differ by many orders of magnitude
@@ -132,8 +132,8 @@ def _invert(a: Float64Array) -> None:
 
 
 @compiled
-def _take_out(a: Float64Array, b: Float64Array, tip: Float64Array, pull: Float64Array) -> None:
-    """Take dq out: the joint's form in `tip`, A_qq^-1 A_qV in a[6:, :6], A_qq^-1 g in b[6:]."""
+def _condense(a: Float64Array, b: Float64Array, tip: Float64Array, pull: Float64Array) -> None:
+    """Eliminate dq: Schur complement in `tip`, A_qq^-1 A_qV in a[6:, :6], A_qq^-1 g in b[6:]."""
     inverse, across, below, own = a[TWIST:, TWIST:], a[:TWIST, TWIST:], a[TWIST:, :TWIST], b[TWIST:]
     x, y, z = own[0], own[1], own[2]
     for i in range(3):

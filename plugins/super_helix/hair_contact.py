@@ -14,9 +14,9 @@ from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled
 
 CELL = 0.01
-"""Metres; a lock's width."""
+"""Edge of a cell in metres: about the width of a lock."""
 WIDEST = 256
-"""Cells along an edge of the grid at most; hair beyond is taken at its border."""
+"""Cells along an edge of the grid at most; points beyond are clamped to its border."""
 
 
 class Neighbours:
@@ -65,7 +65,7 @@ class Neighbours:
 
 
 def _around(points: Float64Array, velocity: Float64Array, masses: Float64Array) -> Float64Array:
-    """Return (P, 7) density, mean velocity, and unit direction down the slope of density."""
+    """Return (P, 7) density, mean velocity, and the unit direction of falling density."""
     if not len(points):
         return np.zeros((0, 7))
     low = points.min(axis=0)

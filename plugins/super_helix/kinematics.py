@@ -1,4 +1,4 @@
-"""Where a super-helix lies and how it moves: the readable NumPy form, one strand at a time.
+"""Kinematics of a super-helix: the readable NumPy form, one strand at a time.
 
 The frame travels as F' = F [q]x with q = (twist, curvature, curvature) constant on an element, the
 point as r' = F e1 (Bertails et al. 2006, equations 3 to 5). A change dq of an element turns all

@@ -18,7 +18,7 @@ from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled
 
 from .contact import touch
-from .element_kernels import carried, node, onward, product, times, turns
+from .element_kernels import advance_frame, node, place_clamped_end, product, times, turns
 from .elimination import TWIST, eliminate
 from .rods import NODES, SHARES, WEIGHTS, Rods
 from .state import CLOSE, FAR, Loads, Motion, Step
@@ -35,23 +35,23 @@ def step_strands(
     for strand in range(begin, stop):
         first, last = rods.offsets[strand], rods.offsets[strand + 1]
         root, frame = np.empty(3), np.empty((3, 3))
-        carried(step.head, rods.roots[strand], rods.frames[strand], root, frame)
+        place_clamped_end(step.head, rods.roots[strand], rods.frames[strand], root, frame)
         now, two_step = motion.q[first:last].copy(), step.two_step
-        solved = _solved(
+        converged = _solve_step(
             rods, motion, loads, step, two_step, step.iterations, first, last, root, frame, now
         )
-        if not solved:
-            # wild hair takes Euler's step, which only takes energy, from where it is
+        if not converged:
+            # not converged: redo with backward Euler, which dissipates energy
             two_step = False
             motion.q_before[first:last] = now
             more = 2 * step.iterations
-            _solved(rods, motion, loads, step, two_step, more, first, last, root, frame, now)
+            _solve_step(rods, motion, loads, step, two_step, more, first, last, root, frame, now)
         motion.q_before[first:last] = now
-        _keep(rods, motion, step, two_step, first, last, root, frame)
+        _update_motion(rods, motion, step, two_step, first, last, root, frame)
 
 
 @compiled
-def _solved(
+def _solve_step(
     rods: Rods,
     motion: Motion,
     loads: Loads,
@@ -64,19 +64,19 @@ def _solved(
     frame: Float64Array,
     now: Float64Array,
 ) -> bool:
-    """Extrapolate one strand's coordinates, iterate, and return whether they settled."""
+    """Extrapolate one strand's coordinates, iterate, and return whether the step converged."""
     start = np.empty((last - first, 3))
     for k in range(last - first):
         for j in range(3):
             before = motion.q_before[first + k, j]
             start[k, j] = (4 * now[k, j] - before) / 3 if two_step else now[k, j]
             motion.q[first + k, j] = 2 * now[k, j] - before
-    turned = 0.0
+    turn = 0.0
     for _ in range(iterations):
-        turned = newton(rods, motion, loads, step, two_step, first, last, root, frame, start)
-        if turned < CLOSE:
+        turn = newton(rods, motion, loads, step, two_step, first, last, root, frame, start)
+        if turn < CLOSE:
             break
-    return turned < FAR
+    return turn < FAR
 
 
 @compiled
@@ -94,7 +94,7 @@ def newton(
 ) -> float:
     """Change `motion.q` of one strand by one Newton iteration of the implicit step.
 
-    Return by how many radians it turned an element at most.
+    Return the largest rotation of an element in it, radians.
     """
     count = last - first
     h = step.seconds * 2 / 3 if two_step else step.seconds
@@ -107,7 +107,7 @@ def newton(
         e = first + k
         own = (frames[k], ends[k], form[k], gradient[k])
         _element(rods, motion, loads, step, two_step, h, e, *own, scratch)
-        _onward(motion.q[e], rods.lengths[e], frames, ends, spin, shift, k, scratch)
+        _advance_element(motion.q[e], rods.lengths[e], frames, ends, spin, shift, k, scratch)
         for j in range(3):
             stiff = rods.lengths[e] * rods.stiffness[e, j]
             form[k, 6 + j, 6 + j] += h * (h + step.friction) * stiff
@@ -188,13 +188,13 @@ def _element(
                 scratch[TOUCH:].reshape(-1, 3),
             )
         if touched:
-            _add(form, gradient, arm, by_change, weight, pull)
+            _add_point(form, gradient, arm, by_change, weight, pull)
         else:
-            _add_alike(form, gradient, arm, by_change, total, pull)
+            _add_isotropic_point(form, gradient, arm, by_change, total, pull)
 
 
 @compiled
-def _add(
+def _add_point(
     form: Float64Array,
     gradient: Float64Array,
     arm: Float64Array,
@@ -222,7 +222,7 @@ def _add(
 
 
 @compiled
-def _add_alike(
+def _add_isotropic_point(
     form: Float64Array,
     gradient: Float64Array,
     arm: Float64Array,
@@ -230,7 +230,7 @@ def _add_alike(
     weight: float,
     pull: Float64Array,
 ) -> None:
-    """Add a point whose weight is alike in all directions: `_add` with most products known."""
+    """Add a point whose weight is a multiple of the identity: `_add_point` with fewer products."""
     square = arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2]
     for i in range(3):
         p, q = (i + 1) % 3, (i + 2) % 3
@@ -254,7 +254,7 @@ def _add_alike(
 
 
 @compiled
-def _onward(
+def _advance_element(
     q: Float64Array,
     length: float,
     frames: Float64Array,
@@ -264,7 +264,7 @@ def _onward(
     k: int,
     scratch: Float64Array,
 ) -> None:
-    """Place the end of element k and how it moves with dq."""
+    """Write the frame and end after element k, and their derivatives by its dq."""
     slope, turn, mean, local = scratch[0], scratch[1], scratch[2], scratch[POINTS, 0]
     node(q, length, local, slope)
     turns(q, length, turn, mean)
@@ -277,7 +277,7 @@ def _onward(
 
 
 @compiled
-def _keep(
+def _update_motion(
     rods: Rods,
     motion: Motion,
     step: Step,
@@ -287,7 +287,7 @@ def _keep(
     root: Float64Array,
     frame: Float64Array,
 ) -> None:
-    """Place the Gauss points at the new coordinates and put the old ones one step back."""
+    """Write the Gauss points of the new coordinates, and keep those of the step before."""
     h = step.seconds * 2 / 3 if two_step else step.seconds
     local, slope, arm = np.empty(3), np.empty((3, 3)), np.empty(3)
     next_frame, next_root = np.empty((3, 3)), np.empty(3)
@@ -303,7 +303,7 @@ def _keep(
                 motion.points[e, g, i] = root[i] + arm[i]
                 motion.velocity_before[e, g, i] = motion.velocity[e, g, i]
                 motion.velocity[e, g, i] = (motion.points[e, g, i] - old) / h
-        onward(motion.q[e], rods.lengths[e], frame, root, next_frame, next_root)
+        advance_frame(motion.q[e], rods.lengths[e], frame, root, next_frame, next_root)
         frame[:], root[:] = next_frame, next_root
 
 
@@ -316,12 +316,12 @@ def place_points(
     frame, root = np.empty((3, 3)), np.empty(3)
     next_frame, next_root = np.empty((3, 3)), np.empty(3)
     for strand in range(begin, stop):
-        carried(head, rods.roots[strand], rods.frames[strand], root, frame)
+        place_clamped_end(head, rods.roots[strand], rods.frames[strand], root, frame)
         for e in range(rods.offsets[strand], rods.offsets[strand + 1]):
             for g in range(NODES):
                 node(q[e], rods.lengths[e] * SHARES[g], local, slope)
                 times(frame, local, arm)
                 for i in range(3):
                     points[e, g, i] = root[i] + arm[i]
-            onward(q[e], rods.lengths[e], frame, root, next_frame, next_root)
+            advance_frame(q[e], rods.lengths[e], frame, root, next_frame, next_root)
             frame[:], root[:] = next_frame, next_root

@@ -1,7 +1,7 @@
 """The same step formed densely and solved by conjugate gradients, as in the patent.
 
-Readable twin of `recursion.py`, one strand at a time, and the energies and generalised forces that
-tests hold against each other. Mass matrix and forces are those of Bertails et al. 2006, section 4:
+Readable twin of `linear_time_step.py`, one strand at a time, and the energies and generalised
+forces that tests compare. Mass matrix and forces are those of Bertails et al. 2006, section 4:
 M = J' m J, K = diag(l GJ, l EI, l EI). The step is implicit (Euler or BDF2) in place of the text's
 semi-implicit one: its Coriolis forces arise from the Gauss points' own velocities.
 """
@@ -91,12 +91,12 @@ def step_densely(rods: Rods, motion: Motion, loads: Loads, step: Step) -> None:
         acting = Loads(*(array[own] for array in loads))
         root = step.head[:3, :3] @ rod.roots[0] + step.head[:3, 3]
         frame = step.head[:3, :3] @ rod.frames[0]
-        q, solved = _iterated(rod, before, acting, step, step.iterations, root, frame)
+        q, converged = _iterate(rod, before, acting, step, step.iterations, root, frame)
         taken = step
-        if not solved:
+        if not converged:
             taken = step._replace(two_step=False)
             calm = before._replace(q_before=before.q)
-            q, _ = _iterated(rod, calm, acting, taken, 2 * step.iterations, root, frame)
+            q, _ = _iterate(rod, calm, acting, taken, 2 * step.iterations, root, frame)
         h, _, back, _ = _history(before, taken)
         points = place(rod, q, root, frame).points
         new = (q, before.q, points, before.points, (points - back) / h, before.velocity)
@@ -104,7 +104,7 @@ def step_densely(rods: Rods, motion: Motion, loads: Loads, step: Step) -> None:
             array[own] = values
 
 
-def _iterated(
+def _iterate(
     rod: Rods,
     before: Motion,
     loads: Loads,
@@ -113,7 +113,7 @@ def _iterated(
     root: Float64Array,
     frame: Float64Array,
 ) -> tuple[Float64Array, bool]:
-    """Return coordinates after Newton iterations from the extrapolated ones; whether settled."""
+    """Return coordinates after Newton iterations from extrapolated ones; whether they converged."""
     q = 2 * before.q - before.q_before
     most = 0.0
     for _ in range(iterations):

@@ -17,7 +17,7 @@ SHARES, WEIGHTS = (
 
 
 class Rods(NamedTuple):
-    """What does not change: packed like strands, element e of strand s in `offsets`."""
+    """The constants of the rods, packed like strands: strand s has elements offsets[s:s + 2]."""
 
     offsets: Int64Array
     """(S + 1,) ascending, first 0."""

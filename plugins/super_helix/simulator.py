@@ -17,28 +17,29 @@ from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
-from .binding import draw, rods_of
+from .binding import bind_rods, draw
 from .hair_contact import Neighbours
 from .linear_time_step import place_points, step_strands
 from .reference import step_densely
 from .rods import NODES, Rods
 from .state import Loads, Motion, Step
-from .statics import at_rest
+from .statics import rest_as_captured
 
 if TYPE_CHECKING:
     from . import Options
 
 FRAME = 1 / 60
-"""Seconds that the option `substeps` divides."""
+"""Seconds that the option `substeps` divides: one frame."""
 SKIN = 0.0015
 """Hair is kept this far off the head, metres, where it was not nearer at rest."""
 PUSH_RATE, GRAB_RATE = 600.0, 150.0
 """Rates, per second, at which contact and a user's hand act on a point's or a strand's mass."""
 POISSON = 0.38
+"""Poisson's ratio of hair."""
 KERATIN = 1300.0
-"""Kilograms per cubic metre."""
+"""Density of hair, kilograms per cubic metre."""
 MIDDLE = 0.6
-"""`bend_stiffness` of a groom that leaves the stiffness of hair as it is."""
+"""`bend_stiffness` of a groom at which the stiffness is that of the options."""
 
 
 class SuperHelices:
@@ -46,7 +47,7 @@ class SuperHelices:
 
     def __init__(self, groom: Groom, options: Options, obstacles: Obstacles | None = None) -> None:
         self._groom = groom
-        self._shape, self._binding = rods_of(groom.strands, options.elements)
+        self._shape, self._binding = bind_rods(groom.strands, options.elements)
         self._rest_gravity = np.array([0.0, -groom.physics.gravity, 0.0])
         if obstacles is None and options.contact and len(groom.strands):
             obstacles = head_obstacles(groom.head)
@@ -82,7 +83,7 @@ class SuperHelices:
         width = groom.material.width * 1e6 if options.diameter is None else options.diameter
         grip = groom.physics.friction if options.friction is None else options.friction
         options = self._options = replace(options, diameter=width, friction=grip)
-        self._rods = at_rest(self._with_material(options), self._rest_gravity)
+        self._rods = rest_as_captured(self._with_material(options), self._rest_gravity)
 
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
         """Put the guides at rest on a head at `head_from_rest` (4, 4), without velocity."""

@@ -1,4 +1,4 @@
-"""What a step starts from and what acts during it: arrays that compiled code and its twin share."""
+"""State, loads and settings of a step: arrays that the compiled code and its twin share."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array
 
 CLOSE = 0.03
-"""Radians by which an iteration turns no element more once a strand's step is solved."""
+"""Largest rotation of an element in an iteration, radians, at which a step has converged."""
 FAR = 0.1
-"""Radians in the last iteration above which a step is given up for a shorter-sighted one."""
+"""Rotation in the last iteration, radians, above which a step is redone with backward Euler."""
 
 
 class Motion(NamedTuple):
@@ -33,12 +33,12 @@ class Motion(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """What acts on the Gauss points during a step."""
+    """Forces on the Gauss points during a step."""
 
     drag: Float64Array
     """(E, NODES) kilograms per second."""
     air: Float64Array
-    """(E, NODES, 3) velocity that the drag pulls to, metres per second."""
+    """(E, NODES, 3) velocity of the medium that drags, metres per second."""
     spring: Float64Array
     """(E, NODES) newton per metre, 0 where nothing holds the point."""
     anchor: Float64Array

@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled, parallel_for
 
-from .element_kernels import node, onward, times, turns
+from .element_kernels import advance_frame, node, times, turns
 from .rods import NODES, SHARES, WEIGHTS, Rods
 
 MARGIN = 0.6
@@ -22,7 +22,7 @@ MARGIN = 0.6
 _DIFFERENCE = 1e-5
 
 
-def at_rest(rods: Rods, gravity: Float64Array) -> Rods:
+def rest_as_captured(rods: Rods, gravity: Float64Array) -> Rods:
     """Return the rods with a natural shape, and stiffness where needed, to rest as captured."""
     load = gravity_forces(rods, rods.captured, gravity)
     rods = stiffened(rods, gravity)
@@ -115,7 +115,7 @@ def _forces(
     frames, ends = np.empty((count + 1, 3, 3)), np.empty((count + 1, 3))
     frames[0], ends[0] = rods.frames[strand], rods.roots[strand]
     for k in range(count):
-        onward(q[k], rods.lengths[first + k], frames[k], ends[k], frames[k + 1], ends[k + 1])
+        advance_frame(q[k], rods.lengths[first + k], frames[k], ends[k], frames[k + 1], ends[k + 1])
     local, slope, arm = np.empty(3), np.empty((3, 3)), np.empty(3)
     turn, mean = np.empty((3, 3)), np.empty((3, 3))
     hung, moment, pull = 0.0, np.zeros(3), np.empty(3)

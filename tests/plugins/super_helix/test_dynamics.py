@@ -9,7 +9,7 @@ from hairkit_plugins.super_helix.kinematics import move_slopes, moves, place
 from hairkit_plugins.super_helix.linear_time_step import newton, step_strands
 from hairkit_plugins.super_helix.rods import NODES, Rods
 from hairkit_plugins.super_helix.state import Loads, Motion, Step
-from hairkit_plugins.super_helix.statics import at_rest, gravity_forces
+from hairkit_plugins.super_helix.statics import gravity_forces, rest_as_captured
 from rod_bench import DOWN, energy, free, random_rods, rest, rod, run, step_of
 from scipy.integrate import solve_ivp
 
@@ -169,7 +169,7 @@ def test_both_solvers_keep_the_same_state(rng: np.random.Generator) -> None:
 
 def test_inverse_statics_rests(rng: np.random.Generator) -> None:
     """With the natural shape found, forces vanish at the captured shape, and nothing moves."""
-    rods = at_rest(random_rods(rng), DOWN)
+    rods = rest_as_captured(random_rods(rng), DOWN)
     motion = rest(rods)
     run(rods, motion, free(rods), step_of(1 / 60), 60)
     np.testing.assert_allclose(motion.q, rods.captured, rtol=0, atol=1e-9)
@@ -179,14 +179,14 @@ def test_inverse_statics_rests(rng: np.random.Generator) -> None:
 def test_rest_is_stable(rng: np.random.Generator) -> None:
     """Hair that stands up is made stiff enough not to fall over when it is pushed."""
     upright = rod(0.2, 8, frame=np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]))
-    rods = at_rest(upright, DOWN)
+    rods = rest_as_captured(upright, DOWN)
     assert (rods.stiffness > 2 * upright.stiffness).all()
     motion = rest(rods)
     motion.velocity[:, :, 0] += 0.3
     run(rods, motion, free(rods, 5.0), step_of(2e-3, two_step=False), 1500)
     np.testing.assert_allclose(motion.q, rods.captured, rtol=0, atol=0.05)
     hanging = rod(0.2, 8, frame=np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]]))
-    np.testing.assert_array_equal(at_rest(hanging, DOWN).stiffness, hanging.stiffness)
+    np.testing.assert_array_equal(rest_as_captured(hanging, DOWN).stiffness, hanging.stiffness)
 
 
 def test_frames_do_not_matter(rng: np.random.Generator) -> None:

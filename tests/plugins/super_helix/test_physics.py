@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hairkit_plugins.super_helix import reference
 from hairkit_plugins.super_helix.kinematics import move_slopes, place
-from hairkit_plugins.super_helix.statics import at_rest, gravity_slopes
+from hairkit_plugins.super_helix.statics import gravity_slopes, rest_as_captured
 from rod_bench import (
     ALONG_DOWN,
     DENSITY,
@@ -96,7 +96,7 @@ def test_hanging_hair_swings_as_a_chain() -> None:
 
     The modes are those of the linear equations; the first one, kicked, also swings at its period.
     """
-    one = at_rest(rod(LENGTH, 12, WEIGHT * LENGTH**3 / 1e6, ALONG_DOWN), DOWN)
+    one = rest_as_captured(rod(LENGTH, 12, WEIGHT * LENGTH**3 / 1e6, ALONG_DOWN), DOWN)
     placed = place(one, one.captured, one.roots[0], one.frames[0])
     mass = reference.mass_matrix(one, placed)
     pull = reference.stiffness_matrix(one) - gravity_slopes(one, DOWN).reshape(mass.shape)
