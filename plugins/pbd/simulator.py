@@ -141,8 +141,8 @@ class PbdSimulator:
         if self._rest_energy is None:
             self._rest_energy = elastic_energy(rods, rest_state(rods), shape)
         down = self._head[:3, :3].T @ self._gravity(None)
-        measured = getattr(self._engine, "measured", None)
-        found = None if measured is None else measured(down)
+        measure = getattr(self._engine, "measure_energies", None)
+        found = None if measure is None else measure(down)
         if found is None:
             state = self._engine.state
             kinetic = 0.5 * float((rods.mass[..., None] * state.velocity**2).sum())
@@ -233,10 +233,10 @@ class PbdSimulator:
 
     def _grabs_on_engine(self, around: Surroundings, head: Float64Array) -> bool:
         """Pass the grabs to the engine; return False if it cannot pull points itself."""
-        hold = getattr(self._engine, "hold", None)
-        if hold is None:
+        set_grabs = getattr(self._engine, "set_grabs", None)
+        if set_grabs is None:
             return False
-        hold(around.grabs, self._embedding, inverse_motion(head), self._options.grab_speed)
+        set_grabs(around.grabs, self._embedding, inverse_motion(head), self._options.grab_speed)
         return True
 
     def _gravity(self, around: Surroundings | None) -> Float64Array:
@@ -248,12 +248,12 @@ class PbdSimulator:
         """Return the air velocity at the nodes, world; gusts are evaluated at every fourth node."""
         wind, gusty = np.asarray(around.wind, np.float64), around.turbulence != 0.0
         gusty = gusty and bool(wind.any())
-        blow = getattr(self._engine, "blow", None)
-        if blow is not None:  # the engine evaluates the gusts itself
+        set_gusts = getattr(self._engine, "set_gusts", None)
+        if set_gusts is not None:  # the engine evaluates the gusts itself
             seed = self._options.seed
             waves = gust_waves(self._time, wind, around.turbulence, seed) if gusty else None
-            blow(waves, wind, head)
-        if blow is not None or not gusty:
+            set_gusts(waves, wind, head)
+        if set_gusts is not None or not gusty:
             return wind
         nodes = self._rods.nodes
         some = np.unique(np.append(np.arange(0, nodes, 4), nodes - 1))

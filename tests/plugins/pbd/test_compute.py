@@ -74,19 +74,19 @@ def test_capsules_hold_hair_off_as_in_the_reference(groom: Groom) -> None:
     """A ball in a tip's way: wind blows it elsewhere, by both backends to the same place."""
     soft = {"stiffness": 0.0, "bend": 0.1}
 
-    def set_gusts(*simulators: PbdSimulator) -> None:
+    def blow(*simulators: PbdSimulator) -> None:
         for simulator in simulators:
             for _ in range(15):
                 simulator.advance(1 / 60, Surroundings(wind=np.array([8.0, 0.0, 0.0])))
 
     free = both(groom, **soft)[0]
-    set_gusts(free)
+    blow(free)
     away = free.points - groom.strands.points
     tip = int(np.linalg.norm(away, axis=1).argmax())
     centre = (groom.strands.points[tip] + 0.9 * away[tip])[None].astype(np.float64)
     ball = Capsules(centre, centre + 1e-3, np.full((1, 2), 0.02))
     pair = both(replace(groom, head=replace(groom.head, capsules=ball)), **soft)
-    set_gusts(*pair)
+    blow(*pair)
     assert np.abs(pair[0].points - free.points).max() > 1e-3
     assert apart(pair) < AGREE
 

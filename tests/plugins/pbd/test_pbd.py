@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hairkit_plugins.pbd import Options
+from hairkit_plugins.pbd.gl_backend import ComputeEngine
 from hairkit_plugins.pbd.head_interpolation import interpolate_motion, inverse_motion, motion_steps
 from hairkit_plugins.pbd.reference import rest_state
 from hairkit_plugins.pbd.simulator import PbdSimulator
@@ -243,6 +246,16 @@ def test_the_plugin_makes_a_simulator(manager: Manager, groom: Groom) -> None:
     assert len(simulator.strands) == guide.sum()
     cache = run(simulator, static_motion(), 2)
     assert cache.points.shape == (2, len(simulator.strands.points), 3)
+
+
+def test_optional_methods_of_engines_exist() -> None:
+    """Each method that the simulator looks up by name is one that the shaders provide.
+
+    A name that no engine has would silently select the slower way.
+    """
+    names = re.findall(r'getattr\(self\._engine, "(\w+)"', inspect.getsource(PbdSimulator))
+    assert {"set_gusts", "set_grabs", "measure_energies"} <= set(names)
+    assert [name for name in names if not hasattr(ComputeEngine, name)] == []
 
 
 def test_compiled_gusts_are_the_law_of_the_wind(groom: Groom) -> None:
