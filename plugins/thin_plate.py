@@ -15,7 +15,7 @@ import numpy as np
 
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
-from hairkit.cameras.silhouette_coherence import Outlines
+from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.similarity import triangulate
 from hairkit.options import option
 

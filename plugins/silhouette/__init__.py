@@ -24,7 +24,8 @@ import numpy as np
 
 from hairkit import Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import Float64Array
-from hairkit.cameras.silhouette_coherence import Outlines, coherence
+from hairkit.cameras.outlines import Outlines
+from hairkit.cameras.silhouette_coherence import coherence
 from hairkit.cameras.turntable import LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, Turn
 from hairkit.errors import InputError
 from hairkit.imaging.masked_filters import picture_scale

@@ -10,7 +10,8 @@ from turntable import Turntable, turntable
 
 from hairkit import Mask
 from hairkit.arrays import Float64Array
-from hairkit.cameras.silhouette_coherence import CAP, REACH, Outlines, coherence
+from hairkit.cameras.outlines import Outlines
+from hairkit.cameras.silhouette_coherence import CAP, REACH, coherence
 from hairkit.cameras.turntable import rotation_matrix
 
 MIDDLE = 0.7

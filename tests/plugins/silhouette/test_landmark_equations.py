@@ -9,7 +9,7 @@ from turntable import Turntable, turntable
 
 from hairkit import Mask
 from hairkit.arrays import Float64Array
-from hairkit.cameras.silhouette_coherence import Outlines
+from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.turntable import Turn
 
 
