@@ -1,7 +1,7 @@
-"""The verbs of the front door: `import hairkit` and each is one call on paths or objects.
+"""Functions of `import hairkit` that each do one command of the command line, on paths or objects.
 
-They find plugins, open files and choose cameras as the command line does. `manager` is the
-plugins to use, the installed ones when None; further keywords are the plugin's options.
+They find plugins, open files and choose cameras as the command line does. `manager` holds the
+plugins to use (None: the installed ones); further keywords are options of the plugin.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ def render(
     frame: int = 0,
     manager: Manager | None = None,
 ) -> UInt8Array:
-    """Return a picture (H, W, 3) uint8 RGB of a groom on its head, and write it when `path` says.
+    """Return a picture (H, W, 3) uint8 RGB of a groom on its head, and write it to `path` if given.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ _VIEWS = ", ".join(TURN)
 
 @contextmanager
 def _cache_file(cache: PointCache | StrPath | None) -> Iterator[Path | None]:
-    """Yield the file that exporters read a motion from; one made for this goes away again."""
+    """Yield the file that exporters read the motion from; a temporary one is deleted afterwards."""
     if not isinstance(cache, PointCache):
         yield None if cache is None else Path(cache)
         return

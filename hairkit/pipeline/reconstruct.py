@@ -1,4 +1,4 @@
-"""The whole road from photos to a groom: one function that runs a recipe, stage after stage."""
+"""Reconstruct a groom from photos: run the stages of a recipe in order."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ from hairkit.types.waves import Waves
 
 MAX_GUIDES = 100_000
 PHOTOS = "photos in "
-"""Begins the line of `hairkit.log` that names their folder."""
+"""Start of the line of `hairkit.log` that names the folder of photos."""
 SHEET = "contact_sheet.png"
-"""Name of the picture that shows what every stage has found."""
+"""Name of the picture that shows the result of every stage."""
 
 
 @one_blas_thread()
@@ -63,8 +63,8 @@ def reconstruct(
         The folder of a capture, or a capture that was read before.
     out
         Folder for `groom.npz`, `scene.json`, the recipe's exports, `contact_sheet.png` and
-        `hairkit.log`; its `work/` keeps what the stages found, so that unchanged stages are not
-        run again.
+        `hairkit.log`; its `work/` keeps the results of stages, so that unchanged stages are not run
+        again.
     recipe
         Which plugin does each stage: a shipped recipe's name, a `.toml` file or a recipe.
     manager
@@ -74,9 +74,9 @@ def reconstruct(
     guides
         Number of roots, each of which grows a strand.
     seed
-        Seed of the roots' places.
+        Seed of the root positions.
     progress
-        Is told how the run goes on.
+        Receives the progress of the run; None reports nothing.
     reuse
         False runs every stage again.
     sheet
@@ -85,7 +85,7 @@ def reconstruct(
     Raises
     ------
     HairkitError
-        The recipe, the photos or a plugin is at fault; its text is one line.
+        The recipe, the photos or a plugin is at fault; the message is one line.
     OSError
         A file cannot be written. Files are written whole or not at all.
     """
@@ -124,7 +124,7 @@ def _head(head: Head | str | os.PathLike[str] | None) -> Head:
 
 @dataclass(frozen=True, eq=False)
 class _Made:
-    """What the stages of one run have made."""
+    """Results of the stages of one run."""
 
     masks: tuple[Mask, ...]
     orientations: tuple[OrientationMap, ...]
@@ -146,7 +146,7 @@ def export_paths(
 
 
 def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int) -> _Made:
-    """Run the stages; views are worked on side by side while later stages wait for them."""
+    """Run the stages; views are processed in parallel, later stages wait for them."""
     photos, views = Given.of(capture), [Given.of(view) for view in capture.views]
     masks = run.every_view("segment", Mask, views)
     orientations = run.every_view("orient", OrientationMap, views, mask=masks)
@@ -181,7 +181,7 @@ def _write(
     made: _Made,
     exports: Sequence[tuple[str, Path]],
 ) -> None:
-    """Write the groom, the scene and the exports; away with the sheet of another groom."""
+    """Write the groom, the scene and the exports; remove the contact sheet of an older run."""
     made.groom.save(folder / "groom.npz")
     _in_photo_pixels(made.scene, capture).write_json(folder / "scene.json")
     for plugin, path in exports:
@@ -210,14 +210,14 @@ def _note_photos(log: RunLog, capture: Capture) -> None:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove what a run that was killed had not finished writing."""
+    """Remove partial files of a run that was killed."""
     for name in ("groom", "scene.json", "hairkit.log", SHEET):
         for leftover in folder.glob(f".{name}*.part"):
             leftover.unlink(missing_ok=True)
 
 
 def _in_photo_pixels(scene: Scene, capture: Capture) -> Scene:
-    """Return the scene with its cameras for the photos as they are on disk."""
+    """Return the scene with cameras for the full-size photos."""
     pairs = zip(scene.cameras, capture.views, strict=True)
     return replace(scene, cameras=tuple(c.resized(*view.photo_size) for c, view in pairs))
 
