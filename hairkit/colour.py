@@ -11,7 +11,7 @@ _Floats = TypeVar("_Floats", npt.NDArray[np.float32], npt.NDArray[np.float64])
 
 _SLOPE, _OFFSET, _GAMMA = 12.92, 0.055, 2.4
 _LINEAR_END, _SRGB_END = 0.0031308, 0.04045
-"""Where the straight piece of the curve ends, in linear light and in sRGB."""
+"""End of the linear segment of the curve, in linear light and in sRGB."""
 
 
 def linear_from_srgb(values: _Floats) -> _Floats:

@@ -57,7 +57,7 @@ _UNREADABLE = (
     KeyError,
     tokenize.TokenError,
 )
-"""What zipfile and NumPy raise on damaged archives, encrypted members and wild headers included."""
+"""Exceptions of zipfile and NumPy for damaged or encrypted archives and invalid headers."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _NAME_KEPT = 32
 """Characters of a file's name that its temporary file bears; file systems allow 255 bytes."""

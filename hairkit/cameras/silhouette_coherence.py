@@ -110,7 +110,7 @@ class _Ray(NamedTuple):
 
 
 class _Slopes(NamedTuple):
-    """How the other silhouettes' distances change at a point on a ray."""
+    """Gradients of the other silhouettes' distances at a point on a ray."""
 
     distance: Float64Array
     """(V,) pixels."""

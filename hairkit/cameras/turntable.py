@@ -19,7 +19,7 @@ from hairkit.types.capture import Capture
 SHARED, PER_VIEW = 8, 6
 """Numbers of a turn that all views share, and numbers of each view."""
 LOG_MAGNIFICATION, PERSPECTIVE = 6, 7
-"""Where the shared numbers hold log(pixels per metre at the turn's centre) and 1 / distance."""
+"""Indices of log(pixels per metre at the turn's centre) and 1 / distance in the shared numbers."""
 MIN_PERSPECTIVE = 0.01
 """Cameras are at most 1 / this away, metres: there pictures are orthographic to 0.1 pixels."""
 

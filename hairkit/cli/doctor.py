@@ -30,7 +30,7 @@ _MODULES = {"opencv-contrib-python-headless": "cv2"}
 """Distributions whose module has another name."""
 
 _NO_CACHE = "no locator available"
-"""What Numba says where it has no folder for compiled code."""
+"""Numba's message if it has no folder for compiled code."""
 
 _GL_CURE = "on Debian: apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6"
 

@@ -95,7 +95,7 @@ _COMMANDS = {
     "export_groom": "hairkit export out/groom.npz -o hair.NAME",
     "import_groom": "hairkit convert hair.NAME hair.abc",
 }
-"""How a plugin of a hook is used that is not chosen by a recipe alone."""
+"""Commands that use plugins of hooks which a recipe alone does not choose."""
 
 _PYPROJECT = """\
 [build-system]

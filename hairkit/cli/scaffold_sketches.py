@@ -19,7 +19,7 @@ class Sketch:
 
 
 STANDARD = ("from dataclasses", "from pathlib")
-"""How imports from the standard library begin."""
+"""Prefixes of imports from the standard library."""
 ALWAYS = ("from hairkit.hookspecs import hookimpl", "from hairkit.options import option")
 _NUMPY = "import numpy as np"
 

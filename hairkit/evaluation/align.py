@@ -20,7 +20,7 @@ from hairkit.types.camera import Camera
 from hairkit.types.strands import Strands
 
 ALIGNMENT_POINTS = 2000
-"""How many strand points, and how many head points, the similarity is fitted to at most."""
+"""Maximum number of strand points, and of head points, that the similarity is fitted to."""
 _SCALES = (0.1, 0.1, 0.1, 0.1, 0.01, 0.01, 0.01)
 """Usual size of log scale, rotation vector (radians) and shift (metres), for the solver's steps."""
 _LOST_PX = 1e4
@@ -60,7 +60,7 @@ class Similarity:
 
 @dataclass(frozen=True)
 class CameraError:
-    """How one aligned camera differs from the true one."""
+    """Difference between one aligned camera and the true one."""
 
     name: str
     azimuth_deg: float

@@ -54,7 +54,7 @@ DENSE_STRANDS = 10_000
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What the pictures of a report are drawn from; not part of the figures."""
+    """Data for the pictures of a report; not part of the figures."""
 
     precision: Hits
     recall: Hits

@@ -48,7 +48,7 @@ class OrientationError:
     """Error of a 2D orientation map over the true hair, its edge left out."""
 
     mean_deg: float
-    """Where the truth is coherent, see `hairkit.imaging.masked_filters.coherent_truth`."""
+    """True where the truth is coherent, see `hairkit.imaging.masked_filters.coherent_truth`."""
     median_deg: float
     mean_everywhere_deg: float
     """Coherent or not."""
@@ -200,7 +200,7 @@ def _sized(
 
 
 class _TrueView(NamedTuple):
-    """What samples are judged by in one view."""
+    """Reference images of one view."""
 
     camera: PackedCamera
     depth: Float32Array

@@ -20,7 +20,7 @@ MIN_QUERIES = 512
 _PRIME_Y, _PRIME_Z = 19349663, 83492791
 """Multipliers of the hash of cells (Teschner et al. 2003)."""
 NONE, AGAINST, ALONG = 0, 1, 2
-"""What a search found: no sample, one of opposite direction only, one of the same direction."""
+"""Results of a search: no sample, one of opposite direction only, one of the same direction."""
 
 
 class HashGrid(NamedTuple):

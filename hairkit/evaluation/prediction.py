@@ -1,4 +1,4 @@
-"""What a reconstruction left in its folder, as far as scoring reads it."""
+"""Results of a reconstruction, read from its folder for scoring."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ class Figure:
     unit: str
     digits: int = 1
     meaning: str = ""
-    """What a good value is."""
+    """Description of a good value."""
 
     def text(self) -> str:
         """Return the value with its unit."""

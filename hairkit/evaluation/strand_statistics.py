@@ -1,4 +1,4 @@
-"""What F does not see: lengths, roots on the scalp, hair inside the head, unbroken strands."""
+"""Strand statistics besides the F score: lengths, roots, points inside the head, broken strands."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class LengthMeasures:
 
 @dataclass(frozen=True)
 class HeadMeasures:
-    """Where strands stand to one head mesh."""
+    """Position of strands relative to one head mesh."""
 
     root_distance_mean_mm: float
     """Unsigned distance of roots to the mesh."""

@@ -23,7 +23,7 @@ from hairkit.types.strands import Strands
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What a rendered capture knows about itself; for scoring only."""
+    """Ground truth of a rendered capture; for scoring only."""
 
     folder: Path
     """The capture's `truth` folder."""

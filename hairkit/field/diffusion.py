@@ -145,7 +145,7 @@ class _System(NamedTuple):
 
 
 class _Iterate(NamedTuple):
-    """What conjugate gradients keep, (N, C) each."""
+    """State of the conjugate gradients, (N, C) each."""
 
     solution: Float32Array
     residual: Float32Array

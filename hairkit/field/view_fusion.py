@@ -175,7 +175,7 @@ class OrientedView(NamedTuple):
 
 
 class Fading(NamedTuple):
-    """How a view's weight falls behind the first hair that it sees, metres."""
+    """Decay length of a view's weight behind the first hair that it sees, metres."""
 
     see_through: float
     """Depth at which the weight falls to 1/e; 0: nothing behind counts."""

@@ -1,4 +1,4 @@
-"""What every exporter does first: choose guides or hair, drop degenerate strands, fill in defaults.
+"""Prepare a groom for export: choose guides or hair, drop degenerate strands, set defaults.
 
 Exporters inherit `ExportOptions` and write what `prepared` returns.
 """

@@ -209,7 +209,7 @@ def _profiles() -> Any:
 
 @cache
 def _nose_curves() -> Any:
-    """How far the ridge stands out, and its half width, over the height."""
+    """Curves of the nose ridge over height: its elevation above the face, and its half width."""
     from scipy.interpolate import PchipInterpolator
 
     return PchipInterpolator(_NOSE[::-1, 0], _NOSE[::-1, 1:])

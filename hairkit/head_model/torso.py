@@ -177,7 +177,7 @@ class Sections(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Where a grid's cells lie from the torso's joint, in the torso's size."""
+    """Position of a grid's cells relative to the torso's joint, in units of the torso's size."""
 
     first: Float64Array
     """(3,) centre of the first cell."""

@@ -1,4 +1,4 @@
-"""How many helix arcs a strand needs."""
+"""Number of helix arcs that a strand needs."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ from hairkit.types.strands import Strands
 TANGENT_STEPS = 3
 """Times that tangents are turned towards the chords."""
 TANGENT_WEIGHT = 0.3
-"""How firmly tangents stay in one such step, against 1 for the chords."""
+"""Weight of the previous tangents in one step; chords have weight 1."""
 LIMIT_STEPS = 4
 """Times that arcs over half a turn are looked for."""
 FARTHEST = 0.5

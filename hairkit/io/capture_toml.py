@@ -80,7 +80,7 @@ class _Top:
 
 @dataclass(frozen=True, eq=False)
 class CaptureFile:
-    """What a `capture.toml` says; the defaults stand for a file that does not exist."""
+    """Content of a `capture.toml`; the defaults apply if there is no file."""
 
     source: Path
     orthographic: bool = False

@@ -30,7 +30,7 @@ SPACES = {
     "z_up_centimetres": ("z_up", 0.01),
     "unreal": ("unreal", 0.01),
 }
-"""What `axis` may be: the axes and the metres per unit of each."""
+"""Values of `axis`: the axes and the metres per unit of each."""
 
 
 @dataclass(frozen=True)

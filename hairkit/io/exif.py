@@ -21,7 +21,7 @@ _MAX_ENTRIES = 512
 
 @dataclass(frozen=True)
 class Exif:
-    """What a photo's EXIF block says; None where it says nothing usable."""
+    """Values of a photo's EXIF block; None where a value is missing or unusable."""
 
     orientation: int = 1
     """1 to 8; 1 is upright."""

@@ -62,7 +62,7 @@ _CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 
 @dataclass(frozen=True)
 class PhotoHeader:
-    """What a picture's file says about it before it is decoded."""
+    """Facts from the header of a picture file."""
 
     kind: str
     """`JPEG` or `PNG`."""

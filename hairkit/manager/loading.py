@@ -35,7 +35,7 @@ NO_PLUGIN = "none"
 
 @dataclass(frozen=True)
 class PluginInfo:
-    """What is known about one plugin, working or broken."""
+    """Description of one plugin, working or broken."""
 
     name: str
     distribution: str
@@ -52,7 +52,7 @@ class PluginInfo:
     module: str = ""
     """Full name of the module that the plugin is, or in which its class is defined."""
     format: FileFormat | None = None
-    """What its file format carries, from the module's `FORMAT`."""
+    """File format that it reads or writes, from the module's `FORMAT`."""
     broken: str | None = None
     """Why the plugin cannot be used, or None."""
 

@@ -1,4 +1,4 @@
-"""What each stage must return: the one table that the results of plugins are checked against.
+"""Checks of the results of plugins, in one table of what each stage must return.
 
 The types check their own arrays when they are made (shapes, ranges, finiteness). Here is what only
 the stage knows: that a mask has its photo's size, that strand s starts at root s.

@@ -140,7 +140,7 @@ def _source(module: str, roots: Roots) -> Path | None:
 
 @dataclass(frozen=True)
 class _Source:
-    """What a digest needs to know about a file."""
+    """Content digest and imports of one file."""
 
     digest: str
     imports: tuple[_Import, ...]

@@ -80,7 +80,7 @@ class Recipe:
 
     name: str
     source: str
-    """Where the recipe comes from, for error messages."""
+    """Origin of the recipe, for error messages."""
     description: str
     stages: tuple[Stage, ...]
 

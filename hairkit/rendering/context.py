@@ -38,7 +38,7 @@ class Renderer:
     def __init__(self, context: moderngl.Context, backend: str) -> None:
         self.context = context
         self.backend = backend
-        """Which of `BACKENDS` made the context."""
+        """The one of `BACKENDS` that made the context."""
         self.home = context.simple_framebuffer((1, 1))
         """Bound between pictures, since moderngl rebinds the last one, even if released."""
         self.home.use()

@@ -25,7 +25,7 @@ StyleName = Literal["straight", "wavy", "curly", "short", "parted"]
 
 @dataclass(frozen=True)
 class Style:
-    """How a head of hair grows; metres unless stated."""
+    """Parameters of a hairstyle; metres unless stated."""
 
     length: float
     points: int
@@ -46,7 +46,7 @@ class Style:
     """0 waves in a plane, 1 round coils."""
     clumps: int
     clumping: float
-    """How far strands gather in their clump at the tip, 0 to 1."""
+    """Clumping of strands at the tip, 0 to 1."""
     frizz: float
     colour: tuple[float, float, float]
     """Linear RGB."""

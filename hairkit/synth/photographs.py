@@ -40,7 +40,7 @@ DISTANCE = 0.756
 FOCAL_PER_HEIGHT = 1.38
 """Focal length over the picture's height: a phone held upright, 47 mm equivalent."""
 TARGET = (0.0, -0.10, 0.0)
-"""Where the photographer aims."""
+"""Point that the cameras aim at."""
 AZIMUTH_JITTER, ELEVATION_JITTER, ROLL_JITTER = 4.0, 3.0, 2.0
 """Degrees at most off the nominal turn."""
 DISTANCE_JITTER, TARGET_JITTER = 0.05, 0.006
@@ -54,9 +54,9 @@ SENSOR_NOISE = 2.2
 CLOTHS = ((0.045, 0.075, 0.16), (0.21, 0.03, 0.04), (0.32, 0.31, 0.29), (0.05, 0.13, 0.09))
 """Linear RGB of the clothes."""
 KEY_AZIMUTHS, KEY_ELEVATION = (-50, 50), 42.0
-"""Where the key light stands, degrees."""
+"""Direction of the key light, degrees."""
 RIM_AZIMUTHS, RIM_ELEVATION = (110, 250), 48.0
-"""Where the rim light stands, degrees."""
+"""Direction of the rim light, degrees."""
 SKY_COLOUR = (1.1, 1.12, 1.18)
 """Linear RGB of the light from all around: overcast."""
 LENS_BLUR = 0.45

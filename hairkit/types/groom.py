@@ -26,7 +26,7 @@ def _grey() -> Float32Array:
 
 @dataclass(frozen=True, eq=False)
 class HairMaterial(Stored):
-    """How the hair looks, as far as photos tell."""
+    """Appearance of the hair, as measured in the photos."""
 
     root_colour: Float32Array = field(default_factory=_grey)
     """(3,) linear RGB in [0, 1]."""
@@ -55,10 +55,10 @@ class HairMaterial(Stored):
 
 @dataclass(frozen=True, eq=False)
 class HairPhysics(Stored):
-    """What a simulator starts from; dimensionless unless a unit is stated."""
+    """Default physics of a groom; dimensionless unless a unit is stated."""
 
     stiffness: float = 0.45
-    """How firmly strands keep the captured shape, 0 to 1."""
+    """Strength with which strands keep the captured shape, 0 to 1."""
     bend_stiffness: float = 0.6
     damping: float = 0.05
     friction: float = 0.1

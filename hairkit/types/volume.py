@@ -94,7 +94,7 @@ class VoxelGrid(Stored):
 
 @dataclass(frozen=True, eq=False)
 class Hull(Stored):
-    """Where hair is: its dense body, the looser volume that may hold strands, and the head."""
+    """Volume of the hair: its dense body, the looser volume that may hold strands, and the head."""
 
     grid: VoxelGrid
     dense: BoolArray
@@ -123,7 +123,7 @@ class Hull(Stored):
 
 @dataclass(frozen=True, eq=False)
 class ScalpDistance(Stored):
-    """How far the cells of a hull are from the scalp along paths through the hair."""
+    """Distance of the cells of a hull from the scalp along paths through the hair."""
 
     values: Float32Array
     """(X, Y, Z) length of the shortest path, metres; 0 where there is none."""

@@ -36,7 +36,7 @@ EDGE = 640
 
 @dataclass(frozen=True)
 class PreviousView:
-    """What a session showed before the alignment began; restored when it ends."""
+    """Settings of a session before the alignment began; restored when it ends."""
 
     paused: bool
     photos: bool

@@ -1,4 +1,4 @@
-"""What an Alembic file holds of a groom: in the file's space, within Unreal's limits."""
+"""Content of an Alembic file for a groom: in the file's space, within Unreal's limits."""
 
 from __future__ import annotations
 

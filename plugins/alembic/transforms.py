@@ -1,4 +1,4 @@
-"""Where an object's transform puts its points.
+"""Transforms of Alembic objects.
 
 Source: AbcGeom XformSample of Alembic 1.8: a stack of operations on row vectors, the last of which
 acts on points first.

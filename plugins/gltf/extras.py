@@ -1,4 +1,4 @@
-"""What glTF has no place for, as JSON under `extras.hairkit` of the document."""
+"""Data without a glTF equivalent, as JSON under `extras.hairkit` of the document."""
 
 from __future__ import annotations
 

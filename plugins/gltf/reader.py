@@ -32,7 +32,7 @@ _FARTHEST = 1e5
 
 
 class ReaderOptions(Protocol):
-    """What `read_gltf_groom` asks of the plugin's options."""
+    """Options of the plugin that `read_gltf_groom` uses."""
 
     @property
     def head(self) -> Path | None: ...

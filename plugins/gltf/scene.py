@@ -25,7 +25,7 @@ _STRANDS_ON = {"ribbons": 6, "cards": 22}
 
 
 class SceneOptions(StripOptions, Protocol):
-    """What `groom_document` asks of the plugin's options."""
+    """Options of the plugin that `groom_document` uses."""
 
     @property
     def lines(self) -> str: ...

@@ -16,7 +16,7 @@ from hairkit.types.strands import Strands
 
 @dataclass(frozen=True)
 class Streamed:
-    """What an array says of itself, and its pieces from the first element to the last."""
+    """Description of an array, and its pieces from the first element to the last."""
 
     dtype: np.dtype[Any]
     shape: tuple[int, ...]

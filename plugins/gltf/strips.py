@@ -26,7 +26,7 @@ _FEWEST_POINTS = 4
 
 
 class StripOptions(Protocol):
-    """What this module asks of the plugin's options."""
+    """Options of the plugin that this module uses."""
 
     @property
     def hair(self) -> str: ...

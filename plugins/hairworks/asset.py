@@ -17,7 +17,7 @@ Material = MappingProxyType[str, MaterialValue]
 
 @dataclass(frozen=True, eq=False)
 class ApxAsset:
-    """What a HairWorks file holds, in the file's own units, axes and numbering.
+    """Content of a HairWorks file, in the file's own units, axes and numbering.
 
     Making one checks what HairWorks checks when it loads a file; `FormatError` says what is wrong.
     """

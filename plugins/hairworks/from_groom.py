@@ -35,7 +35,7 @@ _MIN_DENSITY, _MAX_DENSITY = 0.01, 10.0
 
 
 class ApxOptions(Protocol):
-    """What `groom_to_asset` asks of the plugin's options."""
+    """Options of the plugin that `groom_to_asset` uses."""
 
     @property
     def points_per_strand(self) -> int: ...

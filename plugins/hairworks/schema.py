@@ -1,4 +1,4 @@
-"""What HairWorks 1.1 expects in an .apx file: classes, checksums, fields, types and defaults.
+"""Schema of HairWorks 1.1 .apx files: classes, checksums, fields, types and defaults.
 
 Read from files that NVIDIA's tools wrote; order, names (odd capitals included) and checksums are
 part of the format.

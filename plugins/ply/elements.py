@@ -29,7 +29,7 @@ _NAME = re.compile(r"[ -~]{1,64}")
 
 @dataclass(frozen=True)
 class _Element:
-    """What the header says about one element."""
+    """Declaration of one element in the header."""
 
     name: str
     rows: int

@@ -35,12 +35,12 @@ class PatchSettings:
     half: float = 12.0
     """Half the edge of a patch."""
     search: float = 36.0
-    """How far from the expected place it is looked for."""
+    """Search radius around the expected place."""
     blur: float = 1.5
     correlation: float = 0.8
     """Least correlation of a match."""
     lead: float = 0.06
-    """How far a match must stand out from the next best one."""
+    """Least margin of a match over the next best one."""
     noise: float = 3.0
     """Standard deviation of a match."""
 

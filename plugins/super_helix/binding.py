@@ -25,7 +25,7 @@ SHORTEST = 1e-4
 
 
 class Binding(NamedTuple):
-    """Where the guides' points are on the elements."""
+    """Position of the guides' points on the elements."""
 
     element: Int64Array
     """(P,) element of each point, counted over all strands."""

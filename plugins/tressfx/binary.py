@@ -30,7 +30,7 @@ VERSION = 4.0
 
 @dataclass(frozen=True, eq=False)
 class TfxHair:
-    """What a .tfx file holds, in its own unit and axes."""
+    """Content of a .tfx file, in its own unit and axes."""
 
     points: Float32Array
     """(S, N, 3), or (P, 3) where strands differ."""

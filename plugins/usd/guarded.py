@@ -28,7 +28,7 @@ _PROGRAM = Path(__file__).with_name("reading_child.py")
 
 @dataclass(frozen=True, eq=False)
 class Contents:
-    """What the reading program found."""
+    """Result of the reading process."""
 
     arrays: Mapping[str, npt.NDArray[Any]]
     description: Mapping[str, Any]

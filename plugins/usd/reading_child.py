@@ -33,7 +33,7 @@ CURVE_PRIMVARS = (
     "hairkit:root_barycentric",
 )
 _INSTEAD = {"st": "groom_root_uv", "displayColor": "groom_color"}
-"""What is not needed where something better was found."""
+"""Attributes that are skipped if a better one was found."""
 _INTERPOLATIONS = ("constant", "uniform", "varying", "vertex", "faceVarying")
 
 
@@ -100,7 +100,7 @@ def extracted(source: str) -> dict[str, npt.NDArray[Any]]:
 
 
 class _Taken:
-    """What has been found so far."""
+    """Data found so far."""
 
     def __init__(self) -> None:
         self.arrays: dict[str, npt.NDArray[Any]] = {}

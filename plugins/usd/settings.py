@@ -1,4 +1,4 @@
-"""What only hairkit knows of a groom, as the component's custom data, in SI units."""
+"""Settings of a groom without a USD equivalent, as custom data in SI units."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ DIGITS = 6
 
 
 class StageOptions(Protocol):
-    """What `write_stage` asks of the plugin's options."""
+    """Options of the plugin that `write_stage` uses."""
 
     @property
     def axis(self) -> str: ...

@@ -24,7 +24,7 @@ _log = logging.getLogger("hairkit")
 
 
 class ReadOptions(Protocol):
-    """What `read_groom` asks of the plugin's options, beside those of `adopt`."""
+    """Options of the plugin that `read_groom` uses, besides those of `adopt`."""
 
     @property
     def scale(self) -> float: ...

@@ -44,7 +44,7 @@ USUAL = {
     "roll": 0.1,
     "yaw": 0.15,
 }
-"""How much people differ: standard deviations of ratios' logarithms, metres and radians."""
+"""Variation between people: standard deviations of log ratios, of metres and of radians."""
 RATIOS = ("breadth", "depth", "slope")
 PULL = 0.002
 """Metres of misfit of every outline point that weigh as much as one standard deviation."""

@@ -27,7 +27,7 @@ WIDEST = 5.0
 
 @dataclass(frozen=True)
 class HairLook:
-    """How the hair is drawn in one frame."""
+    """Appearance of the hair in one frame."""
 
     hairs: int
     """Number of strands, the guides first."""
