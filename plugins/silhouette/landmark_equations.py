@@ -23,8 +23,8 @@ MIDLINE = np.array([27, 28, 29, 30, 33, 51, 57, 8])
 """Nose, lips and chin: they lie on the outline of a view from the side."""
 AFFINE_SPREAD, SMOOTH_SPREAD, SMOOTH_LENGTH = 0.004, 0.004, 0.04
 PLACE_SPREAD, LOOSE_SPREAD = 0.004, 0.0015
-"""Variation between heads, metres: stretch over `AFFINE_LENGTH`, smooth deformation and its correlation
-length, position of the face, single points."""
+"""Variation between heads, metres: stretch over `AFFINE_LENGTH`, smooth deformation and its
+correlation length, position of the face, single points."""
 AFFINE_LENGTH = 0.1
 
 
