@@ -17,6 +17,15 @@ from hairkit.types.camera import Camera
 
 Program = moderngl.Program | moderngl.ComputeShader
 
+EMPTY_RANGE = (0.1, 1.0)
+"""Depths that are assumed where no point is drawn, metres."""
+MARGIN = 0.01
+"""Gap between the outermost points and the near and far plane, metres: ribbons have a width."""
+MARGIN_SHARE = 0.01
+"""What is added to that gap, over the depth of the scene."""
+NEAREST = 0.01
+"""Smallest near plane of a perspective camera, and smallest depth of a range, metres."""
+
 
 @dataclass(frozen=True)
 class DepthRange:
@@ -29,13 +38,13 @@ class DepthRange:
     def around(cls, camera: Camera, *point_sets: npt.ArrayLike) -> DepthRange:
         """Return a range that contains all point sets (N, 3), in front of a perspective camera."""
         depths = [camera.depth(points) for points in point_sets if len(np.asarray(points))]
-        low = min((float(depth.min()) for depth in depths), default=0.1)
-        high = max((float(depth.max()) for depth in depths), default=1.0)
-        margin = 0.01 + 0.01 * (high - low)
+        low = min((float(depth.min()) for depth in depths), default=EMPTY_RANGE[0])
+        high = max((float(depth.max()) for depth in depths), default=EMPTY_RANGE[1])
+        margin = MARGIN + MARGIN_SHARE * (high - low)
         near = low - margin
         if camera.model == "perspective":
-            near = max(near, 0.01)
-        return cls(near, max(high + margin, near + 0.01))
+            near = max(near, NEAREST)
+        return cls(near, max(high + margin, near + NEAREST))
 
 
 def clip_from_camera(camera: Camera, depth: DepthRange) -> Float64Array:

@@ -20,6 +20,8 @@ from hairkit.types.strands import Strands
 _RESTART = 0xFFFFFFFF
 _GROUP = 64  # local_size_x of ribbon_shape.glsl
 _SHAPED_BYTES = 32  # a RibbonPoint of ribbon.glsl
+_GOLDEN_STEP = 0.6180339887498949
+"""Inverse of the golden ratio: multiples of it, modulo 1, fill the unit interval evenly."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,7 @@ def draw_ribbons(
 
 def strand_numbers(count: int) -> Float32Array:
     """Return a quasi-random number in [0, 1) for each strand (golden-ratio sequence)."""
-    golden = 0.6180339887498949
-    numbers: Float32Array = np.mod(np.arange(count) * golden, 1.0).astype(np.float32)
+    numbers: Float32Array = np.mod(np.arange(count) * _GOLDEN_STEP, 1.0).astype(np.float32)
     return numbers
 
 

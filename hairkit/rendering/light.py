@@ -37,6 +37,10 @@ STEP_GROWTH, FIRST_STEP = 1.08, 0.9
 """Ratio of successive steps along that ray, and the first sample in cells."""
 SOLID = 250.0
 """Optical depth of meshes, per metre."""
+KEY_DIRECTION, RIM_DIRECTION = (-0.45, -0.6, -0.75), (0.55, -0.6, 0.55)
+"""Towards the lights at a camera, in its axes (x right, y down): above left, behind right."""
+SKY_WEIGHTS = (1.0, 2.0, 1.0)
+"""Weights of the sky along +x, +y and +z; that along the opposite axes is 1."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class Lights:
     @classmethod
     def at_camera(cls, camera: Camera) -> Lights:
         """Return lights fixed to a camera: key above on the left, rim behind on the right."""
-        key, rim = np.array([-0.45, -0.6, -0.75]), np.array([0.55, -0.6, 0.55])
+        key, rim = np.array(KEY_DIRECTION), np.array(RIM_DIRECTION)
         return cls.studio(key @ camera.rotation, rim @ camera.rotation)
 
     @classmethod
@@ -178,11 +182,11 @@ def _optical_depth_towards(
 def _sky_visibility(extinction: Float32Array, spacing: float) -> Float32Array:
     """Return the mean transmittance (X, Y, Z) along the six axes, with double weight upwards."""
     total = np.zeros_like(extinction)
-    for axis, weight_up in ((0, 1.0), (1, 2.0), (2, 1.0)):
+    for axis, weight_up in enumerate(SKY_WEIGHTS):
         before = np.cumsum(extinction, axis=axis) * spacing
         after = before.take([-1], axis=axis) - before
         total += np.exp(-(before - extinction * spacing)) + weight_up * np.exp(-after)
-    return total / np.float32(7.0)
+    return total / np.float32(3 + sum(SKY_WEIGHTS))
 
 
 def _unit(direction: npt.ArrayLike) -> tuple[float, float, float]:

@@ -31,6 +31,8 @@ SHOWN_HAIRS = 50_000
 """Fewer strands are drawn wider, so that they cover the head as this many would."""
 WIDEST = 4.0
 """Largest factor of that widening."""
+HALF_STEP = 127
+"""Half of 255: added before the division by 255, so that it rounds to the nearest level."""
 
 
 def draw(
@@ -220,5 +222,5 @@ def _over(picture: UInt8Array, background: UInt8Array) -> UInt8Array:
             f"background has shape {background.shape}, expected {(*picture.shape[:2], 3)}"
         )
     clear = 255 - picture[..., 3:].astype(np.uint16)
-    mixed = picture[..., :3] + (background * clear + 127) // 255
+    mixed = picture[..., :3] + (background * clear + HALF_STEP) // 255
     return np.minimum(mixed, 255).astype(np.uint8)

@@ -32,6 +32,10 @@ PLUGIN = "manual"
 """The scene plugin that reads the pose."""
 EDGE = 640
 """Long edge of the photos while the head is aligned, pixels."""
+FITTED_VERTICES = 40
+"""Vertices of the head, evenly spaced in their order, whose projections determine a pose."""
+UNSEEN_MISFIT = 1e4
+"""Misfit of a vertex that a camera cannot project, pixels: more than any visible one has."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +119,8 @@ class Adjustment:
 
 def _fit_pose(found: list[Camera], nominal: list[Camera], vertices: Float32Array) -> Float64Array:
     """Return the pose (4, 4) whose projections by `nominal` cameras match those by `found` ones."""
-    points = vertices[np.linspace(0, len(vertices) - 1, 40).astype(int)].astype(np.float64)
+    points = vertices[np.linspace(0, len(vertices) - 1, FITTED_VERTICES).astype(int)]
+    points = points.astype(np.float64)
     wanted = np.stack([camera.project(points) for camera in found])
     rough = fit_similarity([c.position for c in found], [c.position for c in nominal])
     turn = Rotation.from_matrix(rough.rotation).as_rotvec()
@@ -131,7 +136,7 @@ def _fit_pose(found: list[Camera], nominal: list[Camera], vertices: Float32Array
         matrix = pose(values)
         moved = points @ matrix[:3, :3].T + matrix[:3, 3]
         seen = np.stack([camera.project(moved) for camera in nominal])
-        return np.nan_to_num((seen - wanted).ravel(), nan=1e4)
+        return np.nan_to_num((seen - wanted).ravel(), nan=UNSEEN_MISFIT)
 
     return pose(least_squares(misfit, start).x)
 

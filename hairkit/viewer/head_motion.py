@@ -67,11 +67,6 @@ class HeadMotion:
         self.turn = dict.fromkeys(AXES, 0.0)
         self._turned, self._speed = dict(self.turn), dict(self.turn)
 
-    @property
-    def still(self) -> bool:
-        """True if the head does not move."""
-        return not self.shakes and all(abs(speed) < 1e-4 for speed in self._speed.values())
-
     def matrix(self) -> Float64Array:
         """Return head_from_rest (4, 4): roll first, then pitch, then yaw."""
         result = np.eye(4)

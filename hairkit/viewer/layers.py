@@ -43,6 +43,8 @@ FIELD_LINE_HALF = 1.6
 """Half the length of such a segment, voxels."""
 PHOTO_EDGE = 640
 """Long edge of the photos on billboards, pixels."""
+FRUSTUM_COLOUR = (0.15, 0.35, 0.75, 0.8)
+"""Linear RGB and opacity of the view frusta."""
 _Found = TypeVar("_Found", bound=Stored)
 
 
@@ -103,7 +105,7 @@ class Layers:
         paths = []
         for (a, b, c, d), eye in zip(corners, eyes, strict=True):
             paths += [np.array([a, b, d, c, a]), np.array([a, eye, b]), np.array([c, eye, d])]
-        return _line_set(paths, (0.15, 0.35, 0.75, 0.8))
+        return _line_set(paths, FRUSTUM_COLOUR)
 
     def hull(self) -> Solid | None:
         """Return the surface of the dense part of the hull; None without a hull."""

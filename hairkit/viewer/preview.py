@@ -32,6 +32,8 @@ PICKED_COLOUR = (1.0, 0.85, 0.1)
 """sRGB of the picked guide."""
 TIME_SMOOTHING = 0.2
 """Weight of the newest frame in the displayed times."""
+MIN_EDGE = 16
+"""Smallest edge of the picture, pixels, in a window that is almost closed."""
 
 
 class Preview:
@@ -104,7 +106,7 @@ class Preview:
         """Draw the present state of the session."""
         frame_renderer, session = self.frame_renderer, self.session
         quality = LEVELS[0] if still else self.budget.quality
-        width, height = (max(round(n * quality.scale), 16) for n in session.size)
+        width, height = (max(round(n * quality.scale), MIN_EDGE) for n in session.size)
         buffer = None if frame_renderer.soft else session.guide_buffer()
         rows = session.guide_rows() if buffer is None or self._needs_rows else None
         look = self._look(quality.smooth, quality.share)

@@ -12,6 +12,8 @@ from hairkit.viewer.session import Session
 
 PHOTO_OPACITY = 0.5
 """Opacity of the photos during the alignment, so that both photo and head are visible."""
+SCALES = (0.1, 10.0)
+"""Smallest and largest factor of one `head_scale`: excludes typing errors in scripts."""
 
 
 @action(A={})
@@ -69,8 +71,9 @@ def head_turn(session: Session, axis: str = "yaw", degrees: float = 1.0) -> None
 @action(CTRL_PAGE_UP={"factor": 1.01}, CTRL_PAGE_DOWN={"factor": 1 / 1.01})
 def head_scale(session: Session, factor: float) -> None:
     """Scale the head."""
-    if not 0.1 <= factor <= 10:
-        raise InputError(f"head_scale: factor is {factor}, expected 0.1 to 10")
+    low, high = SCALES
+    if not low <= factor <= high:
+        raise InputError(f"head_scale: factor is {factor}, expected {low:g} to {high:g}")
     _adjusting(session).grow(factor)
     session.update_photo_cameras()
 

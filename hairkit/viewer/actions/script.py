@@ -33,6 +33,8 @@ from hairkit.viewer.session import Session
 
 _WRITES = ("screenshot", "record")
 _READS = ("open_file",)
+RERUN_POLL = 0.05
+"""Seconds between two looks at a running reconstruction."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ def _advance_pending(preview: Preview) -> None:
 
 def _wait_for_rerun(session: Session) -> None:
     while session.rerun is not None:
-        time.sleep(0.05)
+        time.sleep(RERUN_POLL)
         session.poll_rerun()
 
 

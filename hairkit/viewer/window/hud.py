@@ -44,6 +44,14 @@ _LABELS = {
 _ARROWS = ("LEFT", "RIGHT", "UP", "DOWN")
 GAP = 24
 """Pixels between columns."""
+MARGIN = 20
+"""Empty border of the help sheet and of a page of messages, pixels."""
+CORNER = 10
+"""Distance of the read-outs and messages from the edges of the picture, pixels."""
+PADDING = (6, 4)
+"""Space beside and above a text in its box, pixels."""
+BASELINE = 5
+"""Height of the baseline above the bottom of a line, pixels."""
 SMALLEST = 0.75
 """Smallest scale of the help sheet; a window too small for it cuts it off."""
 
@@ -136,14 +144,15 @@ def overlay(size: tuple[int, int], session: Session, readings: Readings) -> UInt
     image = np.zeros((height, width, 4), np.uint8)
     drawn = False
     if session.shown.numbers and not session.shown.help:
-        _write(image, status_lines(session, readings), (10, 10))
+        _write(image, status_lines(session, readings), (CORNER, CORNER))
         drawn = True
     if session.shown.help:
         _write_sheet(image, help_lines())
         drawn = True
     if session.message:
-        lines = wrap_text(session.message, width - 40)
-        _write(image, lines, (10, height - LINE_HEIGHT * len(lines) - 14))
+        lines = wrap_text(session.message, width - 2 * MARGIN)
+        top = height - LINE_HEIGHT * len(lines) - CORNER - PADDING[1]
+        _write(image, lines, (CORNER, top))
         drawn = True
     return image if drawn else None
 
@@ -153,10 +162,11 @@ def message_page(size: tuple[int, int], lines: Sequence[str]) -> UInt8Array:
     width, height = size
     page = np.empty((height, width, 4), np.uint8)
     page[:] = (*BACKGROUND, 255)
-    whole = [part for line in lines for part in wrap_text(line, width - 40)]
+    whole = [part for line in lines for part in wrap_text(line, width - 2 * MARGIN)]
     widest = max((_width(line, 1.0) for line in whole), default=0)
-    corner = max((width - widest) // 2, 20), max((height - LINE_HEIGHT * len(whole)) // 2, 10)
-    _write(page, whole, corner)
+    left = max((width - widest) // 2, MARGIN)
+    top = max((height - LINE_HEIGHT * len(whole)) // 2, CORNER)
+    _write(page, whole, (left, top))
     page[..., 3] = 255
     return page
 
@@ -180,13 +190,13 @@ def _write_sheet(image: UInt8Array, lines: Sequence[str]) -> None:
         rows = -(-len(lines) // columns)
         parts = [lines[at : at + rows] for at in range(0, len(lines), rows)]
         wide = sum(sum(_widths(part, 1.0)) + 2 * GAP for part in parts)
-        scale = min(1.0, (width - 40) / wide, (height - 40) / (LINE_HEIGHT * rows))
+        scale = min(1.0, (width - 2 * MARGIN) / wide, (height - 2 * MARGIN) / (LINE_HEIGHT * rows))
         if scale > best[0]:
             best = (scale, parts)
     scale, parts = best if best[0] > SMALLEST else (1.0, [lines])
-    left = 20
+    left = MARGIN
     for part in parts:
-        _write(image, part, (left, 20), scale)
+        _write(image, part, (left, MARGIN), scale)
         left += round(sum(_widths(part, scale)) + 2 * GAP * scale)
 
 
@@ -212,13 +222,13 @@ def _write(
         return
     height, widths = round(LINE_HEIGHT * scale), _widths(lines, scale)
     starts = np.cumsum([0, *(width + round(GAP * scale) for width in widths)]).tolist()
-    left, top = max(corner[0] - 6, 0), max(corner[1] - 4, 0)
-    right = corner[0] + starts[len(widths) - 1] + widths[-1] + 6
-    box = image[top : corner[1] + height * len(lines) + 4, left:right]
+    left, top = max(corner[0] - PADDING[0], 0), max(corner[1] - PADDING[1], 0)
+    right = corner[0] + starts[len(widths) - 1] + widths[-1] + PADDING[0]
+    box = image[top : corner[1] + height * len(lines) + PADDING[1], left:right]
     ink = np.zeros(box.shape[:2], np.uint8)
     for index, line in enumerate(lines):
         for start, part in zip(starts, line.split("\t"), strict=False):
-            place = (corner[0] - left + start, corner[1] - top + height * (index + 1) - 5)
+            place = (corner[0] - left + start, corner[1] - top + height * (index + 1) - BASELINE)
             cv2.putText(ink, part, place, FONT, SIZE * scale, 255, 1, cv2.LINE_AA)
     # blended here: antialiased text drawn into the alpha channel would punch holes
     share = (ink / np.float32(255))[..., None]

@@ -29,6 +29,30 @@ LABELS = 116.0
 """Width of the names beside sliders, pixels."""
 HINT = 48
 """Characters in a line of a tooltip."""
+NAME_WIDTH = 0.4 * WIDTH
+"""Width of the field for a preset's name, pixels; leaves room for the button beside it."""
+HAIRS = (100, 50_000)
+"""Range of the slider for the drawn strands; the action `hairs` goes further."""
+EXPOSURES = (0.1, 3.0)
+"""Range of the slider for the exposure; the action `exposure` goes further."""
+WIND_RANGES = (
+    ("speed", 0.0, 20.0, "%.1f m/s", "Wind speed."),
+    (
+        "azimuth",
+        -180.0,
+        180.0,
+        "%.0f deg",
+        "Where the wind comes from: 0 front, 90 the subject's left.",
+    ),
+    ("turbulence", 0.0, 2.0, "%.2f", "RMS gusts over the mean wind speed."),
+)
+"""Name, range, number format and tooltip of the sliders for the wind."""
+NOD = 15.0
+"""Amplitude of the nod and tilt buttons, degrees, as of their keys."""
+MOVE_STEP = 0.002
+"""Motion of the head by a click during the alignment, metres; the keys move half as far."""
+SCALE_STEP = 1.01
+"""Factor of the head's size by a click, as by a key."""
 
 Perform = Callable[[str, Mapping[str, object]], None]
 
@@ -152,11 +176,11 @@ def _draw_view(imgui: Any, session: Session, perform: Perform) -> None:
     changed, only = imgui.checkbox("guides only", shown.guides_only)
     if changed:
         perform("guides", {"only": only})
-    changed, count = imgui.slider_int("hairs", shown.hairs, 100, 50_000)
+    changed, count = imgui.slider_int("hairs", shown.hairs, *HAIRS)
     _hint(imgui, "Strands drawn, including guides; lowered if frames take too long.")
     if changed:
         perform("hairs", {"count": count})
-    changed, value = imgui.slider_float("exposure", shown.exposure, 0.1, 3.0)
+    changed, value = imgui.slider_float("exposure", shown.exposure, *EXPOSURES)
     if changed:
         perform("exposure", {"value": value})
     if shown.layers & set(BILLBOARDS):
@@ -173,7 +197,7 @@ def _draw_view(imgui: Any, session: Session, perform: Perform) -> None:
 def _draw_presets(imgui: Any, session: Session, name: str, perform: Perform) -> str:
     """Draw the controls of presets; return the name in the text field."""
     imgui.separator()
-    imgui.set_next_item_width(0.4 * WIDTH)
+    imgui.set_next_item_width(NAME_WIDTH)
     _, name = imgui.input_text("##name", name)
     imgui.same_line()
     if imgui.button("save preset") and name.strip():
@@ -191,18 +215,7 @@ def _draw_wind_and_head(imgui: Any, session: Session, perform: Perform) -> None:
     changed, on = imgui.checkbox("wind", air.blowing)
     if changed:
         perform("wind", {"on": on})
-    ranges = (
-        ("speed", 0.0, 20.0, "%.1f m/s", "Wind speed."),
-        (
-            "azimuth",
-            -180.0,
-            180.0,
-            "%.0f deg",
-            "Where the wind comes from: 0 front, 90 the subject's left.",
-        ),
-        ("turbulence", 0.0, 2.0, "%.2f", "RMS gusts over the mean wind speed."),
-    )
-    for name, low, high, shape, hint in ranges:
+    for name, low, high, shape, hint in WIND_RANGES:
         changed, value = imgui.slider_float(name, float(getattr(air, name)), low, high, shape)
         _hint(imgui, hint)
         if changed:
@@ -212,7 +225,7 @@ def _draw_wind_and_head(imgui: Any, session: Session, perform: Perform) -> None:
     for label, values in (("nod", {"axis": "pitch"}), ("tilt", {"axis": "roll"})):
         imgui.same_line()
         if imgui.button(label):
-            perform("shake", {"degrees": 15.0, **values})
+            perform("shake", {"degrees": NOD, **values})
     imgui.same_line()
     if imgui.button("reset"):
         perform("reset", {})
@@ -227,13 +240,12 @@ def _draw_pose(imgui: Any, session: Session, perform: Perform) -> None:
         perform("adjust", {"on": on})
     if session.adjustment is None:
         return
-    moves = {"left": -0.002, "right": 0.002, "up": 0.002, "down": -0.002}
-    for label, metres in moves.items():
+    moves = (("left", "right", -1), ("right", "right", 1), ("up", "up", 1), ("down", "up", -1))
+    for label, axis, sign in moves:
         if imgui.button(label):
-            axis = "right" if label in ("left", "right") else "up"
-            perform("head_move", {axis: metres})
+            perform("head_move", {axis: sign * MOVE_STEP})
         imgui.same_line()
-    for label, factor in (("larger", 1.01), ("smaller", 1 / 1.01)):
+    for label, factor in (("larger", SCALE_STEP), ("smaller", 1 / SCALE_STEP)):
         if imgui.button(label):
             perform("head_scale", {"factor": factor})
         imgui.same_line()

@@ -26,6 +26,8 @@ _ADVICE = (
 )
 POLL_INTERVAL = 0.05
 """Seconds between two polls for events."""
+WARM_UP_WIND, WARM_UP_TURBULENCE = (1.0, 0.0, 0.0), 0.1
+"""Air of the step that compiles the simulator, m/s and share: neither is 0, so gusts are run."""
 _Made = TypeVar("_Made")
 
 
@@ -115,9 +117,9 @@ def warm_up(session: Session) -> None:
     if not len(points):
         return
     x, y, z = points[-1].astype(float).tolist()
-    wind = np.array([1.0, 0.0, 0.0])
+    wind = np.array(WARM_UP_WIND)
     for grabs in ((), (Grab(len(points) - 1, (x, y, z)),)):
-        around = Surroundings(np.eye(4), wind=wind, turbulence=0.1, grabs=grabs)
+        around = Surroundings(np.eye(4), wind=wind, turbulence=WARM_UP_TURBULENCE, grabs=grabs)
         simulator.advance(STEP, around)
     session.measures()
     session.reset()

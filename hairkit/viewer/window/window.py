@@ -39,6 +39,12 @@ IDLE = 0.1
 """Seconds between frames while the simulation is paused and no event arrives."""
 MAX_FRAME_STEP = 0.1
 """Longest time step of a frame, seconds; slower frames slow the simulation down."""
+SIMULATION_SHARE = 0.4
+"""Part of the frame budget that the simulation may take; drawing has the rest."""
+PACE_SMOOTHING = 0.2
+"""Weight of the newest frame in the displayed frame rate."""
+PICTURE_UNIT, TEXT_UNIT = 5, 6
+"""Texture units that `viewer_blit` reads."""
 
 
 def show(
@@ -115,7 +121,7 @@ class Window:
     def __init__(self, context: WindowContext, session: Session, budget: float) -> None:
         self._glfw, self._window = context.glfw, context.window
         self.session = session
-        self._max_seconds = 0.4 * budget if budget > 0 else None
+        self._max_seconds = SIMULATION_SHARE * budget if budget > 0 else None
         self._keys = bindings()
         self.mouse = Mouse(self.perform, session.size[1])
         self._watched = session.opened.path
@@ -203,7 +209,7 @@ class Window:
             self._glfw.swap_buffers(self._window)
             gl.home.use()
         taken = time.perf_counter() - began
-        self._pace += 0.2 * (taken - self._pace) if self._pace else taken
+        self._pace += PACE_SMOOTHING * (taken - self._pace) if self._pace else taken
 
     def _next(self, steps: Iterator[None] | None) -> Iterator[None] | None:
         """Perform the next action of a script once the last one is finished."""
@@ -228,10 +234,10 @@ class Window:
         self._screen.use()
         gl.context.viewport = (0, 0, *size)
         gl.context.enable_only(moderngl.NOTHING)
-        self.preview.frame_renderer.texture.use(5)
-        self._text.use(6)
+        self.preview.frame_renderer.texture.use(PICTURE_UNIT)
+        self._text.use(TEXT_UNIT)
         program = gl.program("viewer_screen", "viewer_blit")
-        set_uniforms(program, u_picture=5, u_text=6, u_size=size)
+        set_uniforms(program, u_picture=PICTURE_UNIT, u_text=TEXT_UNIT, u_size=size)
         self._blit.render(moderngl.TRIANGLES, vertices=3)
 
     def _text_is_old(self) -> bool:
