@@ -84,25 +84,6 @@ def first_hits(
     return free, signed
 
 
-def first_hits_by_hand(
-    targets: tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]],
-    queries: tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]],
-    distances: npt.NDArray[np.float64],
-    cosines: npt.NDArray[np.float64],
-) -> tuple[UInt8Array, UInt8Array]:
-    """Compare every query with every target: the readable twin of `first_hits` for small sets."""
-    gap = queries[0][:, None].astype(np.float64) - targets[0][None].astype(np.float64)
-    squared = (gap**2).sum(axis=2)
-    cosine = queries[1].astype(np.float64) @ targets[1].astype(np.float64).T
-    free = np.full(len(queries[0]), FIRST_HIT_NONE, np.uint8)
-    signed = free.copy()
-    for rank in reversed(range(len(distances))):
-        close = squared <= distances[rank] ** 2
-        free[(close & (np.abs(cosine) >= cosines[rank])).any(axis=1)] = rank
-        signed[(close & (cosine >= cosines[rank])).any(axis=1)] = rank
-    return free, signed
-
-
 def most_followed(
     grid: HashGrid,
     owner: Int64Array,

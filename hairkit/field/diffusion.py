@@ -8,10 +8,9 @@ a very large `c` makes a cell fixed.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
 from hairkit.errors import InputError
@@ -118,17 +117,6 @@ def cell_neighbours(occupied: BoolArray) -> Int32Array:
         for shift in (1, -1):
             columns.append(np.roll(number, shift, axis)[1:-1, 1:-1, 1:-1][occupied])
     return np.ascontiguousarray(np.stack(columns, axis=1))
-
-
-def apply_operator(
-    neighbours: Int32Array, weight: npt.NDArray[Any], smoothness: float, values: npt.NDArray[Any]
-) -> npt.NDArray[Any]:
-    """Return `(diag(c) + s L) u` for `values` (N, C): the compiled operator's readable twin."""
-    padded = np.concatenate([values, np.zeros_like(values[:1])])
-    degree = (neighbours >= 0).sum(axis=1)[:, None]
-    total = sum(padded[neighbours[:, k]] for k in range(6))
-    result: npt.NDArray[Any] = weight[:, None] * values + smoothness * (degree * values - total)
-    return result
 
 
 class _System(NamedTuple):

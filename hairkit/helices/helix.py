@@ -131,26 +131,6 @@ def along_arc(
     return np.asarray(point, np.float64) + moved, (rotation(turn) @ start)[..., 0]
 
 
-def shape_of(darboux: npt.ArrayLike, tangent: npt.ArrayLike) -> tuple[Float64Array, Float64Array]:
-    """Return curvature |w x t| and torsion <w, t> of arcs, (...) each, per metre."""
-    w, t = np.asarray(darboux, np.float64), np.asarray(tangent, np.float64)
-    return np.linalg.norm(np.cross(w, t), axis=-1), (w * t).sum(-1)
-
-
-def radius_and_pitch(
-    curvature: npt.ArrayLike, torsion: npt.ArrayLike
-) -> tuple[Float64Array, Float64Array]:
-    """Return radius and pitch of helices in metres, the pitch signed: positive turns to the right.
-
-    Straight arcs have radius and pitch 0.
-    """
-    k, t = np.asarray(curvature, np.float64), np.asarray(torsion, np.float64)
-    squared = k * k + t * t
-    safe = np.where(squared > 0, squared, 1.0)
-    straight = k <= 1e-12
-    return np.where(straight, 0.0, k / safe), np.where(straight, 0.0, 2 * np.pi * t / safe)
-
-
 def _series(x: Float64Array, order: int) -> Float64Array:
     """Return the sum of (-x)^k / (2 k + order)!."""
     total = np.zeros_like(x)

@@ -7,10 +7,8 @@ segmentation", 2008).
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import dijkstra
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.arrays import BoolArray, Float32Array
 from hairkit.parallel import compiled
 
 FAR = np.float32(1e6)
@@ -43,7 +41,7 @@ def seed_distance(costs: Float32Array, seeds: BoolArray, sweeps: int = 4) -> Flo
     """Return the (H, W) cost of the cheapest path from each pixel to any seed.
 
     Raster sweeps down and up (Toivanen 1996): every sweep lets paths turn once more, so a few are
-    enough on photos; they converge to `seed_distance_exact`.
+    enough on photos; they converge to Dijkstra's distances.
 
     Parameters
     ----------
@@ -60,26 +58,6 @@ def seed_distance(costs: Float32Array, seeds: BoolArray, sweeps: int = 4) -> Flo
         if not _sweep(costs, distance, False) and not down:
             break
     return distance
-
-
-def seed_distance_exact(costs: Float32Array, seeds: BoolArray) -> Float64Array:
-    """Return the limit of `seed_distance` by Dijkstra's algorithm: the readable reference."""
-    height, width = seeds.shape
-    number = np.arange(height * width).reshape(height, width)
-    rows, columns, values = [], [], []
-    for index, (dy, dx) in enumerate(_STEPS):
-        y, x = np.nonzero(costs[..., index] < FAR)
-        rows.append(number[y, x])
-        columns.append(number[y + dy, x + dx])
-        values.append(costs[y, x, index])
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    graph = coo_matrix(entries, (number.size, number.size)).tocsr()
-    start = np.flatnonzero(seeds)
-    if not len(start):
-        return np.full(seeds.shape, float(FAR))
-    reached = dijkstra(graph, directed=False, indices=start, min_only=True)
-    result: Float64Array = np.minimum(reached, float(FAR)).reshape(height, width)
-    return result
 
 
 @compiled

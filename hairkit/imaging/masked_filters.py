@@ -223,27 +223,6 @@ def single_angle(vectors: Float32Array) -> Float32Array:
     return wrap_angle(0.5 * np.arctan2(vectors[..., 1], vectors[..., 0]))
 
 
-def smooth_angles(
-    angle: Float32Array, weight: Float32Array | BoolArray, sigma: float
-) -> tuple[Float32Array, Float32Array]:
-    """Return the Gaussian mean of undirected angles and how well the angles agree.
-
-    Parameters
-    ----------
-    angle, weight : (H, W)
-        Angles in radians and their weights; 0 outside the mask.
-    sigma : float
-        Of the Gaussian, in pixels.
-
-    Returns
-    -------
-    angle, coherence : (H, W) float32
-        Angles in [0, pi); length of the mean resultant in [0, 1], 1 where all angles are equal.
-    """
-    mean = masked_blur(double_angle(angle), weight, sigma)
-    return single_angle(mean), np.minimum(np.hypot(mean[..., 0], mean[..., 1]), 1)
-
-
 def coherent_truth(
     angle: Float32Array,
     mask: BoolArray,

@@ -10,9 +10,7 @@ from hairkit.helices.helix import (
     along_arc,
     mean_rotation,
     mean_rotation_slope,
-    radius_and_pitch,
     rotation,
-    shape_of,
     turn_coefficients,
     turn_slopes,
 )
@@ -82,12 +80,5 @@ def test_a_helix_has_its_radius_and_pitch() -> None:
         curve[0], np.array([0, radius, rise]) / speed, np.array([0, 0, 1 / speed]), angle * speed
     )
     np.testing.assert_allclose(points, curve, rtol=0, atol=1e-15)
-    found = radius_and_pitch(*shape_of(np.array([0, 0, 1 / speed]), tangents))
-    np.testing.assert_allclose(found[0], radius)
-    np.testing.assert_allclose(found[1], pitch)
-
-
-def test_straight_hair_has_neither_radius_nor_pitch() -> None:
-    """No division by zero curvature."""
-    assert radius_and_pitch(0.0, 0.0) == (0.0, 0.0)
-    assert radius_and_pitch(0.0, 3.0) == (0.0, 0.0)
+    flow = np.column_stack([-curve[:, 1], curve[:, 0], np.full(len(curve), rise)]) / speed
+    np.testing.assert_allclose(tangents, flow, rtol=0, atol=1e-12)

@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
 
-from hairkit.imaging.geodesic import FAR, edge_costs, seed_distance, seed_distance_exact
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.imaging.geodesic import FAR, edge_costs, seed_distance
+
+BACKWARD_STEPS = ((0, -1), (-1, -1), (-1, 0), (-1, 1))
+"""(rows, columns) to the neighbours left, up left, up and up right, in the order of the costs."""
 
 
 def scene(seed: int, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
@@ -15,6 +21,26 @@ def scene(seed: int, height: int, width: int) -> tuple[np.ndarray, np.ndarray]:
     seeds = np.zeros((height, width), bool)
     seeds[rng.integers(height), rng.integers(width)] = True
     return colour, seeds
+
+
+def seed_distance_exact(costs: Float32Array, seeds: BoolArray) -> Float64Array:
+    """Return the limit of `seed_distance` by Dijkstra's algorithm: the readable reference."""
+    height, width = seeds.shape
+    number = np.arange(height * width).reshape(height, width)
+    rows, columns, values = [], [], []
+    for index, (dy, dx) in enumerate(BACKWARD_STEPS):
+        y, x = np.nonzero(costs[..., index] < FAR)
+        rows.append(number[y, x])
+        columns.append(number[y + dy, x + dx])
+        values.append(costs[y, x, index])
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    graph = coo_matrix(entries, (number.size, number.size)).tocsr()
+    start = np.flatnonzero(seeds)
+    if not len(start):
+        return np.full(seeds.shape, float(FAR))
+    reached = dijkstra(graph, directed=False, indices=start, min_only=True)
+    result: Float64Array = np.minimum(reached, float(FAR)).reshape(height, width)
+    return result
 
 
 @settings(max_examples=20, deadline=None)

@@ -22,7 +22,6 @@ from hairkit.imaging.masked_filters import (
     masked_blur,
     picture_scale,
     single_angle,
-    smooth_angles,
     well_inside,
 )
 from hairkit.types.capture import View
@@ -155,25 +154,6 @@ def test_double_angles_go_back_to_themselves(angle: float) -> None:
     """single_angle undoes double_angle, whatever the vector's length."""
     back = single_angle(double_angle([angle], [0.3]))
     assert angle_between(back, angle)[0] < 1e-5
-
-
-def test_mean_of_undirected_angles_is_taken_across_pi() -> None:
-    """1 and 179 degrees meet at 0, not at 90."""
-    angle = np.radians(np.where(np.arange(256) % 2, 1.0, 179.0)).astype(np.float32)
-    mean, coherence = smooth_angles(
-        np.tile(angle, (16, 1)), np.ones((16, 256), np.float32), sigma=4.0
-    )
-    assert np.degrees(angle_between(mean, 0)).max() < 0.1
-    assert coherence.min() > 0.99
-
-
-def test_smoothing_ignores_angles_without_weight() -> None:
-    """Angles beyond the mask do not bend those within."""
-    mask = disc()
-    angle = np.where(mask, 0.7, 2.2).astype(np.float32)
-    mean, coherence = smooth_angles(angle, mask, 5.0)
-    assert angle_between(mean, 0.7)[mask].max() < 1e-3
-    assert coherence[mask].min() > 0.999
 
 
 def test_truth_is_coherent_on_smooth_hair_and_not_where_strands_cross() -> None:
