@@ -241,13 +241,13 @@ def write_pieces(
     path: str | os.PathLike[str], pieces: Iterable[bytes | memoryview], *, durable: bool = True
 ) -> None:
     """Write pieces one after the other as `write_bytes` does, without joining them in memory."""
-    with replaced_file(path, durable=durable) as part, part.open("wb") as file:
+    with replace_file(path, durable=durable) as part, part.open("wb") as file:
         for piece in pieces:
             file.write(piece)
 
 
 @contextlib.contextmanager
-def replaced_file(
+def replace_file(
     path: str | os.PathLike[str], suffix: str = ".part", *, durable: bool = True
 ) -> Iterator[Path]:
     """Yield an empty file beside `path`, which takes its place when the block ends without error.

@@ -17,8 +17,14 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Int64Array
 from hairkit.errors import InputError
-from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed, plain_widths, rows_kept
-from hairkit.grooming.prepare_export import ExportOptions, prepared
+from hairkit.grooming.adopt_strands import (
+    ImportOptions,
+    adopt,
+    pack_strands,
+    plain_widths,
+    rows_kept,
+)
+from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.byte_reader import ByteReader, finite
 from hairkit.io.byte_writer import as_bytes
@@ -68,7 +74,7 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the strands with their thickness, and their colours if asked for."""
-    ready = prepared(groom, options).groom
+    ready = prepare_export(groom, options).groom
     longest = ready.strands.counts.max()
     if longest > _MOST_SEGMENTS + 1:
         raise InputError(f"a strand has {longest} points, .hair holds {_MOST_SEGMENTS + 1} at most")
@@ -89,7 +95,7 @@ def import_groom(path: Path, options: Options) -> Groom:
     if arrays & TRANSPARENCY:
         reader.array("<f4", total, "transparency")
     colours = reader.array("<f4", (total, 3), "colours") if arrays & COLOURS else None
-    strands, kept = packed(space.points_to_head(points), counts, path)
+    strands, kept = pack_strands(space.points_to_head(points), counts, path)
     rows = rows_kept(counts, kept)
     if widths is not None:
         widths = plain_widths(widths, space.metres, path)[rows]

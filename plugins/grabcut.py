@@ -79,7 +79,7 @@ def segment(view: View, options: Options) -> Mask | None:
         raise InputError(
             f"{view.strokes_path}: no foreground stroke, draw at least one on the hair"
         )
-    image = brightened(view.image, options.brightness)
+    image = brighten(view.image, options.brightness)
     thickness = options.thickness * picture_scale(height)
     allowed = _inside(strokes, width, height)
     if options.model == "opencv":
@@ -167,7 +167,7 @@ def _inside(strokes: Strokes, width: int, height: int) -> BoolArray:
     return allowed
 
 
-def brightened(image: UInt8Array, preset: str) -> UInt8Array:
+def brighten(image: UInt8Array, preset: str) -> UInt8Array:
     """Return the photo with the gamma curve of one of the presets applied."""
     if preset == "as_is":
         return image

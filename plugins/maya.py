@@ -18,11 +18,11 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Int64Array
 from hairkit.errors import InputError
-from hairkit.grooming.prepare_export import ExportOptions, prepared
+from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.coordinate_space import SPACES, FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.io.number_text import written_rows
+from hairkit.io.number_text import format_rows
 from hairkit.io.strand_blocks import blocks
 from hairkit.options import option
 from hairkit.storage import write_pieces
@@ -62,7 +62,7 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the strands as a Maya scene of curves."""
     space = options.space
     unit = _unit(space)
-    strands = prepared(groom, options).groom.strands
+    strands = prepare_export(groom, options).groom.strands
     header = _HEADER.format(unit=unit, top=_TOP)
     write_pieces(path, itertools.chain([header.encode("ascii")], _scene(strands, space)))
     return True
@@ -117,7 +117,7 @@ def _curves(
         if not len(chosen):
             continue
         part = strands.select(chosen)
-        text, ends = written_rows(b"\t\t%.9g %.9g %.9g\n", space.points_to_file(part.points))
+        text, ends = format_rows(b"\t\t%.9g %.9g %.9g\n", space.points_to_file(part.points))
         places = [0, *ends[part.offsets[1:] - 1].tolist()]
         pieces = []
         for strand, count, start, stop in zip(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from types import MappingProxyType
 
-from hairkit.grooming.prepare_export import ExportOptions, prepared
+from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.types.groom import Groom
@@ -24,7 +24,7 @@ Options = ExportOptions
 def export_groom(groom: Groom, path: Path, options: ExportOptions) -> bool:
     """Write everything that is on the groom, or the strands that the options choose."""
     whole = options == ExportOptions()
-    (groom if whole else prepared(groom, options).groom).save(path)
+    (groom if whole else prepare_export(groom, options).groom).save(path)
     return True
 
 

@@ -14,12 +14,12 @@ import numpy as np
 
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import FormatError
-from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
-from hairkit.grooming.prepare_export import ExportOptions, prepared
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands
+from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.io.number_text import read_numbers, stripped, whole_digits, written_rows
+from hairkit.io.number_text import format_rows, read_numbers, strip_slots, whole_digits
 from hairkit.io.polylines import chains
 from hairkit.io.strand_blocks import blocks
 from hairkit.storage import read_bytes, write_pieces
@@ -37,7 +37,7 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the strands as lines."""
-    write_pieces(path, _pieces(prepared(groom, options).groom.strands, options.space))
+    write_pieces(path, _pieces(prepare_export(groom, options).groom.strands, options.space))
     return True
 
 
@@ -54,7 +54,7 @@ def import_groom(path: Path, options: Options) -> Groom:
             index, counts = chains(index.reshape(-1, 2), len(points))
         except FormatError as error:
             raise FormatError(f"{path}: {error}") from error
-    strands, _ = packed(options.space.points_to_head(points[index]), counts, path)
+    strands, _ = pack_strands(options.space.points_to_head(points[index]), counts, path)
     return adopt(strands, options, path)
 
 
@@ -63,7 +63,7 @@ def _pieces(strands: Strands, space: FileSpace) -> Iterator[bytes]:
     yield b"# hair strands, written by hairkit\n"
     for block in blocks(strands):
         points = space.points_to_file(strands.points[block.points])
-        yield written_rows(b"v %.9g %.9g %.9g\n", points)[0]
+        yield format_rows(b"v %.9g %.9g %.9g\n", points)[0]
     for block in blocks(strands):
         start = block.points.start
         digits = whole_digits(np.arange(start + 1, block.points.stop + 1))
@@ -71,7 +71,7 @@ def _pieces(strands: Strands, space: FileSpace) -> Iterator[bytes]:
         around[0, strands.offsets[:-1][block.strands] - start] = ord("l")
         around[1] = ord(" ")
         around[2, strands.offsets[1:][block.strands] - 1 - start] = ord("\n")
-        yield stripped(np.concatenate([around[:2], digits, around[2:]]))[0]
+        yield strip_slots(np.concatenate([around[:2], digits, around[2:]]))[0]
 
 
 def _elements(text: str) -> tuple[list[str], list[str], list[int]]:

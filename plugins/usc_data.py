@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import BoolArray, Int64Array
-from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
-from hairkit.grooming.prepare_export import ExportOptions, prepared
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands
+from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.byte_reader import ByteReader, finite
 from hairkit.io.byte_writer import as_bytes
@@ -42,7 +42,7 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the strands' points."""
-    strands = prepared(groom, options).groom.strands
+    strands = prepare_export(groom, options).groom.strands
     write_pieces(path, _pieces(strands, options.space, _numbers_a_point(path)))
     return True
 
@@ -58,7 +58,7 @@ def import_groom(path: Path, options: Options) -> Groom:
     counts = _counts(words, width, reader)
     numbers = words[~_is_count(counts, width)].view("<f4").reshape(-1, width)
     points = finite(numbers[:, :3], path, "points")
-    strands, _ = packed(options.space.points_to_head(points), counts, path)
+    strands, _ = pack_strands(options.space.points_to_head(points), counts, path)
     return adopt(strands, options, path)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from hairkit.cli.export import check_target
 from hairkit.cli.settings import add_setting, split_settings
 from hairkit.errors import InputError, OptionError
-from hairkit.grooming.decimate import simplified
+from hairkit.grooming.decimate import decimate
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{target}: is the input file; choose another output")
     groom = load_groom(manager, source, reading, reader)
     if args.guides is not None:
-        groom = simplified(groom, args.guides)
+        groom = decimate(groom, args.guides)
     if args.measure_curl:
         groom = _with_curl(groom)
     manager.call("export_groom", writer, options, groom=groom, path=target)

@@ -20,8 +20,8 @@ from hairkit.evaluation.images import (
     DrawnDirections,
     OrientationError,
     direction_share,
-    drawn_directions,
     hair_silhouette,
+    judge_drawn_directions,
     mask_iou,
     orientation_error,
 )
@@ -193,7 +193,7 @@ def _aligned(
 
 def _directions(samples: Samples, truth: Truth) -> tuple[DrawnDirections, ...]:
     return tuple(
-        drawn_directions(camera, samples, truth.head, truth.orientation(view))
+        judge_drawn_directions(camera, samples, truth.head, truth.orientation(view))
         for view, camera in enumerate(truth.cameras)
     )
 

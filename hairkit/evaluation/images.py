@@ -154,7 +154,7 @@ def _neck(head: Head) -> Float64Array:
     return middle
 
 
-def drawn_directions(
+def judge_drawn_directions(
     camera: Camera, samples: Samples, head: Head | None, truth: npt.NDArray[np.uint8]
 ) -> DrawnDirections:
     """Judge the visible samples of strands drawn into a view by the true orientation there.

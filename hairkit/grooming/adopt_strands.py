@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from hairkit.arrays import BoolArray, Float32Array, Int64Array
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.prepare_export import shorter_than
-from hairkit.head_model.placement import find_place, placed
+from hairkit.head_model.placement import find_place, place_head
 from hairkit.head_model.scalp import bind, roots_at
 from hairkit.head_model.template import default_head
 from hairkit.io.coordinate_space import SpaceOptions
@@ -32,10 +32,10 @@ from hairkit.types.strands import Strands
 __all__ = [
     "ImportOptions",
     "adopt",
-    "packed",
-    "placed",
+    "pack_strands",
+    "place_head",
     "plain_widths",
-    "reversed_strands",
+    "reverse_strands",
     "rows_kept",
     "with_mean_width",
 ]
@@ -70,7 +70,9 @@ class ImportOptions:
     )
 
 
-def packed(points: Float32Array, counts: Int64Array, source: object) -> tuple[Strands, Int64Array]:
+def pack_strands(
+    points: Float32Array, counts: Int64Array, source: object
+) -> tuple[Strands, Int64Array]:
     """Return strands (points (P, 3), metres) and the numbers (S',) of those that were kept.
 
     Strands of fewer than two points are dropped and counted in a warning.
@@ -94,7 +96,7 @@ def packed(points: Float32Array, counts: Int64Array, source: object) -> tuple[St
 
 
 def rows_kept(counts: Int64Array, kept: Int64Array) -> BoolArray | slice:
-    """Return which of the file's points (P,) belong to the strands that `packed` kept."""
+    """Return which of the file's points (P,) belong to the strands that `pack_strands` kept."""
     if len(kept) == len(counts):
         return slice(None)
     keep = np.zeros(len(counts), bool)
@@ -150,7 +152,7 @@ def adopt(
         _log.warning("%s: no strand is marked as a guide; all are taken as guides", source)
         strands = replace(strands, guide=None)
     if options.reverse:
-        strands = reversed_strands(strands)
+        strands = reverse_strands(strands)
         if material is not None:
             material = replace(
                 material, root_colour=material.tip_colour, tip_colour=material.root_colour
@@ -172,7 +174,7 @@ def adopt(
     return groom
 
 
-def reversed_strands(strands: Strands) -> Strands:
+def reverse_strands(strands: Strands) -> Strands:
     """Return the strands with their points, and widths, from tip to root."""
     owner = strands.strand_of_point
     rows = (strands.offsets[:-1] + strands.offsets[1:] - 1)[owner] - np.arange(len(owner))
@@ -237,7 +239,7 @@ def _head(strands: Strands, options: ImportOptions, own: Head | None, source: ob
             np.array2string(place.shift, precision=3, suppress_small=True, separator=", "),
             1000 * place.distance,
         )
-        return placed(head, place.scale, place.shift)
+        return place_head(head, place.scale, place.shift)
     head = _read(options.head)
     if _away(strands.roots, head) <= FARTHEST:
         return head
@@ -249,7 +251,7 @@ def _head(strands: Strands, options: ImportOptions, own: Head | None, source: ob
         np.array2string(place.shift, precision=3, suppress_small=True, separator=", "),
         1000 * place.distance,
     )
-    return placed(head, 1.0, place.shift)
+    return place_head(head, 1.0, place.shift)
 
 
 def _read(path: Path) -> Head:

@@ -35,7 +35,7 @@ class Clusters:
     """(S,) the cluster of every strand."""
 
 
-def simplified(groom: Groom, count: int, *, shape_weight: float = 0.5, seed: int = 0) -> Groom:
+def decimate(groom: Groom, count: int, *, shape_weight: float = 0.5, seed: int = 0) -> Groom:
     """Return the groom with all its strands, `count` of them marked as guides.
 
     Parameters

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from hairkit.grooming.head_collision import push_out_of_head
 from hairkit.grooming.wind_waves import add_waves
-from hairkit.helices import smoothed
+from hairkit.helices import smooth_strands
 from hairkit.options import option
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
@@ -35,7 +35,7 @@ def finish(strands: Strands, waves: Waves, hull: Hull, options: FinishOptions) -
     The first two only where the options ask for it; `options.points` is used by the tracker.
     """
     if options.helix_tolerance > 0:
-        strands = smoothed(strands, options.helix_tolerance)
+        strands = smooth_strands(strands, options.helix_tolerance)
     if options.waves:
         strands = add_waves(strands, waves)
     return push_out_of_head(strands, hull, options.clearance)

@@ -1,6 +1,6 @@
 """Prepare a groom for export: choose guides or hair, drop degenerate strands, set defaults.
 
-Exporters inherit `ExportOptions` and write what `prepared` returns.
+Exporters inherit `ExportOptions` and write what `prepare_export` returns.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class PreparedGroom:
     """Frames (T, P, 3) of exactly these strands, or None for a still groom."""
 
 
-def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
+def prepare_export(groom: Groom, options: ExportOptions) -> PreparedGroom:
     """Return the chosen strands, complete; strands without length are dropped with a warning.
 
     The cache comes from options that also inherit `AnimationOptions`.
@@ -77,7 +77,7 @@ def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
     cache = None if path is None else read_cache(path, guides)
     if options.hairs > len(groom.strands):
         groom = dense_groom(groom, options.hairs, options.seed)
-    groom = completed(groom)
+    groom = complete_groom(groom)
     strands = groom.strands
     frames = None if cache is None else _frames(strands, guides.strands, cache)
     keep = _chosen(strands, options.strands) & ~_degenerate(strands)
@@ -86,7 +86,7 @@ def prepared(groom: Groom, options: ExportOptions) -> PreparedGroom:
     if frames is not None and cache is not None:
         frames = frames[:, keep[strands.strand_of_point]]
         cache = PointCache(frames, cache.times, cache.head_from_rest)
-    return PreparedGroom(selected(groom, keep), cache)
+    return PreparedGroom(select_strands(groom, keep), cache)
 
 
 def _frames(strands: Strands, guides: Strands, cache: PointCache) -> Float32Array:
@@ -117,13 +117,13 @@ def dense_groom(groom: Groom, count: int, seed: int = 0) -> Groom:
     )
 
 
-def completed(groom: Groom) -> Groom:
+def complete_groom(groom: Groom) -> Groom:
     """Return the groom with widths, root uv, groups and guide flags on its strands.
 
     Defaults: the material's width at every point, the bound root's uv, group 0, all guides.
     """
     strands = groom.strands
-    if not any(value is None for value in _made_up(strands)):
+    if not any(value is None for value in _optional_values(strands)):
         return groom
     uv = strands.root_uv
     if uv is None:
@@ -138,11 +138,11 @@ def completed(groom: Groom) -> Groom:
     return replace(groom, strands=full)
 
 
-def _made_up(strands: Strands) -> tuple[object, ...]:
+def _optional_values(strands: Strands) -> tuple[object, ...]:
     return strands.widths, strands.root_uv, strands.group, strands.guide
 
 
-def selected(groom: Groom, keep: BoolArray) -> Groom:
+def select_strands(groom: Groom, keep: BoolArray) -> Groom:
     """Return the groom with only the strands that the mask (S,) keeps."""
     if keep.all():
         return groom
@@ -177,7 +177,7 @@ def shorter_than(strands: Strands, length: float) -> BoolArray:
 
 
 def _guides_of(groom: Groom) -> Groom:
-    return selected(groom, guide_mask(groom.strands))
+    return select_strands(groom, guide_mask(groom.strands))
 
 
 def _chosen(strands: Strands, wanted: str) -> BoolArray:

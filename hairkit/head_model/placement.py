@@ -42,7 +42,7 @@ class Placing:
     """Distance plus the costs of hair in the head and of roots that grow into it, metres."""
 
 
-def placed(head: Head, scale: float, shift: Float64Array) -> Head:
+def place_head(head: Head, scale: float, shift: Float64Array) -> Head:
     """Return the head scaled about the origin, then moved by `shift` (3,), metres."""
     shapes, shift32 = head.capsules, shift.astype(np.float32)
     return replace(

@@ -18,7 +18,7 @@ from hairkit.helices.arc_between import helix_through
 from hairkit.helices.arc_counts import adaptive_counts, patent_counts
 from hairkit.helices.curl import Curl, measure_curl
 from hairkit.helices.floating_tangents import Arcs, fit_arcs
-from hairkit.helices.helix_strands import HelixStrands, smoothed
+from hairkit.helices.helix_strands import HelixStrands, smooth_strands
 
 __all__ = [
     "Arcs",
@@ -29,5 +29,5 @@ __all__ = [
     "helix_through",
     "measure_curl",
     "patent_counts",
-    "smoothed",
+    "smooth_strands",
 ]

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from hairkit.arrays import Float64Array, Int64Array
-from hairkit.helices.helix_strands import smoothed
+from hairkit.helices.helix_strands import smooth_strands
 from hairkit.types.groom import HairMaterial
 from hairkit.types.strands import Strands
 
@@ -100,7 +100,7 @@ def measure_curl(strands: Strands, noise: float = NOISE) -> Curl:
     """
     if not len(strands):
         return _joined([])
-    smooth = smoothed(strands, noise).resampled_by_length(STEP)
+    smooth = smooth_strands(strands, noise).resampled_by_length(STEP)
     bounds = zip(smooth.offsets[:-1], smooth.offsets[1:], strict=True)
     return _joined([_curl_of(smooth.points[a:b].astype(np.float64)) for a, b in bounds])
 

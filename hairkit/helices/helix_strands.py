@@ -110,7 +110,7 @@ class HelixStrands(Stored):
         return Strands(points.astype(np.float32), np.concatenate([[0], np.cumsum(counts)]))
 
 
-def smoothed(strands: Strands, tolerance: float) -> Strands:
+def smooth_strands(strands: Strands, tolerance: float) -> Strands:
     """Return the strands on helix arcs within `tolerance` metres on average along each.
 
     Point counts, roots, widths and groups stay; every tracker's strands can be smoothed by it.

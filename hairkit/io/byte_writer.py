@@ -17,10 +17,10 @@ def as_bytes(kind: npt.DTypeLike, values: npt.ArrayLike) -> memoryview:
     return np.ascontiguousarray(values, kind).reshape(-1).view(np.uint8).data
 
 
-def joined(parts: Sequence[tuple[npt.DTypeLike, npt.ArrayLike]]) -> memoryview:
+def join_bytes(parts: Sequence[tuple[npt.DTypeLike, npt.ArrayLike]]) -> memoryview:
     """Return arrays one after the other as bytes, each converted to its type in the file.
 
-    >>> bytes(joined([("<u2", [1, 2]), ("<f4", [1.0])]))
+    >>> bytes(join_bytes([("<u2", [1, 2]), ("<f4", [1.0])]))
     b'\\x01\\x00\\x02\\x00\\x00\\x00\\x80?'
     """
     arrays = [(np.dtype(kind), np.asarray(values)) for kind, values in parts]

@@ -13,7 +13,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.io.glb_file import GlbFile, readable
-from hairkit.io.mesh_text import MAX_FACES, MAX_MESH_BYTES, MAX_VERTICES, FileMesh, checked_mesh
+from hairkit.io.mesh_text import MAX_FACES, MAX_MESH_BYTES, MAX_VERTICES, FileMesh, check_mesh
 
 
 def read_glb(path: str | os.PathLike[str]) -> FileMesh:
@@ -27,7 +27,7 @@ def read_glb(path: str | os.PathLike[str]) -> FileMesh:
         parts = _parts(GlbFile(path, MAX_MESH_BYTES))
         if not parts:
             raise ValueError("it holds no triangles")
-        return checked_mesh(_joined(parts), path)
+        return check_mesh(_joined(parts), path)
 
 
 def _parts(file: GlbFile) -> list[FileMesh]:

@@ -46,7 +46,7 @@ class FileMesh:
     """Lower-case name of a group, material or vertex property: (V,) weights in [0, 1]."""
 
 
-def checked_mesh(mesh: FileMesh, path: str | os.PathLike[str]) -> FileMesh:
+def check_mesh(mesh: FileMesh, path: str | os.PathLike[str]) -> FileMesh:
     """Return `mesh` without collapsed faces; `FormatError` naming `path` when it is unusable."""
     if not (0 < len(mesh.vertices) <= MAX_VERTICES and 0 < len(mesh.faces) <= MAX_FACES):
         raise FormatError(
@@ -87,7 +87,7 @@ def read_obj(path: str | os.PathLike[str]) -> FileMesh:
             parser.read(line)
         except (ValueError, IndexError, OverflowError) as error:
             raise FormatError(f"{path}: line {number} is not OBJ ({error})") from error
-    return checked_mesh(parser.mesh(), path)
+    return check_mesh(parser.mesh(), path)
 
 
 class _ObjParser:
@@ -198,12 +198,12 @@ def read_ply(path: str | os.PathLike[str]) -> FileMesh:
     try:
         if not data.startswith(b"ply") or b"end_header" not in data[:_MAX_PLY_HEADER]:
             raise ValueError("it has no header from 'ply' to 'end_header'")
-        with np.errstate(all="ignore"):  # damaged numbers are found by `checked_mesh`
+        with np.errstate(all="ignore"):  # damaged numbers are found by `check_mesh`
             mesh = _ply_mesh(load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True))
     except Exception as error:  # trimesh raises almost anything on damaged files
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:_MAX_REASON]
         raise FormatError(f"{path}: not a readable PLY mesh ({reason})") from error
-    return checked_mesh(mesh, path)
+    return check_mesh(mesh, path)
 
 
 def _ply_mesh(found: dict[str, Any]) -> FileMesh:

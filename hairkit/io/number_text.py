@@ -54,22 +54,22 @@ def read_numbers(text: str, source: str | os.PathLike[str], name: str) -> Float6
     return numbers
 
 
-def written_rows(pattern: bytes, rows: Float32Array) -> tuple[bytes, Int64Array]:
+def format_rows(pattern: bytes, rows: Float32Array) -> tuple[bytes, Int64Array]:
     """Return the text of rows (N, C), and where in it each row ends (N,).
 
     The pattern has C places `%.9g`; the text is what Python's `%` makes of them, only faster.
 
-    >>> written_rows(b"v %.9g %.9g\\n", np.array([[0.5, 2], [-3, 1e-7]], np.float32))
+    >>> format_rows(b"v %.9g %.9g\\n", np.array([[0.5, 2], [-3, 1e-7]], np.float32))
     (b'v 0.5 2\\nv -3 1.00000001e-07\\n', array([ 8, 28]))
     """
     between = [np.frombuffer(literal, np.uint8) for literal in pattern.split(_PLACE)]
     parts = [_constant(between[0], len(rows))]
     for column, literal in enumerate(between[1:]):
-        parts += [_written(rows[:, column]), _constant(literal, len(rows))]
-    return stripped(np.concatenate(parts))
+        parts += [_format_numbers(rows[:, column]), _constant(literal, len(rows))]
+    return strip_slots(np.concatenate(parts))
 
 
-def stripped(slots: UInt8Array) -> tuple[bytes, Int64Array]:
+def strip_slots(slots: UInt8Array) -> tuple[bytes, Int64Array]:
     """Return the characters of slots (W, N) text after text, and where each ends (N,).
 
     Bytes of zero are no characters.
@@ -81,7 +81,7 @@ def stripped(slots: UInt8Array) -> tuple[bytes, Int64Array]:
 def whole_digits(numbers: Int64Array) -> UInt8Array:
     """Return slots (D, N) of whole numbers from 1 to 10**9 - 1.
 
-    >>> stripped(whole_digits(np.array([7, 120])))
+    >>> strip_slots(whole_digits(np.array([7, 120])))
     (b'7120', array([1, 4]))
     """
     digits = _digits(numbers)
@@ -111,7 +111,7 @@ def _zeros_from(digits: UInt8Array) -> BoolArray:
     return zeros
 
 
-def _written(numbers: Float32Array) -> UInt8Array:
+def _format_numbers(numbers: Float32Array) -> UInt8Array:
     """Return slots (W, N) of numbers as `%.9g`.
 
     They are a sign, `0.000` where the number is below 1, nine digits, and a point behind each digit

@@ -15,7 +15,7 @@ _in_plugin: ContextVar[bool] = ContextVar("in_plugin", default=False)
 
 
 @contextmanager
-def guarded(who: str, hook: str, arguments: Mapping[str, Any]) -> Iterator[None]:
+def guard_hook(who: str, hook: str, arguments: Mapping[str, Any]) -> Iterator[None]:
     """Run a hook of a plugin; its errors name the plugin, the hook and the view or file.
 
     Parameters
@@ -44,7 +44,7 @@ def guarded(who: str, hook: str, arguments: Mapping[str, Any]) -> Iterator[None]
     except BaseException as error:
         if isinstance(error, OSError) and _about_file(error, arguments.get("path")):
             raise
-        raise PluginError(f"{who} failed in {place}: {named(error)}") from error
+        raise PluginError(f"{who} failed in {place}: {describe_error(error)}") from error
 
 
 @contextmanager
@@ -86,7 +86,7 @@ def subject(arguments: Mapping[str, Any]) -> str:
     return f" of {path}" if path is not None else ""
 
 
-def named(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """Return the kind and the text of an error in one line."""
     try:
         text = str(error)

@@ -18,7 +18,7 @@ import pluggy
 
 from hairkit import hookspecs
 from hairkit.errors import HairkitError, OptionError, PluginError
-from hairkit.manager.guard import guarded, named, one_line, quiet_stdout, subject
+from hairkit.manager.guard import describe_error, guard_hook, one_line, quiet_stdout, subject
 from hairkit.manager.loading import (
     DISABLE_AUTOLOAD,
     PluginInfo,
@@ -139,7 +139,7 @@ class Manager:
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            raise OptionError(f"{place}: its Options failed: {named(error)}") from error
+            raise OptionError(f"{place}: its Options failed: {describe_error(error)}") from error
 
     def call(self, stage: str, plugin: str, options: Any = None, **arguments: Any) -> Any:
         """Run one stage on one plugin and return its result.
@@ -192,18 +192,18 @@ class Manager:
                 except KeyboardInterrupt:
                     raise
                 except BaseException as error:  # whatever a listener does, the run goes on
-                    _log.warning("%s failed in %r: %s", info, hook, named(error))
+                    _log.warning("%s failed in %r: %s", info, hook, describe_error(error))
 
     def guard(self, stage: str, plugin: str) -> AbstractContextManager[None]:
         """Return a context in which errors name the plugin: for what its simulator does later."""
-        return guarded(str(self.info(plugin)), stage, {})
+        return guard_hook(str(self.info(plugin)), stage, {})
 
     def _call(self, stage: str, plugin: str, options: Any, arguments: dict[str, Any]) -> Any:
         info = self.implementer(stage, plugin)
         if options is None or isinstance(options, Mapping):
             options = self.options(plugin, options or {})
         call = Call.of(arguments)
-        with guarded(str(info), stage, arguments):
+        with guard_hook(str(info), stage, arguments):
             result = self._caller(stage, plugin)(**arguments, options=options)
             if result is not None:
                 check_result(stage, result, call)
@@ -242,4 +242,4 @@ class Manager:
 
 
 def _reason(error: BaseException) -> str:
-    return one_line(error) if isinstance(error, HairkitError) else named(error)
+    return one_line(error) if isinstance(error, HairkitError) else describe_error(error)

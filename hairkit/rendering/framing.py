@@ -44,10 +44,10 @@ def framing_cameras(
         local = camera.to_camera(cloud)
         needed = (np.abs(local[:, :2]) / slopes).max(axis=1) - local[:, 2]
         distance = max(distance, float(needed.max()))
-    return [moved_back(camera, distance) for camera in cameras]
+    return [move_back(camera, distance) for camera in cameras]
 
 
-def moved_back(camera: Camera, distance: float) -> Camera:
+def move_back(camera: Camera, distance: float) -> Camera:
     """Return the camera moved `distance` metres against its view."""
     matrix = camera.camera_from_head.copy()
     matrix[2, 3] += distance

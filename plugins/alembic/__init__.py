@@ -23,7 +23,7 @@ from __future__ import annotations
 from pathlib import Path
 from types import MappingProxyType
 
-from hairkit.grooming.prepare_export import prepared
+from hairkit.grooming.prepare_export import prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.types.groom import Groom
@@ -57,7 +57,7 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     from .curves import groom_curves
     from .writer import write_curves
 
-    write_curves(groom_curves(prepared(groom, options), options), path)
+    write_curves(groom_curves(prepare_export(groom, options), options), path)
     return True
 
 

@@ -15,7 +15,7 @@ from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import FormatError
 
 from .archive import Archive, Object, Property, tag
-from .transforms import transformed
+from .transforms import compose_transform
 
 _LINEAR, _NON_PERIODIC = 1, 0
 _MOST_LEVELS = 100
@@ -76,7 +76,7 @@ def _walk(archive: Archive) -> Iterator[tuple[Object, Float64Array]]:
         node, above, level = waiting.pop()
         if level > _MOST_LEVELS:
             raise archive.file.error(f"objects lie more than {_MOST_LEVELS} levels deep")
-        world = transformed(above, node)
+        world = compose_transform(above, node)
         yield node, world
         below = [(child, world, level + 1) for child in node.objects()]
         waiting += below[::-1]

@@ -74,7 +74,7 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
     fitted, cache = _limited(strands, ready.cache, options.max_points)
     guide = guide_mask(strands)
     marked, listed = options.mark_guides or not guide.all(), options.attributes
-    assert fitted.widths is not None  # `prepared` has filled in all three
+    assert fitted.widths is not None  # `prepare_export` has filled in all three
     assert fitted.root_uv is not None
     assert fitted.group is not None
     _check_groups(fitted.group, fitted.counts, strict=options.axis == "unreal")

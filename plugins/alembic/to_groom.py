@@ -12,7 +12,7 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array
 from hairkit.errors import FormatError
-from hairkit.grooming.adopt_strands import adopt, packed
+from hairkit.grooming.adopt_strands import adopt, pack_strands
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
@@ -59,7 +59,7 @@ def _strands(sets: list[CurveSet], space: FileSpace, path: Path) -> tuple[Strand
         points = space.points_to_head(np.concatenate([part.points for part in sets]))
     if not np.abs(points).max(initial=0) < _FARTHEST:
         raise FormatError(f"{path}: points lie farther away than {_FARTHEST:g} m; give its unit")
-    strands, index = packed(points, counts, path)
+    strands, index = pack_strands(points, counts, path)
     kept = np.repeat(counts >= 2, counts)
     widths = _together([part.widths for part in sets])
     group = _filled(sets, lambda part: part.group)

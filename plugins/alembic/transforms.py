@@ -19,7 +19,7 @@ _SIZES |= dict.fromkeys((_ROTATE_X, _ROTATE_Y, _ROTATE_Z), 1)
 """Numbers of each kind of operation; angles are in degrees."""
 
 
-def transformed(world: Float64Array, node: Object) -> Float64Array:
+def compose_transform(world: Float64Array, node: Object) -> Float64Array:
     """Return (4, 4), on row vectors, what takes points under `node` to the world.
 
     Parameters

@@ -15,7 +15,7 @@ from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
 import hairkit
 from hairkit.errors import InputError
-from hairkit.storage import replaced_file, utf8_name
+from hairkit.storage import replace_file, utf8_name
 
 from .curves import GroomCurves
 from .ogawa import is_complete
@@ -35,7 +35,7 @@ def write_curves(curves: GroomCurves, path: Path) -> None:
     InputError
         There is no room for the file.
     """
-    with replaced_file(path, ".abc") as part:
+    with replace_file(path, ".abc") as part:
         try:
             _make_room(part, _size(curves))
         except OSError as error:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from hairkit.grooming.prepare_export import ExportOptions, prepared
+from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.coordinate_space import SPACES, FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
@@ -57,6 +57,6 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the groom's head, and its strands where asked for."""
     from .scene import scene_pieces
 
-    strands = prepared(groom, options).groom.strands if options.curves else None
+    strands = prepare_export(groom, options).groom.strands if options.curves else None
     write_pieces(path, scene_pieces(groom.head, strands, options.written_space))
     return True

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hairkit.grooming.adopt_strands import ImportOptions
-from hairkit.grooming.prepare_export import AnimationOptions, ExportOptions, prepared
+from hairkit.grooming.prepare_export import AnimationOptions, ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
@@ -107,7 +107,7 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the groom as .glb."""
     from .scene import groom_document
 
-    groom_document(prepared(groom, options), options).write(path)
+    groom_document(prepare_export(groom, options), options).write(path)
     return True
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from hairkit.arrays import BoolArray, Int64Array
 
 
-def joined(segments: Int64Array, vertices: int) -> tuple[Int64Array, Int64Array]:
+def join_segments(segments: Int64Array, vertices: int) -> tuple[Int64Array, Int64Array]:
     """Return the vertices (P,) of all strands in order and the point counts (S,).
 
     Strands end where a vertex has one segment, or more than two; a ring is cut open at its first

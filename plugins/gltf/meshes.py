@@ -10,13 +10,13 @@ import numpy.typing as npt
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import guide_mask
-from hairkit.grooming.prepare_export import selected
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.io.strand_blocks import shares
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 from .document import INDICES, Document, index_type
-from .streamed import Streamed, at_points, repeated, segments
+from .streamed import Streamed, at_points, repeat_row, segments
 from .strips import HairMesh
 from .texture import white_picture
 
@@ -85,7 +85,7 @@ class Meshes:
             if not keep.any():
                 raise InputError("the groom has no guides; choose lines=all or lines=none")
             shapes = shapes[:, keep[groom.strands.strand_of_point]]
-            groom = selected(groom, keep)
+            groom = select_strands(groom, keep)
         strands, add = groom.strands, self.document.accessor
         attributes = {
             "POSITION": add(strands.points, bounds=True),
@@ -139,7 +139,7 @@ class Meshes:
         joints, weights = np.zeros((2, 4), np.uint8)
         joints[0], weights[0] = HEAD_JOINT, 255
         add = self.document.accessor
-        bound, whole = repeated(joints, count), repeated(weights, count)
+        bound, whole = repeat_row(joints, count), repeat_row(weights, count)
         return {"JOINTS_0": add(bound), "WEIGHTS_0": add(whole, normalised=True)}
 
 

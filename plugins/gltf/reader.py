@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import FormatError
-from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands
 from hairkit.head_model.scalp import bind
 from hairkit.io.glb_file import GlbFile, readable
 from hairkit.types.groom import Groom
@@ -20,7 +20,7 @@ from hairkit.types.head import Head
 from hairkit.types.strands import Strands
 
 from .extras import VERSION, capsules_of, material_of, physics_of, with_landmarks
-from .joining import joined
+from .joining import join_segments
 from .meshes import JOINTS
 
 _LINES, _LOOP, _STRIP, _TRIANGLES = 1, 2, 3, 4
@@ -125,7 +125,7 @@ def _part(file: GlbFile, primitive: dict[str, Any], matrix: Float64Array, metres
     segments = _segments(file, primitive, len(points))
     if "_STRAND_ID" not in attributes:
         segments = _welded(segments, points)
-    order, counts = joined(segments, len(points))
+    order, counts = join_segments(segments, len(points))
     if not np.array_equal(matrix, np.eye(4)) or metres != 1:
         points = metres * (points @ matrix[:3, :3].T + matrix[:3, 3])
     if not (np.abs(points) <= _FARTHEST).all():
@@ -230,7 +230,7 @@ def _strands(parts: list[_Part], path: object) -> Strands:
     """Return all parts' strands; what only some parts have is left out."""
     points = np.concatenate([part.points for part in parts])
     counts = np.concatenate([part.counts for part in parts])
-    strands, kept = packed(points, counts, path)
+    strands, kept = pack_strands(points, counts, path)
     radius, uv, group, guide = (
         None if any(values is None for values in column) else np.concatenate(column)
         for column in zip(

@@ -70,7 +70,7 @@ class Locks:
         return lines.reshape(-1, self.points_per_line, 3)
 
 
-def gathered(strands: Strands, count: int, points: int, *, mean: bool, seed: int = 0) -> Locks:
+def gather_locks(strands: Strands, count: int, points: int, *, mean: bool, seed: int = 0) -> Locks:
     """Return `count` lines of `points` points that stand for the strands, spread evenly over them.
 
     Strands are gathered by roots and tips with a few rounds of Lloyd's k-means; when there are no

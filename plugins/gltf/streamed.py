@@ -44,7 +44,7 @@ def at_points(
     return Streamed(dtype, (len(strands.points),), pieces)
 
 
-def repeated(row: npt.NDArray[Any], count: int) -> Streamed:
+def repeat_row(row: npt.NDArray[Any], count: int) -> Streamed:
     """Return an array (count, ...) whose elements are all the same."""
     most = 16_384
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from hairkit.arrays import Float32Array
 from hairkit.grooming.guide_weights import follow, guide_mask
-from hairkit.grooming.prepare_export import bound_roots, dense_groom, selected
+from hairkit.grooming.prepare_export import bound_roots, dense_groom, select_strands
 from hairkit.types.groom import Groom
 
-from .ribbons import Locks, Ribbons, frames, gathered, make_ribbons, outward
+from .ribbons import Locks, Ribbons, frames, gather_locks, make_ribbons, outward
 
 RIBBONS, CARDS = 4000, 800
 """Strips where the options say 0."""
@@ -61,7 +61,7 @@ def hair_meshes(groom: Groom, shapes: Float32Array, options: StripOptions) -> It
     Parameters
     ----------
     groom
-        Strands with all that `completed` fills in.
+        Strands with all that `complete_groom` fills in.
     shapes
         (M, P, 3) shifts of the strands' points.
     options
@@ -87,9 +87,9 @@ def _denser(
     if not guide.any():
         return groom, shapes
     shapes = shapes[:, guide[groom.strands.strand_of_point]]
-    guides = selected(groom, guide)
+    guides = select_strands(groom, guide)
     points = options.strip_points
-    even = gathered(guides.strands, len(guides.strands), points, mean=False)
+    even = gather_locks(guides.strands, len(guides.strands), points, mean=False)
     rest = even.moved(guides.strands.points).reshape(-1, 3)
     moved = np.stack([rest, *(rest + even.moved(shape).reshape(-1, 3) for shape in shapes)])
     strands = replace(
@@ -113,7 +113,7 @@ def _level(
     wider: int,
 ) -> HairMesh:
     strands = groom.strands
-    locks = gathered(strands, count, points, mean=options.hair == "cards", seed=options.seed)
+    locks = gather_locks(strands, count, points, mean=options.hair == "cards", seed=options.seed)
     lines = locks.moved(strands.points)
     out = outward(lines, groom.head)
     ribbons = make_ribbons(lines, out, _widths(groom, locks, lines, out, options, wider))

@@ -21,7 +21,7 @@ from types import MappingProxyType
 
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt
-from hairkit.grooming.prepare_export import ExportOptions, prepared
+from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
@@ -89,7 +89,7 @@ class Options:
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the groom's guides as .apx."""
-    chosen = prepared(groom, ExportOptions(strands=options.strands)).groom
+    chosen = prepare_export(groom, ExportOptions(strands=options.strands)).groom
     write_text(path, asset_text(groom_to_asset(chosen, options)))
     return True
 

@@ -47,7 +47,7 @@ class LineOptions(Protocol):
     def longest(self) -> float: ...
 
 
-def lifted_lines(
+def lift_photo_lines(
     cameras: Sequence[Camera],
     masks: Sequence[Mask],
     orientations: Sequence[OrientationMap],
@@ -67,13 +67,13 @@ def lifted_lines(
         parallel_for(
             _follow_photo, len(rows), photo, rows, columns, lines, counts, min_chunk=MIN_LINES
         )
-        found.append(lifted(camera, lines, counts))
+        found.append(lift_lines(camera, lines, counts))
     points = np.concatenate([points for points, _ in found])
     counts = np.concatenate([counts for _, counts in found])
     return _resample_lines(points, counts)
 
 
-def lifted(
+def lift_lines(
     camera: Camera, lines: Float32Array, counts: Int64Array
 ) -> tuple[Float32Array, Int64Array]:
     """Return packed smooth points (P, 3) in the head frame of all long lines, and their counts."""

@@ -24,7 +24,7 @@ from .photo_lines import (
     TensorVolume,
     agreeing,
     join,
-    lifted_lines,
+    lift_photo_lines,
 )
 
 NEIGHBOURS, ROUNDS = 8, 10
@@ -69,7 +69,7 @@ def find_segments(
     certainty = fused.certainty
     volume = np.zeros((*hull.grid.shape, 6), np.float32)
     volume[hull.loose] = fused.tensor * np.minimum(certainty, 1)[:, None]
-    lines = lifted_lines(cameras, masks, fused.orientations, hull, options)
+    lines = lift_photo_lines(cameras, masks, fused.orientations, hull, options)
     lines = agreeing(lines, hull, volume, options.agreement_deg)
     inner = lines_through_cells(hull, volume, certainty, options.longest)
     points = np.concatenate([lines.points, inner.points])

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.grooming.guide_weights import guide_mask
-from hairkit.grooming.prepare_export import selected
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.rendering.context import on_graphics_card
 from hairkit.simulation import Measures, Surroundings
 from hairkit.simulation.obstacles import Obstacles, head_obstacles
@@ -45,7 +45,7 @@ class PbdSimulator:
     """Simulated guides of a groom (see `hairkit.simulation.Simulator`)."""
 
     def __init__(self, groom: Groom, options: Options) -> None:
-        guides = selected(groom, guide_mask(groom.strands))
+        guides = select_strands(groom, guide_mask(groom.strands))
         self._groom = guides
         self._obstacles: Obstacles = head_obstacles(guides.head)
         self._points: Float32Array | None = None

@@ -24,12 +24,12 @@ from hairkit.errors import FormatError, InputError
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
-    packed,
+    pack_strands,
     plain_widths,
     rows_kept,
     with_mean_width,
 )
-from hairkit.grooming.prepare_export import ExportOptions, prepared
+from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.byte_reader import finite
 from hairkit.io.byte_writer import as_bytes
@@ -77,7 +77,7 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write vertices, edges and strands."""
-    ready = prepared(groom, options).groom
+    ready = prepare_export(groom, options).groom
     longest = ready.strands.counts.max()
     if longest > _MOST_SEGMENTS + 1:
         raise InputError(f"a strand has {longest} points, .ply holds {_MOST_SEGMENTS + 1} at most")
@@ -96,7 +96,7 @@ def import_groom(path: Path, options: Options) -> Groom:
         points = np.stack([vertex[name] for name in "xyz"], axis=1).astype(np.float32)
     finite(points, path, "vertices")
     order, counts = _strand_order(elements, len(points), path)
-    strands, kept = packed(options.space.points_to_head(points[order]), counts, path)
+    strands, kept = pack_strands(options.space.points_to_head(points[order]), counts, path)
     rows = rows_kept(counts, kept)
     widths = None
     if "thickness" in vertex:

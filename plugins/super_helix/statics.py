@@ -25,12 +25,12 @@ _DIFFERENCE = 1e-5
 def rest_as_captured(rods: Rods, gravity: Float64Array) -> Rods:
     """Return the rods with a natural shape, and stiffness where needed, to rest as captured."""
     load = gravity_forces(rods, rods.captured, gravity)
-    rods = stiffened(rods, gravity)
+    rods = stiffen(rods, gravity)
     natural = rods.captured - load / (rods.lengths[:, None] * rods.stiffness)
     return rods._replace(natural=natural)
 
 
-def stiffened(rods: Rods, gravity: Float64Array) -> Rods:
+def stiffen(rods: Rods, gravity: Float64Array) -> Rods:
     """Return the rods, those stiffer whose captured shape gravity would topple."""
     slope = gravity_slopes(rods, gravity)
     factor = np.ones(len(rods.lengths))

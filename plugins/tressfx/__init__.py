@@ -23,12 +23,12 @@ from hairkit.arrays import Float32Array
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
-    packed,
+    pack_strands,
     plain_widths,
     rows_kept,
     with_mean_width,
 )
-from hairkit.grooming.prepare_export import ExportOptions, prepared
+from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.byte_reader import ByteReader
 from hairkit.io.coordinate_space import SpaceOptions
@@ -77,7 +77,7 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the strands, and the .tfxbone beside the file."""
-    ready = _resampled(prepared(groom, options).groom, options.points_per_strand)
+    ready = _resampled(prepare_export(groom, options).groom, options.points_per_strand)
     uv = _flipped(np.asarray(ready.strands.root_uv), options)
     count, coloured = options.points_per_strand, options.colours
     write_pieces(path, tfx_pieces(ready, count, options.space, uv, coloured=coloured))
@@ -92,7 +92,7 @@ def import_groom(path: Path, options: Options) -> Groom:
     data = read_bytes(path)
     hair, counts = read_text(data, path) if is_text(data) else read_binary(ByteReader(data, path))
     points = options.space.points_to_head(hair.points.reshape(-1, 3))
-    strands, kept = packed(points, counts, path)
+    strands, kept = pack_strands(points, counts, path)
     widths, uv, colours = None, None, None
     if hair.thickness is not None:
         each = plain_widths(hair.thickness, options.space.metres, path)

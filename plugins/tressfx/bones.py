@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 
-from hairkit.io.byte_writer import joined
+from hairkit.io.byte_writer import join_bytes
 
 JOINTS = ("root", "neck", "head")
 """Names of the joints of a groom's head, in its order."""
@@ -26,4 +26,4 @@ def bone_bytes(strands: int) -> memoryview:
     rows["pairs"]["bone"][:, 0] = JOINTS.index("head")
     rows["pairs"]["weight"][:, 0] = 1.0
     head = names + struct.pack("<i", strands)
-    return joined([("u1", np.frombuffer(head, np.uint8)), (STRAND, rows)])
+    return join_bytes([("u1", np.frombuffer(head, np.uint8)), (STRAND, rows)])

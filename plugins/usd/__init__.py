@@ -29,7 +29,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from hairkit.grooming.adopt_strands import ImportOptions
-from hairkit.grooming.prepare_export import AnimationOptions, ExportOptions, prepared
+from hairkit.grooming.prepare_export import AnimationOptions, ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
@@ -66,7 +66,7 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the groom as .usda (text), .usdc or .usd (crate), animated where options say so."""
     from .stage import write_stage
 
-    write_stage(prepared(groom, options), path, options)
+    write_stage(prepare_export(groom, options), path, options)
     return True
 
 

@@ -45,17 +45,17 @@ def main() -> None:
     """Read the file named first and write the archive named second."""
     source, target = sys.argv[1:]
     _limit_memory(os.path.getsize(source))
-    print(json.dumps(answered(source, target)), flush=True)
+    print(json.dumps(answer_request(source, target)), flush=True)
     os._exit(0)  # nothing of the library's is needed any more, least of all its destructors
 
 
-def answered(source: str, target: str) -> dict[str, str]:
+def answer_request(source: str, target: str) -> dict[str, str]:
     """Write the archive; return nothing, or the `error` and its `kind`."""
     from pxr import Tf
 
     save: Any = np.savez  # whose stubs take names of arrays for options
     try:
-        save(target, **extracted(source))
+        save(target, **extract_arrays(source))
     except RefusedError as error:
         return {"kind": "refused", "error": str(error)}
     except Tf.ErrorException as error:
@@ -67,7 +67,7 @@ def answered(source: str, target: str) -> dict[str, str]:
     return {}
 
 
-def extracted(source: str) -> dict[str, npt.NDArray[Any]]:
+def extract_arrays(source: str) -> dict[str, npt.NDArray[Any]]:
     """Return arrays by name; `description` is JSON text as bytes."""
     from pxr import Sdf, Usd, UsdGeom, UsdSkel
 

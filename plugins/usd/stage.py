@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from hairkit.errors import InputError, MissingExtraError
 from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.io.coordinate_space import FileSpace
-from hairkit.storage import replaced_file, utf8_name
+from hairkit.storage import replace_file, utf8_name
 
 MISSING = "USD files need usd-core, which is not installed: pip install 'hairkit[usd]'"
 DIGITS = 6
@@ -51,7 +51,7 @@ def write_stage(ready: PreparedGroom, path: Path, options: StageOptions) -> None
     stage = Usd.Stage.CreateInMemory(f"groom{path.suffix.lower()}")
     _describe(stage, ready, space)
     _fill(stage, ready, space, options)
-    with replaced_file(path, path.suffix.lower()) as part:
+    with replace_file(path, path.suffix.lower()) as part:
         try:
             stage.GetRootLayer().Export(utf8_name(part))
         except Tf.ErrorException as error:

@@ -11,7 +11,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array, Int64Array
 from hairkit.errors import FormatError, InputError
-from hairkit.grooming.adopt_strands import ImportOptions, adopt, packed, rows_kept
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands, rows_kept
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
@@ -56,7 +56,7 @@ def read_groom(path: Path, options: Any) -> Groom:
     if not every:
         raise FormatError(f"{path}: holds no BasisCurves with points")
     joined = _joined(every)
-    strands, kept = packed(joined.points, joined.counts, path)
+    strands, kept = pack_strands(joined.points, joined.counts, path)
     strands = _complete(strands, joined, kept)
     settings = found.description["settings"]
     material = material_from(settings, path) or _look(joined, strands, kept)

@@ -8,8 +8,8 @@ import pytest
 from hairkit.errors import InputError
 from hairkit.evaluation.images import (
     direction_share,
-    drawn_directions,
     hair_silhouette,
+    judge_drawn_directions,
     mask_iou,
     orientation_error,
 )
@@ -85,7 +85,7 @@ def test_drawn_strands_are_right_along_the_truth_and_wrong_across() -> None:
     """Strands straight down are right on upright hair, strands across it wrong."""
     shares = [
         direction_share(
-            [drawn_directions(CAMERA, sample_strands(rows(0.15, a)), ball_head(), UPRIGHT)]
+            [judge_drawn_directions(CAMERA, sample_strands(rows(0.15, a)), ball_head(), UPRIGHT)]
         )
         for a in (False, True)
     ]
@@ -98,11 +98,11 @@ def test_hidden_strands_are_not_judged() -> None:
     both = sample_strands(
         Strands.from_list([*right.points.reshape(-1, 2, 3), *wrong.points.reshape(-1, 2, 3)])
     )
-    assert direction_share([drawn_directions(CAMERA, both, ball_head(), UPRIGHT)]) > 0.97
+    assert direction_share([judge_drawn_directions(CAMERA, both, ball_head(), UPRIGHT)]) > 0.97
     behind = sample_strands(rows(0.0, across=True))
-    assert drawn_directions(CAMERA, behind, ball_head(), UPRIGHT).drawn == 0
+    assert judge_drawn_directions(CAMERA, behind, ball_head(), UPRIGHT).drawn == 0
     bald = np.zeros_like(UPRIGHT)
-    assert drawn_directions(CAMERA, sample_strands(right), ball_head(), bald).drawn == 0
+    assert judge_drawn_directions(CAMERA, sample_strands(right), ball_head(), bald).drawn == 0
 
 
 def test_overlap_of_masks() -> None:

@@ -12,13 +12,13 @@ from hairkit.errors import FormatError, InputError
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
-    packed,
+    pack_strands,
     plain_widths,
-    reversed_strands,
+    reverse_strands,
     rows_kept,
 )
 from hairkit.grooming.guide_weights import guide_mask
-from hairkit.head_model.placement import find_place, placed
+from hairkit.head_model.placement import find_place, place_head
 from hairkit.head_model.scalp import evaluate, sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.io.coordinate_space import SpaceOptions
@@ -49,7 +49,7 @@ def test_the_default_head_is_put_where_hair_grew(
 ) -> None:
     """Size and place of the head that the hair was made on are found again, and said."""
     groom = adopt(hair_on(scale, shift), ImportOptions(), "a.hair")
-    wanted = placed(default_head(), scale, np.array(shift))
+    wanted = place_head(default_head(), scale, np.array(shift))
     assert np.abs(groom.head.vertices - wanted.vertices).max() < 0.008
     bound = evaluate(groom.head, groom.root_triangle, groom.root_barycentric)
     assert np.linalg.norm(bound - groom.strands.roots, axis=1).mean() < 0.004
@@ -109,7 +109,7 @@ def test_a_few_strands_far_off_do_not_change_the_unit() -> None:
 def test_hair_drawn_from_tip_to_root_is_said_and_turned(caplog: pytest.LogCaptureFixture) -> None:
     """Tips on the head and roots off it are warned of; `reverse` puts them right, and only then."""
     hair = hair_on()
-    head, wrong = default_head(), reversed_strands(hair)
+    head, wrong = default_head(), reverse_strands(hair)
     adopt(wrong, ImportOptions(), "a.hair", head=head)
     assert "set reverse=true" in caplog.text
     caplog.clear()
@@ -126,12 +126,12 @@ def test_turning_over_twice_changes_nothing(rng: np.random.Generator) -> None:
     counts = rng.integers(2, 7, 30)
     offsets = np.concatenate([[0], np.cumsum(counts)])
     strands = Strands(rng.random((offsets[-1], 3)), offsets, rng.random(offsets[-1]))
-    once = reversed_strands(strands)
+    once = reverse_strands(strands)
     assert np.array_equal(once.roots, strands.tips)
     assert once.widths is not None
     assert strands.widths is not None
     assert np.array_equal(once.widths[offsets[:-1]], strands.widths[offsets[1:] - 1])
-    assert np.array_equal(reversed_strands(once).points, strands.points)
+    assert np.array_equal(reverse_strands(once).points, strands.points)
 
 
 def test_strands_without_length_are_dropped(caplog: pytest.LogCaptureFixture) -> None:
@@ -150,16 +150,16 @@ def test_packing_drops_strands_of_one_point(caplog: pytest.LogCaptureFixture) ->
     """Numbers of the kept strands and their rows are told; wild points are refused."""
     counts = np.array([1, 3, 0, 2])
     points = np.arange(18, dtype=np.float32).reshape(6, 3)
-    strands, kept = packed(points, counts, "a.hair")
+    strands, kept = pack_strands(points, counts, "a.hair")
     assert kept.tolist() == [1, 3]
     assert strands.offsets.tolist() == [0, 3, 5]
     assert np.array_equal(strands.points, points[rows_kept(counts, kept)])
     assert "2 strands of fewer than two points dropped" in caplog.text
     for bad in (np.nan, np.inf, 1e30):
         with pytest.raises(FormatError, match="expected hair on a head"):
-            packed(np.full((2, 3), bad, np.float32), np.array([2]), "a.hair")
+            pack_strands(np.full((2, 3), bad, np.float32), np.array([2]), "a.hair")
     with pytest.raises(FormatError, match="no strand of two"):
-        packed(points[:1], np.array([1]), "a.hair")
+        pack_strands(points[:1], np.array([1]), "a.hair")
 
 
 def test_widths_are_plain_numbers() -> None:

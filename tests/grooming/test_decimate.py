@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hairkit.errors import InputError
-from hairkit.grooming.decimate import cluster_strands, simplified
+from hairkit.grooming.decimate import cluster_strands, decimate
 from hairkit.grooming.guide_weights import closest_guides
 from hairkit.grooming.prepare_export import dense_groom
 from hairkit.testing import bristle_groom
@@ -44,7 +44,7 @@ def test_as_many_guides_as_wanted(count: int, rng: np.random.Generator) -> None:
 def test_a_simplified_groom_keeps_its_hair_and_follows_its_guides() -> None:
     """Every strand stays; hair between guides is tied to guides only."""
     full = dense_groom(bristle_groom(), 900, seed=2)
-    found = simplified(full, 60)
+    found = decimate(full, 60)
     np.testing.assert_array_equal(found.strands.points, full.strands.points)
     assert found.strands.guide is not None
     assert found.strands.guide.sum() == 60

@@ -13,11 +13,11 @@ from hairkit.errors import InputError
 from hairkit.grooming.prepare_export import (
     AnimationOptions,
     ExportOptions,
-    completed,
+    complete_groom,
     dense_groom,
     point_colours,
-    prepared,
-    selected,
+    prepare_export,
+    select_strands,
     shorter_than,
 )
 from hairkit.head_model.scalp import evaluate
@@ -35,7 +35,7 @@ def test_every_strand_is_in_one_choice() -> None:
     """Guides and hair together are all, in order."""
     groom = rich_groom()
     parts = {
-        choice: prepared(groom, ExportOptions(strands=choice)).groom.strands
+        choice: prepare_export(groom, ExportOptions(strands=choice)).groom.strands
         for choice in ("all", "guides", "hair")
     }
     assert parts["guides"].guide is not None
@@ -49,7 +49,7 @@ def test_every_strand_is_in_one_choice() -> None:
 def test_completing_fills_what_lacks_and_changes_nothing_else() -> None:
     """Defaults are the material's width, the head's uv, group 0 and guides; what is there stays."""
     bare = bristle_groom()
-    full = completed(replace(bare, strands=Strands(bare.strands.points, bare.strands.offsets)))
+    full = complete_groom(replace(bare, strands=Strands(bare.strands.points, bare.strands.offsets)))
     assert np.all(full.strands.widths == np.float32(bare.material.width))
     assert np.allclose(full.strands.root_uv, bare.strands.root_uv, atol=1e-6)
     assert full.strands.group is not None
@@ -57,13 +57,13 @@ def test_completing_fills_what_lacks_and_changes_nothing_else() -> None:
     assert full.strands.guide is not None
     assert full.strands.guide.all()
     rich = rich_groom()
-    assert completed(rich) is rich
+    assert complete_groom(rich) is rich
 
 
 def test_degenerate_strands_are_dropped_and_counted(caplog: pytest.LogCaptureFixture) -> None:
     """What is bound to a strand goes with it."""
     groom = with_degenerate(rich_groom())
-    ready = prepared(groom, ExportOptions()).groom
+    ready = prepare_export(groom, ExportOptions()).groom
     assert len(ready.strands) == len(groom.strands) - 1
     assert np.array_equal(ready.root_triangle, groom.root_triangle[1:])
     assert np.array_equal(ready.strands.root_uv, groom.strands.root_uv[1:])
@@ -82,14 +82,14 @@ def test_length_is_told_by_few_segments_as_by_all(rng: np.random.Generator) -> N
 def test_nothing_to_write_is_refused() -> None:
     """A groom of guides alone has no hair to write."""
     with pytest.raises(InputError, match="strands=hair"):
-        prepared(bristle_groom(), ExportOptions(strands="hair"))
+        prepare_export(bristle_groom(), ExportOptions(strands="hair"))
 
 
 def test_dense_grooms_begin_with_the_guides() -> None:
     """Hair is added up to the number, bound to the head, equal for equal seeds."""
     groom = rich_groom()
     dense = dense_groom(groom, 200, 3)
-    guides = selected(groom, np.asarray(groom.strands.guide))
+    guides = select_strands(groom, np.asarray(groom.strands.guide))
     assert len(dense.strands) == 200
     assert np.array_equal(np.flatnonzero(dense.strands.guide), np.arange(len(guides.strands)))
     bound = evaluate(dense.head, dense.root_triangle, dense.root_barycentric)
@@ -112,7 +112,7 @@ def test_colours_run_from_root_to_tip() -> None:
 def test_a_cache_comes_along_for_the_strands_that_are_written(tmp_path: Path) -> None:
     """Frames belong to the kept strands, and hair moves as rigidly as its guides do."""
     groom = rich_groom()
-    guides = selected(groom, np.asarray(groom.strands.guide)).strands.points
+    guides = select_strands(groom, np.asarray(groom.strands.guide)).strands.points
     shift = np.array([0.0, 0.01, 0.02], np.float32)
     cache = PointCache(
         np.stack([guides, guides + shift]), np.array([0.0, 0.1]), np.tile(np.eye(4), (2, 1, 1))
@@ -120,10 +120,10 @@ def test_a_cache_comes_along_for_the_strands_that_are_written(tmp_path: Path) ->
     cache.save(tmp_path / "cache.npz")
     for choice, hairs in (("all", 0), ("guides", 0), ("hair", 0), ("all", 400), ("hair", 400)):
         options = Animated(strands=choice, hairs=hairs, cache=tmp_path / "cache.npz")
-        ready = prepared(groom, options)
+        ready = prepare_export(groom, options)
         assert ready.cache is not None
         rest = ready.groom.strands.points
         assert np.allclose(ready.cache.points[0], rest, atol=1e-7)
         assert np.allclose(ready.cache.points[1], rest + shift, atol=1e-6)
     with pytest.raises(InputError, match="a cache of"):
-        prepared(bristle_groom(), Animated(cache=tmp_path / "cache.npz"))
+        prepare_export(bristle_groom(), Animated(cache=tmp_path / "cache.npz"))

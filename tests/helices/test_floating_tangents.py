@@ -9,7 +9,14 @@ import pytest
 from scipy.spatial import cKDTree
 
 from hairkit.errors import InputError
-from hairkit.helices import Arcs, HelixStrands, adaptive_counts, fit_arcs, patent_counts, smoothed
+from hairkit.helices import (
+    Arcs,
+    HelixStrands,
+    adaptive_counts,
+    fit_arcs,
+    patent_counts,
+    smooth_strands,
+)
 from hairkit.helices.arc_counts import FEWEST, MOST, mean_error
 from hairkit.helices.arc_length import Path as Curve
 from hairkit.types.strands import Strands
@@ -180,7 +187,7 @@ def test_smoothing_takes_noise_off(rng: np.random.Generator) -> None:
     clean = wandering(rng)
     noise = rng.normal(0, 0.001, clean.points.shape).astype(np.float32)
     noise[clean.offsets[:-1]] = 0
-    smooth = smoothed(Strands(clean.points + noise, clean.offsets), 0.002)
+    smooth = smooth_strands(Strands(clean.points + noise, clean.offsets), 0.002)
     np.testing.assert_array_equal(smooth.offsets, clean.offsets)
     np.testing.assert_array_equal(smooth.roots, clean.roots)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hairkit.errors import FormatError
 from hairkit.io.byte_reader import ByteReader, finite
-from hairkit.io.byte_writer import joined
+from hairkit.io.byte_writer import join_bytes
 
 KINDS = ("<u2", ">i4", "<f4", "<f8", "u1")
 arrays = st.lists(st.tuples(st.sampled_from(KINDS), st.lists(st.integers(0, 99), max_size=9)))
@@ -18,7 +18,7 @@ arrays = st.lists(st.tuples(st.sampled_from(KINDS), st.lists(st.integers(0, 99),
 @given(parts=arrays)
 def test_reading_undoes_joining(parts: list[tuple[str, list[int]]]) -> None:
     """Arrays come back in their order, and nothing is left over."""
-    reader = ByteReader(bytes(joined(parts)), "a.bin")
+    reader = ByteReader(bytes(join_bytes(parts)), "a.bin")
     for kind, values in parts:
         assert reader.array(kind, len(values), "values").tolist() == values
     assert reader.left == 0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from hairkit.arrays import Float32Array
 from hairkit.errors import FormatError
-from hairkit.io.number_text import read_numbers, stripped, whole_digits, written_rows
+from hairkit.io.number_text import format_rows, read_numbers, strip_slots, whole_digits
 
 floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
 
@@ -18,7 +18,7 @@ floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
 def test_nine_digits_hold_a_float32(rows: list[tuple[float, float, float]]) -> None:
     """Writing rows and reading the numbers gives every bit back."""
     table = np.array(rows, np.float32).reshape(-1, 3)
-    text = written_rows(b"%.9g %.9g %.9g\n", table)[0].decode("ascii")
+    text = format_rows(b"%.9g %.9g %.9g\n", table)[0].decode("ascii")
     assert np.array_equal(read_numbers(text, "a.txt", "points").astype(np.float32), table.ravel())
     assert text.count("\n") == len(table)
 
@@ -46,7 +46,7 @@ def test_texts_are_those_of_python_in_every_decade() -> None:
 
 def _assert_as_python_writes(numbers: Float32Array) -> None:
     texts = [b"v %.9g;" % number for number in numbers.tolist()]
-    text, ends = written_rows(b"v %.9g;", numbers[:, None])
+    text, ends = format_rows(b"v %.9g;", numbers[:, None])
     assert text == b"".join(texts)
     assert ends.tolist() == np.cumsum([len(part) for part in texts], dtype=np.int64).tolist()
 
@@ -54,7 +54,7 @@ def _assert_as_python_writes(numbers: Float32Array) -> None:
 @given(numbers=st.lists(st.integers(1, 10**9 - 1), max_size=30))
 def test_whole_numbers_have_no_zeros_before_them(numbers: list[int]) -> None:
     """They are written as `str` writes them."""
-    text = stripped(whole_digits(np.array(numbers, np.int64)))[0]
+    text = strip_slots(whole_digits(np.array(numbers, np.int64)))[0]
     assert text.decode("ascii") == "".join(map(str, numbers))
 
 

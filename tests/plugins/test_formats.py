@@ -12,7 +12,7 @@ import pytest
 from rich_groom import rich_groom, with_degenerate
 
 from hairkit.errors import MissingExtraError
-from hairkit.grooming.prepare_export import completed, selected
+from hairkit.grooming.prepare_export import complete_groom, select_strands
 from hairkit.head_model.scalp import evaluate, roots_at
 from hairkit.io.file_format import Feature
 from hairkit.manager import Manager, PluginInfo
@@ -105,11 +105,11 @@ def is_lost(feature: Feature, back: Groom, true: Groom) -> bool:
 def counterpart(info: PluginInfo, back: Groom, groom: Groom) -> Groom:
     """Return the part of the groom that the file holds: all, or guides where it declares so."""
     assert info.format is not None
-    true = completed(groom)
+    true = complete_groom(groom)
     if len(back.strands) == len(true.strands) or Feature.POINTS in info.format.exact:
         return true
     assert true.strands.guide is not None
-    return selected(true, true.strands.guide)
+    return select_strands(true, true.strands.guide)
 
 
 @pytest.mark.parametrize(("info", "suffix"), BOTH_WAYS, ids=named)

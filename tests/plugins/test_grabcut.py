@@ -129,7 +129,7 @@ def test_brightness_presets_keep_black_and_white() -> None:
     """Every preset keeps the ends of the scale and the order of brightness."""
     ramp = np.repeat(np.arange(256, dtype=np.uint8)[None, :, None], 3, axis=2)
     for preset in ("as_is", "brighter", "much_brighter", "darker"):
-        out = grabcut.brightened(ramp, preset)[0, :, 0].astype(int)
+        out = grabcut.brighten(ramp, preset)[0, :, 0].astype(int)
         assert (out[0], out[-1]) == (0, 255)
         assert (np.diff(out) >= 0).all()
 

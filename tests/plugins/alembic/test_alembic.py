@@ -16,7 +16,7 @@ from hairkit_plugins.alembic import curves, writer
 
 from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import closest_guides
-from hairkit.grooming.prepare_export import completed, selected
+from hairkit.grooming.prepare_export import complete_groom, select_strands
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.point_cache import PointCache
@@ -115,7 +115,7 @@ def test_one_strand_comes_back(tmp_path: Path) -> None:
     """Where one value may belong to the object, the strand or a point, nothing is mixed up."""
     groom = hair_groom()
     keep = np.arange(len(groom.strands)) == 5
-    path = written(selected(groom, keep), tmp_path)
+    path = written(select_strands(groom, keep), tmp_path)
     back = alembic.import_groom(path, alembic.Options()).strands
     np.testing.assert_array_equal(back.points, groom.strands.select(keep).points)
     assert back.guide is None  # hair without any guide is all guides
@@ -372,7 +372,7 @@ def test_the_room_made_is_enough(tmp_path: Path, caplog: pytest.LogCaptureFixtur
     caplog.set_level(logging.CRITICAL)
     _, file = swaying(bristle_groom(), tmp_path)
     for groom, options in ((hair_groom(), {}), (bristle_groom(), {"cache": file})):
-        ready = alembic.prepared(groom, alembic.Options(**options))
+        ready = alembic.prepare_export(groom, alembic.Options(**options))
         size = writer._size(curves.groom_curves(ready, alembic.Options(**options)))
         have = written(groom, tmp_path, **options).stat().st_size
         assert have <= size < 2 * have + 50_000
@@ -390,5 +390,5 @@ def test_attributes_can_be_left_out(tmp_path: Path) -> None:
     assert b"groom_id" not in bare.read_bytes()
     back = alembic.import_groom(bare, alembic.Options()).strands
     np.testing.assert_array_equal(back.points, groom.strands.points)
-    np.testing.assert_array_equal(back.widths, completed(groom).strands.widths)
+    np.testing.assert_array_equal(back.widths, complete_groom(groom).strands.widths)
     assert back.guide is None

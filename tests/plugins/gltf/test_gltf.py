@@ -11,10 +11,10 @@ import pytest
 import trimesh
 from clients_gltf import complaints
 from hairkit_plugins import gltf
-from hairkit_plugins.gltf.joining import joined
+from hairkit_plugins.gltf.joining import join_segments
 
 from hairkit.errors import FormatError, InputError
-from hairkit.grooming.prepare_export import completed, selected
+from hairkit.grooming.prepare_export import complete_groom, select_strands
 from hairkit.io.glb_file import GlbFile
 from hairkit.io.glb_motion import read_head_motion
 from hairkit.io.head_reader import read_head
@@ -119,7 +119,7 @@ def test_khronos_validator_is_silent(tmp_path: Path) -> None:
     """No error, warning or information, whatever the options."""
     groom = rich_groom()
     cache = tmp_path / "cache.npz"
-    waving_cache(selected(groom, groom.strands.guide)).save(cache)
+    waving_cache(select_strands(groom, groom.strands.guide)).save(cache)
     files = []
     for number, options in enumerate(OPTIONS):
         chosen = options | ({"cache": cache} if "cache" in options else {})
@@ -274,7 +274,7 @@ def test_segments_join_to_strands(rng: np.random.Generator, shuffled: bool) -> N
         segments = segments[rng.permutation(len(segments))]
         flip = rng.random(len(segments)) < 0.3
         segments[flip] = segments[flip, ::-1]
-    order, found = joined(segments, len(names))
+    order, found = join_segments(segments, len(names))
     assert len(order) == found.sum() == counts.sum()
     ends = np.cumsum(found)
     strands = [tuple(order[e - n : e]) for e, n in zip(ends, found, strict=True)]
@@ -288,7 +288,7 @@ def test_rings_forks_and_twins() -> None:
     ring = np.array([[5, 6], [6, 7], [7, 5]])
     fork = np.array([[0, 1], [1, 2], [1, 3]])
     twins = np.array([[8, 9], [9, 8], [8, 9], [9, 9]])
-    order, counts = joined(np.concatenate([ring, fork, twins]), 10)
+    order, counts = join_segments(np.concatenate([ring, fork, twins]), 10)
     assert counts.tolist() == [4, 2, 2, 2, 2]
     assert order.tolist() == [5, 6, 7, 5, 0, 1, 1, 2, 1, 3, 8, 9]
 
@@ -298,7 +298,7 @@ def test_completed_is_what_is_written(tmp_path: Path) -> None:
     bare = bristle_groom()
     bare = replace(bare, strands=replace(bare.strands, root_uv=None))
     found = gltf.import_groom(written(tmp_path, bare, hair="none"), gltf.Options())
-    want = completed(bare).strands
+    want = complete_groom(bare).strands
     np.testing.assert_array_equal(found.strands.widths, want.widths)
     np.testing.assert_allclose(found.strands.root_uv, want.root_uv, atol=1e-7)
     assert found.strands.guide is not None

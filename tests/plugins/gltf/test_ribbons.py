@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.gltf.ribbons import Ribbons, frames, gathered, make_ribbons, outward
+from hairkit_plugins.gltf.ribbons import Ribbons, frames, gather_locks, make_ribbons, outward
 
 from hairkit.errors import InputError
 from hairkit.testing import ball_head, bristle_groom
@@ -92,7 +92,7 @@ def test_bristles_have_strips() -> None:
 def test_locks_are_of_the_strands(count: int, mean: bool) -> None:
     """No more lines than asked for or than strands; weights of each point sum to one."""
     strands = bristle_groom().strands
-    locks = gathered(strands, count, 6, mean=mean)
+    locks = gather_locks(strands, count, 6, mean=mean)
     assert 1 <= len(locks.strand) <= min(count, len(strands))
     np.testing.assert_allclose(np.asarray(locks.from_points.sum(axis=1)).ravel(), 1, atol=1e-9)
     lines = locks.moved(strands.points)
@@ -107,7 +107,7 @@ def test_locks_are_of_the_strands(count: int, mean: bool) -> None:
 def test_lines_go_with_their_strands(rng: np.random.Generator) -> None:
     """Moving all hair moves the lines alike; the mean of a lock stays within its strands."""
     strands = bristle_groom().strands
-    locks = gathered(strands, 10, 4, mean=True)
+    locks = gather_locks(strands, 10, 4, mean=True)
     shift = np.float32([0.1, -0.2, 0.3])
     np.testing.assert_allclose(
         locks.moved(strands.points + shift), locks.moved(strands.points) + shift, atol=1e-6
@@ -121,11 +121,11 @@ def test_uneven_strands_are_evened() -> None:
     strand = np.zeros((5, 3), np.float32)
     strand[:, 1] = [0, 0.001, 0.002, 0.003, 0.1]
     strands = replace(Strands.from_list([strand, strand[:2]]), root_uv=None)
-    lines = gathered(strands, 2, 6, mean=False).moved(strands.points)
+    lines = gather_locks(strands, 2, 6, mean=False).moved(strands.points)
     np.testing.assert_allclose(lines[0, :, 1], np.linspace(0, 0.1, 6), atol=1e-7)
 
 
 def test_senseless_sizes_are_refused() -> None:
     """No strips, or strips of one point, cannot be made."""
     with pytest.raises(InputError, match="0 strips"):
-        gathered(bristle_groom().strands, 0, 4, mean=True)
+        gather_locks(bristle_groom().strands, 0, 4, mean=True)

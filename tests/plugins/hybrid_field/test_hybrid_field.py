@@ -16,7 +16,7 @@ from hairkit_plugins.hybrid_field.photo_lines import (
     Photo,
     _follow_photo,
     agreeing,
-    lifted,
+    lift_lines,
 )
 from hairkit_plugins.hybrid_field.ribbons import SURFACE, Band, ribbons
 from hairkit_plugins.hybrid_field.segments import find_segments, orient_segments
@@ -119,7 +119,7 @@ def test_a_line_is_lifted_and_smoothed_the_same_wherever_it_stands_in_the_pack()
     lines = rng.uniform(40, 80, (5, 30, 3)).astype(np.float32)
     lines[..., 2] = rng.uniform(0.4, 0.6, (5, 30))
     counts = np.array([30, 2, 5, 12, 30])
-    points, kept = lifted(camera, lines, counts)
+    points, kept = lift_lines(camera, lines, counts)
     np.testing.assert_array_equal(kept, [30, 5, 12, 30])
     ends = np.cumsum(kept)
     for line, last, count in zip(lines[[0, 2, 3, 4]], ends, kept, strict=True):

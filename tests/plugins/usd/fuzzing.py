@@ -108,7 +108,7 @@ def _read(path: Path) -> None:
 
 
 def _run_here(path: Path, archive: Path, seconds: float) -> dict[str, Any]:
-    return reading_child.answered(str(path), str(archive))
+    return reading_child.answer_request(str(path), str(archive))
 
 
 if __name__ == "__main__":

@@ -46,7 +46,7 @@ def read(manager: Manager, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> R
     """Return a function that reads the text of a stage as a groom, in this process: faster."""
 
     def run(path: Path, archive: Path, seconds: float) -> dict[str, str]:
-        return reading_child.answered(str(path), str(archive))
+        return reading_child.answer_request(str(path), str(archive))
 
     monkeypatch.setattr(guarded, "run", run)
 

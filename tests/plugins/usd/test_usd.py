@@ -13,7 +13,7 @@ import pytest
 
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError, MissingExtraError
-from hairkit.grooming.prepare_export import completed, dense_groom, selected
+from hairkit.grooming.prepare_export import complete_groom, dense_groom, select_strands
 from hairkit.head_model.skinning import head_weights
 from hairkit.manager import Manager
 from hairkit.storage import to_arrays
@@ -66,9 +66,9 @@ def exported(
     """Return the crate file that the groom was written to."""
     path = folder / "groom.usdc"
     if animated:
-        mask = completed(groom).strands.guide
+        mask = complete_groom(groom).strands.guide
         assert mask is not None
-        turning(selected(groom, mask)).save(folder / "cache.npz")
+        turning(select_strands(groom, mask)).save(folder / "cache.npz")
         values["cache"] = folder / "cache.npz"
     options = manager.options("usd", values)
     manager.call("export_groom", "usd", options, groom=groom, path=path)
@@ -98,7 +98,7 @@ def test_export_then_import_gives_the_whole_groom(
     options = manager.options("usd", {"axis": axis})
     manager.call("export_groom", "usd", options, groom=groom, path=path)
     back = to_arrays(manager.call("import_groom", "usd", options, path=path))
-    there = to_arrays(completed(groom))
+    there = to_arrays(complete_groom(groom))
     assert there.keys() == back.keys()
     for field, array in there.items():
         if axis == "y_up_metres":
