@@ -86,7 +86,7 @@ def export(
     with _cache_file(cache) as motion:
         values = options if motion is None else {**options, "cache": motion}
         checked = plugins.options(name, values)
-        opened = _opened(groom, plugins)
+        opened = _open(groom, plugins)
         plugins.call("export_groom", name, checked, groom=opened, path=Path(path))
 
 
@@ -132,7 +132,7 @@ def simulate(
     from hairkit.simulation import Weather, add_shakes, read_motion, run
 
     plugins = manager or Manager.loaded()
-    opened = _opened(groom, plugins)
+    opened = _open(groom, plugins)
     if not len(opened.strands):
         raise InputError("the groom holds no strands, so there is nothing to simulate")
     base = read_motion(Path(motion)) if isinstance(motion, (str, os.PathLike)) else motion
@@ -186,7 +186,7 @@ def render(
     from hairkit.rendering.picture_file import write_picture
     from hairkit.simulation.posing import pose_groom
 
-    shown = _opened(groom, manager)
+    shown = _open(groom, manager)
     if cache is not None:
         motion = cache if isinstance(cache, PointCache) else PointCache.load(cache)
         shown = pose_groom(shown, motion, frame)
@@ -229,7 +229,7 @@ def evaluate(
     return evaluation.evaluate(given, known, consistency=consistency)
 
 
-def _opened(groom: Groom | StrPath, manager: Manager | None) -> Groom:
+def _open(groom: Groom | StrPath, manager: Manager | None) -> Groom:
     return groom if isinstance(groom, Groom) else read_groom(groom, manager=manager)
 
 

@@ -145,7 +145,7 @@ def make_options(kind: type[_T], values: Mapping[str, object], where: str) -> _T
     for name, value in values.items():
         if name not in infos:
             raise OptionError(f"{where}: {unknown_name('option', name, infos)}")
-        checked[name] = _checked(infos[name], value, where)
+        checked[name] = _check(infos[name], value, where)
     return kind(**checked)
 
 
@@ -172,7 +172,7 @@ def unknown_name(thing: str, name: str, known: typing.Iterable[str]) -> str:
     return f"no {thing} {name!r}{hint}; valid: {', '.join(names) or 'none'}"
 
 
-def _checked(info: OptionInfo, value: object, where: str) -> Any:
+def _check(info: OptionInfo, value: object, where: str) -> Any:
     refused = OptionError(f"{where}: option {info.name} is {value!r}, expected {info.wanted}")
     if info.optional and (value is None or (value in ("", "none") and not _holds(info.type, str))):
         return None

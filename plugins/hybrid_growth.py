@@ -76,7 +76,9 @@ def track(
 ) -> Strands:
     """Grow one strand from every root."""
     way = scalp_distance.hair_length
-    strands = grow(field, _signed(field), _distance(field, hull), roots.positions, way, options)
+    strands = grow(
+        field, _sign_directions(field), _distance(field, hull), roots.positions, way, options
+    )
     return finish(replace(strands, root_uv=roots.uv), waves, hull, options)
 
 
@@ -119,7 +121,7 @@ def grow(
     return Strands(points.reshape(-1, 3), np.arange(len(starts) + 1) * options.points)
 
 
-def _signed(field: OrientationField) -> Float32Array:
+def _sign_directions(field: OrientationField) -> Float32Array:
     """Return the field's own signed direction, or its tensors' along the growth."""
     if field.direction is not None:
         return field.direction

@@ -48,7 +48,7 @@ def estimate_scene(
     capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
 ) -> Scene:
     """Return the nominal turn in the frame of the head, which landmarks place in it."""
-    pixels, known = _seen(capture)
+    pixels, known = _gather_landmarks(capture)
     if head.landmark_vertices is None:
         raise InputError(
             "the head has no landmark_vertices for the plugin 'landmarks'; use the plugin 'manual'"
@@ -63,7 +63,7 @@ def estimate_scene(
     return Scene(tuple(view.name for view in capture.views), fitted, head, residual)
 
 
-def _seen(capture: Capture) -> tuple[Float64Array, Float64Array]:
+def _gather_landmarks(capture: Capture) -> tuple[Float64Array, Float64Array]:
     """Return landmarks (V, 68, 2), zero where unknown, and 1 for views that have them (V,)."""
     known = np.array([float(view.landmarks is not None) for view in capture.views])
     if known.sum() < 2:

@@ -85,7 +85,7 @@ def _scene(strands: Strands, space: FileSpace) -> Iterator[bytes]:
         assert strands.group is not None
         groups = np.unique(strands.group[chosen])
         for group in groups.tolist():
-            name = kind.group if len(groups) == 1 else _numbered(kind.group, group)
+            name = kind.group if len(groups) == 1 else _number_name(kind.group, group)
             yield f'createNode transform -n "{name}" -p "|{_TOP}";\n'.encode("ascii")
             index = np.flatnonzero(chosen & (strands.group == group))
             yield from _curves(strands, space, index, name.encode(), kind.curve.encode())
@@ -102,7 +102,7 @@ def _kinds(strands: Strands) -> list[tuple[_Kind, BoolArray]]:
     return [(_Kind("guides", "guide"), strands.guide), (_Kind("hair", "hair"), ~strands.guide)]
 
 
-def _numbered(name: str, number: int) -> str:
+def _number_name(name: str, number: int) -> str:
     """Return a name of letters, digits and underscores, as Maya's are."""
     return f"{name}_{number}" if number >= 0 else f"{name}_minus{-number}"
 

@@ -72,7 +72,7 @@ def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head
     smoothing = np.concatenate([loose, np.full(len(anchors), options.anchor_smoothing)])
     places = np.concatenate([source, anchors])
     moves = np.concatenate([points - source, np.zeros_like(anchors)])
-    return _moved(head, places, moves, smoothing)
+    return _warp(head, places, moves, smoothing)
 
 
 def _cranium(head: Head) -> Int64Array:
@@ -119,7 +119,7 @@ def _bend_to_outlines(
         wanted = np.where((excess > 0) & (slope < -0.3), excess / np.maximum(-slope, 0.3), 0.0)
         push = np.maximum(push, np.minimum(wanted, LARGEST_PUSH))
     smoothing[push > 0] = options.smoothing
-    return _moved(head, places, -push[:, None] * normals, smoothing)
+    return _warp(head, places, -push[:, None] * normals, smoothing)
 
 
 def _inside_by(
@@ -151,7 +151,7 @@ def _bilinear(field: Float32Array, column: Float64Array, row: Float64Array) -> F
     return np.where(inside, upper * (1 - y) + lower * y, np.inf)
 
 
-def _moved(head: Head, places: Float64Array, moves: Float64Array, smoothing: Float64Array) -> Head:
+def _warp(head: Head, places: Float64Array, moves: Float64Array, smoothing: Float64Array) -> Head:
     """Return the head, its joints and capsules carried along by the spline through `moves` at
     `places`."""
     from scipy.interpolate import RBFInterpolator  # loads half of SciPy

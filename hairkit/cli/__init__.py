@@ -106,7 +106,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def explain(error: BaseException) -> tuple[str, int]:
     """Return one line that explains an error to a user, and the exit code."""
-    if _interrupted(error):
+    if _is_interrupt(error):
         said = str(error) if isinstance(error, KeyboardInterrupt) else ""
         return f"interrupted; {said or 'run it again to continue where it stopped'}", 2
     if isinstance(error, HairkitError):
@@ -192,11 +192,11 @@ def _log_to_stderr(level: int) -> None:
         logger.addHandler(handler)
 
 
-def _interrupted(error: BaseException | None) -> bool:
+def _is_interrupt(error: BaseException | None) -> bool:
     """Return whether Ctrl-C caused an error: a library may turn it into an ImportError."""
     if error is None or isinstance(error, KeyboardInterrupt):
         return error is not None
-    return _interrupted(error.__cause__ or error.__context__)
+    return _is_interrupt(error.__cause__ or error.__context__)
 
 
 def _one_line(error: BaseException) -> str:

@@ -141,14 +141,14 @@ def _try_backend(backend: str) -> tuple[bool, str]:
 
 
 def _extra(extra: str, names: list[str]) -> Finding:
-    missing = [name for name in names if name != "hairkit" and not _installed(name)]
+    missing = [name for name in names if name != "hairkit" and not _is_installed(name)]
     if missing:
         cure = f'pip install "hairkit[{extra}]"'
         return Finding(f"extra {extra}", "note", f"not there: {', '.join(missing)}; {cure}")
     return Finding(f"extra {extra}", "ok", ", ".join(names))
 
 
-def _installed(name: str) -> bool:
+def _is_installed(name: str) -> bool:
     try:
         importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:

@@ -183,20 +183,20 @@ def _lines(facts: dict[str, Any], indent: str = "") -> list[str]:
     lines = []
     for name, value in facts.items():
         if not isinstance(value, dict):
-            lines.append(f"{indent}{name}: {_shown(value)}")
+            lines.append(f"{indent}{name}: {_format_value(value)}")
         elif any(isinstance(item, dict) for item in value.values()):
             lines += [f"{indent}{name}:", *_lines(value, indent + "  ")]
         else:
-            inner = ", ".join(f"{key} {_shown(item)}" for key, item in value.items())
+            inner = ", ".join(f"{key} {_format_value(item)}" for key, item in value.items())
             lines.append(f"{indent}{name}: {inner}")
     return lines
 
 
-def _shown(value: Any) -> str:
+def _format_value(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, list) and value and isinstance(value[0], list):
-        return " to ".join(_shown(item) for item in value)
+        return " to ".join(_format_value(item) for item in value)
     if isinstance(value, list):
         return f"({', '.join(str(item) for item in value)})"
     return "unknown" if value is None else str(value)

@@ -72,14 +72,17 @@ def _details(info: PluginInfo) -> str:
         lines.append(f"listens to: {', '.join(info.notifications)}")
     lines.append("options:" if info.options else "no options")
     for option in info.options:
-        lines += [f"  {option.name} = {_shown(option)}  ({option.wanted})", f"      {option.doc}"]
+        lines += [
+            f"  {option.name} = {_format_default(option)}  ({option.wanted})",
+            f"      {option.doc}",
+        ]
     if info.options:
         first = info.options[0]
-        lines.append(f"set one with --set {info.name}.{first.name}={_shown(first)}")
+        lines.append(f"set one with --set {info.name}.{first.name}={_format_default(first)}")
     return "\n".join(lines)
 
 
-def _shown(option: OptionInfo) -> str:
+def _format_default(option: OptionInfo) -> str:
     if isinstance(option.default, tuple):
         return ",".join(str(item) for item in option.default)
     if isinstance(option.default, bool):

@@ -65,7 +65,7 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw and print the names of the pictures."""
-    groom = _posed(args)
+    groom = _pose_groom(args)
     if not 1 <= args.hairs <= MOST_HAIRS:
         raise InputError(f"--hairs is {args.hairs}, expected 1 to {MOST_HAIRS}")
     hair = densify(groom, args.hairs, args.seed)
@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _posed(args: argparse.Namespace) -> Groom:
+def _pose_groom(args: argparse.Namespace) -> Groom:
     """Return the groom, at the frame of its simulation where one is given."""
     manager = Manager.loaded(args.plugin)
     reader = importer_of(manager, args.groom)

@@ -156,8 +156,8 @@ def _exporter(manager: Any, path: Path) -> str | None:
     if path.suffix.lower() == ".npz":
         return None
     exporter = plugin_for(manager, "export_groom", path)
-    if not _animated(manager, exporter):
-        able = [name for name in manager.names("export_groom") if _animated(manager, name)]
+    if not _can_animate(manager, exporter):
+        able = [name for name in manager.names("export_groom") if _can_animate(manager, name)]
         endings = sorted({ending for name in able for ending in manager.info(name).suffixes})
         raise InputError(
             f"{path}: {exporter} writes no animation; write a cache .npz, or {', '.join(endings)}"
@@ -165,5 +165,5 @@ def _exporter(manager: Any, path: Path) -> str | None:
     return exporter
 
 
-def _animated(manager: Any, exporter: str) -> bool:
+def _can_animate(manager: Any, exporter: str) -> bool:
     return "cache" in {info.name for info in manager.info(exporter).options}

@@ -153,7 +153,7 @@ def evaluate(
         When views do not pair up or no strand is long enough to score.
     """
     prediction = prediction.in_order_of(truth)
-    groom, similarity, cameras = _aligned(prediction, truth)
+    groom, similarity, cameras = _align(prediction, truth)
     samples = sample_strands(groom.strands, name="predicted")
     precision, recall = sample_hits(samples, truth.samples, surfaces=truth.surfaces, visible=True)
     directions = _directions(samples, truth)
@@ -179,7 +179,7 @@ def evaluate(
     )
 
 
-def _aligned(
+def _align(
     prediction: Prediction, truth: Truth
 ) -> tuple[Groom, Similarity, tuple[CameraError, ...]]:
     groom = prediction.groom

@@ -96,7 +96,7 @@ def orientation_error(
     if not coherent.any():
         raise InputError("no pixel of true hair is left to take the orientation error over")
     error = orientation_gap(orientation, truth)
-    confidence = _sized(orientation.confidence, truth)
+    confidence = _resize_like(orientation.confidence, truth)
     sure = coherent & (confidence >= np.median(confidence[coherent]))
     return OrientationError(
         mean_deg=float(error[coherent].mean()),
@@ -110,7 +110,7 @@ def orientation_gap(
     orientation: OrientationMap, truth: npt.NDArray[np.uint8]
 ) -> npt.NDArray[np.float64]:
     """Return (H, W) degrees in [0, 90] between a map and the true picture, hair or not."""
-    return np.degrees(angle_between(_sized(orientation.angle, truth), truth_angle(truth)))
+    return np.degrees(angle_between(_resize_like(orientation.angle, truth), truth_angle(truth)))
 
 
 def truth_angle(truth: npt.NDArray[np.uint8]) -> Float64Array:
@@ -120,7 +120,7 @@ def truth_angle(truth: npt.NDArray[np.uint8]) -> Float64Array:
 
 def mask_iou(first: npt.NDArray[np.bool_], second: npt.NDArray[np.bool_]) -> float:
     """Return intersection over union of two masks (H, W); the first may have another size."""
-    resized = _sized(first.astype(np.uint8), second) > 0
+    resized = _resize_like(first.astype(np.uint8), second) > 0
     union = int((resized | second).sum())
     return int((resized & second).sum()) / union if union else 1.0
 
@@ -190,7 +190,7 @@ def direction_share(views: Sequence[DrawnDirections]) -> float:
     return sum(view.right for view in views) / drawn if drawn else 0.0
 
 
-def _sized(
+def _resize_like(
     image: npt.NDArray[Any], like: npt.NDArray[np.uint8] | npt.NDArray[np.bool_]
 ) -> npt.NDArray[Any]:
     if image.shape == like.shape:

@@ -75,11 +75,11 @@ def densify(
     bundle = _Bundle.of(even)
     positions, uv = _new_roots(guides, bundle, count - len(strands), roots, seed, generator)
     mix = _choose_guides(bundle, positions)
-    shapes = _mixed_shapes(bundle, mix)
+    shapes = _mix_shapes(bundle, mix)
     if scatter > 0:
         shapes += _wander(len(positions), bundle.points, scatter, generator)
         shapes *= 1 - 0.12 * generator.random((len(positions), 1, 1), dtype=np.float32) ** 3
-    return _joined(even, positions[:, None] + shapes, mix.guides[:, 0], uv, material)
+    return _join(even, positions[:, None] + shapes, mix.guides[:, 0], uv, material)
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ def _agreement(bundle: _Bundle, near: Int64Array) -> npt.NDArray[np.bool_]:
     return agrees
 
 
-def _mixed_shapes(bundle: _Bundle, mix: _Mix) -> Float32Array:
+def _mix_shapes(bundle: _Bundle, mix: _Mix) -> Float32Array:
     """Return (N, m, 3) shapes relative to the root, as long as the guides they are mixed from."""
     shape = np.zeros((len(mix.guides), bundle.points, 3), np.float32)
     for k in range(mix.guides.shape[1]):
@@ -230,7 +230,7 @@ def _wander(
     return result
 
 
-def _joined(
+def _join(
     even: Strands,
     new: Float32Array,
     nearest: Int64Array,

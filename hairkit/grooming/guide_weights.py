@@ -92,16 +92,16 @@ def follow(
     still = np.eye(4)[None].repeat(len(guide_frames), axis=0)
     motions = still if head_from_rest is None else head_from_rest
     for frame, moved, motion in zip(frames, guide_frames, motions, strict=True):
-        seen = _turned(moved, np.linalg.inv(motion))
+        seen = _move(moved, np.linalg.inv(motion))
         shift = np.concatenate([seen - rest, np.zeros((1, 3), np.float32)])
         for k in range(CLOSEST):
             frame += share[:, k, :1] * shift[low[:, k]] + share[:, k, 1:] * shift[low[:, k] + 1]
-        frame[:] = _turned(frame, motion)
+        frame[:] = _move(frame, motion)
         frame[rows] = moved
     return frames
 
 
-def _turned(points: Float32Array, motion: Float64Array) -> Float32Array:
+def _move(points: Float32Array, motion: Float64Array) -> Float32Array:
     """Return points (P, 3) under a rigid motion (4, 4); as they are where it is none."""
     if np.array_equal(motion, np.eye(4)):
         return points

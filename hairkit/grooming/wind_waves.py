@@ -27,7 +27,7 @@ def add_waves(strands: Strands, waves: Waves, seed: int = 0, ramp: float = 0.03)
         return strands
     points = strands.points.reshape(len(strands), -1, 3).astype(np.float64)
     arc = strands.arc_lengths().reshape(len(strands), -1)
-    first, second = _transported_frames(points)
+    first, second = _transport_frames(points)
     rng = np.random.RandomState(seed)  # its stream never changes (NEP 19)
     phase, side = _wisp_phase(points[:, 0], rng), _wisp_phase(points[:, 0], rng)
     turn = waves.handedness or np.where(np.sin(side) > 0, 1, -1)[:, None]
@@ -45,7 +45,7 @@ def add_waves(strands: Strands, waves: Waves, seed: int = 0, ramp: float = 0.03)
     )
 
 
-def _transported_frames(points: Float64Array) -> tuple[Float64Array, Float64Array]:
+def _transport_frames(points: Float64Array) -> tuple[Float64Array, Float64Array]:
     """Return two unit normals (S, M, 3) that do not twist along the strands (Bishop 1975)."""
     tangent = np.gradient(points, axis=1)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-12)

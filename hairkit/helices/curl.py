@@ -71,7 +71,7 @@ class Curl:
         The median of its curled strands; a wisp most of whose strands are straight is straight.
         """
         _, index = np.unique(wisp, return_inverse=True)
-        return _joined([self._median(index == k) for k in range(index.max(initial=-1) + 1)])
+        return _join([self._median(index == k) for k in range(index.max(initial=-1) + 1)])
 
     def written_to(self, material: HairMaterial) -> HairMaterial:
         """Return the material with the median radius and pitch of all strands."""
@@ -99,10 +99,10 @@ def measure_curl(strands: Strands, noise: float = NOISE) -> Curl:
         Mean distance, metres, that is taken for noise and smoothed away by helix arcs.
     """
     if not len(strands):
-        return _joined([])
+        return _join([])
     smooth = smooth_strands(strands, noise).resampled_by_length(STEP)
     bounds = zip(smooth.offsets[:-1], smooth.offsets[1:], strict=True)
-    return _joined([_curl_of(smooth.points[a:b].astype(np.float64)) for a, b in bounds])
+    return _join([_curl_of(smooth.points[a:b].astype(np.float64)) for a, b in bounds])
 
 
 def _curl_of(points: Float64Array) -> tuple[float, float, int]:
@@ -188,6 +188,6 @@ def _parallel_frame(tangents: Float64Array) -> tuple[Float64Array, Float64Array]
     return first, np.cross(tangents, first)
 
 
-def _joined(found: list[tuple[float, float, int]]) -> Curl:
+def _join(found: list[tuple[float, float, int]]) -> Curl:
     radius, pitch, hand = zip(*found, strict=True) if found else ((), (), ())
     return Curl(np.array(radius, float), np.array(pitch, float), np.array(hand, np.int64))

@@ -74,7 +74,7 @@ def fit_arcs(path: Path | Strands, counts: Int64Array, *, turning: bool = True) 
     first, offsets = cuts(counts)
     points, tangents = path.at(*even(path, counts))
     if turning:
-        points, tangents = _released(points, tangents, first)
+        points, tangents = _release_points(points, tangents, first)
     else:
         frame = _frame(tangents, first)
         points = points + _release(points, frame, first, np.zeros(len(first)))
@@ -97,12 +97,12 @@ def even(path: Path, counts: Int64Array) -> tuple[Int64Array, Float64Array]:
     return strand, rank / counts[strand] * path.lengths[strand]
 
 
-def _released(
+def _release_points(
     points: Float64Array, tangents: Float64Array, first: Int64Array
 ) -> tuple[Float64Array, Float64Array]:
     """Return points and tangents with co-helical pairs whose arcs turn at most half a turn."""
     for _ in range(TANGENT_STEPS):
-        tangents = _turned(points, tangents, first)
+        tangents = _turn_tangents(points, tangents, first)
     limit, frame = np.zeros(len(first)), _frame(tangents, first)
     moved = points + _release(points, frame, first, limit)
     for _ in range(LIMIT_STEPS):
@@ -157,7 +157,7 @@ def _along(chord: Float64Array, m: Float64Array) -> Float64Array:
     return result
 
 
-def _turned(points: Float64Array, tangents: Float64Array, first: Int64Array) -> Float64Array:
+def _turn_tangents(points: Float64Array, tangents: Float64Array, first: Int64Array) -> Float64Array:
     """Return tangents turned towards the chords beside them: one linear least-squares step.
 
     A pair wants its mean tangent to turn by what stands in the way of a co-helical arc of up to

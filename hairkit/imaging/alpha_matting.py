@@ -68,18 +68,18 @@ def refine_labels(
     )
     sure = _sure(labels, seeds)
     unsure = ~np.logical_or.reduce(list(sure.values()))
-    band = _enlarged(unsure, width, height)
+    band = _enlarge(unsure, width, height)
     mean = {
-        label: _upsampled(_local_mean(small, core), band)
+        label: _upsample(_local_mean(small, core), band)
         for label, core in sure.items()
         if core.any()
     }
-    away = {label: _upsampled(_distance(sure[label]), band) for label in mean}
+    away = {label: _upsample(_distance(sure[label]), band) for label in mean}
     coarse = np.where(unsure, np.uint8(PERSON), labels)
     large = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_NEAREST)
     result: UInt8Array = np.asarray(large, np.uint8)
-    result[band] = _explained(lab[band], mean, away)
-    forbidden = (result == HAIR) & ~_enlarged(hair_allowed, width, height)
+    result[band] = _classify(lab[band], mean, away)
+    forbidden = (result == HAIR) & ~_enlarge(hair_allowed, width, height)
     result[forbidden] = BACKGROUND
     return result
 
@@ -97,7 +97,7 @@ def _sure(labels: UInt8Array, seeds: UInt8Array) -> dict[int, BoolArray]:
     return sure
 
 
-def _explained(
+def _classify(
     colour: Float32Array, mean: dict[int, Float32Array], away: dict[int, Float32Array]
 ) -> UInt8Array:
     """Return the label (N,) of pixels of `colour` (N, 3), mixed of hair and the likelier other."""
@@ -143,12 +143,12 @@ def _distance(core: BoolArray) -> Float32Array:
     return np.asarray(cv2.distanceTransform((~core).astype(np.uint8), cv2.DIST_L2, 3), np.float32)
 
 
-def _enlarged(mask: BoolArray, width: int, height: int) -> BoolArray:
+def _enlarge(mask: BoolArray, width: int, height: int) -> BoolArray:
     large = cv2.resize(mask.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
     return np.asarray(large > 0)
 
 
-def _upsampled(values: Float32Array, band: BoolArray) -> Float32Array:
+def _upsample(values: Float32Array, band: BoolArray) -> Float32Array:
     """Return `values` of the reduced picture at the band's pixels of the full one."""
     height, width = band.shape
     return np.asarray(cv2.resize(values, (width, height))[band], np.float32)

@@ -135,7 +135,7 @@ def _digits(name: str) -> list[str]:
 def _places(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> list[_Place]:
     """Say which view every photo shows: by capture.toml, by the file's name, or by file order."""
     if settings.views:
-        return _listed(photos, settings, photo_folder)
+        return _match_views(photos, settings, photo_folder)
     named = [_view_name(photo) for photo in photos]
     if not set(named) & set(TURN):
         named = list(TURN)
@@ -148,7 +148,7 @@ def _places(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> li
     return [_Place(by_name[name], name, azimuth, ViewEntry()) for name, azimuth in TURN.items()]
 
 
-def _listed(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> list[_Place]:
+def _match_views(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> list[_Place]:
     """Match the views of capture.toml with photos, by file name, by view name, or in order."""
     by_name = {key: p for p in photos for key in (_view_name(p), p.stem, p.name)}
     places = []

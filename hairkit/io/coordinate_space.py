@@ -58,11 +58,11 @@ class FileSpace:
 
     def points_to_head(self, points: npt.ArrayLike) -> Float32Array:
         """Return points (..., 3) of the file in the head frame, metres."""
-        return _turned(points, self.file_from_head.T, self.metres)
+        return _turn_vectors(points, self.file_from_head.T, self.metres)
 
     def directions_to_file(self, directions: npt.ArrayLike, factor: float = 1.0) -> Float32Array:
         """Return vectors (..., 3) in the file's axes, their lengths times `factor`."""
-        return _turned(directions, self.file_from_head, factor)
+        return _turn_vectors(directions, self.file_from_head, factor)
 
     def faces_to_file(self, faces: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
         """Return triangles (F, 3) that still face outward in the file (and back again)."""
@@ -76,7 +76,7 @@ class FileSpace:
         return result
 
 
-def _turned(vectors: npt.ArrayLike, turn: Float64Array, factor: float) -> Float32Array:
+def _turn_vectors(vectors: npt.ArrayLike, turn: Float64Array, factor: float) -> Float32Array:
     """Signed permutations are written out: no rounding but that of the unit, and fast."""
     with np.errstate(over="ignore"):  # readers refuse what is not finite, in their own words
         source = np.asarray(vectors, np.float32)

@@ -170,7 +170,7 @@ class GlbFile:
                 raise ValueError(f"buffer {number} has no data")
             return self._binary
         if uri.startswith("data:"):
-            return _embedded(uri)
+            return _decode_data_uri(uri)
         name = urllib.parse.unquote(uri)
         if name != Path(name).name or "\\" in name or ":" in name or name in ("", ".", ".."):
             raise ValueError(f"buffer {number} lies outside the file's folder: {name[:80]!r}")
@@ -222,7 +222,7 @@ def _chunks(data: bytes) -> tuple[memoryview, memoryview | None]:
     return found[JSON_CHUNK], found.get(BINARY_CHUNK)
 
 
-def _embedded(uri: str) -> memoryview:
+def _decode_data_uri(uri: str) -> memoryview:
     head, comma, body = uri.partition(",")
     if not comma or not head.endswith(";base64"):
         raise ValueError("a data URI is not base64")

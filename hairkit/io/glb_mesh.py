@@ -27,7 +27,7 @@ def read_glb(path: str | os.PathLike[str]) -> FileMesh:
         parts = _parts(GlbFile(path, MAX_MESH_BYTES))
         if not parts:
             raise ValueError("it holds no triangles")
-        return check_mesh(_joined(parts), path)
+        return check_mesh(_join(parts), path)
 
 
 def _parts(file: GlbFile) -> list[FileMesh]:
@@ -88,7 +88,7 @@ def _primitive(
     )  # fmt: skip
 
 
-def _joined(parts: list[FileMesh]) -> FileMesh:
+def _join(parts: list[FileMesh]) -> FileMesh:
     counts = [len(part.vertices) for part in parts]
     firsts = np.cumsum([0, *counts[:-1]])
     faces = np.concatenate([part.faces + first for part, first in zip(parts, firsts, strict=True)])

@@ -48,8 +48,8 @@ def read_head_motion(path: str | os.PathLike[str]) -> tuple[Float64Array, Float6
         if not end - start <= LONGEST:
             raise ValueError(f"its animation lasts {end - start:.4g} s, expected up to {LONGEST:g}")
         times = np.arange(int(np.floor((end - start) * RATE + 1e-6)) + 1) / RATE
-        rest = _placed(file, way, {}, np.zeros(1))[0]
-        return times, _rigid(_placed(file, way, tracks, times + start), rest)
+        rest = _chain_transforms(file, way, {}, np.zeros(1))[0]
+        return times, _rigid(_chain_transforms(file, way, tracks, times + start), rest)
 
 
 _Tracks = dict[int, dict[str, tuple[Float64Array, Float64Array, str]]]
@@ -103,7 +103,9 @@ def _way_to(file: GlbFile, node: int) -> list[int]:
     return way
 
 
-def _placed(file: GlbFile, way: list[int], tracks: _Tracks, times: Float64Array) -> Float64Array:
+def _chain_transforms(
+    file: GlbFile, way: list[int], tracks: _Tracks, times: Float64Array
+) -> Float64Array:
     """Return scene_from_node (T, 4, 4) of the last node of the way."""
     result = np.tile(np.eye(4), (len(times), 1, 1))
     for number in way:
@@ -119,7 +121,7 @@ def _local(
     if not tracks:
         return np.tile(node_matrix(node), (len(times), 1, 1))
     parts = {
-        name: _sampled(*tracks[name], times, turning=name == "rotation")
+        name: _sample(*tracks[name], times, turning=name == "rotation")
         if name in tracks
         else np.tile(np.array(node.get(name, rest), np.float64), (len(times), 1))
         for name, rest in _REST.items()
@@ -130,7 +132,7 @@ def _local(
     return matrices
 
 
-def _sampled(
+def _sample(
     keys: Float64Array, values: Float64Array, way: str, times: Float64Array, *, turning: bool
 ) -> Float64Array:
     """Return (T, width) values at the times, those of the ends beyond the keys."""
@@ -150,7 +152,7 @@ def _sampled(
         return _slerp(values[before], values[after], share)
     else:
         result = values[before] * (1 - share) + values[after] * share
-    return _normalised(result) if turning else result
+    return _normalise(result) if turning else result
 
 
 def _spline(
@@ -168,7 +170,7 @@ def _spline(
 
 def _slerp(first: Float64Array, second: Float64Array, share: Float64Array) -> Float64Array:
     """Return unit quaternions on the shorter arc between two."""
-    first, second = _normalised(first), _normalised(second)
+    first, second = _normalise(first), _normalise(second)
     cosine = (first * second).sum(axis=1, keepdims=True)
     second = np.where(cosine < 0, -second, second)
     angle = np.arccos(np.clip(np.abs(cosine), 0, 1))
@@ -177,10 +179,10 @@ def _slerp(first: Float64Array, second: Float64Array, share: Float64Array) -> Fl
     divisor = np.where(near, 1.0, sine)
     low = np.where(near, 1 - share, np.sin((1 - share) * angle) / divisor)
     high = np.where(near, share, np.sin(share * angle) / divisor)
-    return _normalised(low * first + high * second)
+    return _normalise(low * first + high * second)
 
 
-def _normalised(quaternions: Float64Array) -> Float64Array:
+def _normalise(quaternions: Float64Array) -> Float64Array:
     length = np.linalg.norm(quaternions, axis=1, keepdims=True)
     if (length < 1e-6).any():
         raise ValueError("a rotation is a quaternion of length 0")

@@ -66,7 +66,7 @@ def read_head(
     weight = _scalp_weight(mesh, file, scalp)
     vertices = _in_metres(mesh.vertices, units, up)
     check_reach(vertices, file, "vertices")
-    faces = _wound_outward(vertices, mesh.faces.astype(np.int32))
+    faces = _orient_outward(vertices, mesh.faces.astype(np.int32))
     used = np.unique(faces)
     breadth, middle = _breadth_and_middle(vertices[used], weight[used], file)
     landmarks = _landmarks(file, vertices, units, up)
@@ -171,7 +171,7 @@ def _in_metres(points: Float64Array, units: str, up: str) -> Float64Array:
     return np.asarray(turned * UNITS[units], np.float64)
 
 
-def _wound_outward(vertices: Float64Array, faces: Int32Array) -> Int32Array:
+def _orient_outward(vertices: Float64Array, faces: Int32Array) -> Int32Array:
     corners = vertices[faces] - vertices.mean(axis=0)
     volume = (np.cross(corners[:, 0], corners[:, 1]) * corners[:, 2]).sum()
     return np.ascontiguousarray(faces[:, ::-1]) if volume < 0 else faces

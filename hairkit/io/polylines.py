@@ -38,7 +38,7 @@ def chains(edges: Int64Array, vertices: int) -> tuple[Int64Array, Int64Array]:
     start = np.concatenate([edges[:, 0], edges[:, 1]])
     first = _first_half_edges(start, last, degree, len(edges))
     counts = steps[first] + 2
-    return _walked(start, after, first, counts), counts
+    return _walk(start, after, first, counts), counts
 
 
 def _next_half_edge(edges: Int64Array, vertices: int) -> Int64Array:
@@ -85,7 +85,7 @@ def _first_half_edges(
     return chosen[np.argsort(start[chosen])]
 
 
-def _walked(
+def _walk(
     start: Int64Array, after: Int64Array, first: Int64Array, counts: Int64Array
 ) -> Int64Array:
     """Return the vertices of all strands; one step of the longest strand is one step of all."""

@@ -83,10 +83,12 @@ def shares(counts: Int64Array) -> Profile:
 
 def colours(look: HairMaterial, counts: Int64Array) -> Profile:
     """Return the profile (K, 3) of linear RGB from the root's colour to the tip's."""
-    return shares(counts).mapped(lambda share: _mixed(look, share.astype(np.float32)[:, None]))
+    return shares(counts).mapped(
+        lambda share: _mix_colours(look, share.astype(np.float32)[:, None])
+    )
 
 
-def _mixed(look: HairMaterial, share: Float32Array) -> Float32Array:
+def _mix_colours(look: HairMaterial, share: Float32Array) -> Float32Array:
     mixed: Float32Array = (1 - share) * look.root_colour + share * look.tip_colour
     return mixed
 

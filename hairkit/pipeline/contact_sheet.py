@@ -84,7 +84,7 @@ def contact_sheet(
         _guide_pictures(groom, cameras),
         _hair_pictures(groom, cameras),
     )
-    return _arranged(rows, [view.name for view in capture.views], size)
+    return _arrange(rows, [view.name for view in capture.views], size)
 
 
 def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
@@ -146,7 +146,7 @@ def _lights() -> Lights:
     return replace(lights, rim_colour=lights.key_colour)
 
 
-def _arranged(
+def _arrange(
     rows: Iterable[Sequence[UInt8Array]], names: Sequence[str], size: tuple[int, int]
 ) -> UInt8Array:
     width, height = size

@@ -156,7 +156,7 @@ def load_recipe(name: str | os.PathLike[str]) -> Recipe:
     """Read a shipped recipe by name, or a `.toml` file by path; `InputError` says what is wrong."""
     text = os.fspath(name)
     if text in recipe_names():
-        return parse_recipe(_shipped(text), text, f"recipe {text}")
+        return parse_recipe(_read_shipped(text), text, f"recipe {text}")
     path = Path(text)
     if path.suffix != ".toml" and not path.exists():
         reason = unknown_name("recipe", text, recipe_names())
@@ -198,11 +198,11 @@ def _document(data: bytes, source: str) -> dict[str, Any]:
 @functools.cache
 def _default_tables() -> Mapping[str, Any]:
     """Return the tables of the recipe that others differ from."""
-    document = _document(_shipped("default"), "recipe default")
+    document = _document(_read_shipped("default"), "recipe default")
     return {key: content for key, content in document.items() if key in HOOKS}
 
 
-def _shipped(name: str) -> bytes:
+def _read_shipped(name: str) -> bytes:
     return (importlib.resources.files("hairkit") / "recipes" / f"{name}.toml").read_bytes()
 
 

@@ -283,14 +283,14 @@ def _write_truth(folder: Path, groom: Groom, cameras: list[Camera], seen: UInt8A
 
 
 def _jpeg(picture: UInt8Array) -> bytes:
-    return _encoded(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return _encode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
 
 
 def _png(picture: UInt8Array) -> bytes:
-    return _encoded(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
+    return _encode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
 
 
-def _encoded(kind: str, picture: UInt8Array, settings: list[int]) -> bytes:
+def _encode(kind: str, picture: UInt8Array, settings: list[int]) -> bytes:
     done, data = cv2.imencode(kind, picture, settings)
     if not done:
         raise InputError(f"a {kind} picture of {picture.shape} cannot be encoded")

@@ -154,7 +154,7 @@ def _faces(camera: Camera | _TurnView, head: Head) -> _Primitives:
     facing = -(normal * camera.view_direction(middle)).sum(axis=1)
     seen = facing > 0
     colours = np.outer(0.35 + 0.65 * facing[seen], SKIN)
-    return _fixed(camera.project(corners[seen])), camera.depth(middle[seen]), colours
+    return _to_fixed_point(camera.project(corners[seen])), camera.depth(middle[seen]), colours
 
 
 def _segments(camera: Camera | _TurnView, strands: Strands) -> _Primitives:
@@ -168,10 +168,10 @@ def _segments(camera: Camera | _TurnView, strands: Strands) -> _Primitives:
     cosine = (along * camera.view_direction(middle)).sum(axis=1)
     tint = 0.7 + 0.6 * (_GOLDEN_RATIO * strands.strand_of_point[first] % 1)
     colours = np.outer(tint * (0.3 + 0.7 * np.sqrt(np.clip(1 - cosine**2, 0, 1))), HAIR)
-    return _fixed(camera.project(ends)), camera.depth(middle), colours
+    return _to_fixed_point(camera.project(ends)), camera.depth(middle), colours
 
 
-def _fixed(pixels: Float64Array) -> npt.NDArray[np.int32]:
+def _to_fixed_point(pixels: Float64Array) -> npt.NDArray[np.int32]:
     """Return pixel coordinates as OpenCV takes them: it counts from the first pixel's middle."""
     bounded = np.clip(np.nan_to_num(pixels - 0.5, nan=-_FAR), -_FAR, _FAR)
     fixed: npt.NDArray[np.int32] = np.rint(bounded * 2**_FIXED_BITS).astype(np.int32)

@@ -100,9 +100,9 @@ def _curve_set(node: Object, world: Float64Array) -> CurveSet | None:
     group = values.per_strand(attributes.get("groom_group_id"), 1, "i")
     guide = values.per_strand(attributes.get("groom_guide"), 1, "i")
     return CurveSet(
-        points=_moved(points, world),
+        points=_move(points, world),
         counts=counts,
-        widths=None if widths is None else _scaled(widths[:, 0], world),
+        widths=None if widths is None else _scale(widths[:, 0], world),
         root_uv=uv,
         colour=values.per_point(attributes.get("groom_color"), 3),
         group=None if group is None else group[:, 0],
@@ -132,7 +132,7 @@ def _polyline(kind: Property | None) -> bool:
     return bool(numbers.ravel()[0] == _LINEAR and numbers.ravel()[1] == _NON_PERIODIC)
 
 
-def _moved(points: Float32Array, world: Float64Array) -> Float32Array:
+def _move(points: Float32Array, world: Float64Array) -> Float32Array:
     if np.array_equal(world, _IDENTITY):
         return points
     with np.errstate(over="ignore", invalid="ignore"):
@@ -140,7 +140,7 @@ def _moved(points: Float32Array, world: Float64Array) -> Float32Array:
     return moved
 
 
-def _scaled(widths: Float32Array, world: Float64Array) -> Float32Array:
+def _scale(widths: Float32Array, world: Float64Array) -> Float32Array:
     """Return widths times the mean scale of the transform."""
     if np.array_equal(world, _IDENTITY):
         return widths

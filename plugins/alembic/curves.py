@@ -71,7 +71,7 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
         A group has more curves or points than Unreal takes, and `axis` is Unreal's.
     """
     strands, space = ready.groom.strands, options.space
-    fitted, cache = _limited(strands, ready.cache, options.max_points)
+    fitted, cache = _limit_points(strands, ready.cache, options.max_points)
     guide = guide_mask(strands)
     marked, listed = options.mark_guides or not guide.all(), options.attributes
     assert fitted.widths is not None  # `prepare_export` has filled in all three
@@ -94,7 +94,7 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
     )
 
 
-def _limited(
+def _limit_points(
     strands: Strands, cache: PointCache | None, most: int
 ) -> tuple[Strands, PointCache | None]:
     """Return strands, and their frames, of at most so many points; longer ones are resampled."""
@@ -104,15 +104,15 @@ def _limited(
     if not long.any():
         return strands, cache
     _log.warning("%d strands of more than %d points are resampled to these", long.sum(), most)
-    fitted = _shortened(strands, long, most)
+    fitted = _shorten(strands, long, most)
     if cache is not None:
         moving = (replace(strands, points=points) for points in cache.points)
-        frames = np.stack([_shortened(frame, long, most).points for frame in moving])
+        frames = np.stack([_shorten(frame, long, most).points for frame in moving])
         cache = PointCache(frames, cache.times, cache.head_from_rest)
     return fitted, cache
 
 
-def _shortened(strands: Strands, long: BoolArray, most: int) -> Strands:
+def _shorten(strands: Strands, long: BoolArray, most: int) -> Strands:
     """Return the strands, those that the mask (S,) names resampled to `most` points."""
     resampled = strands.select(long).resampled(most)
     counts: Int64Array = np.minimum(strands.counts, most)

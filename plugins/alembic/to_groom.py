@@ -62,8 +62,8 @@ def _strands(sets: list[CurveSet], space: FileSpace, path: Path) -> tuple[Strand
     strands, index = pack_strands(points, counts, path)
     kept = np.repeat(counts >= 2, counts)
     widths = _together([part.widths for part in sets])
-    group = _filled(sets, lambda part: part.group)
-    guide = _filled(sets, lambda part: part.guide)
+    group = _fill(sets, lambda part: part.group)
+    guide = _fill(sets, lambda part: part.guide)
     uv = _together([part.root_uv for part in sets])
     return replace(
         strands,
@@ -79,7 +79,7 @@ def _together(parts: list[Any]) -> Any:
     return None if any(part is None for part in parts) else np.concatenate(parts)
 
 
-def _filled(sets: list[CurveSet], part_of: Callable[[CurveSet], Any]) -> Any:
+def _fill(sets: list[CurveSet], part_of: Callable[[CurveSet], Any]) -> Any:
     """Return numbers (S,) of all sets, 0 in sets without; None where no set has them."""
     parts = [part_of(one) for one in sets]
     if all(part is None for part in parts):

@@ -35,7 +35,9 @@ def _add_geometry(scene: Scene, head: Head) -> int:
     scalp = np.repeat(head.scalp[:, None], 4, axis=1)
     scalp[:, 3] = 1.0
     layers = {
-        "Normal": _layer("Normal", "", "ByVertice", "Direct", _held("Normals", head, scene)),
+        "Normal": _layer(
+            "Normal", "", "ByVertice", "Direct", _normals_record("Normals", head, scene)
+        ),
         "Color": _indexed("Color", "scalp", "Colors", "ColorIndex", scalp, faces),
         "UV": _indexed("UV", "map1", "UV", "UVIndex", head.uv, faces),
         "Material": _layer(
@@ -54,7 +56,7 @@ def _add_geometry(scene: Scene, head: Head) -> int:
     )
 
 
-def _held(name: str, head: Head, scene: Scene) -> Record:
+def _normals_record(name: str, head: Head, scene: Scene) -> Record:
     return record(name, array("d", scene.space.directions_to_file(head.normals())))
 
 
@@ -123,7 +125,7 @@ def _add_bones(scene: Scene, joints: Float64Array) -> list[int]:
     return bones
 
 
-def _moved(offset: Float64Array) -> Float64Array:
+def _translation(offset: Float64Array) -> Float64Array:
     """Return the translation by `offset`, acting on row vectors."""
     matrix = np.eye(4)
     matrix[3, :3] = offset
@@ -132,7 +134,7 @@ def _moved(offset: Float64Array) -> Float64Array:
 
 def _add_bind_pose(scene: Scene, mesh: int, bones: list[int], joints: Float64Array) -> None:
     places = [(mesh, np.eye(4))]
-    places += [(bone, _moved(joint)) for bone, joint in zip(bones, joints, strict=True)]
+    places += [(bone, _translation(joint)) for bone, joint in zip(bones, joints, strict=True)]
     scene.add(
         "Pose",
         "bind",
@@ -175,8 +177,8 @@ def _add_skin(
             record("Version", number("I", 100)),
             record("UserData", text(""), text("")),
             *(listed if len(rows) else ()),
-            record("Transform", array("d", _moved(-joint))),
-            record("TransformLink", array("d", _moved(joint))),
+            record("Transform", array("d", _translation(-joint))),
+            record("TransformLink", array("d", _translation(joint))),
             label="SubDeformer",
         )
         scene.connect(cluster, skin)

@@ -49,17 +49,17 @@ def number(kind: str, value: float) -> bytes:
 
 def text(value: str) -> bytes:
     """Return a string value."""
-    return _counted(b"S", value.encode())
+    return _prefix_length(b"S", value.encode())
 
 
 def raw(value: bytes) -> bytes:
     """Return a value of plain bytes."""
-    return _counted(b"R", value)
+    return _prefix_length(b"R", value)
 
 
 def object_name(name: str, kind: str) -> bytes:
     """Return the name of an object with its class, as binary files join them."""
-    return _counted(b"S", name.encode() + b"\0\1" + kind.encode())
+    return _prefix_length(b"S", name.encode() + b"\0\1" + kind.encode())
 
 
 def array(kind: str, values: npt.ArrayLike) -> bytes:
@@ -86,7 +86,7 @@ def file_pieces(records: Sequence[Record]) -> list[bytes]:
     return [*pieces, footer, b"\0" * padding, struct.pack("<I", VERSION), b"\0" * 120, _FOOTER_END]
 
 
-def _counted(kind: bytes, value: bytes) -> bytes:
+def _prefix_length(kind: bytes, value: bytes) -> bytes:
     return kind + struct.pack("<I", len(value)) + value
 
 

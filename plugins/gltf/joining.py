@@ -34,7 +34,7 @@ def join_segments(segments: Int64Array, vertices: int) -> tuple[Int64Array, Int6
     segments = segments[np.sort(first)]
     if not len(segments):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    return _strands(_ranked(_Halves.of(segments, vertices)))
+    return _strands(_rank(_Halves.of(segments, vertices)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,17 +83,17 @@ def _consecutive(segments: Int64Array, vertices: int) -> tuple[Int64Array, Int64
     return order, counts
 
 
-def _ranked(halves: _Halves) -> _Ranked:
-    last, left = _jumped(halves.following)
+def _rank(halves: _Halves) -> _Ranked:
+    last, left = _jump_to_ends(halves.following)
     open_ended = halves.following[last] == last
     kept = np.ones(len(last), bool)
     if not open_ended.all():
         halves, kept = _cut_rings(halves, ~open_ended)
-        last, left = _jumped(halves.following)
+        last, left = _jump_to_ends(halves.following)
     return _Ranked(halves, last, left, kept)
 
 
-def _jumped(following: Int64Array) -> tuple[Int64Array, Int64Array]:
+def _jump_to_ends(following: Int64Array) -> tuple[Int64Array, Int64Array]:
     """Return where each half's way ends and after how many steps; rings come to no end."""
     last, left = following, (following != np.arange(len(following))).astype(np.int64)
     for _ in range(len(following).bit_length()):

@@ -124,7 +124,7 @@ def _part(file: GlbFile, primitive: dict[str, Any], matrix: Float64Array, metres
         raise ValueError("positions are not finite numbers")
     segments = _segments(file, primitive, len(points))
     if "_STRAND_ID" not in attributes:
-        segments = _welded(segments, points)
+        segments = _weld(segments, points)
     order, counts = join_segments(segments, len(points))
     if not np.array_equal(matrix, np.eye(4)) or metres != 1:
         points = metres * (points @ matrix[:3, :3].T + matrix[:3, 3])
@@ -173,7 +173,7 @@ class _Custom:
     def of_strands(self, name: str) -> Int64Array | None:
         """Return (S,) whole numbers: of the attribute, or one for all strands in the extras."""
         values = self.of_points(f"_{name.upper()}")
-        constant = _described(self.primitive).get(name)
+        constant = _read_extras(self.primitive).get(name)
         if values is None and constant is None:
             return None
         column = np.full(len(self.first), constant, np.float64)
@@ -184,7 +184,7 @@ class _Custom:
         return np.rint(column).astype(np.int64)
 
 
-def _described(primitive: dict[str, Any]) -> dict[str, Any]:
+def _read_extras(primitive: dict[str, Any]) -> dict[str, Any]:
     extras = primitive.get("extras")
     own = extras.get("hairkit") if isinstance(extras, dict) else None
     return own if isinstance(own, dict) else {}
@@ -216,7 +216,7 @@ def _segments(file: GlbFile, primitive: dict[str, Any], vertices: int) -> Int64A
     return kept
 
 
-def _welded(segments: Int64Array, points: npt.NDArray[Any]) -> Int64Array:
+def _weld(segments: Int64Array, points: npt.NDArray[Any]) -> Int64Array:
     """Join segments that have their own vertices each, where one starts as the last one ended."""
     if len(segments) < 2 or np.bincount(segments.ravel(), minlength=len(points)).max() > 1:
         return segments

@@ -52,7 +52,7 @@ def groom_document(ready: PreparedGroom, options: SceneOptions) -> Document:
     document = Document()
     groom = ready.groom
     document.json["extras"] = {"hairkit": groom_extras(groom)}
-    baked = _baked(ready, options)
+    baked = _bake(ready, options)
     shapes = (
         np.zeros((0, len(groom.strands.points), 3), np.float32) if baked is None else baked.shapes
     )
@@ -78,7 +78,7 @@ def groom_document(ready: PreparedGroom, options: SceneOptions) -> Document:
     return document
 
 
-def _baked(ready: PreparedGroom, options: SceneOptions) -> Baked | None:
+def _bake(ready: PreparedGroom, options: SceneOptions) -> Baked | None:
     if ready.cache is None or options.animation == "none":
         return None
     rest = ready.groom.strands.points

@@ -81,14 +81,14 @@ def _array(name: str, kind: str, values: npt.NDArray[np.generic], more: str = ""
         return head + "</array>"
     number = "%d" if values.dtype.kind in "iu" else "%.9g"
     if values.ndim == 1:
-        text = _wrapped([number], len(values), " ", _SCALARS_PER_LINE)
+        text = _wrap_pattern([number], len(values), " ", _SCALARS_PER_LINE)
     else:
         per_line = max(_ELEMENTS_PER_LINE // max(values.shape[1] // 4, 1), 1)
-        text = _wrapped([number] * values.shape[1], len(values), ", ", per_line)
+        text = _wrap_pattern([number] * values.shape[1], len(values), ", ", per_line)
     return f"{head}\n{_INDENT}{text % tuple(values.reshape(-1).tolist())}\n    </array>"
 
 
-def _wrapped(element: Sequence[str], count: int, separator: str, per_line: int) -> str:
+def _wrap_pattern(element: Sequence[str], count: int, separator: str, per_line: int) -> str:
     """Return a pattern for `count` elements, broken into indented lines."""
     pattern = " ".join(element)
     full = separator.join([pattern] * per_line)
@@ -100,7 +100,7 @@ def _wrapped(element: Sequence[str], count: int, separator: str, per_line: int) 
 
 def _string_array(name: str, texts: Sequence[str]) -> str:
     head = f'    <array name="{name}" size="{len(texts)}" type="String">'
-    rows = [f'{_INDENT}<value type="String">{_escaped(name, text)}</value>' for text in texts]
+    rows = [f'{_INDENT}<value type="String">{_escape(name, text)}</value>' for text in texts]
     return "\n".join([head, *rows, "    </array>"]) if rows else head + "</array>"
 
 
@@ -130,7 +130,7 @@ def _value(name: str, kind: str, value: MaterialValue, more: str = "") -> str:
 
 def _number(name: str, value: MaterialValue) -> str:
     if isinstance(value, str):
-        return _escaped(name, value)
+        return _escape(name, value)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple):
@@ -140,7 +140,7 @@ def _number(name: str, value: MaterialValue) -> str:
     return f"{value:.9g}"
 
 
-def _escaped(name: str, text: str) -> str:
+def _escape(name: str, text: str) -> str:
     if len(text) > schema.MAX_STRING or not (text.isascii() and text.isprintable()):
         raise InputError(
             f"{name} is {text[:40]!r}, expected at most {schema.MAX_STRING} printable ASCII letters"

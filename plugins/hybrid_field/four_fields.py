@@ -101,11 +101,11 @@ def internal_distance(hull: Hull, segments: Strands, tolerance: float) -> Float3
         cells = hull.grid.nearest_cell(segments.points) // COARSE
         strand[tuple(cells.T)] = True
     if not strand.any():
-        strand = _pooled(hull.dense & ~ndimage.binary_erosion(hull.dense), shape)
+        strand = _pool(hull.dense & ~ndimage.binary_erosion(hull.dense), shape)
     away = ndimage.distance_transform_edt(~strand) * (COARSE * hull.grid.spacing / UNIT)
     border = np.ones(shape, bool)
     border[1:-1, 1:-1, 1:-1] = False
-    inside = _pooled(hull.head_distance < 0, shape) & ~strand
+    inside = _pool(hull.head_distance < 0, shape) & ~strand
     value = np.where(strand, 1.0, np.where(border, 1 + away, 0.0)).astype(np.float32)
     known = (strand | border | inside).ravel()
     weight = np.where(known, FIXED, 0).astype(np.float32)
@@ -117,7 +117,7 @@ def internal_distance(hull: Hull, segments: Strands, tolerance: float) -> Float3
     return result
 
 
-def _pooled(cells: BoolArray, shape: tuple[int, ...]) -> BoolArray:
+def _pool(cells: BoolArray, shape: tuple[int, ...]) -> BoolArray:
     """Return which coarse cells hold at least one of `cells`."""
     padded = np.zeros(tuple(COARSE * n for n in shape), bool)
     padded[tuple(slice(n) for n in cells.shape)] = cells

@@ -131,14 +131,14 @@ def _ascii(
         rows = numbers[at : at + element.rows * width].reshape(-1, width) if width else None
         at += element.rows * width
         found[element.name] = {
-            name: _converted(rows[:, column], kind, source)
+            name: _convert(rows[:, column], kind, source)
             for column, (name, kind) in enumerate(element.fields)
             if rows is not None and kind != "list"
         }
     return found
 
 
-def _converted(
+def _convert(
     values: npt.NDArray[np.float64], kind: str, source: str | os.PathLike[str]
 ) -> npt.NDArray[np.generic]:
     """Return the numbers in the property's type, which must hold them."""

@@ -77,8 +77,8 @@ class Options(ExportOptions, ImportOptions, SpaceOptions):
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the strands, and the .tfxbone beside the file."""
-    ready = _resampled(prepare_export(groom, options).groom, options.points_per_strand)
-    uv = _flipped(np.asarray(ready.strands.root_uv), options)
+    ready = _resample(prepare_export(groom, options).groom, options.points_per_strand)
+    uv = _flip_v(np.asarray(ready.strands.root_uv), options)
     count, coloured = options.points_per_strand, options.colours
     write_pieces(path, tfx_pieces(ready, count, options.space, uv, coloured=coloured))
     if options.bones:
@@ -98,20 +98,20 @@ def import_groom(path: Path, options: Options) -> Groom:
         each = plain_widths(hair.thickness, options.space.metres, path)
         widths = np.repeat(each[kept], strands.counts)
     if hair.uv is not None:
-        uv = _flipped(hair.uv[kept], options)
+        uv = _flip_v(hair.uv[kept], options)
     if hair.colours is not None:
         colours = hair.colours.reshape(-1, 3)[rows_kept(counts, kept)]
     strands = Strands(strands.points, strands.offsets, widths, uv)
     return adopt(strands, options, path, _look(colours, strands))
 
 
-def _resampled(groom: Groom, count: int) -> Groom:
+def _resample(groom: Groom, count: int) -> Groom:
     if (groom.strands.counts == count).all():
         return groom
     return replace(groom, strands=groom.strands.resampled(count))
 
 
-def _flipped(uv: Float32Array, options: Options) -> Float32Array:
+def _flip_v(uv: Float32Array, options: Options) -> Float32Array:
     turned = uv.copy()
     if options.flip_v:
         turned[:, 1] = 1 - turned[:, 1]

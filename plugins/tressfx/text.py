@@ -60,7 +60,7 @@ def read_text(data: bytes, source: str | os.PathLike[str]) -> tuple[TfxHair, Int
             " each point that its strands claim"
         )
     with np.errstate(over="ignore"):  # what is not finite is refused with the points
-        placed = _placed(points.reshape(-1, 3), settings, source).astype(np.float32)
+        placed = _place(points.reshape(-1, 3), settings, source).astype(np.float32)
     return TfxHair(placed, uv.astype(np.float32), None, None), counts
 
 
@@ -91,7 +91,7 @@ def _strand_lines(
     return numbers.astype(np.int64), np.stack([u, v], axis=1)
 
 
-def _placed(
+def _place(
     points: Float64Array, settings: dict[str, Float64Array], source: str | os.PathLike[str]
 ) -> Float64Array:
     """Return the points scaled and moved as the settings say."""

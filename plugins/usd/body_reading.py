@@ -36,7 +36,7 @@ def read_head(found: Contents, space: FileSpace, path: Path) -> Head | None:
     settings = found.description["settings"]
     try:
         return Head(
-            _placed(arrays["points"], mesh, space),
+            _place(arrays["points"], mesh, space),
             _triangles(arrays["faceVertexCounts"], arrays["faceVertexIndices"]),
             np.asarray(arrays["st"]),
             np.asarray(arrays["hairkit:scalp"]),
@@ -51,7 +51,7 @@ def read_head(found: Contents, space: FileSpace, path: Path) -> Head | None:
 _NAMES = ("points", "faceVertexCounts", "faceVertexIndices", "st", "hairkit:scalp")
 
 
-def _placed(points: Any, mesh: dict[str, Any], space: FileSpace) -> Float32Array:
+def _place(points: Any, mesh: dict[str, Any], space: FileSpace) -> Float32Array:
     matrix = np.array(mesh["to_stage"], np.float64)
     if not np.array_equal(matrix, np.eye(4)):
         points = points @ matrix[:3, :3] + matrix[3, :3]

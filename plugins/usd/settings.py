@@ -47,12 +47,12 @@ def _numbers(value: HairMaterial | HairPhysics) -> dict[str, Any]:
 
 def material_from(settings: Mapping[str, Any], source: object) -> HairMaterial | None:
     """Return the look that the settings (as plain numbers and lists) hold, or None."""
-    return _made(HairMaterial, settings.get("material"), source)
+    return _make(HairMaterial, settings.get("material"), source)
 
 
 def physics_from(settings: Mapping[str, Any], source: object) -> HairPhysics | None:
     """Return the physics that the settings hold, or None."""
-    return _made(HairPhysics, settings.get("physics"), source)
+    return _make(HairPhysics, settings.get("physics"), source)
 
 
 def capsules_from(settings: Mapping[str, Any], source: object) -> Capsules:
@@ -77,7 +77,7 @@ def numbers(value: Any, shape: tuple[int, ...], source: object, name: str) -> np
     return array
 
 
-def _made(kind: type[_T], found: Any, source: object) -> _T | None:
+def _make(kind: type[_T], found: Any, source: object) -> _T | None:
     """Return the dataclass with the fields found, the others at their defaults."""
     if not isinstance(found, Mapping):
         return None

@@ -55,7 +55,7 @@ def read_groom(path: Path, options: Any) -> Groom:
     every = [curves for curves in every if len(curves.counts)]
     if not every:
         raise FormatError(f"{path}: holds no BasisCurves with points")
-    joined = _joined(every)
+    joined = _join(every)
     strands, kept = pack_strands(joined.points, joined.counts, path)
     strands = _complete(strands, joined, kept)
     settings = found.description["settings"]
@@ -182,7 +182,7 @@ class _Values:
         _log.warning("%s: %s does not match its curves and is ignored", self.where, name)
 
 
-def _joined(every: list[_Curves]) -> _Curves:
+def _join(every: list[_Curves]) -> _Curves:
     """Return one set of curves; values that only some have are left out, groups number the sets."""
 
     def column(name: str) -> Any:

@@ -78,7 +78,7 @@ class HairBody:
             raise InputError(f"hairs is {hairs}, expected 0 to {MAX_HAIRS}")
         shares = choose_shares(guides)
         rest = GuideSampler(guides, shares)(guides.points)
-        hair = _drawn_hair(guides, head, material, hairs, own, seed, shares)
+        hair = _arrange_hair(guides, head, material, hairs, own, seed, shares)
         mix = closest_guides(hair)
         shape = hair.points.reshape(-1, len(shares), 3)
         course = np.einsum("sk,skmc->smc", mix.weights, rest[mix.guides], optimize=True)
@@ -177,7 +177,7 @@ def _places(guides: Strands, shares: Float64Array) -> tuple[Int64Array, Float32A
     return before, part
 
 
-def _drawn_hair(
+def _arrange_hair(
     guides: Strands,
     head: Head,
     material: HairMaterial,
