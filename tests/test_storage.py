@@ -248,5 +248,5 @@ def test_frozen_arrays_are_checked_copies() -> None:
         kept[0, 0] = 2
     with pytest.raises(InputError, match=r"points has shape \(2, 3\), expected \(n, 4\)"):
         frozen_array(mine, np.float32, (None, 4), "points")
-    with pytest.raises(InputError, match="points holds 1 values that are not finite"):
+    with pytest.raises(InputError, match="points has 1 values that are not finite"):
         frozen_array([np.nan, 1], np.float32, (2,), "points")

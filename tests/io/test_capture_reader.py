@@ -141,7 +141,7 @@ WRONG = {
     "no photo '4_bakc' .did you mean '4_back'": lambda f: (f / "masks" / "4_back.png").rename(
         f / "masks" / "4_bakc.png"
     ),
-    "landmarks holds 1 values that are not finite": lambda f: write_landmarks(
+    "landmarks has 1 values that are not finite": lambda f: write_landmarks(
         f, [[float("nan"), 1], *POINTS[1:].tolist()]
     ),
     "5 landmarks, expected the 68 iBUG points": lambda f: write_landmarks(f, POINTS[:5].tolist()),

@@ -163,7 +163,7 @@ def make_simulator(groom):
     [
         ("sys.exit(0)", "failed in 'make_simulator': SystemExit: 0"),
         ("1 / 0", "failed in 'make_simulator': ZeroDivisionError"),
-        ("self.points = self.points * np.nan", "'make_simulator': the simulation is not finite"),
+        ("self.points = self.points * np.nan", "'make_simulator': the simulation diverged at"),
         ("self.points = self.points[0]", "'make_simulator': points has shape (3,)"),
     ],
 )

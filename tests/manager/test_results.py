@@ -150,39 +150,39 @@ WRONG: dict[str, dict[str, Callable[[Arguments], Any]]] = {
     "estimate_scene": {
         "camera of view 'front' has 48 x 64 pixels": scene(small_cameras, "estimate_scene"),
         "the scene has the views front-right, right": scene(turned_names, "estimate_scene"),
-        "camera_from_head holds 1 values that are not finite": scene(nan_camera, "estimate_scene"),
+        "camera_from_head has 1 values that are not finite": scene(nan_camera, "estimate_scene"),
     },
     "fit_head": {
         "camera of view 'front' has 48 x 64 pixels": scene(small_cameras, "fit_head"),
         "head faces changed": scene(turned_faces, "fit_head"),
     },
     "orient": {
-        "angle holds 1 values that are not finite": angles("angle", np.nan),
+        "angle has 1 values that are not finite": angles("angle", np.nan),
         "angles lie in": angles("angle", 3.2),
         "confidences lie in": angles("confidence", 1.5),
-        "confidence holds 1 values that are not finite": angles("confidence", np.inf),
+        "confidence has 1 values that are not finite": angles("confidence", np.inf),
         "the orientation map has 5 x 4 pixels, expected 96 x 128": lambda _: OrientationMap(
             np.zeros((4, 5)), np.zeros((4, 5))
         ),
     },
     "build_hull": {
-        "hull head_distance holds 1 values": hull(head_distance=lambda d: spoilt(d, np.nan)),
+        "hull head_distance has 1 values": hull(head_distance=lambda d: spoilt(d, np.nan)),
         "every dense cell must be a loose cell": hull(loose=np.zeros_like),
         "the hull is empty": hull(dense=np.zeros_like),
         "hull dense has shape": hull(dense=lambda d: d[1:]),
     },
     "solve_field": {
         "expected the hull's": field(grid=shifted),
-        "field tensor holds 1 values": field(tensor=lambda t: spoilt(t, np.nan)),
+        "field tensor has 1 values": field(tensor=lambda t: spoilt(t, np.nan)),
         "field confidence lies in": field(confidence=lambda c: spoilt(c, 1.5)),
-        "field growth holds 1 values": field(growth=lambda g: spoilt(g, -np.inf)),
+        "field growth has 1 values": field(growth=lambda g: spoilt(g, -np.inf)),
     },
     "track": {
         "strands for": strands(lambda s: s.select(range(len(s) - 1))),
         "starts 50 mm from its root": strands(
             lambda s: replace(s, points=s.points + np.float32([0.05, 0, 0]))
         ),
-        "strand points holds 1 values": strands(
+        "strand points has 1 values": strands(
             lambda s: replace(s, points=spoilt(s.points, np.nan))
         ),
         "1 strands have fewer than two points": strands(
@@ -202,13 +202,13 @@ WRONG: dict[str, dict[str, Callable[[Arguments], Any]]] = {
         "returned False": writing(b"hair", answer=False),
     },
     "import_groom": {
-        "strand points holds 1 values": imported(
+        "strand points has 1 values": imported(
             strands=lambda s: replace(s, points=spoilt(s.points, np.nan))
         ),
         "root_triangle names faces": imported(root_triangle=lambda t: spoilt(t, -1)),
         "stiffness is nan, expected": imported(physics=lambda p: replace(p, stiffness=np.nan)),
         "width is inf, expected": imported(material=lambda m: replace(m, width=np.inf)),
-        "root_colour holds 3 values": imported(
+        "root_colour has 3 values": imported(
             material=lambda m: replace(m, root_colour=np.full(3, np.nan))
         ),
     },
