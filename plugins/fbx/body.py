@@ -38,8 +38,8 @@ def _add_geometry(scene: Scene, head: Head) -> int:
         "Normal": _layer(
             "Normal", "", "ByVertice", "Direct", _normals_record("Normals", head, scene)
         ),
-        "Color": _indexed("Color", "scalp", "Colors", "ColorIndex", scalp, faces),
-        "UV": _indexed("UV", "map1", "UV", "UVIndex", head.uv, faces),
+        "Color": _indexed_layer("Color", "scalp", "Colors", "ColorIndex", scalp, faces),
+        "UV": _indexed_layer("UV", "map1", "UV", "UVIndex", head.uv, faces),
         "Material": _layer(
             "Material", "", "AllSame", "IndexToDirect", record("Materials", array("i", [0]))
         ),
@@ -60,7 +60,7 @@ def _normals_record(name: str, head: Head, scene: Scene) -> Record:
     return record(name, array("d", scene.space.directions_to_file(head.normals())))
 
 
-def _indexed(
+def _indexed_layer(
     kind: str, name: str, values: str, index: str, rows: Float32Array, faces: Int32Array
 ) -> Record:
     """Return a layer with a value a vertex, named again at every corner of every face."""
