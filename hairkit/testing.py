@@ -29,7 +29,25 @@ VIEW_NAMES = tuple(TURN)
 """Views of the nominal turn, 45 degrees apart, towards the subject's left."""
 
 _WIDTH, _HEIGHT = 96, 128
+"""Pixels of a photo."""
+_FOCAL = 200.0
+"""Focal length, pixels: the ball and its hair fill half of the picture's height."""
+_DISTANCE = 0.6
+"""Metres from a camera to the middle of the ball."""
+_BETWEEN_VIEWS = 45.0
+"""Degrees from one camera to the next."""
 _BALL, _HAIR = 0.1, 0.125
+"""Radii of the head and of the outer surface of its hair, metres."""
+_HULL_EDGE = 0.3
+"""Edge of the cube of voxels around ball and hair, metres."""
+_GREY = 110
+"""Mean grey of the stripes, of 255."""
+_FINE_STRIPES, _COARSE_STRIPES = (60, 6), (20, 17)
+"""Amplitude in grey levels and period in pixels: strands, and locks of them."""
+_NECK = -0.1
+"""Height of the neck's joint, metres; the root is as far below it as the head's joint above."""
+_BRISTLE, _BRISTLE_POINTS = 0.03, 5
+"""Length of the straight strands in metres, and their points."""
 
 
 def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
@@ -79,22 +97,30 @@ def striped_view(angle_deg: float, *, name: str = "front", azimuth_deg: float = 
     row, column = np.mgrid[:_HEIGHT, :_WIDTH] + 0.5
     angle = np.radians(angle_deg)
     across = -np.sin(angle) * column + np.cos(angle) * row
-    grey = 110 + 60 * np.sin(2 * np.pi * across / 6) + 20 * np.sin(2 * np.pi * across / 17)
+    grey = np.full_like(across, _GREY)
+    for amplitude, period in (_FINE_STRIPES, _COARSE_STRIPES):
+        grey = grey + amplitude * np.sin(2 * np.pi * across / period)
     image = np.repeat(grey[..., None], 3, axis=-1).astype(np.uint8)
-    return View(name, azimuth_deg, image, focal_px=200.0)
+    return View(name, azimuth_deg, image, focal_px=_FOCAL)
 
 
 def turn_capture() -> Capture:
     """Return the eight photos of the turn, with upright stripes."""
-    views = enumerate(VIEW_NAMES)
-    return Capture(tuple(striped_view(90.0, name=n, azimuth_deg=45.0 * i) for i, n in views))
+    return Capture(
+        tuple(
+            striped_view(90.0, name=name, azimuth_deg=_BETWEEN_VIEWS * number)
+            for number, name in enumerate(VIEW_NAMES)
+        )
+    )
 
 
 def turn_scene() -> Scene:
     """Return the eight true cameras and the ball head."""
     cameras = tuple(
-        Camera.on_turn(45.0 * i, distance=0.6, focal=200.0, width=_WIDTH, height=_HEIGHT)
-        for i in range(len(VIEW_NAMES))
+        Camera.on_turn(
+            _BETWEEN_VIEWS * number, distance=_DISTANCE, focal=_FOCAL, width=_WIDTH, height=_HEIGHT
+        )
+        for number in range(len(VIEW_NAMES))
     )
     return Scene(VIEW_NAMES, cameras, ball_head())
 
@@ -124,7 +150,7 @@ def ball_head(rings: int = 12) -> Head:
         (0.5 + 0.5 * vertices[:, [0, 2]] / _BALL).astype(np.float32),
         (vertices[:, 1] > 0.0).astype(np.float32),
         None,
-        np.array([[0.0, -0.2, 0.0], [0.0, -0.1, 0.0], [0.0, 0.0, 0.0]], np.float32),
+        np.array([[0, 2 * _NECK, 0], [0, _NECK, 0], [0, 0, 0]], np.float32),
         Capsules(centre, centre, np.full((1, 2), _BALL, np.float32)),
     )
 
@@ -148,7 +174,7 @@ def combed_orientation(mask: Mask) -> OrientationMap:
 
 def shell_hull(spacing: float = 0.01) -> Hull:
     """Return the shell of hair around the upper half of the ball, as cells."""
-    grid = VoxelGrid.around(np.full(3, -0.15), np.full(3, 0.15), spacing)
+    grid = VoxelGrid.around(np.full(3, -_HULL_EDGE / 2), np.full(3, _HULL_EDGE / 2), spacing)
     distance, shell = _shell(grid, _HAIR)
     return Hull(grid, shell, _shell(grid, _HAIR + spacing)[1], distance)
 
@@ -180,9 +206,9 @@ def bristle_groom() -> Groom:
     """Return straight strands of 3 cm along the scalp's normals, bound to the ball head."""
     head = ball_head()
     roots = scalp_roots(head)
-    along = np.linspace(0.0, 0.03, 5, dtype=np.float32)[None, :, None]
+    along = np.linspace(0.0, _BRISTLE, _BRISTLE_POINTS, dtype=np.float32)[None, :, None]
     points = roots.positions[:, None] + along * roots.normals[:, None]
-    offsets = np.arange(len(roots) + 1) * 5
+    offsets = np.arange(len(roots) + 1) * _BRISTLE_POINTS
     strands = Strands(points.reshape(-1, 3), offsets, root_uv=roots.uv)
     return Groom(strands, head, roots.triangle, roots.barycentric)
 

@@ -18,10 +18,17 @@ from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.similarity import triangulate
 from hairkit.options import option
+from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 
-JAW = 17
-"""The first landmarks trace the jaw, which detectors place less surely."""
 JAW_LOOSENESS = 3.0
+"""Factor of the smoothing at the jaw's landmarks, which detectors place less surely."""
+OUTLINE_POINTS = 20
+"""Points a silhouette that the outlines keep; only their distance fields are read here."""
+LEAST_SLOPE = 0.3
+"""Metres outwards in a picture for a metre along a normal: normals that run along the outline do
+not say how far to push."""
+SLOPE_STEP = 0.002
+"""Metres along a normal over which that slope is measured."""
 LARGEST_PUSH = 0.008
 """Metres: what sticks out farther is a wrong camera or mask rather than a big head."""
 
@@ -51,7 +58,7 @@ def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: O
     """Bend the scene's head to the landmarks and into the silhouettes."""
     head = _bend_to_landmarks(capture, scene, options)
     if options.rounds and all(mask.person_known for mask in masks):
-        outlines = Outlines.of(masks, count=20)
+        outlines = Outlines.of(masks, count=OUTLINE_POINTS)
         controls = _spread(head, options.controls)
         for _ in range(options.rounds):
             head = _bend_to_outlines(head, scene.cameras, outlines, controls, options)
@@ -68,7 +75,7 @@ def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head
     points = triangulate(cameras, pixels)
     source = head.vertices[head.landmark_vertices].astype(np.float64)
     anchors = head.vertices[_farthest(head, _cranium(head), options.anchors)].astype(np.float64)
-    loose = np.where(np.arange(68) < JAW, JAW_LOOSENESS, 1.0) * options.smoothing
+    loose = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_LOOSENESS, 1.0) * options.smoothing
     smoothing = np.concatenate([loose, np.full(len(anchors), options.anchor_smoothing)])
     places = np.concatenate([source, anchors])
     moves = np.concatenate([points - source, np.zeros_like(anchors)])
@@ -115,8 +122,8 @@ def _bend_to_outlines(
     for view, camera in enumerate(cameras):
         inside, slope = _inside_by(outlines.fields[view], outlines.scale, camera, places, normals)
         excess = margin - inside
-        # A normal that runs along the outline says nothing about how far to go.
-        wanted = np.where((excess > 0) & (slope < -0.3), excess / np.maximum(-slope, 0.3), 0.0)
+        known = (excess > 0) & (slope < -LEAST_SLOPE)
+        wanted = np.where(known, excess / np.maximum(-slope, LEAST_SLOPE), 0.0)
         push = np.maximum(push, np.minimum(wanted, LARGEST_PUSH))
     smoothing[push > 0] = options.smoothing
     return _warp(head, places, -push[:, None] * normals, smoothing)
@@ -127,16 +134,15 @@ def _inside_by(
 ) -> tuple[Float64Array, Float64Array]:
     """Return how far places lie inside the silhouette (metres, infinity off the picture), and its
     slope along normals."""
-    step = 0.002
     metres = camera.focal if camera.model == "orthographic" else camera.focal / camera.depth(places)
     values = []
-    for moved in (places, places + step * normals):
+    for moved in (places, places + SLOPE_STEP * normals):
         column, row = np.nan_to_num(camera.project(moved) * scale - 0.5, nan=-1).T
         values.append(_bilinear(field, column, row) / metres)
     slope = np.where(np.isfinite(values[0]) & np.isfinite(values[1]), values[1], 0.0)
     slope = (
         slope - np.where(np.isfinite(values[0]) & np.isfinite(values[1]), values[0], 0.0)
-    ) / step
+    ) / SLOPE_STEP
     return values[0], slope
 
 

@@ -54,6 +54,8 @@ VERBS = {
     "doctor": "check this machine and print what to install",
 }
 
+_COMMAND_COLUMNS = 28
+"""Characters of the help's left column, indent included: no option of a verb breaks its line."""
 _EXAMPLE = "Example: hairkit reconstruct photos/ -o out/"
 
 
@@ -61,7 +63,7 @@ class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
     """Keeps the description's lines and leaves room for the longest command."""
 
     def __init__(self, *args: Any, **settings: Any) -> None:
-        super().__init__(*args, **{"max_help_position": 28, **settings})
+        super().__init__(*args, **{"max_help_position": _COMMAND_COLUMNS, **settings})
 
 
 class Parser(argparse.ArgumentParser):

@@ -21,6 +21,10 @@ and landmarks.json, matched by name, and a capture.toml. OUT gets groom.npz, sce
 recipe's exports, contact_sheet.png and hairkit.log. After an interruption, run it again: it
 continues where it stopped.
 """
+GUIDES = 600
+"""Roots by default, as of `hairkit.reconstruct`."""
+SMALLEST_EDGE, LARGEST_EDGE = 128, 8192
+"""Longer edges in pixels to which photos may be scaled."""
 
 
 def register(subparsers: Any) -> None:
@@ -41,7 +45,8 @@ def register(subparsers: Any) -> None:
     add("--head-units", default="m", metavar="U", help="units of the head file (default m)")
     add("--head-scalp", metavar="NAME", help="the scalp: a group of it, or a mask picture")
     add("--head-up", default="y", metavar="AXIS", help="axis that points up in it (default y)")
-    add("--guides", type=int, default=600, metavar="N", help="number of guide hairs (default 600)")
+    guides = f"number of guide hairs (default {GUIDES})"
+    add("--guides", type=int, default=GUIDES, metavar="N", help=guides)
     add("--seed", type=int, default=0, metavar="N", help="seed of the roots' places (default 0)")
     add("--max-edge", type=int, metavar="PX", help="scale larger photos to this edge (1440)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
@@ -107,8 +112,10 @@ def _photos(args: argparse.Namespace) -> Path:
 def _max_edge(args: argparse.Namespace, default: int) -> int:
     if args.max_edge is None:
         return default
-    if not 128 <= args.max_edge <= 8192:
-        raise InputError(f"--max-edge is {args.max_edge}, expected 128 to 8192 pixels")
+    if not SMALLEST_EDGE <= args.max_edge <= LARGEST_EDGE:
+        raise InputError(
+            f"--max-edge is {args.max_edge}, expected {SMALLEST_EDGE} to {LARGEST_EDGE} pixels"
+        )
     return int(args.max_edge)
 
 

@@ -34,7 +34,11 @@ Draw a groom on its head, its guides interpolated to full hair. The camera is a 
 "azimuth,elevation" in degrees, or a view of a scene.json. --turntable 24 writes 24 pictures.
 --cache draws a frame of what hairkit simulate wrote."""
 
+HAIRS = 20_000
+"""Strands drawn by default."""
 MOST_HAIRS = 200_000
+MOST_PICTURES = 3600
+"""Of a turntable: ten a degree."""
 LARGEST = 8192
 """Longest edge of a picture, pixels."""
 
@@ -51,7 +55,7 @@ def register(subparsers: Any) -> None:
     )
     parser.add_argument("--scene", type=Path, metavar="FILE", help="scene.json with cameras")
     parser.add_argument("--view", metavar="NAME", help="the view of the scene (its first)")
-    parser.add_argument("--hairs", type=int, default=20_000, metavar="N", help="strands (20000)")
+    parser.add_argument("--hairs", type=int, default=HAIRS, metavar="N", help=f"strands ({HAIRS})")
     parser.add_argument("--size", metavar="WxH", help="pixels (1280x720; the scene's own size)")
     parser.add_argument("--turntable", type=int, metavar="N", help="N pictures all around")
     parser.add_argument("--seed", type=int, default=0, help="of the interpolated hair (0)")
@@ -104,10 +108,10 @@ def _cameras(args: argparse.Namespace, head: Any, hair: Strands) -> list[Camera]
     azimuth, elevation = _direction(args.camera or "front")
     if args.turntable is None:
         turn = [azimuth]
-    elif 1 <= args.turntable <= 3600:
+    elif 1 <= args.turntable <= MOST_PICTURES:
         turn = (azimuth + 360 * np.arange(args.turntable) / args.turntable).tolist()
     else:
-        raise InputError(f"--turntable is {args.turntable}, expected 1 to 3600 pictures")
+        raise InputError(f"--turntable is {args.turntable}, expected 1 to {MOST_PICTURES} pictures")
     points = np.concatenate([head, hair.points])
     return framing_cameras(points, [(a, elevation) for a in turn], width, height)
 

@@ -23,7 +23,15 @@ Shakes are AXIS:DEGREES:HERTZ[:SECONDS] with yaw, pitch or roll; several go toge
 the air goes to: +X the subject's left, +Y up, +Z out of the face."""
 
 SIMULATOR = "pbd"
+FRAMES, RATE = 120, 60.0
+"""Frames written by default, and their number a second: two seconds."""
 MOST_FRAMES = 100_000
+LOWEST_RATE, HIGHEST_RATE = 0.1, 10_000
+"""Frames a second."""
+LONGEST_WARM_UP = 3600
+"""Seconds."""
+STRONGEST_WIND = 200
+"""Metres per second along an axis; the strongest storms have about 100."""
 
 
 def register(subparsers: Any) -> None:
@@ -34,8 +42,8 @@ def register(subparsers: Any) -> None:
     add = parser.add_argument
     add("groom", metavar="GROOM", type=Path, help="groom.npz, or a file that a plugin imports")
     add("-o", "--out", required=True, type=Path, metavar="FILE", help="cache.npz, or hair.abc, ...")
-    add("--frames", type=int, default=120, metavar="N", help="frames to write (120)")
-    add("--fps", type=float, default=60.0, metavar="N", help="frames per second (60)")
+    add("--frames", type=int, default=FRAMES, metavar="N", help=f"frames to write ({FRAMES})")
+    add("--fps", type=float, default=RATE, metavar="N", help=f"frames per second ({RATE:g})")
     add("--warm-up", type=float, default=0.0, metavar="S", help="seconds before the first frame")
     add("--shake", action="append", default=[], metavar="A:D:H", help="as yaw:20:1.5")
     add("--motion", type=Path, metavar="FILE", help="head motion: .json, or an animated .glb")
@@ -107,10 +115,12 @@ def _run(args: argparse.Namespace) -> int:
 def _check(args: argparse.Namespace) -> None:
     if not 1 <= args.frames <= MOST_FRAMES:
         raise InputError(f"--frames is {args.frames}, expected 1 to {MOST_FRAMES}")
-    if not (math.isfinite(args.fps) and 0.1 <= args.fps <= 10_000):
-        raise InputError(f"--fps is {args.fps}, expected 0.1 to 10000 frames per second")
-    if not 0 <= args.warm_up <= 3600:
-        raise InputError(f"--warm-up is {args.warm_up}, expected 0 to 3600 seconds")
+    if not LOWEST_RATE <= args.fps <= HIGHEST_RATE:
+        raise InputError(
+            f"--fps is {args.fps}, expected {LOWEST_RATE} to {HIGHEST_RATE} frames per second"
+        )
+    if not 0 <= args.warm_up <= LONGEST_WARM_UP:
+        raise InputError(f"--warm-up is {args.warm_up}, expected 0 to {LONGEST_WARM_UP} seconds")
     if not 0 <= args.turbulence <= 10:
         raise InputError(f"--turbulence is {args.turbulence}, expected 0 to 10 times the wind")
     if not args.out.parent.is_dir():
@@ -122,8 +132,12 @@ def _vector(name: str, text: str) -> Float64Array:
         vector = np.array([float(part) for part in text.split(",")])
     except ValueError:
         vector = np.zeros(0)
-    if vector.shape != (3,) or not np.isfinite(vector).all() or np.abs(vector).max() > 200:
-        raise InputError(f"{name} is {text!r}, expected X,Y,Z up to 200, as 3,0,1")
+    if (
+        vector.shape != (3,)
+        or not np.isfinite(vector).all()
+        or np.abs(vector).max() > STRONGEST_WIND
+    ):
+        raise InputError(f"{name} is {text!r}, expected X,Y,Z up to {STRONGEST_WIND}, as 3,0,1")
     return vector
 
 

@@ -17,6 +17,8 @@ Example: hairkit synth wavy -o wavy/
 
 Grow a groom and take eight photos of it: photos/, masks/, landmarks.json, groom.npz, and truth/ for
 `hairkit evaluate`. Then: hairkit reconstruct wavy/ -o out/"""
+STRANDS = 10_000
+"""Hairs by default: a tenth of a head's."""
 
 
 def register(subparsers: Any) -> None:
@@ -24,7 +26,9 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser("synth", help="make photos", description=_DESCRIPTION)
     parser.add_argument("style", metavar="STYLE", help=", ".join(STYLES))
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder")
-    parser.add_argument("--strands", type=int, default=10_000, metavar="N", help="hairs (10000)")
+    parser.add_argument(
+        "--strands", type=int, default=STRANDS, metavar="N", help=f"hairs ({STRANDS})"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of hair, cameras and room (0)")
     parser.add_argument("--size", default="810x1080", metavar="WxH", help="photos (810x1080)")
     parser.add_argument(

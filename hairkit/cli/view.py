@@ -13,6 +13,8 @@ from hairkit.cli.settings import add_setting
 from hairkit.errors import InputError
 
 MOST_HAIRS = 200_000
+BUDGET_MS = 50
+"""Milliseconds a picture may take by default: 20 pictures a second."""
 _DESCRIPTION = """\
 Example: hairkit view out/groom.npz
 
@@ -32,7 +34,7 @@ def register(subparsers: Any) -> None:
     add("--preset", metavar="NAME", help="simulator options saved beside the groom")
     add("--hairs", type=int, metavar="N", help="strands drawn (10000)")
     add("--size", metavar="WxH", help="pixels (1280x720)")
-    add("--budget", type=float, metavar="MS", help="milliseconds a picture may take (50)")
+    add("--budget", type=float, metavar="MS", help=f"milliseconds a picture may take ({BUDGET_MS})")
     add("--headless", action="store_true", help="no window: run --script")
     add("--script", type=Path, metavar="FILE", help="actions to run (TOML)")
     add("--out", type=Path, metavar="FOLDER", help="where a script's pictures go (.)")
@@ -170,7 +172,7 @@ def _size(args: argparse.Namespace) -> tuple[int, int]:
 
 def _budget(args: argparse.Namespace) -> float:
     if args.budget is None:
-        return 1 / 20
+        return BUDGET_MS / 1e3
     if not args.budget > 0:
         raise InputError(f"--budget is {args.budget}, expected milliseconds above 0")
     return float(args.budget) / 1e3

@@ -19,6 +19,10 @@ from hairkit.types.volume import Hull, ScalpDistance, VoxelGrid, outer_products
 
 WHORL_BEHIND = 0.03
 """Metres from the head's highest point back to the vertical axis of the crown's whorl."""
+WHORL_SLOPE = 0.7
+"""Part of short hair's direction away from the whorl's axis, against 1 straight down."""
+LEAST_WHORL = 0.05
+"""Share of the direction from the crown in long hair, which decides where the flow vanishes."""
 SHORT_HAIR, LONG_HAIR = 0.03, 0.1
 """Lengths in metres: shorter hair is combed from the crown, longer hair along the potential."""
 TIP_SLOPE = 0.2
@@ -39,8 +43,8 @@ def combing_direction(
     """Return unit directions (N, 3), root to tip, of hair on the scalp near points (N, 3).
 
     Long hair: the tangential part of the growth potential's gradient. Hair shorter than
-    `SHORT_HAIR`, which ends everywhere: "0.7 away from the crown's axis + 1 down". In between a
-    blend; made unit, plus `lift` times the outward normal.
+    `SHORT_HAIR`, which ends everywhere: `WHORL_SLOPE` away from the crown's axis and 1 down. In
+    between a blend; made unit, plus `lift` times the outward normal.
     """
     at = np.asarray(points, np.float64)
     outward = gradient(hull.grid, hull.head_distance, at)
@@ -48,7 +52,7 @@ def combing_direction(
     flow -= np.sum(flow * outward, axis=1, keepdims=True) * outward
     length = float(np.ptp(growth[hull.dense]))
     share = _long_share(length)
-    combed = share * flow + max(1 - share, 0.05) * _from_crown(head, at, outward)
+    combed = share * flow + max(1 - share, LEAST_WHORL) * _from_crown(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
     direction = combed + lift * outward
     result: Float64Array = direction / np.maximum(
@@ -101,7 +105,7 @@ def _from_crown(head: Head, at: Float64Array, outward: Float64Array) -> Float64A
     away = at - (top - [0, 0, WHORL_BEHIND])
     away[:, 1] = 0
     away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
-    combed = 0.7 * away + [0.0, -1.0, 0.0]
+    combed = WHORL_SLOPE * away + [0.0, -1.0, 0.0]
     combed -= np.sum(combed * outward, axis=1, keepdims=True) * outward
     result: Float64Array = combed / np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
     return result

@@ -32,6 +32,16 @@ MAX_TIP_GAP = 0.5
 """Guides whose tips lie further apart than this share of their length are not mixed."""
 COURSE_SIGMA = 0.06
 """Width of the smoothing that parts a guide's course from its waves, in shares of its length."""
+NEAR_ENOUGH = 5e-4
+"""Metres: guides nearer to a new root than this weigh no more."""
+BEYOND_FARTHEST = 1.05
+"""Half the distance at which weights fall to 0, in distances of the farthest guide mixed."""
+MOST_STRETCH = 1.3
+"""Factor by which a mixture, shorter than its guides, is lengthened at most."""
+SHORTENED = 0.12
+"""Share by which a new strand may be shorter than its mixture; the cube of a random number."""
+SWING = 0.4
+"""Slow swing of a new strand about its own line, in shares of the tip's wander."""
 MAX_POINTS = 128
 """Points a strand at most; longer guides are resampled."""
 
@@ -78,7 +88,7 @@ def densify(
     shapes = _mix_shapes(bundle, mix)
     if scatter > 0:
         shapes += _wander(len(positions), bundle.points, scatter, generator)
-        shapes *= 1 - 0.12 * generator.random((len(positions), 1, 1), dtype=np.float32) ** 3
+        shapes *= 1 - SHORTENED * generator.random((len(positions), 1, 1), dtype=np.float32) ** 3
     return _join(even, positions[:, None] + shapes, mix.guides[:, 0], uv, material)
 
 
@@ -176,8 +186,8 @@ def _choose_guides(bundle: _Bundle, positions: Float32Array) -> _Mix:
     near, distance = np.take_along_axis(near, order, 1), np.take_along_axis(distance, order, 1)
     agrees = np.take_along_axis(agrees, order, 1)
     # far guides weigh little, so that hair changes smoothly from root to root
-    reach = np.where(agrees, distance, 0).max(axis=1, keepdims=True) * 1.05 + 1e-6
-    weight = np.where(agrees, (1 / np.maximum(distance, 5e-4) - 0.5 / reach) ** 2, 0)
+    reach = np.where(agrees, distance, 0).max(axis=1, keepdims=True) * BEYOND_FARTHEST + 1e-6
+    weight = np.where(agrees, (1 / np.maximum(distance, NEAR_ENOUGH) - 0.5 / reach) ** 2, 0)
     weight /= weight.sum(axis=1, keepdims=True)
     return _Mix(near, weight.astype(np.float32))
 
@@ -203,7 +213,7 @@ def _mix_shapes(bundle: _Bundle, mix: _Mix) -> Float32Array:
         shape += mix.weights[:, k, None, None] * bundle.course[mix.guides[:, k]]
     course_length = _shape_lengths(bundle.course)
     wanted = (mix.weights * course_length[mix.guides]).sum(axis=1)
-    stretch = np.clip(wanted / np.maximum(_shape_lengths(shape), 1e-9), 1.0, 1.3)
+    stretch = np.clip(wanted / np.maximum(_shape_lengths(shape), 1e-9), 1.0, MOST_STRETCH)
     shape *= stretch[:, None, None].astype(np.float32)
     shape += bundle.waves[mix.guides[:, 0]]
     return shape
@@ -225,7 +235,7 @@ def _wander(
     drift = generator.standard_normal((count, 3), dtype=np.float32)
     wave = generator.standard_normal((count, 3), dtype=np.float32)
     swing = np.sin(phase[:, :1] + 2 * np.pi * turns[:, :1] * t) - np.sin(phase[:, :1])
-    offsets = t[None, :, None] * drift[:, None] + 0.4 * (t * swing)[:, :, None] * wave[:, None]
+    offsets = t[None, :, None] * drift[:, None] + SWING * (t * swing)[:, :, None] * wave[:, None]
     result: Float32Array = np.float32(scatter / np.sqrt(3)) * offsets
     return result
 

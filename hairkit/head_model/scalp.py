@@ -18,6 +18,12 @@ from hairkit.types.head import Head, Roots
 MAX_ROOTS = 200_000
 CANDIDATES_PER_ROOT = 12
 """Points tried for each root; with fewer, gaps stay open."""
+PACKING = 0.7
+"""Roots that dart throwing packs into a square whose edge is their least distance."""
+FIRST_CANDIDATES = 64
+"""Candidates added to those of the packing, so that large radii have some."""
+MOST_CELLS = 200
+"""Cells a side, at most, of the grid that finds roots nearby."""
 SHRINK = 0.95
 """Factor from one radius of the dart throwing to the next."""
 _LONGEST_EDGE = 3.2
@@ -147,7 +153,7 @@ def _progressive_roots(head: Head, count: int, seed: int) -> tuple[Int32Array, F
     radius = np.sqrt(area.sum())
     while found < count:
         radius *= SHRINK
-        wanted = int(CANDIDATES_PER_ROOT * 0.7 * area.sum() / radius**2) + 64
+        wanted = int(CANDIDATES_PER_ROOT * PACKING * area.sum() / radius**2) + FIRST_CANDIDATES
         face, weight = _candidates(head, area, tried, wanted, shift)
         tried = wanted
         faces, weights = np.concatenate([faces, face]), np.concatenate([weights, weight])
@@ -203,7 +209,7 @@ def take_free(
     edge = radius
     for k in range(3):
         low[k] = points[:, k].min()
-        edge = max(edge, (points[:, k].max() - low[k]) / 200)
+        edge = max(edge, (points[:, k].max() - low[k]) / MOST_CELLS)
     for k in range(3):
         shape[k] = int((points[:, k].max() - low[k]) / edge) + 3
     heads = np.full((shape[0], shape[1], shape[2]), -1, np.int32)

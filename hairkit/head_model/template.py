@@ -180,7 +180,7 @@ def _sphere(frequency: int) -> tuple[Float64Array, Int32Array]:
 
 def _icosahedron() -> tuple[Float64Array, Int32Array]:
     """Corners (12, 3) and faces (20, 3), counter-clockwise from outside, no corner at the crown."""
-    golden = (1 + np.sqrt(5)) / 2
+    golden = (1 + 5**0.5) / 2
     corners = np.array([(0, a, b * golden) for a in (-1, 1) for b in (-1, 1)], np.float64)
     corners = np.concatenate([np.roll(corners, shift, axis=1) for shift in range(3)])
     triangles = ConvexHull(corners).simplices

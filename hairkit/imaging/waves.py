@@ -39,6 +39,10 @@ TROUGH = -0.09
 SWING_LOSS = 1.6
 """Orientation maps average strands that are out of step; the swing they keep is smaller by about
 this."""
+STEEPEST = 0.8
+"""Radians: larger swings and slants are errors, and their tangents would make huge waves."""
+SURE_LINE = 0.3
+"""Weight of the map where lines start."""
 SURE_SLANT = 2.5
 """Standard errors by which the views' mean slant must differ from 0."""
 
@@ -68,8 +72,8 @@ def measure_waves(
     mean, error = np.mean(slants), np.std(slants) / np.sqrt(len(slants))
     slant = float(mean) if abs(mean) > SURE_SLANT * error else 0.0
     swing_rms = SWING_LOSS * float(np.sqrt(np.mean(squares)))
-    from_swing = pitch * np.sqrt(2) * np.tan(min(swing_rms, 0.8)) / (2 * np.pi)
-    from_slant = pitch * np.tan(min(abs(slant), 0.8)) / 4
+    from_swing = pitch * np.sqrt(2) * np.tan(min(swing_rms, STEEPEST)) / (2 * np.pi)
+    from_slant = pitch * np.tan(min(abs(slant), STEEPEST)) / 4
     return Waves(float(max(from_swing, from_slant)), pitch, slant)
 
 
@@ -93,7 +97,7 @@ def _swing(found: OrientationMap, mask: Mask) -> tuple[float, Float64Array]:
     average = (0.5 * np.arctan2(smooth[..., 1], smooth[..., 0])).astype(np.float32)
     angle = 0.5 * np.arctan2(vector[..., 1], vector[..., 0])
     swing = np.mod(angle - average + np.pi / 2, np.pi) - np.pi / 2
-    rows, columns = np.nonzero(weight > 0.3)
+    rows, columns = np.nonzero(weight > SURE_LINE)
     if not len(rows):
         return 0.0, np.zeros(LONGEST_LAG)
     pick = np.linspace(0, len(rows) - 1, LINES).astype(np.int64)

@@ -22,6 +22,17 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres in one unit of a head file."""
 _READERS = {".obj": read_obj, ".ply": read_ply, ".glb": read_glb}
 _DEFAULT_BREADTH = 0.155
+"""Breadth of the default head, metres."""
+_NARROWEST, _BROADEST = 0.05, 0.6
+"""Metres: scalps from a doll's to a statue's; others are in another unit than was given."""
+_OFF_CENTRE = 0.02
+"""Metres from the origin to the middle of the cranium; heads farther off are moved."""
+_LANDMARK_GAP = 0.02
+"""Metres from a landmark to the nearest vertex; farther off, units or axes differ."""
+_LEVEL_BREADTHS = 0.1
+"""Half the height, in head breadths, of the slice that gives the cranium's depth."""
+_WHITE = 0.75
+"""Brightness that painted scalp reaches and bare skin does not, of 1."""
 _MAX_LANDMARK_BYTES = 2**20
 _TOP_OVER_BREADTH = 0.452
 """Height of the crown over the head's centre, in head breadths."""
@@ -70,7 +81,7 @@ def read_head(
     used = np.unique(faces)
     breadth, middle = _breadth_and_middle(vertices[used], weight[used], file)
     landmarks = _landmarks(file, vertices, units, up)
-    moved = vertices if np.linalg.norm(middle) <= 0.02 else vertices - middle
+    moved = vertices if np.linalg.norm(middle) <= _OFF_CENTRE else vertices - middle
     middle = middle if moved is vertices else np.zeros(3)
     uv = _azimuthal_uv(moved - middle) if mesh.uv is None else _in_unit_square(mesh.uv)
     joints, capsules = _skeleton(breadth / _DEFAULT_BREADTH, middle)
@@ -161,7 +172,7 @@ def _painted_weight(colours: Float64Array, file: Path) -> Float64Array:
     if redness.max() > 0.5:
         return np.asarray(redness / redness.max(), np.float64)
     brightness: Float64Array = colours.mean(axis=1)
-    if brightness.min() > 0.25 or brightness.max() < 0.75 or np.ptp(colours, axis=1).max() > 0.25:
+    if brightness.min() > 0.25 or brightness.max() < _WHITE or np.ptp(colours, axis=1).max() > 0.25:
         raise InputError(f"{file}: its colours mark no scalp: {_HOW_TO_MARK}")
     return brightness
 
@@ -183,13 +194,13 @@ def _breadth_and_middle(
     """Breadth of the scalp and the middle of the cranium, metres, by the default head's shape."""
     scalp = vertices[weight > 0.5]
     breadth = float(np.ptp(scalp[:, 0])) if len(scalp) else 0.0
-    if not 0.05 <= breadth <= 0.6:
+    if not _NARROWEST <= breadth <= _BROADEST:
         raise InputError(
-            f"{file}: the scalp is {breadth:.4g} m broad, a head's is about 0.155 m: "
+            f"{file}: the scalp is {breadth:.4g} m broad, a head's is about {_DEFAULT_BREADTH} m: "
             "give the file's units (m, cm, mm, in)"
         )
     height = scalp[:, 1].max() - _TOP_OVER_BREADTH * breadth
-    level = vertices[np.abs(vertices[:, 1] - height) < 0.1 * breadth]
+    level = vertices[np.abs(vertices[:, 1] - height) < _LEVEL_BREADTHS * breadth]
     depth = level if len(level) else scalp
     middle = [
         0.5 * (scalp[:, 0].min() + scalp[:, 0].max()),
@@ -218,7 +229,7 @@ def _landmarks(file: Path, vertices: Float64Array, units: str, up: str) -> Int32
         return values.astype(np.int32)
     points = _in_metres(values, units, up)
     apart, nearest = cKDTree(vertices).query(points)
-    if apart.max() > 0.02:
+    if apart.max() > _LANDMARK_GAP:
         raise InputError(
             f"{path}: a landmark is {1e3 * apart.max():.0f} mm from the head; same units and axes?"
         )

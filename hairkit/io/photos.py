@@ -32,6 +32,8 @@ MAX_BYTES = 256 * 2**20
 FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
 """Diagonal of the 35 mm film frame, to which equivalent focal lengths refer (CIPA DCG-001)."""
 
+_CROPPED = 0.02
+"""Relative change of the aspect ratio since the picture was taken; more means it was cropped."""
 _KINDS = {
     b"\xff\xd8\xff": "JPEG",
     b"\x89PNG\r\n\x1a\n": "PNG",
@@ -77,7 +79,7 @@ class PhotoHeader:
         """Focal length in pixels of the whole picture, or None when EXIF does not tell."""
         sides = sorted((self.width, self.height))
         taken = sorted(self.exif.pixels) if self.exif.pixels is not None else sides
-        if abs(taken[0] * sides[1] - taken[1] * sides[0]) > 0.02 * taken[1] * sides[1]:
+        if abs(taken[0] * sides[1] - taken[1] * sides[0]) > _CROPPED * taken[1] * sides[1]:
             return None  # cropped after it was taken: the lens's field of view is gone
         if self.exif.focal_35mm is not None:
             return focal_from_equivalent(self.exif.focal_35mm, self.width, self.height)

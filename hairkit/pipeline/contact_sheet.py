@@ -38,9 +38,15 @@ GUIDE_POINTS = 20
 CLAY = (0.16, 0.15, 0.14)
 """Linear RGB of the hull."""
 EXPOSURE = 1.0
+KEY_DIRECTION, RIM_DIRECTION = (0.4, 0.8, 0.6), (-0.4, 0.7, -0.6)
+"""Towards the lights: one before the face, one behind the head, both from above."""
 
 PAPER, INK = 250, 60
 _HAIR_TINT, _PERSON_TINT = (232, 60, 132), (70, 130, 235)
+_HAIR_OPACITY, _PERSON_OPACITY = 0.6, 0.35
+"""Shares of the tints over the grey photo, which stays visible through them."""
+_FONT, _FONT_SCALE, _BOX_GREY = cv2.FONT_HERSHEY_SIMPLEX, 0.45, 40
+"""The letters of names, ten pixels high, and the grey behind those on pictures."""
 _ROWS = ("photo", "mask", "orientation", "hull", "guides", "hair")
 
 
@@ -98,8 +104,10 @@ def _fit(image: npt.NDArray[np.uint8], size: tuple[int, int]) -> UInt8Array:
 def _mask_picture(photo: UInt8Array, mask: Mask) -> UInt8Array:
     """Return the photo, hair tinted pink and the rest of the person blue."""
     size = (photo.shape[1], photo.shape[0])
-    hair = _fit((mask.labels == HAIR) * np.uint8(255), size)[..., None] / 255 * 0.6
-    person = _fit((mask.labels == PERSON) * np.uint8(255), size)[..., None] / 255 * 0.35
+    hair, person = (
+        _fit((mask.labels == label) * np.uint8(255), size)[..., None] / 255 * opacity
+        for label, opacity in ((HAIR, _HAIR_OPACITY), (PERSON, _PERSON_OPACITY))
+    )
     grey = photo.mean(axis=2, keepdims=True) * (1 - hair - person)
     return np.asarray(grey + hair * _HAIR_TINT + person * _PERSON_TINT).astype(np.uint8)
 
@@ -142,7 +150,7 @@ def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
 
 def _lights() -> Lights:
     """Return lights from front and back alike, bright as a window: the photos go around."""
-    lights = Lights.studio((0.4, 0.8, 0.6), (-0.4, 0.7, -0.6), EXPOSURE)
+    lights = Lights.studio(KEY_DIRECTION, RIM_DIRECTION, EXPOSURE)
     return replace(lights, rim_colour=lights.key_colour)
 
 
@@ -167,9 +175,9 @@ def _arrange(
 def _write(
     sheet: UInt8Array, text: str, at: tuple[int, int], grey: int, boxed: bool = False
 ) -> None:
-    font = cv2.FONT_HERSHEY_SIMPLEX
     if boxed:
-        (width, height), _ = cv2.getTextSize(text, font, 0.45, 1)
+        (width, height), _ = cv2.getTextSize(text, _FONT, _FONT_SCALE, 1)
         low = (at[0] - 4, at[1] + 6)
-        cv2.rectangle(sheet, low, (at[0] + width + 4, at[1] - height - 4), (40, 40, 40), cv2.FILLED)
-    cv2.putText(sheet, text, at, font, 0.45, (grey, grey, grey), 1, cv2.LINE_AA)
+        high = (at[0] + width + 4, at[1] - height - 4)
+        cv2.rectangle(sheet, low, high, (_BOX_GREY,) * 3, cv2.FILLED)
+    cv2.putText(sheet, text, at, _FONT, _FONT_SCALE, (grey,) * 3, 1, cv2.LINE_AA)

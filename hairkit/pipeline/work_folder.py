@@ -25,7 +25,11 @@ from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
 
 _Result = TypeVar("_Result", bound=Stored)
 _DIGEST = "work_digest"
+_DIGEST_BYTES = 20
+"""Length of a digest, as SHA-1's and git's: no two inputs share one by chance."""
 _LOCK_POLL_S = 0.2
+_ALL_READ_AND_WRITE = 0o666
+"""Permissions of the lock file, less the user's umask."""
 
 
 def digest_of(*values: Any) -> str:
@@ -34,7 +38,7 @@ def digest_of(*values: Any) -> str:
     Takes numbers, strings, None, arrays, tuples and dataclasses of these; a path counts with the
     content of its file, not with its name.
     """
-    state = hashlib.blake2b(digest_size=20)
+    state = hashlib.blake2b(digest_size=_DIGEST_BYTES)
     for value in values:
         _feed(state, value)
     return state.hexdigest()
@@ -162,7 +166,7 @@ def _lock(path: Path, waiting: Callable[[], None]) -> int | None:
         import fcntl
     except ImportError:  # no file locks on this system; files are still written atomically
         return None
-    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    handle = os.open(path, os.O_RDWR | os.O_CREAT, _ALL_READ_AND_WRITE)
     reported = False
     try:
         while True:

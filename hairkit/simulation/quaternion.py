@@ -10,6 +10,10 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
 
+_ALONG_X = 0.6
+"""Component from which a unit vector is too near to the x axis for a cross product with it, so that
+the y axis is taken; any value well between 0 and 1 does."""
+
 
 def product(a: Float64Array, b: Float64Array) -> Float64Array:
     """Return the Hamilton product: rotation by `b`, then by `a`."""
@@ -63,7 +67,7 @@ def shortest_arc(start: Float64Array, end: Float64Array) -> Float64Array:
     turn = np.concatenate([(1.0 + cosine)[..., None], axis], axis=-1)
     opposite = cosine < -1.0 + 1e-12
     if opposite.any():
-        other = np.where(np.abs(start[..., :1]) < 0.6, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+        other = np.where(np.abs(start[..., :1]) < _ALONG_X, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
         half = np.concatenate([np.zeros_like(cosine)[..., None], np.cross(start, other)], axis=-1)
         turn = np.where(opposite[..., None], half, turn)
     return normalize(turn)

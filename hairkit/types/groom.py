@@ -20,17 +20,21 @@ _STRANDS = "strands."
 _AT_TOP = ("points", "offsets", "widths", "root_uv", "group", "guide")
 
 
-def _grey() -> Float32Array:
-    return np.array([0.16, 0.11, 0.08], np.float32)
+_BROWN = (0.16, 0.11, 0.08)
+"""Linear RGB of hair whose photos give no colour."""
+
+
+def _default_colour() -> Float32Array:
+    return np.array(_BROWN, np.float32)
 
 
 @dataclass(frozen=True, eq=False)
 class HairMaterial(Stored):
     """Appearance of the hair, as measured in the photos."""
 
-    root_colour: Float32Array = field(default_factory=_grey)
+    root_colour: Float32Array = field(default_factory=_default_colour)
     """(3,) linear RGB in [0, 1]."""
-    tip_colour: Float32Array = field(default_factory=_grey)
+    tip_colour: Float32Array = field(default_factory=_default_colour)
     """(3,) linear RGB in [0, 1]."""
     width: float = 8e-5
     """Strand diameter, metres."""

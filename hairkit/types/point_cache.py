@@ -13,6 +13,9 @@ from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.groom import Groom
 
+FILM_RATE = 24.0
+"""Frames per second of the cinema, taken where a single frame gives no rate."""
+
 
 @dataclass(frozen=True, eq=False)
 class PointCache(Stored):
@@ -43,7 +46,7 @@ class PointCache(Stored):
     def frames_per_second(self) -> float:
         """Frames per second of a uniform cache; 24 for a single frame."""
         if len(self.times) < 2:
-            return 24.0
+            return FILM_RATE
         return float((len(self.times) - 1) / (self.times[-1] - self.times[0]))
 
 

@@ -31,6 +31,12 @@ MOST_STRANDS = 400
 """Strands drawn at most, evenly chosen."""
 BACKDROP, SKIN, HAIR = 232, (176, 150, 132), (92, 66, 48)
 """Grey, and sRGB of a surface that faces the camera and of a strand across the view."""
+_SKIN_IN_SHADE = 0.35
+"""Share of its colour that a surface seen edge-on keeps."""
+_DARKEST_STRAND, _STRAND_RANGE = 0.7, 0.6
+"""Least factor of the hair's colour, and how much it varies: neighbours can be told apart."""
+_HAIR_END_ON = 0.3
+"""Share of its colour that a strand keeps that runs along the view."""
 _GOLDEN_RATIO = (1 + 5**0.5) / 2
 """Its multiples spread evenly modulo 1: neighbouring strands differ in brightness."""
 _MARGIN = 1.1
@@ -153,7 +159,7 @@ def _faces(camera: Camera | _TurnView, head: Head) -> _Primitives:
     middle = corners.mean(axis=1)
     facing = -(normal * camera.view_direction(middle)).sum(axis=1)
     seen = facing > 0
-    colours = np.outer(0.35 + 0.65 * facing[seen], SKIN)
+    colours = np.outer(_SKIN_IN_SHADE + (1 - _SKIN_IN_SHADE) * facing[seen], SKIN)
     return _to_fixed_point(camera.project(corners[seen])), camera.depth(middle[seen]), colours
 
 
@@ -166,8 +172,9 @@ def _segments(camera: Camera | _TurnView, strands: Strands) -> _Primitives:
     middle = ends.mean(axis=1)
     along = vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-20)
     cosine = (along * camera.view_direction(middle)).sum(axis=1)
-    tint = 0.7 + 0.6 * (_GOLDEN_RATIO * strands.strand_of_point[first] % 1)
-    colours = np.outer(tint * (0.3 + 0.7 * np.sqrt(np.clip(1 - cosine**2, 0, 1))), HAIR)
+    tint = _DARKEST_STRAND + _STRAND_RANGE * (_GOLDEN_RATIO * strands.strand_of_point[first] % 1)
+    sine = np.sqrt(np.clip(1 - cosine**2, 0, 1))
+    colours = np.outer(tint * (_HAIR_END_ON + (1 - _HAIR_END_ON) * sine), HAIR)
     return _to_fixed_point(camera.project(ends)), camera.depth(middle), colours
 
 

@@ -15,6 +15,12 @@ SKIN = (0.5, 0.36, 0.29)
 """Linear RGB of the head, whose colour the photos do not give."""
 
 
+SKIN_SPECULAR = 0.1
+"""Factor of the skin's highlight, of 1: skin is matt."""
+DEFORM_ACCURACY = 50.0
+"""`Link_DeformAcuracy` (so spelled in the format), per cent, as other exporters write it."""
+
+
 def add_body(scene: Scene, head: Head) -> None:
     """Add the head mesh, bound to the root, neck and head joints."""
     joints = scene.space.points_to_file(head.joints).astype(np.float64)
@@ -107,7 +113,7 @@ def _add_material(scene: Scene) -> int:
         record("MultiLayer", number("I", 0)),
         properties70(
             one("DiffuseColor", "Color", "", "A", *SKIN),
-            one("SpecularFactor", "Number", "", "A", 0.1),
+            one("SpecularFactor", "Number", "", "A", SKIN_SPECULAR),
         ),
     )
 
@@ -164,7 +170,7 @@ def _add_skin(
         "head_skin",
         "Skin",
         record("Version", number("I", 101)),
-        record("Link_DeformAcuracy", number("D", 50.0)),
+        record("Link_DeformAcuracy", number("D", DEFORM_ACCURACY)),
     )
     scene.connect(skin, geometry)
     for name, bone, joint, share in zip(JOINT_NAMES, bones, joints, weights.T, strict=True):

@@ -24,6 +24,8 @@ JOINTS = ("root", "neck", "head")
 HEAD_JOINT = JOINTS.index("head")
 LINES = 1
 ROUGHNESS = {"head": 0.7, "hair": 0.45, "guides": 0.6}
+_SCALP_SHADE = 0.6
+"""Brightness of the scalp in shares of the roots' colour: hair shades what lies below it."""
 _SKIN_COLOUR = np.array([0.58, 0.4, 0.32])
 
 
@@ -36,7 +38,7 @@ class Meshes:
     def head(self) -> int:
         """Add the head and return its mesh; the scalp is tinted like the hair's roots."""
         head, add = self.groom.head, self.document.accessor
-        tint = head.scalp[:, None] * (0.6 * self.groom.material.root_colour / _SKIN_COLOUR)
+        tint = head.scalp[:, None] * (_SCALP_SHADE * self.groom.material.root_colour / _SKIN_COLOUR)
         colour = np.clip(tint + 1 - head.scalp[:, None], 0, 1)
         # a picture of the face may take its place; without one, validators call the uv unused
         white = self.document.image(white_picture(), "white")

@@ -25,6 +25,8 @@ _TIP_IN_LOCK = 0.4
 """Weight of a metre between tips beside a metre between roots when strands are gathered."""
 _STRANDS_PER_STRIP = 12
 _SMOOTHINGS = 3
+_MEAN_ACROSS, _ANY_ACROSS = 1e-3, 1e-5
+"""Small weights of the strip's mean plane, and of any plane, which decide where none is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +157,9 @@ def frames(lines: Float32Array, out: Float32Array) -> tuple[Float32Array, Float3
     for _ in range(_SMOOTHINGS):
         padded = np.concatenate([across[:, :1], across, across[:, -1:]], axis=1)
         across = 0.25 * padded[:, :-2] + 0.5 * padded[:, 1:-1] + 0.25 * padded[:, 2:]
-    across += 1e-3 * _unit(across.sum(axis=1, keepdims=True)) + 1e-5 * _any_across(along[:, :1])
+    across += _MEAN_ACROSS * _unit(across.sum(axis=1, keepdims=True)) + (
+        _ANY_ACROSS * _any_across(along[:, :1])
+    )
     across -= along * (across * along).sum(axis=-1, keepdims=True)
     lost = np.linalg.norm(across, axis=-1, keepdims=True) < 1e-9
     across = _unit(np.where(lost, _any_across(along), across))

@@ -23,6 +23,12 @@ _STRANDS_PER_CARD = 8
 _CARD_SPREAD = 3.0
 """Widths of a card in root mean square distances of its strands from the middle."""
 _FEWEST_POINTS = 4
+_COARSER = 0.75
+"""Points of a strip in shares of those one level of detail finer."""
+_DIMMEST = 0.8
+"""Brightness of the darkest strips, so that neighbours can be told apart."""
+_ROOT_WIDTH, _TAPER = 0.7, 0.65
+"""Width of a strip at its root, and how much it loses towards its tip, in shares of the whole."""
 
 
 class StripOptions(Protocol):
@@ -74,7 +80,7 @@ def hair_meshes(groom: Groom, shapes: Float32Array, options: StripOptions) -> It
     for level in range(options.lods):
         count = max(wanted >> level, 1)
         points = max(
-            round(options.strip_points * 0.75**level), min(_FEWEST_POINTS, options.strip_points)
+            round(options.strip_points * _COARSER**level), min(_FEWEST_POINTS, options.strip_points)
         )
         yield _level(groom, shapes, count, points, options, 2**level)
 
@@ -121,7 +127,7 @@ def _level(
     moved = [locks.moved(shape).reshape(-1, 3)[beside] for shape in shapes]
     strip = beside // points
     uv = strands.root_uv if strands.root_uv is not None else bound_roots(groom).uv
-    shade = np.random.default_rng(options.seed).uniform(0.8, 1, len(locks.strand))
+    shade = np.random.default_rng(options.seed).uniform(_DIMMEST, 1, len(locks.strand))
     return HairMesh(
         ribbons,
         uv[locks.strand][strip],
@@ -149,6 +155,6 @@ def _widths(
         gathered_within = np.sqrt(((locks.spread * across) ** 2).sum(axis=-1))
         whole = np.clip(_CARD_SPREAD * gathered_within, 0.5 * width, _WIDEST * wider)
     share = np.linspace(0, 1, points)
-    profile = np.minimum(0.7 + 3 * share, 1.0) * (1 - 0.65 * share**4)
+    profile = np.minimum(_ROOT_WIDTH + 3 * share, 1.0) * (1 - _TAPER * share**4)
     result: Float32Array = (whole * profile).astype(np.float32)
     return result

@@ -9,8 +9,20 @@ from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.colour import srgb_from_linear
 
 _SHORTEST = 0.72
-"""Share of the strip's length that the shortest strand reaches."""
+_LONGEST = 1.02
+"""Shares of the strip's length that strands reach; the longest are cut off by its end."""
 _DARKEST = 0.62
+"""Brightness of the darkest strand, of 1."""
+_EDGE_SHADE = 0.75
+"""Brightness of a strand's edges, of its middle's: a round strand turns away there."""
+_BULGE = 0.3
+"""Height of a strand in shares of its slot's width."""
+_HALF_WIDTH = 0.62
+"""Half the width of a strand in shares of its slot's: neighbours overlap a little."""
+_TAPERING = 0.3
+"""Share of the strip's length over which a strand narrows to its tip."""
+_THINNEST = 1e-4
+"""Least half width in shares of the strip's: strands that have ended do not divide by 0."""
 
 
 def strand_pictures(strands: int, opaque: bool, seed: int = 0) -> tuple[bytes, bytes]:
@@ -27,11 +39,11 @@ def strand_pictures(strands: int, opaque: bool, seed: int = 0) -> tuple[bytes, b
     """
     width, height = (64, 256) if strands <= 8 else (256, 256)
     relief, shade = _strands_side_by_side(strands, width, height, seed)
-    lit = shade * (0.75 + 0.25 * np.maximum(relief, 0))
+    lit = shade * (_EDGE_SHADE + 0.25 * np.maximum(relief, 0))
     colour = np.repeat(255 * srgb_from_linear(lit)[..., None], 4, axis=-1)
     edge = 0.25  # of the relief: alpha goes from 0 to 1 there, so that the cut is smooth
     colour[..., 3] = 255 if opaque else 255 * np.clip(0.5 + relief / edge, 0, 1)
-    return _png(colour), _png(_normals(np.maximum(relief, 0) * width / strands * 0.3))
+    return _png(colour), _png(_normals(np.maximum(relief, 0) * width / strands * _BULGE))
 
 
 def white_picture() -> bytes:
@@ -47,12 +59,12 @@ def _strands_side_by_side(
     u = (np.arange(width) + 0.5)[:, None] / width
     v = (np.arange(height) + 0.5)[:, None, None] / height
     slot = (np.arange(strands) + 0.5) / strands
-    phase, end = random.uniform(0, 2 * np.pi, strands), random.uniform(_SHORTEST, 1.02, strands)
-    end[strands // 2] = 1.02
+    phase, end = random.uniform(0, 2 * np.pi, strands), random.uniform(_SHORTEST, _LONGEST, strands)
+    end[strands // 2] = _LONGEST
     centre = slot + 0.25 / strands * np.sin(phase + 2 * np.pi * v * random.uniform(0.5, 1, strands))
-    half = 0.62 / strands * np.sqrt(np.clip((end - v) / 0.3, 0, 1))
+    half = _HALF_WIDTH / strands * np.sqrt(np.clip((end - v) / _TAPERING, 0, 1))
     # a quadratic bump for every strand; the highest is seen
-    bumps = 1 - ((u - centre) / np.maximum(half, 1e-4)) ** 2
+    bumps = 1 - ((u - centre) / np.maximum(half, _THINNEST)) ** 2
     nearest = bumps.argmax(axis=-1)
     shade = random.uniform(_DARKEST, 1.0, strands)[nearest]
     return np.maximum(bumps.max(axis=-1), -1.0), shade
@@ -63,7 +75,7 @@ def _normals(relief: Float64Array) -> Float64Array:
     down, right = np.gradient(relief)
     normal = np.stack([-right, down, np.ones_like(relief)], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    result: Float64Array = 127.5 * (normal + 1)
+    result: Float64Array = 255 / 2 * (normal + 1)
     return result
 
 
