@@ -91,8 +91,9 @@ def _row(
     name = (
         f"{'chosen: ' if level is None else ''}scale {quality.scale}, {quality.share:.0%} of hairs"
     )
+    drawn_by = "processor" if preview.frame_renderer.soft else "shaders"
     print(
-        f"| {session.simulation.plugin} | {'processor' if preview.frame_renderer.soft else 'shaders'}"
+        f"| {session.simulation.plugin} | {drawn_by}"
         f" | {name}{', soft' if quality.smooth else ''} | {1e3 * wall:.0f}"
         f" | {1 / wall:.1f} | {1e3 * processor:.0f} | {1 / processor:.1f} |",
         flush=True,
