@@ -1,10 +1,10 @@
-"""The head bent to the photos by a thin plate spline (Bookstein 1989), the distance its kernel.
+"""The head warped to the photos by a 3D thin-plate spline with kernel |r| (Bookstein 1989).
 
-Landmarks are intersected with the refined cameras and pull the head's landmarks; points on the
-cranium, which no landmark tells about, hold still softly. Then what sticks out of a silhouette is
-pushed inside, the scalp a little deeper, for hair always lies outside the head. Each push is a
-smooth spline again, so the scalp stays smooth. Skin outlines are not drawn on to the silhouettes'
-edges: with cameras found from photos that made faces worse (1.9 mm instead of 0.8).
+Landmarks, intersected from the refined cameras, pull the landmarks of the head; points on the
+cranium, where there are no landmarks, are held softly. Then points that project outside a silhouette
+are pushed inside, those of the scalp a little deeper, since hair lies outside the head. Each
+correction is a smooth spline again, so the scalp stays smooth. Skin outlines are not fitted to the
+edges of the silhouettes: with estimated cameras that made faces worse (1.9 mm instead of 0.8).
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ def register(subparsers: Any) -> None:
     add("--head-up", default="y", metavar="AXIS", help="axis that points up in it (default y)")
     guides = f"number of guide hairs (default {GUIDES})"
     add("--guides", type=int, default=GUIDES, metavar="N", help=guides)
-    add("--seed", type=int, default=0, metavar="N", help="seed of the roots' places (default 0)")
+    add("--seed", type=int, default=0, metavar="N", help="seed of the root positions (default 0)")
     add("--max-edge", type=int, metavar="PX", help="scale larger photos to this edge (1440)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--no-cache", action="store_true", help="run every stage again")
