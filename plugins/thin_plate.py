@@ -1,9 +1,9 @@
 """The head warped to the photos by a 3D thin-plate spline with kernel |r| (Bookstein 1989).
 
 Landmarks, intersected from the refined cameras, pull the landmarks of the head; points on the
-cranium, where there are no landmarks, are held softly. Then points that project outside a silhouette
-are pushed inside, those of the scalp a little deeper, since hair lies outside the head. Each
-correction is a smooth spline again, so the scalp stays smooth. Skin outlines are not fitted to the
+cranium, where there are no landmarks, are held softly. Then points that project outside a
+silhouette are pushed inside, those of the scalp a little deeper, since hair lies outside the head.
+Each correction is a smooth spline again, so the scalp stays smooth. Skin outlines are not fitted to the
 edges of the silhouettes: with estimated cameras that made faces worse (1.9 mm instead of 0.8).
 """
 
