@@ -3,8 +3,8 @@
 Landmarks, intersected from the refined cameras, pull the landmarks of the head; points on the
 cranium, where there are no landmarks, are held softly. Then points that project outside a
 silhouette are pushed inside, those of the scalp a little deeper, since hair lies outside the head.
-Each correction is a smooth spline again, so the scalp stays smooth. Skin outlines are not fitted to the
-edges of the silhouettes: with estimated cameras that made faces worse (1.9 mm instead of 0.8).
+Each correction is a smooth spline again, so the scalp stays smooth. Skin outlines are not fitted to
+the edges of the silhouettes: with estimated cameras that made faces worse (1.9 mm instead of 0.8).
 """
 
 from __future__ import annotations
