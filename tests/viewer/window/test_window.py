@@ -59,7 +59,9 @@ def screens(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Seen]:
         with os.fdopen(numbers) as reader:
             display = reader.readline().strip()
         words = [HERE / "drive_window.py", folder / "groom.npz", folder, folder]
-        paths = os.pathsep.join([str(HERE.parents[1] / "support"), os.environ.get("PYTHONPATH", "")])
+        paths = os.pathsep.join(
+            [str(HERE.parents[1] / "support"), os.environ.get("PYTHONPATH", "")]
+        )
         environment = {**os.environ, "DISPLAY": f":{display}", "PYTHONPATH": paths}
         environment.pop("WAYLAND_DISPLAY", None)
         done = subprocess.run(
