@@ -24,7 +24,7 @@ FORMATS = (
 )
 """Readers and writers of files: integers in them are given by the format."""
 LEFT_OUT = ("plugins/pbd/", "hairkit/viewer/draw/")
-"""The position based dynamics and the drawing of the viewer's hair."""
+"""The rod solver and the loops that draw the viewer's hair."""
 
 
 def unnamed_literals(source: str, *, integers: bool = True) -> Iterator[tuple[int, str]]:

@@ -1,4 +1,4 @@
-"""Laws of carrying landmarks to neighbours by patches."""
+"""Laws of transferring landmarks to neighbouring views by template matching."""
 
 from __future__ import annotations
 
