@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ball_camera import camera_at
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.cameras.depth_raster import (
@@ -19,22 +20,6 @@ from hairkit.types.head import Capsules, Head
 
 BALL = 0.1
 MODELS: tuple[CameraModel, ...] = ("perspective", "orthographic")
-
-
-def camera_at(azimuth: float, elevation: float, model: CameraModel, height: int = 120) -> Camera:
-    """A camera that holds the ball in a picture of that height."""
-    distance = 0.8 if model == "perspective" else 1.0
-    return Camera.on_turn(
-        azimuth,
-        elevation_deg=elevation,
-        roll_deg=7.0,
-        distance=distance,
-        target=(0.01, -0.02, 0.0),
-        focal=height * 3.0 * distance,
-        width=height,
-        height=height,
-        model=model,
-    )
 
 
 def sphere_depth(camera: Camera) -> Float64Array:

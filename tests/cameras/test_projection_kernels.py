@@ -4,30 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ball_camera import camera_at
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hairkit.cameras.projection_kernels import pack_camera, perspective_divisor, project
-from hairkit.types.camera import Camera, CameraModel
+from hairkit.types.camera import CameraModel
 
 MODELS: tuple[CameraModel, ...] = ("perspective", "orthographic")
 coordinates = st.floats(-0.4, 0.4)
-
-
-def camera_at(azimuth: float, elevation: float, model: CameraModel, height: int = 120) -> Camera:
-    """A camera that holds the ball in a picture of that height."""
-    distance = 0.8 if model == "perspective" else 1.0
-    return Camera.on_turn(
-        azimuth,
-        elevation_deg=elevation,
-        roll_deg=7.0,
-        distance=distance,
-        target=(0.01, -0.02, 0.0),
-        focal=height * 3.0 * distance,
-        width=height,
-        height=height,
-        model=model,
-    )
 
 
 @pytest.mark.parametrize("model", MODELS)
