@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any, Generic, Self, TypeVar
 
 import cv2
+import numba
 import numpy as np
+import scipy
 
 import hairkit
 from hairkit.errors import PluginError
@@ -204,5 +206,6 @@ def _ready(argument: Argument) -> Given[Any]:
 
 @cache
 def _own_digest() -> str:
-    """Return a digest of the versions of hairkit and of the libraries that change results."""
-    return digest_of(hairkit.__version__, np.__version__, cv2.__version__)
+    """Return a digest of the versions of hairkit and of the libraries that compute results."""
+    libraries = (np, scipy, numba, cv2)
+    return digest_of(hairkit.__version__, *(library.__version__ for library in libraries))
