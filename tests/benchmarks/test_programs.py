@@ -22,6 +22,7 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
     "super_helix": ({"GUIDES": 8, "ELEMENTS": 5, "FRAMES": 2}, []),
+    "threads": ({"REPETITIONS": 1}, ["--runs", "2"]),
     "viewer": (
         {"WARM": 1},
         ["--guides", "20", "--hairs", "60", "--size", "64x48", "--pictures", "1"],
