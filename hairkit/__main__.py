@@ -34,6 +34,15 @@ def _end_at_second_interrupt() -> None:
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         return  # a background job ignores it
 
+    def interrupt(number: int, frame: object) -> None:
+        """Raise `KeyboardInterrupt` once; what comes after that belongs to the thread.
+
+        Raised a second time, it would break into a `join`, and Python 3.11 takes a thread whose
+        `join` was interrupted for one that ended: the process would leave with another exit code.
+        """
+        signal.signal(signal.SIGINT, lambda number, frame: None)
+        raise KeyboardInterrupt
+
     def wait() -> None:
         while heard.recv(1) != bytes([signal.SIGINT]):
             pass  # another signal that Python handles
@@ -53,6 +62,7 @@ def _end_at_second_interrupt() -> None:
     heard, pressed = socket.socketpair()
     pressed.setblocking(False)
     signal.set_wakeup_fd(pressed.detach(), warn_on_full_buffer=False)
+    signal.signal(signal.SIGINT, interrupt)
     threading.Thread(target=listen, name="ctrl-c", daemon=True).start()
 
 
