@@ -17,12 +17,15 @@ import pluggy
 if TYPE_CHECKING:
     from hairkit.simulation.simulator import Simulator
     from hairkit.types.capture import Capture, View
+    from hairkit.types.face import Face
     from hairkit.types.groom import Groom
     from hairkit.types.head import Head, Roots
-    from hairkit.types.mask import Mask
+    from hairkit.types.mask import Mask, Masks
     from hairkit.types.orientation import OrientationMap
+    from hairkit.types.person import Person
     from hairkit.types.scene import Scene
     from hairkit.types.strands import Strands
+    from hairkit.types.turnaround import Turnaround
     from hairkit.types.volume import Hull, OrientationField, ScalpDistance
     from hairkit.types.waves import Waves
 
@@ -30,9 +33,26 @@ PROJECT = "hairkit"
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
 
-HOOKSPEC_VERSION = (1, 0)
+HOOKSPEC_VERSION = (1, 1)
 """Version of this contract. The second number grows when hooks or arguments are added, the first
 when one is removed or changes; a plugin may check it when it is imported."""
+
+
+@hookspec(firstresult=True)
+def detect_landmarks(view: View, options: Any) -> Face | None:
+    """Find the face in one photo: its 68 landmarks and direction, in pixels of `view.image`."""
+
+
+@hookspec(firstresult=True)
+def segment_person(view: View, options: Any) -> Person | None:
+    """Find the person in one photo, hair and clothes included, as a probability."""
+
+
+@hookspec(firstresult=True)
+def find_turn(
+    capture: Capture, faces: tuple[Face, ...], persons: tuple[Person, ...], options: Any
+) -> Turnaround | None:
+    """Find from where each photo was taken: order, azimuths, elevations, which side is up."""
 
 
 @hookspec(firstresult=True)
@@ -45,6 +65,13 @@ def estimate_scene(
     capture: Capture, masks: tuple[Mask, ...], head: Head, options: Any
 ) -> Scene | None:
     """Estimate the cameras of all views and the head's size and pose; `head` is not fitted yet."""
+
+
+@hookspec(firstresult=True)
+def refine_masks(
+    capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: Any
+) -> Masks | None:
+    """Mend the masks of all views together, guided by the cameras and the head; V masks again."""
 
 
 @hookspec(firstresult=True)

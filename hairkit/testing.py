@@ -16,10 +16,12 @@ from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.io.capture_reader import TURN
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
+from hairkit.types.face import Face
 from hairkit.types.groom import Groom
 from hairkit.types.head import Capsules, Head, Roots
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_products
@@ -68,6 +70,8 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
     every: dict[str, Any] = {
         "capture": capture,
         "view": capture.views[0],
+        "faces": (Face.absent(),) * len(masks),
+        "persons": tuple(ball_person(mask) for mask in masks),
         "mask": masks[0],
         "masks": masks,
         "head": scene.head,
@@ -81,8 +85,12 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
     }
     seen, derived = ("scene", "masks", "orientations"), ("waves", "scalp_distance")
     wanted = {
+        "detect_landmarks": ("view",),
+        "segment_person": ("view",),
+        "find_turn": ("capture", "faces", "persons"),
         "segment": ("view",),
         "estimate_scene": ("capture", "masks", "head"),
+        "refine_masks": ("capture", "masks", "scene"),
         "fit_head": ("capture", "masks", "scene"),
         "orient": ("view", "mask"),
         "build_hull": ("scene", "masks"),
@@ -164,6 +172,11 @@ def ball_mask(camera: Camera) -> Mask:
     labels = np.where(distance < _BALL, PERSON, BACKGROUND)
     labels[(distance < _HAIR) & (nearest[..., 1] > 0)] = HAIR
     return Mask(labels, True)
+
+
+def ball_person(mask: Mask) -> Person:
+    """Return the ball and its hair as a certain person."""
+    return Person(np.where(mask.person, np.uint8(255), np.uint8(0)))
 
 
 def combed_orientation(mask: Mask) -> OrientationMap:

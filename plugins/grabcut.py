@@ -141,6 +141,8 @@ def _is_backdrop(stroke: Stroke, strokes: Strokes, hair_top: float) -> bool:
 
 
 def _on_reduced(strokes: Strokes, view: View, width: int, height: int) -> Strokes:
+    on_disk = view.photo_size[::-1] if view.quarter_turns % 2 else view.photo_size
+    strokes = strokes.turned(view.quarter_turns, *(strokes.size or on_disk))
     drawn_on = strokes.size or view.photo_size
     difference = abs(drawn_on[0] * view.height - drawn_on[1] * view.width)
     if difference > _ASPECT_TOLERANCE * max(view.width, view.height):

@@ -21,7 +21,7 @@ def segment(view: View) -> Mask | None:
     """Return the mask of the view's file at working size, None when the view has no file."""
     if view.mask_path is None:
         return None
-    drawn = read_drawing(view.mask_path)
+    drawn = np.rot90(read_drawing(view.mask_path), -view.quarter_turns)
     size = drawn.shape[1], drawn.shape[0]
     if size != view.photo_size:
         wanted = f"{view.photo_size[0]} x {view.photo_size[1]}"

@@ -125,6 +125,19 @@ class Turn:
         return tuple(cameras)
 
 
+def view_angles(rotation: Float64Array) -> Float64Array:
+    """Return azimuth, elevation and roll (3,) in radians of a camera's rotation (3, 3).
+
+    The inverse of the per-view rotation of a `Turn`, for elevations below 90 degrees.
+    """
+    back = -rotation[2]
+    azimuth = np.arctan2(back[0], back[2])
+    elevation = np.arcsin(np.clip(back[1], -1, 1))
+    level = _view_rotations(np.array([azimuth]), np.array([elevation]), np.zeros(1))[0]
+    roll = np.arctan2(-rotation[0] @ level[1], rotation[0] @ level[0])
+    return np.array([azimuth, elevation, roll])
+
+
 def rotation_matrix(vector: npt.ArrayLike) -> Float64Array:
     """Return the rotation (3, 3) about `vector` by its length in radians (Rodrigues)."""
     axis = np.asarray(vector, np.float64)

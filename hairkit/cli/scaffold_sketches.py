@@ -24,6 +24,49 @@ ALWAYS = ("from hairkit.hookspecs import hookimpl", "from hairkit.options import
 _NUMPY = "import numpy as np"
 
 SKETCHES = {
+    "detect_landmarks": Sketch(
+        "A face in the middle of the photo, seen from in front.",
+        (
+            _NUMPY,
+            "from hairkit.types.capture import View",
+            "from hairkit.types.face import Face",
+            "from hairkit.types.head import LANDMARKS",
+        ),
+        'noise: float = option(50.0, low=1.0, high=500.0, doc="Of each landmark.", unit="px")',
+        "view: View, options: Options) -> Face | None",
+        """
+middle = np.tile([view.width / 2, view.height / 2], (LANDMARKS, 1))
+return Face(0.5, middle, np.full(LANDMARKS, options.noise), 0.0, 0.0, 0.0)""",
+    ),
+    "segment_person": Sketch(
+        "All that differs from the picture's upper corner is the person.",
+        (
+            _NUMPY,
+            "from hairkit.types.capture import View",
+            "from hairkit.types.person import Person",
+        ),
+        'gain: float = option(4.0, low=0.1, high=100.0, doc="Opacity for a grey level.")',
+        "view: View, options: Options) -> Person",
+        """
+difference = np.abs(view.image.astype(np.float32) - view.image[0, 0]).mean(axis=-1)
+return Person(np.clip(options.gain * difference, 0, 255).astype(np.uint8))""",
+    ),
+    "find_turn": Sketch(
+        "Photos in file order, evenly around the head.",
+        (
+            _NUMPY,
+            "from hairkit.types.capture import Capture",
+            "from hairkit.types.turnaround import Turnaround",
+        ),
+        'step: float = option(45.0, low=-180.0, high=180.0, doc="To the next.", unit="deg")',
+        "capture: Capture, options: Options) -> Turnaround",
+        """
+index = np.arange(len(capture.views))
+names = tuple(view.name for view in capture.views)
+level, upright = np.zeros(len(index)), np.zeros(len(index), np.int64)
+azimuth = options.step * index % 360
+return Turnaround(index, azimuth, level, upright, names, np.inf, "turn as numbered")""",
+    ),
     "segment": Sketch(
         "Everything dark is hair.",
         (
@@ -60,6 +103,24 @@ cameras = tuple(
     for view in capture.views
 )
 return Scene(tuple(view.name for view in capture.views), cameras, head)""",
+    ),
+    "refine_masks": Sketch(
+        "Take specks off the hair.",
+        (
+            "import cv2",
+            _NUMPY,
+            "from hairkit.types.mask import HAIR, PERSON, Mask, Masks",
+        ),
+        'radius: int = option(1, low=0, high=50, doc="Of the specks.", unit="px")',
+        "masks: tuple[Mask, ...], options: Options) -> Masks",
+        """
+refined = []
+for mask in masks:
+    size = 2 * options.radius + 1
+    opened = cv2.morphologyEx(mask.labels, cv2.MORPH_OPEN, np.ones((size, size), np.uint8))
+    labels = np.where((mask.labels == HAIR) & (opened != HAIR), np.uint8(PERSON), mask.labels)
+    refined.append(Mask(labels, mask.person_known) if (labels == HAIR).any() else mask)
+return Masks(tuple(refined))""",
     ),
     "fit_head": Sketch(
         "Scale the head about its centre.",

@@ -13,7 +13,7 @@ from hairkit.evaluation.truth import Truth
 from hairkit.storage import Stored, from_arrays, read_npz
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
-from hairkit.types.mask import Mask
+from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import read_cameras
 
@@ -88,8 +88,16 @@ def read_prediction(
         names,
         cameras,
         _stage_results(folder, "orient", names, OrientationMap),
-        _stage_results(folder, "segment", names, Mask),
+        _masks(folder, names),
     )
+
+
+def _masks(folder: Path, names: Sequence[str]) -> tuple[Mask, ...] | None:
+    """Return the masks that the groom was made with: refined ones where there are any."""
+    path = folder / WORK / "refine.npz"
+    if path.is_file():
+        return from_arrays(Masks, read_npz(path), str(path)).views
+    return _stage_results(folder, "segment", names, Mask)
 
 
 def _stage_results(

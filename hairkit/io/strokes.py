@@ -16,6 +16,7 @@ from hairkit.arrays import BoolArray, Float64Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.options import unknown_name
 from hairkit.storage import read_bytes
+from hairkit.types.face import turn_points
 
 StrokeLabel = Literal["foreground", "background", "person"]
 
@@ -70,6 +71,17 @@ class Strokes:
         strokes = tuple(Stroke(s.label, s.area, s.points * factor) for s in self.strokes)
         rectangle = None if self.rectangle is None else self.rectangle * factor
         return Strokes(strokes, rectangle, None)
+
+    def turned(self, quarter_turns: int, width: int, height: int) -> Strokes:
+        """Return the strokes for the photo of `width` x `height` after clockwise quarter turns."""
+
+        def turn(points: Float64Array) -> Float64Array:
+            return turn_points(points, quarter_turns, width, height)
+
+        strokes = tuple(Stroke(s.label, s.area, turn(s.points)) for s in self.strokes)
+        corners = None if self.rectangle is None else np.sort(turn(self.rectangle), axis=0)
+        size = (height, width) if quarter_turns % 2 else (width, height)
+        return Strokes(strokes, corners, size)
 
 
 def read_strokes(path: str | os.PathLike[str]) -> Strokes:

@@ -172,15 +172,27 @@ class Manager:
     def call_first(
         self, stage: str, choices: Sequence[tuple[str, Any]], **arguments: Any
     ) -> tuple[str, Any]:
-        """Try (plugin, options) pairs in order; return the first plugin with a result, and it."""
-        for plugin, options in choices:
-            result = self._call(stage, plugin, options, arguments)
-            if result is not None:
-                return plugin, result
+        """Try (plugin, options) pairs in order; return the first plugin with a result, and it.
+
+        Raises `PluginError` when none has one.
+        """
+        found = self.find_first(stage, choices, **arguments)
+        if found is not None:
+            return found
         tried = ", ".join(plugin for plugin, _ in choices) or "none"
         raise PluginError(
             f"no plugin has an answer for {stage!r}{subject(arguments)}; tried: {tried}"
         )
+
+    def find_first(
+        self, stage: str, choices: Sequence[tuple[str, Any]], **arguments: Any
+    ) -> tuple[str, Any] | None:
+        """Return what `call_first` does; None when no plugin has a result."""
+        for plugin, options in choices:
+            result = self._call(stage, plugin, options, arguments)
+            if result is not None:
+                return plugin, result
+        return None
 
     def notify(self, hook: str, **arguments: Any) -> None:
         """Call a notification on all plugins; one that raises is only logged, as a warning."""

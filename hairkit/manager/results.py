@@ -15,11 +15,14 @@ from typing import Any
 import numpy as np
 
 from hairkit.errors import DataError
+from hairkit.types.face import Face
 from hairkit.types.groom import Groom
-from hairkit.types.mask import Mask
+from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
+from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
+from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid
 
 ROOT_TOLERANCE = 1e-3
@@ -57,6 +60,24 @@ def check_result(hook: str, result: object, call: Call) -> None:
 
 def _mask_has_photo_size(mask: Mask, call: Call) -> None:
     _check_size("mask", mask.labels.shape, call.arguments["view"])
+
+
+def _person_has_photo_size(person: Person, call: Call) -> None:
+    _check_size("person", person.alpha.shape, call.arguments["view"])
+
+
+def _turn_has_each_photo(turn: Turnaround, call: Call) -> None:
+    count = len(call.arguments["capture"].views)
+    if len(turn.names) != count:
+        raise DataError(f"the turn has {len(turn.names)} photos, expected {count}")
+
+
+def _masks_have_photo_sizes(masks: Masks, call: Call) -> None:
+    views = call.arguments["capture"].views
+    if len(masks.views) != len(views):
+        raise DataError(f"{len(masks.views)} masks, expected one for each of {len(views)} views")
+    for view, mask in zip(views, masks.views, strict=True):
+        _check_size(f"mask of view {view.name!r}", mask.labels.shape, view)
 
 
 def _angles_have_photo_size(orientation: OrientationMap, call: Call) -> None:
@@ -173,8 +194,12 @@ def _file_state(path: Path) -> tuple[int, int, int] | None:
 Check = Callable[[Any, Call], None]
 
 RESULTS: dict[str, tuple[type, tuple[Check, ...]]] = {
+    "detect_landmarks": (Face, ()),
+    "segment_person": (Person, (_person_has_photo_size,)),
+    "find_turn": (Turnaround, (_turn_has_each_photo,)),
     "segment": (Mask, (_mask_has_photo_size,)),
     "estimate_scene": (Scene, (_scene_has_a_camera_per_photo,)),
+    "refine_masks": (Masks, (_masks_have_photo_sizes,)),
     "fit_head": (Scene, (_scene_has_a_camera_per_photo, _head_keeps_its_mesh)),
     "orient": (OrientationMap, (_angles_have_photo_size,)),
     "build_hull": (Hull, ()),

@@ -34,8 +34,12 @@ from hairkit.pipeline.module_digest import module_digest
 from hairkit.storage import read_bytes
 
 HOOKS = {
+    "landmarks": "detect_landmarks",
+    "person": "segment_person",
+    "turn": "find_turn",
     "segment": "segment",
     "scene": "estimate_scene",
+    "refine": "refine_masks",
     "head": "fit_head",
     "orient": "orient",
     "hull": "build_hull",
@@ -45,7 +49,7 @@ HOOKS = {
 }
 """Table of the recipe -> stage hook, in the order in which they run."""
 
-SEVERAL = ("segment", "export")
+SEVERAL = ("landmarks", "person", "segment", "export")
 """Tables that may name several plugins."""
 
 NEEDED = ("segment", "scene", "orient", "hull", "field", "track")
@@ -66,7 +70,7 @@ class Stage:
     table: str
     """Name of the recipe's table: `scene`."""
     choices: tuple[Choice, ...]
-    """One plugin; for `segment` and `export` any number, in order."""
+    """One plugin; for the tables of `SEVERAL` any number, in order."""
 
     @property
     def hook(self) -> str:

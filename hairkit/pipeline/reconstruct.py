@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,16 +21,19 @@ from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.recipe import Recipe, load_recipe
 from hairkit.pipeline.run_log import RunLog
-from hairkit.pipeline.stage_runner import Argument, Given, StageRunner
+from hairkit.pipeline.stage_runner import Argument, Given, StageRunner, completed
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
-from hairkit.types.capture import Capture
+from hairkit.types.capture import Capture, View
+from hairkit.types.face import Face
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head
-from hairkit.types.mask import Mask
+from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
+from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
+from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull, OrientationField, ScalpDistance
 from hairkit.types.waves import Waves
 
@@ -94,14 +97,15 @@ def reconstruct(
     recipe.check(manager)
     if not 1 <= guides <= MAX_GUIDES:
         raise InputError(f"{guides} guides, expected 1 to {MAX_GUIDES}")
-    capture = photos if isinstance(photos, Capture) else read_capture(photos)
+    given = photos if isinstance(photos, Capture) else read_capture(photos)
     log = RunLog(progress or Silent())
     folder = Path(out)
     work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(_waiting(folder)))
     with work, ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool:
-        _sweep(folder)
         run = StageRunner(recipe, manager, work, log, pool)
+        _sweep(folder, run)
         try:
+            capture = _find_views(run, given, log)
             made = _grow(run, capture, _head(head), guides, seed)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -145,10 +149,56 @@ def export_paths(
     )
 
 
+def _find_views(run: StageRunner, capture: Capture, log: RunLog) -> Capture:
+    """Find faces, persons and the turn; return the views upright and in the turn's order."""
+    views = [Given.of(view) for view in capture.views]
+    faces = run.every_view("landmarks", Face, views, absent=Face.absent)
+    persons = run.every_view("person", Person, views, absent=Person.absent)
+    seen = replace(
+        capture,
+        views=tuple(
+            _see(view, face.result().value, person.result().value)
+            for view, face, person in zip(capture.views, faces, persons, strict=True)
+        ),
+    )
+    if not run.has("turn"):
+        return seen
+    photos = Given.of(capture)
+    turn = run.once("turn", Turnaround, capture=photos, faces=faces, persons=persons).value
+    log.message(turn.summary)
+    return _with_upright_persons(run, seen.arranged(turn))
+
+
+def _see(view: View, face: Face, person: Person) -> View:
+    """Return the view with what was found in it; landmarks that were given are kept."""
+    landmarks = view.landmarks
+    if landmarks is None and face.sure:
+        landmarks = face.landmarks
+    return replace(
+        view,
+        landmarks=landmarks,
+        face=face if face.presence > 0 else None,
+        person=person if person.alpha.size else None,
+    )
+
+
+def _with_upright_persons(run: StageRunner, capture: Capture) -> Capture:
+    """Return the capture with persons found again in photos that lay on their side."""
+    turned = [i for i, view in enumerate(capture.views) if view.quarter_turns and view.person]
+    views = list(capture.views)
+    upright = [Given.of(replace(views[i], person=None)) for i in turned]
+    again = run.every_view("person", Person, upright, absent=Person.absent) if turned else []
+    for i, found in zip(turned, again, strict=True):
+        views[i] = replace(views[i], person=found.result().value)
+    return replace(capture, views=tuple(views))
+
+
 def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int) -> _Made:
     """Run the stages; views are processed in parallel, later stages wait for them."""
     photos, views = Given.of(capture), [Given.of(view) for view in capture.views]
     masks = run.every_view("segment", Mask, views)
+    if run.has("refine"):
+        masks = _refine(run, photos, masks, Given.of(head))
     orientations = run.every_view("orient", OrientationMap, views, mask=masks)
     scene = run.once("scene", Scene, capture=photos, masks=masks, head=Given.of(head))
     if run.has("head"):
@@ -172,6 +222,18 @@ def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int
         capture.views, labels, scene.value.head, roots.value, strands.value, waves.value
     )
     return _Made(labels, angles, hull.value, scene.value, groom)
+
+
+def _refine(
+    run: StageRunner,
+    photos: Given[Capture],
+    masks: Sequence[Future[Given[Mask]]],
+    head: Given[Head],
+) -> list[Future[Given[Mask]]]:
+    """Return the masks after the first scene has shown where the head is in every view."""
+    scene = run.once("scene", Scene, "first_scene", capture=photos, masks=masks, head=head)
+    refined = run.once("refine", Masks, capture=photos, masks=masks, scene=scene)
+    return [completed(Given.of(mask)) for mask in refined.value.views]
 
 
 def _write(
@@ -209,8 +271,11 @@ def _note_photos(log: RunLog, capture: Capture) -> None:
         log.noted(f"{PHOTOS}{photo.resolve().parent}")
 
 
-def _sweep(folder: Path) -> None:
-    """Remove partial files of a run that was killed."""
+def _sweep(folder: Path, run: StageRunner) -> None:
+    """Remove partial files of a run that was killed, and results that this recipe lacks."""
+    for table in ("turn", "refine"):
+        if not run.has(table):
+            (folder / "work" / f"{table}.npz").unlink(missing_ok=True)
     for name in ("groom", "scene.json", "hairkit.log", SHEET):
         for leftover in folder.glob(f".{name}*.part"):
             leftover.unlink(missing_ok=True)

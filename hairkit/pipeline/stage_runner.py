@@ -69,10 +69,16 @@ class StageRunner:
         """Return whether the recipe has the stage."""
         return self._recipe.stage(table) is not None
 
-    def once(self, table: str, kind: type[_Result], **arguments: Argument) -> Given[_Result]:
-        """Return the result of a stage that sees all views; waits for its arguments."""
+    def once(
+        self, table: str, kind: type[_Result], name: str = "", /, **arguments: Argument
+    ) -> Given[_Result]:
+        """Return the result of a stage that sees all views; waits for its arguments.
+
+        `name` is that of the result where a stage runs a second time.
+        """
         ready, stage = _all_ready(arguments), self._stage(table)
-        return self._steps_of(stage, 1).run(0, kind, self._code(stage), "", ready)
+        steps = self._steps_of(stage, 1, name or table)
+        return steps.run(0, kind, self._code(stage), "", ready)
 
     def derive(
         self, name: str, kind: type[_Result], make: Callable[..., _Result], **arguments: Argument
@@ -87,11 +93,17 @@ class StageRunner:
         table: str,
         kind: type[_Result],
         views: Sequence[Given[View]],
+        absent: Callable[[], _Result] | None = None,
         **arguments: Sequence[Future[Given[Any]]],
     ) -> list[Future[Given[_Result]]]:
-        """Start a stage on every view; a view's step waits only for that view's arguments."""
+        """Start a stage on every view; a view's step waits only for that view's arguments.
+
+        `absent` makes the result where the recipe leaves the stage out or no plugin has an answer.
+        """
+        if absent is not None and not self.has(table):
+            return [completed(Given.of(absent())) for _ in views]
         stage = self._stage(table)
-        steps = self._steps_of(stage, len(views))
+        steps = self._steps_of(stage, len(views), table, absent)
         code = self._code(stage)
 
         def run(index: int, view: Given[View]) -> Given[_Result]:
@@ -110,9 +122,14 @@ class StageRunner:
         self._manager.call("export_groom", plugin, options, groom=groom, path=path)
         self._log.finished(plugin, time.perf_counter() - started, False)
 
-    def call(self, stage: Stage, values: dict[str, Any]) -> Any:
+    def call(
+        self, stage: Stage, values: dict[str, Any], absent: Callable[[], Any] | None = None
+    ) -> Any:
         """Call the plugin of a stage, the first of several that has an answer."""
         choices = [(choice.plugin, choice.options) for choice in stage.choices]
+        if absent is not None:
+            found = self._manager.find_first(stage.hook, choices, **values)
+            return absent() if found is None else found[1]
         if len(choices) == 1:
             return self._manager.call(stage.hook, *choices[0], **values)
         return self._manager.call_first(stage.hook, choices, **values)[1]
@@ -123,8 +140,12 @@ class StageRunner:
             raise PluginError(f"recipe {self._recipe.name} has no stage {table!r}")
         return stage
 
-    def _steps_of(self, stage: Stage, count: int) -> _Steps:
-        return _Steps(self, stage.table, count, lambda values: self.call(stage, values), stage.hook)
+    def _steps_of(
+        self, stage: Stage, count: int, name: str, absent: Callable[[], Any] | None = None
+    ) -> _Steps:
+        return _Steps(
+            self, name, count, lambda values: self.call(stage, values, absent), stage.hook
+        )
 
     def _code(self, stage: Stage) -> str:
         return stage_digest(self._manager, stage)
@@ -190,6 +211,13 @@ class _Steps:
                 runner._manager.notify(
                     "stage_finished", stage=self._hook, seconds=seconds, result=whole
                 )
+
+
+def completed(value: Given[_Value]) -> Future[Given[_Value]]:
+    """Return a future that holds a value already."""
+    future: Future[Given[_Value]] = Future()
+    future.set_result(value)
+    return future
 
 
 def _all_ready(arguments: dict[str, Argument]) -> dict[str, Given[Any]]:

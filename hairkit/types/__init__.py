@@ -5,14 +5,17 @@ the packages named after the subject.
 
 * `camera`: pinhole and orthographic cameras
 * `capture`: the photos and what is known about each
+* `face`: landmarks and direction of a face
 * `groom`: strands on a head with material and physics
 * `head`: the head mesh, roots, capsules
 * `mask`: labels: hair, person, background
 * `orientation`: 2D strand angle and confidence
+* `person`: probability of the person
 * `point_cache`: simulated frames of the guides
 * `preview`: the pictures of these types that a notebook shows
 * `scene`: cameras and fitted head
 * `strands`: packed polylines
+* `turnaround`: from where each photo was taken
 * `volume`: grid, hull, orientation field, distance from the scalp
 * `waves`: radius, pitch and slant of wavy hair
 """

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
 from hairkit.arrays import Float64Array, UInt8Array, frozen_array
 from hairkit.errors import DataError
+from hairkit.types.face import Face, turn_points
+from hairkit.types.person import Person
 from hairkit.types.preview import PHOTO_HEIGHT, Previewed, row
+from hairkit.types.turnaround import Turnaround
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +35,17 @@ class View:
     strokes_path: Path | None = None
     photo_path: Path | None = None
     photo_size: tuple[int, int] = (0, 0)
-    """(width, height) of the photo on disk after EXIF rotation: the pixels of masks and strokes."""
+    """(width, height) of the photo on disk, upright: the pixels of masks and strokes."""
+    elevation_deg: float = 0.0
+    """Nominal elevation: 0 level with the head, positive from above."""
+    named: bool = True
+    """False when neither the photo's name nor `capture.toml` says which view it shows."""
+    quarter_turns: int = 0
+    """Clockwise quarter turns from the photo on disk, after EXIF rotation, to `image`."""
+    face: Face | None = None
+    """What a detector found, in pixels of `image`; None before the stage `landmarks`."""
+    person: Person | None = None
+    """Where the person is, in pixels of `image`; None where no model was run."""
 
     def __post_init__(self) -> None:
         object.__setattr__(
@@ -59,6 +73,26 @@ class View:
         """Height of `image` in pixels."""
         return int(self.image.shape[0])
 
+    def turned(self, quarter_turns: int) -> Self:
+        """Return the view after clockwise quarter turns of its photo."""
+        turns = quarter_turns % 4
+        if turns == 0:
+            return self
+        width, height = self.width, self.height
+        person = self.person
+        if person is not None and person.alpha.size:
+            person = Person(np.rot90(person.alpha, -turns))
+        given = self.landmarks
+        return replace(
+            self,
+            image=np.rot90(self.image, -turns),
+            landmarks=None if given is None else turn_points(given, turns, width, height),
+            photo_size=self.photo_size[::-1] if turns % 2 else self.photo_size,
+            quarter_turns=(self.quarter_turns + turns) % 4,
+            face=None if self.face is None else self.face.turned(turns, width, height),
+            person=person,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Capture(Previewed):
@@ -80,6 +114,20 @@ class Capture(Previewed):
     def __repr__(self) -> str:
         sizes = " or ".join(sorted({f"{view.width} x {view.height}" for view in self.views}))
         return f"Capture({len(self.views)} views of {sizes} px)"
+
+    def arranged(self, turn: Turnaround) -> Self:
+        """Return the views upright, in the order, with the names and from where the turn says."""
+        views = tuple(
+            replace(
+                self.views[i].turned(int(turn.quarter_turns[i])),
+                name=turn.names[i],
+                azimuth_deg=float(turn.azimuth_deg[i]),
+                elevation_deg=float(turn.elevation_deg[i]),
+                named=True,
+            )
+            for i in turn.order
+        )
+        return replace(self, views=views)
 
     def preview(self) -> UInt8Array | None:
         """Return the photos side by side, (H, W, 3) uint8 RGB."""

@@ -21,6 +21,8 @@ class Mask(Stored):
     """(H, W), only the three label values."""
     person_known: bool
     """False when nobody said where the person is: then 0 means only "not hair"."""
+    alpha: UInt8Array | None = None
+    """(H, W) opacity of the hair, 255 where it covers a pixel wholly; None where unknown."""
 
     def __post_init__(self) -> None:
         labels = frozen_array(self.labels, np.uint8, (None, None), "mask labels")
@@ -30,6 +32,9 @@ class Mask(Stored):
         if not (labels == HAIR).any():
             raise DataError("mask is empty: no pixel is marked as hair (255)")
         object.__setattr__(self, "labels", labels)
+        if self.alpha is not None:
+            alpha = frozen_array(self.alpha, np.uint8, labels.shape, "mask alpha")
+            object.__setattr__(self, "alpha", alpha)
 
     @property
     def hair(self) -> BoolArray:
@@ -40,3 +45,10 @@ class Mask(Stored):
     def person(self) -> BoolArray:
         """(H, W) true where the person is, hair included."""
         return np.asarray(self.labels != BACKGROUND)
+
+
+@dataclass(frozen=True, eq=False)
+class Masks(Stored):
+    """The masks of all views, in their order."""
+
+    views: tuple[Mask, ...]

@@ -22,9 +22,10 @@ from hairkit.storage import Stored, from_arrays, read_npz
 from hairkit.synth.bust import Bust
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
-from hairkit.types.mask import HAIR, PERSON, Mask
+from hairkit.types.mask import HAIR, PERSON, Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import Scene
+from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid
 from hairkit.viewer.draw.lines import Billboard, LineSet
 
@@ -161,14 +162,18 @@ class Layers:
     def _photos(self) -> dict[str, UInt8Array]:
         if self.capture is None:
             return {}
-        return {
-            view.name: _add_alpha(view.image)
-            for view in read_capture(self.capture, PHOTO_EDGE).views
-        }
+        capture, turn = read_capture(self.capture, PHOTO_EDGE), self._read(Turnaround, "turn")
+        if turn is not None and len(turn.names) == len(capture.views):
+            capture = capture.arranged(turn)
+        return {view.name: _add_alpha(view.image) for view in capture.views}
 
     def _masks(self) -> dict[str, UInt8Array]:
         pictures = {}
-        for name, mask in self._every(Mask, "segment").items():
+        refined = self._read(Masks, "refine")
+        segmented = self._every(Mask, "segment")
+        if refined is not None and len(refined.views) == len(self.cameras):
+            segmented = dict(zip(self.cameras, refined.views, strict=True))
+        for name, mask in segmented.items():
             image = np.zeros((*mask.labels.shape, 4), np.uint8)
             image[mask.labels == HAIR] = (232, 60, 132, 230)
             image[mask.labels == PERSON] = (70, 130, 235, 150)

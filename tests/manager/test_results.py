@@ -23,10 +23,12 @@ from hairkit.errors import InputError, PluginError, ResultError
 from hairkit.manager import RESULTS, STAGES
 from hairkit.testing import stage_arguments
 from hairkit.types.camera import Camera
-from hairkit.types.mask import Mask
+from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
+from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
+from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull, VoxelGrid
 
 Arguments = dict[str, Any]
@@ -140,7 +142,29 @@ def imported(**change: Any) -> Callable[[Arguments], Any]:
     return make
 
 
+def turn(**change: Any) -> Callable[[Arguments], Any]:
+    return lambda given: replace(right("find_turn", given), **change)
+
+
 WRONG: dict[str, dict[str, Callable[[Arguments], Any]]] = {
+    "detect_landmarks": {
+        "face presence is 2": lambda given: replace(right("detect_landmarks", given), presence=2),
+        "face landmarks has shape": lambda given: replace(
+            right("detect_landmarks", given), landmarks=np.zeros((5, 2))
+        ),
+    },
+    "segment_person": {
+        "the person has 5 x 4 pixels, expected 96 x 128": lambda _: Person(np.zeros((4, 5))),
+    },
+    "find_turn": {
+        "turn order is": turn(order=np.zeros(8)),
+        "turn elevation_deg is beyond": turn(elevation_deg=np.full(8, 91)),
+        "turn names two photos alike": turn(names=("front",) * 8),
+        "turn quarter_turns holds": turn(quarter_turns=np.full(8, 4)),
+        "the turn has 1 photos, expected 8": lambda _: Turnaround(
+            np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1), ("front",), 1.0, ""
+        ),
+    },
     "segment": {
         "the mask has 5 x 4 pixels, expected 96 x 128": lambda _: Mask(np.full((4, 5), 255), True),
         "mask holds the value 7": lambda _: Mask(np.full((128, 96), 7), True),
@@ -151,6 +175,12 @@ WRONG: dict[str, dict[str, Callable[[Arguments], Any]]] = {
         "camera of view 'front' has 48 x 64 pixels": scene(small_cameras, "estimate_scene"),
         "the scene has the views front-right, right": scene(turned_names, "estimate_scene"),
         "camera_from_head has 1 values that are not finite": scene(nan_camera, "estimate_scene"),
+    },
+    "refine_masks": {
+        "7 masks, expected one for each of 8": lambda given: Masks(given["masks"][1:]),
+        "the mask of view 'front' has 5 x 4": lambda given: Masks(
+            (Mask(np.full((4, 5), 255), True), *given["masks"][1:])
+        ),
     },
     "fit_head": {
         "camera of view 'front' has 48 x 64 pixels": scene(small_cameras, "fit_head"),

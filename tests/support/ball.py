@@ -11,7 +11,10 @@ from hairkit.testing import VIEW_NAMES, ball_mask, bristle_groom, turn_capture, 
 
 PLUGIN_FILE = Path(__file__).with_name("ball_plugin.py")
 TABLES = ("segment", "scene", "head", "orient", "hull", "field", "track", "export")
-RECIPE = "".join(f'[{table}]\nplugin = "ball_plugin"\n' for table in TABLES)
+LEFT_OUT = ("landmarks", "person", "turn", "refine")
+RECIPE = "".join(f"{table} = false\n" for table in LEFT_OUT) + "".join(
+    f'[{table}]\nplugin = "ball_plugin"\n' for table in TABLES
+)
 
 
 def write_capture(folder: Path, *, masks: bool = False) -> Path:

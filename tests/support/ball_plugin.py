@@ -9,7 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from hairkit import Groom, Hull, Mask, OrientationMap, Roots, Scene, Strands, View, hookimpl
+from hairkit import (
+    Capture,
+    Groom,
+    Hull,
+    Mask,
+    OrientationMap,
+    Roots,
+    Scene,
+    Strands,
+    View,
+    hookimpl,
+)
 from hairkit.io.file_format import FileFormat
 from hairkit.options import option
 from hairkit.storage import write_bytes
@@ -21,6 +32,10 @@ from hairkit.testing import (
     shell_hull,
     turn_scene,
 )
+from hairkit.types.face import Face
+from hairkit.types.mask import Masks
+from hairkit.types.person import Person
+from hairkit.types.turnaround import Turnaround
 
 FORMAT = FileFormat("Ball", (".ball",))
 
@@ -39,6 +54,34 @@ class Options:
 def _begin(stage: str, options: Options, view: str = "") -> None:
     CALLS.append(f"{stage} {view}".strip())
     time.sleep(options.delay)
+
+
+@hookimpl
+def detect_landmarks(options: Options) -> Face:
+    _begin("landmarks", options)
+    return Face(0.5, np.zeros((68, 2)), np.ones(68), 0.0, 0.0, 0.0)
+
+
+@hookimpl
+def segment_person(view: View, options: Options) -> Person:
+    _begin("person", options, view.name)
+    return Person(np.full((view.height, view.width), 128, np.uint8))
+
+
+@hookimpl
+def find_turn(capture: Capture, options: Options) -> Turnaround:
+    """The turn as the capture says."""
+    _begin("turn", options)
+    views = capture.views
+    azimuth, zero = np.array([view.azimuth_deg for view in views]), np.zeros(len(views))
+    names = tuple(view.name for view in views)
+    return Turnaround(np.arange(len(views)), azimuth, zero, zero, names, np.inf, "turn as said")
+
+
+@hookimpl
+def refine_masks(masks: tuple[Mask, ...], options: Options) -> Masks:
+    _begin("refine", options)
+    return Masks(masks)
 
 
 @hookimpl

@@ -1,0 +1,49 @@
+"""From where each photo of a capture was taken, as the photos themselves tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit.arrays import Float64Array, Int64Array, frozen_array
+from hairkit.errors import DataError
+from hairkit.storage import Stored
+
+
+@dataclass(frozen=True, eq=False)
+class Turnaround(Stored):
+    """Azimuth, elevation and upright position of every photo, in the order they were read."""
+
+    order: Int64Array
+    """(V,) indices of the photos in the order of the turn: the frontal one first, then towards the
+    subject's left; photos from above last."""
+    azimuth_deg: Float64Array
+    """(V,) azimuth of each camera."""
+    elevation_deg: Float64Array
+    """(V,) elevation of each camera, positive from above."""
+    quarter_turns: Int64Array
+    """(V,) clockwise quarter turns that bring each photo upright, 0 to 3."""
+    names: tuple[str, ...]
+    """Name of the view that each photo shows."""
+    margin: float
+    """Cost of the next best arrangement over that of this one; 1 is a tie, inf no other fits."""
+    summary: str
+    """One line for the user."""
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        for name in ("order", "quarter_turns"):
+            array = frozen_array(getattr(self, name), np.int64, (count,), f"turn {name}")
+            object.__setattr__(self, name, array)
+        for name in ("azimuth_deg", "elevation_deg"):
+            array = frozen_array(getattr(self, name), np.float64, (count,), f"turn {name}")
+            object.__setattr__(self, name, array)
+        if not np.array_equal(np.sort(self.order), np.arange(count)):
+            raise DataError(f"turn order is {self.order.tolist()}, expected each photo once")
+        if not np.isin(self.quarter_turns, range(4)).all():
+            raise DataError("turn quarter_turns holds other values than 0 to 3")
+        if (np.abs(self.elevation_deg) > 90).any():
+            raise DataError("turn elevation_deg is beyond 90 degrees")
+        if len(set(self.names)) != count:
+            raise DataError("turn names two photos alike")

@@ -1,0 +1,48 @@
+"""Landmarks that come with the photos, and the direction of the head that they tell.
+
+The direction is that of the camera which sees the landmarks of the template head best
+(perspective-n-point: Terzakis and Lourakis, "A consistently fast and globally optimal solution to
+the perspective-n-point problem", 2020). The jaw is left out: annotators trace its outline.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from hairkit import View, hookimpl
+from hairkit.arrays import Float64Array
+from hairkit.cameras.turntable import view_angles
+from hairkit.head_model.template import default_head
+from hairkit.imaging.masked_filters import picture_scale
+from hairkit.io.photos import focal_from_equivalent
+from hairkit.types.face import Face
+from hairkit.types.head import JAW_LANDMARKS
+
+NOISE_PX = 1.5
+"""Standard deviation of careful landmarks in a photo 1080 px high, as `silhouette` assumes it."""
+USUAL_LENS_MM = 42.0
+"""Full-frame focal length where the photo does not tell, as the plugin `manual` has it."""
+
+
+@hookimpl
+def detect_landmarks(view: View) -> Face | None:
+    """Return the given landmarks as a certain face, None when the view has none."""
+    if view.landmarks is None:
+        return None
+    noise = np.full(len(view.landmarks), NOISE_PX * picture_scale(view.height))
+    azimuth, elevation, roll = np.degrees(_direction(view, view.landmarks))
+    return Face(1.0, view.landmarks, noise, azimuth, elevation, roll)
+
+
+def _direction(view: View, landmarks: Float64Array) -> Float64Array:
+    """Return azimuth, elevation and roll (3,) of the camera, radians."""
+    head = default_head()
+    assert head.landmark_vertices is not None  # the template has all of them
+    places = head.vertices[head.landmark_vertices].astype(np.float64)[JAW_LANDMARKS:]
+    focal = view.focal_px or focal_from_equivalent(USUAL_LENS_MM, view.width, view.height)
+    lens = np.array([[focal, 0, view.width / 2], [0, focal, view.height / 2], [0, 0, 1]])
+    _, rotation, _ = cv2.solvePnP(
+        places, landmarks[JAW_LANDMARKS:], lens, None, flags=cv2.SOLVEPNP_SQPNP
+    )
+    return view_angles(cv2.Rodrigues(rotation)[0].astype(np.float64))
