@@ -15,6 +15,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `plugins`: list of plugins and options
 * `reconstruct`: photos to groom
 * `render`: pictures of a groom
+* `rerun`: a recorded run once more
 * `scaffold`: the files that `new-plugin` writes
 * `scaffold_sketches`: the simplest method for every hook, which it writes
 * `settings`: `--set` of all verbs
@@ -41,6 +42,7 @@ from hairkit.errors import HairkitError
 
 VERBS = {
     "reconstruct": "turn eight photos into a groom",
+    "rerun": "run a reconstruction again from its record",
     "evaluate": "score a groom against the truth",
     "synth": "make a procedural groom and photos of it, with their truth",
     "render": "draw a groom on its head",

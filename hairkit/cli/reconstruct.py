@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,8 @@ Example: hairkit reconstruct photos/ -o out/
 Turn eight photos into a groom. PHOTOS is a folder with the photos of the turn: front, then every
 45 degrees towards the subject's left; or a folder with photos/ and, where present, masks/, strokes/
 and landmarks.json, matched by name, and a capture.toml. OUT gets groom.npz, scene.json, the
-recipe's exports, contact_sheet.png and hairkit.log. After an interruption, run it again: it
+recipe's exports, contact_sheet.png, run.json (what was done, and how good it is) and hairkit.log.
+After an interruption, run it again: it
 continues where it stopped.
 """
 GUIDES = 600
@@ -60,8 +62,10 @@ def run(args: argparse.Namespace) -> int:
     """Reconstruct, and print a summary."""
     from hairkit.io.capture_reader import WORKING_EDGE, read_capture
     from hairkit.manager import Manager
+    from hairkit.pipeline.health import summarise
     from hairkit.pipeline.recipe import load_recipe
     from hairkit.pipeline.reconstruct import SHEET, export_paths, reconstruct
+    from hairkit.pipeline.run_record import RECORD, read_record
     from hairkit.progress import Recorder, progress_for
 
     began = time.perf_counter()
@@ -85,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
             sheet=not args.no_sheet,
         )
     sheet = Path(args.out) / SHEET
+    health = read_record(Path(args.out) / RECORD).health
     lengths = groom.strands.lengths()
     summary = {
         "groom": str(Path(args.out) / "groom.npz"),
@@ -95,9 +100,13 @@ def run(args: argparse.Namespace) -> int:
         "roots": args.guides,
         "mean_length_m": round(float(lengths.mean()), 4),
         "stages": record.stages,
+        "health": [asdict(figure) for figure in health],
         "seconds": round(time.perf_counter() - began, 3),
     }
-    print(json.dumps(summary, indent=1) if args.json else _summary_text(summary))
+    if args.json:
+        print(json.dumps(summary, indent=1))
+    else:
+        print("\n".join([_summary_text(summary), *summarise(health)]))
     return 0
 
 
@@ -122,9 +131,9 @@ def _max_edge(args: argparse.Namespace, default: int) -> int:
 def _head(args: argparse.Namespace) -> Any:
     if args.head is None:
         return None
-    from hairkit.io.head_reader import read_head
+    from hairkit.io.head_reader import HeadFile
 
-    return read_head(args.head, units=args.head_units, scalp=args.head_scalp, up=args.head_up)
+    return HeadFile(args.head, args.head_units, args.head_scalp, args.head_up)
 
 
 def _summary_text(summary: dict[str, Any]) -> str:

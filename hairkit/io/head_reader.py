@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,26 @@ _HOW_TO_MARK = (
     "mark it by a group, material or vertex property named 'scalp', by vertices painted red (or "
     "white on black), or by a mask picture NAME.scalp.png over its texture coordinates"
 )
+
+
+@dataclass(frozen=True)
+class HeadFile:
+    """The file of a head and how to read it, see `read_head`."""
+
+    path: str
+    units: str = "m"
+    scalp: str | None = None
+    up: str = "y"
+
+    def read(self) -> Head:
+        """Return the head."""
+        return read_head(self.path, self.units, self.scalp, self.up)
+
+    def files(self) -> list[Path]:
+        """Return the files that the head is read from, those that exist."""
+        file = Path(self.path)
+        named = [file, _beside(file, "landmarks.json"), _beside(file, "scalp.png")]
+        return [path for path in (*named, Path(self.scalp or "")) if path.is_file()]
 
 
 def read_head(

@@ -4,11 +4,14 @@ The program that runs the plugins of a recipe. No method of reconstruction is he
 plugins.
 
 * `contact_sheet`: one picture of all stages
+* `health`: figures that tell how good a run is
 * `module_digest`: digests of the code that made a cached result
 * `open_groom`: grooms by any name that a user may give
 * `recipe`: which plugin does each stage, with which options
 * `reconstruct`: a whole run
+* `rerun`: a run once more, from its record
 * `run_log`: `hairkit.log`: versions, options and times
+* `run_record`: `run.json`: inputs, recipe, outputs and health
 * `stage_runner`: one stage, once or once for each view
 * `work_folder`: cached results of stages
 """

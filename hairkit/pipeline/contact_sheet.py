@@ -14,6 +14,7 @@ from hairkit.arrays import UInt8Array
 from hairkit.errors import InputError
 from hairkit.field.isosurface import volume_surface
 from hairkit.grooming.densify import densify
+from hairkit.pipeline.health import AMBER, GREEN, RED, Figure
 from hairkit.rendering import Lights, Solid, draw_views
 from hairkit.storage import write_bytes
 from hairkit.types.camera import Camera
@@ -31,6 +32,8 @@ GAP = 4
 """Pixels between pictures."""
 HEADER = 24
 """Height of the line of view names, pixels."""
+HEALTH_LINE = 20
+"""Height of a line of health, pixels."""
 HAIRS = 2500
 """Strands of the hair in the last row: a pixel of a tile is millimetres wide."""
 GUIDE_POINTS = 20
@@ -47,6 +50,9 @@ _HAIR_OPACITY, _PERSON_OPACITY = 0.6, 0.35
 """Shares of the tints over the grey photo, which stays visible through them."""
 _FONT, _FONT_SCALE, _BOX_GREY = cv2.FONT_HERSHEY_SIMPLEX, 0.45, 40
 """The letters of names, ten pixels high, and the grey behind those on pictures."""
+_DOT_PX = 5
+"""Radius of a light before a line of health."""
+_LIGHT_COLOURS = {GREEN: (60, 160, 70), AMBER: (235, 160, 30), RED: (215, 50, 45)}
 _ROWS = ("photo", "mask", "orientation", "hull", "guides", "hair")
 
 
@@ -58,12 +64,13 @@ def write_contact_sheet(
     hull: Hull,
     groom: Groom,
     scene: Scene,
+    health: Sequence[Figure] = (),
 ) -> None:
-    """Write the sheet to `path` (PNG): one column a view, one row a stage.
+    """Write the sheet to `path` (PNG): one column a view, one row a stage, health below.
 
     Masks and orientation maps may have any size; they are shown over the photos of `capture`.
     """
-    sheet = contact_sheet(capture, masks, orientations, hull, groom, scene)
+    sheet = contact_sheet(capture, masks, orientations, hull, groom, scene, health)
     done, data = cv2.imencode(".png", sheet[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
     if not done:
         raise InputError(f"{path}: the contact sheet of {sheet.shape[:2]} pixels cannot be encoded")
@@ -77,6 +84,7 @@ def contact_sheet(
     hull: Hull,
     groom: Groom,
     scene: Scene,
+    health: Sequence[Figure] = (),
 ) -> UInt8Array:
     """Return the sheet (H, W, 3) RGB that `write_contact_sheet` writes."""
     size = _tile_size(scene.cameras)
@@ -90,7 +98,8 @@ def contact_sheet(
         _guide_pictures(groom, cameras),
         _hair_pictures(groom, cameras),
     )
-    return _arrange(rows, [view.name for view in capture.views], size)
+    pictures = _arrange(rows, [view.name for view in capture.views], size)
+    return np.concatenate([pictures, _health_lines(health, pictures.shape[1])])
 
 
 def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
@@ -170,6 +179,17 @@ def _arrange(
             sheet[top : top + height, left : left + width] = tile
         _write(sheet, _ROWS[index], (GAP + 5, top + 15), 255, boxed=True)
     return sheet
+
+
+def _health_lines(health: Sequence[Figure], width: int) -> UInt8Array:
+    """Return one line a figure, (H, width, 3), with a dot of its light before it."""
+    paper = np.full((len(health) * HEALTH_LINE, width, 3), PAPER, np.uint8)
+    for index, figure in enumerate(health):
+        middle = (index * HEALTH_LINE) + HEALTH_LINE // 2
+        dot = (GAP + _DOT_PX, middle)
+        cv2.circle(paper, dot, _DOT_PX, _LIGHT_COLOURS[figure.light], cv2.FILLED, cv2.LINE_AA)
+        _write(paper, figure.line(), (GAP + 4 * _DOT_PX, middle + _DOT_PX), INK)
+    return paper
 
 
 def _write(

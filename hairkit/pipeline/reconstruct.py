@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import time
 from collections.abc import Sequence
@@ -16,11 +17,13 @@ from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.imaging.waves import measure_waves
 from hairkit.io.capture_reader import read_capture
-from hairkit.io.head_reader import read_head
+from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
+from hairkit.pipeline.health import RED, Figure, assess
 from hairkit.pipeline.recipe import Recipe, load_recipe
 from hairkit.pipeline.run_log import RunLog
+from hairkit.pipeline.run_record import RECORD, describe_run, finish_record
 from hairkit.pipeline.stage_runner import Argument, Given, StageRunner, completed
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
@@ -38,10 +41,9 @@ from hairkit.types.volume import Hull, OrientationField, ScalpDistance
 from hairkit.types.waves import Waves
 
 MAX_GUIDES = 100_000
-PHOTOS = "photos in "
-"""Start of the line of `hairkit.log` that names the folder of photos."""
 SHEET = "contact_sheet.png"
 """Name of the picture that shows the result of every stage."""
+_log = logging.getLogger("hairkit")
 
 
 @one_blas_thread()
@@ -51,7 +53,7 @@ def reconstruct(
     recipe: Recipe | str | os.PathLike[str] = "default",
     manager: Manager | None = None,
     *,
-    head: Head | str | os.PathLike[str] | None = None,
+    head: Head | HeadFile | str | os.PathLike[str] | None = None,
     guides: int = 600,
     seed: int = 0,
     progress: Progress | None = None,
@@ -65,15 +67,16 @@ def reconstruct(
     photos
         The folder of a capture, or a capture that was read before.
     out
-        Folder for `groom.npz`, `scene.json`, the recipe's exports, `contact_sheet.png` and
-        `hairkit.log`; its `work/` keeps the results of stages, so that unchanged stages are not run
-        again.
+        Folder for `groom.npz`, `scene.json`, the recipe's exports, `contact_sheet.png`,
+        `run.json` and `hairkit.log`; its `work/` keeps the results of stages, so that unchanged
+        stages are not run again.
     recipe
         Which plugin does each stage: a shipped recipe's name, a `.toml` file or a recipe.
     manager
         The plugins; the installed ones when None.
     head
-        The head to fit, or a file of it (OBJ, PLY, GLB in metres, y up); None for the default head.
+        The head to fit, or a file of it (OBJ, PLY, GLB in metres, y up; `HeadFile` for others);
+        None for the default head.
     guides
         Number of roots, each of which grows a strand.
     seed
@@ -98,6 +101,8 @@ def reconstruct(
     if not 1 <= guides <= MAX_GUIDES:
         raise InputError(f"{guides} guides, expected 1 to {MAX_GUIDES}")
     given = photos if isinstance(photos, Capture) else read_capture(photos)
+    head = HeadFile(os.fspath(head)) if isinstance(head, (str, os.PathLike)) else head
+    record = describe_run(given, head, recipe, manager, guides, seed)
     log = RunLog(progress or Silent())
     folder = Path(out)
     work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(_waiting(folder)))
@@ -105,25 +110,29 @@ def reconstruct(
         run = StageRunner(recipe, manager, work, log, pool)
         _sweep(folder, run)
         try:
-            capture = _find_views(run, given, log)
-            made = _grow(run, capture, _head(head), guides, seed)
+            capture, turn = _find_views(run, given, log)
+            made = _grow(run, capture, _head(head), guides, seed, turn)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
         work.flush()
-        _write(folder, run, capture, made, export_paths(folder, recipe, manager))
+        exports = export_paths(folder, recipe, manager)
+        _write(folder, run, capture, made, exports)
         if sheet:
             _draw_sheet(folder / SHEET, capture, made, log)
         manager.notify("groom_ready", groom=made.groom)
-        _note_photos(log, capture)
+        _tell_health(made.health, log, warn=progress is None)
         log.write(folder / "hairkit.log", recipe, manager)
+        outputs = [folder / "groom.npz", folder / "scene.json", *(path for _, path in exports)]
+        whole = finish_record(record, [*outputs, folder / SHEET], log.stages, made.health)
+        whole.write(folder / RECORD)
     return made.groom
 
 
-def _head(head: Head | str | os.PathLike[str] | None) -> Head:
+def _head(head: Head | HeadFile | None) -> Head:
     if head is None:
         return default_head()
-    return head if isinstance(head, Head) else read_head(head)
+    return head if isinstance(head, Head) else head.read()
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +144,7 @@ class _Made:
     hull: Hull
     scene: Scene
     groom: Groom
+    health: tuple[Figure, ...]
 
 
 def export_paths(
@@ -149,8 +159,10 @@ def export_paths(
     )
 
 
-def _find_views(run: StageRunner, capture: Capture, log: RunLog) -> Capture:
-    """Find faces, persons and the turn; return the views upright and in the turn's order."""
+def _find_views(
+    run: StageRunner, capture: Capture, log: RunLog
+) -> tuple[Capture, Turnaround | None]:
+    """Find faces, persons and the turn; return the views upright, in its order, and the turn."""
     views = [Given.of(view) for view in capture.views]
     faces = run.every_view("landmarks", Face, views, absent=Face.absent)
     persons = run.every_view("person", Person, views, absent=Person.absent)
@@ -162,11 +174,11 @@ def _find_views(run: StageRunner, capture: Capture, log: RunLog) -> Capture:
         ),
     )
     if not run.has("turn"):
-        return seen
+        return seen, None
     photos = Given.of(capture)
     turn = run.once("turn", Turnaround, capture=photos, faces=faces, persons=persons).value
     log.message(turn.summary)
-    return _with_upright_persons(run, seen.arranged(turn))
+    return _with_upright_persons(run, seen.arranged(turn)), turn
 
 
 def _see(view: View, face: Face, person: Person) -> View:
@@ -193,7 +205,14 @@ def _with_upright_persons(run: StageRunner, capture: Capture) -> Capture:
     return replace(capture, views=tuple(views))
 
 
-def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int) -> _Made:
+def _grow(
+    run: StageRunner,
+    capture: Capture,
+    head: Head,
+    guides: int,
+    seed: int,
+    turn: Turnaround | None,
+) -> _Made:
     """Run the stages; views are processed in parallel, later stages wait for them."""
     photos, views = Given.of(capture), [Given.of(view) for view in capture.views]
     masks = run.every_view("segment", Mask, views)
@@ -221,7 +240,10 @@ def _grow(run: StageRunner, capture: Capture, head: Head, guides: int, seed: int
     groom = assemble_groom(
         capture.views, labels, scene.value.head, roots.value, strands.value, waves.value
     )
-    return _Made(labels, angles, hull.value, scene.value, groom)
+    health = assess(
+        capture, labels, scene.value, hull.value, groom, guides, distance.value.hair_length, turn
+    )
+    return _Made(labels, angles, hull.value, scene.value, groom, health)
 
 
 def _refine(
@@ -243,9 +265,11 @@ def _write(
     made: _Made,
     exports: Sequence[tuple[str, Path]],
 ) -> None:
-    """Write the groom, the scene and the exports; remove the contact sheet of an older run."""
+    """Write the groom, the scene and the exports; remove sheet and record of an older run."""
+    (folder / RECORD).unlink(missing_ok=True)
     made.groom.save(folder / "groom.npz")
-    _in_photo_pixels(made.scene, capture).write_json(folder / "scene.json")
+    photos = [None if v.photo_path is None else v.photo_path.name for v in capture.views]
+    _in_photo_pixels(made.scene, capture).write_json(folder / "scene.json", photos)
     for plugin, path in exports:
         run.export(plugin, made.groom, path)
     (folder / SHEET).unlink(missing_ok=True)
@@ -258,17 +282,20 @@ def _draw_sheet(path: Path, capture: Capture, made: _Made, log: RunLog) -> None:
     log.started("sheet", 1)
     try:
         write_contact_sheet(
-            path, capture, made.masks, made.orientations, made.hull, made.groom, made.scene
-        )
+            path, capture, made.masks, made.orientations, made.hull, made.groom, made.scene,
+            made.health,
+        )  # fmt: skip
     except RenderError as error:
         log.message(f"no contact sheet: {error}")
     log.finished("sheet", time.perf_counter() - began, False)
 
 
-def _note_photos(log: RunLog, capture: Capture) -> None:
-    photo = capture.views[0].photo_path
-    if photo is not None:
-        log.noted(f"{PHOTOS}{photo.resolve().parent}")
+def _tell_health(health: Sequence[Figure], log: RunLog, *, warn: bool) -> None:
+    """Show every figure; where nobody listens, the red ones are logged as warnings."""
+    for figure in health:
+        log.message(figure.line())
+        if warn and figure.light == RED:
+            _log.warning("%s", figure.line())
 
 
 def _sweep(folder: Path, run: StageRunner) -> None:
@@ -276,7 +303,7 @@ def _sweep(folder: Path, run: StageRunner) -> None:
     for table in ("turn", "refine"):
         if not run.has(table):
             (folder / "work" / f"{table}.npz").unlink(missing_ok=True)
-    for name in ("groom", "scene.json", "hairkit.log", SHEET):
+    for name in ("groom", "scene.json", "hairkit.log", RECORD, SHEET):
         for leftover in folder.glob(f".{name}*.part"):
             leftover.unlink(missing_ok=True)
 

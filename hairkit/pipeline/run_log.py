@@ -7,6 +7,7 @@ import os
 import platform
 import threading
 import time
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -19,6 +20,16 @@ from hairkit.progress import Progress
 from hairkit.storage import write_text
 
 
+@dataclass(frozen=True)
+class StageTime:
+    """Duration of one stage of a run."""
+
+    stage: str
+    seconds: float
+    reused: bool
+    """True when the result of an earlier run was taken."""
+
+
 class RunLog:
     """Forwards progress and records it for `hairkit.log`."""
 
@@ -27,6 +38,8 @@ class RunLog:
         self._progress = progress
         self._began = time.perf_counter()
         self._lines: list[str] = []
+        self.stages: list[StageTime] = []
+        """Stages that have ended, in that order."""
         self._guard = threading.Lock()
 
     def started(self, stage: str, steps: int) -> None:
@@ -43,6 +56,7 @@ class RunLog:
         """Record and forward the end of a stage."""
         with self._guard:
             self._lines.append(f"{stage:<12} {seconds:8.3f} s{' (kept)' if reused else ''}")
+            self.stages.append(StageTime(stage, round(seconds, 4), reused))
             self._progress.finished(stage, seconds, reused)
 
     def message(self, text: str) -> None:
@@ -50,11 +64,6 @@ class RunLog:
         with self._guard:
             self._lines.append(text)
             self._progress.message(text)
-
-    def noted(self, text: str) -> None:
-        """Record one line without showing it."""
-        with self._guard:
-            self._lines.append(text)
 
     def write(self, path: str | os.PathLike[str], recipe: Recipe, manager: Manager) -> None:
         """Write the log file."""

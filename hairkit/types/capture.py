@@ -103,6 +103,10 @@ class Capture(Previewed):
     """True when capture.toml says that the pictures are orthographic."""
     head_pose: Float64Array | None = None
     """(4, 4) similarity that places the head by hand, `scene_from_head`, metres, or None."""
+    source: Path | None = None
+    """The folder or video that the photos were read from; None when they were made in memory."""
+    max_edge: int | None = None
+    """Long edge in pixels that larger photos were scaled down to."""
 
     def __post_init__(self) -> None:
         if not self.views:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hairkit.arrays import UInt8Array
@@ -43,10 +44,17 @@ class Scene(Previewed, Stored):
         )
         return row([draw_view(camera, self.head) for camera in small], PHOTO_HEIGHT)
 
-    def write_json(self, path: str | os.PathLike[str]) -> None:
-        """Write cameras and head joints as JSON, cameras in the form of `truth.json`."""
+    def write_json(
+        self, path: str | os.PathLike[str], photos: Sequence[str | None] | None = None
+    ) -> None:
+        """Write cameras and head joints as JSON, cameras in the form of `truth.json`.
+
+        `photos` are the file names of the views' photos, None for those that have no file.
+        """
+        named = zip(self.names, photos or [None] * len(self.names), self.cameras, strict=True)
         views = [
-            camera.to_json(name) for name, camera in zip(self.names, self.cameras, strict=True)
+            camera.to_json(name) | ({} if photo is None else {"photo": photo})
+            for name, photo, camera in named
         ]
         joints = dict(zip(("root", "neck", "head"), self.head.joints.tolist(), strict=True))
         document = {

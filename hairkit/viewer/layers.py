@@ -16,7 +16,7 @@ from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.errors import HairkitError, InputError
 from hairkit.field.isosurface import volume_surface
 from hairkit.io.capture_reader import read_capture
-from hairkit.pipeline.reconstruct import PHOTOS
+from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.rendering.head import Solid
 from hairkit.storage import Stored, from_arrays, read_npz
 from hairkit.synth.bust import Bust
@@ -203,15 +203,14 @@ class Layers:
 
 
 def _find_capture(results: Path | None) -> Path | None:
-    """Return the folder of photos named in the log of a reconstruction, None if it is gone."""
-    if results is None or not (results / "hairkit.log").is_file():
+    """Return the photos that the record of a reconstruction names, None if they are gone."""
+    if results is None or not (results / RECORD).is_file():
         return None
-    for line in (results / "hairkit.log").read_text(errors="replace").splitlines():
-        if line.startswith(PHOTOS):
-            folder = Path(line.removeprefix(PHOTOS))
-            folder = folder.parent if folder.name == "photos" else folder
-            return folder if folder.is_dir() else None
-    return None
+    try:
+        photos = Path(read_record(results / RECORD).photos or "")
+    except HairkitError:
+        return None
+    return photos if photos.is_dir() else None
 
 
 def _hsv_picture(found: OrientationMap) -> UInt8Array:

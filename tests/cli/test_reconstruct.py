@@ -50,8 +50,9 @@ def start(words: list[str]) -> subprocess.Popen[str]:
 
 
 def results(out: Path) -> dict[str, bytes]:
-    """The content of what was made, the log apart."""
-    return {p.name: p.read_bytes() for p in out.glob("*") if p.is_file() and p.suffix != ".log"}
+    """The content of what was made, log and record apart."""
+    timed = ("hairkit.log", "run.json")
+    return {p.name: p.read_bytes() for p in out.glob("*") if p.is_file() and p.name not in timed}
 
 
 def test_results_on_stdout_progress_on_stderr(
@@ -63,7 +64,10 @@ def test_results_on_stdout_progress_on_stderr(
     assert printed.out.startswith("30 guides of 30 roots, mean length 3.0 cm")
     for name in ("groom.ball", "contact_sheet.png"):
         assert str(tmp_path / "out" / name) in printed.out
-    assert [line.split()[0] for line in printed.err.splitlines()][-2:] == ["ball_plugin", "sheet"]
+    told = [line.split()[0] for line in printed.err.splitlines()]
+    assert told[told.index("track") + 1 :][:2] == ["ball_plugin", "sheet"]
+    assert told[-1] in ("green", "amber", "red")
+    assert "\nhealth: " in printed.out
     assert main([*words, "--quiet"]) == 0
     assert capsys.readouterr().err == ""
 

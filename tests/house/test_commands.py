@@ -24,8 +24,8 @@ from hairkit.testing import turn_scene
 PROJECT = Path(__file__).parents[2]
 PAGES = [PROJECT / "README.md", *sorted((PROJECT / "docs").rglob("*.md"))]
 PAGES += sorted((PROJECT / "examples").rglob("*.md"))
-NOT_RUN = {"reconstruct", "view", "evaluate", "doctor"}
-"""They take long, or need a window or captures: only their arguments and recipes are checked."""
+NOT_RUN = {"reconstruct", "rerun", "view", "evaluate", "doctor"}
+"""They take long, or need a window, captures or a record: arguments and recipes are checked."""
 ALONE = ("doctor", "plugins")
 """Verbs that are commands without arguments; a page may speak of the others by name."""
 LIGHTER = {

@@ -1,0 +1,240 @@
+"""The record of a run, `run.json`: what went in, what was done, what came out, how good it is."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import hairkit
+from hairkit.errors import FormatError
+from hairkit.io.head_reader import HeadFile
+from hairkit.manager import Manager
+from hairkit.pipeline.health import Figure
+from hairkit.pipeline.module_digest import module_digest
+from hairkit.pipeline.recipe import HOOKS, Choice, Recipe, Stage
+from hairkit.pipeline.run_log import StageTime
+from hairkit.storage import read_bytes, read_text, write_text
+from hairkit.types.capture import Capture
+
+RECORD = "run.json"
+"""Name of the record beside the groom."""
+VERSION = 1
+"""Version of the record's form; it grows when what is in it changes its meaning."""
+LIBRARIES = ("numpy", "scipy", "numba", "opencv-contrib-python-headless", "moderngl", "pluggy")
+"""Distributions whose versions may change a result."""
+_MAX_RECORD_BYTES = 2**24
+
+
+@dataclass(frozen=True)
+class FileRecord:
+    """A file and its content."""
+
+    path: str
+    """Inputs have absolute paths, outputs are named within the folder of the record."""
+    sha256: str
+
+
+@dataclass(frozen=True)
+class PluginRecord:
+    """One plugin of the recipe, with its options as they were resolved."""
+
+    stage: str
+    """Table of the recipe: `scene`."""
+    plugin: str
+    distribution: str
+    """Name of the installed distribution, or the absolute path of a plugin file."""
+    version: str
+    code: str
+    """Digest of the plugin's source and of what it imports, see `module_digest`."""
+    options: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """Everything that a run depends on, and what it gave."""
+
+    hairkit: str
+    """Version of hairkit."""
+    platform: str
+    libraries: Mapping[str, str]
+    """Version of Python and of each library by name."""
+    photos: str | None
+    """Folder or video of the capture; None when the photos were not read from a path."""
+    max_edge: int | None
+    """Long edge that photos were scaled down to, pixels."""
+    head: HeadFile | None
+    """File of the head; None for the default head and for one that was given as an object."""
+    head_given: bool
+    """True when the head was given as an object, which no file can bring back."""
+    guides: int
+    seed: int
+    recipe: str
+    recipe_source: str
+    plugins: tuple[PluginRecord, ...]
+    inputs: tuple[FileRecord, ...]
+    stages: tuple[StageTime, ...] = ()
+    health: tuple[Figure, ...] = ()
+    outputs: tuple[FileRecord, ...] = ()
+
+    def write(self, path: Path) -> None:
+        """Write the record as JSON."""
+        document = {"run_record": VERSION} | dataclasses.asdict(self)
+        write_text(path, json.dumps(document, indent=1, default=_plain) + "\n")
+
+    def as_recipe(self) -> Recipe:
+        """Return the recipe that was run, every option with its value."""
+        stages = []
+        for table in HOOKS:
+            own = [record for record in self.plugins if record.stage == table]
+            choices = tuple(Choice(p.plugin, MappingProxyType(dict(p.options))) for p in own)
+            if choices:
+                stages.append(Stage(table, choices))
+        return Recipe(self.recipe, f"{RECORD} of {self.recipe_source}", "", tuple(stages))
+
+    def plugin_files(self) -> list[Path]:
+        """Return the files of plugins that belong to no installed distribution."""
+        return [
+            Path(name)
+            for name in dict.fromkeys(record.distribution for record in self.plugins)
+            if name.endswith(".py")
+        ]
+
+
+def describe_run(
+    capture: Capture,
+    head: object,
+    recipe: Recipe,
+    manager: Manager,
+    guides: int,
+    seed: int,
+) -> RunRecord:
+    """Return the record of a run that is about to start.
+
+    Parameters
+    ----------
+    capture
+        The photos as they were read.
+    head
+        The head as it was given: a `HeadFile`, a `Head`, or None for the default head.
+    recipe, manager
+        What runs.
+    guides, seed
+        Of the roots.
+    """
+    head_file = head if isinstance(head, HeadFile) else None
+    plugins = _plugins(recipe, manager)
+    files = [*input_files(capture), *(head_file.files() if head_file else ()), *_named(plugins)]
+    return RunRecord(
+        hairkit=hairkit.__version__,
+        platform=platform.platform(),
+        libraries=library_versions(),
+        photos=None if capture.source is None else str(capture.source.resolve()),
+        max_edge=capture.max_edge,
+        head=head_file,
+        head_given=head is not None and head_file is None,
+        guides=guides,
+        seed=seed,
+        recipe=recipe.name,
+        recipe_source=recipe.source,
+        plugins=plugins,
+        inputs=tuple(hash_file(path.resolve()) for path in files),
+    )
+
+
+def finish_record(
+    record: RunRecord,
+    outputs: Sequence[Path],
+    stages: Sequence[StageTime],
+    health: Sequence[Figure],
+) -> RunRecord:
+    """Return the record with what the run gave; outputs are named without their folder."""
+    return dataclasses.replace(
+        record,
+        stages=tuple(stages),
+        health=tuple(health),
+        outputs=tuple(hash_file(path, path.name) for path in outputs if path.is_file()),
+    )
+
+
+def read_record(path: str | os.PathLike[str]) -> RunRecord:
+    """Read a `run.json`; `InputError` when it is missing, `FormatError` when it is none."""
+    try:
+        document = json.loads(read_text(path, _MAX_RECORD_BYTES))
+        if document.pop("run_record") != VERSION:
+            raise FormatError(f"{path}: a record of another version, this hairkit reads {VERSION}")
+        head = document["head"]
+        return RunRecord(
+            **document
+            | {
+                "head": None if head is None else HeadFile(**head),
+                "plugins": tuple(PluginRecord(**each) for each in document["plugins"]),
+                "inputs": tuple(FileRecord(**each) for each in document["inputs"]),
+                "stages": tuple(StageTime(**each) for each in document["stages"]),
+                "health": tuple(Figure(**each) for each in document["health"]),
+                "outputs": tuple(FileRecord(**each) for each in document["outputs"]),
+            }
+        )
+    except FormatError:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise FormatError(f"{path}: not the record of a run ({error})") from error
+
+
+def input_files(capture: Capture) -> list[Path]:
+    """Return the files that a capture was read from, those that exist, each once."""
+    views = capture.views
+    named = [path for v in views for path in (v.photo_path, v.mask_path, v.strokes_path)]
+    source = capture.source
+    if source is not None:
+        beside = (source / "landmarks.json", source / "capture.toml")
+        named += [source, *beside]
+    return [path for path in dict.fromkeys(named) if path is not None and path.is_file()]
+
+
+def hash_file(path: Path, name: str | None = None) -> FileRecord:
+    """Return a file's SHA-256 under its path, or under another name."""
+    return FileRecord(name or str(path), hashlib.sha256(read_bytes(path)).hexdigest())
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries that compute results."""
+    return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
+
+
+def _plugins(recipe: Recipe, manager: Manager) -> tuple[PluginRecord, ...]:
+    records = []
+    for stage in recipe.stages:
+        for choice in stage.choices:
+            options = manager.options(choice.plugin, choice.options)
+            values = {} if options is None else dataclasses.asdict(options)
+            info = manager.info(choice.plugin)
+            code = module_digest(info.module)
+            file = Path(info.distribution)
+            origin = str(file.resolve()) if file.is_file() else info.distribution
+            records.append(
+                PluginRecord(stage.table, choice.plugin, origin, info.version, code, values)
+            )
+    return tuple(records)
+
+
+def _named(plugins: Sequence[PluginRecord]) -> list[Path]:
+    """Return the files of plugins and those that their options name, each once."""
+    values = [value for record in plugins for value in record.options.values()]
+    files = [value for value in values if isinstance(value, Path)]
+    files += [Path(record.distribution) for record in plugins]
+    return [path for path in dict.fromkeys(files) if path.is_file()]
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"a record cannot hold {type(value).__name__}")

@@ -1,0 +1,123 @@
+"""The record of a run names everything that the result depends on, and brings it back."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+import ball_plugin
+import pytest
+from ball import PLUGIN_FILE, RECIPE, write_capture
+
+import hairkit
+from hairkit.cli import main
+from hairkit.errors import FormatError, InputError
+from hairkit.io.head_reader import write_head_obj
+from hairkit.manager import Manager
+from hairkit.pipeline.recipe import parse_recipe
+from hairkit.pipeline.reconstruct import reconstruct
+from hairkit.pipeline.rerun import changed_versions, rerun
+from hairkit.pipeline.run_record import RECORD, read_record
+from hairkit.storage import write_text
+from hairkit.testing import ball_head, turn_capture
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    """The results of the small capture, with masks, strokes, a head's file and an option."""
+    capture = write_capture(tmp_path / "capture", masks=True)
+    (tmp_path / "ball.toml").write_text(RECIPE)
+    write_head_obj(tmp_path / "head.obj", ball_head())
+    words = ["reconstruct", str(capture), "-o", str(tmp_path / "out"), "--guides", "20"]
+    words += ["--recipe", str(tmp_path / "ball.toml"), "--plugin", str(PLUGIN_FILE), "--quiet"]
+    words += ["--head", str(tmp_path / "head.obj"), "--set", "ball_plugin.length=0.05"]
+    assert main([*words, "--no-sheet", "--seed", "3", "--max-edge", "128"]) == 0
+    return tmp_path / "out"
+
+
+def test_the_record_names_all_that_the_result_depends_on(out: Path) -> None:
+    """Inputs and outputs with their SHA-256, plugins, options, versions, times and health."""
+    record = read_record(out / RECORD)
+    capture = out.parent / "capture"
+    wanted = {*capture.glob("photos/*"), *capture.glob("masks/*"), out.parent / "head.obj"}
+    assert wanted | {PLUGIN_FILE} <= {Path(file.path) for file in record.inputs}
+    for file in record.inputs:
+        assert file.sha256 == hashlib.sha256(Path(file.path).read_bytes()).hexdigest()
+    assert {file.path for file in record.outputs} == {"groom.npz", "scene.json", "groom.ball"}
+    for file in record.outputs:
+        assert file.sha256 == hashlib.sha256((out / file.path).read_bytes()).hexdigest()
+    assert (record.guides, record.seed, record.max_edge) == (20, 3, 128)
+    assert record.hairkit == hairkit.__version__
+    assert {"python", "numpy", "opencv-contrib-python-headless"} <= set(record.libraries)
+    assert {plugin.plugin for plugin in record.plugins} == {"ball_plugin"}
+    assert all(plugin.options == {"delay": 0.0, "length": 0.05} for plugin in record.plugins)
+    assert {"segment", "track"} <= {stage.stage for stage in record.stages}
+    assert {"strands", "hull"} <= {figure.stage for figure in record.health}
+
+
+def test_a_rerun_gives_the_same_bytes(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Groom, scene and exports of the second run are those of the first, its record too."""
+    again = out.parent / "again"
+    assert main(["rerun", str(out / RECORD), "-o", str(again), "--quiet"]) == 0
+    assert capsys.readouterr().out.count(": the same bytes") == 3
+    for name in ("groom.npz", "scene.json", "groom.ball"):
+        assert (out / name).read_bytes() == (again / name).read_bytes()
+    first, second = read_record(out / RECORD), read_record(again / RECORD)
+    for field in ("inputs", "outputs", "plugins", "health", "photos", "head"):
+        assert getattr(first, field) == getattr(second, field), field
+
+
+@pytest.mark.parametrize("name", ["capture/photos/4_back.png", "capture/masks/0_front.png"])
+def test_a_changed_input_is_named(out: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """One line says which file has changed; --force takes it as it is, a missing one is missing."""
+    file = out.parent / name
+    file.write_bytes(
+        file.with_name(file.name.replace("4_back", "3_back-left")).read_bytes() + b"\0"
+    )
+    words = ["rerun", str(out / RECORD), "-o", str(out.parent / "again"), "--quiet"]
+    assert main(words) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"hairkit: {file}: changed since")
+    assert said.count("\n") == 1
+    assert main([*words, "--force"]) == 0
+    file.unlink()
+    assert main([*words, "--force"]) == 2
+    assert f"{file}: no such file" in capsys.readouterr().err
+
+
+def test_the_scene_names_the_photo_of_every_view(out: Path) -> None:
+    """Each camera of scene.json says which file it belongs to."""
+    views = json.loads((out / "scene.json").read_text())["views"]
+    photos = sorted(path.name for path in (out.parent / "capture" / "photos").iterdir())
+    assert [view["photo"] for view in views] == photos
+    assert all(view["photo"].endswith(f"_{view['name']}.png") for view in views)
+
+
+def test_other_versions_are_told(out: Path) -> None:
+    """Whatever is of another version than in the record has a line."""
+    document = json.loads((out / RECORD).read_text())
+    document["libraries"]["numpy"] = "1.0"
+    document["hairkit"] = "0.0.1"
+    write_text(out / RECORD, json.dumps(document))
+    record = read_record(out / RECORD)
+    lines = changed_versions(record, Manager.loaded(record.plugin_files()))
+    assert [line.partition(":")[0] for line in lines] == ["hairkit", "numpy"]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"run_record": 99}', '{"run_record": 1}'])
+def test_what_is_no_record_is_refused(tmp_path: Path, text: str) -> None:
+    """A file of anything else gives one line that names it."""
+    (tmp_path / RECORD).write_text(text)
+    with pytest.raises(FormatError, match=str(tmp_path / RECORD)):
+        read_record(tmp_path / RECORD)
+
+
+def test_a_run_on_objects_cannot_be_brought_back(tmp_path: Path) -> None:
+    """Photos and heads that were never files are said to be missing."""
+    manager = Manager()
+    manager.register(ball_plugin, "ball_plugin")
+    recipe = parse_recipe(RECIPE.encode(), "ball", "test")
+    reconstruct(turn_capture(), tmp_path, recipe, manager, head=ball_head(), sheet=False)
+    with pytest.raises(InputError, match="photos of this run were given as objects"):
+        rerun(tmp_path / RECORD, tmp_path / "again")
