@@ -13,6 +13,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `rendering`: pictures without a window
 * `field`: methods on volumes
 * `io`: files
+* `nets`: networks of others, run in a process of their own
 * `simulation`: contract of simulators, motion, wind
 * `grooming`: methods on strands and grooms
 * `synth`: procedural hair

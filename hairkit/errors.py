@@ -35,5 +35,9 @@ class MissingExtraError(HairkitError, ImportError):
     """An optional dependency is not installed; the text names the pip command that installs it."""
 
 
+class ModelError(HairkitError, RuntimeError):
+    """A neural network's file is not what it should be, or the network cannot be run."""
+
+
 class RenderError(HairkitError, RuntimeError):
     """No OpenGL context could be created, or drawing failed."""

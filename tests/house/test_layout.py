@@ -22,7 +22,7 @@ FLOORS = (
     ("errors", "arrays", "colour", "options", "storage", "progress", "parallel"),
     ("types",),
     ("cameras", "imaging", "helices", "head_model", "rendering"),
-    ("field", "io"),
+    ("field", "io", "nets"),
     ("simulation", "grooming", "synth", "hookspecs"),
     ("manager", "testing"),
     ("pipeline", "evaluation"),

