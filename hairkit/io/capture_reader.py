@@ -1,4 +1,4 @@
-"""Reading a capture: a folder of eight photos, with masks, strokes and landmarks where present.
+"""Reading a capture: a folder of photos, with masks, strokes and landmarks where present.
 
 Either the photos lie in the folder itself, or in its `photos/` beside `masks/`, `strokes/` and
 `landmarks.json`; these are matched by name. An optional `capture.toml` says more (`capture_file`).
@@ -11,7 +11,7 @@ import os
 import re
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,17 +37,23 @@ TURN = {
 }
 """The nominal turn: view names and azimuths in degrees, in the order in which photos are taken."""
 
+TOP_DEG = 60.0
+"""Elevation of the view `top`, which may be added to the turn: from the front, looking down."""
+
+NAMES = (*TURN, "top")
+"""Names by which photos tell what they show."""
+
+FEWEST, MOST = 3, 36
+"""Numbers of photos: three go around a head, and more than one every 10 degrees add nothing."""
+
 WORKING_EDGE = 1440
 """Long edge in pixels that photos are scaled down to."""
-
-SMALLEST_SHARE = 0.85
-"""Least width and height of the smallest photo, as a share of the largest: it may be cropped."""
 
 _PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png")
 _OTHER_SUFFIXES = (".heic", ".heif", ".webp", ".tif", ".tiff", ".bmp", ".gif", ".dng", ".avif")
 _LANDMARKS = 68
 _MAX_LANDMARK_BYTES = 2**22
-"""68 points of eight views are some 20 kB of JSON."""
+"""68 points of a view are some 2.5 kB of JSON."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +63,10 @@ class _Place:
     photo: Path
     name: str
     azimuth_deg: float
-    entry: ViewEntry
+    elevation_deg: float = 0.0
+    entry: ViewEntry | None = None
+    named: bool = True
+    """False when only the order of the files tells the view."""
 
 
 def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> Capture:
@@ -66,26 +75,26 @@ def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> 
     Parameters
     ----------
     path
-        The capture's folder. Photos without names of views are the nominal turn in file order.
+        The capture's folder. Photos without names of views are an even turn in file order until
+        the stage `turn` finds out from where they were taken.
     max_edge
         Photos whose long edge has more pixels are scaled down to it.
 
     Raises
     ------
     InputError
-        There are not eight photos, one cannot be read or has another size than the rest, or masks,
-        strokes or landmarks do not belong to the photos.
+        There are fewer than 3 or more than 36 photos, one cannot be read, or masks, strokes or
+        landmarks do not belong to the photos.
     """
     folder = Path(path)
     if not folder.is_dir():
         reason = "not a folder" if folder.exists() else "no such folder"
-        raise InputError(f"{folder}: {reason}, expected a folder with {len(TURN)} photos")
+        raise InputError(f"{folder}: {reason}, expected a folder of photos")
     photo_folder = folder / "photos" if (folder / "photos").is_dir() else folder
     settings = read_capture_file(folder / "capture.toml")
-    photos = _photos(photo_folder, folder)
+    photos = _photos(photo_folder)
     places = _places(photos, settings, photo_folder)
     headers = [read_header(place.photo) for place in places]
-    _check_sizes(places, headers)
     masks = _beside(folder / "masks", ".png", places)
     for place, header in zip(places, headers, strict=True):
         _check_mask(masks.get(place.photo.stem), header)
@@ -107,22 +116,18 @@ def sample_folder() -> Path:
     return Path(__file__).parents[1] / "sample"
 
 
-def _photos(photo_folder: Path, folder: Path) -> list[Path]:
-    """Return the eight photos in natural file order: `2.jpg` before `10.jpg`."""
+def _photos(photo_folder: Path) -> list[Path]:
+    """Return the photos in natural file order: `2.jpg` before `10.jpg`."""
     names = [entry for entry in photo_folder.iterdir() if not entry.name.startswith(".")]
     pictures = [p for p in names if p.suffix.lower() in _PHOTO_SUFFIXES + _OTHER_SUFFIXES]
     pictures.sort(key=lambda p: [int(s) if s.isdigit() else s for s in _digits(p.name.lower())])
     for picture in pictures:
         if picture.suffix.lower() in _OTHER_SUFFIXES:
             raise InputError(f"{picture}: expected JPEG or PNG photos; save it as one of these")
-    if len(pictures) != len(TURN):
-        stems = {p.stem for p in pictures}
-        drawn = [*folder.glob("masks/*.png"), *folder.glob("strokes/*.json")]
-        missing = sorted({p.stem for p in drawn} - stems)
-        hint = f"; the photo {missing[0]!r} is missing" if missing else ""
+    if not FEWEST <= len(pictures) <= MOST:
         raise InputError(
-            f"{photo_folder}: {len(pictures)} photos, expected {len(TURN)}: the whole turn,"
-            f" 45 degrees apart{hint}"
+            f"{photo_folder}: {len(pictures)} photos, expected {FEWEST} to {MOST} from all around"
+            f" the head; {len(TURN)}, 45 degrees apart, are usual"
         )
     return pictures
 
@@ -137,20 +142,32 @@ def _places(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> li
     if settings.views:
         return _match_views(photos, settings, photo_folder)
     named = [_view_name(photo) for photo in photos]
-    if not set(named) & set(TURN):
-        named = list(TURN)
+    if not set(named) & set(NAMES):
+        return [_unnamed(photo, index, len(photos)) for index, photo in enumerate(photos)]
     for photo, name in zip(photos, named, strict=True):
-        if name not in TURN:
-            raise InputError(f"{photo}: {unknown_name('view', name, TURN)}; rename the photo")
+        if name not in NAMES:
+            raise InputError(f"{photo}: {unknown_name('view', name, NAMES)}; rename the photo")
         if named.count(name) > 1:
             raise InputError(f"{photo}: there are two photos of the view {name!r}; remove one")
     by_name = dict(zip(named, photos, strict=True))
-    return [_Place(by_name[name], name, azimuth, ViewEntry()) for name, azimuth in TURN.items()]
+    return [_Place(by_name[name], name, *_direction(name)) for name in NAMES if name in by_name]
+
+
+def _direction(name: str) -> tuple[float, float]:
+    """Return azimuth and elevation of a named view, degrees."""
+    return (TURN[name], 0.0) if name in TURN else (0.0, TOP_DEG)
+
+
+def _unnamed(photo: Path, index: int, count: int, entry: ViewEntry | None = None) -> _Place:
+    """Return the place of a photo in an even turn in file order."""
+    name = list(TURN)[index] if count == len(TURN) else f"view-{index + 1}"
+    azimuth = 360.0 * index / count
+    return _Place(photo, name, azimuth, entry=entry, named=False)
 
 
 def _match_views(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> list[_Place]:
     """Match the views of capture.toml with photos, by file name, by view name, or in order."""
-    by_name = {key: p for p in photos for key in (_view_name(p), p.stem, p.name)}
+    by_name = {key: p for p in photos for key in (_view_name(p), p.stem, p.name) if key}
     places = []
     if len(settings.views) != len(photos):
         count = len(settings.views)
@@ -162,12 +179,7 @@ def _match_views(photos: list[Path], settings: CaptureFile, photo_folder: Path) 
             raise InputError(
                 f"{photo_folder / str(wanted)}: no such photo; {settings.source} names it"
             )
-        name = entry.name or list(TURN)[index]
-        azimuth = TURN.get(name) if entry.azimuth_deg is None else entry.azimuth_deg
-        if azimuth is None:
-            reason = unknown_name("view", name, TURN)
-            raise InputError(f"{settings.source}: {reason}; or give its azimuth_deg")
-        places.append(_Place(photo, name, azimuth, entry))
+        places.append(_said_place(photo, index, entry, settings))
     for thing in ([place.photo.name for place in places], [place.name for place in places]):
         twice = next((item for item in thing if thing.count(item) > 1), None)
         if twice is not None:
@@ -175,25 +187,25 @@ def _match_views(photos: list[Path], settings: CaptureFile, photo_folder: Path) 
     return places
 
 
+def _said_place(photo: Path, index: int, entry: ViewEntry, settings: CaptureFile) -> _Place:
+    """Return the place of a photo as a `[[views]]` table says it."""
+    usual = _unnamed(photo, index, len(settings.views), entry)
+    own = _view_name(photo) if _view_name(photo) in NAMES else None
+    if not (entry.name or own) and entry.azimuth_deg is None:
+        return replace(usual, elevation_deg=entry.elevation_deg or 0.0)
+    name = entry.name or own or usual.name
+    if entry.azimuth_deg is None and name not in NAMES:
+        reason = unknown_name("view", name, NAMES)
+        raise InputError(f"{settings.source}: {reason}; or give its azimuth_deg")
+    azimuth, elevation = _direction(name) if name in NAMES else (0.0, 0.0)
+    azimuth = azimuth if entry.azimuth_deg is None else entry.azimuth_deg
+    elevation = elevation if entry.elevation_deg is None else entry.elevation_deg
+    return _Place(photo, name, azimuth, elevation, entry)
+
+
 def _view_name(photo: Path) -> str:
     """Return the view that a photo's name tells: `0_Front.jpg` shows `front`."""
     return re.sub(r"^\d+[-_. ]*", "", photo.stem).lower().replace("_", "-").replace(" ", "-")
-
-
-def _check_sizes(places: list[_Place], headers: list[PhotoHeader]) -> None:
-    """Raise `InputError` for the photo whose size differs most from the others', beyond cropping.
-
-    The size of most photos is the median of their edges.
-    """
-    sizes = np.array([(header.width, header.height) for header in headers])
-    if (sizes.min(axis=0) >= SMALLEST_SHARE * sizes.max(axis=0)).all():
-        return
-    usual = np.sort(sizes, axis=0)[len(sizes) // 2]
-    odd = int(np.abs(np.log(sizes / usual)).max(axis=1).argmax())
-    raise InputError(
-        f"{places[odd].photo}: {sizes[odd, 0]} x {sizes[odd, 1]} pixels, most photos have"
-        f" {usual[0]} x {usual[1]}; take all photos at the same size"
-    )
 
 
 def _beside(folder: Path, suffix: str, places: list[_Place]) -> dict[str, Path]:
@@ -267,7 +279,7 @@ def _view(
     image, header = read_photo(place.photo, max_edge)
     height, width = image.shape[:2]
     scale = np.array([width / header.width, height / header.height])
-    focal = _focal(place.entry, settings, header)
+    focal = _focal(place.entry or ViewEntry(), settings, header)
     return View(
         place.name,
         place.azimuth_deg,
@@ -278,6 +290,8 @@ def _view(
         strokes_path=strokes,
         photo_path=place.photo,
         photo_size=(header.width, header.height),
+        elevation_deg=place.elevation_deg,
+        named=place.named,
     )
 
 

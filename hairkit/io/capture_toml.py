@@ -6,10 +6,11 @@ focal_mm_equivalent = 47.8       # 35 mm equivalent, by the diagonal; or focal_p
 scale = 1.05
 rotation_deg = [0, 5, 0]         # about x, then y, then z
 translation_m = [0, 0.01, 0]
-[[views]]                        # eight of these, in the order of the photos
+[[views]]                        # one for each photo, in the order of the files
 name = "front"
 photo = "IMG_0412.jpg"
 azimuth_deg = 0                  # towards the subject's left
+elevation_deg = 0                # from above
 focal_px = 1492
 """
 
@@ -49,6 +50,7 @@ class ViewEntry:
     name: str | None = option(None, doc="Name of the view.")
     photo: str | None = option(None, doc="File name of its photo.")
     azimuth_deg: float | None = option(None, low=-360, high=360, doc="Azimuth.", unit="deg")
+    elevation_deg: float | None = option(None, low=-90, high=90, doc="Elevation.", unit="deg")
     focal_px: float | None = option(None, low=1, high=1e6, doc="Focal length.", unit="px")
     focal_mm_equivalent: float | None = option(None, low=8, high=2000, doc="Same.", unit="mm")
 

@@ -100,7 +100,10 @@ def empty_mask(folder: Path) -> None:
 
 WRONG = {
     "no such folder": (shutil.rmtree, []),
-    "7 photos, expected 8": (lambda f: (f / "photos" / "4_back.png").unlink(), []),
+    "2 photos, expected 3 to 36": (
+        lambda f: [p.unlink() for p in (f / "photos").glob("[2-7]*")],
+        [],
+    ),
     "not a picture": (lambda f: (f / "photos" / "4_back.png").write_text("hello"), []),
     "no pixel is marked as hair": (empty_mask, ["--set", "segment=mask_files"]),
     "no recipe 'best'": (None, ["--recipe", "best"]),

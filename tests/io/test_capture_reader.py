@@ -117,15 +117,14 @@ def spoil_photo(folder: Path, content: bytes) -> None:
 
 WRONG = {
     "no such folder": lambda f: shutil.rmtree(f),
-    "7 photos, expected 8.*the photo '4_back' is missing": lambda f: (
-        f / "photos" / "4_back.png"
-    ).unlink(),
-    "9 photos, expected 8": lambda f: write_grey(
-        f / "photos" / "9.png", np.zeros((128, 96), np.uint8)
-    ),
+    "4_back.png: no photo '4_back'": lambda f: (f / "photos" / "4_back.png").unlink(),
+    "2 photos, expected 3 to 36": lambda f: [p.unlink() for p in (f / "photos").glob("[2-7]*")],
+    "37 photos, expected 3 to 36": lambda f: [
+        write_grey(f / "photos" / f"{n}.png", np.zeros((8, 8), np.uint8)) for n in range(10, 39)
+    ],
     "4_back.png: not a picture, expected a JPEG or PNG": lambda f: spoil_photo(f, b"hello"),
     "4_back.png: an empty file": lambda f: spoil_photo(f, b""),
-    "4_back.png: 60 x 40 pixels, most photos have 96 x 128": lambda f: write_grey(
+    "4_back.png: 96 x 128 pixels, its photo has 60 x 40": lambda f: write_grey(
         f / "photos" / "4_back.png", np.zeros((40, 60), np.uint8)
     ),
     "no view 'frnt' .did you mean 'front'": lambda f: (f / "photos" / "0_front.png").rename(
@@ -176,25 +175,50 @@ def test_wrong_input_gets_one_line(tmp_path: Path, reason: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@given(
-    odd=st.integers(0, 7),
-    size=st.sampled_from([(128, 96), (60, 80), (160, 160), (96, 50), (300, 400)]),
-    crops=st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=8, max_size=8),
-)
-@settings(max_examples=30)
-def test_the_photo_of_another_size_is_blamed(
-    tmp_path_factory: pytest.TempPathFactory,
-    odd: int,
-    size: tuple[int, int],
-    crops: list[tuple[int, int]],
+@pytest.mark.parametrize("count", [3, 5, 12, 36])
+def test_photos_without_names_are_an_even_turn_in_file_order(tmp_path: Path, count: int) -> None:
+    """3 to 36 photos are read; their views are marked as not named, each has a name of its own."""
+    for number in range(count):
+        write_grey(tmp_path / f"IMG_{number + 5}.png", np.full((20, 20), number, np.uint8))
+    views = read_capture(tmp_path).views
+    assert [view.azimuth_deg for view in views] == [360.0 * i / count for i in range(count)]
+    assert [int(view.image[0, 0, 0]) for view in views] == list(range(count))
+    assert not any(view.named for view in views)
+    assert len({view.name for view in views}) == count
+
+
+def test_names_of_some_views_are_enough(tmp_path: Path) -> None:
+    """Named photos may be fewer than eight; `top` is seen from above; all are marked as named."""
+    for name in ("left", "right", "back", "top", "front"):
+        write_grey(tmp_path / f"{name}.png", np.zeros((20, 20), np.uint8))
+    views = read_capture(tmp_path).views
+    assert [view.name for view in views] == ["front", "left", "back", "right", "top"]
+    assert [view.elevation_deg for view in views] == [0, 0, 0, 0, 60]
+    assert all(view.named for view in views)
+
+
+def test_capture_toml_names_what_it_says(tmp_path: Path) -> None:
+    """A table with an azimuth names its view, and tells the elevation; an empty one names none."""
+    for number in range(3):
+        write_grey(tmp_path / f"{number}.png", np.zeros((20, 20), np.uint8))
+    tables = "[[views]]\nazimuth_deg = 70\nelevation_deg = 20\n[[views]]\n[[views]]\nname='back'"
+    (tmp_path / "capture.toml").write_text(tables)
+    views = read_capture(tmp_path).views
+    assert [view.named for view in views] == [True, False, True]
+    assert (views[0].azimuth_deg, views[0].elevation_deg) == (70, 20)
+    assert views[2].azimuth_deg == 180
+
+
+@given(sizes=st.lists(st.tuples(st.integers(8, 90), st.integers(8, 90)), min_size=3, max_size=9))
+@settings(max_examples=20)
+def test_every_photo_has_a_size_of_its_own(
+    tmp_path_factory: pytest.TempPathFactory, sizes: list[tuple[int, int]]
 ) -> None:
-    """Seven photos of about one size and one of another, turned, larger or smaller: that one."""
+    """Photos of any sizes, upright and lying, are read as they are."""
     folder = tmp_path_factory.mktemp("sizes")
-    for number, (across, down) in enumerate(crops):
-        width, height = size if number == odd else (96 - across, 128 - down)
+    for number, (width, height) in enumerate(sizes):
         write_grey(folder / f"b{number}.png", np.zeros((height, width), np.uint8))
-    with pytest.raises(InputError, match=rf"b{odd}\.png: {size[0]} x {size[1]} pixels, most"):
-        read_capture(folder)
+    assert [view.photo_size for view in read_capture(folder).views] == sizes
 
 
 def test_a_head_pose_is_a_similarity() -> None:

@@ -1,0 +1,226 @@
+"""What single photos and pairs of them show of the turn: outlines, skin, copies.
+
+All pictures are upright. Lengths are in head widths, so that photos of different sizes, lenses and
+distances can be compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from hairkit.arrays import BoolArray, Float64Array, UInt8Array
+from hairkit.types.face import Face
+
+PERSON_LEVEL = 127
+"""Probability, of 255, above which a pixel is the person's."""
+DEPTHS = np.linspace(0.02, 1.3, 48)
+"""Depths below the crown at which outlines are compared, head widths: crown to collar."""
+WIDTH_DEPTHS = (0.35, 0.7)
+"""The head's width is the median between these depths, head widths."""
+WIDTH_ROUNDS = 20
+"""Most rounds until width and depths agree: they settle within five."""
+STRETCHES = np.linspace(0.85, 1.18, 9)
+"""Scales tried between two outlines: heads are nearer in one photo than in the other."""
+SHIFTS = np.array([-0.05, -0.025, 0.0, 0.025, 0.05])
+"""Vertical shifts tried, head widths."""
+SHOULDER = 1.35
+"""Shoulders begin where the outline is this many head widths wide."""
+HEAD_DEPTH = 1.25
+"""Depth below the crown down to which skin is looked for, head widths: the chin."""
+SKIN_BLUR_PX, SKIN_EDGE = 1.0, 240
+"""Gaussian of the photo in which skin is looked for, and the long edge it is scaled down to."""
+SKIN_FLOOR = 0.02
+"""Added to colours, of 1, before their logarithm: sensor noise."""
+SKIN_SLACK = np.diag([0.003, 0.003, 0.1])
+"""Added to the covariance of skin's log chromaticity (2) and log brightness: white balance is
+8 % and exposure 0.5 stops off from photo to photo."""
+SKIN_WIDTH = 2.0
+"""Spreads at which a pixel counts 0.6 as skin."""
+SKIN_OUTLIER = 1.5
+"""Log colours farther than this from the median are eyes or glints."""
+FACE_POINTS = np.r_[17:68]
+"""iBUG points whose hull is skin: all but the jaw, which may lie under hair."""
+EYES_AND_MOUTH = (np.r_[36:42], np.r_[42:48], np.r_[48:60])
+"""iBUG points of what is no skin inside."""
+THUMBNAIL, THUMBNAIL_BLUR = 32, 1.0
+"""Edge of the grey thumbnails in which copies are recognised, and their Gaussian, pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The silhouette of a head, down to the collar."""
+
+    width_px: float
+    """Width of the head in the photo."""
+    top_px: float
+    """Row of the crown."""
+    middle_px: float
+    """Column of the head's middle."""
+    edges: Float64Array
+    """(48, 2) left and right edge at `DEPTHS`, head widths from the head's middle."""
+    shoulder: float
+    """Depth of the shoulders below the crown, head widths; inf where the picture shows none."""
+    inside: BoolArray
+    """(H, W) the person, without other things that were taken for persons."""
+
+
+def trace_outline(alpha: UInt8Array) -> Outline | None:
+    """Return the outline of the largest person in a probability (H, W), None where nobody is."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(
+        (alpha > PERSON_LEVEL).astype(np.uint8)
+    )
+    if count < 2:
+        return None
+    inside = labels == 1 + stats[1:, cv2.CC_STAT_AREA].argmax()
+    rows = np.nonzero(inside.any(1))[0]
+    left = inside.argmax(1)[rows].astype(np.float64)
+    right = inside.shape[1] - inside[:, ::-1].argmax(1)[rows].astype(np.float64)
+    width = _head_width(right - left)
+    if width < 2:
+        return None
+    depth = (rows - rows[0]) / width
+    middle = float(np.median(((left + right) / 2)[_between(depth, *WIDTH_DEPTHS)]))
+    edges = np.stack([np.interp(DEPTHS, depth, (side - middle) / width) for side in (left, right)])
+    wide = (right - left > SHOULDER * width) & (depth > WIDTH_DEPTHS[1])
+    shoulder = float(depth[wide.argmax()]) if wide.any() else np.inf
+    return Outline(width, float(rows[0]), middle, edges.T, shoulder, inside)
+
+
+def _between(depth: Float64Array, low: float, high: float) -> BoolArray:
+    found: BoolArray = np.asarray((depth >= low) & (depth <= high))
+    return found if found.any() else np.asarray(depth == depth[np.abs(depth - low).argmin()])
+
+
+def _head_width(widths: Float64Array) -> float:
+    """Return the median width between the depths that are measured in this very width."""
+    width = float(np.median(widths[: max(2, len(widths) // 4)]))
+    for _ in range(WIDTH_ROUNDS):
+        first, last = (int(depth * width) for depth in WIDTH_DEPTHS)
+        if first >= len(widths):
+            break
+        found = float(np.median(widths[first : max(last, first + 2)]))
+        if abs(found - width) < 1:
+            break
+        width = found
+    return width
+
+
+def compare_outlines(outlines: Sequence[Outline]) -> tuple[Float64Array, Float64Array]:
+    """Return distances (V, V) of outlines from each other, and from each other's mirror images.
+
+    Mean absolute difference of the edges, head widths, after the best scale and shift. Views from
+    opposite sides mirror each other; neighbours are alike.
+    """
+    count = len(outlines)
+    edges = np.array([outline.edges for outline in outlines])
+    variants = np.array([_variants(each) for each in edges])
+    alike, mirrored = np.zeros((count, count)), np.zeros((count, count))
+    for i in range(count):
+        alike[i] = _distance(variants, edges[i])
+        mirrored[i] = _distance(variants, -edges[i, :, ::-1])
+    return (alike + alike.T) / 2, (mirrored + mirrored.T) / 2
+
+
+def _variants(edges: Float64Array) -> Float64Array:
+    """Return (9 * 5, 48, 2) an outline at all scales and shifts."""
+    found = [
+        np.stack([np.interp(DEPTHS / s + d, DEPTHS, side) * s for side in edges.T], axis=1)
+        for s in STRETCHES
+        for d in SHIFTS
+    ]
+    return np.array(found)
+
+
+def _distance(variants: Float64Array, edges: Float64Array) -> Float64Array:
+    """Return distances (V,) of outlines, each at all its scales, from one."""
+    off = variants - edges
+    off = off - np.median(off, axis=(2, 3), keepdims=True)
+    nearest: Float64Array = np.abs(off).mean(axis=(2, 3)).min(axis=1)
+    return nearest
+
+
+def measure_skin(
+    photos: Sequence[UInt8Array], outlines: Sequence[Outline], faces: Sequence[Face]
+) -> Float64Array | None:
+    """Return (V, 2): share of the head that is skin, and its sideways moment in head widths.
+
+    Skin is what has the colour of the sure faces' cheeks. Its share falls from the front to the
+    back; its moment is negative from the subject's left, where the face lies on the left. None
+    without a sure face.
+    """
+    samples = [_cheeks(p, f) for p, f in zip(photos, faces, strict=True) if f.sure]
+    samples = [sample for sample in samples if len(sample)]
+    if not samples:
+        return None
+    colour = np.concatenate(samples)
+    usual = np.median(colour, axis=0)
+    near = (np.abs(colour - usual) < SKIN_OUTLIER).all(1)
+    precision = np.asarray(np.linalg.inv(np.cov((colour[near] - usual).T) + SKIN_SLACK), np.float64)
+    return np.array([
+        _skin_moments(photo, outline, usual, precision)
+        for photo, outline in zip(photos, outlines, strict=True)
+    ])  # fmt: skip
+
+
+def _log_colour(image: UInt8Array) -> Float64Array:
+    """Return log(red / green), log(blue / green) and log(green) of RGB."""
+    log = np.log(image / 255 + SKIN_FLOOR)
+    return np.stack([log[..., 0] - log[..., 1], log[..., 2] - log[..., 1], log[..., 1]], axis=-1)
+
+
+def _cheeks(photo: UInt8Array, face: Face) -> Float64Array:
+    """Return log colours (N, 3) of the skin of a face."""
+    small, scale = _shrink(photo)
+    points = (face.landmarks * scale).astype(np.float32)
+    skin = np.zeros(small.shape[:2], np.uint8)
+    for chosen, value in ((FACE_POINTS, 1), *((part, 0) for part in EYES_AND_MOUTH)):
+        hull = cv2.convexHull(points[chosen]).astype(np.int32)
+        cv2.fillConvexPoly(skin, hull, value)
+    return _log_colour(small[skin > 0])
+
+
+def _shrink(photo: UInt8Array) -> tuple[UInt8Array, float]:
+    """Return a smooth small copy of a photo and its scale."""
+    scale = min(1.0, SKIN_EDGE / max(photo.shape[:2]))
+    size = (max(1, round(photo.shape[1] * scale)), max(1, round(photo.shape[0] * scale)))
+    small = cv2.resize(photo, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.GaussianBlur(small, (0, 0), SKIN_BLUR_PX), np.uint8), scale
+
+
+def _skin_moments(
+    photo: UInt8Array, outline: Outline, usual: Float64Array, precision: Float64Array
+) -> Float64Array:
+    small, scale = _shrink(photo)
+    size = (small.shape[1], small.shape[0])
+    inside = cv2.resize(outline.inside.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+    rows, columns = np.nonzero(inside)
+    head = rows < (outline.top_px + HEAD_DEPTH * outline.width_px) * scale
+    rows, columns = rows[head], columns[head]
+    off = _log_colour(small[rows, columns]) - usual
+    squared = np.einsum("ni,ij,nj->n", off, precision, off)
+    skin = np.exp(-squared / (2 * SKIN_WIDTH))
+    sideways = (columns - columns.mean()) / (outline.width_px * scale)
+    return np.array([skin.mean(), (skin * sideways).mean()])
+
+
+def thumbnails_alike(photos: Sequence[UInt8Array]) -> Float64Array:
+    """Return the correlation (V, V) of small grey copies of the photos: copies of one are alike."""
+    small = [
+        cv2.GaussianBlur(
+            cv2.resize(
+                cv2.cvtColor(photo, cv2.COLOR_RGB2GRAY),
+                (THUMBNAIL, THUMBNAIL),
+                interpolation=cv2.INTER_AREA,
+            ).astype(np.float64),
+            (0, 0),
+            THUMBNAIL_BLUR,
+        ).ravel()
+        for photo in photos
+    ]
+    table = np.array(small) - np.mean(small, axis=1, keepdims=True)
+    table = table / np.maximum(np.linalg.norm(table, axis=1, keepdims=True), 1e-9)
+    return np.asarray(table @ table.T, np.float64)

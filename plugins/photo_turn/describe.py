@@ -1,0 +1,112 @@
+"""Names of views, their order in the turn, and the line that tells the user what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hairkit import View
+from hairkit.arrays import BoolArray, Float64Array, Int64Array
+from hairkit.io.capture_reader import TURN
+
+from .arrangement import wrap
+from .refuse import photo_name
+
+UNSURE = 1.3
+"""Margin below which the summary says that another arrangement fits nearly as well."""
+NAMED_DEG = 40.0
+"""The photos of a turn of eight are named in order if each is less than this off its view."""
+TOP = "top"
+"""Name of photos from above."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """From where the photos were taken, and how that is known."""
+
+    azimuth_deg: Float64Array
+    """(V,)."""
+    elevation_deg: Float64Array
+    """(V,)."""
+    above: BoolArray
+    """(V,) true for photos from above, which are no part of the turn."""
+    margin: float
+    named: BoolArray
+    """(V,) true for photos that keep the name they came with."""
+    note: str = ""
+    """How it was found, for the user; empty for a turn in the order of the files."""
+
+
+def in_turn_order(found: Found) -> Int64Array:
+    """Return the photos (V,) from the front on towards the subject's left, then from above."""
+    azimuth = np.where(found.above, np.inf, np.abs(wrap(found.azimuth_deg)))
+    first = found.azimuth_deg[azimuth.argmin()]
+    along = np.where(found.above, 360.0, 0.0) + (found.azimuth_deg - first) % 360.0
+    return np.argsort(along, kind="stable").astype(np.int64)
+
+
+def name_views(views: Sequence[View], found: Found, order: Int64Array) -> tuple[str, ...]:
+    """Return a name for every photo: the one it had if it was named, or that of its direction."""
+    nominal = np.array(list(TURN.values()))
+    ring = order[~found.above[order]]
+    off = wrap(found.azimuth_deg[ring][:, None] - nominal)
+    nearest = np.abs(off).argmin(axis=1)
+    if len(ring) == len(TURN) and np.abs(np.diagonal(off)).max() < NAMED_DEG:
+        nearest = np.arange(len(TURN))
+    names = [TOP] * len(views)
+    for i, direction in zip(ring, nearest, strict=True):
+        names[i] = list(TURN)[direction]
+    names = [v.name if k else n for v, n, k in zip(views, names, found.named, strict=True)]
+    return tuple(_number_twins(names, order))
+
+
+def _number_twins(names: list[str], order: Int64Array) -> list[str]:
+    """Return the names with -2, -3, ... after those that occurred before in the order."""
+    taken: set[str] = set()
+    for i in order:
+        name, count = names[i], 2
+        while name in taken:
+            name, count = f"{names[i]}-{count}", count + 1
+        taken.add(name)
+        names[i] = name
+    return names
+
+
+def summarise(
+    views: Sequence[View],
+    found: Found,
+    names: Sequence[str],
+    turns: Int64Array,
+    twins: Sequence[tuple[int, int]],
+) -> str:
+    """Return one line: direction, steps, margin, and everything that is unusual."""
+    ring = np.nonzero(~found.above)[0]
+    steps = wrap(np.diff(found.azimuth_deg[ring], append=found.azimuth_deg[ring[0]]))
+    side = "left" if np.median(steps) > 0 else "right"
+    sizes = np.diff(np.sort(found.azimuth_deg[ring] % 360.0))
+    parts = [
+        f"turn to the subject's {side}, steps {sizes.min():.0f} to {sizes.max():.0f} degrees",
+        *_tell_photos(views, found, names),
+    ]
+    if np.isfinite(found.margin):
+        parts.append(f"margin {found.margin:.2f}")
+        if found.margin < UNSURE:
+            parts.append("unsure: another arrangement fits nearly as well")
+    if found.note:
+        parts.append(found.note)
+    if turns.any():
+        parts.append(f"{np.count_nonzero(turns)} photos lie on their side and are turned")
+    parts += [f"{photo_name(views[j])} equals {photo_name(views[i])}" for i, j in twins]
+    return "; ".join(parts)
+
+
+def _tell_photos(views: Sequence[View], found: Found, names: Sequence[str]) -> list[str]:
+    """Return which photos are the front, the sides, the back and from above, if not named so."""
+    shown = ("front", "left", "right", "back", TOP)
+    return [
+        f"{photo_name(view)} is {'from above' if name == TOP else 'the ' + name}"
+        for view, name, kept in zip(views, names, found.named, strict=True)
+        if name in shown and not kept
+    ]

@@ -1,0 +1,102 @@
+"""What is no turn around one head is refused, each with the photo and the reason."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hairkit import View
+from hairkit.arrays import Float64Array
+from hairkit.errors import InputError
+
+from .appearance import thumbnails_alike
+from .arrangement import Placed, wrap
+
+COPIES, TWINS = 0.9, 0.97
+"""Correlation of thumbnails: the median over all pairs above which all photos are copies of one,
+and that of a pair above which two are. Different photos of a turn correlate by 0.3 to 0.75 in the
+median and by 0.953 at most; copies with other exposure, cropped by 4 %, by 0.94 to 0.997."""
+BACK_DEG = 100.0
+"""Some photo is taken from within this of the back."""
+OFF_DEG, NAMED_OFF_DEG = 45.0, 50.0
+"""Faces farther than this from where the turn, or a photo's name, has them contradict it."""
+FRONTAL_DEG = 50.0
+"""Faces are mistaken for others beyond this yaw."""
+DISTINCT_MOMENT = 0.02
+"""Sideways moment of skin in oblique views, head widths, from which on it tells the back from the
+sides; that of bald men does not."""
+SIDE_SHARE, SIDE_MOMENT = 0.55, 0.5
+"""Photos of the side show at least these shares of the front's skin and of its largest moment."""
+
+
+def photo_name(view: View) -> str:
+    """Return how a user calls a photo: its file's name."""
+    return view.photo_path.name if view.photo_path is not None else view.name
+
+
+def find_copies(views: Sequence[View]) -> list[tuple[int, int]]:
+    """Return pairs of equal photos; `InputError` when all photos are copies of one."""
+    alike = thumbnails_alike([view.image for view in views])
+    first, second = np.triu_indices(len(views), 1)
+    pairs = alike[first, second]
+    if len(pairs) and np.median(pairs) > COPIES:
+        i, j = first[pairs.argmax()], second[pairs.argmax()]
+        raise InputError(
+            f"{photo_name(views[j])}: a copy of {photo_name(views[i])}, as most of the"
+            f" {len(views)} photos are; take photos from all around the head"
+        )
+    return [(int(first[pair]), int(second[pair])) for pair in np.nonzero(pairs > TWINS)[0]]
+
+
+def contradicting(yaw_deg: Float64Array, azimuth_deg: Float64Array) -> int | None:
+    """Return the photo whose face contradicts its name most plainly, or None."""
+    off = np.abs(wrap(np.where(np.abs(yaw_deg) <= FRONTAL_DEG, yaw_deg - azimuth_deg, 0.0)))
+    return int(off.argmax()) if off.max() > NAMED_OFF_DEG else None
+
+
+def check_turn(
+    views: Sequence[View], placed: Placed, yaw_deg: Float64Array, skin: Float64Array | None
+) -> None:
+    """Raise `InputError` when the best arrangement is no turn around one head."""
+    _check_back(views, placed)
+    if skin is not None:
+        _check_sides(views, placed, yaw_deg, skin)
+    off = np.where(np.abs(yaw_deg) <= FRONTAL_DEG, np.abs(placed.off_deg), 0.0)
+    if off.max() > OFF_DEG:
+        worst = int(off.argmax())
+        raise InputError(
+            f"{photo_name(views[worst])}: its face is turned by {yaw_deg[worst]:.0f} degrees, where"
+            f" the other photos leave room at {yaw_deg[worst] - placed.off_deg[worst]:.0f};"
+            " give photos of one turn around one head"
+        )
+
+
+def _check_back(views: Sequence[View], placed: Placed) -> None:
+    """Refuse photos that are all from the front."""
+    ring = np.nonzero(~placed.above)[0]
+    last = int(ring[np.abs(placed.azimuth_deg[ring]).argmax()])
+    if abs(placed.azimuth_deg[last]) < 180.0 - BACK_DEG:
+        _refuse_back(views, last, f"at about {abs(placed.azimuth_deg[last]):.0f} degrees")
+
+
+def _check_sides(
+    views: Sequence[View], placed: Placed, yaw_deg: Float64Array, skin: Float64Array
+) -> None:
+    """Refuse turns whose photos without a face all show as much skin as the side of a head."""
+    faces = np.isfinite(yaw_deg) & ~placed.above
+    others = ~faces & ~placed.above
+    share, moment = skin[:, 0], np.abs(skin[:, 1])
+    largest = moment[faces].max()
+    if not others.any() or largest < DISTINCT_MOMENT:
+        return
+    sides = (share > SIDE_SHARE * share[faces].max()) & (moment > SIDE_MOMENT * largest)
+    if sides[others].all():
+        _refuse_back(views, int(np.nonzero(others)[0][share[others].argmin()]), "from the side")
+
+
+def _refuse_back(views: Sequence[View], nearest: int, where: str) -> None:
+    raise InputError(
+        f"{photo_name(views[nearest])}: of {len(views)} photos this is nearest to the back of the"
+        f" head, and it is {where}; add photos from behind"
+    )

@@ -1,0 +1,246 @@
+"""Laws of the found turn: it depends on what the photos show, not on their order or position."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hairkit_plugins.photo_turn import find_turn
+from hairkit_plugins.photo_turn.arrangement import Placed, wrap
+from hairkit_plugins.photo_turn.refuse import check_turn
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hairkit import Camera, Capture, View
+from hairkit.arrays import Float64Array
+from hairkit.cameras.depth_raster import head_depth
+from hairkit.errors import InputError
+from hairkit.head_model.template import default_head
+from hairkit.types.face import Face
+from hairkit.types.person import Person
+from hairkit.types.turnaround import Turnaround
+
+WIDTH, HEIGHT = 150, 200
+SKIN, HAIR = (220, 170, 140), (60, 40, 30)
+EIGHT = tuple(45.0 * i for i in range(8))
+CARELESS = (-12.0, -39.0, -96.0, -144.0, -168.0, 129.0, 91.0, 39.0)
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A photo with what detectors find in it."""
+
+    view: View
+    face: Face
+    person: Person
+    azimuth_deg: float
+
+
+_SHOTS: dict[tuple[float, float], Shot] = {}
+
+
+def shoot(azimuth: float, elevation: float = 0.0) -> Shot:
+    """Return a photo of the default head: the face is skin, all behind the ears is hair."""
+    key = (azimuth, elevation)
+    if key not in _SHOTS:
+        _SHOTS[key] = _shoot(azimuth, elevation)
+    return _SHOTS[key]
+
+
+def _shoot(azimuth: float, elevation: float) -> Shot:
+    head = default_head()
+    camera = Camera.on_turn(
+        azimuth, elevation_deg=elevation, distance=0.8, target=[0.0, -0.03, 0.0], focal=350.0,
+        width=WIDTH, height=HEIGHT,
+    )  # fmt: skip
+    depth = head_depth(head, camera)
+    inside = np.isfinite(depth)
+    pixels = np.stack(np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5), axis=-1)
+    local = camera.unproject(pixels[inside], depth[inside])
+    image = np.full((HEIGHT, WIDTH, 3), 200, np.uint8)
+    image[inside] = np.where((local[:, 2] > 0.02)[:, None] & (local[:, 1:2] < 0.08), SKIN, HAIR)
+    seed = round(7 * azimuth + elevation) % 1000
+    wall = np.random.default_rng(seed).integers(60, 250, (8, 6, 3)).astype(np.uint8)
+    room = cv2.resize(wall, (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC)
+    image[~inside] = room[~inside]
+    face = Face.absent()
+    yaw = float(wrap(np.array(azimuth)))
+    if abs(yaw) < 52 and elevation < 40:
+        marks = camera.project(head.vertices[head.landmark_vertices].astype(np.float64))
+        face = Face(1.0, marks, np.full(68, 2.0), yaw + 2, elevation - 1, 0.0)
+    photo = View("x", 0.0, image, named=False)
+    return Shot(photo, face, Person(np.where(inside, 255, 0).astype(np.uint8)), yaw)
+
+
+def ring(azimuths: Sequence[float]) -> list[Shot]:
+    """Return level photos, seen from these azimuths."""
+    return [shoot(float(azimuth)) for azimuth in azimuths]
+
+
+def find(shots: Sequence[Shot]) -> Turnaround:
+    """Run the plugin on photos in this order, named IMG_0.jpg and so on."""
+    views = tuple(
+        replace(s.view, name=f"view-{i}", azimuth_deg=360.0 * i / len(shots))
+        if not s.view.named
+        else s.view
+        for i, s in enumerate(shots)
+    )
+    views = tuple(replace(v, photo_path=Path(f"IMG_{i}.jpg")) for i, v in enumerate(views))
+    return find_turn(Capture(views), tuple(s.face for s in shots), tuple(s.person for s in shots))
+
+
+def off(turn: Turnaround, shots: Sequence[Shot]) -> Float64Array:
+    """Return by how many degrees each photo's azimuth is wrong."""
+    true = np.array([shot.azimuth_deg for shot in shots])
+    return np.abs(wrap(turn.azimuth_deg - true))
+
+
+@pytest.mark.parametrize("azimuths", [EIGHT, CARELESS], ids=["even", "careless"])
+@given(first=st.integers(0, 7), reverse=st.booleans())
+@settings(max_examples=16, deadline=None)
+def test_neither_direction_nor_first_photo_matters(
+    azimuths: tuple[float, ...], first: int, reverse: bool
+) -> None:
+    """Photos turned the other way, from any first one, are put in the same order and places."""
+    shots = ring(azimuths)
+    moved = np.roll(np.arange(8), first)[:: -1 if reverse else 1]
+    want, got = find(shots), find([shots[i] for i in moved])
+    assert off(want, shots).max() < 25
+    assert np.array_equal(moved[got.order], want.order)
+    assert np.allclose(wrap(got.azimuth_deg - want.azimuth_deg[moved]), 0, atol=1e-6)
+    assert [got.names[k] for k in got.order] == [want.names[k] for k in want.order]
+
+
+@given(seed=st.integers(0, 999))
+@settings(max_examples=5, deadline=None)
+def test_shuffled_photos_are_sorted(seed: int) -> None:
+    """Photos in no order are put into the order of the turn."""
+    shots = ring(CARELESS)
+    moved = np.random.default_rng(seed).permutation(8)
+    found = find([shots[i] for i in moved])
+    assert off(found, [shots[i] for i in moved]).max() < 25
+
+
+@pytest.mark.parametrize("turns", [1, 2, 3])
+def test_photos_lying_on_their_side_are_turned(turns: int) -> None:
+    """Pictures that all lie on one side, or stand on the head, come upright at the same places."""
+    shots = ring(EIGHT)
+    lying = []
+    for shot in shots:
+        person = Person(np.rot90(shot.person.alpha, turns))
+        face = replace(shot.face, quarter_turns=turns) if shot.face.sure else shot.face
+        if shot.face.sure:
+            face = replace(shot.face.turned(-turns % 4, WIDTH, HEIGHT), quarter_turns=turns)
+        lying.append(Shot(shot.view.turned(-turns), face, person, shot.azimuth_deg))
+    found = find(lying)
+    assert found.quarter_turns.tolist() == [turns] * 8
+    assert np.array_equal(found.azimuth_deg, find(shots).azimuth_deg)
+    assert "on their side" in found.summary
+
+
+@pytest.mark.parametrize("count", [4, 5, 6, 10, 12, 24, 36])
+def test_any_number_of_photos_is_placed(count: int) -> None:
+    """Even turns of 4 to 36 photos are found, begun anywhere."""
+    shots = ring(np.round(np.arange(count) * 360 / count + 360 / count * 0.3))
+    shots = shots[count // 3 :] + shots[: count // 3]
+    found = find(shots)
+    assert off(found, shots).max() < 15
+    assert len(set(found.names)) == count
+
+
+@pytest.mark.parametrize("place", [0, 3, 8])
+def test_a_photo_from_above_is_told_apart(place: int) -> None:
+    """One photo from above, anywhere among eight level ones, leaves their places as they are."""
+    shots = ring(EIGHT)
+    shots.insert(place, shoot(5.0, 62.0))
+    found = find(shots)
+    assert found.order[-1] == place
+    assert found.elevation_deg[place] > 40
+    assert np.delete(off(found, shots), place).max() < 10
+    assert found.names[place] == "top"
+
+
+def test_the_elevation_of_the_ring_is_that_of_the_faces() -> None:
+    """A turn photographed from above the head is placed there, photos without faces too."""
+    shots = [shoot(azimuth, 18.0) for azimuth in EIGHT]
+    assert (find(shots).elevation_deg > 7).all()
+    assert (np.abs(find(ring(EIGHT)).elevation_deg) < 3).all()
+
+
+def named(shots: Sequence[Shot], azimuths: Sequence[float]) -> list[Shot]:
+    """Return the photos with views that a user named."""
+    return [
+        replace(shot, view=replace(shot.view, name=f"n{i}", azimuth_deg=a, named=True))
+        for i, (shot, a) in enumerate(zip(shots, azimuths, strict=True))
+    ]
+
+
+def test_names_are_believed() -> None:
+    """Views that are named keep their azimuths and names, also when they are not even."""
+    azimuths = [azimuth + 9 for azimuth in EIGHT]
+    found = find(named(ring(EIGHT), azimuths))
+    assert found.azimuth_deg.tolist() == azimuths
+    assert found.names == tuple(f"n{i}" for i in range(8))
+
+
+def test_names_that_faces_contradict_are_not() -> None:
+    """Left and right confused: the faces are believed, and the summary names a wrong photo."""
+    shots = named(ring(EIGHT), [-azimuth for azimuth in EIGHT])
+    found = find(shots)
+    assert off(found, shots).max() < 10
+    assert "is no view 'n" in found.summary
+    assert "the faces are believed" in found.summary
+
+
+def test_without_faces_the_order_stays_and_the_summary_says_so() -> None:
+    """Where no model looked, an unnamed turn is taken as read, with a word about it."""
+    shots = [replace(s, face=Face.absent(), person=Person.absent()) for s in ring(EIGHT[::-1])]
+    found = find(shots)
+    assert np.allclose(found.azimuth_deg, EIGHT)
+    assert "nobody checked" in found.summary
+
+
+def copies() -> list[Shot]:
+    """Eight copies of one photo, some brighter."""
+    shot = shoot(0.0)
+    brighter = np.clip(shot.view.image * 1.2, 0, 255).astype(np.uint8)
+    return [
+        replace(shot, view=replace(shot.view, image=brighter if i % 2 else shot.view.image))
+        for i in range(8)
+    ]
+
+
+REFUSED = {
+    "a copy of IMG_": copies,
+    "add photos from behind": lambda: ring([-20, -10, 0, 10, 20, 30]),
+    "nearest to the back": lambda: ring([-50, -25, 0, 25, 50]),
+}
+
+
+@pytest.mark.parametrize("reason", REFUSED)
+def test_what_is_no_turn_is_refused(reason: str) -> None:
+    """One line names a photo and says why."""
+    with pytest.raises(InputError, match=reason) as caught:
+        find(REFUSED[reason]())
+    assert "IMG_" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_face_far_from_its_place_is_refused() -> None:
+    """Where a face looks elsewhere than the best turn has it, that photo is no part of the turn."""
+    views = [shot.view for shot in ring(EIGHT)]
+    nowhere = np.zeros(8, np.bool_)
+    yaw, away = np.full(8, np.nan), np.zeros(8)
+    yaw[5], away[5] = 10.0, 60.0
+    with pytest.raises(InputError, match="turned by 10 degrees.*room at -50"):
+        check_turn(views, Placed(wrap(np.array(EIGHT)), nowhere, away, 9.0), yaw, None)
+
+
+def test_two_equal_photos_are_told() -> None:
+    """One repeated photo is no harm: the summary names the pair."""
+    shots = ring(EIGHT)
+    assert "IMG_8.jpg equals IMG_0.jpg" in find([*shots, shots[0]]).summary
