@@ -236,7 +236,7 @@ def test_a_face_far_from_its_place_is_refused() -> None:
     nowhere = np.zeros(8, np.bool_)
     yaw, away = np.full(8, np.nan), np.zeros(8)
     yaw[5], away[5] = 10.0, 60.0
-    with pytest.raises(InputError, match="turned by 10 degrees.*room at -50"):
+    with pytest.raises(InputError, match=r"turned by 10 degrees.*room at -50"):
         check_turn(views, Placed(wrap(np.array(EIGHT)), nowhere, away, 9.0), yaw, None)
 
 
