@@ -14,7 +14,7 @@ DISPLAYS := xvfb
 
 .PHONY: test test-clients demo lint docs matrix bench clean
 
-test: $(VENV)/.tests
+test: $(VENV)/.tests $(VENV)/.models
 	@sh .ci/libraries $(DISPLAYS)
 	@sh .ci/validator $(CLIENTS)
 	$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/clients
@@ -23,7 +23,7 @@ test-clients: $(VENV)/.tests $(CLIENTS)/.blender
 	@sh .ci/validator $(CLIENTS)
 	$(BIN)/python -m pytest -n auto --dist worksteal tests/clients tests/plugins
 
-demo: $(VENV)/.hairkit
+demo: $(VENV)/.hairkit $(VENV)/.models
 	$(BIN)/hairkit reconstruct hairkit/sample -o $(DEMO)
 	@echo "Your hair is in $(DEMO)/: look at $(DEMO)/contact_sheet.png, open groom.glb (head and"
 	@echo "hair) or groom.abc (strands) in Blender, groom.apx in HairWorks, or move it here:"
@@ -59,6 +59,11 @@ $(VENV)/.python:
 $(VENV)/.hairkit: $(VENV)/.python pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
 	@touch $@
+
+$(VENV)/.models: $(VENV)/.hairkit hairkit/nets/known_models.py
+	@if $(BIN)/hairkit models install >/dev/null; then touch $@; else \
+	  echo "the networks could not be installed: faces and persons are not found, and tests that" >&2; \
+	  echo "need networks are skipped; get them by hand: $(BIN)/hairkit models --help" >&2; fi
 
 $(VENV)/.tests: $(VENV)/.hairkit $(wildcard $(EXAMPLE)/*.*)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'

@@ -19,7 +19,7 @@ from typing import Any
 import cv2
 import numpy as np
 from hairkit_plugins.face_mesh import MODELS, Options, find_face
-from hairkit_plugins.face_mesh.crops import crop_around, find_mesh, wobble
+from hairkit_plugins.face_mesh.crops import find_mesh, refine_crop, wobble
 from hairkit_plugins.face_mesh.detector import detect
 from hairkit_plugins.face_mesh.head_angles import measure_angles
 from hairkit_plugins.face_mesh.landmark_table import (
@@ -108,8 +108,8 @@ def _samples(folder: Path) -> list[Sample]:
         if abs(azimuth) > WIDEST_DEG:
             continue
         image, nets = _read(photo), shared_nets()
-        first, _ = find_mesh(image, [detect(image, [0], 0.0, nets)[0].crop()], nets)
-        crop = crop_around(first[0])
+        crop = detect(image, [0], 0.0, nets)[0].crop()
+        crop = refine_crop(image, refine_crop(image, crop, nets), nets)
         meshes, _ = find_mesh(image, wobble(crop, Options().crops), nets)
         halves = np.median(np.array(np.split(meshes, 2)), axis=1)
         seen = camera.project(points)

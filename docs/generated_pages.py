@@ -73,6 +73,8 @@ def front_door() -> str:
 def plugin_page(info: PluginInfo) -> str:
     """Return the page of a plugin: docstring, hooks, file format, options."""
     lines = [f"# {info.name}", "", _docstring(info), "", f"Hooks: {_hooks(info)}."]
+    if info.models:
+        lines += ["", f"[Networks](../models.md): {', '.join(f'`{m}`' for m in info.models)}."]
     if info.format is not None:
         lines += ["", "## File format", "", *_format_rows(info)]
     lines += ["", "## Options", ""]

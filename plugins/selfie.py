@@ -24,7 +24,7 @@ from hairkit.nets.tflite_header import read_input_shape
 from hairkit.options import option
 from hairkit.types.person import Person
 
-MODEL = "selfie_segmentation"
+MODELS = ("selfie_segmentation",)
 _SUM_TOLERANCE = 1e-2
 """Channels that are probabilities add up to one within this."""
 
@@ -41,7 +41,7 @@ class Options:
 @hookimpl
 def segment_person(view: View, options: Options) -> Person | None:
     """Return the probability of the person in every pixel, None without a network."""
-    path = options.model or find_model(MODEL)
+    path = options.model or find_model(*MODELS)
     if path is None:
         return None
     return Person(find_person(view.image, path, shared_nets()))

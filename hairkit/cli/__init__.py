@@ -11,6 +11,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `export`: write a groom for an engine
 * `format_table`: the table of file formats
 * `info`: what a file holds
+* `models`: networks that plugins use
 * `new_plugin`: a plugin to start from
 * `plugins`: list of plugins and options
 * `reconstruct`: photos to groom
@@ -52,6 +53,7 @@ VERBS = {
     "simulate": "simulate a groom, its head shaken and in wind",
     "info": "print what a file contains",
     "plugins": "list the plugins, or describe one",
+    "models": "list the networks that plugins use, or install them",
     "new-plugin": "start a plugin of your own",
     "doctor": "check this machine and print what to install",
 }

@@ -19,6 +19,9 @@ from typing import Any, Literal
 
 from hairkit import __version__
 from hairkit.manager import Manager
+from hairkit.nets.install import is_intact
+from hairkit.nets.known_models import KNOWN_MODELS
+from hairkit.nets.model_folder import model_folder
 
 _DESCRIPTION = """\
 Example: hairkit doctor
@@ -79,6 +82,7 @@ def examine() -> Iterator[Finding]:
     yield from _graphics()
     yield from (_extra(extra, names) for extra, names in extras.items())
     yield _kernel_cache()
+    yield _networks()
     yield from _plugins()
 
 
@@ -170,6 +174,15 @@ def _kernel_cache() -> Finding:
             continue
     cure = "so Numba refuses to compile; set NUMBA_CACHE_DIR to a writable folder"
     return Finding("compiled kernels", "FAIL", f"{folders[0]} cannot be written, {cure}")
+
+
+def _networks() -> Finding:
+    """Check for the networks that plugins use, by hash."""
+    missing = [model.name for model in KNOWN_MODELS if not is_intact(model)]
+    if missing:
+        text = f"not there: {', '.join(missing)}; hairkit models install"
+        return Finding("networks", "note", text)
+    return Finding("networks", "ok", f"{len(KNOWN_MODELS)} in {model_folder()}")
 
 
 def _plugins() -> Iterator[Finding]:

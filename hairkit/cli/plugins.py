@@ -68,6 +68,8 @@ def _details(info: PluginInfo) -> str:
     if info.broken:
         return "\n".join([*lines, f"broken: {info.broken}"])
     lines.append(f"stages: {', '.join(info.stages) or 'none'}")
+    if info.models:
+        lines.append(f"networks: {', '.join(info.models)}")
     if info.notifications:
         lines.append(f"listens to: {', '.join(info.notifications)}")
     lines.append("options:" if info.options else "no options")

@@ -21,6 +21,7 @@ from hairkit import hookspecs
 from hairkit.errors import PluginError
 from hairkit.io.file_format import FileFormat
 from hairkit.manager.results import STAGES
+from hairkit.nets.known_models import known_model
 from hairkit.options import OptionInfo, describe, make_options, unknown_name
 
 ENTRY_POINT_GROUP = "hairkit"
@@ -53,6 +54,8 @@ class PluginInfo:
     """Full name of the module that the plugin is, or in which its class is defined."""
     format: FileFormat | None = None
     """File format that it reads or writes, from the module's `FORMAT`."""
+    models: tuple[str, ...] = ()
+    """Networks that it uses when they are installed, from the module's `MODELS`."""
     broken: str | None = None
     """Why the plugin cannot be used, or None."""
 
@@ -122,6 +125,7 @@ def inspect_plugin(plugin: object, name: str, distribution: str, version: str) -
         source=Path(file) if file else None,
         module=getattr(plugin, "__module__", getattr(plugin, "__name__", "")),
         format=form,
+        models=tuple(known_model(model).name for model in getattr(plugin, "MODELS", ())),
     )
 
 

@@ -7,6 +7,7 @@ plugins.
 * `health`: figures that tell how good a run is
 * `module_digest`: digests of the code that made a cached result
 * `open_groom`: grooms by any name that a user may give
+* `own_head`: landmarks for a head that has none
 * `recipe`: which plugin does each stage, with which options
 * `reconstruct`: a whole run
 * `rerun`: a run once more, from its record

@@ -29,6 +29,7 @@ from typing import Any
 
 from hairkit.errors import HairkitError, InputError, OptionError
 from hairkit.manager import Manager
+from hairkit.nets.model_folder import missing_models
 from hairkit.options import split_setting, unknown_name
 from hairkit.pipeline.module_digest import module_digest
 from hairkit.storage import read_bytes
@@ -214,7 +215,8 @@ def stage_digest(manager: Manager, stage: Stage) -> str:
     """Return a hex digest of plugins, versions and options: equal digests, equal behaviour.
 
     Options are taken with their defaults filled in; a file that an option names counts with its
-    content. A plugin counts with its distribution and with every module that it imports.
+    content. A plugin counts with its distribution, with every module that it imports and with the
+    networks that it finds installed.
     """
     digest = hashlib.sha256(stage.hook.encode())
     for choice in stage.choices:
@@ -222,12 +224,20 @@ def stage_digest(manager: Manager, stage: Stage) -> str:
         info = manager.info(choice.plugin)
         code = module_digest(info.module)
         digest.update(f"\n{choice.plugin} {info.origin} {code}".encode())
+        digest.update(f"\nwithout {missing_models(info.models)}".encode())
         for field in dataclasses.fields(options) if options is not None else ():
             value = getattr(options, field.name)
             digest.update(f"\n{field.name}={value!r}".encode())
             if isinstance(value, Path) and value.is_file():
                 digest.update(hashlib.sha256(value.read_bytes()).digest())
     return digest.hexdigest()
+
+
+def missing_networks(recipe: Recipe, manager: Manager) -> dict[str, tuple[str, ...]]:
+    """Return the networks that plugins of a recipe would use but that are not installed."""
+    choices = [choice for stage in recipe.stages for choice in stage.choices]
+    missing = {c.plugin: missing_models(manager.info(c.plugin).models) for c in choices}
+    return {plugin: names for plugin, names in missing.items() if names}
 
 
 def _stage(table: str, content: object, source: str) -> Stage:

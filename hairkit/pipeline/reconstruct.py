@@ -21,7 +21,8 @@ from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.health import RED, Figure, assess
-from hairkit.pipeline.recipe import Recipe, load_recipe
+from hairkit.pipeline.own_head import mark_head
+from hairkit.pipeline.recipe import Recipe, load_recipe, missing_networks
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.run_record import RECORD, describe_run, finish_record
 from hairkit.pipeline.stage_runner import Argument, Given, StageRunner, completed
@@ -109,9 +110,17 @@ def reconstruct(
     with work, ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool:
         run = StageRunner(recipe, manager, work, log, pool)
         _sweep(folder, run)
+        _tell_missing(recipe, manager, log)
         try:
             capture, turn = _find_views(run, given, log)
-            made = _grow(run, capture, _head(head), guides, seed, turn)
+            made = _grow(
+                run,
+                capture,
+                mark_head(_head(head), recipe, manager, log.message),
+                guides,
+                seed,
+                turn,
+            )
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -127,6 +136,14 @@ def reconstruct(
         whole = finish_record(record, [*outputs, folder / SHEET], log.stages, made.health)
         whole.write(folder / RECORD)
     return made.groom
+
+
+def _tell_missing(recipe: Recipe, manager: Manager, log: RunLog) -> None:
+    """Say in one line which plugins work without their networks."""
+    missing = missing_networks(recipe, manager)
+    if missing:
+        plugins = " and ".join(missing)
+        log.message(f"no networks for {plugins}, results are worse; hairkit models install")
 
 
 def _head(head: Head | HeadFile | None) -> Head:

@@ -31,7 +31,7 @@ from hairkit.nets.net_process import NetProcess, shared_nets
 from hairkit.options import option
 from hairkit.types.face import Face
 
-from .crops import Crop, crop_around, find_mesh, wobble
+from .crops import Crop, crop_around, find_mesh, refine_crop, wobble
 from .detector import FULL_RANGE, SHORT_RANGE, Detection, detect
 from .head_angles import measure_angles
 from .landmark_table import MESH, noise_of, pick_landmarks
@@ -74,7 +74,10 @@ def find_face(image: UInt8Array, options: Options, nets: NetProcess) -> Face:
         upright = abs(_roll(around, found.quarter_turns)) < np.radians(_UPRIGHT_DEG)
         if upright and found.score * presence[0] > best_score:
             best, best_score = (found, around), float(found.score * presence[0])
-    return Face.absent() if best is None else _settle(image, *best, options, nets)
+    if best is None:
+        return Face.absent()
+    found, around = best
+    return _settle(image, found, refine_crop(image, around, nets), options, nets)
 
 
 def _roll(crop: Crop, quarter_turns: int) -> float:

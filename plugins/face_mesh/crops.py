@@ -21,10 +21,12 @@ MARGIN = 1.5
 RIGHT_EYE, LEFT_EYE = 33, 263
 """Mesh points at the outer corners of the subject's eyes."""
 _WOBBLES = (
-    (0.0, 0.0, 1.0), (0.04, 0.02, 1.08), (-0.04, 0.03, 0.94), (0.02, -0.04, 1.0),
-    (-0.02, -0.02, 1.04), (0.03, 0.0, 0.97), (-0.03, 0.04, 1.0), (0.0, -0.03, 1.08),
+    (0.0, 0.0, 1.0, 0.0), (0.04, 0.02, 1.08, 6.0), (-0.04, 0.03, 0.94, -6.0),
+    (0.02, -0.04, 1.0, 3.0), (-0.02, -0.02, 1.04, -3.0), (0.03, 0.0, 0.97, -6.0),
+    (-0.03, 0.04, 1.0, 6.0), (0.0, -0.03, 1.08, 0.0),
 )  # fmt: skip
-"""Shifts across and down, in edges of the crop, and zooms: within what the detector itself errs."""
+"""Shifts right and down in edges of the crop, zooms, and clockwise turns in degrees: what the
+detector itself errs by."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +61,26 @@ def crop_around(mesh: Float64Array) -> Crop:
     return Crop((float(x), float(y)), MARGIN * float((high - low).max()), angle)
 
 
+def refine_crop(image: UInt8Array, crop: Crop, nets: NetProcess) -> Crop:
+    """Return the crop around the mesh that is found in a crop."""
+    return crop_around(find_mesh(image, [crop], nets)[0][0])
+
+
 def wobble(crop: Crop, count: int) -> list[Crop]:
-    """Return `count` shifted and zoomed copies of a crop, then their mirror images."""
-    across = np.array([np.cos(crop.angle), np.sin(crop.angle)]) * crop.size
-    down = np.array([-across[1], across[0]])
-    copies = []
-    for right, below, zoom in _WOBBLES[:count]:
-        x, y = crop.centre + right * across + below * down
-        copies.append(replace(crop, centre=(float(x), float(y)), size=zoom * crop.size))
-    return copies + [replace(copy, mirrored=True) for copy in copies]
+    """Return `count` shifted and zoomed copies of a crop, then their mirror images.
+
+    The mirror images are those that the mirrored photo would give.
+    """
+    copies = [replace(crop, mirrored=mirrored) for mirrored in (False, True) for _ in range(count)]
+    return [_moved(copy, *_WOBBLES[k % count]) for k, copy in enumerate(copies)]
+
+
+def _moved(crop: Crop, right: float, below: float, zoom: float, turn_deg: float) -> Crop:
+    """Return a crop shifted to its own right and down by shares of its edge, zoomed and turned."""
+    turn = np.radians(-turn_deg if crop.mirrored else turn_deg)
+    x, y = crop.matrix() @ [EDGE * (right + 0.5), EDGE * (below + 0.5), 1.0]
+    angle = crop.angle + float(turn)
+    return replace(crop, centre=(float(x), float(y)), size=zoom * crop.size, angle=angle)
 
 
 def find_mesh(

@@ -29,7 +29,7 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     ),
 }
 """Constants and arguments that make a program quick. CAPTURES is a folder with one capture."""
-ELSEWHERE = {"blender_picture", "export", "fidelity", "simulation"}
+ELSEWHERE = {"blender_picture", "export", "face_landmarks", "fidelity", "simulation"}
 """Programs with tests of their own beside this one, or that need Blender."""
 
 
@@ -77,7 +77,9 @@ def test_it_prints_its_table(
     assert rows[0].count("|") == rows[2].count("|")
 
 
-@pytest.mark.parametrize("name", ["cameras", "orientation", "segmentation", "fidelity"])
+@pytest.mark.parametrize(
+    "name", ["cameras", "face_landmarks", "orientation", "segmentation", "fidelity"]
+)
 def test_captures_are_named_by_the_user(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

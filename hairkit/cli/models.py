@@ -1,0 +1,60 @@
+"""`hairkit models [list | install]`: the networks that plugins use, and how to get them."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from typing import Any
+
+from hairkit.errors import InputError
+from hairkit.nets.install import install_models, is_intact
+from hairkit.nets.known_models import KNOWN_MODELS, KnownModel
+from hairkit.nets.model_folder import VARIABLE, model_folder
+
+_DESCRIPTION = f"""\
+Example: hairkit models install
+
+List the networks that plugins use, or install them: all, or those named. They are taken out of
+pinned packages of the Python index (42 MB are downloaded, 3 MB kept, no package is installed), or
+out of FILE_OR_FOLDER: .tflite files or these packages' wheels. {VARIABLE} names another folder for
+them. Everything works without them, less well."""
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser("models", help="list or install", description=_DESCRIPTION)
+    parser.add_argument(
+        "action", nargs="?", choices=("list", "install"), default="list", help="list by default"
+    )
+    parser.add_argument("names", nargs="*", metavar="NAME", help="networks to install (all)")
+    parser.add_argument(
+        "--from", dest="source", metavar="FILE_OR_FOLDER", help="take them from here"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the table of networks, or install some and print their paths."""
+    if args.action == "list":
+        if args.names or args.source:
+            raise InputError("hairkit models list takes no name and no --from; say install")
+        print(json.dumps([_facts(m) for m in KNOWN_MODELS], indent=1) if args.json else _table())
+        return 0
+    paths = [str(path) for path in install_models(args.names, args.source)]
+    print(json.dumps(paths, indent=1) if args.json else "\n".join(paths))
+    return 0
+
+
+def _facts(model: KnownModel) -> dict[str, Any]:
+    return {**asdict(model), "installed": is_intact(model)}
+
+
+def _table() -> str:
+    rows = [
+        f"{model.name:<28} {'installed' if is_intact(model) else '-':<10}"
+        f" {model.size / 1e6:4.1f} MB  {model.licence:<20} {model.purpose};"
+        f" from {model.wheel.requirement}"
+        for model in KNOWN_MODELS
+    ]
+    return "\n".join([f"in {model_folder()}", *rows])
