@@ -62,13 +62,17 @@ if TYPE_CHECKING:
     from hairkit.pipeline.reconstruct import reconstruct
     from hairkit.types.camera import Camera
     from hairkit.types.capture import Capture, View
+    from hairkit.types.face import Face
     from hairkit.types.groom import Groom, HairMaterial, HairPhysics
     from hairkit.types.head import Capsules, Head, Roots
-    from hairkit.types.mask import Mask
+    from hairkit.types.mask import Mask, Masks
     from hairkit.types.orientation import OrientationMap
+    from hairkit.types.parting import Parting
+    from hairkit.types.person import Person
     from hairkit.types.point_cache import PointCache
     from hairkit.types.scene import Scene
     from hairkit.types.strands import Strands
+    from hairkit.types.turnaround import Turnaround
     from hairkit.types.volume import Hull, OrientationField, ScalpDistance, VoxelGrid
     from hairkit.types.waves import Waves
 
@@ -78,6 +82,7 @@ __all__ = [
     "Camera",
     "Capsules",
     "Capture",
+    "Face",
     "Groom",
     "HairMaterial",
     "HairPhysics",
@@ -86,14 +91,18 @@ __all__ = [
     "Hull",
     "Manager",
     "Mask",
+    "Masks",
     "OrientationField",
     "OrientationMap",
+    "Parting",
+    "Person",
     "PointCache",
     "Recipe",
     "Roots",
     "ScalpDistance",
     "Scene",
     "Strands",
+    "Turnaround",
     "View",
     "VoxelGrid",
     "Waves",
@@ -133,13 +142,17 @@ _HOMES = {
     "pipeline.reconstruct": ("reconstruct",),
     "types.camera": ("Camera",),
     "types.capture": ("Capture", "View"),
+    "types.face": ("Face",),
     "types.groom": ("Groom", "HairMaterial", "HairPhysics"),
     "types.head": ("Capsules", "Head", "Roots"),
-    "types.mask": ("Mask",),
+    "types.mask": ("Mask", "Masks"),
     "types.orientation": ("OrientationMap",),
+    "types.parting": ("Parting",),
+    "types.person": ("Person",),
     "types.point_cache": ("PointCache",),
     "types.scene": ("Scene",),
     "types.strands": ("Strands",),
+    "types.turnaround": ("Turnaround",),
     "types.volume": ("Hull", "OrientationField", "ScalpDistance", "VoxelGrid"),
     "types.waves": ("Waves",),
 }

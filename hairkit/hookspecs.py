@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from hairkit.types.head import Head, Roots
     from hairkit.types.mask import Mask, Masks
     from hairkit.types.orientation import OrientationMap
+    from hairkit.types.parting import Parting
     from hairkit.types.person import Person
     from hairkit.types.scene import Scene
     from hairkit.types.strands import Strands
@@ -97,6 +98,7 @@ def solve_field(
     hull: Hull,
     waves: Waves,
     scalp_distance: ScalpDistance,
+    parting: Parting,
     options: Any,
 ) -> OrientationField | None:
     """Fuse the 2D orientations of all views into 3D and fill the rest of the hull."""
@@ -112,6 +114,7 @@ def track(
     roots: Roots,
     waves: Waves,
     scalp_distance: ScalpDistance,
+    parting: Parting,
     options: Any,
 ) -> Strands | None:
     """Grow one strand from every root; strand s belongs to root s."""

@@ -21,6 +21,7 @@ from hairkit.types.groom import Groom
 from hairkit.types.head import Capsules, Head, Roots
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
@@ -81,9 +82,10 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
         "field": combed_field(hull.grid),
         "waves": Waves(),
         "scalp_distance": measure_scalp_distance(scene.head, hull),
+        "parting": Parting(),
         "roots": scalp_roots(scene.head),
     }
-    seen, derived = ("scene", "masks", "orientations"), ("waves", "scalp_distance")
+    seen, derived = ("scene", "masks", "orientations"), ("waves", "scalp_distance", "parting")
     wanted = {
         "detect_landmarks": ("view",),
         "segment_person": ("view",),

@@ -7,6 +7,10 @@ cell's depth behind the first hair the view sees ("see-through"). D D^T is diffu
 certainty (Paris et al. 2008; thesis 5.4); near the scalp, where photos show little, a weak prior
 gives the direction in which hair leaves the head. A potential that grows with the distance from the
 scalp through the hair later tells a strand's root from its tip.
+
+On the crown, which level photos see at a grazing angle, long hair is combed from its parting
+(`hairkit.field.parting`). Photos of tight curls show no strand direction (`hairkit.imaging.waves`):
+there the field is the prior alone, and the tracker winds the strands about it.
 """
 
 from __future__ import annotations
@@ -20,6 +24,7 @@ from hairkit import (
     Mask,
     OrientationField,
     OrientationMap,
+    Parting,
     ScalpDistance,
     Scene,
     Waves,
@@ -53,6 +58,9 @@ class Options(FusionOptions):
     scalp_lift: float = option(
         0.6, low=0, high=5, doc="Outward part of the prior against its tangential part."
     )
+    parting_weight: float = option(
+        0.15, low=0, high=10, doc="Weight of the comb from the parting in the hair on the crown."
+    )
     tip_share: float = option(
         0.6,
         low=0.05,
@@ -70,15 +78,23 @@ def solve_field(
     hull: Hull,
     waves: Waves,
     scalp_distance: ScalpDistance,
+    parting: Parting,
     options: Options,
 ) -> OrientationField:
     """Fuse the views, add the scalp prior, diffuse over the loose hull."""
     growth = growth_potential(hull, scalp_distance, options.tip_share)
     fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options, options.min_views)
+    tensor, certainty = fused.tensor, fused.certainty
+    if waves.curly:
+        certainty = np.zeros_like(certainty)
     prior = ScalpPrior(
-        options.scalp_weight, options.scalp_reach, options.scalp_lift, options.scalp == "normal"
+        1.0 if waves.curly else options.scalp_weight,
+        np.inf if waves.curly else options.scalp_reach,
+        options.scalp_lift,
+        options.scalp == "normal",
+        options.parting_weight,
     )
-    data, weight = add_scalp_prior(scene.head, hull, growth, fused.tensor, fused.certainty, prior)
+    data, weight = add_scalp_prior(scene.head, hull, growth, tensor, certainty, prior, parting)
     if options.hard:
         weight = np.where(weight > 0, HARD_WEIGHT, 0).astype(np.float32)
     solved = solve_screened(

@@ -13,8 +13,10 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.field.parting import comb_from_parting, crown_share, root_lift
 from hairkit.parallel import compiled
 from hairkit.types.head import Head
+from hairkit.types.parting import Parting
 from hairkit.types.volume import Hull, ScalpDistance, VoxelGrid, outer_products
 
 WHORL_BEHIND = 0.03
@@ -25,6 +27,8 @@ LEAST_WHORL = 0.05
 """Share of the direction from the crown in long hair, which decides where the flow vanishes."""
 SHORT_HAIR, LONG_HAIR = 0.03, 0.1
 """Lengths in metres: shorter hair is combed from the crown, longer hair along the potential."""
+PARTED_HAIR = 0.09
+"""Longest way through the hair, in metres, from which hair is combed from a parting."""
 TIP_SLOPE = 0.2
 """Slope of the growth potential among the tips; 1 before them."""
 FLOW_SMOOTHING = 2.0
@@ -38,13 +42,19 @@ LEAST_CHANGE = 1e-7
 
 
 def combing_direction(
-    head: Head, hull: Hull, growth: Float32Array, points: npt.ArrayLike, lift: float
+    head: Head,
+    hull: Hull,
+    growth: Float32Array,
+    points: npt.ArrayLike,
+    lift: float,
+    parting: Parting,
 ) -> Float64Array:
     """Return unit directions (N, 3), root to tip, of hair on the scalp near points (N, 3).
 
     Long hair: the tangential part of the growth potential's gradient. Hair shorter than
     `SHORT_HAIR`, which ends everywhere: `WHORL_SLOPE` away from the crown's axis and 1 down. In
-    between a blend; made unit, plus `lift` times the outward normal.
+    between a blend; made unit, plus `lift` times the outward normal. On the crown of long hair
+    with a parting, `comb_from_parting` takes the place of the gradient.
     """
     at = np.asarray(points, np.float64)
     outward = gradient(hull.grid, hull.head_distance, at)
@@ -54,11 +64,20 @@ def combing_direction(
     share = _long_share(length)
     combed = share * flow + max(1 - share, LEAST_WHORL) * _from_crown(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
+    if parts(parting, length):
+        crown = crown_share(head, at)[:, None]
+        combed = (1 - crown) * combed + crown * comb_from_parting(parting, at, outward)
+        combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
     direction = combed + lift * outward
     result: Float64Array = direction / np.maximum(
         np.linalg.norm(direction, axis=1, keepdims=True), 1e-9
     )
     return result
+
+
+def parts(parting: Parting, hair_length: float) -> bool:
+    """Return whether the hair, of a length in metres, is combed from the parting."""
+    return parting.seen and hair_length >= PARTED_HAIR
 
 
 @dataclass(frozen=True)
@@ -73,6 +92,8 @@ class ScalpPrior:
     """Outward part against the tangential one."""
     normal: bool = False
     """True: hair grows along the head's normal instead of being combed."""
+    crown: float = 0.0
+    """Weight of the comb from the parting, in all the hair on the crown."""
 
 
 def add_scalp_prior(
@@ -82,22 +103,39 @@ def add_scalp_prior(
     tensor: Float32Array,
     certainty: Float32Array,
     prior: ScalpPrior,
+    parting: Parting,
 ) -> tuple[Float32Array, Float32Array]:
     """Add the prior to tensors (N, 6) and certainty (N,) of the loose cells; return new ones."""
-    distance = hull.head_distance[hull.loose]
-    near = distance < prior.reach
-    if not prior.weight or not near.any():
-        return tensor, certainty
-    points = hull.grid.centres_of(hull.loose)[near]
-    if prior.normal:
-        comb = gradient(hull.grid, hull.head_distance, points)
-    else:
-        comb = combing_direction(head, hull, growth, points, prior.lift)
     data, weight = tensor.copy(), certainty.copy()
-    weight[near] += prior.weight
-    share = (prior.weight / weight[near])[:, None]
-    data[near] = (1 - share) * tensor[near] + share * outer_products(comb)
+    points = hull.grid.centres_of(hull.loose)
+    near = hull.head_distance[hull.loose] < prior.reach
+    if prior.weight and near.any():
+        comb = gradient(hull.grid, hull.head_distance, points[near])
+        if not prior.normal:
+            comb = combing_direction(head, hull, growth, points[near], prior.lift, parting)
+        _mix(data, weight, near, comb, np.full(len(comb), prior.weight))
+    if prior.crown and parts(parting, float(np.ptp(growth[hull.dense]))):
+        share = prior.crown * crown_share(head, points)
+        top = share > 0
+        outward = gradient(hull.grid, hull.head_distance, points[top])
+        lift = root_lift(hull, points[top])[:, None]
+        comb = comb_from_parting(parting, points[top], outward) + lift * outward
+        comb /= np.maximum(np.linalg.norm(comb, axis=1, keepdims=True), 1e-9)
+        _mix(data, weight, top, comb, share[top])
     return data, weight
+
+
+def _mix(
+    data: Float32Array,
+    weight: Float32Array,
+    cells: BoolArray,
+    direction: Float64Array,
+    more: Float64Array,
+) -> None:
+    """Add directions (M, 3) of weights (M,) to tensors (N, 6) and weights (N,) at some cells."""
+    weight[cells] += more
+    share = (more / np.maximum(weight[cells], 1e-9))[:, None]
+    data[cells] = (1 - share) * data[cells] + share * outer_products(direction)
 
 
 def _from_crown(head: Head, at: Float64Array, outward: Float64Array) -> Float64Array:

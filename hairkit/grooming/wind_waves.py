@@ -11,6 +11,9 @@ from hairkit.types.waves import Waves
 WAVELENGTHS = (0.11, 0.07, 0.05, 0.02, 0.01, 0.006)
 """Metres over which the phase varies on the scalp. The shortest is a wisp that stays in phase:
 without the last three, F at 4 mm falls from 81 to 77 on wavy hair."""
+POINTS_PER_TURN, LONG_AXIS, MOST_POINTS = 10, 0.4, 255
+"""Points that show a turn of a helix to 5 % of its radius, on strands up to this length before they
+are wound, metres; the most that every format can take."""
 PHASE_AMPLITUDE = 2.5
 """Radians by which the phase varies over each wavelength."""
 
@@ -25,6 +28,9 @@ def add_waves(strands: Strands, waves: Waves, seed: int = 0, ramp: float = 0.03)
     """
     if waves.radius <= 0 or waves.pitch <= 0 or len(strands) == 0:
         return strands
+    needed = min(int(np.ceil(POINTS_PER_TURN * LONG_AXIS / waves.pitch)), MOST_POINTS)
+    if needed > len(strands.points) // len(strands):
+        strands = strands.resampled(needed)
     points = strands.points.reshape(len(strands), -1, 3).astype(np.float64)
     arc = strands.arc_lengths().reshape(len(strands), -1)
     first, second = _transport_frames(points)

@@ -1,80 +1,240 @@
-"""Measure the waves of the hair in the orientation maps of the photos.
+"""Measure the waves and curls of the hair in the brightness of the photos.
 
-Strands of wavy hair are helices, and neighbours differ in phase. Eight photos cannot resolve them
-one by one, but they show three numbers. Along the average direction the angle oscillates, so its
-autocorrelation has a minimum at half a turn, which gives the pitch. The near half of a helix slants
-to one side, the same in every view, by `tan(slant) = 4 radius / pitch` on average (the mean of a
-cosine over its half turn is 2 / pi). Where all hair turns one way, the slant gives radius and
-handedness; `remove_slant` subtracts it before views are fused, because hair does not grow in that
-direction. Where hair turns both ways the slants cancel, and the rms of the oscillation gives the
-radius.
+Strands of wavy and curly hair are helices: the near half of each coil is bright, the far half dark,
+along all locks that hang side by side. The 2D orientation does not show curls: for a helix whose
+slope is 1.5 the mean doubled angle is 0, whatever its axis. So all is taken from power spectra of
+the brightness, summed over views; hair hangs, and the axis is taken as vertical.
+
+* The pitch is the first peak of the autocorrelation along the axis.
+* The slope `2 pi radius / pitch` follows from how the power is spread over directions, from its
+  second and fourth angular moments, and a model of the near half of a helix.
+
+Where all hair turns one way, the near halves of its helices slant to one side, the same in every
+view. The mean of the orientation maps shows that slant; it tells the handedness, and
+`remove_slant` subtracts it before views are fused, because hair does not grow in that direction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import cv2
 import numpy as np
+from scipy import ndimage
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.parallel import compiled
 from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture, View
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.waves import Waves
 
-HEIGHT = 540
-"""Waves are measured on maps of this height, where they still span tens of pixels."""
-LEAST_WEIGHT = 0.05
-"""Lines end where the map's weight falls to this."""
-HIGH_PASS = 12.5
-"""Gaussian in pixels of such a map that separates the average direction from the swing."""
-LONGEST_LAG, LINE_LENGTH, LINES = 55, 120, 500
-"""Pixels of the autocorrelation and of the lines it is taken on; lines a view."""
-SHORTEST_LAG = 5
-"""Half turns of fewer pixels are noise."""
-TROUGH = -0.09
-"""Autocorrelation below which there are waves; straight hair has -0.03, noise 0."""
-SWING_LOSS = 1.6
-"""Orientation maps average strands that are out of step; the swing they keep is smaller by about
-this."""
-STEEPEST = 0.8
-"""Radians: larger swings and slants are errors, and their tangents would make huge waves."""
-SURE_LINE = 0.3
-"""Weight of the map where lines start."""
+RESOLUTION = 1500.0
+"""Pixels per metre of the pictures that are measured; photos 540 px high still resolve curls."""
+HALF_HEAD = 0.09
+"""Metres from the middle of the head to the hair that a camera sees."""
+STEEPEST_VIEW = 30.0
+"""Degrees of elevation above which a view does not see hair hang upright."""
+CONTRAST_SCALE = 0.014
+"""Gaussian over which brightness is brought to equal mean and contrast, metres."""
+LEAST_CONTRAST = 1.0
+"""Grey levels added to the standard deviation."""
+PITCH_SQUARE, PITCH_STEP, PITCH_FILLED = 0.096, 0.02, 0.85
+"""Edge and spacing of the squares for the autocorrelation, metres; their least share of hair."""
+SHORTEST_PITCH, LONGEST_PITCH, SMALLEST_LAG = 0.008, 0.078, 0.002
+"""Metres. Below the smallest lag there is the noise of pixels."""
+LEAST_CORRELATION = 0.1
+"""Autocorrelation at the smallest lag, relative to lag 0, below which the picture is noise."""
+PROFILE_BLUR, PROFILE_HALF_WIDTH = 0.0015, 0.001
+"""Metres along and across the axis over which the autocorrelation is averaged."""
+FIRST_PEAK = 0.6
+"""The pitch is the first peak of this share of the largest prominence."""
+LEAST_PROMINENCE = 0.08
+"""Of a peak over the trough before it, relative to the smallest lag: straight hair has up to 0.03,
+wavy and curly hair 0.24 to 0.31."""
+SLOPE_SQUARE, SLOPE_STEP = 0.048, 0.012
+"""Edge and spacing of the squares, wholly hair, for the spectrum, metres."""
+BAND = (150.0, 350.0)
+"""Cycles per metre: 3 to 7 mm, coarser than the lattice of pixels, finer than locks."""
+FEWEST_SQUARES = 12
+"""Squares of all views below which nothing is measured."""
+AXIS_SCATTER = 0.12
+"""Radians by which axes scatter about the vertical; as much again for each unit of slope."""
+LINE_SHARE, LINE_SPREAD = 0.45, 0.5
+"""Usual share of the power that is lines, not noise, and the spread of its logarithm."""
+MOMENT_ERROR, MODEL_ERROR = 0.012, 0.1
+"""Statistical error of a moment over eight views, and relative error of the model."""
+LEAST_SLOPE = 0.4
+"""Slope of the slightest waves."""
 SURE_SLANT = 2.5
 """Standard errors by which the views' mean slant must differ from 0."""
+_SLOPES = np.linspace(0.02, 4.0, 200)
+_SHARES = np.exp(np.linspace(np.log(0.04), 0.0, 120))
+_ANGLES, _RADII = 180, 12
+"""Samples of the polar spectrum."""
 
 
 def measure_waves(
-    orientations: Sequence[OrientationMap], masks: Sequence[Mask], cameras: Sequence[Camera]
+    capture: Capture,
+    orientations: Sequence[OrientationMap],
+    masks: Sequence[Mask],
+    cameras: Sequence[Camera],
 ) -> Waves:
-    """Measure pitch, radius and slant of the waves in all views together."""
-    correlation = np.zeros(LONGEST_LAG)
-    squares, slants, metres = [], [], []
-    for found, mask, camera in zip(orientations, masks, cameras, strict=True):
-        swing, total = _swing(found, mask)
-        correlation += total
-        squares.append(swing)
-        slants.append(_mean_slant(found, mask))
-        distance = 1.0 if camera.model == "orthographic" else float(camera.depth(np.zeros(3)))
-        metres.append(found.angle.shape[0] / HEIGHT * distance / camera.focal)
-    if correlation[0] <= 0:
+    """Return the radius, pitch and slant of the waves that all views show together.
+
+    The cameras see the head at the origin; orientations, masks and cameras are in the capture's
+    order.
+    """
+    scaled = [
+        _scale(view, mask, camera)
+        for view, mask, camera in zip(capture.views, masks, cameras, strict=True)
+    ]
+    views = [_normalise(*view) for view in scaled if view is not None]
+    pitch, prominence = _measure_pitch(views)
+    moments = _angular_moments(views) if prominence >= LEAST_PROMINENCE else None
+    slope = 0.0 if moments is None else _fit_slope(*moments)
+    if slope < LEAST_SLOPE:
         return Waves()
-    trough = int(np.argmin(correlation))
-    if (
-        correlation[trough] > TROUGH * correlation[0]
-        or not SHORTEST_LAG <= trough < LONGEST_LAG - 1
-    ):
-        return Waves()
-    pitch = 2 * trough * float(np.median(metres))
+    return Waves(slope * pitch / (2 * np.pi), pitch, _measure_slant(orientations, masks))
+
+
+def _measure_slant(orientations: Sequence[OrientationMap], masks: Sequence[Mask]) -> float:
+    """Return the views' mean slant, radians; 0 unless it is the same in all of them."""
+    slants = [_mean_slant(found, mask) for found, mask in zip(orientations, masks, strict=True)]
     mean, error = np.mean(slants), np.std(slants) / np.sqrt(len(slants))
-    slant = float(mean) if abs(mean) > SURE_SLANT * error else 0.0
-    swing_rms = SWING_LOSS * float(np.sqrt(np.mean(squares)))
-    from_swing = pitch * np.sqrt(2) * np.tan(min(swing_rms, STEEPEST)) / (2 * np.pi)
-    from_slant = pitch * np.tan(min(abs(slant), STEEPEST)) / 4
-    return Waves(float(max(from_swing, from_slant)), pitch, slant)
+    return float(mean) if abs(mean) > SURE_SLANT * error else 0.0
+
+
+def _scale(view: View, mask: Mask, camera: Camera) -> tuple[Float32Array, Float32Array] | None:
+    """Return a picture and its hair at `RESOLUTION` on the hair's surface; None from above."""
+    if abs(np.degrees(np.arcsin(camera.view_direction(np.zeros(3))[1]))) > STEEPEST_VIEW:
+        return None
+    distance = 1.0
+    if camera.model == "perspective":
+        distance = max(float(camera.depth(np.zeros(3))) - HALF_HEAD, HALF_HEAD)
+    factor = RESOLUTION * distance / camera.focal
+    size = (max(1, round(view.width * factor)), max(1, round(view.height * factor)))
+    way = cv2.INTER_AREA if factor < 1 else cv2.INTER_CUBIC
+    image = cv2.cvtColor(view.image, cv2.COLOR_RGB2GRAY).astype(np.float32)
+    grey = cv2.resize(image, size, interpolation=way).astype(np.float32)
+    hair = cv2.resize(mask.hair.astype(np.float32), size, interpolation=cv2.INTER_NEAREST)
+    return grey, np.asarray(hair, np.float32)
+
+
+def _normalise(grey: Float32Array, hair: Float32Array) -> tuple[Float32Array, Float32Array]:
+    """Return the picture with equal mean and contrast all over the hair, 0 outside; and the hair.
+
+    Normalised convolution (Knutsson and Westin 1993) keeps the backdrop out of the averages.
+    """
+
+    def average(values: Float32Array) -> Float32Array:
+        blurred = cv2.GaussianBlur(values * hair, (0, 0), CONTRAST_SCALE * RESOLUTION)
+        return np.asarray(blurred / known, np.float32)
+
+    known = np.maximum(cv2.GaussianBlur(hair, (0, 0), CONTRAST_SCALE * RESOLUTION), 1e-3)
+    centred = grey - average(grey)
+    deviation = np.sqrt(np.maximum(average(centred**2), 0)) + LEAST_CONTRAST
+    return np.asarray(centred / deviation * hair, np.float32), hair
+
+
+def _squares(
+    views: Sequence[tuple[Float32Array, Float32Array]], edge: float, step: float, filled: float
+) -> Iterator[tuple[Float32Array, Float32Array]]:
+    """Yield squares of pictures and of hair that hold at least a share of hair, metres."""
+    size, stride = round(edge * RESOLUTION), round(step * RESOLUTION)
+    for picture, hair in views:
+        for top in range(0, picture.shape[0] - size + 1, stride):
+            for left in range(0, picture.shape[1] - size + 1, stride):
+                place = np.s_[top : top + size, left : left + size]
+                if hair[place].mean() >= filled:
+                    yield picture[place], hair[place]
+
+
+def _measure_pitch(views: Sequence[tuple[Float32Array, Float32Array]]) -> tuple[float, float]:
+    """Return the pitch in metres and its prominence, both 0 where no peak is found."""
+    size = round(PITCH_SQUARE * RESOLUTION)
+    shape, count = (2 * size, 2 * size), 0
+    power, window = np.zeros((2 * size, size + 1)), np.zeros((2 * size, size + 1))
+    for picture, hair in _squares(views, PITCH_SQUARE, PITCH_STEP, PITCH_FILLED):
+        mean = picture.sum() / max(float(hair.sum()), 1.0)
+        power += np.abs(np.fft.rfft2((picture - mean) * hair, shape)) ** 2
+        window += np.abs(np.fft.rfft2(hair, shape)) ** 2
+        count += 1
+    if count < FEWEST_SQUARES:
+        return 0.0, 0.0
+    overlap = np.maximum(np.fft.irfft2(window, shape), 1.0)
+    correlation = np.fft.irfft2(power, shape) / overlap
+    across = round(PROFILE_HALF_WIDTH * RESOLUTION)
+    near = [correlation[:size, column] for column in range(-across, across + 1)]
+    sharp = np.mean(near, axis=0)
+    if sharp[round(SMALLEST_LAG * RESOLUTION)] < LEAST_CORRELATION * sharp[0]:
+        return 0.0, 0.0
+    return _first_peak(ndimage.gaussian_filter1d(sharp, PROFILE_BLUR * RESOLUTION))
+
+
+def _first_peak(profile: Float64Array) -> tuple[float, float]:
+    """Return lag in metres and prominence of the first high peak of an autocorrelation (N,)."""
+    start = round(SMALLEST_LAG * RESOLUTION)
+    lags = np.arange(round(SHORTEST_PITCH * RESOLUTION), round(LONGEST_PITCH * RESOLUTION))
+    lags = lags[lags < len(profile) - 1]
+    peaks = lags[(profile[lags] >= profile[lags - 1]) & (profile[lags] > profile[lags + 1])]
+    if not len(peaks) or profile[start] <= 0:
+        return 0.0, 0.0
+    trough = np.minimum.accumulate(profile[start:])
+    prominence = (profile[peaks] - trough[peaks - start]) / profile[start]
+    first = int(np.argmax(prominence >= FIRST_PEAK * prominence.max()))
+    at = int(peaks[first])
+    before, here, after = profile[at - 1 : at + 2]
+    shift = 0.5 * (before - after) / min(before - 2 * here + after, -1e-12)
+    return float((at + shift) / RESOLUTION), float(prominence[first])
+
+
+def _angular_moments(
+    views: Sequence[tuple[Float32Array, Float32Array]],
+) -> tuple[float, float] | None:
+    """Return the means of cos 2 phi and cos 4 phi over the power; phi is off the vertical."""
+    size, count = round(SLOPE_SQUARE * RESOLUTION), 0
+    taper = np.outer(np.hanning(size), np.hanning(size))
+    power = np.zeros((size, size))
+    for picture, _ in _squares(views, SLOPE_SQUARE, SLOPE_STEP, 1.0):
+        power += np.abs(np.fft.fft2((picture - picture.mean()) * taper)) ** 2
+        count += 1
+    if count < FEWEST_SQUARES:
+        return None
+    angle = np.arange(_ANGLES) * np.pi / _ANGLES  # of the wave vector, so of the strand off upright
+    frequency = np.linspace(*BAND, _RADII)[:, None] * size / RESOLUTION
+    place = [size // 2 + frequency * np.sin(angle), size // 2 + frequency * np.cos(angle)]
+    polar = ndimage.map_coordinates(np.fft.fftshift(power), place, order=1)
+    strength = (polar * frequency).sum(axis=0)
+    second, fourth = ((strength * np.cos(n * angle)).sum() / strength.sum() for n in (2, 4))
+    return float(second), float(fourth)
+
+
+def _fit_slope(second: float, fourth: float) -> float:
+    """Return the slope of the helices from the angular moments: a posterior mean."""
+    scatter = AXIS_SCATTER**2 * (1 + _SLOPES**2)
+    model = helix_moments(_SLOPES) * np.exp(-np.stack([2 * scatter, 8 * scatter]))
+    share = _SHARES[:, None]
+    cost = (np.log(share / LINE_SHARE) / LINE_SPREAD) ** 2
+    for found, wanted in zip((second, fourth), model, strict=True):
+        error = np.hypot(MOMENT_ERROR, MODEL_ERROR * abs(found))
+        cost = cost + ((found - share * wanted) / error) ** 2
+    weight = np.exp(-0.5 * (cost - cost.min())).sum(axis=0)
+    return float((weight * _SLOPES).sum() / weight.sum())
+
+
+def helix_moments(slopes: Float64Array) -> Float64Array:
+    """Return the mean of cos 2 phi and of cos 4 phi (2, N) over the near half of helices.
+
+    phi is the drawn strand's angle off the axis: `tan phi = slope cos u` on the half turn u. Places
+    count by their drawn length and, since they face the camera less to the sides, by sqrt(cos u).
+    """
+    turn = (np.arange(360) + 0.5) / 360 * np.pi - np.pi / 2
+    slant = np.asarray(slopes)[:, None] * np.cos(turn)
+    weight = np.sqrt((1 + slant**2) * np.cos(turn))
+    angle = np.arctan(slant)
+    means = [(weight * np.cos(n * angle)).sum(axis=1) / weight.sum(axis=1) for n in (2, 4)]
+    return np.stack(means)
 
 
 def remove_slant(found: OrientationMap, waves: Waves) -> OrientationMap:
@@ -82,65 +242,6 @@ def remove_slant(found: OrientationMap, waves: Waves) -> OrientationMap:
     if waves.slant == 0:
         return found
     return OrientationMap(wrap_angle(found.angle - waves.slant), found.confidence)
-
-
-def _swing(found: OrientationMap, mask: Mask) -> tuple[float, Float64Array]:
-    """Return the mean square of the angle's swing, radians squared, and its autocorrelation."""
-    size = (round(found.angle.shape[1] * HEIGHT / found.angle.shape[0]), HEIGHT)
-    inside = cv2.resize(mask.hair.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
-    inside = cv2.erode(inside, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (7, 7)))
-    weight = cv2.resize(found.confidence, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-    weight = weight * inside
-    vector = np.stack([np.cos(2 * found.angle), np.sin(2 * found.angle)], axis=-1)
-    vector = cv2.resize(vector, size, interpolation=cv2.INTER_AREA) * weight[..., None]
-    smooth = cv2.GaussianBlur(vector, (0, 0), HIGH_PASS)
-    average = (0.5 * np.arctan2(smooth[..., 1], smooth[..., 0])).astype(np.float32)
-    angle = 0.5 * np.arctan2(vector[..., 1], vector[..., 0])
-    swing = np.mod(angle - average + np.pi / 2, np.pi) - np.pi / 2
-    rows, columns = np.nonzero(weight > SURE_LINE)
-    if not len(rows):
-        return 0.0, np.zeros(LONGEST_LAG)
-    pick = np.linspace(0, len(rows) - 1, LINES).astype(np.int64)
-    starts = np.stack([columns[pick], rows[pick]], axis=1).astype(np.float64)
-    total, count = _autocorrelation(average, swing, weight, starts, LINE_LENGTH, LONGEST_LAG)
-    mean = total / np.maximum(count, 1)
-    return float(mean[0]), np.where(count > LINES, mean, 0)
-
-
-@compiled
-def _autocorrelation(
-    average: Float32Array,
-    swing: Float32Array,
-    weight: Float32Array,
-    starts: Float64Array,
-    length: int,
-    lags: int,
-) -> tuple[Float64Array, Float64Array]:
-    """Sum swing[i] * swing[i + lag] along lines that follow `average`; and the number of terms."""
-    height, width = swing.shape
-    total, count = np.zeros(lags), np.zeros(lags)
-    line = np.empty(length)
-    for s in range(len(starts)):
-        x, y = starts[s, 0], starts[s, 1]
-        dx, dy = 0.0, 1.0
-        n = 0
-        while n < length:
-            ix, iy = int(x), int(y)
-            if ix < 0 or iy < 0 or ix >= width or iy >= height or weight[iy, ix] <= LEAST_WEIGHT:
-                break
-            line[n] = swing[iy, ix]
-            n += 1
-            c, d = np.cos(average[iy, ix]), np.sin(average[iy, ix])
-            if c * dx + d * dy < 0:
-                c, d = -c, -d
-            dx, dy = c, d
-            x += dx
-            y += dy
-        for lag in range(min(lags, n)):
-            for i in range(n - lag):
-                total[lag] += line[i] * line[i + lag]
-            count[lag] += n - lag
-    return total, count
 
 
 def _mean_slant(found: OrientationMap, mask: Mask) -> float:

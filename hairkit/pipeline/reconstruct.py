@@ -12,6 +12,7 @@ from pathlib import Path
 
 from hairkit.errors import InputError, RenderError
 from hairkit.field.growth_prior import measure_scalp_distance
+from hairkit.field.parting import measure_parting
 from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
@@ -34,6 +35,7 @@ from hairkit.types.groom import Groom
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
+from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
@@ -242,12 +244,22 @@ def _grow(
     hull = run.once("hull", Hull, scene=scene, masks=masks)
     cameras, shape = Given.of(scene.value.cameras), Given.of(scene.value.head)
     waves = run.derive(
-        "waves", Waves, measure_waves, orientations=orientations, masks=masks, cameras=cameras
+        "waves",
+        Waves,
+        measure_waves,
+        capture=photos,
+        orientations=orientations,
+        masks=masks,
+        cameras=cameras,
     )
     distance = run.derive("distance", ScalpDistance, measure_scalp_distance, head=shape, hull=hull)
+    parting = run.derive(
+        "parting", Parting, measure_parting, masks=masks, cameras=cameras, head=shape
+    )
     seen: dict[str, Argument] = {
         "scene": scene, "masks": masks, "orientations": orientations,
         "hull": hull, "waves": waves, "scalp_distance": distance,
+        "parting": parting,
     }  # fmt: skip
     field = run.once("field", OrientationField, **seen)
     roots = Given.of(sample_roots(scene.value.head, guides, seed, rest=head))

@@ -10,6 +10,7 @@ the packages named after the subject.
 * `head`: the head mesh, roots, capsules
 * `mask`: labels: hair, person, background
 * `orientation`: 2D strand angle and confidence
+* `parting`: the parting on the crown
 * `person`: probability of the person
 * `point_cache`: simulated frames of the guides
 * `preview`: the pictures of these types that a notebook shows

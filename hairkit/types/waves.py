@@ -8,6 +8,10 @@ import numpy as np
 
 from hairkit.storage import Stored
 
+CURLY_SLOPE = 1.1
+"""Slope of helices from which 2D orientations do not tell the axis: their mean doubled angle falls
+from 1 for straight hair through 0 at a slope of 1.5."""
+
 
 @dataclass(frozen=True)
 class Waves(Stored):
@@ -19,6 +23,16 @@ class Waves(Stored):
     """Length of one turn along the axis, metres."""
     slant: float = 0.0
     """Mean slant of the visible strands in the pictures, radians; 0 when hair turns both ways."""
+
+    @property
+    def slope(self) -> float:
+        """Slope of the helix against its axis: 2 pi radius over pitch."""
+        return 2 * np.pi * self.radius / self.pitch if self.pitch > 0 else 0.0
+
+    @property
+    def curly(self) -> bool:
+        """True for coils so steep that photos show no strand direction, only the coils."""
+        return self.slope >= CURLY_SLOPE
 
     @property
     def handedness(self) -> int:

@@ -20,6 +20,7 @@ from scipy import ndimage
 from hairkit import (
     Hull,
     OrientationField,
+    Parting,
     Roots,
     ScalpDistance,
     Scene,
@@ -99,10 +100,11 @@ def track(
     roots: Roots,
     waves: Waves,
     scalp_distance: ScalpDistance,
+    parting: Parting,
     options: Options,
 ) -> Strands:
     """Grow one strand from every root, trim, smooth and wave it, and keep it out of the head."""
-    directions = _start_directions(scene, hull, field, roots, options)
+    directions = _start_directions(scene, hull, field, roots, parting, options)
     points, counts = _grow(hull, field, roots, directions, scalp_distance.hair_length, options)
     points, counts = trim_u_turns(points, counts, options.u_share)
     offsets = np.concatenate([[0], np.cumsum(counts)])
@@ -115,12 +117,19 @@ def track(
 
 
 def _start_directions(
-    scene: Scene, hull: Hull, field: OrientationField, roots: Roots, options: Options
+    scene: Scene,
+    hull: Hull,
+    field: OrientationField,
+    roots: Roots,
+    parting: Parting,
+    options: Options,
 ) -> Float64Array:
     """Return unit first directions (N, 3)."""
     normals = roots.normals.astype(np.float64)
     if options.start == "combed":
-        return combing_direction(scene.head, hull, field.growth, roots.positions, options.lift)
+        return combing_direction(
+            scene.head, hull, field.growth, roots.positions, options.lift, parting
+        )
     # thesis 6.1: the normal n rotated by an angle G about n x (0, -1, 0)
     axis = np.cross(normals, [0.0, -1.0, 0.0])
     length = np.linalg.norm(axis, axis=1, keepdims=True)

@@ -30,6 +30,7 @@ from hairkit import (
     Mask,
     OrientationField,
     OrientationMap,
+    Parting,
     ScalpDistance,
     Scene,
     Waves,
@@ -84,6 +85,9 @@ class Options(FusionOptions):
         0.02, low=0, high=0.1, unit="m", doc="Distance from the scalp within which the prior acts."
     )
     scalp_lift: float = option(0.6, low=0, high=5, doc="Outward part of the prior.")
+    parting_weight: float = option(
+        0.15, low=0, high=10, doc="Weight of the comb from the parting in the hair on the crown."
+    )
     surface: float = option(0.5, low=0, high=10, doc="Largest weight of S, on strand cells.")
     surface_reach: float = option(
         0.004, low=1e-4, high=0.1, unit="m", doc="Distance from strands at which S falls to 1/e."
@@ -107,16 +111,21 @@ def solve_field(
     hull: Hull,
     waves: Waves,
     scalp_distance: ScalpDistance,
+    parting: Parting,
     options: Options,
 ) -> OrientationField:
     """Return the blended field with its signs and the internal distance."""
     growth = growth_potential(hull, scalp_distance, options.tip_share)
     fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options)
     segments = find_segments(scene.cameras, masks, fused, hull, growth, options)
-    prior = ScalpPrior(options.scalp_weight, options.scalp_reach, options.scalp_lift)
-    wanted, weight = add_scalp_prior(scene.head, hull, growth, fused.tensor, fused.certainty, prior)
+    prior = ScalpPrior(
+        options.scalp_weight, options.scalp_reach, options.scalp_lift, crown=options.parting_weight
+    )
+    wanted, weight = add_scalp_prior(
+        scene.head, hull, growth, fused.tensor, fused.certainty, prior, parting
+    )
     band = ribbons(segments, hull, options.ribbon)
-    signs = growth_direction(scene.head, hull, growth, band, options)
+    signs = growth_direction(scene.head, hull, growth, band, parting, options)
     inner = internal_direction(hull, wanted, weight, band, options)
     distance = internal_distance(hull, segments, options.tolerance)
     surface = surface_structure(hull, band, options.tolerance)

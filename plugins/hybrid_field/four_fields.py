@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from scipy import ndimage
 
-from hairkit import Head, Hull, Strands
+from hairkit import Head, Hull, Parting, Strands
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.field.diffusion import solve_screened
 from hairkit.field.growth_prior import combing_direction
@@ -60,7 +60,12 @@ def surface_structure(hull: Hull, band: Band, tolerance: float) -> Float32Array:
 
 
 def growth_direction(
-    head: Head, hull: Hull, growth: Float32Array, band: Band, options: FieldOptions
+    head: Head,
+    hull: Hull,
+    growth: Float32Array,
+    band: Band,
+    parting: Parting,
+    options: FieldOptions,
 ) -> Float32Array:
     """Return O (N, 3) of the loose cells: ribbons and the scalp prior, diffused as vectors."""
     data = band.direction[hull.loose].copy()
@@ -68,7 +73,7 @@ def growth_direction(
     near = (hull.head_distance[hull.loose] < options.scalp_reach) & (weight == 0)
     at = hull.grid.centres_of(hull.loose)[near]
     if len(at):
-        data[near] = combing_direction(head, hull, growth, at, options.scalp_lift)
+        data[near] = combing_direction(head, hull, growth, at, options.scalp_lift, parting)
         weight[near] = 1.0
     if not (weight > 0).any():
         return data

@@ -20,6 +20,7 @@ from hairkit.field.growth_prior import (
     measure_scalp_distance,
 )
 from hairkit.testing import ball_head, scalp_roots
+from hairkit.types.parting import Parting
 from hairkit.types.volume import Hull, VoxelGrid
 
 BALL = 0.1
@@ -161,7 +162,7 @@ def test_combed_hair_leaves_the_scalp_at_the_angle_of_the_lift(hull: Hull, lift:
     at = scalp_roots(head).positions * 1.05
     at = at[at[:, 1] < 0.08]
     growth = potential(hull)
-    combed = combing_direction(head, hull, growth, at, lift)
+    combed = combing_direction(head, hull, growth, at, lift, Parting())
     np.testing.assert_allclose(np.linalg.norm(combed, axis=1), 1, atol=1e-6)
     outward = gradient(hull.grid, hull.head_distance, at)
     rise = np.sum(combed * outward, axis=1)
@@ -178,7 +179,7 @@ def test_short_hair_is_combed_away_from_a_whorl_behind_the_crown() -> None:
     whorl = np.array([0, 0.095, -0.03])
     around = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1)
     points = whorl + 0.02 * around
-    combed = combing_direction(head, hull, flat, points, 0.0)
+    combed = combing_direction(head, hull, flat, points, 0.0, Parting())
     assert (np.sum(combed * around, axis=1) > 0.3).all()
 
 
@@ -186,7 +187,8 @@ def test_combing_of_long_hair_follows_the_flow_wherever_it_leads() -> None:
     """A potential that grows sideways combs sideways: all hair to the subject's left."""
     head, hull = ball_head(), curtain()
     sideways = (2 * hull.grid.centres()[..., 0]).astype(np.float32)
-    combed = combing_direction(head, hull, sideways, [[0.0, 0.11, 0.0], [0.0, 0.08, 0.08]], 0.0)
+    points = [[0.0, 0.11, 0.0], [0.0, 0.08, 0.08]]
+    combed = combing_direction(head, hull, sideways, points, 0.0, Parting())
     assert (combed[:, 0] > 0.95).all()
 
 
@@ -206,3 +208,29 @@ def test_the_potential_of_long_hair_grows_up_to_its_hem() -> None:
     height = np.arange(-0.1, -0.27, -0.02)
     down = np.stack([np.full_like(height, 0.115), height, np.zeros_like(height)], axis=1)
     assert (np.diff(hull.grid.sample(growth, down)) > 0.1 * 0.02).all()
+
+
+def test_long_hair_is_combed_from_its_parting_on_the_crown_only() -> None:
+    """With a parting, hair on top leads away from it to both sides; below nothing changes."""
+    head, hull = ball_head(), curtain(hem=-0.3)
+    growth, parting = potential(hull), Parting(0.02, 0.05, True)
+    top = [[0.0, 0.098, 0.02], [0.04, 0.092, 0.02]]
+    combed = combing_direction(head, hull, growth, top, 0.0, parting)
+    assert combed[0, 0] < -0.3
+    assert combed[1, 0] > 0.3
+    below = [[0.1, 0.02, 0.0], [-0.1, 0.0, 0.02]]
+    plain, parted = (
+        combing_direction(head, hull, growth, below, 0.3, line) for line in (Parting(), parting)
+    )
+    np.testing.assert_array_equal(plain, parted)
+
+
+def test_short_hair_has_no_parting() -> None:
+    """Hair that ends before it could lie down is combed as before."""
+    head, hull = ball_head(), curtain(0.005, hem=0.0, thickness=0.015)
+    growth, at = potential(hull), scalp_roots(head).positions
+    plain, parted = (
+        combing_direction(head, hull, growth, at, 0.3, line)
+        for line in (Parting(), Parting(0.02, 0.05, True))
+    )
+    np.testing.assert_array_equal(plain, parted)

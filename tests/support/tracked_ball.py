@@ -11,6 +11,7 @@ from hairkit.arrays import BoolArray, Float64Array
 from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.testing import scalp_roots, turn_scene
 from hairkit.types.head import Roots
+from hairkit.types.parting import Parting
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_products
 from hairkit.types.waves import Waves
@@ -74,7 +75,7 @@ def run(
     """Track; straight hair unless waves are given."""
     scene = turn_scene()
     distance = measure_scalp_distance(scene.head, hull)
-    return track(scene, hull, field, roots, waves or Waves(), distance, options)
+    return track(scene, hull, field, roots, waves or Waves(), distance, Parting(), options)
 
 
 def polylines(strands: Strands) -> Float64Array:

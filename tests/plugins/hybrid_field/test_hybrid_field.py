@@ -29,6 +29,7 @@ from hairkit.testing import ball_head
 from hairkit.types.camera import Camera
 from hairkit.types.mask import HAIR, Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull, VoxelGrid, cell_slopes, outer_products
@@ -208,7 +209,14 @@ def test_one_direction_everywhere_comes_back_signed() -> None:
     scene = Scene(tuple("abcdefgh"), views, ball_head())
     hull = bun()
     field = solve_field(
-        scene, masks, maps, hull, Waves(), measure_scalp_distance(scene.head, hull), PLAIN
+        scene,
+        masks,
+        maps,
+        hull,
+        Waves(),
+        measure_scalp_distance(scene.head, hull),
+        Parting(),
+        PLAIN,
     )
     assert field.direction is not None
     direction = field.direction[hull.dense].astype(np.float64)
@@ -226,7 +234,7 @@ def test_without_segments_the_inner_field_alone_speaks() -> None:
     hull = bun()
     distance = measure_scalp_distance(scene.head, hull)
     options = Options(pool=0.0, unslant=False)
-    field = solve_field(scene, masks, blank, hull, Waves(), distance, options)
+    field = solve_field(scene, masks, blank, hull, Waves(), distance, Parting(), options)
     assert field.direction is not None
     assert np.isfinite(field.direction).all()
     assert field.internal_distance is not None

@@ -1,0 +1,144 @@
+"""The parting on the crown: where skin shows between the hair, and how hair is combed from it.
+
+Level views see the crown at a grazing angle, so that the 2D orientation of the strands there tells
+little. Skin that shows inside the hair does: its median is the parting. From it, hair is combed
+away to both sides, down and back; behind its end the nearest point of the line is its end, which
+makes a whorl.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from hairkit.arrays import Float64Array
+from hairkit.types.camera import Camera
+from hairkit.types.head import Head
+from hairkit.types.mask import PERSON, Mask
+from hairkit.types.parting import Parting
+from hairkit.types.volume import Hull
+
+CROWN_DEPTH = 0.045
+"""Height of the crown below the top of the head, metres."""
+FADE_START, FADE_LENGTH = 0.055, 0.02
+"""The comb begins this far below the top of the head and is whole `FADE_LENGTH` above, metres."""
+SCALP_EDGE = 0.01
+"""Skin nearer than this to the edge of the scalp may be the forehead's or the temples', metres."""
+LEAST_FACING = 0.15
+"""Cosine between a normal and the ray to the camera below which a view does not see the place."""
+LEAST_SKIN = 0.004
+"""Share of the crown that is skin from which there is a parting; 0.006 to 0.06 on heads that have
+one, 0.000 on curls."""
+QUARTILES = (0.25, 0.5, 0.75)
+WIDEST_SKIN = 0.05
+"""Distance in metres between the quartiles of the skin's x from which it is no line but a hairline
+whose hair is tied back: 9 cm there, at most 3.5 cm on partings, 6.6 cm if spread evenly."""
+LINE_FRONT, LINE_BACK = 0.09, -0.06
+"""The parting's ends along z of the head frame, metres."""
+DOWN = 1.0
+"""Part of the direction down the head, against 1 away from the parting."""
+SWEEP, SWEEP_SLOPE, SWEEP_AT = 0.6, 5.0, 0.02
+"""Part of the direction backwards, its growth per metre towards the back of the head, and the
+height z where it has its mean: hair of the fringe goes sideways."""
+MOST_SWEEP = 2.0
+THINNEST, THICKEST = 0.004, 0.03
+"""Bounds of the hair's thickness over which the lift at the roots fades, metres."""
+THICKNESS_BLUR, LEAST_HELD = 2.0, 0.05
+"""Standard deviation in cells of the thickness over the crown, and the least share of hair in such
+a neighbourhood that counts."""
+
+
+def measure_parting(masks: Sequence[Mask], cameras: Sequence[Camera], head: Head) -> Parting:
+    """Return where the views see skin on the crown, each place weighted by how it faces them."""
+    at, normals = _crown(head)
+    if not len(at) or not all(mask.person_known for mask in masks):
+        return Parting()
+    skin, faced = np.zeros(len(at)), np.zeros(len(at))
+    for mask, camera in zip(masks, cameras, strict=True):
+        facing = -np.einsum("ij,ij->i", camera.view_direction(at), normals)
+        column, row = np.floor(camera.project(at)).astype(np.int64).T
+        height, width = mask.labels.shape
+        inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
+        weight = np.where(inside & (facing > LEAST_FACING), facing, 0.0)
+        label = mask.labels[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
+        skin += weight * (label == PERSON)
+        faced += weight
+    share = float(skin.sum() / max(faced.sum(), LEAST_FACING))
+    if share < LEAST_SKIN:
+        return Parting(0.0, share)
+    order = np.argsort(at[:, 0])
+    quarters = skin.sum() * np.array(QUARTILES)
+    low, middle, high = at[order[np.searchsorted(np.cumsum(skin[order]), quarters)], 0]
+    return Parting(float(middle), share, bool(high - low < WIDEST_SKIN))
+
+
+def _crown(head: Head) -> tuple[Float64Array, Float64Array]:
+    """Return points (N, 3) and normals (N, 3) of the scalp on top of the head."""
+    vertices, normals = head.vertices.astype(np.float64), head.normals().astype(np.float64)
+    bare = vertices[head.scalp <= 0.5]
+    inner = head.scalp > 0.5
+    if len(bare):
+        inner &= cKDTree(bare).query(vertices)[0] > SCALP_EDGE
+    top = vertices[:, 1].max() - CROWN_DEPTH
+    chosen = inner & (vertices[:, 1] > top) & (normals[:, 1] > 0)
+    return vertices[chosen], normals[chosen]
+
+
+def crown_share(head: Head, points: npt.ArrayLike) -> Float64Array:
+    """Return how much the comb of the parting counts at points (N, 3): 1 on top, 0 below."""
+    top = float(head.vertices[:, 1].max())
+    rise: Float64Array = (np.asarray(points, np.float64)[:, 1] - (top - FADE_START)) / FADE_LENGTH
+    share: Float64Array = np.clip(rise, 0.0, 1.0)
+    return share
+
+
+def comb_from_parting(
+    parting: Parting, points: npt.ArrayLike, outward: Float64Array
+) -> Float64Array:
+    """Return unit tangents (N, 3), root to tip, of hair combed from a parting.
+
+    Parameters
+    ----------
+    points
+        (N, 3) near the crown, metres in the head frame.
+    outward
+        (N, 3) unit normals of the head there.
+    """
+    at = np.asarray(points, np.float64)
+    away = np.zeros_like(at)
+    away[:, 0] = at[:, 0] - parting.x
+    away[:, 2] = at[:, 2] - np.clip(at[:, 2], LINE_BACK, LINE_FRONT)
+    away = _unit(_tangent(away, outward))
+    back = np.clip(SWEEP + SWEEP_SLOPE * (SWEEP_AT - at[:, 2]), -MOST_SWEEP, MOST_SWEEP)
+    pull = DOWN * np.array([0.0, -1.0, 0.0]) + back[:, None] * np.array([0.0, 0.0, -1.0])
+    return _unit(away + _tangent(pull, outward))
+
+
+def root_lift(hull: Hull, points: npt.ArrayLike) -> Float64Array:
+    """Return the outward part (N,) of hair on the crown at points (N, 3): 1 at the skin, 0 on top.
+
+    Hair that leaves the skin flat would leave the volume empty that the photos show.
+    """
+    height = np.where(hull.dense, hull.head_distance, 0).max(axis=1)
+    held = ndimage.gaussian_filter((height > 0).astype(np.float32), THICKNESS_BLUR)
+    thickness = ndimage.gaussian_filter(height, THICKNESS_BLUR) / np.maximum(held, LEAST_HELD)
+    cell = hull.grid.nearest_cell(points)
+    distance = hull.grid.sample(hull.head_distance, points).astype(np.float64)
+    over = np.clip(thickness[cell[:, 0], cell[:, 2]], THINNEST, THICKEST)
+    lift: Float64Array = np.clip(1 - distance / over, 0.0, 1.0)
+    return lift
+
+
+def _tangent(vector: Float64Array, outward: Float64Array) -> Float64Array:
+    tangent: Float64Array = vector - np.einsum("ij,ij->i", vector, outward)[:, None] * outward
+    return tangent
+
+
+def _unit(vector: Float64Array) -> Float64Array:
+    length = np.linalg.norm(vector, axis=1, keepdims=True)
+    unit: Float64Array = vector / np.maximum(length, 1e-9)
+    return unit

@@ -1,0 +1,108 @@
+"""Laws of the parting: where it is found, and how hair is combed from it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairkit.arrays import Float64Array
+from hairkit.field.parting import comb_from_parting, crown_share, measure_parting, root_lift
+from hairkit.testing import ball_head, shell_hull, turn_scene
+from hairkit.types.camera import Camera
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.parting import Parting
+
+BALL = 0.1
+"""Radius of the head, metres."""
+LINE = 0.006
+"""Half of the width of the skin that a parting shows, metres."""
+HEAD = ball_head(60)
+CAMERAS = turn_scene().cameras
+
+
+def parted_mask(camera: Camera, x: float | None) -> Mask:
+    """Return the labels of a ball of hair with a line of skin at `x` on top of it."""
+    column, row = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    start, way = camera.rays(np.stack([column, row], axis=-1))
+    along = -np.sum(start * way, axis=-1)
+    gap = BALL**2 - np.sum(start * start, axis=-1) + along**2
+    hit = start + (along - np.sqrt(np.maximum(gap, 0)))[..., None] * way
+    labels = np.where(gap > 0, HAIR, BACKGROUND).astype(np.uint8)
+    if x is not None:
+        skin = (np.abs(hit[..., 0] - x) < LINE) & (hit[..., 1] > 0.05) & (gap > 0)
+        labels[skin] = PERSON
+    return Mask(labels, True)
+
+
+def masks_of(x: float | None) -> list[Mask]:
+    """Return the labels of all views, in pictures four times as large as those of the turn."""
+    return [parted_mask(camera, x) for camera in large_cameras()]
+
+
+def large_cameras() -> list[Camera]:
+    """Return the cameras of the turn with pixels that resolve a parting."""
+    return [camera.resized(4 * camera.width, 4 * camera.height) for camera in CAMERAS]
+
+
+@pytest.mark.parametrize("x", [-0.03, 0.0, 0.02])
+def test_the_parting_is_where_skin_shows(x: float) -> None:
+    """Its place is right to half a vertex spacing, whatever side it is on."""
+    parting = measure_parting(masks_of(x), large_cameras(), HEAD)
+    assert parting.seen
+    assert parting.x == pytest.approx(x, abs=0.004)
+
+
+def test_a_crown_without_skin_has_no_parting() -> None:
+    """Hair everywhere, or masks that do not know the person, say nothing."""
+    assert not measure_parting(masks_of(None), large_cameras(), HEAD).seen
+    unknown = [
+        Mask(np.where(mask.hair, HAIR, BACKGROUND), person_known=False) for mask in masks_of(0.0)
+    ]
+    assert not measure_parting(unknown, large_cameras(), HEAD).seen
+
+
+def crown_points() -> tuple[Float64Array, Float64Array]:
+    """Return points on top of the ball and their normals."""
+    side, depth = np.meshgrid(np.linspace(-0.05, 0.05, 8), np.linspace(-0.05, 0.05, 8))
+    flat = np.stack([side.ravel(), depth.ravel()], axis=1)
+    height = np.sqrt(BALL**2 - np.sum(flat**2, axis=1))
+    points = np.stack([flat[:, 0], height, flat[:, 1]], axis=1)
+    return points, points / BALL
+
+
+def test_hair_is_combed_along_the_skin_away_from_the_parting() -> None:
+    """Directions are unit tangents; hair to the left of the line goes left, to its right right."""
+    points, normals = crown_points()
+    combed = comb_from_parting(Parting(0.01, 0.1, True), points, normals)
+    np.testing.assert_allclose(np.linalg.norm(combed, axis=1), 1, atol=1e-9)
+    np.testing.assert_allclose(np.sum(combed * normals, axis=1), 0, atol=1e-9)
+    beside = np.abs(points[:, 0] - 0.01) > 0.005
+    assert (np.sign(combed[beside, 0]) == np.sign(points[beside, 0] - 0.01)).all()
+
+
+def test_the_mirrored_parting_combs_the_mirror_image() -> None:
+    """Nothing in the comb prefers a side."""
+    points, normals = crown_points()
+    mirror = np.array([-1.0, 1.0, 1.0])
+    left = comb_from_parting(Parting(0.02, 0.1, True), points, normals)
+    right = comb_from_parting(Parting(-0.02, 0.1, True), points * mirror, normals * mirror)
+    np.testing.assert_allclose(left * mirror, right, atol=1e-12)
+
+
+def test_the_comb_counts_on_top_and_fades_below() -> None:
+    """1 at the top of the head, 0 at the ears, never growing on the way down."""
+    height = np.linspace(0.1, -0.1, 50)
+    share = crown_share(HEAD, np.stack([0 * height, height, 0 * height], axis=1))
+    assert share[0] == 1
+    assert share[-1] == 0
+    assert (np.diff(share) <= 0).all()
+
+
+def test_the_lift_fades_through_the_hair() -> None:
+    """Strands stand off at the skin and lie flat on the surface of the hair."""
+    hull = shell_hull(0.005)
+    height = np.array([0.101, 0.108, 0.116, 0.124])
+    lift = root_lift(hull, np.stack([0 * height, height, 0 * height], axis=1))
+    assert lift[0] > 0.8
+    assert lift[-1] < 0.2
+    assert (np.diff(lift) < 0).all()
