@@ -5,6 +5,8 @@ measured over all views.
 
 * `alpha_matting`: mask edges refined at full size
 * `geodesic`: geodesic distance from seeds; contours are expensive to cross
+* `hair_features`: what the hair network sees of a photo
+* `hair_network`: probability of hair, person and background by a small network
 * `masked_filters`: filters that respect a mask, means of undirected angles
 * `seeded_segmentation`: hair, person and background from seeds
 * `waves`: radius and pitch of waves in the orientation maps

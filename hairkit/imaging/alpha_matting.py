@@ -49,6 +49,18 @@ def refine_labels(
 ) -> UInt8Array:
     """Return labels (H, W) of the full picture from those of a reduced one.
 
+    Parameters are those of `refine_labels_and_alpha`.
+    """
+    return refine_labels_and_alpha(image, labels, seeds, hair_allowed)[0]
+
+
+def refine_labels_and_alpha(
+    image: UInt8Array, labels: UInt8Array, seeds: UInt8Array, hair_allowed: BoolArray
+) -> tuple[UInt8Array, UInt8Array]:
+    """Return labels (H, W) of the full picture from those of a reduced one, and hair's opacity.
+
+    The opacity (H, W), 0 to 255, is the share of hair in a pixel near an edge.
+
     Parameters
     ----------
     image : (H, W, 3)
@@ -67,6 +79,10 @@ def refine_labels(
         cv2.resize(lab, labels.shape[::-1], interpolation=cv2.INTER_AREA), np.float32
     )
     sure = _sure(labels, seeds)
+    if not sure[HAIR].any():
+        plain = cv2.resize(labels, (width, height), interpolation=cv2.INTER_NEAREST)
+        enlarged: UInt8Array = np.asarray(plain, np.uint8)
+        return enlarged, np.where(enlarged == HAIR, np.uint8(255), np.uint8(0))
     unsure = ~np.logical_or.reduce(list(sure.values()))
     band = _enlarge(unsure, width, height)
     mean = {
@@ -78,10 +94,13 @@ def refine_labels(
     coarse = np.where(unsure, np.uint8(PERSON), labels)
     large = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_NEAREST)
     result: UInt8Array = np.asarray(large, np.uint8)
-    result[band] = _classify(lab[band], mean, away)
+    result[band], share = _classify(lab[band], mean, away)
+    alpha = np.where(result == HAIR, np.uint8(255), np.uint8(0))
+    alpha[band] = np.rint(255 * share)
     forbidden = (result == HAIR) & ~_enlarge(hair_allowed, width, height)
     result[forbidden] = BACKGROUND
-    return result
+    alpha[forbidden] = 0
+    return result, alpha
 
 
 def _sure(labels: UInt8Array, seeds: UInt8Array) -> dict[int, BoolArray]:
@@ -99,13 +118,17 @@ def _sure(labels: UInt8Array, seeds: UInt8Array) -> dict[int, BoolArray]:
 
 def _classify(
     colour: Float32Array, mean: dict[int, Float32Array], away: dict[int, Float32Array]
-) -> UInt8Array:
-    """Return the label (N,) of pixels of `colour` (N, 3), mixed of hair and the likelier other."""
+) -> tuple[UInt8Array, Float32Array]:
+    """Return label (N,) and share of hair (N,) of pixels of `colour` (N, 3).
+
+    A pixel is mixed of hair and of the likelier of the other two.
+    """
     best = np.full(len(colour), np.inf, np.float32)
     result = np.full(len(colour), HAIR, np.uint8)
+    opacity = np.ones(len(colour), np.float32)
     limits = {PERSON: HAIR_OVER_PERSON, BACKGROUND: HAIR_OVER_BACKGROUND}
     for label, limit in limits.items():
-        if label not in mean or HAIR not in mean:
+        if label not in mean:
             continue
         across = mean[HAIR] - mean[label]
         offset = colour - mean[label]
@@ -116,7 +139,8 @@ def _classify(
         better = misfit < best
         best = np.where(better, misfit, best)
         result = np.where(better, np.where(share > limit, HAIR, label), result).astype(np.uint8)
-    return result
+        opacity = np.where(better, share, opacity)
+    return result, opacity
 
 
 def _local_mean(values: Float32Array, core: BoolArray) -> Float32Array:

@@ -1,4 +1,4 @@
-"""Label a photo from seeds: hair, the rest of the person, background.
+"""Label a photo from seeds or from probabilities: hair, the rest of the person, background.
 
 The method follows GrabCut (Rother, Kolmogorov and Blake 2004): a colour mixture for each class is
 learnt from the seeds, labels every pixel, and is learnt again from the labels. Three things differ.
@@ -16,7 +16,7 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.errors import InputError
-from hairkit.imaging.alpha_matting import refine_labels
+from hairkit.imaging.alpha_matting import refine_labels, refine_labels_and_alpha
 from hairkit.imaging.geodesic import edge_costs, seed_distance
 from hairkit.imaging.masked_filters import blur
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
@@ -57,6 +57,10 @@ _CERTAIN, _CERTAIN_WINDOW = 0.95, 5
 """Least probability of pixels from which the mixtures are learnt again, and the edge in pixels of
 the square that has to have one label around them."""
 
+_SURE, _FEWEST, _LEAST_PROBABILITY = 0.85, 30, 1e-4
+"""Probability from which a pixel teaches the mixtures, the fewest pixels that do, and the least
+probability of a class. With 0.95 in the place of 0.85 photographs lose 0.01 of IoU."""
+
 
 @dataclass(frozen=True)
 class LabelSettings:
@@ -74,6 +78,11 @@ class LabelSettings:
     """Largest difference in log-likelihood that one pixel's appearance makes between classes."""
     seed: int = 1
     """Seed of the clustering."""
+
+
+BESIDE_A_PRIOR = LabelSettings(components=8, evidence_cap=3.0)
+"""Weights of colours beside the network's probability: a cap of 1.5 instead of 3 loses 0.01 of IoU
+on photographs, one of 6 changes nothing."""
 
 
 def reduced_size(width: int, height: int, reduced_height: int) -> tuple[int, int]:
@@ -133,12 +142,10 @@ def coarse_labels(
             "to tell them apart"
         )
     height, width = seeds.shape
-    colour, features = appearance(image, width, height)
+    colour, flat = _standard_features(image, width, height)
     costs = edge_costs(blur(colour, _DENOISE_SIGMA), _COST_PER_PIXEL, _COST_PER_CONTRAST)
     distance = np.stack([seed_distance(costs, seeds == label) for label in classes], axis=-1)
     prior = -np.float32(settings.distance_weight) * np.minimum(distance, settings.distance_cap)
-    flat = features.reshape(height * width, -1)
-    flat = (flat - flat.mean(axis=0)) / (flat.std(axis=0) + np.float32(_LEAST_DEVIATION))
     terms = polynomial_terms(flat)
     known = seeds
     for _ in range(settings.rounds):
@@ -148,6 +155,64 @@ def coarse_labels(
         known = _certain(labels, probability.max(axis=-1), seeds)
     result: UInt8Array = labels
     return result
+
+
+def label_from_probability(
+    image: UInt8Array,
+    probability: Float32Array,
+    size: tuple[int, int],
+    settings: LabelSettings | None = None,
+) -> tuple[UInt8Array, UInt8Array]:
+    """Return labels (H, W) of the photo's pixels, and the opacity of the hair, 0 to 255.
+
+    The mixtures of the classes are learnt from the pixels that are probable, and what they say is
+    weighed against the probability; then they are learnt once more from the result.
+
+    Parameters
+    ----------
+    image : (H, W, 3)
+        RGB.
+    probability : (h, w, 3)
+        Of hair, of the rest of the person and of the background, of a smaller picture.
+    size : (width, height)
+        Of the reduced picture that is labelled before the edges are refined.
+    settings : LabelSettings, optional
+        Its weights of the distance from seeds are not used.
+    """
+    settings = settings or BESIDE_A_PRIOR
+    prior = np.asarray(cv2.resize(probability, size, interpolation=cv2.INTER_CUBIC), np.float32)
+    prior = np.clip(prior, np.float32(_LEAST_PROBABILITY), 1)
+    posterior = prior / prior.sum(axis=-1, keepdims=True)
+    _, flat = _standard_features(image, *size)
+    terms = polynomial_terms(flat)
+    order = np.array([HAIR, PERSON, BACKGROUND], np.uint8)
+    for _ in range(settings.rounds):
+        sure = posterior.max(axis=-1) > _SURE
+        known = np.where(sure, order[posterior.argmax(axis=-1)], np.uint8(UNKNOWN))
+        counts = [np.count_nonzero(known == label) for label in order]
+        classes = [int(label) for label, n in zip(order, counts, strict=True) if n >= _FEWEST]
+        if len(classes) < 2:
+            break
+        evidence = class_evidence(flat, terms, known, classes, settings)
+        relative = np.full(prior.shape, -settings.evidence_cap, np.float32)
+        relative[..., np.isin(order, classes)] = np.maximum(
+            evidence - evidence.max(axis=-1, keepdims=True), -settings.evidence_cap
+        )
+        odds = prior * np.exp(blur(relative, _DENOISE_SIGMA))
+        posterior = odds / odds.sum(axis=-1, keepdims=True)
+    labels = np.take(order, posterior.argmax(axis=-1))
+    anywhere = np.ones(labels.shape, np.bool_)
+    return refine_labels_and_alpha(image, labels, np.full_like(labels, UNKNOWN), anywhere)
+
+
+def _standard_features(
+    image: UInt8Array, width: int, height: int
+) -> tuple[Float32Array, Float32Array]:
+    """Return the Lab picture (h, w, 3) and features (h w, 8) with mean 0 and deviation 1."""
+    colour, features = appearance(image, width, height)
+    flat = features.reshape(height * width, -1)
+    flat = (flat - flat.mean(axis=0)) / (flat.std(axis=0) + np.float32(_LEAST_DEVIATION))
+    return colour, flat
 
 
 def appearance(image: UInt8Array, width: int, height: int) -> tuple[Float32Array, Float32Array]:

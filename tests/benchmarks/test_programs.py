@@ -18,6 +18,7 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "helices": ({"COUNT": 10}, []),
+    "masks": ({}, ["CAPTURES"]),
     "orientation": ({}, ["CAPTURES", "--only", "structure_tensor"]),
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),

@@ -92,6 +92,15 @@ def test_no_hair_is_told_in_one_line(kind: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_the_opacity_agrees_with_the_labels() -> None:
+    """Pixels of hair are opaque for the most part, and pixels off its edges are clear."""
+    photo, _ = portrait()
+    mask = auto_matte.segment(view=View("front", 0.0, photo), options=auto_matte.Options())
+    assert mask.alpha is not None
+    assert (mask.alpha[mask.hair] > 0.29 * 255).all()
+    assert (mask.alpha[~mask.hair] <= 0.61 * 255).all()
+
+
 def test_hair_is_found_in_a_rendered_capture(captures: Path) -> None:
     """The back of a head with wavy hair is found in a picture of a path tracer."""
     pixels = cv2.imread(str(captures / "wavy/photos/4_back.jpg"))

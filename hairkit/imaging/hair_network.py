@@ -1,0 +1,101 @@
+"""A small convolutional network that tells hair from the rest of a person and the background.
+
+A U-Net (Ronneberger, Fischer and Brox 2015) on the features of `hairkit.imaging.hair_features`,
+with a stride of two at its entry and a sub-pixel convolution at its end (Shi et al. 2016). It was
+trained by `benchmarks/train_hair_network.py` on rendered heads alone, whose hair, skin, clothes and
+surroundings were recoloured at random.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import resources
+
+import numpy as np
+
+from hairkit.arrays import Float32Array, Float64Array, UInt8Array
+from hairkit.imaging.hair_features import hair_features
+from hairkit.storage import read_npz
+
+_MIRRORED = (5, 9)
+"""Features that change their sign in a mirrored photo: the strands' slope and the coordinate across
+the face."""
+
+
+def hair_probability(
+    image: UInt8Array, person: Float32Array | None, landmarks: Float64Array | None
+) -> Float32Array:
+    """Return (h, w, 3) the probabilities of hair, of the rest of the person and of the background.
+
+    The longer side of the result has `hairkit.imaging.hair_features.GRID` cells. It is the mean of
+    the network's answers to the photo and to its mirror image. Parameters are those of
+    `hair_features`.
+    """
+    features = hair_features(image, person, landmarks)
+    columns, rows = features.size
+    mirrored = np.zeros_like(features.values)
+    mirrored[:, :rows, :columns] = features.values[:, :rows, :columns][..., ::-1]
+    mirrored[list(_MIRRORED)] *= -1
+    first = _softmax(_network(features.values))[:, :rows, :columns]
+    second = _softmax(_network(mirrored))[:, :rows, :columns][..., ::-1]
+    return np.moveaxis(np.asarray((first + second) / 2, np.float32), 0, -1)
+
+
+def _network(values: Float32Array) -> Float32Array:
+    """Return the scores (3, GRID, GRID) of the three classes."""
+    weights = _weights()
+    levels = sum(name.startswith("up") for name in weights) // 2
+    x = _relu(_convolve(_relu(_convolve(values, "entry", stride=2)), "first"))
+    kept = [x]
+    for level in range(levels):
+        x = _relu(_convolve(_halve(x), f"down{level}a"))
+        x = _relu(_convolve(x, f"down{level}b"))
+        kept.append(x)
+    for level in reversed(range(levels)):
+        doubled = x.repeat(2, axis=1).repeat(2, axis=2)
+        x = _relu(_convolve(np.concatenate([doubled, kept[level]]), f"up{level}"))
+    scores = _convolve(x, "exit")
+    classes, rows, columns = len(scores) // 4, *scores.shape[1:]
+    blocks = scores.reshape(classes, 2, 2, rows, columns).transpose(0, 3, 1, 4, 2)
+    return blocks.reshape(classes, 2 * rows, 2 * columns)
+
+
+def _convolve(x: Float32Array, name: str, stride: int = 1) -> Float32Array:
+    """Return the correlation of x (C, h, w), padded with zeros, with the kernels of a layer."""
+    kernels, bias = _weights()[f"{name}.weight"], _weights()[f"{name}.bias"]
+    edge = kernels.shape[-1]
+    height, width = x.shape[1:]
+    padded = np.pad(x, ((0, 0), (edge // 2,) * 2, (edge // 2,) * 2))
+    patches = np.concatenate(
+        [
+            padded[:, row : row + height : stride, column : column + width : stride]
+            for row in range(edge)
+            for column in range(edge)
+        ]
+    )
+    flat = kernels.transpose(0, 2, 3, 1).reshape(len(kernels), -1)
+    result = flat @ patches.reshape(len(patches), -1) + bias[:, None]
+    return np.asarray(result.reshape(len(kernels), *patches.shape[1:]), np.float32)
+
+
+def _halve(x: Float32Array) -> Float32Array:
+    """Return the largest of every 2 x 2 values of x (C, h, w)."""
+    channels, height, width = x.shape
+    return np.asarray(x.reshape(channels, height // 2, 2, width // 2, 2).max(axis=(2, 4)))
+
+
+def _relu(x: Float32Array) -> Float32Array:
+    return np.maximum(x, 0)
+
+
+def _softmax(scores: Float32Array) -> Float32Array:
+    odds = np.exp(scores - scores.max(axis=0))
+    return np.asarray(odds / odds.sum(axis=0), np.float32)
+
+
+@cache
+def _weights() -> dict[str, Float32Array]:
+    """Return kernels (C out, C in, k, k) and biases (C out,) of every layer by its name."""
+    path = resources.files("hairkit") / "imaging" / "hair_network.npz"
+    with resources.as_file(path) as file:
+        return {name: array.astype(np.float32) for name, array in read_npz(file).items()}

@@ -1,0 +1,67 @@
+"""Laws of the hair network and of its features."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from hairkit.imaging import hair_network
+from hairkit.imaging.hair_features import CHANNELS, GRID, hair_features
+from hairkit.imaging.hair_network import hair_probability
+
+
+def photo(height: int = 160, width: int = 120) -> np.ndarray:
+    """Return a random smooth picture (height, width, 3)."""
+    rng = np.random.default_rng(4)
+    noise = cv2.GaussianBlur(rng.normal(0, 400, (height, width, 3)), (0, 0), 3)
+    return np.clip(128 + noise, 0, 255).astype(np.uint8)
+
+
+def ring(centre: tuple[float, float], radius: float) -> np.ndarray:
+    """Return 68 points on a circle, the eyes above and the mouth below its centre."""
+    angle = np.linspace(0, 2 * np.pi, 68, endpoint=False)
+    points = np.stack([np.cos(angle), np.sin(angle)], axis=1) * radius
+    points[36:48], points[48:] = points[36:48] * 0.3 - (0, radius / 2), points[48:] * 0.3
+    points[48:] += (0, radius / 2)
+    return points + centre
+
+
+@pytest.mark.parametrize("size", [(160, 120), (90, 300), (40, 40), (1, 7)])
+def test_probabilities_add_up_to_one(size: tuple[int, int]) -> None:
+    """Every cell of a photo of any shape gets three probabilities."""
+    result = hair_probability(photo(*size), None, None)
+    assert max(result.shape[:2]) == GRID
+    assert np.allclose(result.sum(axis=-1), 1, atol=1e-4)
+
+
+def test_a_mirrored_photo_has_the_mirrored_probability() -> None:
+    """With the face and the person mirrored too; sums are made in another order."""
+    image, centre = photo(128, 128), (70.0, 60.0)
+    person = np.random.default_rng(1).random((128, 128)).astype(np.float32)
+    landmarks = ring(centre, 20.0)
+    first = hair_probability(image, person, landmarks)
+    mirrored = landmarks * (-1, 1) + (128, 0)
+    flip = np.ascontiguousarray
+    second = hair_probability(flip(image[:, ::-1]), flip(person[:, ::-1]), mirrored)
+    assert np.allclose(first, second[:, ::-1], atol=0.05)
+
+
+def test_cells_off_the_photo_are_empty() -> None:
+    """The photo fills the upper left of the grid and no other cell."""
+    features = hair_features(photo(60, 120), None, ring((60, 30), 10))
+    columns, rows = features.size
+    assert (columns, rows) == (GRID, GRID // 2)
+    assert features.values.shape == (CHANNELS, GRID, GRID)
+    assert not features.values[:, rows:].any()
+    assert (features.values[8, :rows] == 1).all()
+
+
+def test_a_convolution_equals_its_definition() -> None:
+    """One output of a layer is the sum over its window, written out."""
+    x = np.random.default_rng(2).normal(size=(14, 8, 8)).astype(np.float32)
+    kernels, bias = (hair_network._weights()[f"entry.{part}"] for part in ("weight", "bias"))
+    result = hair_network._convolve(x, "entry", stride=2)
+    window = x[:, 3:6, 1:4]
+    assert result.shape == (len(kernels), 4, 4)
+    assert np.allclose(result[:, 2, 1], (kernels * window).sum(axis=(1, 2, 3)) + bias, atol=1e-4)
