@@ -3,6 +3,7 @@
 Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.types.head.Head`.
 
 * `bvh`: nearest points and ray crossings on triangle meshes
+* `hairline`: where the photos show that hair grows
 * `placement`: a head placed under given strands
 * `scalp`: roots: sampling, binding to faces, growth mesh
 * `signed_distance`: signed distance to a head, on a grid or at points

@@ -28,6 +28,12 @@ SHRINK = 0.95
 """Factor from one radius of the dart throwing to the next."""
 _LONGEST_EDGE = 3.2
 """Edges of the growth mesh longer than this many root spacings bridge what is not scalp."""
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1)
+"""Multiples of it, less their whole parts, are spread evenly over [0, 1) in every run of them."""
+_MOST_TIMES = 16
+"""Factor by which the sequence is prolonged at most in one go."""
+_SPARE = 1.02
+"""Roots tried beyond those that should do."""
 _STEPS = np.array(
     [15111065706836454659, 12378569675163806722, 10140184033053478359], dtype=np.uint64
 )
@@ -45,7 +51,9 @@ def sample_roots(
 
     Distances are measured on the head at rest. Triangles and barycentric weights therefore depend
     on its topology and scalp alone: heads fitted to other photos, or by other versions of a
-    library, carry their roots at the same places.
+    library, carry their roots at the same places. Where the head's density is below 1 the sequence
+    is thinned: each place is taken or left by its own number in [0, 1), however many roots there
+    are and wherever else hair grows.
 
     Parameters
     ----------
@@ -63,11 +71,11 @@ def sample_roots(
     Raises
     ------
     InputError
-        `count` is out of bounds, or the scalp has no area.
+        `count` is out of bounds, the scalp has no area, or too little hair grows on it.
     """
     if not (count >= 1 and first >= 0 and first + count <= MAX_ROOTS):
         raise InputError(f"{count} roots asked for, expected 1 to {MAX_ROOTS}")
-    triangle, barycentric = _progressive_roots(_at_rest(head, rest), first + count, seed)
+    triangle, barycentric = _growing_roots(_at_rest(head, rest), first + count, seed)
     return roots_at(head, triangle[first:], barycentric[first:])
 
 
@@ -141,6 +149,23 @@ def _at_rest(head: Head, rest: Head | None) -> Head:
         if shape is not None and np.array_equal(shape.faces, head.faces):
             return replace(head, vertices=shape.vertices)
     return head
+
+
+def _growing_roots(head: Head, count: int, seed: int) -> tuple[Int32Array, Float64Array]:
+    """Return the first `count` roots of a seed's sequence that its density keeps."""
+    wanted = count
+    while True:
+        triangle, barycentric = _progressive_roots(head, wanted, seed)
+        chance = np.arange(1, wanted + 1) * _GOLDEN % 1.0
+        kept = np.flatnonzero(head.density_at(triangle, barycentric) > chance)[:count]
+        if len(kept) == count:
+            return triangle[kept], barycentric[kept]
+        if wanted == MAX_ROOTS:
+            raise InputError(
+                f"hair grows at {len(kept)} of {MAX_ROOTS} roots, expected {count}; ask for fewer"
+            )
+        share = max(len(kept) / wanted, 1 / _MOST_TIMES)
+        wanted = min(int(count / share * _SPARE) + 1, MAX_ROOTS)
 
 
 def _progressive_roots(head: Head, count: int, seed: int) -> tuple[Int32Array, Float64Array]:

@@ -18,6 +18,7 @@ class Feature(StrEnum):
     GROUP = "groups"
     GUIDE = "guide flag"
     GUIDE_WEIGHTS = "guide weights"
+    DENSITY = "density at the roots"
     HEAD = "head mesh"
     SKIN = "skeleton and skin"
     CAPSULES = "capsules"

@@ -14,6 +14,7 @@ from hairkit.errors import InputError, RenderError
 from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.field.parting import measure_parting
 from hairkit.grooming.assemble import assemble_groom
+from hairkit.head_model.hairline import Hairline, measure_hairline
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.imaging.waves import measure_waves
@@ -262,13 +263,13 @@ def _grow(
         "parting": parting,
     }  # fmt: skip
     field = run.once("field", OrientationField, **seen)
-    roots = Given.of(sample_roots(scene.value.head, guides, seed, rest=head))
+    hairline = run.derive("hairline", Hairline, measure_hairline, scene=scene, masks=masks)
+    grown = replace(scene.value.head, density=hairline.value.density)
+    roots = Given.of(sample_roots(grown, guides, seed, rest=head))
     strands = run.once("track", Strands, **seen, field=field, roots=roots)
     labels = tuple(mask.result().value for mask in masks)
     angles = tuple(orientation.result().value for orientation in orientations)
-    groom = assemble_groom(
-        capture.views, labels, scene.value.head, roots.value, strands.value, waves.value
-    )
+    groom = assemble_groom(capture.views, labels, grown, roots.value, strands.value, waves.value)
     health = assess(
         capture, labels, scene.value, hull.value, groom, guides, distance.value.hair_length, turn
     )

@@ -103,6 +103,11 @@ class Groom(Previewed, Stored):
         strands = repr(self.strands).removeprefix("Strands(").removesuffix(")")
         return f"Groom({strands}, head of {len(self.head.vertices)} vertices)"
 
+    @property
+    def root_density(self) -> Float32Array:
+        """(S,) density of the hair about each root, of that of full hair, 0 to 1."""
+        return self.head.density_at(self.root_triangle, self.root_barycentric)
+
     def preview(self) -> UInt8Array | None:
         """Return the guides on their head: front, left and back, (H, W, 3) uint8 RGB."""
         return draw_turn(self.head, self.strands)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array, frozen_array
 from hairkit.errors import DataError
@@ -56,6 +57,8 @@ class Head(Previewed, Stored):
     joints: Float32Array
     """(3, 3) root, neck and head joint positions, metres."""
     capsules: Capsules
+    density: Float32Array | None = None
+    """(V,) density of the hair on the scalp, of that of full hair, 0 to 1; None: full hair."""
 
     def __post_init__(self) -> None:
         vertices = frozen_array(self.vertices, np.float32, (None, 3), "head vertices")
@@ -76,6 +79,11 @@ class Head(Previewed, Stored):
         object.__setattr__(
             self, "joints", frozen_array(self.joints, np.float32, (3, 3), "head joints")
         )
+        if self.density is not None:
+            density = frozen_array(self.density, np.float32, (len(vertices),), "head density")
+            if density.min() < 0 or density.max() > 1:
+                raise DataError("head density lies outside [0, 1]")
+            object.__setattr__(self, "density", density)
         if self.landmark_vertices is not None:
             index = frozen_array(
                 self.landmark_vertices, np.int32, (LANDMARKS,), "head landmark_vertices"
@@ -89,6 +97,14 @@ class Head(Previewed, Stored):
     def preview(self) -> UInt8Array | None:
         """Return front, left and back, (H, W, 3) uint8 RGB."""
         return draw_turn(self, None)
+
+    def density_at(self, triangle: npt.ArrayLike, barycentric: npt.ArrayLike) -> Float32Array:
+        """Return (N,) the density of the hair on faces (N,) at barycentric weights (N, 3)."""
+        face, weights = np.asarray(triangle, np.int64), np.asarray(barycentric, np.float32)
+        if self.density is None:
+            return np.ones(len(face), np.float32)
+        density: Float32Array = (self.density[self.faces[face]] * weights).sum(axis=1)
+        return np.clip(density, 0, 1)
 
     def normals(self) -> Float64Array:
         """Return (V, 3) unit vertex normals, outward, weighted by face area."""

@@ -47,7 +47,7 @@ FORMAT = FileFormat(
         }
     ),
     partial=MappingProxyType({Feature.ANIMATION: "written; the first frame is read"}),
-    written=frozenset({Feature.GUIDE_WEIGHTS}),
+    written=frozenset({Feature.GUIDE_WEIGHTS, Feature.DENSITY}),
 )
 
 

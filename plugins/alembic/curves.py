@@ -37,6 +37,8 @@ class GroomCurves:
     """(P,) diameters."""
     root_uv: Float32Array
     """(S, 2)."""
+    density: Float32Array
+    """(S,) density of the hair about each root, 0 to 1."""
     colour: Profile
     """(P, 3) linear RGB."""
     group: Int32Array
@@ -84,6 +86,7 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
         counts=fitted.counts.astype(np.int32),
         widths=fitted.widths / np.float32(space.metres),
         root_uv=fitted.root_uv,
+        density=ready.groom.root_density,
         colour=colours(ready.groom.material, fitted.counts),
         group=fitted.group,
         guide=guide if marked else None,

@@ -64,7 +64,7 @@ def _make_room(part: Path, size: int) -> None:
 def _size(curves: GroomCurves) -> int:
     """Return at least the bytes of the file: its numbers, each sample's key, and headers."""
     frames = 1 if curves.cache is None else len(curves.cache)
-    arrays = [curves.counts, curves.widths, curves.root_uv, curves.group]
+    arrays = [curves.counts, curves.widths, curves.root_uv, curves.density, curves.group]
     # colours are three numbers a point, as places are
     size = sum(array.nbytes for array in arrays) + (frames + 1) * curves.points.nbytes
     # also each curve's number, guide flag, and three guides with weights
@@ -125,6 +125,7 @@ def _write_attributes(attributes: Any, curves: GroomCurves) -> None:
     _write_attribute(attributes, "groom_id", "Int32", _UNIFORM, number)
     _write_attribute(attributes, "groom_group_id", "Int32", _UNIFORM, curves.group)
     _write_attribute(attributes, "groom_root_uv", "V2f", _UNIFORM, curves.root_uv)
+    _write_attribute(attributes, "hairkit_root_density", "Float", _UNIFORM, curves.density)
     _write_attribute(attributes, "groom_color", "V3f", _VERTEX, curves.colour.at())
     if curves.guide is not None:
         guide = curves.guide.astype(np.int32)

@@ -39,9 +39,9 @@ from hairkit.types.groom import Groom
 FORMAT = FileFormat(
     title="USD",
     suffixes=(".usdc", ".usda", ".usd"),
-    exact=frozenset(Feature) - {Feature.GUIDE_WEIGHTS, Feature.ANIMATION},
+    exact=frozenset(Feature) - {Feature.GUIDE_WEIGHTS, Feature.DENSITY, Feature.ANIMATION},
     partial=MappingProxyType({Feature.ANIMATION: "written; the rest pose is read"}),
-    written=frozenset({Feature.GUIDE_WEIGHTS}),
+    written=frozenset({Feature.GUIDE_WEIGHTS, Feature.DENSITY}),
 )
 
 

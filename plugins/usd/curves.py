@@ -13,6 +13,9 @@ from hairkit.head_model.skinning import HEAD_JOINT
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.types.groom import Groom
 
+ROOT_DENSITY = "hairkit:root_density"
+"""Primvar of the density of the hair about each root, 0 to 1."""
+
 
 def add_hair(
     stage: Any,
@@ -65,6 +68,8 @@ def _add_primvars(primvars: Any, groom: Groom) -> None:
     for name, values in _numbers(groom).items():
         array, kind = Vt.IntArray.FromNumpy(values), types.IntArray
         primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.uniform).Set(array)
+    density = Vt.FloatArray.FromNumpy(groom.root_density)
+    primvars.CreatePrimvar(ROOT_DENSITY, types.FloatArray, UsdGeom.Tokens.uniform).Set(density)
     for name, rows in _triples(groom).items():
         array, kind = Vt.Vec3fArray.FromNumpy(rows), types.Float3Array
         primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.uniform).Set(array)

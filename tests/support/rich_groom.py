@@ -31,9 +31,15 @@ def rich_groom(strands: int = 40) -> Groom:
         group=rng.integers(0, 3, strands),
         guide=np.arange(strands) % 3 != 1,
     )
+    head = replace(
+        bare.head,
+        capsules=_capsules(),
+        joints=bare.head.joints + np.float32(0.01),
+        density=rng.uniform(0.2, 1.0, len(bare.head.vertices)),
+    )
     return Groom(
         packed,
-        replace(bare.head, capsules=_capsules(), joints=bare.head.joints + np.float32(0.01)),
+        head,
         bare.root_triangle[index],
         bare.root_barycentric[index],
         HairMaterial(np.array([0.3, 0.2, 0.1]), np.array([0.6, 0.4, 0.3]), 7e-5, 0.002, 0.011),

@@ -27,11 +27,12 @@ ATTRIBUTES = {
     "groom_group_id": ("int32_t", "uni"),
     "groom_guide": ("int32_t", "uni"),
     "groom_root_uv": ("float32_t[2]", "uni"),
+    "hairkit_root_density": ("float32_t", "uni"),
     "groom_color": ("float32_t[3]", "vtx"),
     "groom_closest_guides": ("int32_t[3]", "uni"),
     "groom_guide_weights": ("float32_t[3]", "uni"),
 }
-"""Type and scope of each attribute, as Epic's specification 1.5 has them."""
+"""Type and scope of each attribute: our own one, and the others as Epic's specification 1.5 has them."""
 
 
 def hair_groom() -> Groom:
