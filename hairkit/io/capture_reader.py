@@ -21,6 +21,7 @@ from hairkit.arrays import Float64Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.io.capture_toml import CaptureFile, ViewEntry, read_capture_file
 from hairkit.io.photos import PhotoHeader, focal_from_equivalent, read_header, read_photo
+from hairkit.io.video import is_video, read_video
 from hairkit.options import unknown_name
 from hairkit.storage import read_bytes
 from hairkit.types.capture import Capture, View
@@ -70,13 +71,14 @@ class _Place:
 
 
 def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> Capture:
-    """Return the capture in a folder.
+    """Return the capture in a folder, or that of a video.
 
     Parameters
     ----------
     path
-        The capture's folder. Photos without names of views are an even turn in file order until
-        the stage `turn` finds out from where they were taken.
+        The capture's folder, or a video of a turn, see `read_video`.
+        Photos without names of views are an even turn in file order until the stage `turn` finds
+        out from where they were taken.
     max_edge
         Photos whose long edge has more pixels are scaled down to it.
 
@@ -87,6 +89,8 @@ def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> 
         landmarks do not belong to the photos.
     """
     folder = Path(path)
+    if is_video(folder):
+        return read_video(folder, max_edge)
     if not folder.is_dir():
         reason = "not a folder" if folder.exists() else "no such folder"
         raise InputError(f"{folder}: {reason}, expected a folder of photos")

@@ -32,7 +32,7 @@ ATTRIBUTES = {
     "groom_closest_guides": ("int32_t[3]", "uni"),
     "groom_guide_weights": ("float32_t[3]", "uni"),
 }
-"""Type and scope of each attribute: our own one, and the others as Epic's specification 1.5 has them."""
+"""Type and scope of each attribute; all but our own are those of Epic's specification 1.5."""
 
 
 def hair_groom() -> Groom:

@@ -1,0 +1,77 @@
+"""The process that decodes a video: a damaged file may crash a decoder, and must not end a run.
+
+Run as `python video_child.py MODE VIDEO OUT.npz ...`; it knows nothing of hairkit.
+
+* `scan`: WIDTH MOST, writes small grey frames, their numbers and their sharpness
+* `pick`: EDGE NUMBERS, writes the frames with these numbers, scaled down to the edge
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import cv2
+import numpy as np
+
+
+def scan(video: Any, width: int, most: int) -> dict[str, Any]:
+    """Return small grey frames (N, H, W), their numbers (N,) and sharpness (N,).
+
+    Sharpness is the variance of the Laplacian (Pech-Pacheco et al. 2000), at four times the width.
+    """
+    claimed = max(int(video.get(cv2.CAP_PROP_FRAME_COUNT)), 0)
+    every = max(1, claimed // most)
+    small: list[Any] = []
+    numbers: list[int] = []
+    sharp: list[float] = []
+    number = 0
+    while video.grab():
+        if number % every == 0 and len(numbers) < 2 * most:
+            decoded, frame = video.retrieve()
+            if not decoded or frame is None:
+                break
+            grey = cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY)
+            height = max(1, round(grey.shape[0] * width / grey.shape[1]))
+            middle = cv2.resize(grey, (4 * width, 4 * height), interpolation=cv2.INTER_AREA)
+            small.append(cv2.resize(middle, (width, height), interpolation=cv2.INTER_AREA))
+            sharp.append(float(cv2.Laplacian(middle, cv2.CV_32F).var()))
+            numbers.append(number)
+        number += 1
+    return {"claimed": claimed, "read": number, "small": small, "numbers": numbers, "sharp": sharp}
+
+
+def pick(video: Any, edge: int, numbers: list[int]) -> dict[str, Any]:
+    """Return the frames with ascending numbers as RGB (N, H, W, 3), and their size on disk."""
+    frames, size = [], (0, 0)
+    for number in range(numbers[-1] + 1):
+        if not video.grab():
+            break
+        if number in numbers:
+            decoded, frame = video.retrieve()
+            if not decoded or frame is None:
+                break
+            size = frame.shape[1], frame.shape[0]
+            scale = min(1.0, edge / max(size))
+            fitted = [max(1, round(side * scale)) for side in size]
+            frames.append(cv2.resize(frame, fitted, interpolation=cv2.INTER_AREA)[..., ::-1])
+    return {"frames": frames, "size": size}
+
+
+def main(mode: str, path: str, out: str, *rest: str) -> None:
+    """Do one of the two and write the arrays."""
+    cv2.setNumThreads(1)
+    video = cv2.VideoCapture(path)
+    video.set(cv2.CAP_PROP_ORIENTATION_AUTO, 1)
+    if not video.isOpened():
+        sys.exit("OpenCV cannot open it as a video")
+    if mode == "scan":
+        found = scan(video, int(rest[0]), int(rest[1]))
+    else:
+        found = pick(video, int(rest[0]), [int(number) for number in rest[1].split(",")])
+    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in found.items()}
+    np.savez(out, **arrays)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
