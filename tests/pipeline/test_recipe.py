@@ -9,12 +9,14 @@ import pytest
 
 from hairkit.errors import HairkitError, InputError, OptionError, PluginError
 from hairkit.manager import STAGES, Manager
+from hairkit.nets.known_models import known_model
 from hairkit.pipeline import recipe as recipe_module
 from hairkit.pipeline.recipe import (
     HOOKS,
     Recipe,
     Stage,
     load_recipe,
+    missing_networks,
     parse_recipe,
     recipe_names,
     stage_digest,
@@ -227,6 +229,20 @@ def test_the_digest_knows_values_not_spelling(manager: Manager) -> None:
     assert digest("") == digest(f'{first.name} = "{first.default}"')
     other = first.high if first.high is not None else first.default + 1
     assert digest("") != digest(f"{first.name} = {other}")
+
+
+def test_the_digest_knows_the_networks_that_are_there(
+    manager: Manager, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A result made without a network is not taken for one made with it."""
+    monkeypatch.setenv("HAIRKIT_MODELS", str(tmp_path))
+    stage = stage_of(load_recipe("default"), "person")
+    before = stage_digest(manager, stage)
+    assert missing_networks(load_recipe("default"), manager)["selfie"] == ("selfie_segmentation",)
+    known = known_model("selfie_segmentation")
+    (tmp_path / known.file).write_bytes(bytes(known.size))
+    assert stage_digest(manager, stage) != before
+    assert "selfie" not in missing_networks(load_recipe("default"), manager)
 
 
 def test_the_example_in_the_docstring_is_toml() -> None:
