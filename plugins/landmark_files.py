@@ -21,6 +21,8 @@ from hairkit.types.head import JAW_LANDMARKS
 
 NOISE_PX = 1.5
 """Standard deviation of careful landmarks in a photo 1080 px high, as `silhouette` assumes it."""
+JAW_NOISE = 2.0
+"""Times that for points of the jaw: the outline that annotators trace slides along it."""
 USUAL_LENS_MM = 42.0
 """Full-frame focal length where the photo does not tell, as the plugin `manual` has it."""
 
@@ -31,6 +33,7 @@ def detect_landmarks(view: View) -> Face | None:
     if view.landmarks is None:
         return None
     noise = np.full(len(view.landmarks), NOISE_PX * picture_scale(view.height))
+    noise[:JAW_LANDMARKS] *= JAW_NOISE
     azimuth, elevation, roll = np.degrees(_direction(view, view.landmarks))
     return Face(1.0, view.landmarks, noise, azimuth, elevation, roll)
 

@@ -42,17 +42,20 @@ class Turn:
     """(V, 2) width and height in pixels."""
     focal_ratios: Float64Array
     """(V,) focal length of each view over the first one's."""
+    elevations: Float64Array
+    """(V,) nominal elevations, radians."""
 
     @classmethod
     def of(cls, capture: Capture) -> Turn:
-        """Return the turn of a capture: nominal azimuths, sizes, focal lengths by EXIF or size."""
+        """Return the nominal turn of a capture, with focal lengths by EXIF or size."""
         sizes = np.array([(view.width, view.height) for view in capture.views])
         focal = np.hypot(*sizes.T)
         known = [view.focal_px for view in capture.views if view.focal_px is not None]
         if len(known) == len(sizes):
             focal = np.array(known, np.float64)
         azimuths = np.radians([view.azimuth_deg for view in capture.views])
-        return cls(azimuths, sizes, focal / focal[0])
+        elevations = np.radians([view.elevation_deg for view in capture.views])
+        return cls(azimuths, sizes, focal / focal[0], elevations)
 
     @property
     def size(self) -> int:
@@ -63,7 +66,9 @@ class Turn:
         """Return rotations (V, 3, 3), translations (V, 3) and focal lengths (V,) in pixels."""
         views = vector[SHARED:].reshape(-1, PER_VIEW)
         far = 1.0 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE)
-        view_rotation = _view_rotations(self.azimuths + views[:, 0], views[:, 1], views[:, 2])
+        view_rotation = _view_rotations(
+            self.azimuths + views[:, 0], self.elevations + views[:, 1], views[:, 2]
+        )
         rotation = view_rotation @ rotation_matrix(vector[:3])
         offset = np.stack([views[:, 4], views[:, 5], far * np.exp(views[:, 3])], axis=1)
         translation = offset - rotation @ vector[3:6]

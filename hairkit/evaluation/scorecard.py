@@ -83,11 +83,13 @@ def _view_figures(evaluation: Evaluation) -> tuple[Figure, ...]:
     apart = 1000 * float(np.mean([camera.position_m for camera in cameras]))
     lower, overlap = "lower is better", "higher is better, 1 is best"
     orientation, azimuth = evaluation.orientation_deg, evaluation.azimuth_error_deg
+    scale = 1 / evaluation.similarity.scale
     return (
         Figure("drawn direction within 20 deg", share, " %", 1, "higher is better, 100 is best"),
         Figure("silhouette IoU", evaluation.silhouette, "", 3, overlap),
         Figure("2D orientation error", orientation, " deg", 1, f"{lower}, guessing gives 45"),
         Figure("hair mask IoU", evaluation.mask_iou, "", 3, overlap),
+        Figure("metric scale / true", scale, "", 3, "1 is best: scores are of the groom so scaled"),
         Figure("camera azimuth error", azimuth, " deg", 2, lower),
         Figure("camera rotation error", rotation, " deg", 2, lower),
         Figure("camera position error", apart, " mm", 1, lower),

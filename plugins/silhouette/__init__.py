@@ -64,6 +64,11 @@ FROM_THE_SIDE = 0.35
 PROFILE_PX = 3.0
 FOCAL_SPREAD = 0.03
 """Of the logarithm of a known focal length: lenses breathe and cameras crop."""
+ABOVE, LOOSE_ABOVE = np.radians(35), 4.0
+"""Elevation (radians) from which a view is one from above, and how much wider the spreads of its
+azimuth and elevation are: such photos belong to no turn, and show no face."""
+PLACE_ROUNDS = 4
+"""Rounds of the first place and depths: the magnification settles to 0.1 %."""
 MIN_SIGHTS = 6
 """Fewer landmarks than this place no head."""
 
@@ -193,12 +198,13 @@ class _Problem:
     def of(
         cls, capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
     ) -> _Problem:
-        pixel = picture_scale(capture.views[0].height)
+        pixels = np.array([picture_scale(view.height) for view in capture.views])
+        pixel = float(pixels.mean())
         turn = Turn.of(capture)
         outlines = Outlines.of(masks, options.contour_points)
         angles = np.radians([options.azimuth, options.elevation, options.roll])
         each = [*angles, options.distance, options.shift, options.shift]
-        sights = Sights.of(capture, masks, options.landmark_px * pixel)
+        sights = Sights.of(capture, masks, options.landmark_px * pixels)
         landmarks = None
         if head.landmark_vertices is not None and len(sights) >= MIN_SIGHTS:
             places = head.vertices[head.landmark_vertices].astype(np.float64)
@@ -210,7 +216,9 @@ class _Problem:
                 places, shape_precision(places), sights, fields, scale, side, PROFILE_PX * pixel
             )
         shared = SHARED_SPREAD if landmarks is not None else SHARED_SPREAD_BY_MASKS
-        spread = np.concatenate([shared, np.tile(each, len(capture.views))])
+        own = np.tile(each, (len(capture.views), 1))
+        own[turn.elevations > ABOVE, :2] *= LOOSE_ABOVE
+        spread = np.concatenate([shared, own.ravel()])
         noise = options.silhouette_px * pixel
         focals = [view.focal_px for view in capture.views]
         focal = None if None in focals else focals[0]
@@ -246,19 +254,28 @@ class _Problem:
         return (*self.turn.unpack(vector), self.turn.sizes / 2.0)
 
     def _place_by_landmarks(self, landmarks: LandmarkFit) -> tuple[float, Float64Array]:
-        """Return magnification and the turn's centre: exact for cameras far away, so linear."""
+        """Return magnification and the turn's centre.
+
+        Pixels times depth over the usual distance are those of cameras far away, for which the
+        solution is linear; depths follow from the place found before.
+        """
         sights = landmarks.sights
-        axes = self.turn.unpack(np.zeros(self.turn.size))[0][sights.view, :2]
+        axes = self.turn.unpack(np.zeros(self.turn.size))[0][sights.view]
         seen = sights.pixel - self.turn.sizes[sights.view] / 2.0
+        points = landmarks.landmarks[sights.point]
         weight = np.repeat(1 / sights.noise, 2)
-        left = np.concatenate([seen.reshape(-1, 1), axes.reshape(-1, 3)], axis=1)
-        right = np.einsum("nij,nj->ni", axes, landmarks.landmarks[sights.point]).ravel()
-        solution = np.linalg.lstsq(left * weight[:, None], right * weight, rcond=None)[0]
+        right = np.einsum("nij,nj->ni", axes[:, :2], points).ravel()
+        nearness = np.ones(len(points))
+        for _ in range(PLACE_ROUNDS):
+            left = np.column_stack([(seen * nearness[:, None]).ravel(), axes[:, :2].reshape(-1, 3)])
+            solution = np.linalg.lstsq(left * weight[:, None], right * weight, rcond=None)[0]
+            depth = np.einsum("nj,nj->n", axes[:, 2], points - solution[1:])
+            nearness = 1 + depth / USUAL_DISTANCE
         if not solution[0] > 0:
             raise InputError(
                 "the landmarks do not fit a head seen from the views' azimuths; check their order"
             )
-        return 1 / float(solution[0]), solution[1:]
+        return 1 / float(solution[0]), np.asarray(solution[1:], np.float64)
 
     def _place_by_masks(self) -> tuple[float, Float64Array]:
         """Return magnification and the turn's centre from the silhouettes' tops and widths.

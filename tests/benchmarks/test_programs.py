@@ -24,6 +24,7 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
     "super_helix": ({"GUIDES": 8, "ELEMENTS": 5, "FRAMES": 2}, []),
     "threads": ({"REPETITIONS": 1}, ["--runs", "2"]),
+    "turn": ({"SHUFFLES": 1}, ["CAPTURES"]),
     "viewer": (
         {"WARM": 1},
         ["--guides", "20", "--hairs", "60", "--size", "64x48", "--pictures", "1"],
@@ -79,7 +80,7 @@ def test_it_prints_its_table(
 
 
 @pytest.mark.parametrize(
-    "name", ["cameras", "face_landmarks", "orientation", "segmentation", "fidelity"]
+    "name", ["cameras", "face_landmarks", "orientation", "segmentation", "fidelity", "turn"]
 )
 def test_captures_are_named_by_the_user(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

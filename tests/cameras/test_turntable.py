@@ -18,7 +18,7 @@ numbers = st.floats(-3, 3)
 
 def _turn(count: int = 8) -> Turn:
     sizes = np.tile([[300, 400]], (count, 1))
-    return Turn(np.arange(count) * np.pi / 4, sizes, np.ones(count))
+    return Turn(np.arange(count) * np.pi / 4, sizes, np.ones(count), np.zeros(count))
 
 
 def _vector(turn: Turn, rng: np.random.Generator) -> Float64Array:

@@ -1,0 +1,143 @@
+"""Print how well the turn is found whatever order and position the photos are in.
+
+python benchmarks/turn.py captures/ --photos-alone
+
+Faces and persons are those of the capture (landmarks.json, masks/) unless `--photos-alone` asks the
+networks (`hairkit models install`). Names of files are ignored. A turn counts as found when no
+photo is more than 30 degrees off; the true turn is in truth/.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from hairkit_plugins import face_mesh, landmark_files, mask_files, photo_turn, selfie
+
+from hairkit import Capture, View
+from hairkit.errors import InputError
+from hairkit.evaluation import read_truth
+from hairkit.io.capture_reader import read_capture
+from hairkit.options import make_options
+from hairkit.types.face import Face
+from hairkit.types.person import Person
+from hairkit.types.turnaround import Turnaround
+
+FOUND_DEG = 30.0
+"""Error of the worst photo up to which a turn is found."""
+SHUFFLES = 8
+"""Random orders tried of each capture."""
+
+
+@dataclass(frozen=True)
+class Photo:
+    """A photo with what is found in it, and from where it was taken."""
+
+    view: View
+    face: Face
+    person: Person
+    azimuth_deg: float
+
+
+def main() -> None:
+    """Find the turn of every capture that has truth, in its order and in others."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "captures",
+        type=Path,
+        nargs="?",
+        default=os.environ.get("HAIRKIT_CAPTURES"),
+        help="folder of captures (default: $HAIRKIT_CAPTURES)",
+    )
+    parser.add_argument("--photos-alone", action="store_true", help="faces and persons by networks")
+    arguments = parser.parse_args()
+    if arguments.captures is None:
+        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        return
+    print(
+        "| capture | azimuth | worst | margin | turned about | on its side | shuffled | one out |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
+    for folder in sorted(path.parent for path in arguments.captures.glob("*/truth")):
+        print(_row(folder.name, _photos(folder, arguments.photos_alone)))
+
+
+def _photos(folder: Path, photos_alone: bool) -> list[Photo]:
+    """Return the photos of a capture with all that `find_turn` is given."""
+    capture, truth = read_capture(folder), read_truth(folder / "truth")
+    azimuths = dict(zip(truth.names, (c.azimuth_deg for c in truth.cameras), strict=True))
+    photos = []
+    for view in capture.views:
+        if photos_alone:
+            mesh = make_options(face_mesh.Options, {}, "face_mesh")
+            face = face_mesh.detect_landmarks(view, mesh)
+            person = selfie.segment_person(view, make_options(selfie.Options, {}, "selfie"))
+        else:
+            face = landmark_files.detect_landmarks(view)
+            mask = mask_files.segment(view)
+            person = Person(np.where(mask.person, 255, 0).astype(np.uint8)) if mask else None
+        photos.append(
+            Photo(
+                replace(view, named=False, landmarks=None),
+                face or Face.absent(),
+                person or Person.absent(),
+                azimuths[view.name],
+            )
+        )
+    return photos
+
+
+def _row(name: str, photos: list[Photo]) -> str:
+    """Return one line of the table."""
+    count = len(photos)
+    errors, turn = _errors(photos)
+    if turn is None:
+        return f"| {name} | refused | | | | | | |"
+    about = [np.roll(np.arange(count), first)[::step] for first in range(count) for step in (1, -1)]
+    generator = np.random.default_rng(0)
+    shuffled = [generator.permutation(count) for _ in range(SHUFFLES)]
+    missing = [np.delete(np.arange(count), out) for out in range(count)]
+    cells = [
+        f"{errors.mean():.1f}",
+        f"{errors.max():.1f}",
+        f"{turn.margin:.2f}",
+        _share(photos, about),
+        _share([_lying(photo) for photo in photos], [np.arange(count)]),
+        _share(photos, shuffled),
+        _share(photos, missing),
+    ]
+    return f"| {name} | " + " | ".join(cells) + " |"
+
+
+def _share(photos: list[Photo], orders: Iterable[npt.NDArray[np.int64]]) -> str:
+    """Return how many of the orders give the true turn."""
+    worst = [_errors([photos[i] for i in order])[0].max() for order in orders]
+    return f"{np.count_nonzero(np.array(worst) < FOUND_DEG)} of {len(worst)}"
+
+
+def _errors(photos: list[Photo]) -> tuple[npt.NDArray[np.float64], Turnaround | None]:
+    """Return each photo's error in degrees, all 180 for a turn that is refused."""
+    views = tuple(replace(p.view, name=f"view-{i}") for i, p in enumerate(photos))
+    faces, persons = tuple(p.face for p in photos), tuple(p.person for p in photos)
+    try:
+        turn = photo_turn.find_turn(Capture(views), faces, persons)
+    except InputError:
+        return np.full(len(photos), 180.0), None
+    true = np.array([photo.azimuth_deg for photo in photos])
+    return np.abs((turn.azimuth_deg - true + 180) % 360 - 180), turn
+
+
+def _lying(photo: Photo) -> Photo:
+    """Return the photo on its right side."""
+    face = photo.face.turned(1, photo.view.width, photo.view.height)
+    person = Person(np.rot90(photo.person.alpha, -1))
+    return Photo(photo.view.turned(1), face, person, photo.azimuth_deg)
+
+
+if __name__ == "__main__":
+    main()
