@@ -22,6 +22,7 @@ from hairkit.io.capture_reader import read_capture, sample_folder
 from hairkit.manager import Manager
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
+from hairkit.types.parting import Parting
 from hairkit.types.waves import Waves
 
 TRACKERS = ("hybrid_growth", "certainty_tracker")
@@ -60,6 +61,7 @@ def main() -> int:
         "hull": hull,
         "field": field,
         "waves": Waves(),
+        "parting": Parting(),
         "scalp_distance": measure_scalp_distance(scene.head, hull),
     }
     for name in TRACKERS:
