@@ -27,10 +27,16 @@ from hairkit.types.face import Face
 from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
 
-from .appearance import Outline, compare_outlines, measure_skin, trace_outline
+from .appearance import (
+    Outline,
+    compare_outlines,
+    measure_clothes,
+    measure_skin,
+    trace_outline,
+)
 from .arrangement import Evidence
 from .describe import Found, in_turn_order, name_views, summarise
-from .refuse import check_turn, contradicting, find_copies, photo_name
+from .refuse import check_one_person, check_turn, contradicting, find_copies, photo_name
 from .search import find_arrangements, margin_of
 from .upright import find_quarter_turns
 
@@ -92,7 +98,9 @@ def _arrange(views: Sequence[View], faces: Sequence[Face], named: BoolArray) -> 
     outlines = _trace_outlines(views)
     skin, distances = None, None
     if outlines is not None:
-        skin = measure_skin([view.image for view in views], outlines, faces)
+        photos = [view.image for view in views]
+        check_one_person(views, measure_clothes(photos, outlines))
+        skin = measure_skin(photos, outlines, faces)
         distances = compare_outlines(outlines)
     seen = Evidence.of(faces, distances, skin)
     azimuth = np.array([view.azimuth_deg for view in views])

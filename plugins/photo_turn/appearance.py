@@ -46,6 +46,11 @@ FACE_POINTS = np.r_[17:68]
 """iBUG points whose hull is skin: all but the jaw, which may lie under hair."""
 EYES_AND_MOUTH = (np.r_[36:42], np.r_[42:48], np.r_[48:60])
 """iBUG points of what is no skin inside."""
+CLOTHES_BAND, CROWN_DEPTH = 0.08, 0.25
+"""Clothes are looked for in the lowest rows of the person, a share of the picture's height; hair is
+what lies above this depth below the crown, head widths."""
+NOT_HAIR, CLOTHED = 0.18, 0.3
+"""Clothes differ from hair by this much in log chromaticity, in at least this share of the band."""
 THUMBNAIL, THUMBNAIL_BLUR = 32, 1.0
 """Edge of the grey thumbnails in which copies are recognised, and their Gaussian, pixels."""
 
@@ -205,6 +210,23 @@ def _skin_moments(
     skin = np.exp(-squared / (2 * SKIN_WIDTH))
     sideways = (columns - columns.mean()) / (outline.width_px * scale)
     return np.array([skin.mean(), (skin * sideways).mean()])
+
+
+def measure_clothes(photos: Sequence[UInt8Array], outlines: Sequence[Outline]) -> Float64Array:
+    """Return the log chromaticity (V, 2) of the clothes, NaN where hair covers them."""
+    found = []
+    for photo, outline in zip(photos, outlines, strict=True):
+        small, scale = _shrink(photo)
+        size = (small.shape[1], small.shape[0])
+        inside = cv2.resize(outline.inside.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+        rows, columns = np.nonzero(inside)
+        colour = _log_colour(small[rows, columns])[:, :2]
+        crown = rows <= (outline.top_px + CROWN_DEPTH * outline.width_px) * scale
+        band = colour[rows >= rows.max() - CLOTHES_BAND * len(small)]
+        off = np.linalg.norm(band - np.median(colour[crown], axis=0), axis=1)
+        clothed = (off > NOT_HAIR).mean() > CLOTHED
+        found.append(np.median(band[off > NOT_HAIR], axis=0) if clothed else np.full(2, np.nan))
+    return np.array(found)
 
 
 def thumbnails_alike(photos: Sequence[UInt8Array]) -> Float64Array:

@@ -18,6 +18,8 @@ UNSURE = 1.3
 """Margin below which the summary says that another arrangement fits nearly as well."""
 NAMED_DEG = 40.0
 """The photos of a turn of eight are named in order if each is less than this off its view."""
+MOST_TOLD = 3
+"""Pairs of equal photos that the summary names."""
 TOP = "top"
 """Name of photos from above."""
 
@@ -98,7 +100,9 @@ def summarise(
         parts.append(found.note)
     if turns.any():
         parts.append(f"{np.count_nonzero(turns)} photos lie on their side and are turned")
-    parts += [f"{photo_name(views[j])} equals {photo_name(views[i])}" for i, j in twins]
+    parts += [f"{photo_name(views[j])} equals {photo_name(views[i])}" for i, j in twins[:MOST_TOLD]]
+    if len(twins) > MOST_TOLD:
+        parts.append(f"so do {len(twins) - MOST_TOLD} more pairs")
     return "; ".join(parts)
 
 
