@@ -82,9 +82,9 @@ MOST_MARGIN = 100.0
 LANDMARK_VIEWS = Limits(2, 0)
 """Views whose landmarks are known. Without any the head's size is a guess: on the captures it came
 out 1.17 to 1.59 times too large."""
-LANDMARK_MM = Limits(2.0, 5.5)
-"""At most 1.4 mm on seven captures as they are; 2.4 to 11 with moved masks, 8 to 32 with wrong
-azimuths, 10 to 27 when shuffled, 6 where the turn ran the other way."""
+LANDMARK_MM = Limits(3.0, 5.5)
+"""At most 1.4 mm on six captures as they are, 2.3 with landmarks found by `face_mesh`; 2.4 to 11
+with moved masks, 8 to 32 with wrong azimuths, 10 to 27 when shuffled."""
 OUTLINE_MM = Limits(1.1, 2.5)
 """At most 0.9 mm on captures as they are; 1.3 to 4 with two heads, 8 and more when shuffled."""
 PUPIL_MM = Limits(7.5, 13.0)
@@ -94,8 +94,9 @@ ADULT_PUPILS_MM = 63.4
 """Mean distance of the pupils of adults (Dodgson 2004)."""
 COVERED = Limits(0.9, 0.8)
 """At least 0.91 on captures as they are; at most 0.86 when shuffled, 0.89 with two heads."""
-AGREEMENT = Limits(0.8, 0.68)
-"""At least 0.82 on captures as they are; at most 0.62 when shuffled, 0.65 with wrong azimuths."""
+AGREEMENT = Limits(0.75, 0.68)
+"""At least 0.82 on captures as they are, 0.77 on photos alone; at most 0.62 when
+shuffled, 0.65 with wrong azimuths."""
 BARE_FACE = Limits(0.05, 0.25)
 """At most 0.01 on captures as they are; 0.5 to 1 with the face in the masks."""
 GROWN = Limits(0.98, 0.9)
@@ -201,8 +202,8 @@ def assess_cameras(scene: Scene) -> tuple[Figure, ...]:
     scale = float(np.mean([_pixels_per_metre(camera) for camera in scene.cameras]))
     off = 1000 * scene.residual_px / scale
     note = "are all photos of one head, in the order of the turn?"
-    name = f"outlines off by {scene.residual_px:.1f} px,"
-    return (Figure("cameras", name, off, "mm", OUTLINE_MM.light(off), note, 1),)
+    note = f"{scene.residual_px:.1f} px; {note}"
+    return (Figure("cameras", "outlines off by", off, "mm", OUTLINE_MM.light(off), note, 1),)
 
 
 def assess_masks(masks: Sequence[Mask], scene: Scene) -> tuple[Figure, ...]:

@@ -17,6 +17,7 @@ PROGRAMS = sorted(path.stem for path in (PROJECT / "benchmarks").glob("*.py"))
 SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
+    "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "as_they_are"]),
     "helices": ({"COUNT": 10}, []),
     "masks": ({}, ["CAPTURES"]),
     "orientation": ({}, ["CAPTURES", "--only", "structure_tensor"]),
@@ -80,7 +81,8 @@ def test_it_prints_its_table(
 
 
 @pytest.mark.parametrize(
-    "name", ["cameras", "face_landmarks", "orientation", "segmentation", "fidelity", "turn"]
+    "name",
+    ["cameras", "face_landmarks", "orientation", "segmentation", "fidelity", "health", "turn"],
 )
 def test_captures_are_named_by_the_user(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

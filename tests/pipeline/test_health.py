@@ -1,0 +1,166 @@
+"""Health: a good capture is green, and each fault turns the figure red that names it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairkit.arrays import Float64Array
+from hairkit.cameras.depth_raster import mesh_depth
+from hairkit.head_model.template import default_head
+from hairkit.manager import Manager
+from hairkit.pipeline.health import GREEN, RED, Figure, Limits, assess, summarise
+from hairkit.synth import grow
+from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture, View
+from hairkit.types.groom import Groom
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.scene import Scene
+from hairkit.types.turnaround import Turnaround
+from hairkit.types.volume import Hull
+
+WIDTH, HEIGHT = 360, 480
+HAIR_SIZE = 1.25
+"""Size of the surface of the hair over that of the scalp."""
+ROOTS = 60
+HAIR_LENGTH = 0.06
+SHUFFLED = [3, 6, 0, 5, 1, 7, 2, 4]
+
+
+class Run:
+    """The results of a run on the default head, and what to spoil in them."""
+
+    def __init__(self) -> None:
+        head = default_head()
+        cameras = tuple(
+            Camera.on_turn(45.0 * k, distance=0.8, focal=1000.0, width=WIDTH, height=HEIGHT)
+            for k in range(8)
+        )
+        self.scene = Scene(tuple(str(k) for k in range(8)), cameras, head, residual_px=0.3)
+        self.masks = tuple(self._mask(camera) for camera in cameras)
+        assert head.landmark_vertices is not None
+        points = head.vertices[head.landmark_vertices].astype(np.float64)
+        self.capture = Capture(
+            tuple(self._view(k, camera.project(points)) for k, camera in enumerate(cameras))
+        )
+        self.hull: Hull = Manager.loaded(autoload=False).call(
+            "build_hull", "visual_hull", scene=self.scene, masks=self.masks
+        )
+        self.groom: Groom = grow("short", head, ROOTS, seed=1)
+        self.turn: Turnaround | None = self._turn(1.5)
+        self.roots = len(self.groom.strands)
+
+    def _mask(self, camera: Camera) -> Mask:
+        head = self.scene.head
+        faces = head.faces[(head.scalp[head.faces] > 0.5).all(axis=1)]
+        skin = mesh_depth(head.vertices, head.faces, camera)
+        hair = mesh_depth((HAIR_SIZE * head.vertices).astype(np.float32), faces, camera)
+        labels = np.where(np.isfinite(skin), PERSON, BACKGROUND)
+        labels[np.isfinite(hair) & (hair < skin)] = HAIR
+        return Mask(labels, True)
+
+    def _view(self, k: int, points: Float64Array) -> View:
+        image = np.full((HEIGHT, WIDTH, 3), 100, np.uint8)
+        return View(str(k), 45.0 * k, image, landmarks=points if k in (0, 1, 7) else None)
+
+    def _turn(self, margin: float) -> Turnaround:
+        k, zero = np.arange(8), np.zeros(8)
+        return Turnaround(k, 45.0 * k, zero, zero, self.scene.names, margin, "a turn")
+
+    def figures(self) -> dict[str, Figure]:
+        """Return the figures by stage and name."""
+        every = assess(
+            self.capture, self.masks, self.scene, self.hull, self.groom, self.roots,
+            HAIR_LENGTH, self.turn,
+        )  # fmt: skip
+        return {f"{figure.stage}: {figure.name}": figure for figure in every}
+
+
+@pytest.fixture(scope="module")
+def good() -> Mapping[str, Figure]:
+    """The figures of the run as it is."""
+    return Run().figures()
+
+
+def test_a_good_run_is_green(good: Mapping[str, Figure]) -> None:
+    """Nothing is doubtful where masks, cameras, head and strands fit together."""
+    assert {name for name, figure in good.items() if figure.light != GREEN} == set()
+    assert summarise(list(good.values())) == [f"health: {len(good)} green, 0 amber, 0 red"]
+
+
+def shuffle(run: Run) -> None:
+    """The photos are in another order than the cameras."""
+    views = tuple(run.capture.views[k] for k in SHUFFLED)
+    run.capture, run.masks = Capture(views), tuple(run.masks[k] for k in SHUFFLED)
+
+
+def two_heads(run: Run) -> None:
+    """Every other mask is that of another, taller head of hair."""
+    lifted = [Mask(np.roll(mask.labels, -75, axis=0), True) for mask in run.masks]
+    run.masks = tuple(lifted[k] if k % 2 else run.masks[k] for k in range(8))
+
+
+def hairy_face(run: Run) -> None:
+    """The whole head is called hair."""
+    run.masks = tuple(
+        Mask(np.where(mask.labels == PERSON, HAIR, mask.labels), True) for mask in run.masks
+    )
+
+
+def large_head(run: Run) -> None:
+    """The head and all around it came out 1.3 times too large."""
+    head = replace(run.scene.head, vertices=1.3 * run.scene.head.vertices)
+    run.scene = replace(run.scene, head=head)
+
+
+def no_landmarks(run: Run) -> None:
+    """No landmarks are known."""
+    run.capture = Capture(tuple(replace(view, landmarks=None) for view in run.capture.views))
+
+
+def wrong_outlines(run: Run) -> None:
+    """The outlines of the views contradict each other."""
+    run.scene = replace(run.scene, residual_px=6.0)
+
+
+def few_strands(run: Run) -> None:
+    """A fifth of the roots gave no strand."""
+    run.roots = round(1.25 * run.roots)
+
+
+def any_turn(run: Run) -> None:
+    """Another arrangement of the photos fits as well."""
+    run.turn = run._turn(1.0)
+
+
+FAULTS = {
+    "cameras: landmarks off by": shuffle,
+    "masks: hair that all views agree on, worst view": two_heads,
+    "hull: overlap with the masks": two_heads,
+    "masks: face called hair": hairy_face,
+    "head: distance of the pupils": large_head,
+    "landmarks: views used": no_landmarks,
+    "cameras: outlines off by": wrong_outlines,
+    "strands: roots grown": few_strands,
+    "turn: margin over the next best": any_turn,
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_turns_its_figure_red(name: str) -> None:
+    """The figure that names a fault is red, and its line is among the last ones of the run."""
+    run = Run()
+    FAULTS[name](run)
+    figures = run.figures()
+    assert figures[name].light == RED
+    assert figures[name].line() in summarise(list(figures.values()))
+
+
+def test_limits_may_rise_or_fall() -> None:
+    """Green and red lie beyond their limits, amber between, whichever way is better."""
+    lights = [Limits(0.9, 0.8).light(value) for value in (1.0, 0.9, 0.85, 0.8, 0.1)]
+    assert lights == ["green", "green", "amber", "red", "red"]
+    assert [Limits(1, 3).light(value) for value in (0, 2, 3)] == ["green", "amber", "red"]
