@@ -11,9 +11,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
 from hairkit.imaging.hair_network import hair_probability
@@ -47,9 +48,11 @@ def segment(view: View, options: Options) -> Mask:
     InputError
         No hair was found.
     """
-    probability = hair_probability(view.image, _person(view), _landmarks(view))
+    landmarks = _landmarks(view)
+    probability = hair_probability(view.image, _person(view), landmarks)
     size = reduced_size(view.width, view.height, options.reduced_height)
-    labels, alpha = label_from_probability(view.image, probability, size)
+    face = None if landmarks is None else _face(landmarks * size / (view.width, view.height), size)
+    labels, alpha = label_from_probability(view.image, probability, size, face)
     if np.count_nonzero(labels == HAIR) < _LEAST_HAIR * labels.size:
         raise InputError(
             f"no hair found in photo {view.name}; draw strokes on it or give a mask file"
@@ -71,3 +74,10 @@ def _landmarks(view: View) -> Float64Array | None:
     if view.face is not None and view.face.presence > _LIKELY_FACE:
         return view.face.landmarks
     return None
+
+
+def _face(points: Float64Array, size: tuple[int, int]) -> BoolArray:
+    """Return (h, w) the convex hull of the landmarks, in reduced pixels: jaw to brows."""
+    canvas = np.zeros((size[1], size[0]), np.uint8)
+    cv2.fillConvexPoly(canvas, cv2.convexHull(np.rint(points - 0.5).astype(np.int32)), 1)
+    return canvas > 0

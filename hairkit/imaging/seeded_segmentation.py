@@ -61,6 +61,9 @@ _SURE, _FEWEST, _LEAST_PROBABILITY = 0.85, 30, 1e-4
 """Probability from which a pixel teaches the mixtures, the fewest pixels that do, and the least
 probability of a class. With 0.95 in the place of 0.85 photographs lose 0.01 of IoU."""
 
+_NEARBY = 13
+"""Edge in reduced pixels of the disc around hair in which edges are refined."""
+
 
 @dataclass(frozen=True)
 class LabelSettings:
@@ -161,6 +164,7 @@ def label_from_probability(
     image: UInt8Array,
     probability: Float32Array,
     size: tuple[int, int],
+    face: BoolArray | None = None,
     settings: LabelSettings | None = None,
 ) -> tuple[UInt8Array, UInt8Array]:
     """Return labels (H, W) of the photo's pixels, and the opacity of the hair, 0 to 255.
@@ -176,6 +180,8 @@ def label_from_probability(
         Of hair, of the rest of the person and of the background, of a smaller picture.
     size : (width, height)
         Of the reduced picture that is labelled before the edges are refined.
+    face : (height, width), optional
+        Where colours do not count, because a beard, brows and glasses have those of the hair.
     settings : LabelSettings, optional
         Its weights of the distance from seeds are not used.
     """
@@ -198,11 +204,28 @@ def label_from_probability(
         relative[..., np.isin(order, classes)] = np.maximum(
             evidence - evidence.max(axis=-1, keepdims=True), -settings.evidence_cap
         )
+        if face is not None:
+            relative[face] = 0
         odds = prior * np.exp(blur(relative, _DENOISE_SIGMA))
         posterior = odds / odds.sum(axis=-1, keepdims=True)
     labels = np.take(order, posterior.argmax(axis=-1))
+    return _refine_nearby(image, labels)
+
+
+def _refine_nearby(image: UInt8Array, labels: UInt8Array) -> tuple[UInt8Array, UInt8Array]:
+    """Return labels and opacity with edges refined near the hair of the reduced `labels` (h, w).
+
+    Elsewhere an outline between skin and backdrop that is as dark as hair is none.
+    """
     anywhere = np.ones(labels.shape, np.bool_)
-    return refine_labels_and_alpha(image, labels, np.full_like(labels, UNKNOWN), anywhere)
+    fine, alpha = refine_labels_and_alpha(image, labels, np.full_like(labels, UNKNOWN), anywhere)
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_NEARBY, _NEARBY))
+    nearby = cv2.dilate((labels == HAIR).astype(np.uint8), disc)
+    large = image.shape[1::-1]
+    far = cv2.resize(nearby, large, interpolation=cv2.INTER_NEAREST) == 0
+    coarse = cv2.resize(labels, large, interpolation=cv2.INTER_NEAREST)
+    result: UInt8Array = np.where(far, coarse, fine).astype(np.uint8)
+    return result, np.where(far, np.uint8(0), alpha)
 
 
 def _standard_features(
