@@ -50,8 +50,8 @@ FEWEST, MOST = 3, 36
 WORKING_EDGE = 1440
 """Long edge in pixels that photos are scaled down to."""
 
-_PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png")
-_OTHER_SUFFIXES = (".heic", ".heif", ".webp", ".tif", ".tiff", ".bmp", ".gif", ".dng", ".avif")
+_PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png", ".heic", ".heif")
+_OTHER_SUFFIXES = (".webp", ".tif", ".tiff", ".bmp", ".gif", ".dng", ".avif")
 _LANDMARKS = 68
 _MAX_LANDMARK_BYTES = 2**22
 """68 points of a view are some 2.5 kB of JSON."""
@@ -127,7 +127,9 @@ def _photos(photo_folder: Path) -> list[Path]:
     pictures.sort(key=lambda p: [int(s) if s.isdigit() else s for s in _digits(p.name.lower())])
     for picture in pictures:
         if picture.suffix.lower() in _OTHER_SUFFIXES:
-            raise InputError(f"{picture}: expected JPEG or PNG photos; save it as one of these")
+            raise InputError(
+                f"{picture}: expected JPEG, PNG or HEIC photos; save it as one of these"
+            )
     if not FEWEST <= len(pictures) <= MOST:
         raise InputError(
             f"{photo_folder}: {len(pictures)} photos, expected {FEWEST} to {MOST} from all around"

@@ -10,7 +10,7 @@ import os
 import re
 import struct
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ import numpy.typing as npt
 from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
 from hairkit.io.exif import Exif, read_exif
+from hairkit.io.heic import decode_heic, is_heic, read_heic_header
 from hairkit.storage import read_bytes
 
 MAX_PIXELS = 64_000_000
@@ -67,7 +68,7 @@ class PhotoHeader:
     """Facts from the header of a picture file."""
 
     kind: str
-    """`JPEG` or `PNG`."""
+    """`JPEG`, `PNG` or `HEIC`."""
     width: int
     """Width in pixels after EXIF rotation."""
     height: int
@@ -110,7 +111,7 @@ def read_photo(
     Parameters
     ----------
     path
-        A JPEG or PNG file.
+        A JPEG or PNG file, or a HEIC file where pillow-heif is installed.
     max_edge
         Larger pictures are scaled down so that their long edge has this many pixels.
 
@@ -163,10 +164,13 @@ def read_drawing(path: str | os.PathLike[str]) -> UInt8Array:
 
 def _header(data: bytes, path: Path) -> PhotoHeader:
     kind = _kind(data)
-    if kind not in ("JPEG", "PNG"):
-        raise FormatError(f"{path}: {kind}, expected a JPEG or PNG picture; save it as one")
+    if kind not in ("JPEG", "PNG", "HEIC"):
+        raise FormatError(f"{path}: {kind}, expected a JPEG, PNG or HEIC picture; save it as one")
     try:
-        width, height, exif_block = _scan_jpeg(data) if kind == "JPEG" else _scan_png(data)
+        if kind == "HEIC":
+            width, height, exif_block = read_heic_header(data, str(path))
+        else:
+            width, height, exif_block = _scan_jpeg(data) if kind == "JPEG" else _scan_png(data)
     except (struct.error, IndexError, ValueError) as error:
         raise FormatError(f"{path}: damaged {kind} file; save it again") from error
     if width * height > MAX_PIXELS or not width * height:
@@ -174,6 +178,8 @@ def _header(data: bytes, path: Path) -> PhotoHeader:
             f"{path}: {width} x {height} pixels, expected 1 to {MAX_PIXELS} in all; scale it down"
         )
     exif = read_exif(exif_block)
+    if kind == "HEIC":
+        exif = replace(exif, orientation=1)  # the decoder turns the picture by the file's own tag
     if exif.orientation >= 5:
         width, height = height, width
     return PhotoHeader(kind, width, height, exif)
@@ -182,8 +188,10 @@ def _header(data: bytes, path: Path) -> PhotoHeader:
 def _kind(data: bytes) -> str:
     if not data:
         return "an empty file"
+    if is_heic(data):
+        return "HEIC"
     if data[4:8] == b"ftyp":
-        return "HEIC, AVIF or a video"
+        return "AVIF or a video"
     if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
         return "WebP"
     named = (kind for start, kind in _KINDS.items() if data.startswith(start))
@@ -290,6 +298,8 @@ def _scan_png(data: bytes) -> tuple[int, int, bytes]:
 def _decode(data: bytes, mode: int, path: Path) -> UInt8Array:
     kind = _kind(data)
     try:
+        if kind == "HEIC":
+            return decode_heic(data, str(path))[..., ::-1]
         if kind == "PNG":
             _check_png_data(data)
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), mode | _AS_STORED)

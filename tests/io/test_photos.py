@@ -139,6 +139,7 @@ def test_a_bomb_is_refused_before_it_is_decoded(
         (b"", "an empty file"),
         (b"dear diary", "not a picture"),
         (b"\0\0\0\x18ftypheic" + bytes(40), "HEIC"),
+        (b"\0\0\0\x18ftypavif" + bytes(40), "AVIF or a video"),
         (b"RIFF\0\0\0\0WEBPVP8 ", "WebP"),
         (b"GIF89a" + bytes(20), "GIF"),
         (jpeg(scene_picture())[:-200], "damaged JPEG"),
