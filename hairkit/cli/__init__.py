@@ -42,7 +42,7 @@ from typing import Any, NoReturn
 from hairkit.errors import HairkitError
 
 VERBS = {
-    "reconstruct": "turn eight photos into a groom",
+    "reconstruct": "turn photos of a head, or a video, into a groom",
     "rerun": "run a reconstruction again from its record",
     "evaluate": "score a groom against the truth",
     "synth": "make a procedural groom and photos of it, with their truth",

@@ -1,4 +1,4 @@
-"""`hairkit reconstruct PHOTOS -o OUT`: turn eight photos into a groom."""
+"""`hairkit reconstruct PHOTOS -o OUT`: turn photos of a head into a groom."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ from hairkit.errors import InputError
 _DESCRIPTION = """\
 Example: hairkit reconstruct photos/ -o out/
 
-Turn eight photos into a groom. PHOTOS is a folder with the photos of the turn: front, then every
-45 degrees towards the subject's left; or a folder with photos/ and, where present, masks/, strokes/
-and landmarks.json, matched by name, and a capture.toml. OUT gets groom.npz, scene.json, the
-recipe's exports, contact_sheet.png, run.json (what was done, and how good it is) and hairkit.log.
-After an interruption, run it again: it
-continues where it stopped.
+Turn photos of a head into a groom. PHOTOS is a folder with 3 to 36 photos taken around the head, in
+any order and direction; or a folder with photos/ and, where present, masks/, strokes/ and
+landmarks.json, matched by name, and a capture.toml; or a video of one turn. OUT gets groom.npz,
+scene.json, the recipe's exports, contact_sheet.png, run.json (what was done, and how good it is) and
+hairkit.log. After an interruption, run it again: it continues where it stopped.
 """
 GUIDES = 600
 """Roots by default, as of `hairkit.reconstruct`."""
@@ -34,10 +33,12 @@ def register(subparsers: Any) -> None:
     from hairkit.pipeline.recipe import recipe_names
 
     parser = subparsers.add_parser(
-        "reconstruct", help="turn eight photos into a groom", description=_DESCRIPTION
+        "reconstruct",
+        help="turn photos of a head, or a video, into a groom",
+        description=_DESCRIPTION,
     )
     add = parser.add_argument
-    add("photos", nargs="?", metavar="PHOTOS", help="folder of the capture")
+    add("photos", nargs="?", metavar="PHOTOS", help="folder of the photos, or a video")
     add("-o", "--out", required=True, metavar="OUT", help="output folder")
     add("--sample", action="store_true", help="use the capture that ships with hairkit")
     recipes = f"{', '.join(recipe_names())} or a .toml file"
