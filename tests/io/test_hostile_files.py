@@ -41,7 +41,7 @@ OWN_FILES = {
     "hairkit/pipeline/recipe.py": "shipped recipes",
     "hairkit/pipeline/work_folder.py": "files that hairkit wrote there, and digests",
     "hairkit/rendering/context.py": "shaders",
-    "hairkit/viewer/layers.py": "the log that hairkit wrote there",
+    "plugins/face_mesh/landmark_table.py": "its own tables",
 }
 """Modules that read files of hairkit itself in other ways."""
 
