@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import nnls
 
 from hairkit.arrays import BoolArray, Float64Array, Int64Array
 from hairkit.types.face import Face
@@ -214,6 +213,8 @@ def _outline_cost(azimuth: Float64Array, photos: Int64Array, evidence: Evidence)
 
 def _skin_cost(azimuth: Float64Array, photos: Int64Array, evidence: Evidence) -> float:
     """Return the misfit of skin's share and moment to their usual course around a head."""
+    from scipy.optimize import nnls  # slow to load
+
     if evidence.skin is None:
         return 0.0
     angle = np.radians(azimuth)
