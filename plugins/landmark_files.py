@@ -2,7 +2,8 @@
 
 The direction is that of the camera which sees the landmarks of the template head best
 (perspective-n-point: Terzakis and Lourakis, "A consistently fast and globally optimal solution to
-the perspective-n-point problem", 2020). The jaw is left out: annotators trace its outline.
+the perspective-n-point problem", 2020). The jaw is left out: annotators trace its outline. A
+file does not say how sure its points are; options of the stage `scene` do.
 """
 
 from __future__ import annotations
@@ -14,15 +15,10 @@ from hairkit import View, hookimpl
 from hairkit.arrays import Float64Array
 from hairkit.cameras.turntable import view_angles
 from hairkit.head_model.template import default_head
-from hairkit.imaging.masked_filters import picture_scale
 from hairkit.io.photos import focal_from_equivalent
 from hairkit.types.face import Face
 from hairkit.types.head import JAW_LANDMARKS
 
-NOISE_PX = 1.5
-"""Standard deviation of careful landmarks in a photo 1080 px high, as `silhouette` assumes it."""
-JAW_NOISE = 2.0
-"""Times that for points of the jaw: the outline that annotators trace slides along it."""
 USUAL_LENS_MM = 42.0
 """Full-frame focal length where the photo does not tell, as the plugin `manual` has it."""
 
@@ -32,10 +28,9 @@ def detect_landmarks(view: View) -> Face | None:
     """Return the given landmarks as a certain face, None when the view has none."""
     if view.landmarks is None:
         return None
-    noise = np.full(len(view.landmarks), NOISE_PX * picture_scale(view.height))
-    noise[:JAW_LANDMARKS] *= JAW_NOISE
+    unknown = np.zeros(len(view.landmarks))
     azimuth, elevation, roll = np.degrees(_direction(view, view.landmarks))
-    return Face(1.0, view.landmarks, noise, azimuth, elevation, roll)
+    return Face(1.0, view.landmarks, unknown, azimuth, elevation, roll)
 
 
 def _direction(view: View, landmarks: Float64Array) -> Float64Array:

@@ -26,7 +26,7 @@ class Face(Stored):
     landmarks: Float64Array
     """(68, 2) iBUG points in pixels of the photo as the view holds it."""
     noise_px: Float64Array
-    """(68,) standard deviation of each, pixels."""
+    """(68,) standard deviation of each, pixels; 0 where unknown."""
     yaw_deg: float
     """Azimuth from which the head is seen: 0 in front, positive from the subject's left."""
     pitch_deg: float

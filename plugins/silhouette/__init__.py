@@ -238,7 +238,7 @@ class _Problem:
         vector = np.zeros(self.turn.size)
         vector[PERSPECTIVE] = 1 / USUAL_DISTANCE
         magnification, place = (
-            self._place_by_landmarks(self.landmarks)
+            self._place_by_landmarks(self.landmarks, flat)
             if self.landmarks is not None
             else self._place_by_masks()
         )
@@ -253,11 +253,11 @@ class _Problem:
         """Return the cameras as arrays."""
         return (*self.turn.unpack(vector), self.turn.sizes / 2.0)
 
-    def _place_by_landmarks(self, landmarks: LandmarkFit) -> tuple[float, Float64Array]:
+    def _place_by_landmarks(self, landmarks: LandmarkFit, flat: bool) -> tuple[float, Float64Array]:
         """Return magnification and the turn's centre.
 
-        Pixels times depth over the usual distance are those of cameras far away, for which the
-        solution is linear; depths follow from the place found before.
+        The solution is linear for orthographic cameras. Pixels times depth over the usual distance
+        are those of such cameras; depths follow from the place found before.
         """
         sights = landmarks.sights
         axes = self.turn.unpack(np.zeros(self.turn.size))[0][sights.view]
@@ -266,7 +266,7 @@ class _Problem:
         weight = np.repeat(1 / sights.noise, 2)
         right = np.einsum("nij,nj->ni", axes[:, :2], points).ravel()
         nearness = np.ones(len(points))
-        for _ in range(PLACE_ROUNDS):
+        for _ in range(1 if flat else PLACE_ROUNDS):
             left = np.column_stack([(seen * nearness[:, None]).ravel(), axes[:, :2].reshape(-1, 3)])
             solution = np.linalg.lstsq(left * weight[:, None], right * weight, rcond=None)[0]
             depth = np.einsum("nj,nj->n", axes[:, 2], points - solution[1:])

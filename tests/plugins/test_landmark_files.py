@@ -38,6 +38,7 @@ def test_the_direction_is_that_of_the_camera(azimuth: float, elevation: float) -
     assert face.roll_deg == pytest.approx(0.0, abs=0.5)
     assert np.array_equal(face.landmarks, view.landmarks)
     assert face.presence == 1
+    assert not face.noise_px.any()
 
 
 def test_a_view_without_landmarks_is_left_to_the_next_plugin() -> None:

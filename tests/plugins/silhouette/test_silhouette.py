@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.silhouette import Options, estimate_scene
+from hairkit_plugins.silhouette import Options, _Problem, estimate_scene
 from turntable import Turntable, azimuth_errors, turntable
 
-from hairkit import Camera, Capture, Mask, View
+from hairkit import Camera, Capture, Face, Mask, View
+from hairkit.cameras.turntable import LOG_MAGNIFICATION
 
 
 @pytest.fixture(scope="module")
@@ -56,6 +57,35 @@ def test_orthographic_pictures_are_recognised() -> None:
     assert {camera.model for camera in scene.cameras} == {"orthographic"}
     assert azimuth_errors(scene.cameras, table.cameras).max() < 0.5
     assert scene.cameras[0].focal == pytest.approx(800, rel=0.03)
+
+
+def test_orthographic_cameras_start_at_their_scale() -> None:
+    """Their first place is exact: solved for perspective, the landmarks would be nearer."""
+    table = turntable(np.random.default_rng(2), stray=0.0, model="orthographic", noise=0.0)
+    problem = _Problem.of(table.capture, table.masks, table.head, Options())
+    exact = np.exp(problem.start(flat=True).vector[LOG_MAGNIFICATION])
+    assert exact == pytest.approx(800, rel=0.001)
+    assert np.exp(problem.start(flat=False).vector[LOG_MAGNIFICATION]) < 0.97 * exact
+
+
+def test_options_say_how_sure_landmarks_of_files_are(bust: Turntable) -> None:
+    """A detector's noise counts; where it tells none, `landmark_px` does."""
+    tight, loose = (Options(landmark_px=px, iterations=4, carries=0) for px in (1.0, 30.0))
+
+    def residual(noise: float, options: Options) -> float | None:
+        views = tuple(
+            view
+            if view.landmarks is None
+            else replace(
+                view, face=Face(1.0, view.landmarks, np.full(68, noise), view.azimuth_deg, 0.0, 0.0)
+            )
+            for view in bust.capture.views
+        )
+        capture = replace(bust.capture, views=views)
+        return estimate_scene(capture, bust.masks, bust.head, options).residual_px
+
+    assert residual(0.0, loose) != residual(0.0, tight)
+    assert residual(2.0, loose) == residual(2.0, tight)
 
 
 def test_the_model_can_be_named() -> None:
