@@ -84,12 +84,14 @@ def summarise(
     twins: Sequence[tuple[int, int]],
 ) -> str:
     """Return one line: direction, steps, margin, and everything that is unusual."""
-    ring = np.nonzero(~found.above)[0]
-    steps = wrap(np.diff(found.azimuth_deg[ring], append=found.azimuth_deg[ring[0]]))
-    side = "left" if np.median(steps) > 0 else "right"
-    sizes = np.diff(np.sort(found.azimuth_deg[ring] % 360.0))
+    ring = found.azimuth_deg[~found.above]
+    steps = wrap(np.diff(ring, append=ring[0]))
+    around = np.sort(ring % 360.0)
+    sizes = np.diff(around, append=around[0] + 360.0)
+    one_way = abs(np.count_nonzero(steps > 0) - np.count_nonzero(steps < 0)) > len(steps) / 2
+    side = f"turn to the subject's {'left' if np.median(steps) > 0 else 'right'}"
     parts = [
-        f"turn to the subject's {side}, steps {sizes.min():.0f} to {sizes.max():.0f} degrees",
+        f"{side if one_way else 'turn'}, steps {sizes.min():.0f} to {sizes.max():.0f} degrees",
         *_tell_photos(views, found, names),
     ]
     if np.isfinite(found.margin):

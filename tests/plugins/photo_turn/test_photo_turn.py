@@ -196,6 +196,15 @@ def test_names_that_faces_contradict_are_not() -> None:
     assert "the faces are believed" in found.summary
 
 
+def test_the_summary_tells_direction_and_every_step() -> None:
+    """The last gap counts, too, and photos in no order have no direction."""
+    assert "turn to the subject's left, steps 45 to 45 degrees" in find(ring(EIGHT)).summary
+    assert "turn to the subject's right, steps" in find(ring(EIGHT[::-1])).summary
+    assert "to 90 degrees" in find(ring(EIGHT[:7])).summary
+    mixed = [ring(EIGHT)[i] for i in (0, 5, 7, 2, 1, 6, 4, 3)]
+    assert "to the subject's" not in find(mixed).summary
+
+
 def test_without_faces_the_order_stays_and_the_summary_says_so() -> None:
     """Where no model looked, an unnamed turn is taken as read, with a word about it."""
     shots = [replace(s, face=Face.absent(), person=Person.absent()) for s in ring(EIGHT[::-1])]
