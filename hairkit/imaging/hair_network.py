@@ -4,11 +4,12 @@ A U-Net (Ronneberger, Fischer and Brox 2015) on the features of `hairkit.imaging
 with a stride of two at its entry and a sub-pixel convolution at its end (Shi et al. 2016). It was
 trained on 4,800 pictures made of renders alone, of seven heads and of `hairkit synth`, whose hair,
 skin, clothes and surroundings were recoloured and warped at random, with painted beards, glasses
-and bald crowns.
+and bald crowns; `training/hair_network` in the repository does that.
 """
 
 from __future__ import annotations
 
+import os
 from functools import cache
 from importlib import resources
 
@@ -18,7 +19,10 @@ from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.imaging.hair_features import hair_features
 from hairkit.storage import read_npz
 
-_MIRRORED = (5, 9)
+Weights = dict[str, Float32Array]
+"""Kernels (C out, C in, k, k) and biases (C out,) of every layer: `first.weight`, `first.bias`."""
+
+MIRRORED = (5, 9)
 """Features that change their sign in a mirrored photo: the strands' slope and the coordinate across
 the face."""
 
@@ -36,34 +40,39 @@ def hair_probability(
     columns, rows = features.size
     mirrored = np.zeros_like(features.values)
     mirrored[:, :rows, :columns] = features.values[:, :rows, :columns][..., ::-1]
-    mirrored[list(_MIRRORED)] *= -1
-    first = _softmax(_network(features.values))[:, :rows, :columns]
-    second = _softmax(_network(mirrored))[:, :rows, :columns][..., ::-1]
+    mirrored[list(MIRRORED)] *= -1
+    weights = _shipped_weights()
+    first = _softmax(run_network(features.values, weights))[:, :rows, :columns]
+    second = _softmax(run_network(mirrored, weights))[:, :rows, :columns][..., ::-1]
     return np.moveaxis(np.asarray((first + second) / 2, np.float32), 0, -1)
 
 
-def _network(values: Float32Array) -> Float32Array:
+def run_network(values: Float32Array, weights: Weights) -> Float32Array:
     """Return the scores (3, GRID, GRID) of the three classes."""
-    weights = _weights()
     levels = sum(name.startswith("up") for name in weights) // 2
-    x = _relu(_convolve(_relu(_convolve(values, "entry", stride=2)), "first"))
+    x = _relu(_convolve(_relu(_convolve(values, weights, "entry", stride=2)), weights, "first"))
     kept = [x]
     for level in range(levels):
-        x = _relu(_convolve(_halve(x), f"down{level}a"))
-        x = _relu(_convolve(x, f"down{level}b"))
+        x = _relu(_convolve(_halve(x), weights, f"down{level}a"))
+        x = _relu(_convolve(x, weights, f"down{level}b"))
         kept.append(x)
     for level in reversed(range(levels)):
         doubled = x.repeat(2, axis=1).repeat(2, axis=2)
-        x = _relu(_convolve(np.concatenate([doubled, kept[level]]), f"up{level}"))
-    scores = _convolve(x, "exit")
+        x = _relu(_convolve(np.concatenate([doubled, kept[level]]), weights, f"up{level}"))
+    scores = _convolve(x, weights, "exit")
     classes, rows, columns = len(scores) // 4, *scores.shape[1:]
     blocks = scores.reshape(classes, 2, 2, rows, columns).transpose(0, 3, 1, 4, 2)
     return blocks.reshape(classes, 2 * rows, 2 * columns)
 
 
-def _convolve(x: Float32Array, name: str, stride: int = 1) -> Float32Array:
+def read_weights(path: str | os.PathLike[str]) -> Weights:
+    """Return the weights in a file of `training/hair_network`."""
+    return {name: array.astype(np.float32) for name, array in read_npz(path).items()}
+
+
+def _convolve(x: Float32Array, weights: Weights, name: str, stride: int = 1) -> Float32Array:
     """Return the correlation of x (C, h, w), padded with zeros, with the kernels of a layer."""
-    kernels, bias = _weights()[f"{name}.weight"], _weights()[f"{name}.bias"]
+    kernels, bias = weights[f"{name}.weight"], weights[f"{name}.bias"]
     edge = kernels.shape[-1]
     height, width = x.shape[1:]
     padded = np.pad(x, ((0, 0), (edge // 2,) * 2, (edge // 2,) * 2))
@@ -95,8 +104,7 @@ def _softmax(scores: Float32Array) -> Float32Array:
 
 
 @cache
-def _weights() -> dict[str, Float32Array]:
-    """Return kernels (C out, C in, k, k) and biases (C out,) of every layer by its name."""
+def _shipped_weights() -> Weights:
     path = resources.files("hairkit") / "imaging" / "hair_network.npz"
     with resources.as_file(path) as file:
-        return {name: array.astype(np.float32) for name, array in read_npz(file).items()}
+        return read_weights(file)

@@ -16,6 +16,8 @@ PROJECT = Path(__file__).parents[2]
 SOURCES = sorted((PROJECT / "hairkit").rglob("*.py"))
 PACKAGES = sorted(path.parent for path in (PROJECT / "hairkit").rglob("__init__.py"))
 PACKAGES += sorted(path.parent for path in (PROJECT / "plugins").glob("*/__init__.py"))
+PACKAGES += sorted(path.parent for path in (PROJECT / "training").rglob("__init__.py"))
+TRAINING = sorted((PROJECT / "training").rglob("*.py"))
 PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins" / "__init__.py"})
 
 FLOORS = (
@@ -93,7 +95,9 @@ def test_a_plugin_stands_alone_on_public_names(path: Path) -> None:
             assert FLOOR_OF.get(room(name), 0) < FLOOR_OF["manager"], name
 
 
-@pytest.mark.parametrize("path", SOURCES + PLUGINS, ids=lambda p: str(p.relative_to(PROJECT)))
+@pytest.mark.parametrize(
+    "path", SOURCES + PLUGINS + TRAINING, ids=lambda p: str(p.relative_to(PROJECT))
+)
 def test_a_file_tells_one_story(path: Path) -> None:
     """Files stay under 400 lines, begin with a docstring and have no name that says nothing."""
     text = path.read_text()

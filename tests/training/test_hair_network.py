@@ -1,0 +1,99 @@
+"""Laws of the training of the hair network: its pictures, and the network in PyTorch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from hairkit.imaging.hair_features import CHANNELS, GRID
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON
+from training.hair_network.colours import noise, recolour
+from training.hair_network.compose import label_shares
+from training.hair_network.composer import compose, place
+from training.hair_network.renders import Render
+
+
+@pytest.fixture
+def render() -> Render:
+    """A head of 120 x 160 pixels: hair above, a face below, shoulders."""
+    labels = np.full((160, 120), BACKGROUND, np.uint8)
+    cv2.ellipse(labels, (60, 140), (50, 40), 0, 0, 360, PERSON, -1)
+    cv2.ellipse(labels, (60, 70), (35, 50), 0, 0, 360, HAIR, -1)
+    cv2.ellipse(labels, (60, 85), (24, 32), 0, 0, 360, PERSON, -1)
+    head = np.zeros(labels.shape, np.uint8)
+    cv2.ellipse(head, (60, 75), (30, 45), 0, 0, 360, 1, -1)
+    image = np.random.default_rng(5).integers(0, 256, (*labels.shape, 3)).astype(np.uint8)
+    angle = np.linspace(0, 2 * np.pi, 68, endpoint=False)
+    points = np.stack([60 + 18 * np.cos(angle), 88 + 22 * np.sin(angle)], axis=1)
+    points[36:48, 1], points[48:, 1] = 80, 102
+    return Render("ball/photos/0_front.jpg", image, labels, head > 0, points)
+
+
+def test_equal_seeds_make_equal_pictures(render: Render) -> None:
+    """Pictures follow from the seed; they are of 640 pixels and have the three labels at most."""
+    first, again = ([compose([render], rng) for _ in range(6)] for rng in map(_generator, (1, 1)))
+    for one, other in zip(first, again, strict=True):
+        assert np.array_equal(one.image, other.image)
+        assert np.array_equal(one.labels, other.labels)
+        assert one.image.shape == (*one.labels.shape, 3)
+        assert 639 <= max(one.labels.shape) <= 640
+        assert set(np.unique(one.labels)) <= {BACKGROUND, PERSON, HAIR}
+
+
+def test_labels_move_with_the_picture(render: Render) -> None:
+    """A picture of its own labels stays one in crops, turns and mirrors, but for edges."""
+    large = render.labels.repeat(4, axis=0).repeat(4, axis=1)
+    painted = np.repeat(large[..., None] / 255, 3, axis=2)
+    for seed in range(8):
+        picture, labels = place(_generator(seed), painted, large)
+        wrong = np.abs(picture[..., 0] * 255 - labels) > 2
+        edges = cv2.morphologyEx(labels, cv2.MORPH_GRADIENT, np.ones((17, 17))) > 0
+        inside = (slice(8, -8), slice(8, -8))  # an edge may lie just outside of the picture
+        assert not (wrong & ~edges)[inside].any()
+
+
+def test_hair_of_another_colour_keeps_its_strands(render: Render) -> None:
+    """The mean becomes the colour asked for, light and dark strands stay so, the rest is left."""
+    hair = render.labels == HAIR
+    lab = np.zeros((*hair.shape, 3), np.float32) + np.array((40, 5, 10), np.float32)
+    lab[..., 0] += 3 * noise(_generator(2), hair.shape, 20, 2)
+    changed = recolour(lab, hair, np.array([50.0, 3.0, 20.0]), 1.0)
+    assert np.allclose(changed[hair].mean(axis=0), (50, 3, 20), atol=0.5)
+    assert np.corrcoef(changed[hair][:, 0], lab[hair][:, 0])[0, 1] > 0.99
+    assert np.array_equal(changed[~hair], lab[~hair])
+
+
+def test_shares_of_labels_add_up(render: Render) -> None:
+    """They are 1 together in the photo and 0 outside, and hair has the area of its label."""
+    shares = label_shares(render.labels, (96, GRID))
+    assert np.allclose(shares[:, :, :96].sum(axis=0), 1, atol=1e-5)
+    assert not shares[:, :, 96:].any()
+    area = shares[0].sum() / (96 * GRID)
+    assert area == pytest.approx((render.labels == HAIR).mean(), abs=1e-4)
+
+
+def test_numpy_runs_what_pytorch_trained(tmp_path: Path) -> None:
+    """A step changes the weights; those written give the same scores in NumPy and PyTorch."""
+    pytest.importorskip("torch", reason="training needs PyTorch, which is not installed")
+    from training.hair_network import train
+
+    rng = _generator(3)
+    features = rng.normal(size=(4, CHANNELS, GRID, GRID)).astype(np.float16)
+    shares = np.zeros((4, 3, GRID, GRID), np.uint8)
+    shares[:, 0, :64], shares[:, 2, 64:] = 255, 255
+    np.savez(tmp_path / "set.npz", features=features, shares=shares)
+    words = [str(tmp_path / "set.npz"), "-o", str(tmp_path / "weights.npz"), "--steps", "2"]
+    train.main(words)
+    written: Any = np.load(tmp_path / "weights.npz")
+    before = train.new_weights(0)
+    assert set(written) == set(before)
+    assert not np.allclose(written["exit.bias"], before["exit.bias"].numpy(), atol=1e-5)
+    assert train.disagreement(tmp_path / "weights.npz", features[0]) < 1e-4
+
+
+def _generator(seed: int) -> np.random.Generator:
+    return np.random.default_rng(seed)

@@ -1,0 +1,4 @@
+"""Programs that train the networks which ship with hairkit; not part of the installed package.
+
+* `hair_network`: the network of the plugin `auto_matte`
+"""

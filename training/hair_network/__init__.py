@@ -1,0 +1,9 @@
+"""Training of the hair network that ships with hairkit (docs/segmentation.md).
+
+* `renders`: rendered photos with their labels, heads and landmarks
+* `colours`: random colours, noise and textures
+* `looks`: other hair, skin, clothes, beards, glasses and bald crowns
+* `composer`: one training picture: another look, backdrop, light, shape, crop and camera
+* `compose`: program that makes a set of pictures as the network sees them
+* `train`: program that trains in PyTorch, writes the weights, and compares with NumPy
+"""
