@@ -26,7 +26,7 @@ from hairkit.pipeline.health import RED, Figure, assess
 from hairkit.pipeline.own_head import mark_head
 from hairkit.pipeline.recipe import Recipe, load_recipe, missing_networks
 from hairkit.pipeline.run_log import RunLog
-from hairkit.pipeline.run_record import RECORD, describe_run, finish_record
+from hairkit.pipeline.run_record import RECORD, RunRecord, describe_run, finish_record
 from hairkit.pipeline.stage_runner import Argument, Given, StageRunner, completed
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
@@ -108,7 +108,26 @@ def reconstruct(
     head = HeadFile(os.fspath(head)) if isinstance(head, (str, os.PathLike)) else head
     record = describe_run(given, head, recipe, manager, guides, seed)
     log = RunLog(progress or Silent())
-    folder = Path(out)
+    groom, health = _run(record, given, Path(out), head, recipe, manager, log, reuse, sheet)
+    if progress is None:
+        for figure in health:
+            if figure.light == RED:
+                _log.warning("%s", figure.line())
+    return groom
+
+
+def _run(
+    record: RunRecord,
+    given: Capture,
+    folder: Path,
+    head: Head | HeadFile | None,
+    recipe: Recipe,
+    manager: Manager,
+    log: RunLog,
+    reuse: bool,
+    sheet: bool,
+) -> tuple[Groom, tuple[Figure, ...]]:
+    """Run the stages in the work folder and write all files; the record comes last."""
     work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(_waiting(folder)))
     with work, ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool:
         run = StageRunner(recipe, manager, work, log, pool)
@@ -116,14 +135,8 @@ def reconstruct(
         _tell_missing(recipe, manager, log)
         try:
             capture, turn = _find_views(run, given, log)
-            made = _grow(
-                run,
-                capture,
-                mark_head(_head(head), recipe, manager, log.message),
-                guides,
-                seed,
-                turn,
-            )
+            marked = mark_head(_head(head), recipe, manager, log.message)
+            made = _grow(run, capture, marked, record.guides, record.seed, turn)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -133,12 +146,13 @@ def reconstruct(
         if sheet:
             _draw_sheet(folder / SHEET, capture, made, log)
         manager.notify("groom_ready", groom=made.groom)
-        _tell_health(made.health, log, warn=progress is None)
+        for figure in made.health:
+            log.message(figure.line())
         log.write(folder / "hairkit.log", recipe, manager)
         outputs = [folder / "groom.npz", folder / "scene.json", *(path for _, path in exports)]
         whole = finish_record(record, [*outputs, folder / SHEET], log.stages, made.health)
         whole.write(folder / RECORD)
-    return made.groom
+    return made.groom, made.health
 
 
 def _tell_missing(recipe: Recipe, manager: Manager, log: RunLog) -> None:
@@ -318,14 +332,6 @@ def _draw_sheet(path: Path, capture: Capture, made: _Made, log: RunLog) -> None:
     except RenderError as error:
         log.message(f"no contact sheet: {error}")
     log.finished("sheet", time.perf_counter() - began, False)
-
-
-def _tell_health(health: Sequence[Figure], log: RunLog, *, warn: bool) -> None:
-    """Show every figure; where nobody listens, the red ones are logged as warnings."""
-    for figure in health:
-        log.message(figure.line())
-        if warn and figure.light == RED:
-            _log.warning("%s", figure.line())
 
 
 def _sweep(folder: Path, run: StageRunner) -> None:
