@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import os
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from captures_argument import NO_CAPTURES, add_captures
 from hairkit_plugins import mask_files, thin_plate
 
 from hairkit import Capture, Head, Mask, Scene
@@ -32,18 +32,12 @@ PLUGINS = ("silhouette", "landmarks")
 def main() -> None:
     """Run one scene plugin, then `thin_plate`, over every capture that has truth and masks."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "captures",
-        type=Path,
-        nargs="?",
-        default=os.environ.get("HAIRKIT_CAPTURES"),
-        help="folder of captures (default: $HAIRKIT_CAPTURES)",
-    )
+    add_captures(parser)
     parser.add_argument("--plugin", choices=PLUGINS, default="silhouette")
     parser.add_argument("--set", action="append", default=[], metavar="OPTION=VALUE")
     arguments = parser.parse_args()
     if arguments.captures is None:
-        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        print(NO_CAPTURES)
         return
     plugin: Any = importlib.import_module(f"hairkit_plugins.{arguments.plugin}")
     chosen = dict(item.split("=", 1) for item in arguments.set)

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+from captures_argument import NO_CAPTURES, add_captures
 from hairkit_plugins.face_mesh import MODELS, Options, find_face
 from hairkit_plugins.face_mesh.crops import find_mesh, refine_crop, wobble
 from hairkit_plugins.face_mesh.detector import detect
@@ -68,17 +68,11 @@ class Sample:
 def main() -> None:
     """Print the table; with --write, store weights and noise in the plugin."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument(
-        "captures",
-        type=Path,
-        nargs="?",
-        default=os.environ.get("HAIRKIT_CAPTURES"),
-        help="folder of captures (default: $HAIRKIT_CAPTURES)",
-    )
+    add_captures(parser)
     parser.add_argument("--write", action="store_true", help="store the fit in the plugin")
     arguments = parser.parse_args()
     if arguments.captures is None:
-        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        print(NO_CAPTURES)
         return
     if missing_models(MODELS):
         print("no networks; run hairkit models install")

@@ -20,6 +20,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from captures_argument import add_captures
+
 from hairkit.errors import HairkitError
 from hairkit.evaluation import Evaluation, Truth, evaluate, mask_iou, read_prediction, read_truth
 from hairkit.evaluation.report import write_report
@@ -64,13 +66,7 @@ def _arguments() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add(
-        "--captures",
-        type=Path,
-        default=os.environ.get("HAIRKIT_CAPTURES"),
-        metavar="DIR",
-        help="folder of captures with ground truth (default: $HAIRKIT_CAPTURES)",
-    )
+    add_captures(parser, "--captures")
     add("--names", nargs="+", metavar="NAME", help="captures (default: all with ground truth)")
     add("--recipes", nargs="+", default=["default", "thesis"], metavar="R")
     add("--guides", type=int, default=8000, metavar="N", help="strands tracked (default 8000)")

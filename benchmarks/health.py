@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from captures_argument import NO_CAPTURES, add_captures
 
 from hairkit.errors import HairkitError
 from hairkit.manager import Manager
@@ -155,13 +155,7 @@ WAYS: dict[str, Callable[[Files, Files, Path], Path]] = {
 def main() -> None:
     """Reconstruct every capture as it is and spoiled in every way, and print the figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "captures",
-        type=Path,
-        nargs="?",
-        default=os.environ.get("HAIRKIT_CAPTURES"),
-        help="folder of captures with masks (default: $HAIRKIT_CAPTURES)",
-    )
+    add_captures(parser)
     parser.add_argument("-o", "--out", type=Path, default=Path("health-out"))
     parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
     parser.add_argument("--recipe", default="default")
@@ -169,7 +163,7 @@ def main() -> None:
     parser.add_argument("--guides", type=int, default=GUIDES)
     arguments = parser.parse_args()
     if arguments.captures is None:
-        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        print(NO_CAPTURES)
         return
     manager = Manager.loaded(arguments.plugin)
     # the photos are believed, so that the figures are those of wrong input, not of its refusal

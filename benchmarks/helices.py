@@ -11,12 +11,12 @@ the patent's rule and keeps the tangents; `adaptive` is what hairkit uses.
 from __future__ import annotations
 
 import argparse
-import os
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from captures_argument import add_captures
 from scipy.spatial import cKDTree
 
 from hairkit.head_model.template import default_head
@@ -34,13 +34,7 @@ METHODS: dict[str, Callable[[Strands], Arcs]] = {
 def main() -> None:
     """Print one row a set of strands and method."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "captures",
-        type=Path,
-        nargs="?",
-        default=os.environ.get("HAIRKIT_CAPTURES"),
-        help="folder of captures, whose true strands are measured too (default: $HAIRKIT_CAPTURES)",
-    )
+    add_captures(parser)
     sets = procedural()
     folder = parser.parse_args().captures
     if folder:

@@ -7,13 +7,13 @@ python benchmarks/masks.py --photos Original/Testing --masks GT/Testing --every 
 from __future__ import annotations
 
 import argparse
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+from captures_argument import NO_CAPTURES, add_captures
 
 from hairkit.manager import Manager
 from hairkit.types.capture import View
@@ -28,13 +28,7 @@ FACES, PERSONS = "face_mesh", "selfie"
 def main() -> None:
     """Segment every photo with `auto_matte` and print a row of a table for each capture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "captures",
-        type=Path,
-        nargs="?",
-        default=os.environ.get("HAIRKIT_CAPTURES"),
-        help="folder of captures (default: $HAIRKIT_CAPTURES)",
-    )
+    add_captures(parser)
     parser.add_argument("--photos", type=Path, help="folder of photos, instead of captures")
     parser.add_argument("--masks", type=Path, help="folder of their masks, .pbm or .png")
     parser.add_argument("--every", type=int, default=1, help="score every n-th photo alone")
@@ -42,7 +36,7 @@ def main() -> None:
     parser.add_argument("--overlays", type=Path, help="folder for pictures of the errors")
     arguments = parser.parse_args()
     if arguments.captures is None and arguments.photos is None:
-        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        print(NO_CAPTURES)
         return
     manager = Manager.loaded()
     print("| photos | number | hair IoU mean | worst | median |")

@@ -10,7 +10,6 @@ with confidence above the view's median. Masks are the true ones; OpenCV runs on
 from __future__ import annotations
 
 import argparse
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from typing import Any
 import cv2
 import numpy as np
 import numpy.typing as npt
+from captures_argument import NO_CAPTURES, add_captures
 from hairkit_plugins import gabor, structure_tensor
 
 from hairkit.evaluation.images import truth_angle
@@ -46,18 +46,12 @@ class Sample:
 def main() -> None:
     """Print a table of methods by captures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "captures",
-        type=Path,
-        nargs="?",
-        default=os.environ.get("HAIRKIT_CAPTURES"),
-        help="folder of captures (default: $HAIRKIT_CAPTURES)",
-    )
+    add_captures(parser)
     parser.add_argument("--pictures", type=Path, help="folder for photos beside maps by hue")
     parser.add_argument("--only", action="append", help="name of a method; may be repeated")
     arguments = parser.parse_args()
     if arguments.captures is None:
-        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        print(NO_CAPTURES)
         return
     cv2.setNumThreads(1)
     folders = sorted(path.parents[1] for path in arguments.captures.glob("*/truth/orientation"))

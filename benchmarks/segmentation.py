@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import os
 import time
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+from captures_argument import NO_CAPTURES, add_captures
 
 from hairkit.options import make_options
 from hairkit.types.capture import View
@@ -26,19 +26,13 @@ SIDES = ("front", "front-left", "left", "back-left", "back", "back-right", "righ
 def main() -> None:
     """Run one plugin over every capture below a folder that has masks."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "captures",
-        type=Path,
-        nargs="?",
-        default=os.environ.get("HAIRKIT_CAPTURES"),
-        help="folder of captures (default: $HAIRKIT_CAPTURES)",
-    )
+    add_captures(parser)
     parser.add_argument("--plugin", choices=PLUGINS, default="grabcut")
     parser.add_argument("--set", action="append", default=[], metavar="OPTION=VALUE")
     parser.add_argument("--overlays", type=Path, help="folder for pictures of the errors")
     arguments = parser.parse_args()
     if arguments.captures is None:
-        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        print(NO_CAPTURES)
         return
     plugin: Any = importlib.import_module(f"hairkit_plugins.{arguments.plugin}")
     chosen = dict(item.split("=", 1) for item in arguments.set)

@@ -10,13 +10,13 @@ photo is more than 30 degrees off; the true turn is in truth/.
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from captures_argument import NO_CAPTURES, add_captures
 from hairkit_plugins import face_mesh, landmark_files, mask_files, photo_turn, selfie
 
 from hairkit import Capture, View
@@ -47,17 +47,11 @@ class Photo:
 def main() -> None:
     """Find the turn of every capture that has truth, in its order and in others."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "captures",
-        type=Path,
-        nargs="?",
-        default=os.environ.get("HAIRKIT_CAPTURES"),
-        help="folder of captures (default: $HAIRKIT_CAPTURES)",
-    )
+    add_captures(parser)
     parser.add_argument("--photos-alone", action="store_true", help="faces and persons by networks")
     arguments = parser.parse_args()
     if arguments.captures is None:
-        print("no captures; name their folder, or set HAIRKIT_CAPTURES")
+        print(NO_CAPTURES)
         return
     print(
         "| capture | azimuth | worst | margin | turned about | on its side | shuffled | one out |"
