@@ -77,8 +77,6 @@ class Figure:
 
 
 MARGIN = Limits(1.1, 1.02)
-MOST_MARGIN = 100.0
-"""Larger margins, infinite ones too, are shown as this."""
 LANDMARK_VIEWS = Limits(2, 0)
 """Views whose landmarks are known. Without any the head's size is a guess: on the captures it came
 out 1.17 to 1.59 times too large."""
@@ -155,10 +153,10 @@ def summarise(figures: Sequence[Figure]) -> list[str]:
 
 
 def assess_turn(turn: Turnaround | None) -> tuple[Figure, ...]:
-    """Return by how much the turn that was found fits better than the next best."""
-    if turn is None:
+    """Return by how much the turn fits better than the next best, if others were tried."""
+    if turn is None or not np.isfinite(turn.margin):
         return ()
-    margin = min(turn.margin, MOST_MARGIN)
+    margin = turn.margin
     note = "another direction or first photo fits nearly as well; name the photos"
     return (Figure("turn", "margin over the next best", margin, "", MARGIN.light(margin), note),)
 

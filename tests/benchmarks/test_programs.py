@@ -13,7 +13,9 @@ import pytest
 from hairkit.cli import main as hairkit
 
 PROJECT = Path(__file__).parents[2]
-PROGRAMS = sorted(path.stem for path in (PROJECT / "benchmarks").glob("*.py"))
+SHARED = {"captures_argument"}
+"""Modules that programs import."""
+PROGRAMS = sorted({path.stem for path in (PROJECT / "benchmarks").glob("*.py")} - SHARED)
 SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
