@@ -24,7 +24,7 @@ from hairkit.imaging.seeded_segmentation import (
     label_from_seeds,
     reduced_size,
 )
-from hairkit.io.strokes import Stroke, Strokes, rasterise, read_strokes
+from hairkit.io.strokes import Stroke, Strokes, rasterise, read_view_strokes
 from hairkit.options import option
 from hairkit.types.capture import View
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
@@ -40,9 +40,6 @@ _SIDE_STRIP = 2
 
 _OUTSIDE = 0.5
 """Share of a background stroke outside the rectangle that makes it a stroke on the backdrop."""
-
-_ASPECT_TOLERANCE = 2
-"""Pixels by which photo and drawn-on picture may differ in height for their width: rounding."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +67,10 @@ class Options:
 @hookimpl
 def segment(view: View, options: Options) -> Mask | None:
     """Label the photo from its strokes; None when it has none, so that the next plugin is asked."""
-    if view.strokes_path is None:
-        return None
     width, height = reduced_size(view.width, view.height, options.reduced_height)
-    drawn = read_strokes(view.strokes_path)
-    strokes = _on_reduced(drawn, view, width, height)
+    strokes = read_view_strokes(view, width, height)
+    if strokes is None or strokes.only_parting:
+        return None
     if not strokes.labelled("foreground"):
         raise InputError(
             f"{view.strokes_path}: no foreground stroke, draw at least one on the hair"
@@ -138,19 +134,6 @@ def _is_backdrop(stroke: Stroke, strokes: Strokes, hair_top: float) -> bool:
     (left, top), (right, bottom) = strokes.rectangle
     outside = (points[:, 0] < left) | (points[:, 0] > right) | (points[:, 1] < top)
     return bool(outside.mean() > _OUTSIDE and points[:, 1].min() < (top + bottom) / 2)
-
-
-def _on_reduced(strokes: Strokes, view: View, width: int, height: int) -> Strokes:
-    on_disk = view.photo_size[::-1] if view.quarter_turns % 2 else view.photo_size
-    strokes = strokes.turned(view.quarter_turns, *(strokes.size or on_disk))
-    drawn_on = strokes.size or view.photo_size
-    difference = abs(drawn_on[0] * view.height - drawn_on[1] * view.width)
-    if difference > _ASPECT_TOLERANCE * max(view.width, view.height):
-        raise InputError(
-            f"{view.strokes_path}: drawn on a photo of {drawn_on[0]} x {drawn_on[1]} pixels, "
-            f"expected {view.photo_size[0]} x {view.photo_size[1]}; draw on this photo"
-        )
-    return strokes.scaled(width / drawn_on[0], height / drawn_on[1])
 
 
 def _inside(strokes: Strokes, width: int, height: int) -> BoolArray:

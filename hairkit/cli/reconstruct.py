@@ -6,9 +6,9 @@ import argparse
 import json
 import sys
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from hairkit.cli.settings import STAGE_HELP, add_setting
 from hairkit.errors import InputError
@@ -31,6 +31,7 @@ SMALLEST_EDGE, LARGEST_EDGE = 128, 8192
 def register(subparsers: Any) -> None:
     """Add the verb to the command line."""
     from hairkit.pipeline.recipe import recipe_names
+    from hairkit.types.parting import PartingWord
 
     parser = subparsers.add_parser(
         "reconstruct",
@@ -48,6 +49,8 @@ def register(subparsers: Any) -> None:
     add("--head-units", default="m", metavar="U", help="units of the head file (default m)")
     add("--head-scalp", metavar="NAME", help="the scalp: a group of it, or a mask picture")
     add("--head-up", default="y", metavar="AXIS", help="axis that points up in it (default y)")
+    words = get_args(PartingWord)
+    add("--parting", choices=words, help="where the parting is (default: as the photos show it)")
     guides = f"number of guide hairs (default {GUIDES})"
     add("--guides", type=int, default=GUIDES, metavar="N", help=guides)
     add("--seed", type=int, default=0, metavar="N", help="seed of the root positions (default 0)")
@@ -68,6 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from hairkit.pipeline.reconstruct import SHEET, export_paths, reconstruct
     from hairkit.pipeline.run_record import RECORD, read_record
     from hairkit.progress import Recorder, progress_for
+    from hairkit.types.parting import Parting
 
     began = time.perf_counter()
     manager = Manager.loaded(args.plugin)
@@ -75,6 +79,8 @@ def run(args: argparse.Namespace) -> int:
     recipe.check(manager)
     head = _head(args)
     capture = read_capture(_photos(args), _max_edge(args, WORKING_EDGE))
+    if args.parting is not None:
+        capture = replace(capture, parting=Parting.named(args.parting))
     with progress_for(sys.stderr, quiet=args.quiet or args.json) as shown:
         record = Recorder(shown)
         groom = reconstruct(

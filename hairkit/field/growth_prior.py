@@ -76,8 +76,8 @@ def combing_direction(
 
 
 def parts(parting: Parting, hair_length: float) -> bool:
-    """Return whether the hair, of a length in metres, is combed from the parting."""
-    return parting.seen and hair_length >= PARTED_HAIR
+    """Return whether the hair, of a length in metres, is combed from the parting or back."""
+    return (parting.seen or parting.swept_back) and hair_length >= PARTED_HAIR
 
 
 @dataclass(frozen=True)

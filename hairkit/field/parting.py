@@ -1,9 +1,10 @@
 """The parting on the crown: where skin shows between the hair, and how hair is combed from it.
 
 Level views see the crown at a grazing angle, so that the 2D orientation of the strands there tells
-little. Skin that shows inside the hair does: its median is the parting. From it, hair is combed
-away to both sides, down and back; behind its end the nearest point of the line is its end, which
-makes a whorl.
+little. Skin that shows inside the hair does: its median is the parting; where there is a photo from
+above, it alone is asked. What the user says counts first: `parting` in capture.toml or on the
+command line, then a stroke labelled `parting`. From the parting, hair is combed away to both sides,
+down and back; behind its end the nearest point of the line is its end, which makes a whorl.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float64Array
+from hairkit.io.strokes import read_view_strokes
 from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture, View
 from hairkit.types.head import Head
 from hairkit.types.mask import PERSON, Mask
 from hairkit.types.parting import Parting
@@ -37,14 +40,17 @@ QUARTILES = (0.25, 0.5, 0.75)
 WIDEST_SKIN = 0.05
 """Distance in metres between the quartiles of the skin's x from which it is no line but a hairline
 whose hair is tied back: 9 cm there, at most 3.5 cm on partings, 6.6 cm if spread evenly."""
-LINE_FRONT, LINE_BACK = 0.09, -0.06
-"""The parting's ends along z of the head frame, metres."""
 DOWN = 1.0
 """Part of the direction down the head, against 1 away from the parting."""
 SWEEP, SWEEP_SLOPE, SWEEP_AT = 0.6, 5.0, 0.02
 """Part of the direction backwards, its growth per metre towards the back of the head, and the
 height z where it has its mean: hair of the fringe goes sideways."""
 MOST_SWEEP = 2.0
+BACKWARDS = np.array([0.0, -0.5, -1.0])
+"""Direction of hair that is all combed back, before it is laid on the skin."""
+FROM_ABOVE = 30.0
+"""Degrees of elevation from which a view looks down into the parting: alone it finds a parting to
+2 mm, eight level views to 10 mm."""
 THINNEST, THICKEST = 0.004, 0.03
 """Bounds of the hair's thickness over which the lift at the roots fades, metres."""
 THICKNESS_BLUR, LEAST_HELD = 2.0, 0.05
@@ -52,13 +58,34 @@ THICKNESS_BLUR, LEAST_HELD = 2.0, 0.05
 a neighbourhood that counts."""
 
 
-def measure_parting(masks: Sequence[Mask], cameras: Sequence[Camera], head: Head) -> Parting:
-    """Return where the views see skin on the crown, each place weighted by how it faces them."""
+def measure_parting(
+    capture: Capture, masks: Sequence[Mask], cameras: Sequence[Camera], head: Head
+) -> Parting:
+    """Return the parting that the user gives, or that the views show as skin on the crown.
+
+    Masks and cameras are in the order of the capture's views; a stroke's file is read. Raises
+    `InputError` where strokes cannot be read.
+    """
+    if capture.parting is not None:
+        return capture.parting
+    for view, camera in zip(capture.views, cameras, strict=True):
+        line = _drawn_line(view, camera, head)
+        if line is not None:
+            return Parting(line, source="stroke")
+    views = [pair for pair in zip(masks, cameras, strict=True) if pair[0].person_known]
+    above = [(mask, camera) for mask, camera in views if _elevation(camera) > FROM_ABOVE]
+    if len(views) < len(masks):
+        return Parting()
+    return _measure_skin(above or views, head)
+
+
+def _measure_skin(views: Sequence[tuple[Mask, Camera]], head: Head) -> Parting:
+    """Return the median of the skin on the crown, each place weighted by how it faces the views."""
     at, normals = _crown(head)
-    if not len(at) or not all(mask.person_known for mask in masks):
+    if not len(at):
         return Parting()
     skin, faced = np.zeros(len(at)), np.zeros(len(at))
-    for mask, camera in zip(masks, cameras, strict=True):
+    for mask, camera in views:
         facing = -np.einsum("ij,ij->i", camera.view_direction(at), normals)
         column, row = np.floor(camera.project(at)).astype(np.int64).T
         height, width = mask.labels.shape
@@ -69,11 +96,34 @@ def measure_parting(masks: Sequence[Mask], cameras: Sequence[Camera], head: Head
         faced += weight
     share = float(skin.sum() / max(faced.sum(), LEAST_FACING))
     if share < LEAST_SKIN:
-        return Parting(0.0, share)
+        return Parting(skin_share=share)
     order = np.argsort(at[:, 0])
     quarters = skin.sum() * np.array(QUARTILES)
     low, middle, high = at[order[np.searchsorted(np.cumsum(skin[order]), quarters)], 0]
-    return Parting(float(middle), share, bool(high - low < WIDEST_SKIN))
+    if high - low >= WIDEST_SKIN:
+        return Parting(skin_share=share, spread=float(high - low))
+    return Parting.at(float(middle), share, float(high - low))
+
+
+def _elevation(camera: Camera) -> float:
+    """Return how far above the head's middle the camera stands, degrees."""
+    return float(np.degrees(np.arcsin(-camera.view_direction(np.zeros(3))[1])))
+
+
+def _drawn_line(view: View, camera: Camera, head: Head) -> Float64Array | None:
+    """Return points x, z (N, 2) of the scalp under the view's stroke `parting`, front to back."""
+    strokes = read_view_strokes(view, view.width, view.height)
+    drawn = () if strokes is None else strokes.labelled("parting")
+    if not drawn:
+        return None
+    pixels = np.concatenate([stroke.sampled() for stroke in drawn])
+    facing = -np.einsum("ij,ij->i", camera.view_direction(head.vertices), head.normals())
+    seen = np.flatnonzero((head.scalp > 0.5) & (facing > LEAST_FACING))
+    if not len(seen):
+        return None
+    nearest = cKDTree(camera.project(head.vertices[seen])).query(pixels)[1]
+    line = np.unique(head.vertices[seen[nearest]][:, [0, 2]].astype(np.float64), axis=0)
+    return line[np.argsort(-line[:, 1])] if len(line) > 1 else None
 
 
 def _crown(head: Head) -> tuple[Float64Array, Float64Array]:
@@ -99,7 +149,7 @@ def crown_share(head: Head, points: npt.ArrayLike) -> Float64Array:
 def comb_from_parting(
     parting: Parting, points: npt.ArrayLike, outward: Float64Array
 ) -> Float64Array:
-    """Return unit tangents (N, 3), root to tip, of hair combed from a parting.
+    """Return unit tangents (N, 3), root to tip, of hair combed from a parting, or back without.
 
     Parameters
     ----------
@@ -109,13 +159,25 @@ def comb_from_parting(
         (N, 3) unit normals of the head there.
     """
     at = np.asarray(points, np.float64)
+    if parting.line is None:
+        return _unit(_tangent(np.broadcast_to(BACKWARDS, at.shape), outward))
     away = np.zeros_like(at)
-    away[:, 0] = at[:, 0] - parting.x
-    away[:, 2] = at[:, 2] - np.clip(at[:, 2], LINE_BACK, LINE_FRONT)
+    away[:, [0, 2]] = at[:, [0, 2]] - _nearest_on(parting.line, at[:, [0, 2]])
     away = _unit(_tangent(away, outward))
     back = np.clip(SWEEP + SWEEP_SLOPE * (SWEEP_AT - at[:, 2]), -MOST_SWEEP, MOST_SWEEP)
     pull = DOWN * np.array([0.0, -1.0, 0.0]) + back[:, None] * np.array([0.0, 0.0, -1.0])
     return _unit(away + _tangent(pull, outward))
+
+
+def _nearest_on(line: Float64Array, at: Float64Array) -> Float64Array:
+    """Return the nearest points (N, 2) of a line through (M, 2) to points (N, 2)."""
+    start, way = line[:-1], np.diff(line, axis=0)
+    length = np.maximum((way * way).sum(axis=1), 1e-12)
+    along = np.clip(((at[:, None] - start) * way).sum(axis=2) / length, 0, 1)
+    foot = start + along[..., None] * way
+    best = np.linalg.norm(at[:, None] - foot, axis=2).argmin(axis=1)
+    nearest: Float64Array = foot[np.arange(len(at)), best]
+    return nearest
 
 
 def root_lift(hull: Hull, points: npt.ArrayLike) -> Float64Array:

@@ -112,7 +112,9 @@ def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> 
 
     with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as pool:
         views = tuple(pool.map(view, places))
-    return Capture(views, settings.orthographic, settings.head_pose, folder, max_edge)
+    return Capture(
+        views, settings.orthographic, settings.head_pose, folder, max_edge, settings.parting
+    )
 
 
 def sample_folder() -> Path:

@@ -2,6 +2,8 @@
 
 orthographic = false             # true: no perspective
 focal_mm_equivalent = 47.8       # 35 mm equivalent, by the diagonal; or focal_px, of the photo
+parting = "left"                 # right, middle, none, back; or a line of x and z of the head frame
+                                 # in metres: [[0.03, 0.09], [0.03, -0.06]]
 [head]                           # the head placed by hand, for the scene plugin `manual`
 scale = 1.05
 rotation_deg = [0, 5, 0]         # about x, then y, then z
@@ -27,11 +29,13 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.errors import InputError
+from hairkit.errors import DataError, InputError
 from hairkit.options import make_options, option, unknown_name
 from hairkit.storage import read_text, write_text
+from hairkit.types.parting import Parting
 
-_TABLES = ("head", "views")
+_TABLES = ("parting", "head", "views")
+"""Entries that are more than one value."""
 _MAX_BYTES = 2**20
 
 
@@ -90,6 +94,8 @@ class CaptureFile:
     head_pose: Float64Array | None = None
     """(4, 4) similarity, scene_from_head."""
     views: tuple[ViewEntry, ...] = ()
+    parting: Parting | None = None
+    """How the crown is combed, or None."""
 
 
 def read_capture_file(path: Path) -> CaptureFile:
@@ -111,6 +117,7 @@ def read_capture_file(path: Path) -> CaptureFile:
         Focal(top.focal_px, top.focal_mm_equivalent),
         _head_pose(document["head"], f"{path}: [head]") if "head" in document else None,
         _views(document.get("views", []), path),
+        _parting(document["parting"], path) if "parting" in document else None,
     )
 
 
@@ -148,6 +155,16 @@ def head_entry(pose: Float64Array) -> HeadEntry:
     x, y, z = (round(math.degrees(angle), 6) for angle in angles)
     right, up, front = (round(float(value), 7) for value in pose[:3, 3])
     return HeadEntry(round(scale, 7), (x, y, z), (right, up, front))
+
+
+def _parting(said: Any, path: Path) -> Parting:
+    """Return the parting of a word or of a list of points x, z in metres."""
+    try:
+        if isinstance(said, str):
+            return Parting.named(said, path.name)
+        return Parting(np.asarray(said, np.float64), source=path.name)
+    except (InputError, DataError, TypeError, ValueError) as error:
+        raise InputError(f"{path}: parting: {error}") from error
 
 
 def _views(tables: Any, path: Path) -> tuple[ViewEntry, ...]:

@@ -16,15 +16,18 @@ from hairkit.arrays import BoolArray, Float64Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.options import unknown_name
 from hairkit.storage import read_bytes
+from hairkit.types.capture import View
 from hairkit.types.face import turn_points
 
-StrokeLabel = Literal["foreground", "background", "person"]
+StrokeLabel = Literal["foreground", "background", "person", "parting"]
 
 _BOX = "rectangle"
 _LEAST_POINTS = {"linestrip": 2, "line": 2, "polygon": 3, "rectangle": 2, "circle": 2, "point": 1}
 _AREAS = ("polygon", "rectangle", "circle")
 _MAX_BYTES = 64 * 2**20
 _MAX_SAMPLES = 10_000
+_ASPECT_TOLERANCE = 2
+"""Pixels by which photo and drawn-on picture may differ in height for their width: rounding."""
 _FAR = 30_000
 """Coordinates beyond this are drawn here: OpenCV counts them in 16 bits and a fraction."""
 
@@ -34,7 +37,8 @@ class Stroke:
     """One stroke: a line, or an area with everything in it."""
 
     label: StrokeLabel
-    """`foreground` is hair, `background` is not, `person` is the person but not hair."""
+    """`foreground` is hair, `background` is not, `person` is the person but not hair; `parting` is
+    the line from which the hair is combed."""
     area: bool
     """True for a closed outline whose inside counts too."""
     points: Float64Array
@@ -55,7 +59,7 @@ class Strokes:
     """All strokes of one photo."""
 
     strokes: tuple[Stroke, ...]
-    """Foreground, background and person strokes in the order drawn."""
+    """In the order drawn."""
     rectangle: Float64Array | None = None
     """(2, 2) corners (left, top), (right, bottom) in pixels of what holds all hair, or None."""
     size: tuple[int, int] | None = None
@@ -64,6 +68,12 @@ class Strokes:
     def labelled(self, label: StrokeLabel) -> tuple[Stroke, ...]:
         """Return the strokes of one label, in the order drawn."""
         return tuple(stroke for stroke in self.strokes if stroke.label == label)
+
+    @property
+    def only_parting(self) -> bool:
+        """True when the strokes show the parting and say nothing about where hair is."""
+        labels = {stroke.label for stroke in self.strokes}
+        return labels == {"parting"} and self.rectangle is None
 
     def scaled(self, x: float, y: float) -> Strokes:
         """Return the strokes for the photo scaled by `x` across and by `y` down."""
@@ -108,6 +118,27 @@ def read_strokes(path: str | os.PathLike[str]) -> Strokes:
     width, height = document.get("imageWidth"), document.get("imageHeight")
     size = (width, height) if isinstance(width, int) and isinstance(height, int) else None
     return Strokes(tuple(strokes), rectangle, size)
+
+
+def read_view_strokes(view: View, width: int, height: int) -> Strokes | None:
+    """Return the strokes of a view in pixels of its photo at `width` x `height`; None without any.
+
+    Raises `InputError` or `FormatError` as `read_strokes`, and when they were drawn on a photo of
+    another shape.
+    """
+    if view.strokes_path is None:
+        return None
+    strokes = read_strokes(view.strokes_path)
+    on_disk = view.photo_size[::-1] if view.quarter_turns % 2 else view.photo_size
+    strokes = strokes.turned(view.quarter_turns, *(strokes.size or on_disk))
+    drawn_on = strokes.size or view.photo_size
+    difference = abs(drawn_on[0] * view.height - drawn_on[1] * view.width)
+    if difference > _ASPECT_TOLERANCE * max(view.width, view.height):
+        raise InputError(
+            f"{view.strokes_path}: drawn on a photo of {drawn_on[0]} x {drawn_on[1]} pixels, "
+            f"expected {view.photo_size[0]} x {view.photo_size[1]}; draw on this photo"
+        )
+    return strokes.scaled(width / drawn_on[0], height / drawn_on[1])
 
 
 def rasterise(stroke: Stroke, width: int, height: int, thickness: float) -> BoolArray:

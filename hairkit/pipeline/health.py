@@ -20,6 +20,7 @@ from hairkit.types.capture import Capture, View
 from hairkit.types.groom import Groom
 from hairkit.types.head import JAW_LANDMARKS
 from hairkit.types.mask import HAIR, PERSON, Mask
+from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull
@@ -102,6 +103,9 @@ GROWN = Limits(0.98, 0.9)
 LENGTH = Limits(0.3, 0.15)
 """Mean length over the longest way through the hair: at least 0.87 on captures as they are; 0.08
 to 0.25 on most that were shuffled."""
+PARTING_MM = Limits(25.0, 50.0)
+"""Width of the middle half of the skin that shows on the crown: 6 to 25 mm around partings, 90 mm
+where a bare hairline is all that shows; evenly spread skin is 66 mm wide."""
 CURL_MM = Limits(15.0, 30.0)
 """Radius of the curls: 7 mm on the tightest of the captures; locks of wider curls are bends."""
 
@@ -115,6 +119,7 @@ def assess(
     roots: int,
     hair_length: float,
     turn: Turnaround | None = None,
+    parting: Parting | None = None,
 ) -> tuple[Figure, ...]:
     """Return the figures of a run, in the order of its stages.
 
@@ -128,6 +133,8 @@ def assess(
         Longest way through the hair, metres, see `ScalpDistance`.
     turn
         How the photos were arranged; None when their names were believed.
+    parting
+        How the crown is combed; None when nothing was measured.
     """
     return (
         *assess_turn(turn),
@@ -135,6 +142,7 @@ def assess(
         *assess_cameras(scene),
         *assess_masks(masks, scene),
         *assess_hull(hull, masks, scene),
+        *assess_parting(parting),
         *assess_strands(groom, roots, hair_length),
     )
 
@@ -267,6 +275,15 @@ def compare_hull(hull: Hull, mask: Mask, camera: Camera, scene: Scene) -> tuple[
     drawn, hair = np.isfinite(depth), labels == HAIR
     shown = drawn & (depth < head) & ~((labels == PERSON) & np.isinf(head))
     return _share(drawn, hair), int((shown & hair).sum()) / max(int((shown | hair).sum()), 1)
+
+
+def assess_parting(parting: Parting | None) -> tuple[Figure, ...]:
+    """Return how wide the skin is that shows the parting; nothing where the user says it."""
+    if parting is None or not parting.spread:
+        return ()
+    width = 1000 * parting.spread
+    note = "add a photo from above, draw a stroke `parting` or give --parting"
+    return (Figure("parting", "width of the skin", width, "mm", PARTING_MM.light(width), note, 0),)
 
 
 def assess_strands(groom: Groom, roots: int, hair_length: float) -> tuple[Figure, ...]:

@@ -146,6 +146,7 @@ def _run(
         if sheet:
             _draw_sheet(folder / SHEET, capture, made, log)
         manager.notify("groom_ready", groom=made.groom)
+        log.message(made.parting.summary)
         for figure in made.health:
             log.message(figure.line())
         log.write(folder / "hairkit.log", recipe, manager)
@@ -177,6 +178,7 @@ class _Made:
     orientations: tuple[OrientationMap, ...]
     hull: Hull
     scene: Scene
+    parting: Parting
     groom: Groom
     health: tuple[Figure, ...]
 
@@ -269,7 +271,13 @@ def _grow(
     )
     distance = run.derive("distance", ScalpDistance, measure_scalp_distance, head=shape, hull=hull)
     parting = run.derive(
-        "parting", Parting, measure_parting, masks=masks, cameras=cameras, head=shape
+        "parting",
+        Parting,
+        measure_parting,
+        capture=photos,
+        masks=masks,
+        cameras=cameras,
+        head=shape,
     )
     seen: dict[str, Argument] = {
         "scene": scene, "masks": masks, "orientations": orientations,
@@ -285,9 +293,10 @@ def _grow(
     angles = tuple(orientation.result().value for orientation in orientations)
     groom = assemble_groom(capture.views, labels, grown, roots.value, strands.value, waves.value)
     health = assess(
-        capture, labels, scene.value, hull.value, groom, guides, distance.value.hair_length, turn
-    )
-    return _Made(labels, angles, hull.value, scene.value, groom, health)
+        capture, labels, scene.value, hull.value, groom, guides, distance.value.hair_length, turn,
+        parting.value,
+    )  # fmt: skip
+    return _Made(labels, angles, hull.value, scene.value, parting.value, groom, health)
 
 
 def _refine(

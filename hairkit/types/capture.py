@@ -11,6 +11,7 @@ import numpy as np
 from hairkit.arrays import Float64Array, UInt8Array, frozen_array
 from hairkit.errors import DataError
 from hairkit.types.face import Face, turn_points
+from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.preview import PHOTO_HEIGHT, Previewed, row
 from hairkit.types.turnaround import Turnaround
@@ -107,6 +108,8 @@ class Capture(Previewed):
     """The folder or video that the photos were read from; None when they were made in memory."""
     max_edge: int | None = None
     """Long edge in pixels that larger photos were scaled down to."""
+    parting: Parting | None = None
+    """How the crown is combed, where the user says it; None leaves it to the photos."""
 
     def __post_init__(self) -> None:
         if not self.views:

@@ -213,7 +213,7 @@ def test_the_potential_of_long_hair_grows_up_to_its_hem() -> None:
 def test_long_hair_is_combed_from_its_parting_on_the_crown_only() -> None:
     """With a parting, hair on top leads away from it to both sides; below nothing changes."""
     head, hull = ball_head(), curtain(hem=-0.3)
-    growth, parting = potential(hull), Parting(0.02, 0.05, True)
+    growth, parting = potential(hull), Parting.at(0.02)
     top = [[0.0, 0.098, 0.02], [0.04, 0.092, 0.02]]
     combed = combing_direction(head, hull, growth, top, 0.0, parting)
     assert combed[0, 0] < -0.3
@@ -231,6 +231,6 @@ def test_short_hair_has_no_parting() -> None:
     growth, at = potential(hull), scalp_roots(head).positions
     plain, parted = (
         combing_direction(head, hull, growth, at, 0.3, line)
-        for line in (Parting(), Parting(0.02, 0.05, True))
+        for line in (Parting(), Parting.at(0.02))
     )
     np.testing.assert_array_equal(plain, parted)

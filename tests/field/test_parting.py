@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from hairkit.arrays import Float64Array
+from hairkit.errors import InputError
 from hairkit.field.parting import comb_from_parting, crown_share, measure_parting, root_lift
-from hairkit.testing import ball_head, shell_hull, turn_scene
+from hairkit.testing import ball_head, shell_hull, turn_capture, turn_scene
 from hairkit.types.camera import Camera
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 from hairkit.types.parting import Parting
@@ -47,18 +52,104 @@ def large_cameras() -> list[Camera]:
 @pytest.mark.parametrize("x", [-0.03, 0.0, 0.02])
 def test_the_parting_is_where_skin_shows(x: float) -> None:
     """Its place is right to half a vertex spacing, whatever side it is on."""
-    parting = measure_parting(masks_of(x), large_cameras(), HEAD)
+    parting = measure_parting(turn_capture(), masks_of(x), large_cameras(), HEAD)
     assert parting.seen
     assert parting.x == pytest.approx(x, abs=0.004)
 
 
 def test_a_crown_without_skin_has_no_parting() -> None:
     """Hair everywhere, or masks that do not know the person, say nothing."""
-    assert not measure_parting(masks_of(None), large_cameras(), HEAD).seen
+    assert not measure_parting(turn_capture(), masks_of(None), large_cameras(), HEAD).seen
     unknown = [
         Mask(np.where(mask.hair, HAIR, BACKGROUND), person_known=False) for mask in masks_of(0.0)
     ]
-    assert not measure_parting(unknown, large_cameras(), HEAD).seen
+    assert not measure_parting(turn_capture(), unknown, large_cameras(), HEAD).seen
+
+
+def test_a_view_from_above_alone_tells_the_parting() -> None:
+    """What level views call skin does not count once a camera looks down."""
+    masks, cameras = masks_of(-0.03), large_cameras()
+    front = cameras[0]
+    above = Camera.on_turn(
+        0.0,
+        elevation_deg=70.0,
+        focal=front.focal,
+        width=front.width,
+        height=front.height,
+    )
+    masks, cameras = [*masks, parted_mask(above, 0.02)], [*cameras, above]
+    turn = turn_capture()
+    capture = replace(turn, views=(*turn.views, turn.views[0]))
+    found = measure_parting(capture, masks, cameras, HEAD)
+    assert found.x == pytest.approx(0.02, abs=0.003)
+    assert found.spread < 2 * LINE
+
+
+def test_what_the_user_says_counts_before_the_photos() -> None:
+    """A parting in the capture is returned as it is."""
+    said = replace(turn_capture(), parting=Parting.named("right"))
+    found = measure_parting(said, masks_of(0.03), large_cameras(), HEAD)
+    assert found.source == "option"
+    assert found.x < 0
+
+
+def test_a_stroke_draws_the_parting(tmp_path: Path) -> None:
+    """The line lies on the scalp where its stroke is drawn, whatever the masks show."""
+    cameras = large_cameras()
+    place = np.array([[0.02, 0.096, z] for z in np.linspace(0.05, 0.0, 9)])
+    shape = {
+        "label": "parting",
+        "shape_type": "linestrip",
+        "points": cameras[0].project(place).tolist(),
+    }
+    file = tmp_path / "front.json"
+    file.write_text(json.dumps({"shapes": [shape]}))
+    capture = turn_capture()
+    front = replace(
+        capture.views[0],
+        image=np.zeros((cameras[0].height, cameras[0].width, 3), np.uint8),
+        strokes_path=file,
+        photo_size=(cameras[0].width, cameras[0].height),
+        landmarks=None,
+    )
+    capture = replace(capture, views=(front, *capture.views[1:]))
+    found = measure_parting(capture, masks_of(None), cameras, HEAD)
+    assert found.source == "stroke"
+    assert found.x == pytest.approx(0.02, abs=0.006)
+
+
+@pytest.mark.parametrize("word", ["left", "right", "middle", "none", "back"])
+def test_words_name_partings(word: str) -> None:
+    """Left is the subject's left; only sides and middle have a line."""
+    found = Parting.named(word)
+    assert np.sign(found.x) == {"left": 1, "right": -1}.get(word, 0)
+    assert found.seen == (word in ("left", "right", "middle"))
+    assert found.swept_back == (word == "back")
+
+
+def test_an_unknown_word_is_refused() -> None:
+    """The message lists the words."""
+    with pytest.raises(InputError, match=r"did you mean 'left'.*middle"):
+        Parting.named("lefft")
+
+
+def test_hair_swept_back_runs_back_all_over_the_crown() -> None:
+    """Unit tangents that point backwards on both sides and in the middle."""
+    points, normals = crown_points()
+    combed = comb_from_parting(Parting.named("back"), points, normals)
+    np.testing.assert_allclose(np.sum(combed * normals, axis=1), 0, atol=1e-9)
+    assert (combed[:, 2] < -0.5).all()
+
+
+def test_hair_is_combed_from_a_bent_line() -> None:
+    """The nearest point of a line of any number of points counts."""
+    points, normals = crown_points()
+    bent = Parting(np.array([[0.03, 0.09], [0.03, 0.02], [-0.03, -0.02], [-0.03, -0.09]]))
+    combed = comb_from_parting(bent, points, normals)
+    front, back = points[:, 2] > 0.03, points[:, 2] < -0.03
+    for part, x in ((front, 0.03), (back, -0.03)):
+        beside = part & (np.abs(points[:, 0] - x) > 0.01)
+        assert (np.sign(combed[beside, 0]) == np.sign(points[beside, 0] - x)).all()
 
 
 def crown_points() -> tuple[Float64Array, Float64Array]:
@@ -73,7 +164,7 @@ def crown_points() -> tuple[Float64Array, Float64Array]:
 def test_hair_is_combed_along_the_skin_away_from_the_parting() -> None:
     """Directions are unit tangents; hair to the left of the line goes left, to its right right."""
     points, normals = crown_points()
-    combed = comb_from_parting(Parting(0.01, 0.1, True), points, normals)
+    combed = comb_from_parting(Parting.at(0.01), points, normals)
     np.testing.assert_allclose(np.linalg.norm(combed, axis=1), 1, atol=1e-9)
     np.testing.assert_allclose(np.sum(combed * normals, axis=1), 0, atol=1e-9)
     beside = np.abs(points[:, 0] - 0.01) > 0.005
@@ -84,8 +175,8 @@ def test_the_mirrored_parting_combs_the_mirror_image() -> None:
     """Nothing in the comb prefers a side."""
     points, normals = crown_points()
     mirror = np.array([-1.0, 1.0, 1.0])
-    left = comb_from_parting(Parting(0.02, 0.1, True), points, normals)
-    right = comb_from_parting(Parting(-0.02, 0.1, True), points * mirror, normals * mirror)
+    left = comb_from_parting(Parting.at(0.02), points, normals)
+    right = comb_from_parting(Parting.at(-0.02), points * mirror, normals * mirror)
     np.testing.assert_allclose(left * mirror, right, atol=1e-12)
 
 

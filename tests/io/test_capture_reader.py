@@ -82,7 +82,8 @@ def test_capture_toml_says_what_photos_do_not(tmp_path: Path) -> None:
     ]
     views[3] += "\nfocal_px = 321"
     (folder / "capture.toml").write_text(
-        "orthographic = true\nfocal_mm_equivalent = 50\n[head]\nscale = 2\n"
+        "orthographic = true\nfocal_mm_equivalent = 50\nparting = [[0.03, 0.1], [0.02, 0]]\n"
+        "[head]\nscale = 2\n"
         "rotation_deg = [0, 90, 0]\ntranslation_m = [1, 2, 3]\n" + "\n".join(views)
     )
     capture = read_capture(folder)
@@ -93,6 +94,8 @@ def test_capture_toml_says_what_photos_do_not(tmp_path: Path) -> None:
     assert capture.views[0].focal_px == pytest.approx(focal_from_equivalent(50, 96, 128))
     assert capture.views[3].focal_px == pytest.approx(321)
     assert capture.head_pose @ [0, 0, 0.1, 1] == pytest.approx([1.2, 2, 3, 1])
+    assert capture.parting is not None
+    assert capture.parting.line == pytest.approx(np.array([[0.03, 0.1], [0.02, 0]]))
 
 
 def test_a_little_cropping_is_no_harm(tmp_path: Path) -> None:
@@ -151,6 +154,12 @@ WRONG = {
     "capture.toml: not a TOML file": lambda f: (f / "capture.toml").write_text("="),
     "capture.toml: no entry 'focal'": lambda f: (f / "capture.toml").write_text("focal = 3"),
     "focal_px is -3.0, expected": lambda f: (f / "capture.toml").write_text("focal_px = -3.0"),
+    "parting: no parting 'lift' .did you mean 'left'": lambda f: (f / "capture.toml").write_text(
+        'parting = "lift"'
+    ),
+    "parting: a parting of 1 points": lambda f: (f / "capture.toml").write_text(
+        "parting = [[0.1, 0.2]]"
+    ),
     "views are no tables": lambda f: (f / "capture.toml").write_text("views = 3"),
     "1 views for 8 photos": lambda f: (f / "capture.toml").write_text('[[views]]\nname="a"'),
     "b.png: no such photo": lambda f: (f / "capture.toml").write_text(

@@ -18,6 +18,7 @@ from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.groom import Groom
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull
@@ -52,6 +53,7 @@ class Run:
         self.groom: Groom = grow("short", head, ROOTS, seed=1)
         self.turn: Turnaround | None = self._turn(1.5)
         self.roots = len(self.groom.strands)
+        self.parting = Parting.at(0.0, skin_share=0.02, spread=0.012)
 
     def _mask(self, camera: Camera) -> Mask:
         head = self.scene.head
@@ -74,7 +76,7 @@ class Run:
         """Return the figures by stage and name."""
         every = assess(
             self.capture, self.masks, self.scene, self.hull, self.groom, self.roots,
-            HAIR_LENGTH, self.turn,
+            HAIR_LENGTH, self.turn, self.parting,
         )  # fmt: skip
         return {f"{figure.stage}: {figure.name}": figure for figure in every}
 
@@ -95,6 +97,11 @@ def shuffle(run: Run) -> None:
     """The photos are in another order than the cameras."""
     views = tuple(run.capture.views[k] for k in SHUFFLED)
     run.capture, run.masks = Capture(views), tuple(run.masks[k] for k in SHUFFLED)
+
+
+def bare_hairline(run: Run) -> None:
+    """Skin shows over the whole breadth of the crown."""
+    run.parting = Parting(skin_share=0.1, spread=0.09)
 
 
 def two_heads(run: Run) -> None:
@@ -146,6 +153,7 @@ FAULTS = {
     "cameras: outlines off by": wrong_outlines,
     "strands: roots grown": few_strands,
     "turn: margin over the next best": any_turn,
+    "parting: width of the skin": bare_hairline,
 }
 
 
