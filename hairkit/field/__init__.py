@@ -3,9 +3,10 @@
 What field and tracking plugins share: fusing views, priors, diffusion, and sampling of volumes.
 
 * `diffusion`: screened diffusion on masked cells, by conjugate gradients
+* `find_parting`: where the parting is, as the user says or the views show
 * `growth_prior`: geodesic distances from scalp and tips, and a direction prior
 * `isosurface`: the smooth surface of a volume of cells
-* `parting`: where the parting is, and how hair is combed from it
+* `parting`: how hair on the crown is combed from its parting
 * `sampling_kernels`: compiled look-ups in volumes
 * `symmetric_eigen`: eigenvectors of symmetric 3x3 tensors, in closed form
 * `view_fusion`: 2D orientations of all views fused into 3D tensors

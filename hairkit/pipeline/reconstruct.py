@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hairkit.errors import InputError, RenderError
+from hairkit.field.find_parting import measure_parting
 from hairkit.field.growth_prior import measure_scalp_distance
-from hairkit.field.parting import measure_parting
 from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.hairline import Hairline, measure_hairline
 from hairkit.head_model.scalp import sample_roots

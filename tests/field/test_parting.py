@@ -11,7 +11,8 @@ import pytest
 
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
-from hairkit.field.parting import comb_from_parting, crown_share, measure_parting, root_lift
+from hairkit.field.find_parting import measure_parting
+from hairkit.field.parting import comb_from_parting, crown_share, root_lift
 from hairkit.testing import ball_head, shell_hull, turn_capture, turn_scene
 from hairkit.types.camera import Camera
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask

@@ -44,7 +44,7 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
     ("changed", "again"),
     [
         ("hairkit/types/camera.py", "scene head hull field track"),
-        ("hairkit/types/mask.py", "segment scene head orient hull field track"),
+        ("hairkit/types/mask.py", "segment scene head orient hull field"),
         ("hairkit/storage.py", "segment scene head orient hull field track"),
         ("hairkit/cameras/silhouette_coherence.py", "scene"),
         ("hairkit/cameras/outlines.py", "scene head"),
