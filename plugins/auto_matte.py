@@ -4,7 +4,8 @@ A convolutional network that knows hair, skin, cloth and backdrop from rendered 
 (`hairkit.imaging.hair_network`) says on a coarse grid what is probable. Colour mixtures learnt from
 where it is sure tell this person's hair from this backdrop (after Rother et al. 2004), and edges
 are refined at full size (`hairkit.imaging.alpha_matting`). A person's probability and the face's
-landmarks, where a view has them, are inputs of the network; it works without.
+landmarks, where a view has them, are inputs of the network; it works without. Strokes that correct
+this mask (`flags.corrects` of their file) decide what is under them and what is like it nearby.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
 from hairkit.imaging.hair_network import hair_probability
+from hairkit.imaging.masked_filters import picture_scale
 from hairkit.imaging.seeded_segmentation import label_from_probability, reduced_size
+from hairkit.io.strokes import rasterise, read_view_strokes
 from hairkit.options import option
 from hairkit.types.capture import View
 from hairkit.types.mask import HAIR, Mask
@@ -37,6 +40,9 @@ class Options:
     reduced_height: int = option(
         360, low=120, high=1080, doc="Rows of the picture that is segmented first.", unit="px"
     )
+    thickness: float = option(
+        9.0, low=1.0, high=60.0, doc="Width of correcting lines in a photo 1080 px high.", unit="px"
+    )
 
 
 @hookimpl
@@ -52,12 +58,36 @@ def segment(view: View, options: Options) -> Mask:
     probability = hair_probability(view.image, _person(view), landmarks)
     size = reduced_size(view.width, view.height, options.reduced_height)
     face = None if landmarks is None else _face(landmarks * size / (view.width, view.height), size)
-    labels, alpha = label_from_probability(view.image, probability, size, face)
+    labels, alpha = label_from_probability(
+        view.image, probability, size, face, corrections=_corrections(view, size, options.thickness)
+    )
     if np.count_nonzero(labels == HAIR) < _LEAST_HAIR * labels.size:
         raise InputError(
             f"no hair found in photo {view.name}; draw strokes on it or give a mask file"
         )
     return Mask(labels, person_known=True, alpha=alpha)
+
+
+def _corrections(
+    view: View, size: tuple[int, int], thickness: float
+) -> tuple[BoolArray, BoolArray] | None:
+    """Return where strokes say that there is hair, and that there is none, in reduced pixels."""
+    drawn = read_view_strokes(view, *size)
+    if drawn is None:
+        return None
+    hair = np.zeros(size[::-1], np.bool_)
+    rest = np.zeros_like(hair)
+    if drawn.rectangle is not None:
+        (left, top), (right, bottom) = np.clip(np.rint(drawn.rectangle), 0, None).astype(int)
+        rest[:] = True
+        rest[top:bottom, left:right] = False
+    for stroke in drawn.strokes:
+        if stroke.label == "parting":
+            continue
+        under = rasterise(stroke, *size, thickness * picture_scale(size[1]))
+        is_hair = stroke.label == "foreground"
+        hair[under], rest[under] = is_hair, not is_hair
+    return hair, rest
 
 
 def _person(view: View) -> Float32Array | None:

@@ -66,10 +66,13 @@ class Options:
 
 @hookimpl
 def segment(view: View, options: Options) -> Mask | None:
-    """Label the photo from its strokes; None when it has none, so that the next plugin is asked."""
+    """Label the photo from its strokes; None when it has none, so that the next plugin is asked.
+
+    Strokes that only correct the automatic mask are left to the plugin that makes it.
+    """
     width, height = reduced_size(view.width, view.height, options.reduced_height)
     strokes = read_view_strokes(view, width, height)
-    if strokes is None or strokes.only_parting:
+    if strokes is None or strokes.only_parting or strokes.corrects:
         return None
     if not strokes.labelled("foreground"):
         raise InputError(

@@ -4,6 +4,7 @@ What segmenters and orienters share. Nothing here knows cameras or 3D, except th
 measured over all views.
 
 * `alpha_matting`: mask edges refined at full size
+* `corrections`: a user's strokes on an automatic mask
 * `geodesic`: geodesic distance from seeds; contours are expensive to cross
 * `hair_features`: what the hair network sees of a photo
 * `hair_network`: probability of hair, person and background by a small network

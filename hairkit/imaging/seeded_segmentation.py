@@ -17,6 +17,7 @@ import numpy as np
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.imaging.alpha_matting import refine_labels, refine_labels_and_alpha
+from hairkit.imaging.corrections import pull_prior
 from hairkit.imaging.geodesic import edge_costs, seed_distance
 from hairkit.imaging.masked_filters import blur
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
@@ -166,6 +167,7 @@ def label_from_probability(
     size: tuple[int, int],
     face: BoolArray | None = None,
     settings: LabelSettings | None = None,
+    corrections: tuple[BoolArray, BoolArray] | None = None,
 ) -> tuple[UInt8Array, UInt8Array]:
     """Return labels (H, W) of the photo's pixels, and the opacity of the hair, 0 to 255.
 
@@ -184,12 +186,19 @@ def label_from_probability(
         Where colours do not count, because a beard, brows and glasses have those of the hair.
     settings : LabelSettings, optional
         Its weights of the distance from seeds are not used.
+    corrections : two (height, width), optional
+        Where a user says that there is hair, and that there is none; what is like these places and
+        near them follows.
     """
     settings = settings or BESIDE_A_PRIOR
     prior = np.asarray(cv2.resize(probability, size, interpolation=cv2.INTER_CUBIC), np.float32)
     prior = np.clip(prior, np.float32(_LEAST_PROBABILITY), 1)
+    colour, flat = _standard_features(image, *size)
+    if corrections is not None:
+        smooth = blur(colour, _DENOISE_SIGMA)
+        costs = edge_costs(smooth, _COST_PER_PIXEL, _COST_PER_CONTRAST)
+        prior = pull_prior(prior, costs, *corrections)
     posterior = prior / prior.sum(axis=-1, keepdims=True)
-    _, flat = _standard_features(image, *size)
     terms = polynomial_terms(flat)
     order = np.array([HAIR, PERSON, BACKGROUND], np.uint8)
     for _ in range(settings.rounds):
@@ -206,19 +215,29 @@ def label_from_probability(
         )
         if face is not None:
             relative[face] = 0
+        if corrections is not None:
+            relative[corrections[0] | corrections[1]] = 0
         odds = prior * np.exp(blur(relative, _DENOISE_SIGMA))
         posterior = odds / odds.sum(axis=-1, keepdims=True)
     labels = np.take(order, posterior.argmax(axis=-1))
-    return _refine_nearby(image, labels)
+    seeds = np.full_like(labels, UNKNOWN)
+    if corrections is not None:
+        said = corrections[0] | corrections[1]
+        seeds[said] = labels[said]
+    return _refine_nearby(image, labels, seeds)
 
 
-def _refine_nearby(image: UInt8Array, labels: UInt8Array) -> tuple[UInt8Array, UInt8Array]:
+def _refine_nearby(
+    image: UInt8Array, labels: UInt8Array, seeds: UInt8Array
+) -> tuple[UInt8Array, UInt8Array]:
     """Return labels and opacity with edges refined near the hair of the reduced `labels` (h, w).
+
+    `seeds` (h, w) hold labels that stay, `UNKNOWN` elsewhere.
 
     Elsewhere an outline between skin and backdrop that is as dark as hair is none.
     """
     anywhere = np.ones(labels.shape, np.bool_)
-    fine, alpha = refine_labels_and_alpha(image, labels, np.full_like(labels, UNKNOWN), anywhere)
+    fine, alpha = refine_labels_and_alpha(image, labels, seeds, anywhere)
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_NEARBY, _NEARBY))
     nearby = cv2.dilate((labels == HAIR).astype(np.uint8), disc)
     large = image.shape[1::-1]

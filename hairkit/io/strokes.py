@@ -64,6 +64,9 @@ class Strokes:
     """(2, 2) corners (left, top), (right, bottom) in pixels of what holds all hair, or None."""
     size: tuple[int, int] | None = None
     """(width, height) of the photo they were drawn on, where the file says so."""
+    corrects: bool = False
+    """True for strokes that correct the automatic mask, false for those that stand alone: the flag
+    `corrects` of the file."""
 
     def labelled(self, label: StrokeLabel) -> tuple[Stroke, ...]:
         """Return the strokes of one label, in the order drawn."""
@@ -80,7 +83,7 @@ class Strokes:
         factor = np.array([x, y])
         strokes = tuple(Stroke(s.label, s.area, s.points * factor) for s in self.strokes)
         rectangle = None if self.rectangle is None else self.rectangle * factor
-        return Strokes(strokes, rectangle, None)
+        return Strokes(strokes, rectangle, None, self.corrects)
 
     def turned(self, quarter_turns: int, width: int, height: int) -> Strokes:
         """Return the strokes for the photo of `width` x `height` after clockwise quarter turns."""
@@ -91,7 +94,7 @@ class Strokes:
         strokes = tuple(Stroke(s.label, s.area, turn(s.points)) for s in self.strokes)
         corners = None if self.rectangle is None else np.sort(turn(self.rectangle), axis=0)
         size = (height, width) if quarter_turns % 2 else (width, height)
-        return Strokes(strokes, corners, size)
+        return Strokes(strokes, corners, size, self.corrects)
 
 
 def read_strokes(path: str | os.PathLike[str]) -> Strokes:
@@ -117,7 +120,9 @@ def read_strokes(path: str | os.PathLike[str]) -> Strokes:
             strokes.append(Stroke(label, kind in _AREAS, points))
     width, height = document.get("imageWidth"), document.get("imageHeight")
     size = (width, height) if isinstance(width, int) and isinstance(height, int) else None
-    return Strokes(tuple(strokes), rectangle, size)
+    flags = document.get("flags")
+    corrects = isinstance(flags, dict) and flags.get("corrects") is True
+    return Strokes(tuple(strokes), rectangle, size, corrects)
 
 
 def read_view_strokes(view: View, width: int, height: int) -> Strokes | None:
