@@ -18,10 +18,11 @@ focal_px = 1492
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -123,13 +124,7 @@ def read_capture_file(path: Path) -> CaptureFile:
 
 def write_head_entry(path: Path, entry: HeadEntry) -> None:
     """Put the head's pose into a `capture.toml`, made where there is none; all else in it stays."""
-    text = read_text(path, _MAX_BYTES) if path.exists() else ""
-    kept, inside = [], False
-    for line in text.splitlines():
-        if line.strip().startswith("["):
-            inside = line.split("#")[0].strip() == "[head]"
-        if not inside:
-            kept.append(line)
+    kept = _lines_without(path, "[head]")
     x, y, z = entry.rotation_deg
     right, up, front = entry.translation_m
     table = [
@@ -138,9 +133,41 @@ def write_head_entry(path: Path, entry: HeadEntry) -> None:
         f"rotation_deg = [{x!r}, {y!r}, {z!r}]",
         f"translation_m = [{right!r}, {up!r}, {front!r}]",
     ]
+    write_text(path, "\n".join([*kept, *([""] if kept else []), *table]) + "\n")
+
+
+def write_view_entries(path: Path, entries: Sequence[ViewEntry]) -> None:
+    """Replace the `[[views]]` tables of a `capture.toml`; all else in it stays.
+
+    Without entries the tables go, and the file too if nothing else is in it.
+    """
+    kept = _lines_without(path, "[[views]]")
+    for entry in entries:
+        said = [(f.name, getattr(entry, f.name)) for f in fields(entry)]
+        kept += [*([""] if kept else []), "[[views]]"]
+        kept += [
+            f"{name} = {json.dumps(value, ensure_ascii=False)}"
+            for name, value in said
+            if value is not None
+        ]
+    if kept:
+        write_text(path, "\n".join(kept) + "\n")
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _lines_without(path: Path, header: str) -> list[str]:
+    """Return the lines of a file, none where there is no file, without the tables of a header."""
+    text = read_text(path, _MAX_BYTES) if path.exists() else ""
+    kept, inside = [], False
+    for line in text.splitlines():
+        if line.strip().startswith("["):
+            inside = line.split("#")[0].strip() == header
+        if not inside:
+            kept.append(line)
     while kept and not kept[-1].strip():
         kept.pop()
-    write_text(path, "\n".join([*kept, *([""] if kept else []), *table]) + "\n")
+    return kept
 
 
 def head_entry(pose: Float64Array) -> HeadEntry:

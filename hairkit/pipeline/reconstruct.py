@@ -205,7 +205,7 @@ def _find_views(
     seen = replace(
         capture,
         views=tuple(
-            _see(view, face.result().value, person.result().value)
+            add_findings(view, face.result().value, person.result().value)
             for view, face, person in zip(capture.views, faces, persons, strict=True)
         ),
     )
@@ -217,7 +217,7 @@ def _find_views(
     return _with_upright_persons(run, seen.arranged(turn)), turn
 
 
-def _see(view: View, face: Face, person: Person) -> View:
+def add_findings(view: View, face: Face, person: Person) -> View:
     """Return the view with what was found in it; landmarks that were given are kept."""
     landmarks = view.landmarks
     if landmarks is None and face.sure:
