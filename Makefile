@@ -10,7 +10,7 @@ BPY_PYTHON ?= python3.11
 DEMO := demo-out
 EXAMPLE := examples/hairkit-sobel
 LIBRARIES := libegl1 libgl1 libgl1-mesa-dri libosmesa6
-DISPLAYS := xvfb
+DISPLAYS := xvfb chromium
 
 .PHONY: test test-clients demo lint docs matrix bench clean
 

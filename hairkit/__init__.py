@@ -16,6 +16,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `nets`: networks of others, run in a process of their own
 * `simulation`: contract of simulators, motion, wind
 * `grooming`: methods on strands and grooms
+* `studio`: from a camera to moving hair, in a browser
 * `synth`: procedural hair
 * `pipeline`: recipes and runs
 * `evaluation`: scores against ground truth

@@ -21,6 +21,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `scaffold_sketches`: the simplest method for every hook, which it writes
 * `settings`: `--set` of all verbs
 * `simulate`: simulation to a cache
+* `studio`: photos to moving hair in a browser
 * `synth`: procedural captures
 * `view`: the viewer
 """
@@ -43,6 +44,7 @@ from hairkit.errors import HairkitError
 
 VERBS = {
     "reconstruct": "turn photos of a head, or a video, into a groom",
+    "studio": "from a camera to moving hair, in a browser",
     "rerun": "run a reconstruction again from its record",
     "evaluate": "score a groom against the truth",
     "synth": "make a procedural groom and photos of it, with their truth",

@@ -1,0 +1,102 @@
+"""Outlines of the template head for the views of a turn, drawn by hairkit's own rasteriser.
+
+The camera is the one that the solver assumes when nothing else is known: the outline is where a
+head will be if whoever takes the photo does as the page says.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+
+from hairkit.cameras.depth_raster import head_depth
+from hairkit.head_model.template import default_head
+from hairkit.io.capture_reader import TOP_DEG, TURN
+from hairkit.io.photos import focal_from_equivalent
+from hairkit.types.camera import Camera
+
+WIDTH, HEIGHT = 360, 480
+"""Pixels of the picture that is drawn; outlines are given in shares of it."""
+LENS_MM, DISTANCE = 42.0, 0.85
+"""Full-frame focal length and metres to the head: arm's length of a helper, hair all in frame."""
+LOOK_AT = (0.0, -0.02, 0.0)
+"""Metres in the head frame in the middle of the picture."""
+HAIR_ABOVE = 0.045
+"""Height of usual hair above the top of the head, metres: the line that it should not pass."""
+TOLERANCE = 0.7
+"""Pixels by which an outline is simplified."""
+
+
+def guides_for(count: int, above: bool) -> list[dict[str, Any]]:
+    """Return name, azimuth, outline and line of the hair's top for each view of a turn.
+
+    `outline` are curves [[x, y, x, y, ...], ...], silhouette and face, and `top` a height, in
+    shares of width and height of a picture with sides 3 : 4.
+    """
+    azimuths = [360.0 * index / count for index in range(count)]
+    names = {azimuth: name for name, azimuth in TURN.items()}
+    guides = [_guide(names.get(azimuth, f"{azimuth:.0f}°"), azimuth, 0.0) for azimuth in azimuths]
+    return [*guides, _guide("top", 0.0, TOP_DEG)] if above else guides
+
+
+@cache
+def _guide(name: str, azimuth_deg: float, elevation_deg: float) -> dict[str, Any]:
+    camera = camera_at(azimuth_deg, elevation_deg)
+    head = default_head()
+    inside = np.isfinite(head_depth(head, camera)).astype(np.uint8)
+    curves, _ = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    smooth = [cv2.approxPolyDP(curve, TOLERANCE, True)[:, 0] for curve in curves]
+    crown = np.array([[0.0, float(head.vertices[:, 1].max()) + HAIR_ABOVE, 0.0]])
+    return {
+        "name": name,
+        "azimuth": azimuth_deg,
+        "elevation": elevation_deg,
+        "outline": [_shares([*curve, curve[0]]) for curve in smooth if len(curve) > 2]
+        + _face(camera),
+        "top": float(camera.project(crown)[0, 1] / HEIGHT),
+    }
+
+
+def camera_at(azimuth_deg: float, elevation_deg: float) -> Camera:
+    """Return the camera of a view."""
+    return Camera.on_turn(
+        azimuth_deg,
+        elevation_deg=elevation_deg,
+        distance=DISTANCE,
+        target=LOOK_AT,
+        focal=focal_from_equivalent(LENS_MM, WIDTH, HEIGHT),
+        width=WIDTH,
+        height=HEIGHT,
+    )
+
+
+def _shares(points: Any) -> list[float]:
+    shares = (np.asarray(points, np.float64) + 0.5) / (WIDTH, HEIGHT)
+    return [round(float(value), 4) for value in shares.ravel()]
+
+
+_LINES = ((17, 22), (22, 27), (27, 31), (31, 36), (36, 42), (42, 48), (48, 60))
+"""First and last landmark of brows, nose, eyes and mouth (iBUG)."""
+_CLOSED = (36, 42, 48)
+_FACING = math.cos(math.radians(80))
+"""Cosine of the angle between normal and view from which a line of the face is drawn."""
+
+
+def _face(camera: Camera) -> list[list[float]]:
+    """Return lines of brows, nose, eyes and mouth as far as the camera sees them."""
+    head = default_head()
+    assert head.landmark_vertices is not None
+    points = head.vertices[head.landmark_vertices].astype(np.float64)
+    towards = -camera.view_direction(points)
+    seen = (head.normals()[head.landmark_vertices] * towards).sum(axis=1) > _FACING
+    pixels = camera.project(points)
+    lines = []
+    for first, last in _LINES:
+        order = list(range(first, last)) + ([first] if first in _CLOSED else [])
+        if seen[order].all():
+            lines.append(_shares(pixels[order]))
+    return lines

@@ -1,0 +1,91 @@
+"""A groom for the page: head, hair and the guides that move it, as one block of bytes.
+
+Four bytes `HKS1`, the length of a JSON header (uint32, little-endian), the header padded to a
+multiple of four, then the arrays that it names with type, shape and place.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from hairkit.grooming.densify import densify
+from hairkit.storage import write_bytes
+from hairkit.types.groom import Groom
+
+MAGIC = b"HKS1"
+HAIRS, POINTS = 9000, 16
+"""Strands drawn and points of each: what a phone draws sixty times a second."""
+MOST_GUIDES = 700
+"""Guides that are simulated in the page."""
+CARRIERS = 3
+"""Guides that each hair follows."""
+LEAST_DISTANCE = 1e-3
+"""Added to distances between roots, metres, before weights are taken as their inverse."""
+
+
+def write_packet(groom: Groom, path: Path) -> None:
+    """Write the packet of a groom."""
+    write_bytes(path, packet_of(groom))
+
+
+def packet_of(groom: Groom) -> bytes:
+    """Return the packet of a groom."""
+    strands = groom.strands
+    step = max(1, -(-len(strands) // MOST_GUIDES))
+    guides = strands.select(np.arange(len(strands)) % step == 0).resampled(POINTS)
+    hair = densify(groom, HAIRS).resampled(POINTS)
+    shape = (-1, POINTS, 3)
+    carried, weights = _carriers(guides.points.reshape(shape), hair.points.reshape(shape))
+    head = groom.head
+    arrays: dict[str, npt.NDArray[Any]] = {
+        "head_points": head.vertices.astype(np.float32),
+        "head_normals": head.normals().astype(np.float32),
+        "head_faces": head.faces.astype(np.uint32),
+        "head_scalp": head.scalp.astype(np.float32),
+        "guides": guides.points.astype(np.float32).reshape(shape),
+        "hair": hair.points.astype(np.float32).reshape(shape),
+        "carriers": carried.astype(np.float32),
+        "weights": weights.astype(np.float32),
+        "capsules": np.hstack(
+            [head.capsules.first, head.capsules.second, head.capsules.radius]
+        ).astype(np.float32),
+    }
+    facts = {
+        "root_colour": groom.material.root_colour.tolist(),
+        "tip_colour": groom.material.tip_colour.tolist(),
+        "stiffness": groom.physics.stiffness,
+        "strands": len(strands),
+    }
+    return pack(arrays, facts)
+
+
+def pack(arrays: dict[str, npt.NDArray[Any]], facts: dict[str, Any]) -> bytes:
+    """Return arrays and facts as the page reads them."""
+    places, blocks, at = {}, [], 0
+    for name, array in arrays.items():
+        data = np.ascontiguousarray(array).tobytes()
+        places[name] = {"type": array.dtype.name, "shape": array.shape, "at": at}
+        blocks.append(data)
+        at += len(data)
+    header = json.dumps({"arrays": places, "facts": facts}).encode()
+    header += b" " * (-len(header) % 4)
+    return b"".join([MAGIC, struct.pack("<I", len(header)), header, *blocks])
+
+
+def _carriers(
+    guides: npt.NDArray[np.float32], hair: npt.NDArray[np.float32]
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Return the guides (N, 3) that each hair follows and their weights (N, 3), which sum to 1."""
+    near = min(CARRIERS, len(guides))
+    distance, index = cKDTree(guides[:, 0]).query(hair[:, 0], k=list(range(1, near + 1)))
+    weights = 1 / (distance + LEAST_DISTANCE)
+    weights /= weights.sum(axis=1, keepdims=True)
+    spare = CARRIERS - near
+    return np.pad(index, ((0, 0), (0, spare))), np.pad(weights, ((0, 0), (0, spare)))

@@ -1,0 +1,68 @@
+// The frame of all pages: which page is shown, and how far the hair is.
+import { listen, onChange, openSession, refresh, say } from "./api.js";
+import * as photos from "./photos.js";
+import * as capture from "./capture.js";
+import * as annotate from "./annotate.js";
+import * as pose from "./pose.js";
+import * as hair from "./hair.js";
+
+const pages = { photos, capture, annotate, pose, hair };
+const stageNames = {
+  landmarks: "looking for faces", person: "looking for the person", turn: "ordering the photos",
+  segment: "finding hair", scene: "placing cameras", refine: "comparing masks", head: "fitting the head",
+  orient: "following strands in photos", waves: "measuring waves", hull: "carving the volume",
+  distance: "measuring thickness", parting: "finding the parting", field: "spreading directions",
+  hairline: "finding the hairline", track: "growing strands", sheet: "drawing the overview",
+};
+let leave = () => {};
+let current = "";
+
+function show() {
+  const [name, argument] = location.hash.slice(1).split("/");
+  const page = pages[name] ? name : "photos";
+  leave();
+  current = page;
+  for (const link of document.querySelectorAll("nav a")) {
+    if (link.hash === `#${page}`) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  const main = document.getElementById("page");
+  main.replaceChildren();
+  document.title = `${page[0].toUpperCase()}${page.slice(1)} – hairkit studio`;
+  leave = pages[page].show(main, argument) ?? (() => {});
+}
+
+function showBuild(state) {
+  document.getElementById("name").textContent = state.name || "hairkit studio";
+  const { state: phase, stage, share, reason } = state.build;
+  const text = {
+    running: stageNames[stage] ? `Making hair: ${stageNames[stage]}` : "Making hair",
+    waiting: "Photos changed, starting again", done: "Hair is ready", failed: reason,
+  }[phase] ?? "";
+  const place = document.getElementById("build-text");
+  if (place.textContent !== text) place.textContent = text;
+  place.className = phase === "failed" ? "bad" : phase === "done" ? "good" : "";
+  const bar = document.getElementById("build-share");
+  bar.hidden = phase !== "running";
+  bar.value = share ?? 0;
+}
+
+async function start() {
+  onChange(showBuild);
+  try {
+    await openSession();
+    await refresh();
+  } catch (error) {
+    say(error.message);
+    const text = document.createElement("p");
+    text.textContent = error.message;
+    text.className = "empty";
+    document.getElementById("page").append(text);
+    return;
+  }
+  listen();
+  addEventListener("hashchange", show);
+  show();
+}
+
+start();

@@ -1,0 +1,62 @@
+// The hair that turns and moves, and its files.
+import { make, onChange, say, send, state } from "./api.js";
+import { showHair } from "./hair_controls.js";
+
+const engines = {
+  hairworks: "HairWorks", alembic: "Blender, Unreal, Maya", gltf: "Web, Unity", usd: "Houdini, Omniverse",
+  fbx: "Unity, Maya", maya: "Maya, XGen", native: "hairkit", obj: "any tool", ply: "any tool",
+  tressfx: "TressFX", cyhair: "CyHair", usc_data: "research",
+};
+
+export function show(main) {
+  let shown = "";
+  let close = () => {};
+
+  async function draw() {
+    if (!state.result) {
+      close();
+      shown = "";
+      const running = state.build.state === "running";
+      main.replaceChildren(make("div", { class: "empty" },
+        make("h2", {}, running ? "The hair is growing" : "No hair yet"),
+        make("p", { class: "quiet" }, running
+          ? "It appears here by itself." : "Three photos are the least, eight are usual."),
+        running ? null : state.photos.length >= 3
+          ? make("button", { class: "primary", onclick: () => send("POST", "/api/build").catch((e) => say(e.message)) }, "Make the hair")
+          : make("a", { class: "button primary", href: "#photos" }, "Add photos")));
+      return;
+    }
+    if (shown === state.result) return;
+    shown = state.result;
+    try {
+      const response = await fetch(`/api/result/hair?v=${state.result}`);
+      if (!response.ok) throw new Error("the hair could not be read");
+      const packet = await response.arrayBuffer();
+      close();
+      const stage = make("section", { class: "stage", id: "hair", "aria-label": "The hair in motion" });
+      main.replaceChildren(make("div", { class: "split" }, stage, side()));
+      close = showHair(stage, packet);
+    } catch (error) {
+      say(error.message);
+    }
+  }
+
+  function side() {
+    const health = (state.build.health ?? []).map(([light, line]) => make("li", { class: light }, line));
+    const formats = [...state.formats].sort((a, b) => (engines[b[0]] ? 1 : 0) - (engines[a[0]] ? 1 : 0));
+    return make("section", { class: "side", "aria-label": "Files" },
+      make("h2", {}, "Take it with you"),
+      make("a", { class: "button primary", href: "/api/result/page", download: "result.html" }, "result.html: moves in any browser"),
+      make("p", { class: "quiet" }, "One file that needs no server."),
+      make("div", { class: "tools" }, ...formats.map(([plugin, suffix]) =>
+        make("a", { class: "button", href: `/api/result/${plugin}`, download: `groom${suffix}`, title: engines[plugin] ?? plugin }, suffix))),
+      make("a", { href: "/api/result/sheet", target: "_blank" }, "Overview of all steps"),
+      health.length ? make("h2", {}, "How good it is") : null,
+      make("ul", { class: "lights" }, ...health),
+      make("p", { class: "quiet" }, "On this machine: hairkit view PROJECT/result"));
+  }
+
+  const stop = onChange(draw);
+  draw();
+  return () => { stop(); close(); };
+}

@@ -1,0 +1,333 @@
+"""A project: a folder that `hairkit reconstruct` reads, and what the studio knows beside it.
+
+    photos/ 001.jpg ...       cleaned photos, named by the studio
+    strokes/001.json          what was drawn on a photo, labelme's shape
+    landmarks.json            landmarks that were corrected
+    capture.toml              names and order of the photos, where they were given; head's pose
+    studio.json               the photos in their order: the source of capture.toml's tables
+    result/                   what `hairkit reconstruct PROJECT -o PROJECT/result` writes
+    .studio/                  pictures for the pages and uploads on their way; may be deleted
+
+Every file is replaced whole, in an order in which the folder can be read after each step.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from hairkit.errors import HairkitError, InputError
+from hairkit.io.capture_reader import FEWEST, MOST, NAMES
+from hairkit.io.capture_toml import (
+    HeadEntry,
+    ViewEntry,
+    read_capture_file,
+    write_head_entry,
+    write_view_entries,
+)
+from hairkit.io.strokes import read_strokes
+from hairkit.storage import read_text, write_bytes, write_text
+
+STATE = "studio.json"
+RESULT = "result"
+_BUILT = "studio.json"
+_SUFFIXES = (".jpg", ".jpeg", ".png", ".heic", ".heif")
+_LARGEST_STATE = 2**20
+"""Bytes of studio.json; a photo takes about a hundred."""
+_LANDMARKS = 68
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One photo of a project."""
+
+    id: int
+    """Number that pages use; never used again after the photo has gone."""
+    file: str
+    """Name in the folder of the photos."""
+    view: str | None = None
+    """Name of the view, of `NAMES`, where whoever took the photo said so."""
+
+
+class Project:
+    """The files of one project; used by one server at a time."""
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        """Open a folder, made where there is none; raises `InputError` if it is something else."""
+        self.folder = Path(folder)
+        if self.folder.exists() and not self.folder.is_dir():
+            raise InputError(f"{self.folder}: not a folder; name one for the project")
+        bare = self.folder.is_dir() and any(map(_is_photo, self.folder.iterdir()))
+        self.photo_folder = self.folder if bare else self.folder / "photos"
+        for made in (self.photo_folder, self.folder / "strokes", self.incoming, self.pictures):
+            made.mkdir(parents=True, exist_ok=True)
+        for leftover in self.incoming.iterdir():  # uploads that a crash cut short
+            leftover.unlink(missing_ok=True)
+        self.shots = self._read_shots()
+        self._said = self._said_entries()
+        if shutil.disk_usage(self.folder).free < _LARGEST_STATE:
+            raise InputError(f"{self.folder}: no room on this disk; free some")
+
+    @property
+    def incoming(self) -> Path:
+        """Folder of uploads that are not complete."""
+        return self.folder / ".studio" / "incoming"
+
+    @property
+    def pictures(self) -> Path:
+        """Folder of the pictures that pages show."""
+        return self.folder / ".studio" / "pictures"
+
+    @property
+    def result(self) -> Path:
+        """Folder of the groom and its files."""
+        return self.folder / RESULT
+
+    def shot(self, number: int) -> Shot:
+        """Return the photo with a number; raises `InputError` if there is none."""
+        for shot in self.shots:
+            if shot.id == number:
+                return shot
+        raise InputError(f"no photo {number} in this project")
+
+    def photo(self, shot: Shot) -> Path:
+        """Return the path of a photo."""
+        return self.photo_folder / shot.file
+
+    def strokes(self, shot: Shot) -> Path:
+        """Return the path of what was drawn on a photo, which need not exist."""
+        return self.folder / "strokes" / f"{Path(shot.file).stem}.json"
+
+    def mask(self, shot: Shot) -> Path | None:
+        """Return the file of a mask that came with the photo."""
+        path = self.folder / "masks" / f"{Path(shot.file).stem}.png"
+        return path if path.is_file() else None
+
+    def picture(self, shot: Shot, size: str) -> Path:
+        """Return the path of the picture of a photo that pages show: `small` or `large`."""
+        return self.pictures / f"{Path(shot.file).stem}-{size}.jpg"
+
+    def next_file(self, suffix: str) -> tuple[int, str]:
+        """Return the number and the file name of a new photo; `InputError` when it is full."""
+        if len(self.shots) >= MOST:
+            raise InputError(f"{MOST} photos are in the project, which is the most; remove one")
+        taken = {shot.file for shot in self.shots}
+        number = 1 + max([shot.id for shot in self.shots], default=0)
+        while f"{number:03d}{suffix}" in taken:
+            number += 1
+        return number, f"{number:03d}{suffix}"
+
+    def add(self, cleaned: Path, suffix: str, view: str | None = None) -> Shot:
+        """Move a cleaned photo into the project, as its last."""
+        number, file = self.next_file(suffix)
+        shot = Shot(number, file, view if view in NAMES else None)
+        write_view_entries(self.folder / "capture.toml", [])
+        os.replace(cleaned, self.photo_folder / file)
+        self._keep([*self.shots, shot])
+        return shot
+
+    def retake(self, number: int, cleaned: Path, suffix: str) -> Shot:
+        """Replace a photo by a new one of the same view; what was drawn on it goes."""
+        old = self.shot(number)
+        self._forget(old)
+        write_view_entries(self.folder / "capture.toml", [])
+        new = replace(old, file=Path(old.file).with_suffix(suffix).name)
+        os.replace(cleaned, self.photo(new))
+        if new.file != old.file:
+            self.photo(old).unlink(missing_ok=True)
+        self._keep([new if shot.id == number else shot for shot in self.shots])
+        return new
+
+    def remove(self, number: int) -> None:
+        """Remove a photo and all that belongs to it."""
+        old = self.shot(number)
+        self._forget(old)
+        write_view_entries(self.folder / "capture.toml", [])
+        self.photo(old).unlink(missing_ok=True)
+        self._keep([shot for shot in self.shots if shot.id != number])
+
+    def arrange(self, numbers: Sequence[int]) -> None:
+        """Put the photos in another order; the names of views, which would contradict it, go."""
+        by_number = {shot.id: shot for shot in self.shots}
+        if sorted(numbers) != sorted(by_number):
+            raise InputError("the order names other photos than the project has")
+        self._said = {
+            file: replace(entry, azimuth_deg=None, elevation_deg=None)
+            for file, entry in self._said.items()
+        }
+        self._keep([replace(by_number[number], view=None) for number in numbers])
+
+    def draw(self, number: int, document: dict[str, Any]) -> None:
+        """Keep what was drawn on a photo; a file without shapes is removed.
+
+        Raises `InputError` when `document` is not labelme's JSON with labels that are known.
+        """
+        path = self.strokes(self.shot(number))
+        if not document.get("shapes"):
+            path.unlink(missing_ok=True)
+            return
+        trial = self.incoming / f"strokes-{number}.json"
+        write_text(trial, json.dumps(document))
+        try:
+            read_strokes(trial)
+            os.replace(trial, path)
+        finally:
+            trial.unlink(missing_ok=True)
+
+    def landmarks(self) -> dict[str, Any]:
+        """Return the landmarks that were given, by the photo's stem."""
+        path = self.folder / "landmarks.json"
+        if not path.is_file():
+            return {}
+        try:
+            return dict(json.loads(read_text(path))["views"])
+        except (ValueError, KeyError, TypeError):
+            return {}
+
+    def mark(self, number: int, points: list[list[float]] | None) -> None:
+        """Keep the landmarks (68 points, pixels of the photo) of a photo, or forget them."""
+        if points is not None and len(points) != _LANDMARKS:
+            raise InputError(f"{len(points)} landmarks, expected {_LANDMARKS}")
+        views = self.landmarks()
+        stem = Path(self.shot(number).file).stem
+        views.pop(stem, None)
+        if points is not None:
+            views[stem] = [[float(x), float(y)] for x, y in points]
+        path = self.folder / "landmarks.json"
+        if views:
+            write_text(path, json.dumps({"views": views}))
+        else:
+            path.unlink(missing_ok=True)
+
+    def place_head(self, entry: HeadEntry) -> None:
+        """Keep the pose of the head that was set by hand."""
+        write_head_entry(self.folder / "capture.toml", entry)
+
+    def inputs(self) -> str:
+        """Return a text that changes whenever a file changes that a reconstruction reads."""
+        files = [self.photo(shot) for shot in self.shots]
+        files += sorted((self.folder / "strokes").glob("*.json"))
+        files += sorted((self.folder / "masks").glob("*.png"))
+        files += [self.folder / "landmarks.json", self.folder / "capture.toml"]
+        facts = [(f.name, f.stat().st_size, f.stat().st_mtime_ns) for f in files if f.is_file()]
+        return json.dumps(facts)
+
+    @property
+    def built(self) -> str:
+        """What `inputs` was when the result was made; empty where there is none."""
+        return str(self._built().get("inputs", ""))
+
+    @property
+    def made(self) -> dict[str, Any]:
+        """What was said of the result when it was made."""
+        return dict(self._built().get("made", {}))
+
+    def set_built(self, inputs: str, made: dict[str, Any]) -> None:
+        """Say that the result belongs to these inputs, and keep what pages show of it."""
+        write_text(self.result / _BUILT, json.dumps({"inputs": inputs, "made": made}))
+
+    def _built(self) -> dict[str, Any]:
+        path = self.result / _BUILT
+        if not (path.is_file() and self.groom.is_file()):
+            return {}
+        try:
+            return dict(json.loads(read_text(path)))
+        except (ValueError, TypeError):
+            return {}
+
+    @property
+    def groom(self) -> Path:
+        """The file of the groom."""
+        return self.result / "groom.npz"
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are photos enough for a groom."""
+        return len(self.shots) >= FEWEST
+
+    def write_picture(self, shot: Shot, size: str, data: bytes) -> None:
+        """Keep the picture of a photo that pages show."""
+        write_bytes(self.picture(shot, size), data, durable=False)
+
+    def _read_shots(self) -> list[Shot]:
+        """Return the photos that are there, in the order that was kept; new ones come last."""
+        files = sorted(filter(_is_photo, self.photo_folder.iterdir()), key=_natural)
+        there = {path.name for path in files}
+        shots = [shot for shot in self._kept() if shot.file in there]
+        known = {shot.file for shot in shots}
+        number = max([shot.id for shot in shots], default=0)
+        for path in files:
+            if path.name not in known:
+                number += 1
+                view = re.sub(r"^\d+[-_. ]*", "", path.stem).lower().replace("_", "-")
+                shots.append(Shot(number, path.name, view if view in NAMES else None))
+        return shots
+
+    def _kept(self) -> list[Shot]:
+        path = self.folder / STATE
+        if not path.is_file():
+            return []
+        try:
+            return [
+                Shot(**entry) for entry in json.loads(read_text(path, _LARGEST_STATE))["photos"]
+            ]
+        except (ValueError, KeyError, TypeError, HairkitError):
+            return []  # a file that somebody else wrote; the photos themselves are what counts
+
+    def _keep(self, shots: list[Shot]) -> None:
+        """Write the state, then the tables of capture.toml that follow from it."""
+        self.shots = shots
+        state = {"photos": [asdict(shot) for shot in shots]}
+        write_text(self.folder / STATE, json.dumps(state, indent=1) + "\n")
+        write_view_entries(self.folder / "capture.toml", self._entries())
+
+    def _said_entries(self) -> dict[str, ViewEntry]:
+        """Return what a capture.toml that somebody wrote says of each photo."""
+        entries = read_capture_file(self.folder / "capture.toml").views
+        files = [shot.file for shot in self.shots]
+        return {entry.photo or file: entry for entry, file in zip(entries, files, strict=False)}
+
+    def _entries(self) -> list[ViewEntry]:
+        """Return the tables of the views: names where all are known and differ, or the order."""
+        views = [shot.view for shot in self.shots]
+        named = None not in views and len(set(views)) == len(views)
+        shots = self.shots
+        if named:
+            shots = sorted(shots, key=lambda shot: NAMES.index(shot.view or ""))
+        order = [shot.file for shot in shots]
+        in_order = order == sorted(order, key=lambda name: _natural(Path(name)))
+        if not named and in_order and not set(order) & set(self._said):
+            return []
+        return [
+            replace(
+                self._said.get(s.file, ViewEntry()), photo=s.file, name=s.view if named else None
+            )
+            for s in shots
+        ]
+
+    def _forget(self, shot: Shot) -> None:
+        """Remove what was made from a photo."""
+        self.strokes(shot).unlink(missing_ok=True)
+        mask = self.mask(shot)
+        if mask is not None:
+            mask.unlink(missing_ok=True)
+        if Path(shot.file).stem in self.landmarks():
+            self.mark(shot.id, None)
+        for size in ("small", "large"):
+            self.picture(shot, size).unlink(missing_ok=True)
+
+
+def _is_photo(path: Path) -> bool:
+    return path.suffix.lower() in _SUFFIXES and not path.name.startswith(".") and path.is_file()
+
+
+def _natural(path: Path) -> list[Any]:
+    """Return a key by which `2.jpg` is before `10.jpg`."""
+    pieces = re.split(r"(\d+)", path.name.lower())
+    return [int(piece) if piece.isdigit() else piece for piece in pieces]

@@ -1,0 +1,306 @@
+"""What pages ask of the server."""
+
+from __future__ import annotations
+
+import asyncio
+import tempfile
+from collections.abc import Awaitable, Callable
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
+from starlette.routing import Route
+
+from hairkit.errors import HairkitError
+from hairkit.io.capture_toml import HeadEntry
+from hairkit.options import make_options
+from hairkit.studio.feedback import for_pages
+from hairkit.studio.guard import SESSION_PATH, Sessions
+from hairkit.studio.lan import qr_svg
+from hairkit.studio.project import Shot
+from hairkit.studio.result_page import result_page
+from hairkit.studio.studio import BUILD_S, EXPORT_S, PHOTO_S, Studio
+from hairkit.studio.uploads import receive_file, receive_json
+
+TURNS = (8, 12, 16, 24)
+"""Numbers of views of a guided turn."""
+MOST_PAIRINGS = 20
+"""Links that may wait to be opened."""
+_VIDEO_S = 900.0
+_UNKNOWN = "there is none yet"
+
+Handler = Callable[[Request], Awaitable[Response]]
+
+
+class Routes:
+    """Handlers that share the studio and the sessions."""
+
+    def __init__(self, studio: Studio, sessions: Sessions, link: Callable[[], str]) -> None:
+        """`link` returns a new link for a further browser."""
+        self._studio = studio
+        self._sessions = sessions
+        self._link = link
+
+    def all(self) -> list[Route]:
+        """Return the routes below `/api`."""
+        table: list[tuple[str, str, Handler]] = [
+            (SESSION_PATH, "POST", self._open_session),
+            ("/api/project", "GET", self._project),
+            ("/api/events", "GET", self._events),
+            ("/api/feedback", "GET", self._feedback),
+            ("/api/guides/{count:int}", "GET", self._guides),
+            ("/api/look/{azimuth:int}", "POST", self._look),
+            ("/api/pairing", "POST", self._pairing),
+            ("/api/photos", "POST", self._add_photo),
+            ("/api/video", "POST", self._add_video),
+            ("/api/order", "PUT", self._arrange),
+            ("/api/hold", "PUT", self._hold),
+            ("/api/photos/{id:int}", "PUT", self._retake),
+            ("/api/photos/{id:int}", "DELETE", self._remove),
+            ("/api/photos/{id:int}/small", "GET", self._small),
+            ("/api/photos/{id:int}/large", "GET", self._large),
+            ("/api/photos/{id:int}/outline", "GET", self._outline),
+            ("/api/photos/{id:int}/strokes", "GET", self._strokes),
+            ("/api/photos/{id:int}/strokes", "PUT", self._draw),
+            ("/api/photos/{id:int}/landmarks", "PUT", self._mark),
+            ("/api/pose", "GET", self._pose),
+            ("/api/head", "PUT", self._place_head),
+            ("/api/build", "POST", self._build),
+            ("/api/build", "DELETE", self._stop),
+            ("/api/result/hair", "GET", self._hair),
+            ("/api/result/sheet", "GET", self._sheet),
+            ("/api/result/page", "GET", self._page),
+            ("/api/result/{plugin:str}", "GET", self._file),
+        ]
+        return [Route(path, _clear(handler), methods=[method]) for path, method, handler in table]
+
+    async def _open_session(self, request: Request) -> Response:
+        token = (await receive_json(request)).get("token")
+        secret = self._sessions.open(token) if isinstance(token, str) else None
+        if secret is None:
+            raise HTTPException(
+                HTTPStatus.FORBIDDEN, "this link was used before; the terminal shows a new one"
+            )
+        response = JSONResponse({})
+        secure = request.url.scheme == "https"
+        response.set_cookie(
+            self._sessions.cookie, secret, httponly=True, samesite="strict", secure=secure
+        )
+        if not self._sessions.unused:
+            self._link()
+        return response
+
+    async def _project(self, request: Request) -> Response:
+        return JSONResponse(self._studio.summary())
+
+    async def _events(self, request: Request) -> Response:
+        if self._studio.events.full:
+            raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are open")
+        return StreamingResponse(self._studio.events.listen(), media_type="text/event-stream")
+
+    async def _feedback(self, request: Request) -> Response:
+        return JSONResponse(for_pages())
+
+    async def _guides(self, request: Request) -> Response:
+        count = request.path_params["count"]
+        if count not in TURNS:
+            raise HTTPException(HTTPStatus.NOT_FOUND, f"a turn has {TURNS} views")
+        above = "above" in request.query_params
+        found = await self._studio.editor.call("guides", PHOTO_S, {"count": count, "above": above})
+        return JSONResponse(found)
+
+    async def _look(self, request: Request) -> Response:
+        """Judge a small picture of the camera; it is not kept."""
+        incoming = await receive_file(request, self._studio.project.incoming, "photo")
+        values = {"incoming": str(incoming), "azimuth": request.path_params["azimuth"] % 360}
+        try:
+            return JSONResponse(await self._studio.editor.call("look", PHOTO_S, values))
+        finally:
+            incoming.unlink(missing_ok=True)
+
+    async def _pairing(self, request: Request) -> Response:
+        if self._sessions.unused >= MOST_PAIRINGS:
+            raise HTTPException(
+                HTTPStatus.TOO_MANY_REQUESTS, "many links wait to be opened; use one of them"
+            )
+        link = self._link()
+        return JSONResponse({"link": link, "qr": qr_svg(link)})
+
+    async def _add_photo(self, request: Request) -> Response:
+        incoming = await receive_file(request, self._studio.project.incoming, "photo")
+        shot = await self._studio.add_photo(incoming, request.query_params.get("view"))
+        return JSONResponse({"id": shot.id, **self._studio.facts[shot.id]}, HTTPStatus.CREATED)
+
+    async def _retake(self, request: Request) -> Response:
+        shot = self._shot(request)
+        incoming = await receive_file(request, self._studio.project.incoming, "photo")
+        await self._studio.add_photo(incoming, None, shot.id)
+        return JSONResponse({"id": shot.id, **self._studio.facts[shot.id]})
+
+    async def _add_video(self, request: Request) -> Response:
+        studio = self._studio
+        incoming = await receive_file(request, studio.project.incoming, "video")
+        video = incoming.with_suffix(".mp4")
+        incoming.rename(video)
+        try:
+            folder, name = str(studio.project.incoming), video.stem
+            found = await studio.editor.call(
+                "frames", _VIDEO_S, {"video": str(video), "folder": folder, "name": name}
+            )
+            shots = [await studio.add_photo(Path(path), None) for path in found["frames"]]
+        finally:
+            video.unlink(missing_ok=True)
+        return JSONResponse({"ids": [shot.id for shot in shots]}, HTTPStatus.CREATED)
+
+    async def _remove(self, request: Request) -> Response:
+        shot = self._shot(request)
+        async with self._studio.change:
+            self._studio.project.remove(shot.id)
+        self._studio.facts.pop(shot.id, None)
+        self._studio.changed()
+        return JSONResponse({})
+
+    async def _arrange(self, request: Request) -> Response:
+        order = (await receive_json(request)).get("order")
+        if not isinstance(order, list) or not all(isinstance(n, int) for n in order):
+            raise HTTPException(HTTPStatus.BAD_REQUEST, "expected the numbers of the photos")
+        async with self._studio.change:
+            self._studio.project.arrange(order)
+        self._studio.changed()
+        return JSONResponse({})
+
+    async def _hold(self, request: Request) -> Response:
+        self._studio.held = (await receive_json(request)).get("held") is True
+        if not self._studio.held:
+            self._studio.changed()
+        return JSONResponse({})
+
+    async def _small(self, request: Request) -> Response:
+        return self._picture(request, "small")
+
+    async def _large(self, request: Request) -> Response:
+        return self._picture(request, "large")
+
+    def _picture(self, request: Request, size: str) -> Response:
+        path = self._studio.project.picture(self._shot(request), size)
+        if not path.is_file():
+            raise HTTPException(HTTPStatus.NOT_FOUND, _UNKNOWN)
+        return FileResponse(path, media_type="image/jpeg")
+
+    async def _outline(self, request: Request) -> Response:
+        return JSONResponse(await self._studio.outline(self._shot(request)))
+
+    async def _strokes(self, request: Request) -> Response:
+        path = self._studio.project.strokes(self._shot(request))
+        if not path.is_file():
+            return JSONResponse({"shapes": []})
+        return FileResponse(path, media_type="application/json")
+
+    async def _draw(self, request: Request) -> Response:
+        shot, document = self._shot(request), await receive_json(request)
+        async with self._studio.change:
+            self._studio.project.draw(shot.id, document)
+        facts = await self._studio.outline(shot)
+        self._studio.changed()
+        return JSONResponse(facts)
+
+    async def _mark(self, request: Request) -> Response:
+        shot, points = self._shot(request), (await receive_json(request)).get("points")
+        if points is not None and not _is_points(points):
+            raise HTTPException(HTTPStatus.BAD_REQUEST, "expected pairs of numbers")
+        async with self._studio.change:
+            self._studio.project.mark(shot.id, points)
+        self._studio.changed()
+        return JSONResponse({})
+
+    async def _place_head(self, request: Request) -> Response:
+        entry = make_options(HeadEntry, await receive_json(request), "head")
+        async with self._studio.change:
+            self._studio.project.place_head(entry)
+        self._studio.changed()
+        return JSONResponse({})
+
+    async def _pose(self, request: Request) -> Response:
+        result = str(self._studio.project.result)
+        return JSONResponse(await self._studio.editor.call("pose", PHOTO_S, {"result": result}))
+
+    async def _build(self, request: Request) -> Response:
+        if not self._studio.project.enough:
+            raise HTTPException(HTTPStatus.CONFLICT, "three photos are the least")
+        self._studio.changed(ask=True)
+        return JSONResponse({}, HTTPStatus.ACCEPTED)
+
+    async def _stop(self, request: Request) -> Response:
+        await self._studio.stop_build()
+        return JSONResponse({}, HTTPStatus.ACCEPTED)
+
+    async def _hair(self, request: Request) -> Response:
+        return self._made("studio-hair.bin", "application/octet-stream")
+
+    async def _sheet(self, request: Request) -> Response:
+        return self._made("contact_sheet.png", "image/png")
+
+    async def _page(self, request: Request) -> Response:
+        packet = self._studio.project.result / "studio-hair.bin"
+        if not packet.is_file():
+            raise HTTPException(HTTPStatus.NOT_FOUND, _UNKNOWN)
+        data = await asyncio.to_thread(result_page, packet)
+        headers = {"Content-Disposition": 'attachment; filename="result.html"'}
+        return Response(data, media_type="application/octet-stream", headers=headers)
+
+    async def _file(self, request: Request) -> Response:
+        """Write the groom in a format, unless the build has, and send it."""
+        studio, plugin = self._studio, request.path_params["plugin"]
+        suffix = dict(studio.formats).get(plugin)
+        if suffix is None or not studio.project.groom.is_file():
+            raise HTTPException(HTTPStatus.NOT_FOUND, _UNKNOWN)
+        path = studio.project.result / f"groom{suffix}"
+        groom = studio.project.groom
+        if not path.is_file() or path.stat().st_mtime_ns < groom.stat().st_mtime_ns:
+            with tempfile.TemporaryDirectory(dir=studio.project.incoming) as folder:
+                made = Path(folder) / path.name
+                await studio.builder.call(
+                    "export",
+                    EXPORT_S + BUILD_S,
+                    {"groom": str(groom), "plugin": plugin, "path": str(made)},
+                )
+                made.replace(path)
+        return FileResponse(path, media_type="application/octet-stream", filename=path.name)
+
+    def _made(self, name: str, kind: str) -> Response:
+        path = self._studio.project.result / name
+        if not path.is_file():
+            raise HTTPException(HTTPStatus.NOT_FOUND, _UNKNOWN)
+        return FileResponse(path, media_type=kind)
+
+    def _shot(self, request: Request) -> Shot:
+        try:
+            return self._studio.project.shot(request.path_params["id"])
+        except HairkitError as error:
+            raise HTTPException(HTTPStatus.NOT_FOUND, str(error)) from error
+
+
+def _clear(handler: Handler) -> Handler:
+    """Return a handler whose errors are one line of JSON."""
+
+    async def answer(request: Request) -> Response:
+        try:
+            return await handler(request)
+        except HTTPException as error:
+            return JSONResponse({"error": error.detail}, error.status_code, error.headers)
+        except HairkitError as error:
+            return JSONResponse(
+                {"error": " ".join(str(error).split())}, HTTPStatus.UNPROCESSABLE_ENTITY
+            )
+
+    return answer
+
+
+def _is_points(points: Any) -> bool:
+    return isinstance(points, list) and all(
+        isinstance(p, list) and len(p) == 2 and all(isinstance(c, int | float) for c in p)
+        for p in points
+    )

@@ -1,0 +1,255 @@
+"""The studio's state: the project, its processes, and what is computed meanwhile.
+
+Whatever changes in the project starts the hair again once the changes have paused; stages whose
+inputs did not change are read from the work folder. Nothing has to be asked for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from pathlib import Path
+from typing import Any
+
+from hairkit.errors import HairkitError
+from hairkit.studio.events import Events
+from hairkit.studio.project import Project, Shot
+from hairkit.studio.task_process import TaskError, TaskProcess
+
+QUIET_S = 1.2
+"""Seconds without a change before the hair is made again."""
+MEANWHILE = 6
+"""Photos from which the hair is made unasked: fewer are a turn that is still being taken."""
+PHOTO_S, BUILD_S, EXPORT_S = 120.0, 3600.0, 900.0
+"""Longest times for a photo or an outline, a groom, and a file."""
+STAGES = {
+    "landmarks": 6, "person": 3, "turn": 2, "segment": 10, "scene": 12, "refine": 8, "head": 3,
+    "orient": 12, "waves": 3, "hull": 6, "distance": 3, "parting": 1, "field": 14, "hairline": 2,
+    "track": 10, "sheet": 5,
+}  # fmt: skip
+"""Usual share of each stage in the time of a whole run, percent, from `run.json` of the sample."""
+
+
+class Studio:
+    """One project being worked on."""
+
+    def __init__(self, project: Project, guides: int) -> None:
+        self.project = project
+        self.guides = guides
+        self.events = Events()
+        self.editor, self.builder = TaskProcess(), TaskProcess()
+        self.change = asyncio.Lock()
+        self.facts: dict[int, dict[str, Any]] = {}
+        """What is known of each photo: size, feedback, outline."""
+        self.build: dict[str, Any] = {"state": "none"}
+        """`none`, `waiting`, `running`, `done` or `failed`, with progress or a reason."""
+        self.held = False
+        """True while somebody takes photos: nothing is built until that ends."""
+        self.formats: list[list[str]] = []
+        self._wanted = asyncio.Event()
+        self._asked = False
+        self._tasks: list[asyncio.Task[None]] = []
+        self._shares: dict[str, tuple[int, int]] = {}
+
+    async def start(self) -> None:
+        """Begin to work on what is in the project."""
+        self._tasks = [asyncio.create_task(self._look()), asyncio.create_task(self._build_always())]
+        if self.project.built == self.project.inputs() and self.project.shots:
+            self.build = {"state": "done", **self.project.made}
+        else:
+            self.changed()
+
+    async def close(self) -> None:
+        """End all processes; what is done is kept."""
+        for task in self._tasks:
+            task.cancel()
+        self.events.close()
+        await asyncio.gather(self.editor.close(), self.builder.close())
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def changed(self, ask: bool = False) -> None:
+        """Say that the project changed, or that somebody asks for the hair."""
+        if ask:
+            self.held = False
+            self._asked = True
+        self._wanted.set()
+        self.events.send("project", **self.summary())
+
+    def summary(self) -> dict[str, Any]:
+        """Return the state of the project for pages."""
+        project = self.project
+        photos = [
+            {
+                "id": shot.id,
+                "view": shot.view,
+                "file": shot.file,
+                "drawn": project.strokes(shot).is_file(),
+                "version": _version(project.photo(shot)),
+                **{k: v for k, v in self.facts.get(shot.id, {}).items() if k not in _LARGE},
+            }
+            for shot in project.shots
+        ]
+        return {
+            "name": project.folder.resolve().name,
+            "photos": photos,
+            "build": self.build,
+            "result": _version(project.groom),
+            "formats": self.formats,
+        }
+
+    async def add_photo(self, incoming: Path, view: str | None, number: int | None = None) -> Shot:
+        """Take an upload into the project, as a new photo or in the place of one."""
+        pictures = {size: str(incoming) + f".{size}" for size in ("small", "large")}
+        try:
+            done = await self.editor.call(
+                "accept", PHOTO_S, {"incoming": str(incoming), **pictures}
+            )
+            async with self.change:
+                if number is None:
+                    shot = self.project.add(incoming, done["suffix"], view)
+                else:
+                    shot = self.project.retake(number, incoming, done["suffix"])
+                for size, path in pictures.items():
+                    Path(path).replace(self.project.picture(shot, size))
+        finally:
+            for path in (str(incoming), *pictures.values()):
+                Path(path).unlink(missing_ok=True)
+        self.facts[shot.id] = done
+        self.changed()
+        return shot
+
+    async def outline(self, shot: Shot) -> dict[str, Any]:
+        """Return the outline of the hair in a photo, with what is drawn on it."""
+        project = self.project
+        strokes = project.strokes(shot)
+        mask = project.mask(shot)
+        key = [_version(project.photo(shot)), _version(strokes)]
+        facts = self.facts.setdefault(shot.id, {})
+        if facts.get("outline_of") != key:
+            try:
+                found = await self.editor.call(
+                    "outline",
+                    PHOTO_S,
+                    {
+                        "photo": str(project.photo(shot)),
+                        "strokes": str(strokes) if strokes.is_file() else None,
+                        "mask": None if mask is None else str(mask),
+                    },
+                )
+                facts.pop("problem", None)
+            except TaskError as error:
+                found = {"outline": [], "share": 0.0}
+                facts["problem"] = str(error)
+            facts.update(found, outline_of=key)
+        return facts
+
+    async def stop_build(self) -> None:
+        """End a build that is running, at the end of its step."""
+        await self.builder.stop()
+
+    async def _look(self) -> None:
+        """Find what is not known yet of the photos, one after the other."""
+        self.formats = (await self.editor.call("formats", PHOTO_S))["formats"]
+        while True:
+            for shot in self.project.shots:
+                facts = self.facts.setdefault(shot.id, {})
+                large = self.project.picture(shot, "large")
+                with contextlib.suppress(HairkitError, OSError):
+                    if not large.is_file():
+                        await self._draw_pictures(shot)
+                    if "outline_of" not in facts and not facts.get("busy"):
+                        await self.outline(shot)
+                        self.events.send("project", **self.summary())
+                        break
+            else:
+                await asyncio.sleep(QUIET_S / 3)
+
+    async def _draw_pictures(self, shot: Shot) -> None:
+        pictures = {size: str(self.project.picture(shot, size)) for size in ("small", "large")}
+        photo = str(self.project.photo(shot))
+        self.facts[shot.id] |= await self.editor.call(
+            "pictures", PHOTO_S, {"photo": photo, **pictures}
+        )
+
+    async def _build_always(self) -> None:
+        """Make the hair whenever the project has changed and the changes have paused."""
+        while True:
+            await self._wanted.wait()
+            self._wanted.clear()
+            if self.build["state"] == "running":
+                await self.stop_build()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._wanted.wait(), QUIET_S)
+                continue  # it changed again
+            fewest = 0 if self._asked else MEANWHILE
+            ready = self.project.enough and len(self.project.shots) >= fewest
+            if not ready or self.held or self.project.built == self.project.inputs():
+                if not ready:
+                    self._set_build(state="none")
+                continue
+            await self._while_unchanged(asyncio.create_task(self._build()))
+
+    async def _while_unchanged(self, build: asyncio.Task[None]) -> None:
+        """Wait for a build, or for a change that makes it useless."""
+        change = asyncio.create_task(self._wanted.wait())
+        try:
+            await asyncio.wait({build, change}, return_when=asyncio.FIRST_COMPLETED)
+            if not build.done():
+                await self.stop_build()
+            await build
+        finally:
+            change.cancel()
+            build.cancel()
+
+    async def _build(self) -> None:
+        project, inputs = self.project, self.project.inputs()
+        self._shares = {}
+        self._set_build(state="running", share=0.0, stage="starting")
+        project.result.mkdir(exist_ok=True)
+        try:
+            done = await self.builder.call(
+                "build",
+                BUILD_S,
+                {
+                    "folder": str(project.folder),
+                    "result": str(project.result),
+                    "packet": str(project.result / "studio-hair.bin"),
+                    "guides": self.guides,
+                },
+                self._hear,
+            )
+            project.set_built(inputs, done)
+            self._set_build(state="done", **done)
+            self.events.send("project", **self.summary())
+        except TaskError as error:
+            stopped = self._wanted.is_set()
+            self._set_build(state="waiting" if stopped else "failed", reason=str(error))
+
+    def _hear(self, event: dict[str, Any]) -> None:
+        """Pass the progress of a build on to the pages."""
+        stage, shares = event.get("stage", ""), self._shares
+        if event["event"] == "started":
+            shares[stage] = (0, event["steps"])
+        elif event["event"] == "stepped":
+            shares[stage] = (shares[stage][0] + 1, shares[stage][1])
+        elif event["event"] == "finished":
+            shares[stage] = (1, 1)
+        else:
+            self._set_build(**self.build | {"message": event["text"]})
+            return
+        done = sum(STAGES.get(name, 1) * a / b for name, (a, b) in shares.items() if b)
+        self._set_build(
+            **self.build | {"share": round(done / sum(STAGES.values()), 3), "stage": stage}
+        )
+
+    def _set_build(self, **values: Any) -> None:
+        self.build = values
+        self.events.send("build", **values)
+
+
+_LARGE = ("outline", "landmarks", "outline_of")
+
+
+def _version(path: Path) -> str:
+    """Return a text that changes when a file does, empty where there is none."""
+    return str(path.stat().st_mtime_ns) if path.is_file() else ""

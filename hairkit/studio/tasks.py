@@ -1,0 +1,286 @@
+"""What the studio's processes do: decode photos, find masks, build grooms, write files.
+
+Each task takes a request's values and returns what goes back as JSON. They run in a process of
+their own (`task_child`), so that a picture that crashes a decoder ends one task and not the server.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from hairkit.arrays import UInt8Array
+from hairkit.errors import HairkitError, InputError
+from hairkit.io.capture_reader import read_capture
+from hairkit.io.photos import MAX_BYTES, read_header, read_photo
+from hairkit.io.video import read_video
+from hairkit.manager import Manager
+from hairkit.pipeline.recipe import Recipe, load_recipe
+from hairkit.pipeline.reconstruct import add_findings, reconstruct
+from hairkit.pipeline.run_record import RECORD, read_record
+from hairkit.storage import read_bytes, write_bytes
+from hairkit.studio.clean_photo import clean_photo
+from hairkit.studio.feedback import judge_photo, judge_view
+from hairkit.types.capture import View
+from hairkit.types.face import Face
+from hairkit.types.groom import Groom
+from hairkit.types.mask import HAIR
+from hairkit.types.person import Person
+
+SMALL_EDGE, LARGE_EDGE = 360, 1440
+"""Long edges in pixels of the pictures that pages show."""
+OUTLINE_EDGE = 720
+"""Long edge in pixels of photos whose outlines are found while somebody draws."""
+OUTLINE_TOLERANCE = 0.6
+"""Pixels of that photo by which an outline may be simplified."""
+PICTURE_QUALITY, KEPT_QUALITY = 85, 97
+"""JPEG qualities of pictures for pages, and of photos that have to be encoded again."""
+VIDEO_EDGE = 1440
+"""Long edge in pixels of a video's frames."""
+
+Tell = Callable[[dict[str, Any]], None]
+
+
+class StoppedError(HairkitError):
+    """A build was cancelled."""
+
+
+def accept_photo(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Check an upload, clean it, and write it with the pictures for pages.
+
+    Takes `incoming`, the upload, and returns `suffix`, `feedback` and the size of the cleaned
+    photo, which takes the upload's place; `small` and `large` are files for the pages' pictures.
+    """
+    incoming = Path(request["incoming"])
+    header = read_header(incoming)
+    if header.kind == "HEIC":
+        image, header = read_photo(incoming)
+        encoded = _jpeg(image, KEPT_QUALITY)
+        data, suffix = clean_photo(encoded, header.exif), ".jpg"
+    else:
+        data = clean_photo(read_bytes(incoming, MAX_BYTES), header.exif)
+        suffix = ".png" if header.kind == "PNG" else ".jpg"
+    write_bytes(incoming, data)
+    image, header = read_photo(incoming, LARGE_EDGE)
+    _write_pictures(image, request)
+    codes = [code.value for code in judge_photo(image)]
+    return {"suffix": suffix, "feedback": codes, "width": header.width, "height": header.height}
+
+
+def look(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Return what is wrong with a small picture of the camera, `incoming`, for an `azimuth`."""
+    image, _ = read_photo(request["incoming"], SMALL_EDGE)
+    view = _find(View("camera", 0.0, image))
+    codes = [code.value for code in judge_view(view, request["azimuth"])]
+    return {"feedback": codes, "yaw": None if view.face is None else view.face.yaw_deg}
+
+
+def draw_pictures(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Write the pictures of a `photo` for pages, as `accept_photo` does."""
+    image, header = read_photo(request["photo"], LARGE_EDGE)
+    _write_pictures(image, request)
+    return {"width": header.width, "height": header.height}
+
+
+def pick_frames(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Write the best frames of a `video` as PNG files into a `folder`; returns their paths."""
+    capture = read_video(Path(request["video"]), VIDEO_EDGE)
+    paths = []
+    for index, view in enumerate(capture.views):
+        path = Path(request["folder"]) / f"{request['name']}-{index:02d}.png"
+        data = cv2.imencode(".png", view.image[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
+        write_bytes(path, data.tobytes())
+        paths.append(str(path))
+    return {"frames": paths}
+
+
+def find_outline(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Return the hair of a `photo` as closed curves in its pixels, by the recipe's `segment`.
+
+    `strokes` and `mask` are the files that belong to the photo, or None.
+    """
+    path = Path(request["photo"])
+    seen = _seen(path, path.stat().st_mtime_ns)
+    stage = _recipe().stage("segment")
+    assert stage is not None  # of the recipe `default`
+    files = {
+        key: None if request[key] is None else Path(request[key]) for key in ("strokes", "mask")
+    }
+    view = replace(seen, strokes_path=files["strokes"], mask_path=files["mask"])
+    choices = [(choice.plugin, choice.options) for choice in stage.choices]
+    plugin, mask = _manager().call_first("segment", choices, view=view)
+    scale = view.photo_size[0] / view.width
+    curves, _ = cv2.findContours(
+        (mask.labels == HAIR).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE
+    )
+    simple = [cv2.approxPolyDP(curve, OUTLINE_TOLERANCE, True)[:, 0] for curve in curves]
+    outline = [((c + 0.5) * scale).round(1).ravel().tolist() for c in simple if len(c) > 2]
+    face = None if view.face is None else view.face
+    return {
+        "outline": outline,
+        "plugin": plugin,
+        "width": view.photo_size[0],
+        "height": view.photo_size[1],
+        "share": float((mask.labels == HAIR).mean()),
+        "landmarks": None if face is None else (face.landmarks * scale).round(1).tolist(),
+        "face": None if face is None else [round(face.presence, 2), round(face.yaw_deg, 1)],
+    }
+
+
+def build_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Reconstruct the project in `folder` into its `result`, as `hairkit reconstruct` does."""
+    out = Path(request["result"])
+    capture = read_capture(request["folder"])
+    groom = reconstruct(
+        capture,
+        out,
+        _recipe(),
+        _manager(),
+        guides=request["guides"],
+        progress=_Told(tell, stopped),
+    )
+    _hair_packet(groom, request)
+    health = read_record(out / RECORD).health
+    return {
+        "strands": len(groom.strands),
+        "length_cm": round(100 * float(groom.strands.lengths().mean()), 1),
+        "health": [[figure.light, figure.line()] for figure in health],
+    }
+
+
+def export_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Write the `groom` by the `plugin` to `path`."""
+    groom = Groom.load(request["groom"])
+    options = _manager().options(request["plugin"], {})
+    _manager().call(
+        "export_groom", request["plugin"], options, groom=groom, path=Path(request["path"])
+    )
+    return {}
+
+
+def list_formats(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Return plugin and file suffix of every format that a groom can be written in."""
+    manager = _manager()
+    found = [(name, manager.info(name).suffixes) for name in manager.names("export_groom")]
+    return {"formats": [[name, suffixes[0]] for name, suffixes in found if suffixes]}
+
+
+def draw_guides(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Return the outline of the template head for each view of a turn of `count` photos."""
+    from hairkit.studio.capture_guides import guides_for  # loads OpenGL
+
+    return {"guides": guides_for(request["count"], request["above"])}
+
+
+def describe_pose(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Return the head as every camera of the `result` sees it, and how well they fit."""
+    from hairkit.studio.pose import describe
+
+    return describe(Path(request["result"]))
+
+
+TASKS: dict[str, Callable[[dict[str, Any], Tell, Callable[[], bool]], Any]] = {
+    "accept": accept_photo,
+    "look": look,
+    "pictures": draw_pictures,
+    "frames": pick_frames,
+    "outline": find_outline,
+    "build": build_groom,
+    "export": export_groom,
+    "formats": list_formats,
+    "guides": draw_guides,
+    "pose": describe_pose,
+}
+
+
+class _Told:
+    """Passes progress on, and ends a run that was cancelled at the end of its step."""
+
+    def __init__(self, tell: Tell, stopped: Callable[[], bool]) -> None:
+        self._tell = tell
+        self._stopped = stopped
+
+    def started(self, stage: str, steps: int) -> None:
+        self._say({"event": "started", "stage": stage, "steps": steps})
+
+    def stepped(self, stage: str) -> None:
+        self._say({"event": "stepped", "stage": stage})
+
+    def finished(self, stage: str, seconds: float, reused: bool) -> None:
+        self._say({"event": "finished", "stage": stage, "seconds": seconds, "reused": reused})
+
+    def message(self, text: str) -> None:
+        self._say({"event": "message", "text": text})
+
+    def _say(self, event: dict[str, Any]) -> None:
+        if self._stopped():
+            raise StoppedError("stopped; what is done is kept")
+        self._tell(event)
+
+
+@cache
+def _manager() -> Manager:
+    return Manager.loaded()
+
+
+@cache
+def _recipe() -> Recipe:
+    return load_recipe("default")
+
+
+_VIEWS: dict[Path, tuple[int, View]] = {}
+"""Photos with faces and persons found, by path, with the time of the file."""
+
+
+def _seen(path: Path, changed: int) -> View:
+    """Return a photo with what the recipe finds in it before masks are made."""
+    kept = _VIEWS.get(path)
+    if kept is not None and kept[0] == changed:
+        return kept[1]
+    image, header = read_photo(path, OUTLINE_EDGE)
+    view = View(path.stem, 0.0, image, photo_path=path, photo_size=(header.width, header.height))
+    view = _find(view)
+    _VIEWS[path] = (changed, view)
+    return view
+
+
+def _find(view: View) -> View:
+    """Return the view with face and person, where the recipe finds them."""
+    found: dict[str, Any] = {"landmarks": Face.absent(), "person": Person.absent()}
+    for table in found:
+        stage = _recipe().stage(table)
+        if stage is not None:
+            choices = [(choice.plugin, choice.options) for choice in stage.choices]
+            answer = _manager().find_first(stage.hook, choices, view=view)
+            found[table] = answer[1] if answer is not None else found[table]
+    return add_findings(view, found["landmarks"], found["person"])
+
+
+def _hair_packet(groom: Groom, request: dict[str, Any]) -> None:
+    from hairkit.studio.hair_packet import write_packet
+
+    write_packet(groom, Path(request["packet"]))
+
+
+def _write_pictures(image: UInt8Array, request: dict[str, Any]) -> None:
+    for name, edge in (("small", SMALL_EDGE), ("large", LARGE_EDGE)):
+        if name in request:
+            scale = min(1.0, edge / max(image.shape[:2]))
+            size = [max(1, round(side * scale)) for side in image.shape[1::-1]]
+            shown = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if scale < 1 else image
+            write_bytes(
+                request[name], _jpeg(np.asarray(shown, np.uint8), PICTURE_QUALITY), durable=False
+            )
+
+
+def _jpeg(image: UInt8Array, quality: int) -> bytes:
+    done, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    if not done:
+        raise InputError("the picture cannot be encoded")
+    return data.tobytes()

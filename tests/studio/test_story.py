@@ -1,0 +1,207 @@
+"""The story of a user in a real browser: photos, masks, a stroke, moving hair, files."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairkit.pipeline.reconstruct import reconstruct
+from hairkit.types.groom import Groom
+
+GUIDES = 80
+SLOW_S = 600
+"""Seconds for what computes, on a busy machine."""
+SIZES = ((390, 844), (1440, 900))
+PAGES = ("photos", "capture", "annotate", "pose", "hair")
+
+
+@pytest.fixture(scope="module")
+def project(
+    tmp_path_factory: pytest.TempPathFactory, start_studio: Callable[..., Any]
+) -> Iterator[Any]:
+    """One studio for the whole story."""
+    folder = tmp_path_factory.mktemp("story") / "head"
+    started = start_studio(folder, "--guides", str(GUIDES))
+    yield started
+    started.kill()
+
+
+@pytest.fixture(scope="module")
+def page(browser: Any, project: Any) -> Iterator[Any]:
+    """The page that the link opens; errors and requests to other origins are kept."""
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    opened = context.new_page()
+    opened.trouble, opened.foreign = [], []
+    opened.on("pageerror", lambda error: opened.trouble.append(str(error)))
+    opened.on("console", lambda m: m.type == "error" and opened.trouble.append(m.text))
+    opened.on(
+        "request",
+        lambda r: (
+            r.url.startswith((project.origin, "blob:", "data:")) or opened.foreign.append(r.url)
+        ),
+    )
+    opened.goto(project.link)
+    yield opened
+    context.close()
+
+
+def go(page: Any, project: Any, name: str) -> None:
+    """Go to a page of the studio."""
+    page.goto(f"{project.origin}/#{name}")
+    page.locator(f"nav a[aria-current][href='#{name.partition('/')[0]}']").wait_for()
+
+
+def wait_ready(page: Any, project: Any) -> None:
+    """Wait until the hair belongs to the project as it is."""
+    result = project.folder / "result" / "studio.json"
+    inputs = ""
+    for _ in range(SLOW_S):
+        time.sleep(1)
+        status = page.locator("#build-text")
+        assert "bad" not in (status.get_attribute("class") or ""), status.inner_text()
+        if result.is_file() and status.inner_text() == "Hair is ready":
+            now = json.loads(result.read_text())["inputs"]
+            if now == inputs:
+                return
+            inputs = now
+    raise AssertionError("no hair")
+
+
+def test_photos_become_hair_by_themselves(page: Any, project: Any, photos: list[Path]) -> None:
+    """Photos chosen in the page get masks and become hair without a further touch."""
+    page.set_input_files("#picker", [str(photo) for photo in photos])
+    hair = page.locator(".card path.hair")
+    hair.nth(len(photos) - 1).wait_for(state="attached", timeout=1000 * SLOW_S)
+    wait_ready(page, project)
+    assert not page.trouble
+
+
+def test_files_equal_those_of_the_command_line(
+    page: Any, project: Any, photos: list[Path], tmp_path: Path
+) -> None:
+    """The original photos give the same bytes by `reconstruct`, in every file of the recipe."""
+    originals = tmp_path / "photos"
+    originals.mkdir()
+    for photo in photos:
+        (originals / photo.name).write_bytes(photo.read_bytes())
+    reconstruct(originals, tmp_path / "out", guides=GUIDES, sheet=False)
+    for name in ("groom.npz", "groom.apx", "groom.abc", "groom.glb"):
+        there = project.folder / "result" / name
+        assert there.read_bytes() == (tmp_path / "out" / name).read_bytes(), name
+
+
+def test_a_stroke_moves_the_outline(page: Any, project: Any) -> None:
+    """A stroke that is drawn changes the mask, is kept as labelme's JSON, and can be undone."""
+    go(page, project, "annotate/1")
+    stage = page.locator(".stage")
+    page.get_by_text("Found automatically").wait_for(timeout=1000 * SLOW_S)
+    box = page.locator(".stage canvas").bounding_box()
+    middle, top = box["x"] + box["width"] / 2, box["y"] + 0.45 * box["height"]
+    page.keyboard.press("b")
+    page.mouse.move(middle - 20, top)
+    page.mouse.down()
+    page.mouse.move(middle + 20, top, steps=8)
+    page.mouse.up()
+    page.locator(".stage[data-outline-ms]").wait_for(timeout=1000 * SLOW_S)
+    assert int(stage.get_attribute("data-outline-ms")) > 0
+    kept = json.loads((project.folder / "strokes" / "001.json").read_text())
+    assert kept["flags"] == {"corrects": True}
+    assert kept["shapes"][0]["label"] == "background"
+    assert len(kept["shapes"][0]["points"]) > 4
+    page.keyboard.press("Control+z")
+    page.get_by_text("Found automatically").wait_for(timeout=1000 * SLOW_S)
+    assert not (project.folder / "strokes" / "001.json").exists()
+
+
+def test_the_hair_moves(page: Any, project: Any) -> None:
+    """The hair is drawn, hangs still without wind, moves in wind, and keeps its lengths."""
+    wait_ready(page, project)
+    go(page, project, "hair")
+    page.locator("#hair[data-frames]").wait_for(timeout=1000 * SLOW_S)
+    measure = """() => {
+      const m = document.querySelector('#hair').hairMotion;
+      const step = (n) => { for (let i = 0; i < n; i += 1) m.step(); };
+      const away = () => Math.max(...m.now.map((v, i) => Math.abs(v - m.rest[i])));
+      const stretch = () => {
+        let most = 0;
+        for (let g = 0; g < m.count; g += 1) for (let p = 1; p < m.points; p += 1) {
+          const i = (g * m.points + p) * 3;
+          const [x, y, z] = [0, 1, 2].map((k) => m.now[i + k] - m.now[i + k - 3]);
+          const d = Math.hypot(x, y, z);
+          most = Math.max(most, Math.abs(d / m.lengths[g * m.points + p] - 1));
+        }
+        return most;
+      };
+      step(60); const still = away();
+      m.wind = [3, 0, 0]; step(90); const blown = away(), long = stretch();
+      m.wind = [0, 0, 0]; step(600); return [still, blown, long, away()];
+    }"""
+    still, blown, stretched, settled = page.evaluate(measure)
+    assert still < 1e-3
+    assert blown > 5e-3
+    assert stretched < 0.25
+    assert settled < 2e-3
+    assert not page.trouble
+
+
+def test_files_are_downloaded(page: Any, project: Any, browser: Any, tmp_path: Path) -> None:
+    """Any format comes from the page; `result.html` moves without a server."""
+    go(page, project, "hair")
+    for name in ("groom.apx", "groom.npz", "groom.ply", "result.html"):
+        with page.expect_download(timeout=1000 * SLOW_S) as caught:
+            page.locator(f"a[download='{name}']").click()
+        caught.value.save_as(tmp_path / name)
+    assert len(Groom.load(tmp_path / "groom.npz").strands) > 0
+    assert (tmp_path / "groom.apx").read_bytes() == (
+        project.folder / "result" / "groom.apx"
+    ).read_bytes()
+    go(page, project, "photos")
+    alone = browser.new_page()
+    alone.goto((tmp_path / "result.html").as_uri(), timeout=1000 * SLOW_S)
+    alone.locator("#hair[data-frames]").wait_for(timeout=1000 * SLOW_S)
+    picture = np.frombuffer(alone.locator("#hair").screenshot(), np.uint8)
+    assert len(picture) > 20_000  # a drawn head, not an even ground, which packs to less
+    alone.close()
+
+
+def test_a_shot_of_the_camera_becomes_a_photo(page: Any, project: Any) -> None:
+    """The shutter takes the picture inside the outline; it is the retake of its view."""
+    before = (project.folder / "photos" / "001.jpg").read_bytes()
+    go(page, project, "capture")
+    page.locator(".ring path.taken").first.wait_for(timeout=1000 * SLOW_S)
+    count = len(list((project.folder / "photos").iterdir()))
+    with page.expect_response(lambda r: "/api/photos" in r.url and r.request.method != "GET"):
+        page.keyboard.press("Space")
+    page.get_by_text("Taken", exact=False).first.wait_for()
+    after = list((project.folder / "photos").iterdir())
+    retaken = (project.folder / "photos" / "001.jpg").read_bytes() != before
+    assert retaken or len(after) == count + 1
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_are_accessible(page: Any, project: Any, name: str, size: tuple[int, int]) -> None:
+    """axe-core finds nothing serious, nothing is wider than the screen, keys reach the page."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    go(page, project, name)
+    time.sleep(1)
+    found = axe.Axe().run(page).response["violations"]
+    serious = [(v["id"], [n["target"] for n in v["nodes"]]) for v in found
+               if v["impact"] in ("serious", "critical")]  # fmt: skip
+    assert not serious
+    wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+    assert wide[0] <= wide[1]
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement !== document.body")
+
+
+def test_nothing_comes_from_elsewhere(page: Any) -> None:
+    """In the whole story no request went to another origin."""
+    assert page.foreign == []
