@@ -7,6 +7,7 @@ const tools = {
   hairArea: { name: "Hair area", key: "g", label: "foreground", type: "polygon", colour: "#ff5fa8" },
   restArea: { name: "Other area", key: "n", label: "background", type: "polygon", colour: "#64b5ff" },
   rectangle: { name: "Rectangle", key: "r", label: "rectangle", type: "rectangle", colour: "#f0b45f" },
+  parting: { name: "Parting", key: "p", label: "parting", type: "linestrip", colour: "#f0b45f" },
   erase: { name: "Remove stroke", key: "e", colour: "#eceef0" },
 };
 const NEAR_PX = 14; // a stroke is removed within this distance
@@ -110,7 +111,7 @@ export function show(main, argument) {
   }
 
   function drawShape(context, shape, scale, height) {
-    const colour = shape.label === "foreground" ? "#ff9fcb" : shape.label === "rectangle" ? "#f0b45f" : "#9fd1ff";
+    const colour = shape.label === "foreground" ? "#ff9fcb" : ["rectangle", "parting"].includes(shape.label) ? "#f0b45f" : "#9fd1ff";
     const [first, ...rest] = shape.points;
     context.strokeStyle = colour;
     context.lineJoin = context.lineCap = "round";
