@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from hairkit.types.point_cache import PointCache
     from hairkit.types.scene import Scene
     from hairkit.types.strands import Strands
+    from hairkit.types.tie import Tail, Tie, TiedHair
     from hairkit.types.turnaround import Turnaround
     from hairkit.types.volume import Hull, OrientationField, ScalpDistance, VoxelGrid
     from hairkit.types.waves import Waves
@@ -103,6 +104,9 @@ __all__ = [
     "ScalpDistance",
     "Scene",
     "Strands",
+    "Tail",
+    "Tie",
+    "TiedHair",
     "Turnaround",
     "View",
     "VoxelGrid",
@@ -153,6 +157,7 @@ _HOMES = {
     "types.point_cache": ("PointCache",),
     "types.scene": ("Scene",),
     "types.strands": ("Strands",),
+    "types.tie": ("Tail", "Tie", "TiedHair"),
     "types.turnaround": ("Turnaround",),
     "types.volume": ("Hull", "OrientationField", "ScalpDistance", "VoxelGrid"),
     "types.waves": ("Waves",),

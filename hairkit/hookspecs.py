@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from hairkit.types.person import Person
     from hairkit.types.scene import Scene
     from hairkit.types.strands import Strands
+    from hairkit.types.tie import TiedHair
     from hairkit.types.turnaround import Turnaround
     from hairkit.types.volume import Hull, OrientationField, ScalpDistance
     from hairkit.types.waves import Waves
@@ -34,7 +35,7 @@ PROJECT = "hairkit"
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
 
-HOOKSPEC_VERSION = (1, 1)
+HOOKSPEC_VERSION = (1, 2)
 """Version of this contract. The second number grows when hooks or arguments are added, the first
 when one is removed or changes; a plugin may check it when it is imported."""
 
@@ -99,6 +100,7 @@ def solve_field(
     waves: Waves,
     scalp_distance: ScalpDistance,
     parting: Parting,
+    tied: TiedHair,
     options: Any,
 ) -> OrientationField | None:
     """Fuse the 2D orientations of all views into 3D and fill the rest of the hull."""
@@ -115,6 +117,7 @@ def track(
     waves: Waves,
     scalp_distance: ScalpDistance,
     parting: Parting,
+    tied: TiedHair,
     options: Any,
 ) -> Strands | None:
     """Grow one strand from every root; strand s belongs to root s."""

@@ -25,6 +25,7 @@ from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
+from hairkit.types.tie import TiedHair
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_products
 from hairkit.types.waves import Waves
 
@@ -83,9 +84,11 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
         "waves": Waves(),
         "scalp_distance": measure_scalp_distance(scene.head, hull),
         "parting": Parting(),
+        "tied": TiedHair(),
         "roots": scalp_roots(scene.head),
     }
-    seen, derived = ("scene", "masks", "orientations"), ("waves", "scalp_distance", "parting")
+    seen = ("scene", "masks", "orientations")
+    derived = ("waves", "scalp_distance", "parting", "tied")
     wanted = {
         "detect_landmarks": ("view",),
         "segment_person": ("view",),

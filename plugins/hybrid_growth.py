@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from hairkit import Hull, OrientationField, Roots, ScalpDistance, Strands, Waves, hookimpl
+from hairkit import Hull, OrientationField, Roots, ScalpDistance, Strands, TiedHair, Waves, hookimpl
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.field.sampling_kernels import gradient_at, make_unit, sample_at
 from hairkit.grooming.postprocess import FinishOptions, finish
@@ -72,6 +72,7 @@ def track(
     roots: Roots,
     waves: Waves,
     scalp_distance: ScalpDistance,
+    tied: TiedHair,
     options: Options,
 ) -> Strands:
     """Grow one strand from every root."""
@@ -79,7 +80,7 @@ def track(
     strands = grow(
         field, _sign_directions(field), _distance(field, hull), roots.positions, way, options
     )
-    return finish(replace(strands, root_uv=roots.uv), waves, hull, options)
+    return finish(replace(strands, root_uv=roots.uv), waves, tied, hull, field, options)
 
 
 def grow(

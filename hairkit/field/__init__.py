@@ -9,5 +9,6 @@ What field and tracking plugins share: fusing views, priors, diffusion, and samp
 * `parting`: how hair on the crown is combed from its parting
 * `sampling_kernels`: compiled look-ups in volumes
 * `symmetric_eigen`: eigenvectors of symmetric 3x3 tensors, in closed form
+* `ties`: where hair is tied, and the tube of the tail
 * `view_fusion`: 2D orientations of all views fused into 3D tensors
 """

@@ -10,5 +10,6 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `head_collision`: strand points pushed out of the head
 * `postprocess`: smoothing, waves and head collision after tracking
 * `prepare_export`: choice of strands and defaults for exporters
+* `tie_strands`: strands led to their tie and down the tail
 * `wind_waves`: measured waves put onto strands
 """

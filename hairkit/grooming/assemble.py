@@ -17,6 +17,7 @@ from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head, Roots
 from hairkit.types.mask import Mask
 from hairkit.types.strands import Strands
+from hairkit.types.tie import TiedHair
 from hairkit.types.waves import Waves
 
 SHORTEST = 1e-3
@@ -37,6 +38,7 @@ def assemble_groom(
     roots: Roots,
     strands: Strands,
     waves: Waves | None = None,
+    tied: TiedHair | None = None,
 ) -> Groom:
     """Return the groom of tracked strands, bound to the head, with the colour of the photos.
 
@@ -52,6 +54,8 @@ def assemble_groom(
         What tracking gave; strands shorter than `SHORTEST` are dropped.
     waves
         What the photos show of the hair's waves; None means straight hair.
+    tied
+        Where the strands are tied; None means loose hair.
 
     Raises
     ------
@@ -84,7 +88,12 @@ def assemble_groom(
         np.ones(kept, np.bool_),
     )
     return Groom(
-        packed, head, roots.triangle[long_enough], roots.barycentric[long_enough], material
+        packed,
+        head,
+        roots.triangle[long_enough],
+        roots.barycentric[long_enough],
+        material,
+        ties=() if tied is None else tuple(tail.tie for tail in tied.tails),
     )
 
 

@@ -1,15 +1,17 @@
-"""Last steps of every tracker: smooth the strands, wind them into waves, push them outside."""
+"""Last steps of every tracker: lead the strands to their tie, smooth, wave, push them outside."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from hairkit.grooming.head_collision import push_out_of_head
+from hairkit.grooming.tie_strands import lead_to_ties
 from hairkit.grooming.wind_waves import add_waves
 from hairkit.helices import smooth_strands
 from hairkit.options import option
 from hairkit.types.strands import Strands
-from hairkit.types.volume import Hull
+from hairkit.types.tie import TiedHair
+from hairkit.types.volume import Hull, OrientationField
 from hairkit.types.waves import Waves
 
 
@@ -29,11 +31,19 @@ class FinishOptions:
     points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
 
 
-def finish(strands: Strands, waves: Waves, hull: Hull, options: FinishOptions) -> Strands:
-    """Smooth strands by helices, wind them into waves and push them out of the head.
+def finish(
+    strands: Strands,
+    waves: Waves,
+    tied: TiedHair,
+    hull: Hull,
+    field: OrientationField,
+    options: FinishOptions,
+) -> Strands:
+    """Lead strands to their ties, smooth them by helices, wave them, push them out of the head.
 
-    The first two only where the options ask for it; `options.points` is used by the tracker.
+    Smoothing and waves only where the options ask for it; `options.points` is used by the tracker.
     """
+    strands = lead_to_ties(strands, tied, hull, field)
     if options.helix_tolerance > 0:
         strands = smooth_strands(strands, options.helix_tolerance)
     if options.waves:

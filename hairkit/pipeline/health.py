@@ -18,10 +18,11 @@ from hairkit.cameras.depth_raster import HEAD_TOLERANCE, SPLAT_CELLS, head_depth
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.groom import Groom
-from hairkit.types.head import JAW_LANDMARKS
+from hairkit.types.head import JAW_LANDMARKS, Head
 from hairkit.types.mask import HAIR, PERSON, Mask
 from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
+from hairkit.types.tie import Tie, TiedHair
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull
 
@@ -106,6 +107,10 @@ to 0.25 on most that were shuffled."""
 PARTING_MM = Limits(25.0, 50.0)
 """Width of the middle half of the skin that shows on the crown: 6 to 25 mm around partings, 90 mm
 where a bare hairline is all that shows; evenly spread skin is 66 mm wide."""
+TIE = Limits(0.4, 0.0)
+"""The weakest sign of a tie, see `hairkit.field.ties`: 0.6 at a ponytail."""
+ON_TOP = 0.02
+"""Ties less than this far below the top of the head, metres, are on top."""
 CURL_MM = Limits(15.0, 30.0)
 """Radius of the curls: 7 mm on the tightest of the captures; locks of wider curls are bends."""
 
@@ -120,6 +125,7 @@ def assess(
     hair_length: float,
     turn: Turnaround | None = None,
     parting: Parting | None = None,
+    tied: TiedHair | None = None,
 ) -> tuple[Figure, ...]:
     """Return the figures of a run, in the order of its stages.
 
@@ -135,6 +141,8 @@ def assess(
         How the photos were arranged; None when their names were believed.
     parting
         How the crown is combed; None when nothing was measured.
+    tied
+        The ties that were found; None of loose hair.
     """
     return (
         *assess_turn(turn),
@@ -143,6 +151,7 @@ def assess(
         *assess_masks(masks, scene),
         *assess_hull(hull, masks, scene),
         *assess_parting(parting),
+        *assess_ties(tied, scene.head),
         *assess_strands(groom, roots, hair_length),
     )
 
@@ -284,6 +293,32 @@ def assess_parting(parting: Parting | None) -> tuple[Figure, ...]:
     width = 1000 * parting.spread
     note = "add a photo from above, draw a stroke `parting` or give --parting"
     return (Figure("parting", "width of the skin", width, "mm", PARTING_MM.light(width), note, 0),)
+
+
+def assess_ties(tied: TiedHair | None, head: Head) -> tuple[Figure, ...]:
+    """Return where each tie is and how sure it is; nothing of loose hair."""
+    note = "hull and directions show a tie weakly; look for it on the contact sheet"
+    return tuple(
+        Figure(
+            "ties", f"{describe_tie(tail.tie, head)}, sureness", tail.sureness, "",
+            TIE.light(tail.sureness), note,
+        )
+        for tail in (() if tied is None else tied.tails)
+    )  # fmt: skip
+
+
+def describe_tie(tie: Tie, head: Head) -> str:
+    """Return the kind of a tie and its place: `tail at the back, 9 cm above the nape`."""
+    x, y, z = tie.centre.tolist()
+    behind = head.vertices[(head.scalp > 0.5) & (head.vertices[:, 2] < 0)]
+    above = 100 * (y - float(behind[:, 1].min()))
+    top = float(head.vertices[:, 1].max())
+    if abs(x) > max(-z, 0.0):
+        side = "left" if x > 0 else "right"
+    else:
+        side = "top" if y > top - ON_TOP else "back"
+    where = "on" if side == "top" else "at"
+    return f"{tie.kind} {where} the {side}, {above:.0f} cm above the nape"
 
 
 def assess_strands(groom: Groom, roots: int, hair_length: float) -> tuple[Figure, ...]:

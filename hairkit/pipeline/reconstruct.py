@@ -13,6 +13,7 @@ from pathlib import Path
 from hairkit.errors import InputError, RenderError
 from hairkit.field.find_parting import measure_parting
 from hairkit.field.growth_prior import measure_scalp_distance
+from hairkit.field.ties import measure_ties
 from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.hairline import Hairline, measure_hairline
 from hairkit.head_model.scalp import sample_roots
@@ -40,6 +41,7 @@ from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
+from hairkit.types.tie import TiedHair
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull, OrientationField, ScalpDistance
 from hairkit.types.waves import Waves
@@ -279,10 +281,21 @@ def _grow(
         cameras=cameras,
         head=shape,
     )
+    tied = run.derive(
+        "ties",
+        TiedHair,
+        measure_ties,
+        masks=masks,
+        orientations=orientations,
+        cameras=cameras,
+        head=shape,
+        hull=hull,
+        scalp_distance=distance,
+    )
     seen: dict[str, Argument] = {
         "scene": scene, "masks": masks, "orientations": orientations,
         "hull": hull, "waves": waves, "scalp_distance": distance,
-        "parting": parting,
+        "parting": parting, "tied": tied,
     }  # fmt: skip
     field = run.once("field", OrientationField, **seen)
     hairline = run.derive("hairline", Hairline, measure_hairline, scene=scene, masks=masks)
@@ -291,10 +304,12 @@ def _grow(
     strands = run.once("track", Strands, **seen, field=field, roots=roots)
     labels = tuple(mask.result().value for mask in masks)
     angles = tuple(orientation.result().value for orientation in orientations)
-    groom = assemble_groom(capture.views, labels, grown, roots.value, strands.value, waves.value)
+    groom = assemble_groom(
+        capture.views, labels, grown, roots.value, strands.value, waves.value, tied.value
+    )
     health = assess(
         capture, labels, scene.value, hull.value, groom, guides, distance.value.hair_length, turn,
-        parting.value,
+        parting.value, tied.value,
     )  # fmt: skip
     return _Made(labels, angles, hull.value, scene.value, parting.value, groom, health)
 

@@ -16,11 +16,12 @@ from hairkit.arrays import Float32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.head_model.scalp import sample_roots
 from hairkit.synth.bust import Bust, Obstacle
+from hairkit.synth.tied import choose_fringe, grow_tied
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import Strands
 
-StyleName = Literal["straight", "wavy", "curly", "short", "parted"]
+StyleName = Literal["straight", "wavy", "curly", "short", "parted", "tied"]
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,8 @@ class Style:
     """Linear RGB."""
     length_spread: float = 0.08
     """Standard deviation of strand lengths, share of the length."""
+    tail: float = 0.0
+    """Mean length of the tail behind the tie; 0 for loose hair."""
 
 
 STYLES: dict[StyleName, Style] = {
@@ -79,6 +82,11 @@ STYLES: dict[StyleName, Style] = {
         length=0.20, points=56, parting=0.03, lift=0.35, bend=0.03, layer=0.013, cut=-0.135,
         wave_radius=0.0, wave_pitch=0.0, coil=0.0, clumps=420, clumping=0.35, frizz=0.001,
         colour=(0.300, 0.190, 0.095),
+    ),
+    "tied": Style(
+        length=0.32, points=72, parting=None, lift=0.3, bend=0.03, layer=0.008, cut=None,
+        wave_radius=0.0, wave_pitch=0.0, coil=0.0, clumps=600, clumping=0.1, frizz=0.0008,
+        colour=(0.110, 0.060, 0.030), tail=0.20,
     ),
 }  # fmt: skip
 
@@ -116,6 +124,8 @@ FLYAWAYS, FLYAWAY_FRIZZ = 0.02, 5.0
 """Share of strands that fly away, and how many times the frizz of others they have."""
 FRIZZ_TURNS = (1.5, 4.0, 9.0)
 """Waves over a strand whose sum is its frizz."""
+FRINGE_LENGTH = 0.10
+"""Length of the loose strands over the forehead of tied hair, metres."""
 TIP_LIGHTNESS = 1.25
 """Reflectance at the tips over that at the roots."""
 
@@ -141,6 +151,8 @@ def grow(style: StyleName, head: Head, strands: int = 10_000, seed: int = 0) -> 
     obstacle = Obstacle.of(head, Bust.under(head))
     start = _start_directions(look, head, roots, generator)
     paths = _grow_paths(look, roots, start, obstacle, generator)
+    if look.tail:
+        paths = _tie(look, paths, head, roots, obstacle, generator)
     paths = _cut(look, paths, generator)
     clump = _clumps(look, roots, start, generator)
     paths = _gather_clumps(look, paths, clump, generator)
@@ -154,6 +166,24 @@ def grow(style: StyleName, head: Head, strands: int = 10_000, seed: int = 0) -> 
         roots.barycentric,
         _material(look),
     )
+
+
+def _tie(
+    look: Style,
+    loose: Float32Array,
+    head: Head,
+    roots: Roots,
+    obstacle: Obstacle,
+    generator: np.random.Generator,
+) -> Float32Array:
+    """Return strands (N, m, 3) of which all but the fringe run through a tie."""
+    fringe = choose_fringe(roots, generator)
+    paths = grow_tied(look.tail, look.points, head, roots, obstacle, generator)
+    some = np.arange(look.points)[None, :, None] * FRINGE_LENGTH / look.length
+    low = np.minimum(some.astype(np.int64), look.points - 2)
+    short = np.take_along_axis(loose, low, axis=1) * (1 - (some - low))
+    short += np.take_along_axis(loose, low + 1, axis=1) * (some - low)
+    return np.where(fringe[:, None, None], short, paths).astype(np.float32)
 
 
 def _start_directions(

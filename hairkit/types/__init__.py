@@ -16,6 +16,7 @@ the packages named after the subject.
 * `preview`: the pictures of these types that a notebook shows
 * `scene`: cameras and fitted head
 * `strands`: packed polylines
+* `tie`: ties, and the tails that hang from them
 * `turnaround`: from where each photo was taken
 * `volume`: grid, hull, orientation field, distance from the scalp
 * `waves`: radius, pitch and slant of wavy hair

@@ -14,9 +14,12 @@ from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
 from hairkit.types.head import Head
 from hairkit.types.preview import Previewed, draw_turn
 from hairkit.types.strands import Strands
+from hairkit.types.tie import Tie
 
 _VERSION, _NEWEST = "hairkit_groom", 1
 _STRANDS = "strands."
+_TIES = "ties.count"
+"""Missing in files of hairkit 0.2, whose hair is loose."""
 _AT_TOP = ("points", "offsets", "widths", "root_uv", "group", "guide")
 
 
@@ -87,6 +90,8 @@ class Groom(Previewed, Stored):
     """(S, 3) weights of that face's corners."""
     material: HairMaterial = field(default_factory=HairMaterial)
     physics: HairPhysics = field(default_factory=HairPhysics)
+    ties: tuple[Tie, ...] = ()
+    """Rings that hold strands; the strands of tie k have the group k + 1."""
 
     def __post_init__(self) -> None:
         count = len(self.strands)
@@ -131,6 +136,7 @@ class Groom(Previewed, Stored):
             raise FormatError(f"{path}: not a groom of hairkit; expected what `reconstruct` wrote")
         if version.shape != () or version != _NEWEST:
             raise FormatError(f"{path}: a groom of version {version}, this hairkit reads {_NEWEST}")
+        arrays.setdefault(_TIES, np.zeros((), np.int64))
         named = {_STRANDS + name if name in _AT_TOP else name: arrays[name] for name in arrays}
         groom = from_arrays(cls, named, str(path))
         groom.check_reach(path)
@@ -144,5 +150,7 @@ class Groom(Previewed, Stored):
             check_reach(strands.widths, source, "widths")
         check_reach(self.head.vertices, source, "the head's vertices")
         check_reach(self.head.joints, source, "the head's joints")
+        for tie in self.ties:
+            check_reach(tie.centre, source, "the centre of a tie")
         for lengths in (capsules.first, capsules.second, capsules.radius):
             check_reach(lengths, source, "the head's capsules")

@@ -25,6 +25,7 @@ from hairkit import (
     ScalpDistance,
     Scene,
     Strands,
+    TiedHair,
     Waves,
     hookimpl,
 )
@@ -101,6 +102,7 @@ def track(
     waves: Waves,
     scalp_distance: ScalpDistance,
     parting: Parting,
+    tied: TiedHair,
     options: Options,
 ) -> Strands:
     """Grow one strand from every root, trim, smooth and wave it, and keep it out of the head."""
@@ -113,7 +115,7 @@ def track(
     even = strands.points.reshape(len(roots), options.points, 3)
     smooth = smooth_strands(even, options.smoothing)
     result = Strands(smooth.reshape(-1, 3), strands.offsets, root_uv=roots.uv)
-    return finish(result, waves, hull, options)
+    return finish(result, waves, tied, hull, field, options)
 
 
 def _start_directions(

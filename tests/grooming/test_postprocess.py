@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from hairkit.grooming.postprocess import FinishOptions, finish
-from hairkit.testing import ball_head, scalp_roots, shell_hull
+from hairkit.testing import ball_head, combed_field, scalp_roots, shell_hull
 from hairkit.types.strands import Strands
+from hairkit.types.tie import TiedHair
 from hairkit.types.waves import Waves
 
 PLAIN = FinishOptions(waves=False, clearance=0.0)
+FIELD = combed_field(shell_hull().grid)
 
 
 def bristles() -> Strands:
@@ -27,7 +29,7 @@ def bristles() -> Strands:
 def test_strands_that_need_nothing_stay_as_they_are() -> None:
     """Outside of the head, without waves and smoothing: the same points and coordinates."""
     strands = bristles()
-    result = finish(strands, Waves(), shell_hull(), PLAIN)
+    result = finish(strands, Waves(), TiedHair(), shell_hull(), FIELD, PLAIN)
     np.testing.assert_allclose(result.points, strands.points, atol=1e-7)
     np.testing.assert_array_equal(result.root_uv, strands.root_uv)
 
@@ -36,7 +38,7 @@ def test_wound_strands_keep_the_clearance_too() -> None:
     """Waves are wound before strands are pushed out of the head, so none dips into it."""
     strands, hull = bristles(), shell_hull()
     options = replace(PLAIN, waves=True, clearance=0.003)
-    result = finish(strands, Waves(0.01, 0.03, 0.3), hull, options)
+    result = finish(strands, Waves(0.01, 0.03, 0.3), TiedHair(), hull, FIELD, options)
     assert result.lengths().mean() > 1.2 * strands.lengths().mean()
     free = np.ones(len(result.points), bool)
     free[result.offsets[:-1]] = False

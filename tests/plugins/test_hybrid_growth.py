@@ -18,11 +18,13 @@ from hairkit.testing import (
 )
 from hairkit.types.head import Roots
 from hairkit.types.strands import Strands
+from hairkit.types.tie import TiedHair
 from hairkit.types.volume import OrientationField, VoxelGrid
 from hairkit.types.waves import Waves
 
 FREE = Options(slide_sine=0.0, waves=False, clearance=0.0)
 DISTANCE = measure_scalp_distance(ball_head(), shell_hull())
+LOOSE = TiedHair()
 GRID = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.01)
 
 
@@ -89,7 +91,7 @@ def test_a_root_where_nothing_is_known_keeps_its_place() -> None:
 
 def follow_ball(options: Options, roots: Roots) -> Strands:
     hull = shell_hull()
-    return track(hull, combed_field(hull.grid), roots, Waves(), DISTANCE, options)
+    return track(hull, combed_field(hull.grid), roots, Waves(), DISTANCE, LOOSE, options)
 
 
 def test_a_field_without_signs_is_followed_along_its_growth() -> None:
@@ -184,7 +186,7 @@ def test_strands_can_be_smoothed_by_helix_arcs() -> None:
     hull = shell_hull()
     options = replace(FREE, inertia=0.0, reach=2.0)
     rough, calm = (
-        track(hull, noisy, roots, Waves(), DISTANCE, replace(options, helix_tolerance=t))
+        track(hull, noisy, roots, Waves(), DISTANCE, LOOSE, replace(options, helix_tolerance=t))
         for t in (0.0, 0.0005)
     )
 
@@ -210,7 +212,15 @@ def test_a_strand_does_not_depend_on_how_many_others_are_grown() -> None:
         roots.barycentric[some],
     )
     among, alone = (
-        track(hull, combed_field(hull.grid), r, Waves(0.006, 0.04, 0.0), DISTANCE, Options())
+        track(
+            hull,
+            combed_field(hull.grid),
+            r,
+            Waves(0.006, 0.04, 0.0),
+            DISTANCE,
+            TiedHair(),
+            Options(),
+        )
         for r in (roots, few)
     )
     np.testing.assert_array_equal(among.select(some).points, alone.points)

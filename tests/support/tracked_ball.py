@@ -13,6 +13,7 @@ from hairkit.testing import scalp_roots, turn_scene
 from hairkit.types.head import Roots
 from hairkit.types.parting import Parting
 from hairkit.types.strands import Strands
+from hairkit.types.tie import TiedHair
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_products
 from hairkit.types.waves import Waves
 
@@ -75,7 +76,9 @@ def run(
     """Track; straight hair unless waves are given."""
     scene = turn_scene()
     distance = measure_scalp_distance(scene.head, hull)
-    return track(scene, hull, field, roots, waves or Waves(), distance, Parting(), options)
+    return track(
+        scene, hull, field, roots, waves or Waves(), distance, Parting(), TiedHair(), options
+    )
 
 
 def polylines(strands: Strands) -> Float64Array:

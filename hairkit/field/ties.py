@@ -1,0 +1,326 @@
+"""Ties, found where the hull narrows behind the scalp and where the hair of all views converges.
+
+Two signs, measured apart. The hull: hair that is farther than `OFF_SCALP` from the scalp, along
+ways through the hair, hangs together with the rest through a neck of a few square centimetres;
+loose hair joins the head along its whole hairline. The photos: on the scalp the 2D orientations
+of all views point at one place. Loose hair does that too, at its whorl on the crown, so both
+places must agree. The bundle behind the neck becomes a tube of elliptic sections.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.types.camera import Camera
+from hairkit.types.head import Head
+from hairkit.types.mask import Mask
+from hairkit.types.orientation import OrientationMap
+from hairkit.types.tie import Tail, Tie, TiedHair
+from hairkit.types.volume import Hull, ScalpDistance
+
+OFF_SCALP = 0.025
+"""Distance in metres from the scalp behind which a neck is looked for; at 0.02 the ghosts of a
+hull from unsure masks are twice as wide, at 0.04 buns are lost."""
+LEAST_VOLUME = 4e-5
+"""Cubic metres of a bundle: a ponytail has 3e-4, stray wisps of loose hair up to 3e-5."""
+WIDEST_NECK = 6e-3
+"""Square metres of the neck from which nothing is tied: 2.3e-3 at a ponytail, 2.4e-2 and more at
+loose hair."""
+LEAST_CONVERGENCE, FULL_CONVERGENCE = 0.5, 0.9
+"""Mean cosine of twice the angle between the hair and the way to the tie, from which it is tied
+at all and for sure: 0.94 at a ponytail, 0 in the mean of all places."""
+FARTHEST_APART = 0.05
+"""Metres between the neck of the hull and the place where directions converge, at most."""
+LEAST_FACING = 0.35
+"""Cosine between a normal and the ray to the camera below which a view does not see the place."""
+HAIR_HEIGHT = 0.008
+"""Metres above the scalp at which a view sees the hair."""
+NEAR_TIE = 0.03
+"""Metres around a tie in which directions do not count: the bundle hides the hair there."""
+CANDIDATES = 400
+"""Places on the scalp at which convergence is measured, 8 mm apart."""
+PROBE = 0.002
+"""Metres of the step whose picture gives a direction's angle in a view."""
+
+
+TIE_SEARCH = 0.045
+"""Metres about the neck in which cells nearer to the scalp belong to the bundle, not to the ghosts
+beside it."""
+STEP = 0.005
+"""Metres between the sections of a bundle."""
+DEEPEST = 4
+"""Power of a cell's depth in the bundle by which it pulls the centre of its section: ghosts of the
+hull are thin."""
+FLATTEST = 1.5
+"""Ratio of the axes of a section, at most: views that see a bundle from one side leave corners."""
+REACH_OF_SECTION = 1.6
+"""Cells within this many inscribed radii of the centre belong to a section."""
+SMOOTH_SECTIONS = 2.0
+"""Standard deviation of the smoothing along a bundle, in sections."""
+RIM = 0.0025
+"""Metres by which the hull's bundle is thicker than the hair: half a cell and the masks' slack."""
+THINNEST = 0.003
+"""Least radius of a bundle, metres."""
+BUN = 2.5
+"""Length of a bundle over its width below which it is a bun."""
+BRAIDED = 0.45
+"""Mean cosine of twice the angle between the hair of a tail and its spine below which it is a
+braid: strands that cross at 30 degrees have 0.5, parallel ones 0.9."""
+
+
+def measure_ties(
+    masks: Sequence[Mask],
+    orientations: Sequence[OrientationMap],
+    cameras: Sequence[Camera],
+    head: Head,
+    hull: Hull,
+    scalp_distance: ScalpDistance,
+) -> TiedHair:
+    """Return the bundles that leave the scalp through a neck at which all directions point."""
+    bundles = find_bundles(hull, scalp_distance)
+    if not bundles:
+        return TiedHair()
+    sight = _see_scalp(masks, orientations, cameras, head)
+    places, _ = _scalp_places(head)
+    bases = places[cKDTree(places).query([bundle.centre for bundle in bundles])[1]]
+    nearest = cKDTree(bases).query(sight.places)[1]
+    tails = []
+    for number, bundle in enumerate(bundles):
+        own = ScalpSight(*(column[nearest == number] for column in sight))
+        where, score = find_convergence(own, head)
+        apart = float(np.linalg.norm(where - bases[number]))
+        sureness = min(
+            1 - bundle.neck / WIDEST_NECK,
+            (score - LEAST_CONVERGENCE) / (FULL_CONVERGENCE - LEAST_CONVERGENCE),
+            1 - apart / FARTHEST_APART,
+        )
+        if sureness > 0:
+            tails.append(_tail_of(bundle, hull, scalp_distance, min(sureness, 1.0)))
+    return TiedHair(tuple(tail for tail in tails if tail is not None))
+
+
+class Bundle(NamedTuple):
+    """Hair behind a neck of the hull."""
+
+    cells: BoolArray
+    """(X, Y, Z) dense cells farther than `OFF_SCALP` from the scalp."""
+    centre: Float64Array
+    """(3,) of the neck, metres."""
+    neck: float
+    """Area of the neck, square metres."""
+
+
+def find_bundles(hull: Hull, scalp_distance: ScalpDistance) -> tuple[Bundle, ...]:
+    """Return the parts of the hair off the scalp that have a narrow neck, the largest first."""
+    spacing = hull.grid.spacing
+    parts, _ = ndimage.label(hull.dense & (scalp_distance.values >= OFF_SCALP))
+    sizes = np.bincount(parts.ravel())
+    sizes[0] = 0
+    found = []
+    for part in np.argsort(-sizes):
+        if sizes[part] * spacing**3 < LEAST_VOLUME:
+            break
+        cells = parts == part
+        slab = cells & (scalp_distance.values < OFF_SCALP + 2 * spacing)
+        area = float(slab.sum()) * spacing**2 / 2
+        if slab.any() and area < WIDEST_NECK:
+            centre = hull.grid.centres_of(slab).mean(axis=0, dtype=np.float64)
+            found.append(Bundle(cells, centre, area))
+    return tuple(found)
+
+
+class ScalpSight(NamedTuple):
+    """Directions of hair on the scalp, seen at N places by all views."""
+
+    places: Float64Array
+    """(N, 3) metres."""
+    normals: Float64Array
+    """(N, 3) unit normals."""
+    directions: Float64Array
+    """(N, 3) unit tangents, undirected."""
+    weight: Float64Array
+    """(N,) confidence times the cosine to the ray."""
+
+
+def _see_scalp(
+    masks: Sequence[Mask],
+    orientations: Sequence[OrientationMap],
+    cameras: Sequence[Camera],
+    head: Head,
+) -> ScalpSight:
+    """Return the 2D orientations of all views, laid on the surface of the hair on the scalp."""
+    places, normals = _scalp_places(head)
+    seen = []
+    for mask, found, camera in zip(masks, orientations, cameras, strict=True):
+        facing = -np.einsum("ij,ij->i", camera.view_direction(places), normals)
+        column, row = np.floor(camera.project(places)).astype(np.int64).T
+        height, width = mask.labels.shape
+        inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
+        row, column = np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)
+        chosen = inside & (facing > LEAST_FACING) & mask.hair[row, column]
+        pixel = row[chosen], column[chosen]
+        directions = _lay_on_surface(
+            camera, places[chosen], normals[chosen], found.angle[pixel].astype(np.float64)
+        )
+        weight = found.confidence[pixel] * facing[chosen]
+        seen.append(ScalpSight(places[chosen], normals[chosen], directions, weight))
+    return ScalpSight(*(np.concatenate(column) for column in zip(*seen, strict=True)))
+
+
+def _scalp_places(head: Head) -> tuple[Float64Array, Float64Array]:
+    """Return places (N, 3) `HAIR_HEIGHT` above the scalp and its normals (N, 3)."""
+    on_scalp = head.scalp > 0.5
+    normals = head.normals()[on_scalp].astype(np.float64)
+    return head.vertices[on_scalp] + HAIR_HEIGHT * normals, normals
+
+
+def _lay_on_surface(
+    camera: Camera, places: Float64Array, normals: Float64Array, angle: Float64Array
+) -> Float64Array:
+    """Return unit tangents (N, 3) of the surface whose pictures have the angles (N,)."""
+    first = np.cross(normals, [0.0, 1.0, 1e-3])
+    first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-9)
+    second = np.cross(normals, first)
+    here = camera.project(places)
+    picture = np.stack([camera.project(places + PROBE * e) - here for e in (first, second)], axis=2)
+    wanted = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    # the adjugate serves as well as the inverse: lengths do not count
+    a = picture[:, 1, 1] * wanted[:, 0] - picture[:, 0, 1] * wanted[:, 1]
+    b = picture[:, 0, 0] * wanted[:, 1] - picture[:, 1, 0] * wanted[:, 0]
+    tangent = a[:, None] * first + b[:, None] * second
+    length = np.linalg.norm(tangent, axis=1, keepdims=True)
+    unit: Float64Array = tangent / np.maximum(length, 1e-12)
+    return unit
+
+
+def find_convergence(sight: ScalpSight, head: Head) -> tuple[Float64Array, float]:
+    """Return the place (3,) on the scalp at which hair points best, and how well it does.
+
+    The second is the mean cosine of twice the angle between the hair and the way to the place:
+    1 where all hair points there, 0 in the mean of all places.
+    """
+    places, _ = _scalp_places(head)
+    candidates = places[:: -(-len(places) // CANDIDATES)]
+    scores = np.array([_convergence(sight, at) for at in candidates])
+    best = int(np.argmax(scores))
+    return candidates[best], float(scores[best])
+
+
+def _convergence(sight: ScalpSight, at: Float64Array) -> float:
+    """Return the mean cosine of twice the angle between hair and the way to a place (3,)."""
+    way = at - sight.places
+    distance = np.linalg.norm(way, axis=1)
+    way -= np.einsum("ij,ij->i", way, sight.normals)[:, None] * sight.normals
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+    weight = np.where(distance > NEAR_TIE, sight.weight, 0.0)
+    cosine = np.einsum("ij,ij->i", way, sight.directions)
+    return float((weight * (2 * cosine**2 - 1)).sum() / max(float(weight.sum()), 1e-9))
+
+
+def _tail_of(
+    bundle: Bundle, hull: Hull, scalp_distance: ScalpDistance, sureness: float
+) -> Tail | None:
+    """Return the bundle as a tube from its thinnest place near the scalp to its end."""
+    cells = _with_root(bundle, hull, scalp_distance)
+    points = hull.grid.centres_of(cells).astype(np.float64)
+    depth = ndimage.distance_transform_edt(cells)[cells] * hull.grid.spacing
+    along = scalp_distance.values[cells]
+    sections = _cut_sections(points, depth, along)
+    if len(sections.centres) < 4:
+        return None
+    spine, spokes = _smooth_tube(sections)
+    area = np.linalg.norm(np.cross(spokes[:, 0], spokes[:, 1]), axis=1)
+    widest = int(np.argmax(area))
+    tie = int(np.argmin(area[: widest + 1]))
+    spine, spokes, area = spine[tie:], spokes[tie:], area[tie:]
+    if len(spine) < 2:
+        return None
+    share = np.ones(len(spine))
+    share[widest - tie :] = np.minimum.accumulate(area[widest - tie :] / area.max())
+    radius = float(np.sqrt(area[0]))
+    length = STEP * (len(spine) - 1)
+    kind = "tail" if length > BUN * 2 * float(np.sqrt(area.max())) else "bun"
+    axis = spine[1] - spine[0]
+    axis /= np.linalg.norm(axis)
+    ring = Tie(spine[0].astype(np.float32), axis.astype(np.float32), radius, kind)
+    rest = (value.astype(np.float32) for value in (spine, spokes, share))
+    return Tail(ring, sureness, *rest)
+
+
+def _with_root(bundle: Bundle, hull: Hull, scalp_distance: ScalpDistance) -> BoolArray:
+    """Return the bundle with the cells between it and the scalp, about the neck."""
+    centres = hull.grid.centres_of(hull.dense)
+    near = np.zeros(hull.grid.shape, bool)
+    near[hull.dense] = np.linalg.norm(centres - bundle.centre, axis=1) < TIE_SEARCH
+    return bundle.cells | (near & (scalp_distance.values > 0))
+
+
+class Sections(NamedTuple):
+    """Cross-sections of a bundle, in the order of their way from the scalp."""
+
+    centres: Float64Array
+    """(M, 3) metres."""
+    spreads: Float64Array
+    """(M, 3, 3) squared half axes of the section, as a tensor."""
+    inscribed: Float64Array
+    """(M,) radius of the largest ball, metres."""
+
+
+def _cut_sections(points: Float64Array, depth: Float64Array, along: Float32Array) -> Sections:
+    """Return sections of cells (N, 3) of depths (N,), by their ways (N,) from the scalp."""
+    number = (along / STEP).astype(np.int64)
+    centres, spreads, inscribed = [], [], []
+    for section in np.unique(number):
+        own = number == section
+        place, deep = points[own], depth[own]
+        weight = deep**DEEPEST
+        centre = (weight[:, None] * place).sum(axis=0) / weight.sum()
+        radius = max(float(deep.max()) - RIM, THINNEST)
+        off = place - centre
+        off = off[np.linalg.norm(off, axis=1) < REACH_OF_SECTION * max(radius, STEP)]
+        centres.append(centre)
+        spreads.append(4 * off.T @ off / len(off))
+        inscribed.append(radius)
+    return Sections(np.array(centres), np.array(spreads), np.array(inscribed))
+
+
+def _smooth_tube(sections: Sections) -> tuple[Float64Array, Float64Array]:
+    """Return centres (M, 3) evenly `STEP` apart and spokes (M, 2, 3) of the sections."""
+    smooth = [
+        ndimage.gaussian_filter1d(v, SMOOTH_SECTIONS, axis=0, mode="nearest") for v in sections
+    ]
+    arc = np.append(0, np.cumsum(np.linalg.norm(np.diff(smooth[0], axis=0), axis=1)))
+    at = np.arange(0, arc[-1], STEP)
+    centres, spreads, inscribed = (
+        np.stack(
+            [np.interp(at, arc, column) for column in value.reshape(len(arc), -1).T], axis=1
+        ).reshape(len(at), *value.shape[1:])
+        for value in smooth
+    )
+    tangent = np.gradient(centres, axis=0)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
+    first, second = transport_frames(tangent)
+    spokes = np.empty((len(at), 2, 3))
+    for k in range(len(at)):
+        frame = np.stack([first[k], second[k]])
+        squares, axes = np.linalg.eigh(frame @ spreads[k] @ frame.T)
+        half = np.clip(np.sqrt(np.maximum(squares, 0)), inscribed[k], FLATTEST * inscribed[k])
+        spokes[k] = (axes * half) @ axes.T @ frame
+    return centres, spokes
+
+
+def transport_frames(tangent: Float64Array) -> tuple[Float64Array, Float64Array]:
+    """Return two unit normals (M, 3) of unit tangents (M, 3) that do not twist (Bishop 1975)."""
+    normal = np.empty_like(tangent)
+    side = np.eye(3)[np.argmin(np.abs(tangent[0]))]
+    for k, along in enumerate(tangent):
+        side = side - (side @ along) * along
+        side = side / max(float(np.linalg.norm(side)), 1e-9)
+        normal[k] = side
+    return normal, np.cross(tangent, normal)

@@ -1,0 +1,208 @@
+"""Lead strands to their tie and down the tail that hangs from it.
+
+On the scalp a strand follows the measured orientation, its sign and what the photos do not show
+given by the way to the tie; hair from farther away lies over hair from nearer. It enters the ring
+at the side it comes from, keeps its place in the section of the tail, and ends where the tail has
+become too thin for all: hair is packed as densely at the end as where the tail is widest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.field.growth_prior import gradient
+from hairkit.types.strands import Strands
+from hairkit.types.tie import Tail, TiedHair
+from hairkit.types.volume import Hull, OrientationField, symmetric_matrices
+
+STEP = 0.003
+"""Metres of a step on the scalp."""
+LONGEST_WAY = 0.35
+"""Metres on the scalp after which a strand that has not reached its tie is led there directly."""
+TURN_IN = 0.025
+"""Metres from the tie at which strands leave the scalp and turn into the ring."""
+SKIN = 0.0015
+"""Metres that hair keeps off the skin."""
+TRUST = 0.7
+"""Share of the measured direction in a step, against the way to the tie."""
+MARCH = 0.0015
+"""Metres of the steps by which the thickness of the hair is measured along the normal."""
+THICKEST = 0.02
+"""Metres of hair that lies tight on the scalp, at most: thicker are ghosts beside the neck."""
+THICK_PERCENTILE = 60
+"""Percentile of the thickness over the scalp that bounds it everywhere, times `THICK_SPREAD`."""
+THICK_SPREAD = 1.3
+NEIGHBOURS = 24
+"""Points of other strands among which the farthest-come tells how much hair lies underneath."""
+LEADERS = 1500
+"""Strands, at most, that are asked for the hair underneath."""
+SECTOR = 32
+"""Strands of neighbouring angles among which the radius is spread."""
+GOLDEN = 2.399963229728653
+"""Golden angle, radians."""
+
+
+def lead_to_ties(strands: Strands, tied: TiedHair, hull: Hull, field: OrientationField) -> Strands:
+    """Return strands of equal point counts that pass through the nearest tie; group k is tie k - 1.
+
+    Without ties the strands come back as they are.
+    """
+    if not tied.tails or not len(strands):
+        return strands
+    roots = strands.roots.astype(np.float64)
+    rings = np.array([tail.tie.centre for tail in tied.tails], np.float64)
+    nearest = cKDTree(rings).query(roots)[1]
+    count = len(strands.points) // len(strands)
+    points = strands.points.reshape(len(strands), count, 3).copy()
+    for number, tail in enumerate(tied.tails):
+        own = np.flatnonzero(nearest == number)
+        if len(own):
+            points[own] = _tied_paths(roots[own], tail, hull, field, count)
+    group = (nearest + 1).astype(np.int32)
+    return replace(strands, points=points.reshape(-1, 3), group=group)
+
+
+def _tied_paths(
+    roots: Float64Array, tail: Tail, hull: Hull, field: OrientationField, count: int
+) -> Float32Array:
+    """Return the strands (N, count, 3) from roots (N, 3) through a tie to the end of its tail."""
+    ways, arrived = _ways_to_tie(roots, tail, hull, field)
+    ways = _lay_over(ways, arrived, hull)
+    place = _places_in_section(ways, arrived, tail)
+    paths = []
+    for way, last, (u, v), end in zip(ways, arrived, place, _ends(len(roots), tail), strict=True):
+        hanging = (
+            tail.spine[: end + 1] + u * tail.spokes[: end + 1, 0] + v * tail.spokes[: end + 1, 1]
+        )
+        paths.append(_join(way[: last + 1], hanging.astype(np.float64)))
+    return Strands.from_list(paths).resampled(count).points.reshape(len(roots), count, 3)
+
+
+def _ways_to_tie(
+    roots: Float64Array, tail: Tail, hull: Hull, field: OrientationField
+) -> tuple[Float64Array, Int64Array]:
+    """Return ways (N, M, 3) along the scalp towards the tie and each one's last point (N,)."""
+    steps = int(LONGEST_WAY / STEP)
+    at = roots.copy()
+    ways = np.repeat(at[:, None], steps + 1, axis=1)
+    last = np.zeros(len(roots), np.int64)
+    going = np.arange(len(roots))
+    ring = tail.tie.centre.astype(np.float64)
+    heading = np.zeros_like(roots)
+    for step in range(1, steps + 1):
+        going = going[np.linalg.norm(at[going] - ring, axis=1) > TURN_IN]
+        if not len(going):
+            break
+        p = at[going]
+        outward = _outward(hull, p)
+        goal = _unit(_tangent(ring - p, outward))
+        tensors = symmetric_matrices(hull.grid.sample(field.tensor, p + SKIN * outward))
+        measured = _unit(_tangent(np.einsum("nij,nj->ni", tensors, goal), outward))
+        wanted = _unit(goal + TRUST * (measured - goal))
+        heading[going] = _unit(heading[going] + wanted)
+        p = p + STEP * heading[going]
+        distance = hull.grid.sample(hull.head_distance, p)[:, None].astype(np.float64)
+        at[going] = p + (SKIN - distance) * _outward(hull, p)
+        ways[going, step] = at[going]
+        last[going] = step
+    return ways, last
+
+
+def _lay_over(ways: Float64Array, last: Int64Array, hull: Hull) -> Float64Array:
+    """Return the ways lifted off the skin: the farther a strand has come, the higher it lies."""
+    count, steps, _ = ways.shape
+    real = np.arange(steps)[None, :] <= last[:, None]
+    arc = np.broadcast_to(STEP * np.arange(steps), (count, steps))
+    leaders = np.zeros(count, bool)
+    leaders[:: -(-count // LEADERS)] = True
+    known = real & leaders[:, None]
+    points = ways[real]
+    near = cKDTree(ways[known]).query(points, k=NEIGHBOURS)[1]
+    farthest = arc[known][np.minimum(near, known.sum() - 1)].max(axis=1)
+    height = _thickness(points, hull) * np.clip(arc[real] / np.maximum(farthest, STEP), 0, 1)
+    lifted = ways.copy()
+    lifted[real] = points + np.maximum(height - SKIN, 0)[:, None] * _outward(hull, points)
+    lifted[:, 0] = ways[:, 0]
+    return lifted
+
+
+def _thickness(points: Float64Array, hull: Hull) -> Float64Array:
+    """Return the thickness (N,) of the hair above points (N, 3) on the skin, metres."""
+    outward = _outward(hull, points)
+    inside = np.ones(len(points), bool)
+    thickness = np.full(len(points), SKIN)
+    for height in np.arange(SKIN, THICKEST, MARCH):
+        cell = hull.grid.nearest_cell(points + height * outward)
+        inside &= hull.dense[tuple(cell.T)]
+        thickness[inside] = height
+    usual = THICK_SPREAD * float(np.percentile(thickness, THICK_PERCENTILE))
+    result: Float64Array = np.minimum(thickness, usual)
+    return result
+
+
+def _places_in_section(ways: Float64Array, last: Int64Array, tail: Tail) -> Float64Array:
+    """Return where in the unit disc (N, 2) strands pass the ring, evenly spread over it.
+
+    The angle is that from which a strand comes, the radius grows with the length of its way.
+    """
+    come = ways[np.arange(len(ways)), last] - tail.tie.centre
+    frame = _unit(tail.spokes[0].astype(np.float64))
+    angle = np.arctan2(come @ frame[1], come @ frame[0])
+    order = np.argsort(angle, kind="stable")
+    turn = np.empty(len(ways))
+    turn[order] = 2 * np.pi * (np.arange(len(ways)) + 0.5) / len(ways) - np.pi
+    sector = np.zeros(len(ways), np.int64)
+    sector[order] = np.arange(len(ways)) // SECTOR
+    rank = np.empty(len(ways))
+    by_way = np.lexsort((last, sector))
+    first = np.searchsorted(sector[by_way], sector[by_way])
+    size = np.bincount(sector)[sector[by_way]]
+    rank[by_way] = (np.arange(len(ways)) - first + 0.5) / size
+    radius = np.sqrt(rank)
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1)
+
+
+def _ends(count: int, tail: Tail) -> Int64Array:
+    """Return the last section (N,) that each of `count` strands reaches."""
+    quantile = np.mod((np.arange(count) + 0.5) * GOLDEN / (2 * np.pi), 1.0)
+    reached = np.searchsorted(-tail.share, -quantile, side="left") - 1
+    result: Int64Array = np.clip(reached, 1, len(tail.share) - 1).astype(np.int64)
+    return result
+
+
+def _join(way: Float64Array, hanging: Float64Array) -> Float64Array:
+    """Return a way and the strand in the tail (M, 3), joined by a cubic (Hermite) curve."""
+    start, end = way[-1], hanging[0]
+    gap = float(np.linalg.norm(end - start))
+    if gap < STEP:
+        return np.concatenate([way, hanging])
+    leave = way[-1] - way[-2] if len(way) > 1 else end - start
+    leave = gap * leave / max(float(np.linalg.norm(leave)), 1e-9)
+    enter = hanging[1] - hanging[0]
+    enter = gap * enter / max(float(np.linalg.norm(enter)), 1e-9)
+    t = np.linspace(0, 1, max(int(gap / STEP), 2) + 1)[1:-1, None]
+    curve = (
+        (2 * t**3 - 3 * t**2 + 1) * start
+        + (t**3 - 2 * t**2 + t) * leave
+        + (3 * t**2 - 2 * t**3) * end
+        + (t**3 - t**2) * enter
+    )
+    return np.concatenate([way, curve, hanging])
+
+
+def _outward(hull: Hull, points: Float64Array) -> Float64Array:
+    return gradient(hull.grid, hull.head_distance, points)
+
+
+def _tangent(vector: Float64Array, outward: Float64Array) -> Float64Array:
+    tangent: Float64Array = vector - np.einsum("ij,ij->i", vector, outward)[:, None] * outward
+    return tangent
+
+
+def _unit(vector: Float64Array) -> Float64Array:
+    unit: Float64Array = vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-9)
+    return unit

@@ -1,0 +1,74 @@
+"""Ties: where hair is gathered into a ponytail, pigtails, a bun or a braid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from hairkit.arrays import Float32Array, frozen_array
+from hairkit.errors import DataError
+from hairkit.storage import Stored
+
+TieKind = Literal["tail", "braid", "bun"]
+LONGEST_UNIT_ERROR = 1e-3
+"""Deviation of an axis' length from 1 that rounding in files may cause."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tie(Stored):
+    """A ring that holds strands together: a constraint for simulators and exporters."""
+
+    centre: Float32Array
+    """(3,) metres, head frame; it moves with the head."""
+    axis: Float32Array
+    """(3,) unit vector along the hair, away from the head."""
+    radius: float
+    """Of the bundle in the ring, metres."""
+    kind: str
+    """What hangs from it: `tail`, `braid` or `bun`."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", frozen_array(self.centre, np.float32, (3,), "centre"))
+        object.__setattr__(self, "axis", frozen_array(self.axis, np.float32, (3,), "axis"))
+        if abs(float(np.linalg.norm(self.axis)) - 1) > LONGEST_UNIT_ERROR:
+            raise DataError(f"the axis of a tie is {self.axis}, expected a unit vector")
+        if not 0 < self.radius < np.inf:
+            raise DataError(f"radius of a tie is {self.radius}, expected metres above 0")
+        if self.kind not in get_args(TieKind):
+            raise DataError(f"kind of a tie is {self.kind!r}, expected {get_args(TieKind)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Tail(Stored):
+    """The bundle that hangs from a tie, as a tube of elliptic sections."""
+
+    tie: Tie
+    sureness: float
+    """0 to 1, of the weakest sign that hair is tied here."""
+    spine: Float32Array
+    """(M, 3) centres of the sections from the tie to the end, evenly spaced, metres."""
+    spokes: Float32Array
+    """(M, 2, 3) conjugate half diameters of each section, metres."""
+    share: Float32Array
+    """(M,) share of the strands that reach each section, 1 at the tie, never rising."""
+
+    def __post_init__(self) -> None:
+        spine = frozen_array(self.spine, np.float32, (None, 3), "spine of a tail")
+        count = len(spine)
+        object.__setattr__(self, "spine", spine)
+        spokes = frozen_array(self.spokes, np.float32, (count, 2, 3), "spokes of a tail")
+        object.__setattr__(self, "spokes", spokes)
+        share = frozen_array(self.share, np.float32, (count,), "share of a tail")
+        object.__setattr__(self, "share", share)
+        if count < 2:
+            raise DataError(f"a tail has {count} sections, expected two or more")
+
+
+@dataclass(frozen=True, eq=False)
+class TiedHair(Stored):
+    """The ties that the photos and the hull show; none of loose hair."""
+
+    tails: tuple[Tail, ...] = ()
+    """The largest first."""
