@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
-from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.synth.bust import Obstacle
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import Strands
@@ -56,8 +55,6 @@ def place_tie(head: Head, generator: np.random.Generator) -> tuple[Float64Array,
     axis = np.array([np.sin(azimuth) * flat, np.sin(elevation), np.cos(azimuth) * flat])
     middle = 0.5 * (scalp.min(axis=0) + scalp.max(axis=0))
     skin = scalp[np.argmax((scalp - middle) @ axis)]
-    tree = build_tree(head.vertices, head.faces)
-    skin = nearest_on_surface(tree, (skin + TIE_GAP * axis)[None])[0][0]
     return skin + TIE_GAP * axis, axis
 
 
