@@ -3,6 +3,10 @@
 `p_i = p_(i-1) + delta H(p_(i-1)) / |H|` with a step delta of 1 mm, until the internal distance says
 that the point has left the hair (I > 1.1) or the strand has its greatest length. In a field without
 signs the tensors are followed in the direction in which the growth potential rises.
+
+Added to the patent, and off in the recipe `patent`: a strand that leaves the hair goes on for a
+while (`patience`, the uncertain steps of the thesis) and is cut where it left; a strand that slides
+is turned back to the surface (`pull`). Inertia, too, is an addition.
 """
 
 from __future__ import annotations
@@ -47,6 +51,13 @@ class Options(FinishOptions):
         high=5,
         doc="Strands grow no longer than this share of the longest way through the hair.",
     )
+    patience: float = option(
+        0.012,
+        low=0,
+        high=0.1,
+        unit="m",
+        doc="Length on which a strand may run outside the hair before it ends where it left it.",
+    )
     blind: float = option(
         0.02, low=0, high=0.2, unit="m", doc="Length from the root on which nothing ends a strand."
     )
@@ -60,8 +71,21 @@ class Options(FinishOptions):
     slide_from: float = option(
         1.0, low=0, high=10, doc="Internal distance from which strands slide."
     )
+    pull: float = option(
+        1.0,
+        low=0,
+        high=10,
+        doc="Sine of the angle by which a sliding strand turns back, for each unit of internal"
+        " distance beyond slide_from.",
+    )
     inertia: float = option(
-        0.92, low=0, high=0.99, doc="Share of the previous direction in the next step's."
+        0.9, low=0, high=0.99, doc="Share of the previous direction in the next step's."
+    )
+    wave_share: float = option(
+        0.18,
+        low=0,
+        high=1,
+        doc="Strands of wavy hair remember their direction for at least this share of the pitch.",
     )
 
 
@@ -77,6 +101,10 @@ def track(
 ) -> Strands:
     """Grow one strand from every root."""
     way = scalp_distance.hair_length
+    memory = options.wave_share * waves.pitch
+    if memory > options.step:
+        inertia = max(options.inertia, 1 - options.step / memory)
+        options = replace(options, inertia=inertia)
     strands = grow(
         field, _sign_directions(field), _distance(field, hull), roots.positions, way, options
     )
@@ -109,9 +137,11 @@ def grow(
         options.bound,
         options.inertia,
         int(options.blind / options.step),
+        int(options.patience / options.step),
         steps,
         options.slide_sine,
         options.slide_from,
+        options.pull,
         int(way / options.step),
     )
     values = np.concatenate([direction, distance[..., None]], axis=3)
@@ -166,12 +196,16 @@ class Rules(NamedTuple):
     """Share of the previous direction in the next one."""
     blind_steps: int
     """Steps from the root on which nothing ends a strand."""
+    patience_steps: int
+    """Steps in a row outside the hair that do not end a strand."""
     steps: int
     """Most steps of a strand."""
     slide_sine: float
     """Of the angle to the hair's surface, below which a strand slides along it; 0 for never."""
     slide_from: float
     """Internal distance from which strands slide."""
+    pull: float
+    """Sine of the turn back for each unit of internal distance beyond `slide_from`."""
     slide_steps: int
     """Steps from the root on which strands may slide."""
 
@@ -213,11 +247,13 @@ def _grow_strand(
     p, d, found = np.empty(3), np.zeros(3), np.empty(4)
     p[:] = start
     path[0] = p
-    count = 1
+    count, inside = 1, 1
     for i in range(1, rules.steps + 1):
         sample_at(volume.origin, volume.spacing, volume.values, p, found)
         known = make_unit(found[:3])
-        if i > rules.blind_steps and (found[DISTANCE] > rules.bound or not known):
+        if i <= rules.blind_steps or (known and found[DISTANCE] <= rules.bound):
+            inside = i
+        elif i - inside > rules.patience_steps:
             break
         if known and i > 1:
             for axis in range(3):
@@ -226,12 +262,15 @@ def _grow_strand(
             d[:] = found[:3]
         if not make_unit(d):
             break
-        if i < rules.slide_steps and found[DISTANCE] >= rules.slide_from:
-            _slide(volume, rules.slide_sine, p, d)
+        slides = rules.slide_sine > 0 and i < rules.slide_steps
+        if slides and found[DISTANCE] >= rules.slide_from:
+            back = rules.pull * (found[DISTANCE] - rules.slide_from)
+            _slide(volume, rules.slide_sine, back, p, d)
         for axis in range(3):
             p[axis] += rules.step * d[axis]
         path[count] = p
         count += 1
+    count = min(count, inside + 1)
     if count == 1:  # nothing is known at the root: a step upwards, since every root has a strand
         path[1] = path[0]
         path[1, 1] += rules.step
@@ -240,12 +279,14 @@ def _grow_strand(
 
 
 @compiled
-def _slide(volume: SignedVolume, sine: float, p: Float64Array, d: Float64Array) -> None:
-    """Remove d's part along the internal distance's gradient if d leaves the hair at less."""
+def _slide(
+    volume: SignedVolume, sine: float, back: float, p: Float64Array, d: Float64Array
+) -> None:
+    """Bend d along the hair's surface, and `back` into the hair, if it leaves at a smaller sine."""
     normal = np.empty(3)
     gradient_at(volume.origin, volume.spacing, volume.values[..., DISTANCE:], p, normal)
     outward = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]
-    if 0 < outward < sine:
+    if outward < sine:
         for axis in range(3):
-            d[axis] -= outward * normal[axis]
+            d[axis] -= (max(outward, 0.0) + back) * normal[axis]
         make_unit(d)

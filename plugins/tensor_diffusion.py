@@ -10,7 +10,8 @@ scalp through the hair later tells a strand's root from its tip.
 
 On the crown, which level photos see at a grazing angle, long hair is combed from its parting
 (`hairkit.field.parting`). Photos of tight curls show no strand direction (`hairkit.imaging.waves`):
-there the field is the prior alone, and the tracker winds the strands about it.
+there the field hangs down along the head (`hairkit.field.hanging_hair`), and the tracker winds the
+strands about it.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from hairkit import (
 )
 from hairkit.field.diffusion import solve_screened
 from hairkit.field.growth_prior import ScalpPrior, add_scalp_prior, growth_potential
+from hairkit.field.hanging_hair import hang_curls
 from hairkit.field.view_fusion import FusionOptions, fuse_views
 from hairkit.options import option
 
@@ -83,13 +85,13 @@ def solve_field(
 ) -> OrientationField:
     """Fuse the views, add the scalp prior, diffuse over the loose hull."""
     growth = growth_potential(hull, scalp_distance, options.tip_share)
+    if waves.curly:
+        return hang_curls(scene.head, hull, growth)
     fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options, options.min_views)
     tensor, certainty = fused.tensor, fused.certainty
-    if waves.curly:
-        certainty = np.zeros_like(certainty)
     prior = ScalpPrior(
-        1.0 if waves.curly else options.scalp_weight,
-        np.inf if waves.curly else options.scalp_reach,
+        options.scalp_weight,
+        options.scalp_reach,
         options.scalp_lift,
         options.scalp == "normal",
         options.parting_weight,

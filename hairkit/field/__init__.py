@@ -5,6 +5,7 @@ What field and tracking plugins share: fusing views, priors, diffusion, and samp
 * `diffusion`: screened diffusion on masked cells, by conjugate gradients
 * `find_parting`: where the parting is, as the user says or the views show
 * `growth_prior`: geodesic distances from scalp and tips, and a direction prior
+* `hanging_hair`: the field of tight curls
 * `isosurface`: the smooth surface of a volume of cells
 * `parting`: how hair on the crown is combed from its parting
 * `sampling_kernels`: compiled look-ups in volumes

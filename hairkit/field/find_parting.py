@@ -30,13 +30,15 @@ LEAST_FACING = 0.15
 LEAST_SKIN = 0.004
 """Share of the crown that is skin from which there is a parting; 0.006 to 0.06 on heads that have
 one, 0.000 on curls."""
+LEAST_SKIN_ABOVE = 0.03
+"""The same in photos from above: 0.08 to 0.15 on heads that have a parting, 0.01 on curls."""
 QUARTILES = (0.25, 0.5, 0.75)
 WIDEST_SKIN = 0.05
 """Distance in metres between the quartiles of the skin's x from which it is no line but a hairline
 whose hair is tied back: 9 cm there, at most 3.5 cm on partings, 6.6 cm if spread evenly."""
 FROM_ABOVE = 30.0
 """Degrees of elevation from which a view looks down into the parting: alone it finds a parting to
-2 mm, eight level views to 10 mm."""
+2 mm, eight level views to 5 mm (`benchmarks/parting.py`)."""
 
 
 def measure_parting(
@@ -57,11 +59,14 @@ def measure_parting(
     above = [(mask, camera) for mask, camera in views if _elevation(camera) > FROM_ABOVE]
     if len(views) < len(masks):
         return Parting()
-    return _measure_skin(above or views, head)
+    return _measure_skin(above or views, head, LEAST_SKIN_ABOVE if above else LEAST_SKIN)
 
 
-def _measure_skin(views: Sequence[tuple[Mask, Camera]], head: Head) -> Parting:
-    """Return the median of the skin on the crown, each place weighted by how it faces the views."""
+def _measure_skin(views: Sequence[tuple[Mask, Camera]], head: Head, least: float) -> Parting:
+    """Return the median of the skin on the crown, each place weighted by how it faces the views.
+
+    There is no parting where the share of skin is below `least`.
+    """
     at, normals = _crown(head)
     if not len(at):
         return Parting()
@@ -76,7 +81,7 @@ def _measure_skin(views: Sequence[tuple[Mask, Camera]], head: Head) -> Parting:
         skin += weight * (label == PERSON)
         faced += weight
     share = float(skin.sum() / max(faced.sum(), LEAST_FACING))
-    if share < LEAST_SKIN:
+    if share < least:
         return Parting(skin_share=share)
     order = np.argsort(at[:, 0])
     quarters = skin.sum() * np.array(QUARTILES)

@@ -12,6 +12,7 @@ The patent's first stage, on the cells of the hull: `H = a_s S + a_v V + a_i gra
 5. O, growth direction: the signed tangents of segments and the scalp prior, diffused.
 
 Weights differ from cell to cell: S counts near strands, V away from them, grad(I) at the scalp.
+Tight curls show no direction; theirs hang down along the head (`hairkit.field.hanging_hair`).
 
 * `four_fields`: the four fields and their weighted sum
 * `photo_lines`: lines through orientation maps, lifted onto the hull
@@ -37,6 +38,7 @@ from hairkit import (
     hookimpl,
 )
 from hairkit.field.growth_prior import ScalpPrior, add_scalp_prior, growth_potential
+from hairkit.field.hanging_hair import hang_curls
 from hairkit.field.view_fusion import FusionOptions, fuse_views
 from hairkit.options import option
 
@@ -116,6 +118,8 @@ def solve_field(
 ) -> OrientationField:
     """Return the blended field with its signs and the internal distance."""
     growth = growth_potential(hull, scalp_distance, options.tip_share)
+    if waves.curly:
+        return hang_curls(scene.head, hull, growth)
     fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options)
     segments = find_segments(scene.cameras, masks, fused, hull, growth, options)
     prior = ScalpPrior(

@@ -22,6 +22,7 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "as_they_are"]),
     "helices": ({"COUNT": 10}, []),
     "masks": ({}, ["CAPTURES"]),
+    "parting": ({}, ["CAPTURES"]),
     "orientation": ({}, ["CAPTURES", "--only", "structure_tensor"]),
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
@@ -84,7 +85,16 @@ def test_it_prints_its_table(
 
 @pytest.mark.parametrize(
     "name",
-    ["cameras", "face_landmarks", "orientation", "segmentation", "fidelity", "health", "turn"],
+    [
+        "cameras",
+        "face_landmarks",
+        "orientation",
+        "parting",
+        "segmentation",
+        "fidelity",
+        "health",
+        "turn",
+    ],
 )
 def test_captures_are_named_by_the_user(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

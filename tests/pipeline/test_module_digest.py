@@ -43,7 +43,7 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
 @pytest.mark.parametrize(
     ("changed", "again"),
     [
-        ("hairkit/types/camera.py", "scene head hull field track"),
+        ("hairkit/types/camera.py", "scene head hull field"),
         ("hairkit/types/mask.py", "segment scene head orient hull field"),
         ("hairkit/storage.py", "segment scene head orient hull field track"),
         ("hairkit/cameras/silhouette_coherence.py", "scene"),
@@ -66,7 +66,7 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
         ("hairkit/__init__.py", ""),
         ("plugins/thin_plate.py", "head"),
         ("plugins/silhouette/landmark_transfer.py", "scene"),
-        ("plugins/hybrid_field/segments.py", ""),
+        ("plugins/tensor_diffusion.py", ""),
     ],
 )
 def test_a_changed_file_runs_again_the_stages_that_import_it(

@@ -124,12 +124,12 @@ def test_a_wrong_recipe_is_one_line_with_file_and_key(text: str, said: str) -> N
 
 def test_a_recipe_says_only_what_differs_from_default() -> None:
     """Stages without a table, and plugins of tables that only have options, are default's."""
-    text = "[track]\nstep = 0.5\n[segment.grabcut]\nscale = 1\n[field]\nplugin = 'mine'\n"
+    text = "[track]\ninertia = 0.5\n[segment.grabcut]\nscale = 1\n[field]\nplugin = 'mine'\n"
     recipe, default = parse_recipe(text.encode(), "mine", "mine.toml"), load_recipe("default")
     for table in ("scene", "head", "orient", "hull", "export"):
         assert recipe.stage(table) == default.stage(table)
-    assert [c.plugin for c in stage_of(recipe, "track").choices] == ["certainty_tracker"]
-    assert options_of(recipe, "track") == {"step": 0.5}
+    assert [c.plugin for c in stage_of(recipe, "track").choices] == ["hybrid_growth"]
+    assert options_of(recipe, "track") == {"inertia": 0.5}
     names = [choice.plugin for choice in stage_of(recipe, "segment").choices]
     assert names == [choice.plugin for choice in stage_of(default, "segment").choices]
     assert [dict(c.options) for c in stage_of(recipe, "segment").choices] == [{}, {"scale": 1}, {}]

@@ -111,11 +111,14 @@ def growth_twin(
 ) -> list[np.ndarray]:
     """One strand by the rules, in NumPy; it slides on the first `free` steps."""
     p, d = start.astype(np.float64), np.zeros(3)
-    path = [p]
+    path, inside, patience = [p], 1, round(options.patience / options.step)
     for i in range(1, steps + 1):
         found = GRID.sample(values, p[None])[0].astype(np.float64)
         size = np.linalg.norm(found[:3])
-        if i * options.step > options.blind + 1e-9 and (found[3] > options.bound or size < 1e-9):
+        blind = i * options.step <= options.blind + 1e-9
+        if blind or (found[3] <= options.bound and size > 1e-9):
+            inside = i
+        elif i - inside > patience:
             break
         if size > 1e-9:
             keep = options.inertia if i > 1 else 0.0
@@ -125,12 +128,13 @@ def growth_twin(
             probes = p + GRID.spacing * np.concatenate([np.eye(3), -np.eye(3)])
             level = GRID.sample(values, probes)[:, 3].astype(np.float64)
             normal = (level[:3] - level[3:]) / np.linalg.norm(level[:3] - level[3:])
-            if 0 < d @ normal < options.slide_sine:
-                d = d - (d @ normal) * normal
+            if d @ normal < options.slide_sine:
+                back = options.pull * (found[3] - options.slide_from)
+                d = d - (max(d @ normal, 0) + back) * normal
                 d = d / np.linalg.norm(d)
         p = p + options.step * d
         path.append(p)
-    return path
+    return path[: inside + 1]
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -224,3 +228,29 @@ def test_a_strand_does_not_depend_on_how_many_others_are_grown() -> None:
         for r in (roots, few)
     )
     np.testing.assert_array_equal(among.select(some).points, alone.points)
+
+
+def test_a_strand_that_comes_back_into_the_hair_goes_on() -> None:
+    """A gap shorter than `patience` is crossed; a longer one ends the strand before it."""
+    x = GRID.centres()[..., 0]
+    gap = np.where((x > 0.05) & (x < 0.07), 2.0, 0.5).astype(np.float32)
+    patient, impatient = (
+        run(constant((1, 0, 0)), gap, replace(FREE, patience=p, blind=0.0), way=0.05)
+        for p in (0.03, 0.01)
+    )
+    assert patient.tips[0, 0] == pytest.approx(0.1, abs=2e-3)
+    assert impatient.tips[0, 0] == pytest.approx(0.05, abs=8e-3)
+
+
+def test_sliding_strands_are_pulled_back_to_the_surface() -> None:
+    """Beyond I = 1 the strand returns instead of drifting away from the hair."""
+    distance = (1 + 10 * GRID.centres()[..., 1]).astype(np.float32)
+    field = constant((0.97, 0.24, 0))
+    assert field.direction is not None
+    starts = np.array([[-0.1, 0.02, 0.0]], np.float32)
+    options = replace(FREE, slide_sine=0.5, reach=1.0, inertia=0.0, blind=0.0, bound=3.0)
+    free, pulled = (
+        grow(field, field.direction, distance, starts, 0.1, replace(options, pull=p))
+        for p in (0.0, 1.0)
+    )
+    assert abs(pulled.tips[0, 1]) < 0.5 * free.tips[0, 1]
