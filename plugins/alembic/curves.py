@@ -13,6 +13,7 @@ from hairkit.grooming.guide_weights import GuideWeights, closest_guides, guide_m
 from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.io.strand_blocks import Profile, colours
+from hairkit.types.groom import HairMaterial
 from hairkit.types.point_cache import PointCache
 from hairkit.types.strands import Strands
 
@@ -49,6 +50,8 @@ class GroomCurves:
     """Guides of each curve; None where there are none to follow."""
     attributes: bool
     """False: curves, widths and uv alone."""
+    curl: tuple[float, float] | None
+    """Radius and pitch of the helices that strands are wound into, in the file's unit, or None."""
     cache: PointCache | None
     """Frames (T, P, 3) in the head frame, or None for a still groom."""
     space: FileSpace
@@ -92,9 +95,16 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
         guide=guide if marked else None,
         closest=closest_guides(strands) if listed and marked and guide.any() else None,
         attributes=listed,
+        curl=_curl(ready.groom.material, space) if listed else None,
         cache=cache,
         space=space,
     )
+
+
+def _curl(material: HairMaterial, space: FileSpace) -> tuple[float, float] | None:
+    if material.curl_radius <= 0:
+        return None
+    return material.curl_radius / space.metres, material.curl_pitch / space.metres
 
 
 def _limit_points(

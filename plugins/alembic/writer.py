@@ -75,7 +75,7 @@ def _write(curves: GroomCurves, part: Path) -> None:
     # Abc.OArchive writes no date, unlike CreateArchiveWithInfo: equal grooms are equal files
     archive = Abc.OArchive(utf8_name(part))
     groom = AbcGeom.OXform(archive.getTop(), "groom")
-    _write_groom_properties(groom)
+    _write_groom_properties(groom, curves)
     sampling = 0
     if curves.cache is not None:
         step, start = 1.0 / curves.cache.frames_per_second, float(curves.cache.times[0])
@@ -87,8 +87,8 @@ def _write(curves: GroomCurves, part: Path) -> None:
         _write_attributes(schema.getArbGeomParams(), curves)
 
 
-def _write_groom_properties(groom: Any) -> None:
-    """Write what Unreal looks for on the first transform under the top object."""
+def _write_groom_properties(groom: Any, curves: GroomCurves) -> None:
+    """Write what Unreal looks for on the first transform under the top object, and the curl."""
     transform = AbcGeom.XformSample()
     transform.setInheritsXforms(True)
     groom.getSchema().set(transform)
@@ -98,6 +98,9 @@ def _write_groom_properties(groom: Any) -> None:
     Abc.OInt16Property(properties, "groom_version_minor").setValue(minor)
     tool = f"hairkit {hairkit.__version__}"
     Abc.OStringProperty(properties, "groom_tool").setValue(tool)
+    if curves.curl is not None:
+        for name, length in zip(("radius", "pitch"), curves.curl, strict=True):
+            Abc.ODoubleProperty(properties, f"hairkit_curl_{name}").setValue(length)
 
 
 def _sample(curves: GroomCurves, number: int) -> Any:

@@ -21,6 +21,7 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "as_they_are"]),
     "helices": ({"COUNT": 10}, []),
+    "looks": ({"GUIDES": 60}, ["CAPTURES", "-o", "CAPTURES/looks.jpg"]),
     "masks": ({}, ["CAPTURES"]),
     "parting": ({}, ["CAPTURES"]),
     "orientation": ({}, ["CAPTURES", "--only", "structure_tensor"]),

@@ -24,7 +24,7 @@ def test_curls_stand_off_the_skin_and_lie_down_with_distance() -> None:
 
 
 def test_curls_hang_straight_down_below_the_middle_of_the_head() -> None:
-    """Nothing turns hair inward under the chin; only the whorl behind the middle shifts it a bit."""
+    """Nothing turns hair inward under the chin; the whorl behind the middle shifts it a bit."""
     place = np.array([[0.1, -0.1, 0.0], [0.0, -0.1, -0.1]], np.float32)
     axes = hanging_axes(HEAD, place, np.full(2, 0.1, np.float32))
     np.testing.assert_allclose(axes, [[0, -1, 0], [0, -1, 0]], atol=0.15)

@@ -123,6 +123,20 @@ def test_one_strand_comes_back(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.group, [2])
 
 
+def test_the_curl_is_told_in_the_unit_of_the_file(tmp_path: Path) -> None:
+    """Radius and pitch stand beside the version; straight hair has neither."""
+    straight = hair_groom()
+    look = replace(straight.material, curl_radius=0.007, curl_pitch=0.027)
+    curly = opened(written(replace(straight, material=look), tmp_path))[0].getUserProperties()
+    radius, pitch = (
+        curly.getProperty(f"hairkit_curl_{name}").getValue() for name in ("radius", "pitch")
+    )
+    assert pitch / radius == pytest.approx(0.027 / 0.007)
+    assert radius in (pytest.approx(0.007), pytest.approx(0.7))
+    plain = opened(written(straight, tmp_path))[0].getUserProperties()
+    assert plain.getPropertyHeader("hairkit_curl_radius") is None
+
+
 def test_unreal_finds_its_schema(tmp_path: Path) -> None:
     """Version 1.5 is on the first transform, each attribute has its type, scope and length."""
     groom = hair_groom()
