@@ -15,7 +15,7 @@ from hairkit.synth import STYLES, grow, photograph
 _DESCRIPTION = """\
 Example: hairkit synth wavy -o wavy/
 
-Grow a groom and take eight photos of it: photos/, masks/, landmarks.json, groom.npz, and truth/ for
+Grow a groom and take photos of it: photos/, masks/, landmarks.json, groom.npz, and truth/ for
 `hairkit evaluate`. Then: hairkit reconstruct wavy/ -o out/"""
 STRANDS = 10_000
 """Hairs by default: a tenth of a head's."""
@@ -30,6 +30,7 @@ def register(subparsers: Any) -> None:
         "--strands", type=int, default=STRANDS, metavar="N", help=f"hairs ({STRANDS})"
     )
     parser.add_argument("--seed", type=int, default=0, help="of hair, cameras and room (0)")
+    parser.add_argument("--views", type=int, default=8, metavar="N", help="photos (8)")
     parser.add_argument("--size", default="810x1080", metavar="WxH", help="photos (810x1080)")
     parser.add_argument(
         "--jitter", type=float, default=1.0, help="how far cameras leave the nominal turn (1)"
@@ -50,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
         groom,
         args.output,
         seed=args.seed,
+        views=args.views,
         size=size,
         jitter=args.jitter,
         orthographic=args.orthographic,

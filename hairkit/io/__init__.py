@@ -21,6 +21,8 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `polylines`: strands from loose edges
 * `strand_blocks`: large grooms written in blocks of little memory
 * `strokes`: strokes on photos, labelme's JSON
+* `tiff`: the header of TIFF files
 * `video`: a video of a turn as a capture
 * `video_child`: the process that decodes videos
+* `webp`: the header of WebP files
 """

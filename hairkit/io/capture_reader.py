@@ -20,7 +20,13 @@ import numpy as np
 from hairkit.arrays import Float64Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.io.capture_toml import CaptureFile, ViewEntry, read_capture_file
-from hairkit.io.photos import PhotoHeader, focal_from_equivalent, read_header, read_photo
+from hairkit.io.photos import (
+    PHOTOS_TAKEN,
+    PhotoHeader,
+    focal_from_equivalent,
+    read_header,
+    read_photo,
+)
 from hairkit.io.video import is_video, read_video
 from hairkit.options import unknown_name
 from hairkit.storage import read_bytes
@@ -50,8 +56,8 @@ FEWEST, MOST = 3, 36
 WORKING_EDGE = 1440
 """Long edge in pixels that photos are scaled down to."""
 
-_PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png", ".heic", ".heif")
-_OTHER_SUFFIXES = (".webp", ".tif", ".tiff", ".bmp", ".gif", ".dng", ".avif")
+_PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".heic", ".heif")
+_OTHER_SUFFIXES = (".bmp", ".gif", ".dng", ".avif", ".jxl", ".cr2", ".cr3", ".nef", ".arw")
 _LANDMARKS = 68
 _MAX_LANDMARK_BYTES = 2**22
 """68 points of a view are some 2.5 kB of JSON."""
@@ -129,9 +135,7 @@ def _photos(photo_folder: Path) -> list[Path]:
     pictures.sort(key=lambda p: [int(s) if s.isdigit() else s for s in _digits(p.name.lower())])
     for picture in pictures:
         if picture.suffix.lower() in _OTHER_SUFFIXES:
-            raise InputError(
-                f"{picture}: expected JPEG, PNG or HEIC photos; save it as one of these"
-            )
+            raise InputError(f"{picture}: expected {PHOTOS_TAKEN}; save it as one of these")
     if not FEWEST <= len(pictures) <= MOST:
         raise InputError(
             f"{photo_folder}: {len(pictures)} photos, expected {FEWEST} to {MOST} from all around"

@@ -22,6 +22,8 @@ from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
 from hairkit.io.exif import Exif, read_exif
 from hairkit.io.heic import decode_heic, is_heic, read_heic_header
+from hairkit.io.tiff import clear_orientation, scan_tiff
+from hairkit.io.webp import is_webp, scan_webp
 from hairkit.storage import read_bytes
 
 MAX_PIXELS = 64_000_000
@@ -29,6 +31,12 @@ MAX_PIXELS = 64_000_000
 
 MAX_BYTES = 256 * 2**20
 """Files larger than this are refused unread."""
+
+PHOTO_KINDS = ("JPEG", "PNG", "WebP", "TIFF", "HEIC")
+"""Kinds of pictures that are read."""
+
+PHOTOS_TAKEN = f"a {', '.join(PHOTO_KINDS[:-1])} or {PHOTO_KINDS[-1]} photo"
+"""The same as words of a message."""
 
 FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
 """Diagonal of the 35 mm film frame, to which equivalent focal lengths refer (CIPA DCG-001)."""
@@ -40,8 +48,8 @@ _KINDS = {
     b"\x89PNG\r\n\x1a\n": "PNG",
     b"GIF8": "GIF",
     b"BM": "BMP",
-    b"II*\0": "TIFF or raw",
-    b"MM\0*": "TIFF or raw",
+    b"II*\0": "TIFF",
+    b"MM\0*": "TIFF",
     b"%PDF": "PDF",
 }
 _FILL, _START_OF_IMAGE, _END_OF_IMAGE, _START_OF_SCAN, _EXIF_SEGMENT = 0xFF, 0xD8, 0xD9, 0xDA, 0xE1
@@ -68,7 +76,7 @@ class PhotoHeader:
     """Facts from the header of a picture file."""
 
     kind: str
-    """`JPEG`, `PNG` or `HEIC`."""
+    """One of `PHOTO_KINDS`."""
     width: int
     """Width in pixels after EXIF rotation."""
     height: int
@@ -111,7 +119,8 @@ def read_photo(
     Parameters
     ----------
     path
-        A JPEG or PNG file, or a HEIC file where pillow-heif is installed.
+        A JPEG, PNG, WebP or TIFF file, or a HEIC file where pillow-heif is installed. 16 bits
+        become 8, grey becomes RGB, transparency is ignored.
     max_edge
         Larger pictures are scaled down so that their long edge has this many pixels.
 
@@ -164,13 +173,12 @@ def read_drawing(path: str | os.PathLike[str]) -> UInt8Array:
 
 def _header(data: bytes, path: Path) -> PhotoHeader:
     kind = _kind(data)
-    if kind not in ("JPEG", "PNG", "HEIC"):
-        raise FormatError(f"{path}: {kind}, expected a JPEG, PNG or HEIC picture; save it as one")
+    if kind not in PHOTO_KINDS:
+        raise FormatError(f"{path}: {kind}, expected {PHOTOS_TAKEN}; save it as one of these")
     try:
-        if kind == "HEIC":
-            width, height, exif_block = read_heic_header(data, str(path))
-        else:
-            width, height, exif_block = _scan_jpeg(data) if kind == "JPEG" else _scan_png(data)
+        width, height, exif_block = _scan(kind, data, str(path))
+    except FormatError:
+        raise
     except (struct.error, IndexError, ValueError) as error:
         raise FormatError(f"{path}: damaged {kind} file; save it again") from error
     if width * height > MAX_PIXELS or not width * height:
@@ -185,6 +193,17 @@ def _header(data: bytes, path: Path) -> PhotoHeader:
     return PhotoHeader(kind, width, height, exif)
 
 
+def _scan(kind: str, data: bytes, where: str) -> tuple[int, int, bytes]:
+    """Return width and height as stored, and the EXIF block, by the kind of the file."""
+    if kind == "HEIC":
+        return read_heic_header(data, where)
+    if kind == "WebP":
+        return scan_webp(data, where)
+    if kind == "TIFF":
+        return (*scan_tiff(data, where), data)  # EXIF has TIFF's own tags
+    return _scan_jpeg(data) if kind == "JPEG" else _scan_png(data)
+
+
 def _kind(data: bytes) -> str:
     if not data:
         return "an empty file"
@@ -192,7 +211,7 @@ def _kind(data: bytes) -> str:
         return "HEIC"
     if data[4:8] == b"ftyp":
         return "AVIF or a video"
-    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+    if is_webp(data):
         return "WebP"
     named = (kind for start, kind in _KINDS.items() if data.startswith(start))
     return next(named, "not a picture")
@@ -302,6 +321,8 @@ def _decode(data: bytes, mode: int, path: Path) -> UInt8Array:
             return decode_heic(data, str(path))[..., ::-1]
         if kind == "PNG":
             _check_png_data(data)
+        if kind == "TIFF":
+            data = clear_orientation(data)
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), mode | _AS_STORED)
         if pixels is None:
             raise ValueError("it cannot be decoded")

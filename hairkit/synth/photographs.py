@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.errors import InputError
-from hairkit.io.capture_reader import TURN
+from hairkit.io.capture_reader import FEWEST, MOST, TURN
 from hairkit.rendering import (
     Lights,
     Measurements,
@@ -45,8 +45,8 @@ AZIMUTH_JITTER, ELEVATION_JITTER, ROLL_JITTER = 4.0, 3.0, 2.0
 """Degrees at most off the nominal turn."""
 DISTANCE_JITTER, TARGET_JITTER = 0.05, 0.006
 """Share of the distance at most; metres, standard deviation."""
-LANDMARK_VIEWS = (0, 1, 7)
-"""Views in which a face detector finds landmarks."""
+LANDMARK_DEG = 50.0
+"""Nominal azimuth, either way, up to which a face detector finds landmarks."""
 LANDMARK_NOISE = 0.003
 """Standard deviation of a detected landmark, share of the picture's width."""
 SENSOR_NOISE = 2.2
@@ -84,11 +84,12 @@ def photograph(
     folder: str | os.PathLike[str],
     *,
     seed: int = 0,
+    views: int = len(TURN),
     size: tuple[int, int] = (810, 1080),
     jitter: float = 1.0,
     orthographic: bool = False,
 ) -> None:
-    """Take eight photos of a groom and write them with masks, landmarks and truth into `folder`.
+    """Take photos of a groom and write them with masks, landmarks and truth into `folder`.
 
     Parameters
     ----------
@@ -98,6 +99,8 @@ def photograph(
         Made where it is missing; its files are replaced.
     seed
         Of the cameras' jitter, the lights, the background and the noise.
+    views
+        Number of photos, evenly around the head; eight bear the names of their views.
     size
         Width and height of a photo in pixels.
     jitter
@@ -107,24 +110,34 @@ def photograph(
     """
     if not all(SMALLEST <= edge <= LARGEST for edge in size):
         raise InputError(f"photos of {size} pixels, expected {SMALLEST} to {LARGEST} a side")
+    if not FEWEST <= views <= MOST:
+        raise InputError(f"{views} photos, expected {FEWEST} to {MOST}")
     base = Path(folder)
     for name in ("photos", "masks", "truth/orientation"):
         (base / name).mkdir(parents=True, exist_ok=True)
     generator = np.random.default_rng([seed, 7])
     shoot = _Shoot.prepare(groom, generator)
-    cameras = _cameras(size, jitter, orthographic, generator)
-    stems = [f"{index}_{name}" for index, name in enumerate(TURN)]
+    turn = _turn(views)
+    cameras = _cameras(list(turn.values()), size, jitter, orthographic, generator)
+    stems = [f"{i}_{name}" if views == len(TURN) else name for i, name in enumerate(turn)]
     photos = shoot.photos(cameras, generator)
-    seen = np.zeros(len(groom.strands.points), np.uint8)
+    seen = np.zeros(len(groom.strands.points), np.uint64 if views > len(TURN) else np.uint8)
     for index, (stem, camera) in enumerate(zip(stems, cameras, strict=True)):
         write_bytes(base / "photos" / f"{stem}.jpg", _jpeg(photos[index]))
         write_bytes(base / "masks" / f"{stem}.png", _png(shoot.labels(camera)))
         measured = shoot.measured(camera)
         write_bytes(base / "truth" / "orientation" / f"{stem}.png", _png(_angle_codes(measured)))
         visible = points_at_depth(groom.strands, measured.depth, camera)
-        seen |= visible.astype(np.uint8) << np.uint8(index)
+        seen |= visible.astype(seen.dtype) << seen.dtype.type(index)
     _write_landmarks(base, groom.head, stems, cameras, generator)
-    _write_truth(base / "truth", groom, cameras, seen)
+    _write_truth(base / "truth", groom, turn, cameras, seen)
+
+
+def _turn(views: int) -> dict[str, float]:
+    """Return names and nominal azimuths (degrees) of photos evenly around the head."""
+    if views == len(TURN):
+        return TURN
+    return {f"photo-{i + 1:02d}": i * 360.0 / views for i in range(views)}
 
 
 @dataclass(frozen=True)
@@ -173,12 +186,16 @@ class _Shoot:
 
 
 def _cameras(
-    size: tuple[int, int], jitter: float, orthographic: bool, generator: np.random.Generator
+    azimuths_deg: list[float],
+    size: tuple[int, int],
+    jitter: float,
+    orthographic: bool,
+    generator: np.random.Generator,
 ) -> list[Camera]:
     width, height = size
     focal = FOCAL_PER_HEIGHT * height
     cameras = []
-    for azimuth in TURN.values():
+    for azimuth in azimuths_deg:
         turn = jitter * generator.uniform(-1, 1, 4)
         aim = np.array(TARGET) + jitter * TARGET_JITTER * generator.standard_normal(3)
         cameras.append(
@@ -239,9 +256,12 @@ def _write_landmarks(
         return
     points = head.vertices[head.landmark_vertices]
     views = {}
-    for index in LANDMARK_VIEWS:
-        noise = LANDMARK_NOISE * cameras[index].width * generator.standard_normal((LANDMARKS, 2))
-        views[stems[index]] = np.round(cameras[index].project(points) + noise, 2).tolist()
+    for index, (stem, camera) in enumerate(zip(stems, cameras, strict=True)):
+        nominal = index * 360.0 / len(stems)
+        if min(nominal, 360.0 - nominal) > LANDMARK_DEG:
+            continue
+        noise = LANDMARK_NOISE * camera.width * generator.standard_normal((LANDMARKS, 2))
+        views[stem] = np.round(camera.project(points) + noise, 2).tolist()
     document = {"scheme": "68 points, iBUG/Multi-PIE order", "views": views}
     write_text(base / "landmarks.json", json.dumps(document) + "\n")
 
@@ -252,9 +272,15 @@ def _angle_codes(measured: Measurements) -> UInt8Array:
     return np.where(measured.seen, coded, 0).astype(np.uint8)
 
 
-def _write_truth(folder: Path, groom: Groom, cameras: list[Camera], seen: UInt8Array) -> None:
+def _write_truth(
+    folder: Path,
+    groom: Groom,
+    turn: dict[str, float],
+    cameras: list[Camera],
+    seen: npt.NDArray[np.unsignedinteger],
+) -> None:
     views: list[dict[str, Any]] = []
-    for (name, nominal), camera in zip(TURN.items(), cameras, strict=True):
+    for (name, nominal), camera in zip(turn.items(), cameras, strict=True):
         views.append({**camera.to_json(name), "nominal_azimuth": nominal})
     document = {
         "units": "metres",

@@ -125,7 +125,9 @@ WRONG = {
     "37 photos, expected 3 to 36": lambda f: [
         write_grey(f / "photos" / f"{n}.png", np.zeros((8, 8), np.uint8)) for n in range(10, 39)
     ],
-    "4_back.png: not a picture, expected a JPEG, PNG or HEIC": lambda f: spoil_photo(f, b"hello"),
+    "4_back.png: not a picture, expected a JPEG, PNG, WebP, TIFF or HEIC": lambda f: spoil_photo(
+        f, b"hello"
+    ),
     "4_back.png: an empty file": lambda f: spoil_photo(f, b""),
     "4_back.png: 96 x 128 pixels, its photo has 60 x 40": lambda f: write_grey(
         f / "photos" / "4_back.png", np.zeros((40, 60), np.uint8)
@@ -136,7 +138,9 @@ WRONG = {
     "two photos of the view 'front'": lambda f: (f / "photos" / "1_front-left.png").rename(
         f / "photos" / "1_front.png"
     ),
-    "x.webp: expected JPEG, PNG or HEIC": lambda f: (f / "photos" / "x.webp").write_bytes(b""),
+    "x.bmp: expected a JPEG, PNG, WebP, TIFF or HEIC": lambda f: (
+        f / "photos" / "x.bmp"
+    ).write_bytes(b""),
     "4_back.png: 95 x 128 pixels, its photo has 96 x 128": lambda f: write_grey(
         f / "masks" / "4_back.png", np.zeros((128, 95), np.uint8)
     ),

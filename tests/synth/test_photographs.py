@@ -50,6 +50,22 @@ def test_a_capture_is_complete(folder: Path) -> None:
     assert set(np.unique(read(folder / "masks" / "0_front.png"))) == {0, 128, 255}
 
 
+def test_any_number_of_photos_goes_evenly_round(groom: Groom, tmp_path: Path) -> None:
+    """Twelve photos are 30 degrees apart, each seen point is marked in its view, in any range."""
+    photograph(groom, tmp_path, seed=4, size=SIZE, views=12, jitter=0)
+    truth = read_truth(tmp_path)
+    azimuths = np.array([camera.azimuth_deg for camera in truth.cameras])
+    off = (azimuths - 30.0 * np.arange(12) + 180) % 360 - 180
+    assert np.abs(off).max() < 0.5
+    with np.load(tmp_path / "truth" / "strands.npz") as data:
+        seen = data["visible"]
+    assert all((seen >> np.uint64(view) & np.uint64(1)).any() for view in range(12))
+    names = list(json.loads((tmp_path / "landmarks.json").read_text())["views"])
+    assert names == ["photo-01", "photo-02", "photo-12"]
+    with pytest.raises(InputError, match="2 photos, expected 3 to 36"):
+        photograph(groom, tmp_path, views=2)
+
+
 def test_the_truth_is_the_groom(folder: Path, groom: Groom) -> None:
     """Strands, head and cameras read back; the cameras are the turn's up to their jitter."""
     truth = read_truth(folder)
