@@ -17,6 +17,8 @@ Example: hairkit synth wavy -o wavy/
 
 Grow a groom and take photos of it: photos/, masks/, landmarks.json, groom.npz, and truth/ for
 `hairkit evaluate`. Then: hairkit reconstruct wavy/ -o out/"""
+VIEWS = 8
+"""Photos by default."""
 STRANDS = 10_000
 """Hairs by default: a tenth of a head's."""
 
@@ -30,7 +32,7 @@ def register(subparsers: Any) -> None:
         "--strands", type=int, default=STRANDS, metavar="N", help=f"hairs ({STRANDS})"
     )
     parser.add_argument("--seed", type=int, default=0, help="of hair, cameras and room (0)")
-    parser.add_argument("--views", type=int, default=8, metavar="N", help="photos (8)")
+    parser.add_argument("--views", type=int, default=VIEWS, metavar="N", help=f"photos ({VIEWS})")
     parser.add_argument("--size", default="810x1080", metavar="WxH", help="photos (810x1080)")
     parser.add_argument(
         "--jitter", type=float, default=1.0, help="how far cameras leave the nominal turn (1)"

@@ -69,6 +69,9 @@ ABOVE, LOOSE_ABOVE = np.radians(35), 4.0
 azimuth and elevation are: such photos belong to no turn, and show no face."""
 PLACE_ROUNDS = 4
 """Rounds of the first place and depths: the magnification settles to 0.1 %."""
+ALL_RAYS_OF = 8
+"""Turns of more views than this share the contour points that so many views would have: time grows
+with the number of views, not with its square."""
 MIN_SIGHTS = 6
 """Fewer landmarks than this place no head."""
 
@@ -88,7 +91,9 @@ class Options:
     silhouette_px: float = option(
         3.0, low=0.1, high=50, doc="Noise of outlines, pictures 1080 high.", unit="px"
     )
-    contour_points: int = option(100, low=20, high=1000, doc="Contour points used in each view.")
+    contour_points: int = option(
+        100, low=20, high=1000, doc="Contour points of a view; fewer each beyond eight views."
+    )
     model: str = option(
         "auto",
         choices=("auto", "perspective", "orthographic"),
@@ -201,7 +206,8 @@ class _Problem:
         pixels = np.array([picture_scale(view.height) for view in capture.views])
         pixel = float(pixels.mean())
         turn = Turn.of(capture)
-        outlines = Outlines.of(masks, options.contour_points)
+        share = min(1.0, ALL_RAYS_OF / len(masks))
+        outlines = Outlines.of(masks, max(1, round(options.contour_points * share)))
         angles = np.radians([options.azimuth, options.elevation, options.roll])
         each = [*angles, options.distance, options.shift, options.shift]
         sights = Sights.of(capture, masks, options.landmark_px * pixels)
@@ -331,7 +337,7 @@ class _Problem:
         missed = np.logaddexp(0, -value[near] / soft) * soft / self.noise
         share = 1 / (1 + np.exp(value[near] / soft))
         weight = np.sqrt(soft_l1_weight(missed))
-        rows = np.einsum("nvk,vkp->np", slope[near], tangents)
+        rows = np.tensordot(slope[near], tangents, 2)
         return rows * (share * weight / self.noise)[:, None], missed * weight
 
     def _coherence(
