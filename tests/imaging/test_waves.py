@@ -176,7 +176,7 @@ def about_axes(strands: Strands) -> tuple[Float64Array, Float64Array]:
 def test_wound_strands_keep_roots_and_run_at_the_radius(slant: float) -> None:
     """Root, offsets and uv stay; beyond the ramp the axis is `radius` away, before it less."""
     straight, waves = hanging(), Waves(0.005, 0.04, slant)
-    wound = add_waves(straight, waves)
+    wound = add_waves(straight, waves, spread=0.0)
     np.testing.assert_allclose(wound.roots, straight.roots, atol=1e-7)
     np.testing.assert_array_equal(wound.offsets, straight.offsets)
     np.testing.assert_array_equal(wound.root_uv, straight.root_uv)
@@ -188,7 +188,7 @@ def test_wound_strands_keep_roots_and_run_at_the_radius(slant: float) -> None:
 @pytest.mark.parametrize("pitch", [0.02, 0.06])
 def test_wound_strands_turn_once_in_a_pitch(pitch: float) -> None:
     """Over 30 cm a strand turns 0.3 / pitch times, at an even pace."""
-    _, azimuth = about_axes(add_waves(hanging(), Waves(0.005, pitch, 0.3)))
+    _, azimuth = about_axes(add_waves(hanging(), Waves(0.005, pitch, 0.3), spread=0.0))
     pace = np.abs(np.diff(azimuth, axis=1)) / (2 * np.pi) / (0.3 / 199)
     np.testing.assert_allclose(pace[:, 5:], 1 / pitch, rtol=0.02)
 
@@ -196,7 +196,7 @@ def test_wound_strands_turn_once_in_a_pitch(pitch: float) -> None:
 def test_the_other_handedness_is_the_mirror_image() -> None:
     """From the same start every strand turns as far to the other side."""
     first, second = (
-        about_axes(add_waves(hanging(), Waves(0.005, 0.04, s)))[1] for s in (0.3, -0.3)
+        about_axes(add_waves(hanging(), Waves(0.005, 0.04, s), spread=0.0))[1] for s in (0.3, -0.3)
     )
     turned, back = (turn - turn[:, 10:11] for turn in (first, second))
     np.testing.assert_allclose(turned[:, 10:], -back[:, 10:], atol=0.01)
@@ -218,7 +218,7 @@ def test_a_camera_sees_wound_strands_slant_as_measured(
     pitch = 0.04
     slant = np.radians(slant_deg)
     straight = hanging(rows=8, points=600)
-    wound = add_waves(straight, Waves(pitch * np.tan(abs(slant)) / 4, pitch, slant))
+    wound = add_waves(straight, Waves(pitch * np.tan(abs(slant)) / 4, pitch, slant), spread=0.0)
     camera = orthographic(azimuth_deg)
     near = camera.to_camera(wound.points)[:, 2] < camera.to_camera(straight.points)[:, 2]
     near &= straight.arc_lengths() > 0.04
@@ -229,11 +229,23 @@ def test_a_camera_sees_wound_strands_slant_as_measured(
     )
 
 
+def test_radius_and_pitch_vary_from_wisp_to_wisp() -> None:
+    """Their means stay; their standard deviations over many wisps are the usual shares."""
+    straight = hanging(spacing=0.013, rows=16)
+    distance, azimuth = about_axes(add_waves(straight, Waves(0.005, 0.04, 0.3)))
+    radius, turned = distance[:, -1], np.abs(azimuth[:, -1] - azimuth[:, 40])
+    assert radius.mean() == pytest.approx(0.005, rel=0.05)
+    assert radius.std() / radius.mean() == pytest.approx(0.2, abs=0.05)
+    assert turned.std() / turned.mean() == pytest.approx(0.1, abs=0.03)
+
+
 def test_the_phase_changes_from_wisp_to_wisp() -> None:
     """Hair 0.2 mm apart is nearly in phase, hair 6 mm apart is not."""
 
     def spread(spacing: float) -> float:
-        _, azimuth = about_axes(add_waves(hanging(spacing, rows=10), Waves(0.005, 0.04, 0.3)))
+        _, azimuth = about_axes(
+            add_waves(hanging(spacing, rows=10), Waves(0.005, 0.04, 0.3), spread=0.0)
+        )
         phase = np.exp(1j * azimuth[:, 100]).reshape(10, 10)
         return float(np.abs(np.diff(phase, axis=1)).mean())
 
@@ -270,5 +282,5 @@ def test_no_radius_no_pitch_or_no_strands_is_no_change() -> None:
 
 def test_a_single_strand_is_wound_too() -> None:
     """One strand needs no neighbours."""
-    distance, _ = about_axes(add_waves(hanging(rows=1), Waves(0.005, 0.04, 0.3)))
+    distance, _ = about_axes(add_waves(hanging(rows=1), Waves(0.005, 0.04, 0.3), spread=0.0))
     assert distance[0, -1] == pytest.approx(0.005, abs=1e-5)
