@@ -29,7 +29,9 @@ from hairkit.evaluation.prediction import Prediction
 from hairkit.evaluation.scores import (
     Hits,
     Samples,
+    Score,
     StrandScores,
+    occupancy_score,
     sample_hits,
     sample_strands,
     scores_of_hits,
@@ -73,6 +75,8 @@ class Evaluation:
     similarity: Similarity
     cameras: tuple[CameraError, ...]
     scores: StrandScores
+    occupancy: Score
+    """Of the voxels that strands run through."""
     lengths: LengthMeasures
     true_head: HeadMeasures
     own_head: HeadMeasures
@@ -163,6 +167,7 @@ def evaluate(
         similarity=similarity,
         cameras=cameras,
         scores=scores_of_hits(precision, recall),
+        occupancy=occupancy_score(samples, truth.samples),
         lengths=length_measures(groom.strands, truth.strands),
         true_head=head_measures(groom.strands, samples, truth.head),
         own_head=head_measures(groom.strands, samples, groom.head),

@@ -12,6 +12,8 @@ from hairkit.evaluation.scores import Score
 
 _F_MEANING = "higher is better, 100 is best: points of either side that have a match on the other"
 
+_OCCUPANCY_MEANING = "higher is better, 100 is best: voxels with hair, whatever its direction"
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -54,6 +56,7 @@ def _strand_figures(evaluation: Evaluation) -> tuple[Figure, ...]:
     return (
         *_f_figures(scores.all, "all"),
         *_f_figures(outer, "outer"),
+        Figure("occupancy F 3 mm, all", 100 * evaluation.occupancy.f, "", 1, _OCCUPANCY_MEANING),
         Figure("signed F behind sign-free F", behind, "", 1, "0 is best: no strand runs backwards"),
         Figure("mean length / true", lengths.mean_ratio, "", 2, "1 is best"),
         Figure(

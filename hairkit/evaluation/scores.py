@@ -24,6 +24,12 @@ OUTER_DEPTH = 0.003
 """A predicted sample is outer at most this far behind some view's first surface, metres."""
 
 
+ANY_DIRECTION = 90.0
+"""Largest angle in degrees between directions whose sign does not count."""
+OCCUPANCY_VOXEL = 0.003
+"""Edge of the voxels whose occupancy is compared, metres."""
+
+
 @dataclass(frozen=True)
 class Score:
     """Precision, recall and their harmonic mean at one threshold, each in [0, 1]."""
@@ -158,6 +164,20 @@ def scores_of_hits(
         outer=outer,
         outer_signed=outer_signed,
     )
+
+
+def occupancy_score(predicted: Samples, true: Samples, voxel: float = OCCUPANCY_VOXEL) -> Score:
+    """Return precision and recall of the voxels that strands run through, whatever the direction.
+
+    Voxels have edges of `voxel` metres and a corner at the origin. Counted once each, they do not
+    depend on the number of strands in them, which F of samples does.
+    """
+    mine, other = (
+        np.unique(np.floor(samples.points / voxel).astype(np.int64), axis=0)
+        for samples in (predicted, true)
+    )
+    both = len(mine) + len(other) - len(np.unique(np.concatenate([mine, other]), axis=0))
+    return Score(1000 * voxel, ANY_DIRECTION, both / len(mine), both / len(other))
 
 
 def sample_strands(

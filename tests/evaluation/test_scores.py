@@ -15,7 +15,7 @@ from hairkit.arrays import UInt8Array
 from hairkit.errors import InputError
 from hairkit.evaluation.depth_map import first_surface
 from hairkit.evaluation.neighbour_search import FIRST_HIT_NONE, HashGrid, first_hits
-from hairkit.evaluation.scores import Score, sample_strands, strand_scores
+from hairkit.evaluation.scores import Score, occupancy_score, sample_strands, strand_scores
 from hairkit.evaluation.truth import read_truth
 from hairkit.types.camera import Camera
 from hairkit.types.strands import Strands
@@ -52,6 +52,20 @@ def test_hair_against_itself_is_perfect() -> None:
     assert f_of(scores.all) == f_of(scores.all_signed) == [1.0, 1.0, 1.0]
     assert (scores.predicted_strands, scores.true_strands) == (2, 2)
     assert scores.outer is None
+
+
+def test_occupancy_counts_voxels_not_strands_or_directions() -> None:
+    """Copies and reversed strands change nothing; hair in other voxels has no share in it."""
+    hair = hanging([[0.0015, 0, 0.0015], [0.0495, 0, 0.0015]])
+    one = sample_strands(hair.select(np.array([0])))
+    both = sample_strands(hair)
+    whole = occupancy_score(both, both)
+    assert (whole.precision, whole.recall) == (1.0, 1.0)
+    assert occupancy_score(sample_strands(hair.select(np.array([0, 1, 0, 1]))), both).f == 1.0
+    half = occupancy_score(one, both)
+    assert (half.precision, half.recall) == (1.0, 0.5)
+    assert occupancy_score(sample_strands(reversed_strands(hair)), both).f > 0.97
+    assert occupancy_score(one, sample_strands(moved(hair, [0.006, 0, 0]))).f == 0.0
 
 
 def test_backwards_hair_is_right_only_without_its_sign() -> None:
