@@ -21,8 +21,8 @@ from hairkit.types.camera import Camera
 
 WIDTH, HEIGHT = 360, 480
 """Pixels of the picture that is drawn; outlines are given in shares of it."""
-LENS_MM, DISTANCE = 42.0, 0.85
-"""Full-frame focal length and metres to the head: arm's length of a helper, hair all in frame."""
+LENS_MM, DISTANCE = 42.0, 0.7
+"""Full-frame focal length and metres to the head, as the plugin `manual` assumes them."""
 LOOK_AT = (0.0, -0.02, 0.0)
 """Metres in the head frame in the middle of the picture."""
 HAIR_ABOVE = 0.045

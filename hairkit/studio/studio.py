@@ -149,12 +149,14 @@ class Studio:
 
     async def _look(self) -> None:
         """Find what is not known yet of the photos, one after the other."""
-        self.formats = (await self.editor.call("formats", PHOTO_S))["formats"]
         while True:
+            with contextlib.suppress(TaskError):
+                if not self.formats:
+                    self.formats = (await self.editor.call("formats", PHOTO_S))["formats"]
             for shot in self.project.shots:
                 facts = self.facts.setdefault(shot.id, {})
                 large = self.project.picture(shot, "large")
-                with contextlib.suppress(HairkitError, OSError):
+                with contextlib.suppress(HairkitError, OSError, KeyError):  # it may go
                     if not large.is_file():
                         await self._draw_pictures(shot)
                     if "outline_of" not in facts and not facts.get("busy"):
@@ -221,7 +223,7 @@ class Studio:
             project.set_built(inputs, done)
             self._set_build(state="done", **done)
             self.events.send("project", **self.summary())
-        except TaskError as error:
+        except (TaskError, OSError) as error:
             stopped = self._wanted.is_set()
             self._set_build(state="waiting" if stopped else "failed", reason=str(error))
 

@@ -35,7 +35,7 @@ from hairkit.types.person import Person
 
 SMALL_EDGE, LARGE_EDGE = 360, 1440
 """Long edges in pixels of the pictures that pages show."""
-OUTLINE_EDGE = 720
+OUTLINE_EDGE = 600
 """Long edge in pixels of photos whose outlines are found while somebody draws."""
 OUTLINE_TOLERANCE = 0.6
 """Pixels of that photo by which an outline may be simplified."""

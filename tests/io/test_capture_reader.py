@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from hairkit.errors import InputError
 from hairkit.io.capture_reader import TURN, read_capture, sample_folder
+from hairkit.io.capture_toml import ViewEntry, read_capture_file, write_view_entries
 from hairkit.io.photos import focal_from_equivalent
 from hairkit.testing import striped_view
 from hairkit.types.capture import Capture
@@ -250,3 +251,25 @@ def test_an_image_bomb_is_refused(tmp_path: Path) -> None:
     spoil_photo(folder, bytes(data))
     with pytest.raises(InputError, match="30000 x 30000 pixels"):
         read_capture(folder)
+
+
+def test_views_are_written_as_they_are_read(tmp_path: Path) -> None:
+    """Tables of views are replaced, all else in capture.toml stays; an empty file goes."""
+    path = tmp_path / "capture.toml"
+    entries = (
+        ViewEntry("front", 'Ä "b".jpg', 10.5, None, 900.0),
+        ViewEntry(photo="c\\d.jpg", elevation_deg=60.0),
+    )
+    write_view_entries(path, entries)
+    assert read_capture_file(path).views == entries
+    path.write_text("orthographic = true\n\n" + path.read_text() + "\n[head]\nscale = 2.0\n")
+    write_view_entries(path, entries[1:])
+    found = read_capture_file(path)
+    assert found.views == entries[1:]
+    assert found.orthographic
+    assert found.head_pose is not None
+    write_view_entries(path, ())
+    assert path.read_text() == "orthographic = true\n\n[head]\nscale = 2.0\n"
+    path.write_text("")
+    write_view_entries(path, ())
+    assert not path.exists()

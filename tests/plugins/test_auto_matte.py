@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from hairkit_plugins import auto_matte
+from hairkit_plugins import auto_matte, grabcut
 
 from hairkit.errors import InputError
 from hairkit.types.capture import View
@@ -108,3 +109,28 @@ def test_hair_is_found_in_a_rendered_capture(captures: Path) -> None:
     view = View("back", 180.0, np.ascontiguousarray(pixels[..., ::-1]))
     mask = auto_matte.segment(view=view, options=auto_matte.Options())
     assert overlap(mask.hair, truth == HAIR) > 0.75
+
+
+def test_a_stroke_corrects_the_mask(tmp_path: Path) -> None:
+    """What a stroke is on is as it says, and so is what is like it nearby; the rest stays."""
+    photo, _ = portrait()
+    file = tmp_path / "front.json"
+
+    def segment(label: str, points: list[list[float]]) -> np.ndarray:
+        shape = {"label": label, "shape_type": "linestrip", "points": points}
+        document = {"flags": {"corrects": True}, "shapes": [shape] if points else []}
+        file.write_text(json.dumps(document))
+        view = View("front", 0.0, photo, strokes_path=file)
+        assert grabcut.segment(view=view, options=grabcut.Options()) is None
+        return auto_matte.segment(view=view, options=auto_matte.Options()).hair
+
+    automatic = segment("foreground", [])
+    coat = [[60.0, 250.0], [150.0, 250.0]]
+    added = segment("foreground", coat)
+    assert not automatic[250, 60:150].any()
+    assert added[250, 65:145].mean() > 0.9
+    crown = [[90.0, 60.0], [120.0, 60.0]]
+    removed = segment("background", crown)
+    assert automatic[60, 90:120].mean() > 0.9
+    assert removed[60, 93:117].mean() < 0.1
+    assert overlap(segment("background", [[5.0, 5.0], [5.0, 60.0]]), automatic) > 0.97

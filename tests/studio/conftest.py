@@ -87,7 +87,9 @@ class Server:
     def kill(self) -> None:
         """End the process as a power failure would."""
         self.process.kill()
-        self.process.communicate()
+        self.process.wait()
+        if self.process.stderr is not None:
+            self.process.stderr.close()
 
 
 def start(folder: Path, *words: str) -> Server:

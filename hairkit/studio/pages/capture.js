@@ -11,17 +11,17 @@ const directions = { front: "Look at the camera", left: "left side to the camera
 export function show(main) {
   let stream = null, guides = [], at = 0, taken = new Map(), advice = {}, limits = {}, timer = 0;
   let goodFor = 0, lastSpoken = 0, lastText = "", busy = false, before = null, automatic = true, aloud = true;
-  let looking = false, looked = { at: -1, time: 0, found: [] };
+  let looking = false, pressed = false, looked = { at: -1, time: 0, found: [] };
   let heading = null, headingAtFront = null, zeroOffset = 0;
 
   const video = make("video", { playsinline: true, muted: true, autoplay: true, "aria-label": "Picture of the camera" });
   video.muted = true;
   const guide = make("svg", { class: "guide", viewBox: "0 0 3 4", preserveAspectRatio: "xMidYMid meet", "aria-hidden": "true" });
   const hint = make("p", { class: "hint", role: "status", "aria-live": "polite" }, "Starting the camera…");
-  const shutter = make("button", { class: "shutter", "aria-label": "Take the photo", title: "Space", onclick: () => take() });
-  const finder = make("div", { class: "finder" }, video, guide);
-  const stage = make("section", { class: "stage", "aria-label": "Camera" }, finder, hint, make("div", { class: "overlay" }, shutter));
+  const shutter = make("button", { class: "shutter", "aria-label": "Take the photo", title: "Space", onclick: () => press() });
   const ring = make("svg", { class: "ring", viewBox: "0 0 200 200", role: "img", "aria-label": "Views taken" });
+  const finder = make("div", { class: "finder" }, video, guide);
+  const stage = make("section", { class: "stage", "aria-label": "Camera" }, finder, hint, make("div", { class: "overlay" }, shutter), ring);
   const count = make("select", { onchange: () => load() }, ...COUNTS.map((n) => make("option", { value: n }, `${n} views`)));
   const auto = make("button", { "aria-pressed": "true", onclick: () => { automatic = !automatic; auto.setAttribute("aria-pressed", String(automatic)); } }, "Automatic");
   const voice = make("button", { "aria-pressed": "true", onclick: () => { aloud = !aloud; voice.setAttribute("aria-pressed", String(aloud)); } }, "Voice");
@@ -32,7 +32,7 @@ export function show(main) {
   const phone = make("button", { onclick: pair }, "Use a phone");
   const paired = make("div", { class: "code" });
   main.append(make("div", { class: "split" }, stage, make("section", { class: "side", "aria-label": "The turn" },
-    ring, make("div", { class: "row" }, make("label", {}, "Turn", count), make("label", {}, "Camera", cameras)),
+    make("div", { class: "row" }, make("label", {}, "Turn", count), make("label", {}, "Camera", cameras)),
     make("div", { class: "tools" }, auto, voice, retake, skip), finish, phone, paired,
     make("p", { class: "quiet" }, "Head into the outline, top of the hair below the dashed line, the same distance all around. Good: window light, plain wall, hair loose. Bad: lamp behind, zoom, a hat."))));
 
@@ -205,8 +205,14 @@ export function show(main) {
       return;
     }
     goodFor += CHECK_MS / 1000;
-    tell(automatic ? "Good, hold still" : "Good: press the shutter", "Good");
-    if (automatic && goodFor > READY_S && known && taken.size && !taken.has(at)) take();
+    tell(automatic && pressed && !guides[at].elevation ? "Good, hold still" : "Good: press the shutter", "Good");
+    if (automatic && goodFor > READY_S && known && pressed && !guides[at].elevation && !taken.has(at)) take();
+  }
+
+  // The first shot is always the user's: it says that the turn begins.
+  function press() {
+    pressed = true;
+    return take();
   }
 
   async function take() {
@@ -255,7 +261,7 @@ export function show(main) {
   function key(event) {
     if (event.key === " " && !(event.target instanceof HTMLButtonElement) && !(event.target instanceof HTMLSelectElement)) {
       event.preventDefault();
-      take();
+      press();
     }
   }
   addEventListener("deviceorientation", turned);

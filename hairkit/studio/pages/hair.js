@@ -46,8 +46,8 @@ export function show(main) {
     const formats = [...state.formats].sort((a, b) => (engines[b[0]] ? 1 : 0) - (engines[a[0]] ? 1 : 0));
     return make("section", { class: "side", "aria-label": "Files" },
       make("h2", {}, "Take it with you"),
-      make("a", { class: "button primary", href: "/api/result/page", download: "result.html" }, "result.html: moves in any browser"),
-      make("p", { class: "quiet" }, "One file that needs no server."),
+      make("a", { class: "button primary", href: "/api/result/page", download: "result.html" }, "Save result.html"),
+      make("p", { class: "quiet" }, "One file that moves in any browser and needs no server."),
       make("div", { class: "tools" }, ...formats.map(([plugin, suffix]) =>
         make("a", { class: "button", href: `/api/result/${plugin}`, download: `groom${suffix}`, title: engines[plugin] ?? plugin }, suffix))),
       make("a", { href: "/api/result/sheet", target: "_blank" }, "Overview of all steps"),
