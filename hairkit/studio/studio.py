@@ -159,7 +159,7 @@ class Studio:
                 with contextlib.suppress(HairkitError, OSError, KeyError):  # it may go
                     if not large.is_file():
                         await self._draw_pictures(shot)
-                    if "outline_of" not in facts and not facts.get("busy"):
+                    if "outline_of" not in facts:
                         await self.outline(shot)
                         self.events.send("project", **self.summary())
                         break
