@@ -23,6 +23,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `simulate`: simulation to a cache
 * `studio`: photos to moving hair in a browser
 * `synth`: procedural captures
+* `study`: questionnaires
 * `view`: the viewer
 """
 
@@ -48,6 +49,7 @@ VERBS = {
     "rerun": "run a reconstruction again from its record",
     "evaluate": "score a groom against the truth",
     "synth": "make a procedural groom and photos of it, with their truth",
+    "study": "make a questionnaire: which hair is whose",
     "render": "draw a groom on its head",
     "view": "show a groom in motion, in a window or by a script",
     "export": "write a groom in an engine's format",

@@ -28,7 +28,7 @@ FLOORS = (
     ("simulation", "grooming", "synth", "hookspecs"),
     ("manager", "testing"),
     ("pipeline", "evaluation"),
-    ("viewer", "studio", "api"),
+    ("viewer", "studio", "study", "api"),
     ("cli", "__main__"),
 )
 """Rooms of hairkit, lowest floor first. A room may use its own floor and those below."""

@@ -1,0 +1,176 @@
+"""What a study asks about: reconstructions with their photos, and stock grooms as distractors."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from hairkit.arrays import Float32Array, UInt8Array
+from hairkit.errors import InputError
+from hairkit.evaluation.prediction import WORK, Prediction, read_prediction
+from hairkit.grooming.densify import densify
+from hairkit.head_model.template import default_head
+from hairkit.imaging.masked_filters import double_angle
+from hairkit.io.capture_reader import WORKING_EDGE, read_capture
+from hairkit.manager import Manager
+from hairkit.pipeline.run_record import RECORD, read_record
+from hairkit.rendering import draw_views
+from hairkit.rendering.measurement import draw_measurements
+from hairkit.simulation import run, static_motion
+from hairkit.simulation.posing import pose_groom
+from hairkit.storage import from_arrays, read_npz
+from hairkit.study.frame import BACKDROP, cut_out, frame_camera
+from hairkit.synth import STYLES, grow
+from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture
+from hairkit.types.groom import Groom
+from hairkit.types.mask import HAIR
+from hairkit.types.strands import Strands
+from hairkit.types.turnaround import Turnaround
+
+HAIRS, POINTS = 20_000, 48
+"""Strands drawn of a groom, and points of each."""
+COARSE_HAIRS, COARSE_POINTS, COARSE_WIDTH = 4_000, 24, 2.5e-3
+"""Strands, points a strand and width in metres of the hair that a program looks at: a pixel of the
+frame is a millimetre wide."""
+SIMULATOR = "pbd"
+SETTLING_S = 2.0
+"""Seconds of simulation before a groom is drawn: it hangs as a game would show it."""
+_RATE = 60.0
+_STOCK_GUIDES = 1_000
+"""Guides of a stock groom: as many as an artist's."""
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What a program compares of the hair in a picture of the frame."""
+
+    hair: Float32Array
+    """(H, W) coverage by hair, 0 to 1."""
+    direction: Float32Array
+    """(H, W, 2) cosine and sine of twice the angle of the hair, times its certainty."""
+    colour: Float32Array
+    """(3,) mean sRGB of the hair, 0 to 255."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """A photo of a subject, and the camera that took it."""
+
+    name: str
+    camera: Camera
+    picture: UInt8Array
+    """(H, W, 3) RGB of the frame."""
+    look: Look
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A groom at rest under gravity, and the photos it was made of; none of a stock groom."""
+
+    name: str
+    groom: Groom
+    hair: Strands
+    shots: tuple[Shot, ...] = ()
+
+    def draw(self, camera: Camera) -> UInt8Array:
+        """Return the groom on its head in the frame (H, W, 3) RGB, from where `camera` stands."""
+        framed = frame_camera(camera)
+        return draw_views(self.hair, self.groom.head, [framed], material=self.groom.material)[0]
+
+    def look(self, camera: Camera) -> Look:
+        """Return what a program sees of `draw(camera)`."""
+        framed, hair, head = frame_camera(camera), self._coarse, self.groom.head
+        [picture] = draw_views(hair, head, [framed], material=self.groom.material, supersample=1)
+        measured = draw_measurements(hair, head, framed, width=COARSE_WIDTH)
+        seen = measured.seen.astype(np.float32)
+        return Look(seen, double_angle(measured.angle, seen), _mean_colour(picture, seen))
+
+    @cached_property
+    def _coarse(self) -> Strands:
+        return densify(self.groom, COARSE_HAIRS).resampled(COARSE_POINTS)
+
+
+def read_subject(
+    folder: str | os.PathLike[str], manager: Manager, *, settling: float = SETTLING_S
+) -> Subject:
+    """Read what `hairkit reconstruct` wrote, and the photos that its record names.
+
+    Raises `InputError` where the photos, the masks or the orientation maps are not there any more.
+    """
+    base = Path(folder)
+    prediction, capture = read_prediction(base), _read_photos(base)
+    if prediction.masks is None or prediction.orientations is None:
+        raise InputError(f"{base / WORK}: masks and orientation maps are gone; reconstruct again")
+    photos = {view.name: view.image for view in capture.views}
+    if missing := set(prediction.names) - photos.keys():
+        raise InputError(f"{base}: no photo of view {min(missing)!r}; reconstruct again")
+    shots = tuple(
+        _shot(prediction, view, photos[name]) for view, name in enumerate(prediction.names)
+    )
+    return replace(_settle(base.resolve().name, prediction.groom, manager, settling), shots=shots)
+
+
+def make_stock(
+    manager: Manager, *, seed: int = 0, settling: float = SETTLING_S
+) -> tuple[Subject, ...]:
+    """Return a groom of each style of `hairkit synth`: hair that nobody photographed."""
+    head = default_head()
+    return tuple(
+        _settle(f"stock {style}", grow(style, head, _STOCK_GUIDES, seed), manager, settling)
+        for style in STYLES
+    )
+
+
+def check_names(subjects: Sequence[Subject]) -> None:
+    """Raise `InputError` where two subjects have one name."""
+    names = [subject.name for subject in subjects]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"two folders are called {name!r}; a study tells them by their names")
+
+
+def _settle(name: str, groom: Groom, manager: Manager, seconds: float) -> Subject:
+    """Return the groom as it hangs after `seconds`, its guides interpolated to full hair."""
+    if not len(groom.strands):
+        raise InputError(f"{name}: its groom holds no strands")
+    if seconds > 0:
+        simulator = manager.call("make_simulator", SIMULATOR, groom=groom)
+        with manager.guard("make_simulator", SIMULATOR):
+            cache = run(simulator, static_motion(), 1, _RATE, warm_up=seconds)
+        groom = pose_groom(groom, cache, 0)
+    return Subject(name, groom, densify(groom, max(HAIRS, len(groom.strands))).resampled(POINTS))
+
+
+def _read_photos(folder: Path) -> Capture:
+    """Return the capture of a run, arranged as the run found the turn."""
+    record = read_record(folder / RECORD)
+    if record.photos is None:
+        raise InputError(f"{folder}: its photos were given as objects, not as files")
+    capture = read_capture(str(record.photos), record.max_edge or WORKING_EDGE)
+    path = folder / WORK / "turn.npz"
+    if not path.is_file():
+        return capture
+    return capture.arranged(from_arrays(Turnaround, read_npz(path), str(path)))
+
+
+def _shot(prediction: Prediction, view: int, photo: UInt8Array) -> Shot:
+    assert prediction.masks is not None
+    assert prediction.orientations is not None
+    camera, found = prediction.cameras[view], prediction.orientations[view]
+    hair = cut_out((prediction.masks[view].labels == HAIR).astype(np.float32), camera)
+    picture = cut_out(photo, camera, BACKDROP)
+    direction = cut_out(double_angle(found.angle, found.confidence), camera)
+    look = Look(hair, direction, _mean_colour(picture, hair))
+    return Shot(prediction.names[view], camera, picture, look)
+
+
+def _mean_colour(picture: UInt8Array, hair: Float32Array) -> Float32Array:
+    if not hair.any():
+        return np.zeros(3, np.float32)
+    return np.average(picture.reshape(-1, 3), axis=0, weights=hair.ravel()).astype(np.float32)
