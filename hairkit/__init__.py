@@ -17,6 +17,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `simulation`: contract of simulators, motion, wind
 * `grooming`: methods on strands and grooms
 * `studio`: from a camera to moving hair, in a browser
+* `study`: questionnaires about reconstructions
 * `synth`: procedural hair
 * `pipeline`: recipes and runs
 * `evaluation`: scores against ground truth

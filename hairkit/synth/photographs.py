@@ -121,7 +121,8 @@ def photograph(
     cameras = _cameras(list(turn.values()), size, jitter, orthographic, generator)
     stems = [f"{i}_{name}" if views == len(TURN) else name for i, name in enumerate(turn)]
     photos = shoot.photos(cameras, generator)
-    seen = np.zeros(len(groom.strands.points), np.uint64 if views > len(TURN) else np.uint8)
+    bits: type[np.uint8 | np.uint64] = np.uint64 if views > len(TURN) else np.uint8
+    seen: npt.NDArray[np.unsignedinteger[Any]] = np.zeros(len(groom.strands.points), bits)
     for index, (stem, camera) in enumerate(zip(stems, cameras, strict=True)):
         write_bytes(base / "photos" / f"{stem}.jpg", _jpeg(photos[index]))
         write_bytes(base / "masks" / f"{stem}.png", _png(shoot.labels(camera)))
