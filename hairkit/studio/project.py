@@ -71,6 +71,8 @@ class Project:
             leftover.unlink(missing_ok=True)
         self.shots = self._read_shots()
         self._said = self._said_entries()
+        if self._kept() not in ([], self.shots):  # files came or went while nobody looked
+            self._keep(self.shots)
         if shutil.disk_usage(self.folder).free < _LARGEST_STATE:
             raise InputError(f"{self.folder}: no room on this disk; free some")
 

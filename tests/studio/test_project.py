@@ -169,3 +169,18 @@ def test_a_crash_at_any_step_leaves_a_capture(
         if not cut:
             return
     raise AssertionError("a change of more than 12 file operations")
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_photos_that_came_or_went_by_hand_are_found(
+    tmp_path: Path, photos: list[Path], named: bool
+) -> None:
+    """A project whose photos somebody changed in the folder is a capture once it is opened."""
+    project = filled(tmp_path / "p", photos, named)
+    if not named:
+        project.arrange([2, 1, *range(3, len(photos) + 1)])
+    (project.photo_folder / "003.jpg").unlink()
+    shutil.copy(photos[0], project.photo_folder / "extra.jpg")
+    again = Project(project.folder)
+    assert [shot.file for shot in again.shots][-1] == "extra.jpg"
+    assert len(read_capture(again.folder).views) == len(photos)
