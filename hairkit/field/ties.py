@@ -41,6 +41,9 @@ LEAST_FACING = 0.35
 """Cosine between a normal and the ray to the camera below which a view does not see the place."""
 HAIR_HEIGHT = 0.008
 """Metres above the scalp at which a view sees the hair."""
+LEAST_FRINGE, SHORTEST_FRINGE = 4e-6, 0.045
+"""Cubic metres of loose hair, and its way from the scalp in metres, that make a fringe: edges of
+masks leave parts of up to 1.8e-6 and 0.034 below the hairline."""
 NEAR_TIE = 0.03
 """Metres around a tie in which directions do not count: the bundle hides the hair there."""
 CANDIDATES = 400
@@ -102,7 +105,32 @@ def measure_ties(
         )
         if sureness > 0:
             tails.append(_tail_of(bundle, hull, scalp_distance, min(sureness, 1.0)))
-    return TiedHair(tuple(tail for tail in tails if tail is not None))
+    found = tuple(tail for tail in tails if tail is not None)
+    if not found:
+        return TiedHair()
+    fringe = find_fringe(head, hull, scalp_distance, bundles)
+    return TiedHair(found, fringe, len(fringe) / int(hull.dense.sum()))
+
+
+def find_fringe(
+    head: Head, hull: Hull, scalp_distance: ScalpDistance, bundles: Sequence[Bundle]
+) -> Float32Array:
+    """Return cells (K, 4) of hair that hangs over bare skin: centres, and ways from the scalp."""
+    way = scalp_distance.values
+    cells = hull.dense & (way > 0)
+    for bundle in bundles:
+        cells &= ~bundle.cells
+    nearest = cKDTree(head.vertices).query(hull.grid.centres_of(cells))[1]
+    hanging = np.zeros(hull.grid.shape, bool)
+    hanging[cells] = head.scalp[nearest] <= 0.5
+    parts, count = ndimage.label(hanging, np.ones((3, 3, 3)))
+    if not count:
+        return np.zeros((0, 4), np.float32)
+    number = np.arange(1, count + 1)
+    volume = ndimage.sum(hanging, parts, number) * hull.grid.spacing**3
+    longest = ndimage.maximum(way, parts, number)
+    keep = np.append(False, (volume >= LEAST_FRINGE) & (longest >= SHORTEST_FRINGE))[parts]
+    return np.column_stack([hull.grid.centres_of(keep), way[keep]]).astype(np.float32)
 
 
 class Bundle(NamedTuple):

@@ -6,6 +6,7 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `assemble`: strands, head and photo colours put together as a groom
 * `decimate`: guides chosen from full hair
 * `densify`: full hair interpolated between guides
+* `fringe`: strands that hang loose beside tied hair
 * `guide_weights`: the nearest guides of each hair, and hair that follows them
 * `head_collision`: strand points pushed out of the head
 * `postprocess`: smoothing, waves and head collision after tracking

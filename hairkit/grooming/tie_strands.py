@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.field.growth_prior import gradient
+from hairkit.grooming.fringe import hang_fringe
 from hairkit.types.strands import Strands
 from hairkit.types.tie import Tail, TiedHair
 from hairkit.types.volume import Hull, OrientationField, symmetric_matrices
@@ -49,7 +50,7 @@ GOLDEN = 2.399963229728653
 def lead_to_ties(strands: Strands, tied: TiedHair, hull: Hull, field: OrientationField) -> Strands:
     """Return strands of equal point counts that pass through the nearest tie; group k is tie k - 1.
 
-    Without ties the strands come back as they are.
+    The fringe hangs loose, in group 0. Without ties the strands come back as they are.
     """
     if not tied.tails or not len(strands):
         return strands
@@ -62,7 +63,10 @@ def lead_to_ties(strands: Strands, tied: TiedHair, hull: Hull, field: Orientatio
         own = np.flatnonzero(nearest == number)
         if len(own):
             points[own] = _tied_paths(roots[own], tail, hull, field, count)
+    loose, hanging = hang_fringe(roots, tied, field, count)
+    points[loose] = hanging
     group = (nearest + 1).astype(np.int32)
+    group[loose] = 0
     return replace(strands, points=points.reshape(-1, 3), group=group)
 
 

@@ -16,6 +16,7 @@ class Feature(StrEnum):
     WIDTHS = "width per point"
     ROOT_UV = "root uv"
     GROUP = "groups"
+    TIES = "ties"
     GUIDE = "guide flag"
     GUIDE_WEIGHTS = "guide weights"
     DENSITY = "density at the roots"

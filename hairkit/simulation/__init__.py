@@ -9,6 +9,7 @@ The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)`
 * `quaternion`: arrays of unit quaternions
 * `running`: runs a simulator without a window
 * `simulator`: the protocol of all simulators
+* `ties`: which part of every strand its tie holds to the head
 * `wind`: mean wind and gusts
 """
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
@@ -72,3 +72,12 @@ class TiedHair(Stored):
 
     tails: tuple[Tail, ...] = ()
     """The largest first."""
+    fringe: Float32Array = field(default_factory=lambda: np.zeros((0, 4), np.float32))
+    """(K, 4) centres of cells of hair that hangs loose over bare skin, and their ways through the
+    hair from the scalp, metres."""
+    fringe_share: float = 0.0
+    """Share of the hair's volume that hangs loose."""
+
+    def __post_init__(self) -> None:
+        fringe = frozen_array(self.fringe, np.float32, (None, 4), "fringe of tied hair")
+        object.__setattr__(self, "fringe", fringe)

@@ -39,6 +39,7 @@ FORMAT = FileFormat(
             Feature.WIDTHS,
             Feature.ROOT_UV,
             Feature.GROUP,
+            Feature.TIES,
             Feature.GUIDE,
             Feature.HEAD,
             Feature.CAPSULES,

@@ -8,13 +8,14 @@ import numpy as np
 
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Capsules, Head
+from hairkit.types.tie import Tie
 
 VERSION = 1
 _PHYSICS = ("stiffness", "bend_stiffness", "damping", "friction", "gravity")
 
 
 def groom_extras(groom: Groom) -> dict[str, Any]:
-    """Return material, physics, capsules and landmarks of a groom: SI units, linear colours."""
+    """Return what glTF has no place for: material, physics, capsules, ties, landmarks; SI units."""
     look, head = groom.material, groom.head
     landmarks = head.landmark_vertices
     return {
@@ -33,6 +34,15 @@ def groom_extras(groom: Groom) -> dict[str, Any]:
             "second": head.capsules.second.tolist(),
             "radius": head.capsules.radius.tolist(),
         },
+        "ties": [
+            {
+                "centre": tie.centre.tolist(),
+                "axis": tie.axis.tolist(),
+                "radius": float(tie.radius),
+                "kind": tie.kind,
+            }
+            for tie in groom.ties
+        ],
         "landmark_vertices": None if landmarks is None else landmarks.tolist(),
     }
 
@@ -50,6 +60,19 @@ def material_of(extras: dict[str, Any]) -> HairMaterial:
 def physics_of(extras: dict[str, Any]) -> HairPhysics:
     """Return the physics."""
     return HairPhysics(*(_number(extras["physics"][name]) for name in _PHYSICS))
+
+
+def ties_of(extras: dict[str, Any]) -> tuple[Tie, ...]:
+    """Return the ties; none in files of older versions."""
+    return tuple(
+        Tie(
+            np.array(tie["centre"], np.float32),
+            np.array(tie["axis"], np.float32),
+            _number(tie["radius"]),
+            str(tie["kind"]),
+        )
+        for tie in extras.get("ties", [])
+    )
 
 
 def capsules_of(extras: dict[str, Any]) -> Capsules:

@@ -19,7 +19,7 @@ from hairkit.types.groom import Groom
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
 
-from .extras import VERSION, capsules_of, material_of, physics_of, with_landmarks
+from .extras import VERSION, capsules_of, material_of, physics_of, ties_of, with_landmarks
 from .joining import join_segments
 from .meshes import JOINTS
 
@@ -78,13 +78,14 @@ def read_gltf_groom(path: str | os.PathLike[str], options: ReaderOptions) -> Gro
         head = _own_head(file, own) if own else None
         material = material_of(own) if own else None
         physics = physics_of(own) if own else None
+        ties = ties_of(own) if own else ()
     if head is not None and options.head is None and material is not None:
         triangle, barycentric = bind(strands.roots, head)
         groom = Groom(strands, head, triangle, barycentric, material)
         groom.check_reach(path)
     else:
         groom = adopt(strands, ImportOptions(options.head), path, material, head)
-    return groom if physics is None else replace(groom, physics=physics)
+    return groom if physics is None else replace(groom, physics=physics, ties=ties)
 
 
 def _own_extras(file: GlbFile) -> dict[str, Any] | None:

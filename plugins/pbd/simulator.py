@@ -15,6 +15,7 @@ from hairkit.grooming.prepare_export import select_strands
 from hairkit.rendering.context import on_graphics_card
 from hairkit.simulation import Measures, Surroundings
 from hairkit.simulation.obstacles import Obstacles, head_obstacles
+from hairkit.simulation.ties import held_lengths
 from hairkit.simulation.wind import air_velocity, gust_waves
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
@@ -38,6 +39,8 @@ HAIR_DENSITY = 1300.0
 """Density of keratin, kg/m^3."""
 SINGLE_HAIR = 1.2e-3
 """m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""
+HELD = 4e4
+"""1/s^2: squared frequency, of 32 Hz, at which hair before its tie is pulled to the head."""
 _KEPT_SYSTEMS = 4
 
 
@@ -168,7 +171,7 @@ class PbdSimulator:
             mass = self._rods.mass.reshape(-1)
             self._hair_grid: HairGrid = make_hair_grid(self._nodes.reshape(-1, 3), mass)
         self._options = resolved
-        self._rates = _rates(resolved, self._rods, self._width)
+        self._rates = _rates(resolved, self._rods, self._width, self._held)
         self._systems: dict[float, System] = {}
         self._rest_energy = None
         self._contact = _contact(resolved, self._obstacles, self._near, self._deepest)
@@ -184,6 +187,8 @@ class PbdSimulator:
             self._width = np.maximum(mean, 1e-6)
         near = self._obstacles.at(self._nodes.reshape(-1, 3))[0]
         self._near: Float64Array = near.reshape(self._nodes.shape[:2])
+        length = np.maximum(strands.lengths(), 1e-9)
+        self._held: Float64Array = held_lengths(self._groom) / length
         # embedded points between nodes outside the head may still cut through it
         self._deepest = np.minimum(self._obstacles.at(strands.points)[0], 0.001) - 1e-5
 
@@ -284,15 +289,18 @@ def _engine(name: str, rods: Rods, contact: Contact) -> Engine:
     return FastEngine(rods, contact)
 
 
-def _rates(options: Options, rods: Rods, width: Float64Array) -> Rates:
-    """Convert options to rates; drag goes as area over mass, which is 1 / width."""
+def _rates(options: Options, rods: Rods, width: Float64Array, held: Float64Array) -> Rates:
+    """Convert options to rates; drag goes as area over mass, which is 1 / width.
+
+    `held` (S,) is the share of each rod that its tie holds to the head.
+    """
     share = np.linspace(0.0, 1.0, rods.nodes)
     drag = options.drag * width.mean() / width
     shape = options.pull() * (1 - share) ** 2
     return Rates(
         np.repeat(drag[:, None], rods.nodes, axis=1),
         -math.log(1 - options.damping_share()) / FRAME,
-        np.broadcast_to(shape, rods.mass.shape).copy(),
+        np.where(share < held[:, None], HELD, np.broadcast_to(shape, rods.mass.shape)),
     )
 
 

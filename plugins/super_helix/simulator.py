@@ -13,6 +13,7 @@ from hairkit.errors import InputError
 from hairkit.parallel import parallel_for
 from hairkit.simulation import Measures, Surroundings, quaternion
 from hairkit.simulation.obstacles import Obstacles, head_obstacles
+from hairkit.simulation.ties import held_lengths
 from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
@@ -38,6 +39,8 @@ POISSON = 0.38
 """Poisson's ratio of hair."""
 KERATIN = 1300.0
 """Density of hair, kilograms per cubic metre."""
+HELD = 100.0
+"""Times the stiffness of hair that hair before its tie has: it is stretched over the head."""
 MIDDLE = 0.6
 """`bend_stiffness` of a groom at which the stiffness is that of the options."""
 
@@ -208,7 +211,11 @@ class SuperHelices:
         one = np.array([bend / (1 + POISSON), bend, bend])
         shape = self._shape
         density = np.full(len(shape.lengths), KERATIN * np.pi * width**2 / 4)
-        return shape._replace(stiffness=np.tile(one, (len(density), 1)), density=density)
+        strand = np.repeat(np.arange(len(shape.roots)), np.diff(shape.offsets))
+        way = np.append(0.0, np.cumsum(shape.lengths))
+        held = way[1:] - way[shape.offsets[strand]] <= held_lengths(self._groom)[strand]
+        stiffness = np.where(held, HELD, 1.0)[:, None] * one
+        return shape._replace(stiffness=stiffness, density=density)
 
     def _drawn(self) -> Float64Array:
         total = len(self._binding.arc)

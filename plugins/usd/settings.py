@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.errors import FormatError
+from hairkit.errors import DataError, FormatError
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Capsules
+from hairkit.types.tie import Tie, TieKind
 
+_KINDS: tuple[str, ...] = get_args(TieKind)
+"""A tie's kind is stored as its place in this list."""
 _T = TypeVar("_T", HairMaterial, HairPhysics)
 
 
 def settings_of(groom: Groom) -> dict[str, Any]:
-    """Return nested dictionaries of numbers and arrays: material, physics, capsules, landmarks."""
+    """Return nested dictionaries: material, physics, capsules, ties and landmarks."""
     from pxr import Vt
 
     shapes, landmarks = groom.head.capsules, groom.head.landmark_vertices
@@ -30,6 +33,13 @@ def settings_of(groom: Groom) -> dict[str, Any]:
             "radius": Vt.Vec2fArray.FromNumpy(shapes.radius),
         },
     }
+    if groom.ties:
+        settings["ties"] = {
+            "centre": Vt.Vec3fArray.FromNumpy(np.stack([tie.centre for tie in groom.ties])),
+            "axis": Vt.Vec3fArray.FromNumpy(np.stack([tie.axis for tie in groom.ties])),
+            "radius": Vt.FloatArray([tie.radius for tie in groom.ties]),
+            "kind": Vt.IntArray([_KINDS.index(tie.kind) for tie in groom.ties]),
+        }
     if landmarks is not None:
         settings["landmarks"] = Vt.IntArray.FromNumpy(landmarks)
     return settings
@@ -53,6 +63,25 @@ def material_from(settings: Mapping[str, Any], source: object) -> HairMaterial |
 def physics_from(settings: Mapping[str, Any], source: object) -> HairPhysics | None:
     """Return the physics that the settings hold, or None."""
     return _make(HairPhysics, settings.get("physics"), source)
+
+
+def ties_from(settings: Mapping[str, Any], source: object) -> tuple[Tie, ...]:
+    """Return the ties; none where the settings have none."""
+    found = settings.get("ties")
+    if not isinstance(found, Mapping):
+        return ()
+    centre = numbers(found.get("centre", ()), (-1, 3), source, "ties")
+    axis = numbers(found.get("axis", ()), centre.shape, source, "ties")
+    radius, kind = (
+        numbers(found.get(name, ()), (len(centre),), source, "ties") for name in ("radius", "kind")
+    )
+    try:
+        return tuple(
+            Tie(c.astype(np.float32), a.astype(np.float32), float(r), _KINDS[int(k)])
+            for c, a, r, k in zip(centre, axis, radius, kind, strict=True)
+        )
+    except (IndexError, DataError) as error:
+        raise FormatError(f"{source}: hairkit's ties are wrong: {error}") from error
 
 
 def capsules_from(settings: Mapping[str, Any], source: object) -> Capsules:

@@ -18,7 +18,7 @@ from hairkit.types.strands import Strands
 
 from .body_reading import read_head
 from .guarded import Contents, contents
-from .settings import material_from, physics_from
+from .settings import material_from, physics_from, ties_from
 
 _log = logging.getLogger("hairkit")
 
@@ -61,7 +61,11 @@ def read_groom(path: Path, options: Any) -> Groom:
     settings = found.description["settings"]
     material = material_from(settings, path) or _look(joined, strands, kept)
     groom = adopt(strands, options, path, material, head)
-    groom = replace(groom, physics=physics_from(settings, path) or groom.physics)
+    groom = replace(
+        groom,
+        physics=physics_from(settings, path) or groom.physics,
+        ties=ties_from(settings, path),
+    )
     return _bound(groom, joined, kept, options) if head is not None else groom
 
 

@@ -73,6 +73,11 @@ def comes_back(feature: Feature, back: Groom, true: Groom) -> bool:
         Feature.COUNTS: close(strands.counts, wanted.counts),
         Feature.WIDTHS: close(strands.widths, wanted.widths),
         Feature.DENSITY: close(back.root_density, true.root_density),
+        Feature.TIES: len(back.ties) == len(true.ties)
+        and all(
+            same_values(tie, other, ("centre", "axis", "radius")) and tie.kind == other.kind
+            for tie, other in zip(back.ties, true.ties, strict=True)
+        ),
         Feature.SKIN: close(back.head.joints, true.head.joints),
         Feature.CAPSULES: same_values(
             back.head.capsules, true.head.capsules, ("first", "second", "radius")
@@ -94,6 +99,7 @@ def is_lost(feature: Feature, back: Groom, true: Groom) -> bool:
         Feature.ROOT_UV: strands.root_uv is None or close(strands.root_uv, own_uv),
         Feature.GROUP: strands.group is None or len(np.unique(strands.group)) == 1,
         Feature.GUIDE: strands.guide is None or bool(strands.guide.all()),
+        Feature.TIES: not back.ties,
         Feature.DENSITY: bool((back.root_density == 1).all()),
         Feature.HEAD: not close(back.head.vertices, true.head.vertices),
         Feature.SKIN: not close(back.head.joints, true.head.joints),

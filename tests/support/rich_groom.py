@@ -10,6 +10,7 @@ from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Capsules
 from hairkit.types.strands import Strands
+from hairkit.types.tie import Tie
 
 
 def rich_groom(strands: int = 40) -> Groom:
@@ -44,6 +45,7 @@ def rich_groom(strands: int = 40) -> Groom:
         bare.root_barycentric[index],
         HairMaterial(np.array([0.3, 0.2, 0.1]), np.array([0.6, 0.4, 0.3]), 7e-5, 0.002, 0.011),
         HairPhysics(0.31, 0.72, 0.023, 0.17, 9.0),
+        (Tie(np.array([0.1, 0.2, -0.4]), np.array([0.6, 0.0, -0.8]), 0.011, "braid"),),
     )
 
 
