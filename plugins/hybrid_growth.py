@@ -1,12 +1,13 @@
 """Strand growth along a signed field by the patent's rules, point by point from every root.
 
 `p_i = p_(i-1) + delta H(p_(i-1)) / |H|` with a step delta of 1 mm, until the internal distance says
-that the point has left the hair (I > 1.1) or the strand has its greatest length. In a field without
-signs the tensors are followed in the direction in which the growth potential rises.
+that the point has left the hair (I > 1.1 in the patent) or the strand has its greatest length. In a
+field without signs the tensors are followed in the direction in which the growth potential rises.
 
 Added to the patent, and off in the recipe `patent`: a strand that leaves the hair goes on for a
 while (`patience`, the uncertain steps of the thesis) and is cut where it left; a strand that slides
-is turned back to the surface (`pull`). Inertia, too, is an addition.
+is turned back to the surface (`pull`) and ends farther outside (`bound`), because its tip hangs
+below what all views agree on. Inertia, too, is an addition.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class Options(FinishOptions):
 
     step: float = option(0.001, low=1e-4, high=0.01, unit="m", doc="Length of a step (delta).")
     bound: float = option(
-        1.1, low=1, high=10, doc="Internal distance at which a strand has left the hair."
+        1.6, low=1, high=10, doc="Internal distance at which a strand has left the hair."
     )
     max_length: float = option(1.2, low=0.01, high=5, unit="m", doc="Longest strand.")
     reach: float = option(
