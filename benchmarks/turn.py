@@ -1,15 +1,21 @@
 """Print how well the turn is found whatever order and position the photos are in.
 
 python benchmarks/turn.py captures/ --photos-alone
+python benchmarks/turn.py --seconds turn/     # hairkit synth straight --views 36 -o turn
 
 Faces and persons are those of the capture (landmarks.json, masks/) unless `--photos-alone` asks the
 networks (`hairkit models install`). Names of files are ignored. A turn counts as found when no
-photo is more than 30 degrees off; the true turn is in truth/.
+photo is more than 30 degrees off; the true turn is in truth/. `--seconds` prints instead what
+whole runs on 3 to 36 of the photos of one turn take.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
+import shutil
+import tempfile
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +30,7 @@ from hairkit.errors import InputError
 from hairkit.evaluation import read_truth
 from hairkit.io.capture_reader import read_capture
 from hairkit.options import make_options
+from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.types.face import Face
 from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
@@ -32,6 +39,8 @@ FOUND_DEG = 30.0
 """Error of the worst photo up to which a turn is found."""
 SHUFFLES = 8
 """Random orders tried of each capture."""
+COUNTS = (3, 8, 12, 24, 36)
+"""Numbers of photos of which runs are timed."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +58,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     add_captures(parser)
     parser.add_argument("--photos-alone", action="store_true", help="faces and persons by networks")
+    parser.add_argument("--seconds", type=Path, metavar="FOLDER", help="capture of runs to time")
     arguments = parser.parse_args()
+    if arguments.seconds is not None:
+        print_seconds(arguments.seconds)
+        return
     if arguments.captures is None:
         print(NO_CAPTURES)
         return
@@ -59,6 +72,42 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|")
     for folder in sorted(path.parent for path in arguments.captures.glob("*/truth")):
         print(_row(folder.name, _photos(folder, arguments.photos_alone)))
+
+
+def print_seconds(folder: Path) -> None:
+    """Print seconds of whole runs on some of the photos of a capture, without masks or landmarks.
+
+    The first run loads and compiles; it is not printed. Processor time includes child processes.
+    """
+    photos = sorted(path for path in (folder / "photos").iterdir() if path.is_file())
+    print("| photos | seconds | processor s | processor s a photo more |")
+    print("|---|---|---|---|")
+    before: tuple[int, float] | None = None
+    _time_run(photos[:: max(1, len(photos) // COUNTS[0])])
+    for count in (count for count in COUNTS if count <= len(photos)):
+        chosen = [photos[round(i * len(photos) / count)] for i in range(count)]
+        seconds, spent = _time_run(chosen)
+        more = "" if before is None else f"{(spent - before[1]) / (count - before[0]):.2f}"
+        print(f"| {count} | {seconds:.1f} | {spent:.1f} | {more} |", flush=True)
+        before = (count, spent)
+
+
+def _time_run(photos: list[Path]) -> tuple[float, float]:
+    """Return wall and processor seconds of a run on copies of the photos."""
+    with tempfile.TemporaryDirectory() as place:
+        given = Path(place, "photos")
+        given.mkdir()
+        for photo in photos:
+            shutil.copy(photo, given)
+        began, spent = time.perf_counter(), _processor_seconds()
+        reconstruct(given, Path(place, "out"), sheet=False)
+        return time.perf_counter() - began, _processor_seconds() - spent
+
+
+def _processor_seconds() -> float:
+    """Return the processor time of this process and of its children that have ended."""
+    usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in usage)
 
 
 def _photos(folder: Path, photos_alone: bool) -> list[Photo]:

@@ -165,7 +165,9 @@ def test_a_file_is_read_like_a_shipped_recipe(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(NEEDED + '[orient]\nplugin = "gabor"\n')
     assert load_recipe(path).name == "mine"
-    with pytest.raises(InputError, match=r"did you mean 'thesis'.*default, patent, thesis"):
+    with pytest.raises(
+        InputError, match=r"did you mean 'thesis'.*default, patent, patent_printed, thesis"
+    ):
         load_recipe("thesiss")
     with pytest.raises(InputError, match="no such file"):
         load_recipe(tmp_path / "none.toml")
