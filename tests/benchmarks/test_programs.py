@@ -114,3 +114,19 @@ def test_help_tells_what_it_measures(name: str) -> None:
     done = subprocess.run([sys.executable, path, "--help"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert f"usage: {name}.py" in done.stdout
+
+
+def test_runs_are_timed_on_some_of_the_photos(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """After a first run that is not printed there is a row for each number of photos at hand."""
+    turn, seen = program("turn", monkeypatch), []
+
+    def run(given: Path, _out: Path, *, sheet: bool) -> None:
+        seen.append((len(list(given.iterdir())), sheet))
+
+    monkeypatch.setattr(turn, "reconstruct", run)
+    turn.print_seconds(folder / "short")
+    assert [count for count, _ in seen[1:]] == [3, 8]
+    rows = capsys.readouterr().out.splitlines()[2:]
+    assert [row.split("|")[1].strip() for row in rows] == ["3", "8"]
