@@ -20,18 +20,16 @@ SIZES = ((390, 844), (1440, 900))
 PAGES = ("photos", "capture", "annotate", "pose", "hair")
 
 
-@pytest.fixture(scope="module")
-def project(
-    tmp_path_factory: pytest.TempPathFactory, start_studio: Callable[..., Any]
-) -> Iterator[Any]:
+@pytest.fixture
+def project(tmp_path: Path, start_studio: Callable[..., Any]) -> Iterator[Any]:
     """One studio for the whole story."""
-    folder = tmp_path_factory.mktemp("story") / "head"
+    folder = tmp_path / "head"
     started = start_studio(folder, "--guides", str(GUIDES))
     yield started
     started.kill()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def page(browser: Any, project: Any) -> Iterator[Any]:
     """The page that the link opens; errors and requests to other origins are kept."""
     context = browser.new_context(viewport={"width": 1440, "height": 900})
@@ -73,7 +71,23 @@ def wait_ready(page: Any, project: Any) -> None:
     raise AssertionError("no hair")
 
 
-def test_photos_become_hair_by_themselves(page: Any, project: Any, photos: list[Path]) -> None:
+def test_the_whole_story(
+    page: Any, project: Any, browser: Any, photos: list[Path], tmp_path: Path
+) -> None:
+    """From photos to files, every step of the story holds, in this order."""
+    check_photos_become_hair_by_themselves(page, project, photos)
+    check_files_equal_those_of_the_command_line(page, project, photos, tmp_path)
+    check_a_stroke_moves_the_outline(page, project)
+    check_the_hair_moves(page, project)
+    check_files_are_downloaded(page, project, browser, tmp_path)
+    check_a_shot_of_the_camera_becomes_a_photo(page, project)
+    for size in SIZES:
+        for name in PAGES:
+            check_pages_are_accessible(page, project, name, size)
+    assert page.foreign == []  # no request of the whole story went to another origin
+
+
+def check_photos_become_hair_by_themselves(page: Any, project: Any, photos: list[Path]) -> None:
     """Photos chosen in the page get masks and become hair without a further touch."""
     page.set_input_files("#picker", [str(photo) for photo in photos])
     hair = page.locator(".card path.hair")
@@ -82,7 +96,7 @@ def test_photos_become_hair_by_themselves(page: Any, project: Any, photos: list[
     assert not page.trouble
 
 
-def test_files_equal_those_of_the_command_line(
+def check_files_equal_those_of_the_command_line(
     page: Any, project: Any, photos: list[Path], tmp_path: Path
 ) -> None:
     """The original photos give the same bytes by `reconstruct`, in every file of the recipe."""
@@ -96,7 +110,7 @@ def test_files_equal_those_of_the_command_line(
         assert there.read_bytes() == (tmp_path / "out" / name).read_bytes(), name
 
 
-def test_a_stroke_moves_the_outline(page: Any, project: Any) -> None:
+def check_a_stroke_moves_the_outline(page: Any, project: Any) -> None:
     """A stroke that is drawn changes the mask, is kept as labelme's JSON, and can be undone."""
     go(page, project, "annotate/1")
     stage = page.locator(".stage")
@@ -119,7 +133,7 @@ def test_a_stroke_moves_the_outline(page: Any, project: Any) -> None:
     assert not (project.folder / "strokes" / "001.json").exists()
 
 
-def test_the_hair_moves(page: Any, project: Any) -> None:
+def check_the_hair_moves(page: Any, project: Any) -> None:
     """The hair is drawn, hangs still without wind, moves in wind, and keeps its lengths."""
     wait_ready(page, project)
     go(page, project, "hair")
@@ -150,7 +164,7 @@ def test_the_hair_moves(page: Any, project: Any) -> None:
     assert not page.trouble
 
 
-def test_files_are_downloaded(page: Any, project: Any, browser: Any, tmp_path: Path) -> None:
+def check_files_are_downloaded(page: Any, project: Any, browser: Any, tmp_path: Path) -> None:
     """Any format comes from the page; `result.html` moves without a server."""
     go(page, project, "hair")
     for name in ("groom.apx", "groom.npz", "groom.ply", "result.html"):
@@ -170,7 +184,7 @@ def test_files_are_downloaded(page: Any, project: Any, browser: Any, tmp_path: P
     alone.close()
 
 
-def test_a_shot_of_the_camera_becomes_a_photo(page: Any, project: Any) -> None:
+def check_a_shot_of_the_camera_becomes_a_photo(page: Any, project: Any) -> None:
     """The shutter takes the picture inside the outline; it is the retake of its view."""
     before = (project.folder / "photos" / "001.jpg").read_bytes()
     go(page, project, "capture")
@@ -185,9 +199,7 @@ def test_a_shot_of_the_camera_becomes_a_photo(page: Any, project: Any) -> None:
     assert retaken or len(after) == count + 1
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("name", PAGES)
-def test_pages_are_accessible(page: Any, project: Any, name: str, size: tuple[int, int]) -> None:
+def check_pages_are_accessible(page: Any, project: Any, name: str, size: tuple[int, int]) -> None:
     """axe-core finds nothing serious, nothing is wider than the screen, keys reach the page."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     page.set_viewport_size({"width": size[0], "height": size[1]})
@@ -196,13 +208,8 @@ def test_pages_are_accessible(page: Any, project: Any, name: str, size: tuple[in
     found = axe.Axe().run(page).response["violations"]
     serious = [(v["id"], [n["target"] for n in v["nodes"]]) for v in found
                if v["impact"] in ("serious", "critical")]  # fmt: skip
-    assert not serious
+    assert not serious, (name, size)
     wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
-    assert wide[0] <= wide[1]
+    assert wide[0] <= wide[1], (name, size)
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement !== document.body")
-
-
-def test_nothing_comes_from_elsewhere(page: Any) -> None:
-    """In the whole story no request went to another origin."""
-    assert page.foreign == []
