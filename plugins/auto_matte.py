@@ -12,13 +12,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.arrays import BoolArray
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
-from hairkit.imaging.hair_network import hair_probability
+from hairkit.imaging.hair_network import find_hair, mark_face
 from hairkit.imaging.masked_filters import picture_scale
 from hairkit.imaging.seeded_segmentation import label_from_probability, reduced_size
 from hairkit.io.strokes import rasterise, read_view_strokes
@@ -28,9 +27,6 @@ from hairkit.types.mask import HAIR, Mask
 
 _LEAST_HAIR = 5e-4
 """Share of the picture below which there is no hair."""
-
-_LIKELY_FACE = 0.8
-"""Least presence of a face whose landmarks are used."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +50,10 @@ def segment(view: View, options: Options) -> Mask:
     InputError
         No hair was found.
     """
-    landmarks = _landmarks(view)
-    probability = hair_probability(view.image, _person(view), landmarks)
     size = reduced_size(view.width, view.height, options.reduced_height)
-    face = None if landmarks is None else _face(landmarks * size / (view.width, view.height), size)
+    corrections = _corrections(view, size, options.thickness)
     labels, alpha = label_from_probability(
-        view.image, probability, size, face, corrections=_corrections(view, size, options.thickness)
+        view.image, find_hair(view), size, mark_face(view, size) > 0, corrections=corrections
     )
     if np.count_nonzero(labels == HAIR) < _LEAST_HAIR * labels.size:
         raise InputError(
@@ -88,26 +82,3 @@ def _corrections(
         is_hair = stroke.label == "foreground"
         hair[under], rest[under] = is_hair, not is_hair
     return hair, rest
-
-
-def _person(view: View) -> Float32Array | None:
-    """Return the probability of the person (H, W), or None where no model was run."""
-    if view.person is None or view.person.alpha.shape != view.image.shape[:2]:
-        return None
-    return view.person.alpha.astype(np.float32) / np.float32(255)
-
-
-def _landmarks(view: View) -> Float64Array | None:
-    """Return the landmarks that were given, or those of a face that is likely there."""
-    if view.landmarks is not None:
-        return view.landmarks
-    if view.face is not None and view.face.presence > _LIKELY_FACE:
-        return view.face.landmarks
-    return None
-
-
-def _face(points: Float64Array, size: tuple[int, int]) -> BoolArray:
-    """Return (h, w) the convex hull of the landmarks, in reduced pixels: jaw to brows."""
-    canvas = np.zeros((size[1], size[0]), np.uint8)
-    cv2.fillConvexPoly(canvas, cv2.convexHull(np.rint(points - 0.5).astype(np.int32)), 1)
-    return canvas > 0

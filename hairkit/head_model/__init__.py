@@ -2,6 +2,7 @@
 
 Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.types.head.Head`.
 
+* `bare_head`: where a photo shows face, ears and neck
 * `bvh`: nearest points and ray crossings on triangle meshes
 * `hairline`: where the photos show that hair grows
 * `placement`: a head placed under given strands

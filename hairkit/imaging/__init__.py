@@ -6,6 +6,7 @@ measured over all views.
 * `alpha_matting`: mask edges refined at full size
 * `corrections`: a user's strokes on an automatic mask
 * `geodesic`: geodesic distance from seeds; contours are expensive to cross
+* `hair_colours`: photos of one person labelled by their common colours
 * `hair_features`: what the hair network sees of a photo
 * `hair_network`: probability of hair, person and background by a small network
 * `masked_filters`: filters that respect a mask, means of undirected angles

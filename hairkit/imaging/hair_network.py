@@ -13,11 +13,13 @@ import os
 from functools import cache
 from importlib import resources
 
+import cv2
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.imaging.hair_features import hair_features
 from hairkit.storage import read_npz
+from hairkit.types.capture import View
 
 Weights = dict[str, Float32Array]
 """Kernels (C out, C in, k, k) and biases (C out,) of every layer: `first.weight`, `first.bias`."""
@@ -25,6 +27,41 @@ Weights = dict[str, Float32Array]
 MIRRORED = (5, 9)
 """Features that change their sign in a mirrored photo: the strands' slope and the coordinate across
 the face."""
+
+
+_LIKELY_FACE = 0.8
+"""Least presence of a face whose landmarks are used."""
+
+
+def find_hair(view: View) -> Float32Array:
+    """Return `hair_probability` of a view, from the person and the face found in it."""
+    return hair_probability(view.image, _person(view), likely_landmarks(view))
+
+
+def mark_face(view: View, size: tuple[int, int]) -> Float32Array:
+    """Return (height, width) 1 in the convex hull of a view's landmarks, jaw to brows, else 0."""
+    canvas = np.zeros((size[1], size[0]), np.uint8)
+    landmarks = likely_landmarks(view)
+    if landmarks is not None:
+        points = landmarks * size / (view.width, view.height)
+        cv2.fillConvexPoly(canvas, cv2.convexHull(np.rint(points - 0.5).astype(np.int32)), 1)
+    return canvas.astype(np.float32)
+
+
+def likely_landmarks(view: View) -> Float64Array | None:
+    """Return the landmarks that were given, or those of a face that is likely there."""
+    if view.landmarks is not None:
+        return view.landmarks
+    if view.face is not None and view.face.presence > _LIKELY_FACE:
+        return view.face.landmarks
+    return None
+
+
+def _person(view: View) -> Float32Array | None:
+    """Return the probability of the person (H, W), or None where no model was run."""
+    if view.person is None or view.person.alpha.shape != view.image.shape[:2]:
+        return None
+    return view.person.alpha.astype(np.float32) / np.float32(255)
 
 
 def hair_probability(

@@ -254,7 +254,7 @@ def _grow(
     """Run the stages; views are processed in parallel, later stages wait for them."""
     photos, views = Given.of(capture), [Given.of(view) for view in capture.views]
     masks = run.every_view("segment", Mask, views)
-    if run.has("refine"):
+    if run.has("refine") and not all(view.mask_path for view in capture.views):
         masks = _refine(run, photos, masks, Given.of(head))
     orientations = run.every_view("orient", OrientationMap, views, mask=masks)
     scene = run.once("scene", Scene, capture=photos, masks=masks, head=Given.of(head))
@@ -320,10 +320,16 @@ def _refine(
     masks: Sequence[Future[Given[Mask]]],
     head: Given[Head],
 ) -> list[Future[Given[Mask]]]:
-    """Return the masks after the first scene has shown where the head is in every view."""
+    """Return the masks after the first scene has shown where the head is in every view.
+
+    Views that came with a mask keep it.
+    """
     scene = run.once("scene", Scene, "first_scene", capture=photos, masks=masks, head=head)
     refined = run.once("refine", Masks, capture=photos, masks=masks, scene=scene)
-    return [completed(Given.of(mask)) for mask in refined.value.views]
+    return [
+        mask if view.mask_path else completed(Given.of(new))
+        for view, mask, new in zip(photos.value.views, masks, refined.value.views, strict=True)
+    ]
 
 
 def _write(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -117,6 +118,20 @@ def hairy_face(run: Run) -> None:
     )
 
 
+def beard(run: Run) -> None:
+    """The jaw below the mouth is called hair."""
+    corners = run.scene.head.landmark_vertices
+    assert corners is not None
+    jaw = run.scene.head.vertices[corners[[*range(3, 14), 31, 35]]]
+    masks = []
+    for camera, mask in zip(run.scene.cameras, run.masks, strict=True):
+        labels = mask.labels.copy()
+        outline = cv2.convexHull(np.rint(camera.project(jaw)).astype(np.int32))
+        cv2.fillConvexPoly(labels, outline, HAIR)
+        masks.append(Mask(labels, True))
+    run.masks = tuple(masks)
+
+
 def large_head(run: Run) -> None:
     """The head and all around it came out 1.3 times too large."""
     head = replace(run.scene.head, vertices=1.3 * run.scene.head.vertices)
@@ -165,6 +180,13 @@ def test_a_fault_turns_its_figure_red(name: str) -> None:
     figures = run.figures()
     assert figures[name].light == RED
     assert figures[name].line() in summarise(list(figures.values()))
+
+
+def test_a_beard_in_the_masks_is_red() -> None:
+    """The face includes cheeks and jaw."""
+    run = Run()
+    beard(run)
+    assert run.figures()["masks: face called hair"].light == RED
 
 
 def test_limits_may_rise_or_fall() -> None:

@@ -1,0 +1,41 @@
+"""Where a photo shows the part of the head that bears no hair: face, ears and neck."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from scipy import ndimage
+
+from hairkit.arrays import Float32Array
+from hairkit.cameras.depth_raster import HEAD_TOLERANCE, head_depth, mesh_depth
+from hairkit.types.camera import Camera
+from hairkit.types.head import Head
+
+FULL, NONE = 0.015, 0.035
+"""Metres off the drawn head up to which a pixel belongs to its nearest part, and from which to
+none: the head is an average one, and beards stand off it."""
+POSE_BLUR = 0.004
+"""Gaussian in metres over which the border of the scalp is uncertain."""
+
+
+def mark_bare_head(head: Head, camera: Camera) -> Float32Array:
+    """Return (H, W) 1 where the camera sees face, ears or neck, 0 on scalp and far off the head.
+
+    Pixels near the head's outline take the value of its nearest pixel: ears, glasses and a beard
+    stick out of an average head, and so does the head of the person.
+    """
+    depth = head_depth(head, camera)
+    bare = head.faces[(head.scalp[head.faces] < 0.5).all(axis=1)]
+    first = mesh_depth(head.vertices, bare, camera) < depth + np.float32(HEAD_TOLERANCE)
+    drawn = np.isfinite(depth)
+    if not drawn.any():
+        return np.zeros(depth.shape, np.float32)
+    away, (row, column) = ndimage.distance_transform_edt(~drawn, return_indices=True)
+    metre = camera.focal / (1.0 if camera.model == "orthographic" else _distance(camera))
+    fade = np.clip((NONE - away / metre) / (NONE - FULL), 0, 1)
+    marked = ((first & drawn)[row, column] * fade).astype(np.float32)
+    return np.asarray(cv2.GaussianBlur(marked, (0, 0), max(POSE_BLUR * metre, 1e-3)), np.float32)
+
+
+def _distance(camera: Camera) -> float:
+    return max(float(camera.depth(np.zeros(3))), 1e-9)

@@ -1,0 +1,86 @@
+"""Laws of the masks that are mended together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from hairkit_plugins import head_prior
+
+from hairkit.head_model.template import default_head
+from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture, View
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.scene import Scene
+
+WIDTH, HEIGHT = 180, 240
+SKIN, BROWN, WALL = (205, 155, 130), (60, 45, 35), (150, 165, 175)
+
+
+def set_up() -> tuple[Capture, tuple[Mask, ...], Scene]:
+    """Return four views of the default head with a dark scalp, and masks that say so."""
+    head = default_head()
+    views, masks, cameras = [], [], []
+    rng = np.random.default_rng(5)
+    points = head.vertices[(head.scalp > 0.5)]
+    for index in range(4):
+        camera = Camera.on_turn(90.0 * index, distance=0.8, focal=500, width=WIDTH, height=HEIGHT)
+        single = Scene(("one",), (camera,), head)
+        labels = np.full((HEIGHT, WIDTH), BACKGROUND, np.uint8)
+        depth = head_prior.mark_bare_head(single.head, camera)
+        u, v = camera.project(1.06 * points).T.astype(int)
+        labels[depth > 0.5] = PERSON
+        labels[v.clip(0, HEIGHT - 1), u.clip(0, WIDTH - 1)] = HAIR
+        picture = np.zeros((HEIGHT, WIDTH, 3))
+        for label, colour in {HAIR: BROWN, PERSON: SKIN, BACKGROUND: WALL}.items():
+            picture[labels == label] = colour
+        picture += rng.normal(0, 4, picture.shape)
+        image = np.clip(picture, 0, 255).astype(np.uint8)
+        views.append(View(str(index), 90.0 * index, image))
+        masks.append(Mask(labels, True))
+        cameras.append(camera)
+    scene = Scene(tuple("0123"), tuple(cameras), head)
+    return Capture(tuple(views)), tuple(masks), scene
+
+
+def refine(capture: Capture, masks: tuple[Mask, ...], scene: Scene) -> tuple[Mask, ...]:
+    options = head_prior.Options()
+    return head_prior.refine_masks(capture=capture, masks=masks, scene=scene, options=options).views
+
+
+def test_masks_and_strokes_of_the_user_are_kept() -> None:
+    """Views that came with a mask or strokes keep their masks, others are labelled again."""
+    capture, masks, scene = set_up()
+    views = list(capture.views)
+    views[0] = replace(views[0], mask_path=Path("0.png"))
+    views[2] = replace(views[2], strokes_path=Path("2.json"))
+    refined = refine(replace(capture, views=tuple(views)), masks, scene)
+    assert [new is old for new, old in zip(refined, masks, strict=True)][::2] == [True, True]
+    assert all(new.alpha is not None for new in refined[1::2])
+
+
+def test_all_masks_given_are_returned_as_they_are() -> None:
+    """Nothing is computed where every mask is the user's."""
+    capture, masks, scene = set_up()
+    views = tuple(replace(view, mask_path=Path("a.png")) for view in capture.views)
+    assert refine(replace(capture, views=views), masks, scene) == masks
+
+
+def test_equal_photos_have_equal_masks() -> None:
+    """Nothing is left to chance, and the order in which threads end does not matter."""
+    first, second = refine(*set_up()), refine(*set_up())
+    for one, other in zip(first, second, strict=True):
+        assert np.array_equal(one.labels, other.labels)
+
+
+def test_hair_apart_from_the_scalp_on_bare_skin_is_dropped() -> None:
+    """An island of hair on the face is person; hair that reaches off the bare head remains."""
+    labels = np.full((40, 60), PERSON, np.uint8)
+    labels[5:10, 10:50] = HAIR
+    labels[25:30, 10:15] = HAIR
+    bare = np.zeros((40, 60), np.float32)
+    bare[8:] = 1
+    kept = head_prior._without_islands(labels, bare)
+    assert (kept[5:10, 10:50] == HAIR).all()
+    assert (kept[20:] == PERSON).all()
