@@ -23,6 +23,7 @@ from hairkit.manager import Manager
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.types.parting import Parting
+from hairkit.types.tie import TiedHair
 from hairkit.types.waves import Waves
 
 TRACKERS = ("hybrid_growth", "certainty_tracker")
@@ -62,6 +63,7 @@ def main() -> int:
         "field": field,
         "waves": Waves(),
         "parting": Parting(),
+        "tied": TiedHair(),
         "scalp_distance": measure_scalp_distance(scene.head, hull),
     }
     for name in TRACKERS:

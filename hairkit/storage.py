@@ -12,6 +12,7 @@ import math
 import os
 import stat
 import tempfile
+import threading
 import tokenize
 import types
 import typing
@@ -44,6 +45,9 @@ _KINDS = {
     stat.S_IFBLK: "a device",
 }
 
+parsing = threading.Lock()
+"""Held while Python parses source, as which it reads the headers of arrays: Python before 3.11.8
+counts the depth of all threads together and may raise `SystemError` (python/cpython 106905)."""
 _UNREADABLE = (
     zipfile.BadZipFile,
     zlib.error,
@@ -208,10 +212,11 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> npt.NDArray[Any]
     """Return one array of an open npz file, whose header must account for all of its bytes."""
     with archive.open(info) as member:
         version = np.lib.format.read_magic(member)
-        if version == (1, 0):
-            shape, fortran_order, dtype = np.lib.format.read_array_header_1_0(member)
-        else:
-            shape, fortran_order, dtype = np.lib.format.read_array_header_2_0(member)
+        with parsing:
+            if version == (1, 0):
+                shape, fortran_order, dtype = np.lib.format.read_array_header_1_0(member)
+            else:
+                shape, fortran_order, dtype = np.lib.format.read_array_header_2_0(member)
         if dtype.hasobject or not dtype.itemsize:
             raise ValueError(f"{info.filename} holds no numbers or texts")
         count = math.prod(shape)

@@ -68,6 +68,8 @@ SMOOTH_SECTIONS = 2.0
 """Standard deviation of the smoothing along a bundle, in sections."""
 RIM = 0.0025
 """Metres by which the hull's bundle is thicker than the hair: half a cell and the masks' slack."""
+PINHOLE_CELLS = 3
+"""Half width in cells of the holes that are closed in a bundle before its depth is measured."""
 THINNEST = 0.003
 """Least radius of a bundle, metres."""
 BUN = 2.5
@@ -256,6 +258,7 @@ def _tail_of(
 ) -> Tail | None:
     """Return the bundle as a tube from its thinnest place near the scalp to its end."""
     cells = _with_root(bundle, hull, scalp_distance)
+    cells = _without_pinholes(cells) & (scalp_distance.values > 0)
     points = hull.grid.centres_of(cells).astype(np.float64)
     depth = ndimage.distance_transform_edt(cells)[cells] * hull.grid.spacing
     along = scalp_distance.values[cells]
@@ -289,6 +292,14 @@ def _with_root(bundle: Bundle, hull: Hull, scalp_distance: ScalpDistance) -> Boo
     return bundle.cells | (near & (scalp_distance.values > 0))
 
 
+def _without_pinholes(cells: BoolArray) -> BoolArray:
+    """Return the cells with the holes that gaps between strands drill through a bundle closed."""
+    room = np.pad(cells, PINHOLE_CELLS)
+    closed = ndimage.binary_closing(room, iterations=PINHOLE_CELLS)
+    inner = slice(PINHOLE_CELLS, -PINHOLE_CELLS)
+    return np.asarray(closed[inner, inner, inner], bool)
+
+
 class Sections(NamedTuple):
     """Cross-sections of a bundle, in the order of their way from the scalp."""
 
@@ -311,7 +322,8 @@ def _cut_sections(points: Float64Array, depth: Float64Array, along: Float32Array
         centre = (weight[:, None] * place).sum(axis=0) / weight.sum()
         radius = max(float(deep.max()) - RIM, THINNEST)
         off = place - centre
-        off = off[np.linalg.norm(off, axis=1) < REACH_OF_SECTION * max(radius, STEP)]
+        away = np.linalg.norm(off, axis=1)
+        off = off[away < max(REACH_OF_SECTION * max(radius, STEP), away.min() + STEP)]
         centres.append(centre)
         spreads.append(4 * off.T @ off / len(off))
         inscribed.append(radius)

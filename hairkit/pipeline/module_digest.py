@@ -18,6 +18,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from hairkit.storage import parsing
+
 FRONT_DOOR = "hairkit"
 """This package loads its names lazily: each stands for the module that defines it."""
 
@@ -156,7 +158,9 @@ def _parse(path: Path, modified: int, size: int) -> _Source:
     """Read a file once; `modified` and `size` are there to read it again after a change."""
     data = path.read_bytes()
     try:
-        imports = tuple(_imports(ast.parse(data).body, False))
+        with parsing:
+            tree = ast.parse(data)
+        imports = tuple(_imports(tree.body, False))
     except (SyntaxError, ValueError):  # it cannot be imported either
         imports = ()
     if any(item.module == FRONT_DOOR and not item.names for item in imports):
