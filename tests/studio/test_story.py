@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -71,6 +72,10 @@ def wait_ready(page: Any, project: Any) -> None:
     raise AssertionError("no hair")
 
 
+@pytest.mark.skipif(
+    "HAIRKIT_BROWSER_STORY" not in os.environ,
+    reason="takes minutes and its camera step depends on speed; set HAIRKIT_BROWSER_STORY to run it",
+)
 def test_the_whole_story(
     page: Any, project: Any, browser: Any, photos: list[Path], tmp_path: Path
 ) -> None:
