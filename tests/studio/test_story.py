@@ -74,7 +74,7 @@ def wait_ready(page: Any, project: Any) -> None:
 
 @pytest.mark.skipif(
     "HAIRKIT_BROWSER_STORY" not in os.environ,
-    reason="takes minutes and its camera step depends on speed; set HAIRKIT_BROWSER_STORY to run it",
+    reason="its camera step depends on speed; set HAIRKIT_BROWSER_STORY to run it",
 )
 def test_the_whole_story(
     page: Any, project: Any, browser: Any, photos: list[Path], tmp_path: Path
