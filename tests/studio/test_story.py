@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -72,10 +71,6 @@ def wait_ready(page: Any, project: Any) -> None:
     raise AssertionError("no hair")
 
 
-@pytest.mark.skipif(
-    "HAIRKIT_BROWSER_STORY" not in os.environ,
-    reason="its camera step depends on speed; set HAIRKIT_BROWSER_STORY to run it",
-)
 def test_the_whole_story(
     page: Any, project: Any, browser: Any, photos: list[Path], tmp_path: Path
 ) -> None:
@@ -198,7 +193,7 @@ def check_a_shot_of_the_camera_becomes_a_photo(page: Any, project: Any) -> None:
     count = len(list((project.folder / "photos").iterdir()))
     with page.expect_response(lambda r: "/api/photos" in r.url and r.request.method != "GET"):
         page.keyboard.press("Space")
-    page.get_by_text("Taken", exact=False).first.wait_for()
+    page.locator(".stage[data-shots]").wait_for()
     after = list((project.folder / "photos").iterdir())
     retaken = (project.folder / "photos" / "001.jpg").read_bytes() != before
     assert retaken or len(after) == count + 1

@@ -6,11 +6,12 @@ const READY_S = 0.7; // seconds for which all must be right before the shutter r
 const AGAIN_S = 2.2; // seconds between two spoken prompts
 const CHECK_MS = 160;
 const LOOK_WIDTH = 300, LOOKED_MS = 3000; // small pictures for the server, and how long its word counts
+const SHOWN_MS = 1500; // the word after a shot stays this long, so that it can be read
 const directions = { front: "Look at the camera", left: "left side to the camera", back: "back to the camera", right: "right side to the camera" };
 
 export function show(main) {
   let stream = null, guides = [], at = 0, taken = new Map(), advice = {}, limits = {}, timer = 0;
-  let goodFor = 0, lastSpoken = 0, lastText = "", busy = false, before = null, automatic = true, aloud = true;
+  let goodFor = 0, shownUntil = 0, lastSpoken = 0, lastText = "", busy = false, before = null, automatic = true, aloud = true;
   let looking = false, pressed = false, looked = { at: -1, time: 0, found: [] };
   let heading = null, headingAtFront = null, zeroOffset = 0;
 
@@ -191,7 +192,7 @@ export function show(main) {
   }
 
   function check() {
-    if (busy || !video.videoWidth || !guides.length || document.hidden) return;
+    if (busy || !video.videoWidth || !guides.length || document.hidden || performance.now() < shownUntil) return;
     const found = judge();
     const known = looked.at === at && performance.now() - looked.time < LOOKED_MS;
     if (!found.length && !looking) look();
@@ -235,6 +236,8 @@ export function show(main) {
       at = next < 0 ? index : next;
       lastText = "";
       ready();
+      shownUntil = performance.now() + SHOWN_MS;
+      stage.dataset.shots = Number(stage.dataset.shots ?? 0) + 1;
       if (wrong) tell(`Taken, but: ${advice[wrong][0]}`, advice[wrong][1]);
       else tell(next < 0 ? "All views taken" : `Taken. Now ${guides[at].name}`);
     } catch (error) { say(error.message); }
