@@ -9,7 +9,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.colour import linear_from_srgb
 from hairkit.errors import InputError
 from hairkit.types.capture import View
@@ -76,24 +76,26 @@ def assemble_groom(
         _log.warning("%d of %d roots gave no strand", len(roots) - kept, len(roots))
     curl = waves or Waves()
     material = replace(measure_colour(views, masks), curl_radius=curl.radius, curl_pitch=curl.pitch)
-    grown = strands.select(long_enough)
-    packed = Strands(
-        grown.points,
-        grown.offsets,
-        np.full(len(grown.points), material.width, np.float32)
-        if grown.widths is None
-        else grown.widths,
-        roots.uv[long_enough],
-        np.zeros(kept, np.int32) if grown.group is None else grown.group,
-        np.ones(kept, np.bool_),
-    )
     return Groom(
-        packed,
+        _as_guides(strands, roots, long_enough, material.width),
         head,
         roots.triangle[long_enough],
         roots.barycentric[long_enough],
         material,
         ties=() if tied is None else tuple(tail.tie for tail in tied.tails),
+    )
+
+
+def _as_guides(strands: Strands, roots: Roots, kept: BoolArray, width: float) -> Strands:
+    """Return the strands that are kept, with root UVs, and a width and a group each."""
+    grown = strands.select(kept)
+    return Strands(
+        grown.points,
+        grown.offsets,
+        np.full(len(grown.points), width, np.float32) if grown.widths is None else grown.widths,
+        roots.uv[kept],
+        np.zeros(len(grown), np.int32) if grown.group is None else grown.group,
+        np.ones(len(grown), np.bool_),
     )
 
 

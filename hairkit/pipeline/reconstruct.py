@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from hairkit.errors import InputError, RenderError
 from hairkit.field.find_parting import measure_parting
@@ -28,7 +29,7 @@ from hairkit.pipeline.own_head import mark_head
 from hairkit.pipeline.recipe import Recipe, load_recipe, missing_networks
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.run_record import RECORD, RunRecord, describe_run, finish_record
-from hairkit.pipeline.stage_runner import Argument, Given, StageRunner, completed
+from hairkit.pipeline.stage_runner import Given, StageRunner, completed
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
 from hairkit.types.capture import Capture, View
@@ -261,57 +262,48 @@ def _grow(
     if run.has("head"):
         scene = run.once("head", Scene, capture=photos, masks=masks, scene=scene)
     hull = run.once("hull", Hull, scene=scene, masks=masks)
-    cameras, shape = Given.of(scene.value.cameras), Given.of(scene.value.head)
-    waves = run.derive(
-        "waves",
-        Waves,
-        measure_waves,
-        capture=photos,
-        orientations=orientations,
-        masks=masks,
-        cameras=cameras,
-    )
-    distance = run.derive("distance", ScalpDistance, measure_scalp_distance, head=shape, hull=hull)
-    parting = run.derive(
-        "parting",
-        Parting,
-        measure_parting,
-        capture=photos,
-        masks=masks,
-        cameras=cameras,
-        head=shape,
-    )
-    tied = run.derive(
-        "ties",
-        TiedHair,
-        measure_ties,
-        masks=masks,
-        orientations=orientations,
-        cameras=cameras,
-        head=shape,
-        hull=hull,
-        scalp_distance=distance,
-    )
-    seen: dict[str, Argument] = {
-        "scene": scene, "masks": masks, "orientations": orientations,
-        "hull": hull, "waves": waves, "scalp_distance": distance,
-        "parting": parting, "tied": tied,
-    }  # fmt: skip
+    seen = _measure(run, photos, masks, orientations, scene, hull)
     field = run.once("field", OrientationField, **seen)
+    waves, distance = seen["waves"].value, seen["scalp_distance"].value
+    parting, tied = seen["parting"].value, seen["tied"].value
     hairline = run.derive("hairline", Hairline, measure_hairline, scene=scene, masks=masks)
     grown = replace(scene.value.head, density=hairline.value.density)
     roots = Given.of(sample_roots(grown, guides, seed, rest=head))
     strands = run.once("track", Strands, **seen, field=field, roots=roots)
     labels = tuple(mask.result().value for mask in masks)
     angles = tuple(orientation.result().value for orientation in orientations)
-    groom = assemble_groom(
-        capture.views, labels, grown, roots.value, strands.value, waves.value, tied.value
-    )
+    groom = assemble_groom(capture.views, labels, grown, roots.value, strands.value, waves, tied)
     health = assess(
-        capture, labels, scene.value, hull.value, groom, guides, distance.value.hair_length, turn,
-        parting.value, tied.value,
+        capture, labels, scene.value, hull.value, groom, guides, distance.hair_length, turn,
+        parting, tied,
     )  # fmt: skip
-    return _Made(labels, angles, hull.value, scene.value, parting.value, groom, health)
+    return _Made(labels, angles, hull.value, scene.value, parting, groom, health)
+
+
+def _measure(
+    run: StageRunner,
+    photos: Given[Capture],
+    masks: Sequence[Future[Given[Mask]]],
+    orientations: Sequence[Future[Given[OrientationMap]]],
+    scene: Given[Scene],
+    hull: Given[Hull],
+) -> dict[str, Any]:
+    """Return what field and strands are made from: stage results, and what is measured in them."""
+    cameras, head = Given.of(scene.value.cameras), Given.of(scene.value.head)
+    views: dict[str, Any] = {"masks": masks, "cameras": cameras}
+    waves = run.derive(
+        "waves", Waves, measure_waves, capture=photos, orientations=orientations, **views
+    )
+    distance = run.derive("distance", ScalpDistance, measure_scalp_distance, head=head, hull=hull)
+    parting = run.derive("parting", Parting, measure_parting, capture=photos, head=head, **views)
+    tied = run.derive(
+        "ties", TiedHair, measure_ties, orientations=orientations, head=head, hull=hull,
+        scalp_distance=distance, **views,
+    )  # fmt: skip
+    return {
+        "scene": scene, "masks": masks, "orientations": orientations, "hull": hull,
+        "waves": waves, "scalp_distance": distance, "parting": parting, "tied": tied,
+    }  # fmt: skip
 
 
 def _refine(
