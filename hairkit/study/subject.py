@@ -113,7 +113,7 @@ def read_subject(
     shots = tuple(
         _shot(prediction, view, photos[name]) for view, name in enumerate(prediction.names)
     )
-    return replace(_settle(base.resolve().name, prediction.groom, manager, settling), shots=shots)
+    return replace(settle(base.resolve().name, prediction.groom, manager, settling), shots=shots)
 
 
 def make_stock(
@@ -122,7 +122,7 @@ def make_stock(
     """Return a groom of each style of `hairkit synth`: hair that nobody photographed."""
     head = default_head()
     return tuple(
-        _settle(f"stock {style}", grow(style, head, _STOCK_GUIDES, seed), manager, settling)
+        settle(f"stock {style}", grow(style, head, _STOCK_GUIDES, seed), manager, settling)
         for style in STYLES
     )
 
@@ -135,7 +135,7 @@ def check_names(subjects: Sequence[Subject]) -> None:
             raise InputError(f"two folders are called {name!r}; a study tells them by their names")
 
 
-def _settle(name: str, groom: Groom, manager: Manager, seconds: float) -> Subject:
+def settle(name: str, groom: Groom, manager: Manager, seconds: float) -> Subject:
     """Return the groom as it hangs after `seconds`, its guides interpolated to full hair."""
     if not len(groom.strands):
         raise InputError(f"{name}: its groom holds no strands")

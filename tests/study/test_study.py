@@ -18,7 +18,7 @@ from hairkit.study import Study, Subject, make_study, write_results, write_study
 from hairkit.study.frame import HEIGHT, WIDTH, cut_out, frame_camera
 from hairkit.study.questionnaire import CHOICES, every_question
 from hairkit.study.retrieval import answer, look_distance
-from hairkit.study.subject import Shot, _settle
+from hairkit.study.subject import Shot, settle
 from hairkit.synth import STYLES, grow
 from hairkit.types.camera import Camera
 
@@ -36,7 +36,7 @@ def study(manager: Manager) -> Iterator[Study]:
         patch.setattr("hairkit.study.subject.COARSE_HAIRS", 400)
         for style in list(STYLES)[:4]:
             photographed, drawn = (
-                _settle(style, grow(style, default_head(), 400, seed), manager, 0.0)
+                settle(style, grow(style, default_head(), 400, seed), manager, 0.0)
                 for seed in (1, 2)
             )
             shots = tuple(
@@ -44,7 +44,7 @@ def study(manager: Manager) -> Iterator[Study]:
                 for name, at in (("front", 0.0), ("back-left", 135.0))
             )
             subjects.append(replace(drawn, shots=shots))
-        stock = [_settle("stock parted", grow("parted", default_head(), 400, 3), manager, 0.0)]
+        stock = [settle("stock parted", grow("parted", default_head(), 400, 3), manager, 0.0)]
         yield make_study(subjects, stock, 4, seed=5)
 
 
