@@ -347,10 +347,8 @@ def _from_arrays(kind: Any, arrays: dict[str, npt.NDArray[Any]], prefix: str) ->
         return _from_arrays(kinds[0], arrays, prefix) if present else None
     if typing.get_origin(kind) is tuple:
         item = typing.get_args(kind)[0]
-        return tuple(
-            _from_arrays(item, arrays, f"{prefix}{i}.")
-            for i in range(int(arrays[prefix + "count"]))
-        )
+        count = int(arrays.get(prefix + "count", 0))  # older files lack tuples that came later
+        return tuple(_from_arrays(item, arrays, f"{prefix}{i}.") for i in range(count))
     if isinstance(kind, type) and issubclass(kind, Stored):
         hints = typing.get_type_hints(kind)
         names = [field.name for field in dataclasses.fields(typing.cast(Any, kind))]

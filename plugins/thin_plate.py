@@ -168,9 +168,4 @@ def _warp(head: Head, places: Float64Array, moves: Float64Array, smoothing: Floa
         result: Float32Array = (points + spline(points.astype(np.float64))).astype(np.float32)
         return result
 
-    capsules = replace(
-        head.capsules, first=carry(head.capsules.first), second=carry(head.capsules.second)
-    )
-    return replace(
-        head, vertices=carry(head.vertices), joints=carry(head.joints), capsules=capsules
-    )
+    return head.carried(carry)

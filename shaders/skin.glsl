@@ -19,11 +19,11 @@ vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 direction, vec3 light) {
     return light * (albedo * diffuse + u_scatter * SHEEN * sheen * step(0.0, dot(normal, direction)));
 }
 
-vec3 skin(vec3 position, vec3 normal, vec3 albedo) {
+vec3 skin_light(vec3 position, vec3 normal, vec3 albedo) {
     vec3 to_eye = u_perspective > 0.5 ? normalize(u_eye - position) : -u_forward;
     vec3 reached = light_at(position + LIFT * normal);
     vec3 light = lit(albedo, normal, to_eye, u_key_direction, u_key_colour * reached.r)
                + lit(albedo, normal, to_eye, u_rim_direction, u_rim_colour * reached.g)
                + albedo * ambient(normal.y) * reached.b;
-    return tone(light);
+    return light;
 }

@@ -7,10 +7,12 @@ uniform float u_push_m;
 in vec3 in_position;
 in vec3 in_normal;
 in vec3 in_colour;
+in vec2 in_uv;
 
 out vec3 v_position;
 out vec3 v_normal;
 out vec3 v_albedo;
+out vec2 v_uv;
 
 void main() {
     vec4 clip = u_clip_from_head * vec4(in_position, 1.0);
@@ -19,4 +21,5 @@ void main() {
     v_position = in_position;
     v_normal = in_normal;
     v_albedo = in_colour;
+    v_uv = in_uv;
 }

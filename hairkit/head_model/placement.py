@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float64Array
-from hairkit.types.head import Capsules, Head
+from hairkit.types.head import Head
 from hairkit.types.strands import Strands
 
 _ROUNDS, _STILL = 40, 1e-6
@@ -44,15 +44,8 @@ class Placing:
 
 def place_head(head: Head, scale: float, shift: Float64Array) -> Head:
     """Return the head scaled about the origin, then moved by `shift` (3,), metres."""
-    shapes, shift32 = head.capsules, shift.astype(np.float32)
-    return replace(
-        head,
-        vertices=scale * head.vertices + shift32,
-        joints=scale * head.joints + shift32,
-        capsules=Capsules(
-            scale * shapes.first + shift32, scale * shapes.second + shift32, scale * shapes.radius
-        ),
-    )
+    factor, shift32 = np.float32(scale), shift.astype(np.float32)
+    return head.carried(lambda points: factor * points + shift32, scale)
 
 
 def find_place(head: Head, strands: Strands, *, scaled: bool = True) -> Placing:

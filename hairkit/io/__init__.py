@@ -13,6 +13,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `glb_file`: glTF documents
 * `glb_mesh`: the triangle mesh of a glTF file
 * `glb_motion`: the motion of a head in a glTF file
+* `glb_skin`: texture maps and morph targets of glTF meshes
 * `head_reader`: heads from OBJ, PLY and GLB
 * `heic`: HEIC photos, by an optional library
 * `mesh_text`: triangle meshes of OBJ and PLY files
@@ -21,6 +22,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `polylines`: strands from loose edges
 * `strand_blocks`: large grooms written in blocks of little memory
 * `strokes`: strokes on photos, labelme's JSON
+* `textures`: texture maps of mesh files
 * `tiff`: the header of TIFF files
 * `video`: a video of a turn as a capture
 * `video_child`: the process that decodes videos

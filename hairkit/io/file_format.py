@@ -21,6 +21,8 @@ class Feature(StrEnum):
     GUIDE_WEIGHTS = "guide weights"
     DENSITY = "density at the roots"
     HEAD = "head mesh"
+    MAPS = "texture maps of the head"
+    SHAPES = "blendshapes of the head"
     SKIN = "skeleton and skin"
     CAPSULES = "capsules"
     COLOUR = "colour"

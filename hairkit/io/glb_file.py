@@ -84,10 +84,10 @@ class GlbFile:
 
     def accessor(self, number: int) -> npt.NDArray[Any]:
         """Return (count, width) elements as they are stored, read-only, not normalised."""
-        accessor = self._item("accessors", number)
+        accessor = self.item("accessors", number)
         if "sparse" in accessor or "bufferView" not in accessor:
             raise ValueError("it uses sparse or compressed accessors: export it without them")
-        data = self._view(self._item("bufferViews", accessor["bufferView"]))
+        data = self.view(self.item("bufferViews", accessor["bufferView"]))
         count, width = _whole(accessor["count"]), WIDTHS[accessor["type"]]
         kind = np.dtype(COMPONENTS[accessor["componentType"]])
         view = self.document["bufferViews"][accessor["bufferView"]]
@@ -115,13 +115,13 @@ class GlbFile:
 
         Without scenes every node is a root. A node that is reached twice is an error.
         """
-        return [(self._item("nodes", index), matrix) for index, matrix in self.placements().items()]
+        return [(self.item("nodes", index), matrix) for index, matrix in self.placements().items()]
 
     def placements(self) -> dict[int, Float64Array]:
         """Return scene_from_node (4, 4) of every node of the default scene, by number."""
         nodes, scenes = self.document.get("nodes", []), self.document.get("scenes", [])
         if scenes:
-            roots = self._item("scenes", self.document.get("scene", 0)).get("nodes", [])
+            roots = self.item("scenes", self.document.get("scene", 0)).get("nodes", [])
         else:
             below = {child for node in nodes for child in node.get("children", [])}
             roots = [index for index in range(len(nodes)) if index not in below]
@@ -131,20 +131,22 @@ class GlbFile:
             index, above = pending.pop()
             if index in found or len(found) + len(pending) > _MAX_NODES:
                 raise ValueError(f"more than {_MAX_NODES} nodes, or a loop of nodes")
-            node = self._item("nodes", index)
+            node = self.item("nodes", index)
             found[index] = above @ node_matrix(node)
             children = reversed(node.get("children", []))
             pending += [(_whole(child), found[index]) for child in children]
         return found
 
-    def _item(self, kind: str, number: int) -> dict[str, Any]:
+    def item(self, kind: str, number: int) -> dict[str, Any]:
+        """Return an object of the document by its list and number."""
         items = self.document[kind]
         if not 0 <= _whole(number) < len(items):
             raise ValueError(f"{kind} has no number {number}")
         item: dict[str, Any] = items[number]
         return item
 
-    def _view(self, view: dict[str, Any]) -> memoryview:
+    def view(self, view: dict[str, Any]) -> memoryview:
+        """Return the bytes of a buffer view."""
         data = self._buffer(_whole(view["buffer"]))
         start, length = _whole(view.get("byteOffset", 0)), _whole(view["byteLength"])
         if start + length > len(data):
@@ -153,7 +155,7 @@ class GlbFile:
 
     def _buffer(self, number: int) -> memoryview:
         if number not in self._buffers:
-            buffer = self._item("buffers", number)
+            buffer = self.item("buffers", number)
             data = self._buffer_data(buffer, number)
             length = _whole(buffer["byteLength"])
             if length > len(data):
@@ -169,14 +171,18 @@ class GlbFile:
             if number != 0 or self._binary is None:
                 raise ValueError(f"buffer {number} has no data")
             return self._binary
+        return self.side_data(uri, f"buffer {number}")
+
+    def side_data(self, uri: str, what: str) -> memoryview:
+        """Return the data of a URI: its own, or that of a file in the file's own folder."""
         if uri.startswith("data:"):
             return _decode_data_uri(uri)
         name = urllib.parse.unquote(uri)
         if name != Path(name).name or "\\" in name or ":" in name or name in ("", ".", ".."):
-            raise ValueError(f"buffer {number} lies outside the file's folder: {name[:80]!r}")
+            raise ValueError(f"{what} lies outside the file's folder: {name[:80]!r}")
         file = self.path.parent / name
         if file.resolve().parent != self.path.parent.resolve():
-            raise ValueError(f"buffer {number} lies outside the file's folder: {name[:80]!r}")
+            raise ValueError(f"{what} lies outside the file's folder: {name[:80]!r}")
         return memoryview(read_bytes(file))
 
 

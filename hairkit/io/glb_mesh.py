@@ -6,14 +6,20 @@ GB for a file of 1 kB, and it passes over nodes that name meshes which do not ex
 
 from __future__ import annotations
 
+import logging
 import os
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.io.glb_file import GlbFile, readable
+from hairkit.io.glb_skin import material_maps, shape_offsets
 from hairkit.io.mesh_text import MAX_FACES, MAX_MESH_BYTES, MAX_VERTICES, FileMesh, check_mesh
+from hairkit.types.skin import Texture
+
+_log = logging.getLogger("hairkit")
 
 
 def read_glb(path: str | os.PathLike[str]) -> FileMesh:
@@ -27,7 +33,7 @@ def read_glb(path: str | os.PathLike[str]) -> FileMesh:
         parts = _parts(GlbFile(path, MAX_MESH_BYTES))
         if not parts:
             raise ValueError("it holds no triangles")
-        return check_mesh(_join(parts), path)
+        return check_mesh(_join(parts, path), path)
 
 
 def _parts(file: GlbFile) -> list[FileMesh]:
@@ -39,7 +45,9 @@ def _parts(file: GlbFile) -> list[FileMesh]:
         names = [node.get("name", ""), mesh.get("name", "")]
         for primitive in mesh["primitives"]:
             if primitive.get("mode", 4) == 4:
-                parts.append(_primitive(file, primitive, placed, names))
+                part = _primitive(file, primitive, placed, names)
+                shapes = shape_offsets(file, mesh, primitive, placed, len(part.vertices))
+                parts.append(replace(part, shapes=shapes))
         if sum(len(part.vertices) for part in parts) > MAX_VERTICES:
             raise ValueError(f"it has more than {MAX_VERTICES} vertices")
     return parts
@@ -67,8 +75,11 @@ def _primitive(
         index = np.arange(len(vertices))
     if len(index) > 3 * MAX_FACES:
         raise ValueError(f"{len(index) // 3} triangles in one part")
+    maps: dict[str, Texture] = {}
     if "material" in primitive:
-        names = [*names, file.document["materials"][primitive["material"]].get("name", "")]
+        material = file.document["materials"][primitive["material"]]
+        names = [*names, material.get("name", "")]
+        maps = material_maps(file, material)
     groups = {name.lower(): np.ones(len(vertices)) for name in names if name}
     for name, number in attributes.items():
         if name.startswith("_") and len(values := file.numbers(number)) == len(points):
@@ -84,11 +95,11 @@ def _primitive(
     flipped = None if uv is None else np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1)
     return FileMesh(
         vertices, index[: len(index) // 3 * 3].reshape(-1, 3), flipped,
-        None if colours is None else colours[:, :3], groups,
+        None if colours is None else colours[:, :3], groups, maps,
     )  # fmt: skip
 
 
-def _join(parts: list[FileMesh]) -> FileMesh:
+def _join(parts: list[FileMesh], path: str | os.PathLike[str]) -> FileMesh:
     counts = [len(part.vertices) for part in parts]
     firsts = np.cumsum([0, *counts[:-1]])
     faces = np.concatenate([part.faces + first for part, first in zip(parts, firsts, strict=True)])
@@ -104,10 +115,21 @@ def _join(parts: list[FileMesh]) -> FileMesh:
         )
         for name in names
     }
+    shapes = {
+        name: np.concatenate(
+            [part.shapes.get(name, np.zeros_like(part.vertices)) for part in parts]
+        )
+        for name in dict.fromkeys(name for part in parts for name in part.shapes)
+    }
+    mapped = [part for part in parts if "albedo" in part.maps]
+    if len({part.maps["albedo"].data.tobytes() for part in mapped}) > 1:
+        _log.warning("%s: of several materials only that of most triangles is used", path)
     return FileMesh(
         np.concatenate([part.vertices for part in parts]),
         faces,
         np.concatenate(uv) if len(uv) == len(parts) else None,
         np.concatenate(colours) if len(colours) == len(parts) else None,
         groups,
+        max(mapped or parts, key=lambda part: len(part.faces)).maps,
+        shapes,
     )

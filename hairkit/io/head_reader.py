@@ -14,10 +14,12 @@ from hairkit.arrays import Float32Array, Float64Array, Int32Array, check_reach
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.template import default_head
 from hairkit.io.glb_mesh import read_glb
-from hairkit.io.mesh_text import FileMesh, read_obj, read_ply
+from hairkit.io.mesh_text import FileMesh, obj_side_files, read_obj, read_ply
 from hairkit.io.photos import read_drawing
+from hairkit.io.textures import as_maps, write_mtl
 from hairkit.storage import read_text, write_text
 from hairkit.types.head import Capsules, Head
+from hairkit.types.skin import Blendshape
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres in one unit of a head file."""
@@ -60,7 +62,8 @@ class HeadFile:
         """Return the files that the head is read from, those that exist."""
         file = Path(self.path)
         named = [file, _beside(file, "landmarks.json"), _beside(file, "scalp.png")]
-        return [path for path in (*named, Path(self.scalp or "")) if path.is_file()]
+        named += [Path(self.scalp or ""), *(obj_side_files(file) if file.is_file() else ())]
+        return [path for path in named if path.is_file()]
 
 
 def read_head(
@@ -114,16 +117,26 @@ def read_head(
         landmarks,
         joints,
         capsules,
+        maps=as_maps(mesh.maps),
+        blendshapes=tuple(
+            Blendshape(name, _in_metres(offsets, units, up).astype(np.float32))
+            for name, offsets in mesh.shapes.items()
+        ),
     )
 
 
 def write_head_obj(path: str | os.PathLike[str], head: Head) -> None:
     """Write the head as OBJ in metres, its faces in the groups `scalp` and `head`.
 
-    Landmarks go to NAME.landmarks.json beside it. `read_head` gives the same mesh back.
+    Landmarks go to NAME.landmarks.json beside it, maps to NAME.mtl and pictures. `read_head` gives
+    the same mesh and maps back; blendshapes have no place in an OBJ file.
     """
     chosen = head.scalp[head.faces].mean(axis=1) > 0.5
     lines = ["# metres, +Y up, +Z out of the face"]
+    if head.maps is not None:
+        material = Path(path).with_suffix(".mtl")
+        write_mtl(material, head.maps)
+        lines += [f"mtllib {material.name}", "usemtl skin"]
     lines += ["v {:.9g} {:.9g} {:.9g}".format(*row) for row in head.vertices.tolist()]
     lines += ["vt {:.9g} {:.9g}".format(*row) for row in head.uv.tolist()]
     for name, faces in (("scalp", head.faces[chosen]), ("head", head.faces[~chosen])):

@@ -10,8 +10,12 @@ STL files are not read, because nothing in them can mark a scalp.
 from __future__ import annotations
 
 import io
+import logging
 import os
-from dataclasses import dataclass, field
+import re
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +23,11 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import FormatError
+from hairkit.io.textures import read_maps, read_mtl
 from hairkit.storage import read_bytes
+from hairkit.types.skin import Texture
+
+_log = logging.getLogger("hairkit")
 
 MAX_MESH_BYTES = 512 * 2**20
 MAX_VERTICES = 2_000_000
@@ -28,6 +36,7 @@ MAX_FACES = 4_000_000
 _MAX_PLY_HEADER = 2**16
 """Bytes in which a PLY header ends; trimesh reads the lines of an endless one for minutes."""
 _MAX_REASON = 200
+_PLY_TEXTURE = re.compile(rb"^comment TextureFile (.+?)\r?$", re.MULTILINE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +53,10 @@ class FileMesh:
     """(V, 3) painted colours in [0, 1]."""
     groups: dict[str, Float64Array] = field(default_factory=dict)
     """Lower-case name of a group, material or vertex property: (V,) weights in [0, 1]."""
+    maps: dict[str, Texture] = field(default_factory=dict)
+    """Textures by the names of the fields of `SkinMaps`."""
+    shapes: dict[str, Float64Array] = field(default_factory=dict)
+    """Name of a blendshape: (V, 3) offsets."""
 
 
 def check_mesh(mesh: FileMesh, path: str | os.PathLike[str]) -> FileMesh:
@@ -55,7 +68,7 @@ def check_mesh(mesh: FileMesh, path: str | os.PathLike[str]) -> FileMesh:
         )
     if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
         raise FormatError(f"{path}: a face names a vertex that does not exist")
-    arrays = [mesh.vertices, mesh.uv, mesh.colours, *mesh.groups.values()]
+    arrays = [mesh.vertices, mesh.uv, mesh.colours, *mesh.groups.values(), *mesh.shapes.values()]
     if not all(np.isfinite(array).all() for array in arrays if array is not None):
         raise FormatError(f"{path}: holds coordinates or weights that are not finite numbers")
     if np.abs(mesh.vertices).max() > 1e9:
@@ -64,7 +77,7 @@ def check_mesh(mesh: FileMesh, path: str | os.PathLike[str]) -> FileMesh:
     kept = mesh.faces[(a != b) & (b != c) & (c != a)]
     if not len(kept):
         raise FormatError(f"{path}: every face is collapsed to a line or a point")
-    return FileMesh(mesh.vertices, kept, mesh.uv, mesh.colours, mesh.groups)
+    return replace(mesh, faces=kept)
 
 
 def vertex_share(faces: Int64Array, chosen: npt.NDArray[np.bool_], count: int) -> Float64Array:
@@ -78,7 +91,8 @@ def read_obj(path: str | os.PathLike[str]) -> FileMesh:
     """Return the mesh of a Wavefront OBJ file: `v` (with colours), `vt`, `f`, `g`, `o`, `usemtl`.
 
     Polygons are cut into fans; a group's or material's weight at a vertex is the share of the
-    vertex's faces that are in it. Raises `FormatError` with the line's number.
+    vertex's faces that are in it. Maps are those of the material, of the files named by `mtllib`,
+    that most faces have of those with an albedo. Raises `FormatError` with the line's number.
     """
     parser = _ObjParser()
     text = read_bytes(path, MAX_MESH_BYTES).decode("latin-1")
@@ -87,7 +101,42 @@ def read_obj(path: str | os.PathLike[str]) -> FileMesh:
             parser.read(line)
         except (ValueError, IndexError, OverflowError) as error:
             raise FormatError(f"{path}: line {number} is not OBJ ({error})") from error
-    return check_mesh(parser.mesh(), path)
+    mesh = parser.mesh()
+    if mesh.uv is None:
+        return check_mesh(mesh, path)
+    return check_mesh(replace(mesh, maps=_obj_maps(Path(path), parser)), path)
+
+
+def obj_side_files(path: Path) -> list[Path]:
+    """Return the MTL files of an OBJ file and their pictures; none for other kinds of files."""
+    if path.suffix.lower() != ".obj":
+        return []
+    text = read_bytes(path, MAX_MESH_BYTES).decode("latin-1")
+    found = _libraries(path, re.findall(r"^mtllib (.+)$", text, re.MULTILINE))
+    pictures = [each for file in found if file.exists() for each in read_mtl(file).values()]
+    return [*found, *(picture for maps in pictures for picture in maps.values())]
+
+
+def _libraries(path: Path, names: list[str]) -> list[Path]:
+    """Return the MTL files of these names beside an OBJ file."""
+    return [path.with_name(Path(name.strip().replace("\\", "/")).name) for name in names]
+
+
+def _obj_maps(path: Path, parser: _ObjParser) -> dict[str, Texture]:
+    materials: dict[str, dict[str, Path]] = {}
+    for library in _libraries(path, parser.libraries):
+        if library.exists():
+            materials |= read_mtl(library)
+        else:
+            _log.warning("%s: no such file; the head has no texture maps", library)
+    coloured = [name for name in materials if "albedo" in materials[name]] or list(materials)
+    if not coloured:
+        return {}
+    chosen = max(coloured, key=lambda name: parser.uses[name])
+    others = sorted(name for name in coloured if name != chosen and parser.uses[name])
+    if others:
+        _log.warning("%s: of several materials only %s is used", path, chosen)
+    return read_maps(materials[chosen])
 
 
 class _ObjParser:
@@ -99,6 +148,9 @@ class _ObjParser:
         self.face_group: list[int] = []
         self.groups: list[frozenset[str]] = [frozenset()]
         self.names: dict[str, frozenset[str]] = {}
+        self.libraries: list[str] = []
+        self.material = ""
+        self.uses: Counter[str] = Counter()
 
     def read(self, line: str) -> None:
         kind, _, rest = line.partition(" ")
@@ -114,6 +166,10 @@ class _ObjParser:
         elif kind in ("g", "o", "usemtl"):
             self.names[kind] = frozenset(rest.lower().split())
             self.groups.append(frozenset().union(*self.names.values()))
+            if kind == "usemtl":
+                self.material = rest.strip().lower()
+        elif kind == "mtllib":
+            self.libraries.append(rest.strip())
 
     def _face(self, items: list[str]) -> None:
         corners, textures = [], []
@@ -124,6 +180,7 @@ class _ObjParser:
             textures.append(_obj_index(parts[1], len(self.texture)) if has_texture else -1)
         if len(corners) < 3:
             raise ValueError("a face needs three corners")
+        self.uses[self.material] += 1
         for i in range(1, len(corners) - 1):
             self.faces.append((corners[0], corners[i], corners[i + 1]))
             self.corners.append((textures[0], textures[i], textures[i + 1]))
@@ -189,7 +246,8 @@ def _split_at_seams(mesh: FileMesh, corners: Int64Array, texture: Float64Array) 
 def read_ply(path: str | os.PathLike[str]) -> FileMesh:
     """Return the mesh of a PLY file, text or binary, with colours, uv and further properties.
 
-    Every scalar vertex property that is no position, normal, colour or texture coordinate becomes
+    A comment `TextureFile NAME`, as MeshLab writes it, names the albedo beside the file. Every
+    scalar vertex property that is no position, normal, colour or texture coordinate becomes
     a group of that name, with values above 1 divided by 255. Raises `FormatError`.
     """
     from trimesh.exchange.ply import load_ply
@@ -200,9 +258,13 @@ def read_ply(path: str | os.PathLike[str]) -> FileMesh:
             raise ValueError("it has no header from 'ply' to 'end_header'")
         with np.errstate(all="ignore"):  # damaged numbers are found by `check_mesh`
             mesh = _ply_mesh(load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True))
+            named = _PLY_TEXTURE.search(data[: data.find(b"end_header")])
     except Exception as error:  # trimesh raises almost anything on damaged files
         reason = " ".join(f"{type(error).__name__}: {error}".split())[:_MAX_REASON]
         raise FormatError(f"{path}: not a readable PLY mesh ({reason})") from error
+    if named is not None and mesh.uv is not None:
+        picture = Path(named[1].decode("latin-1").replace("\\", "/")).name
+        mesh = replace(mesh, maps=read_maps({"albedo": Path(path).with_name(picture)}))
     return check_mesh(mesh, path)
 
 

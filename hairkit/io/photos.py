@@ -151,6 +151,15 @@ def read_photo(
     return upright, header
 
 
+def decode_picture(data: bytes, source: str | os.PathLike[str]) -> UInt8Array:
+    """Return the (H, W, 3) RGB pixels of a picture file's bytes, not turned by its EXIF tags.
+
+    Raises what `read_photo` raises, naming `source`.
+    """
+    _header(data, Path(source))
+    return np.ascontiguousarray(_decode(data, cv2.IMREAD_COLOR, Path(source))[..., ::-1])
+
+
 def read_drawing(path: str | os.PathLike[str]) -> UInt8Array:
     """Return the single channel (H, W) of a drawn PNG, such as a mask, its values untouched.
 

@@ -15,6 +15,7 @@ the packages named after the subject.
 * `point_cache`: simulated frames of the guides
 * `preview`: the pictures of these types that a notebook shows
 * `scene`: cameras and fitted head
+* `skin`: texture maps and blendshapes of a head
 * `strands`: packed polylines
 * `tie`: ties, and the tails that hang from them
 * `turnaround`: from where each photo was taken

@@ -18,8 +18,6 @@ from hairkit.types.tie import Tie
 
 _VERSION, _NEWEST = "hairkit_groom", 1
 _STRANDS = "strands."
-_TIES = "ties.count"
-"""Missing in files of hairkit 0.2, whose hair is loose."""
 _AT_TOP = ("points", "offsets", "widths", "root_uv", "group", "guide")
 
 
@@ -136,7 +134,6 @@ class Groom(Previewed, Stored):
             raise FormatError(f"{path}: not a groom of hairkit; expected what `reconstruct` wrote")
         if version.shape != () or version != _NEWEST:
             raise FormatError(f"{path}: a groom of version {version}, this hairkit reads {_NEWEST}")
-        arrays.setdefault(_TIES, np.zeros((), np.int64))
         named = {_STRANDS + name if name in _AT_TOP else name: arrays[name] for name in arrays}
         groom = from_arrays(cls, named, str(path))
         groom.check_reach(path)

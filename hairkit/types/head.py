@@ -1,8 +1,9 @@
-"""The head: a triangle mesh, closed or open, with scalp, uv, landmarks, skeleton and capsules."""
+"""The head: a triangle mesh with scalp, uv, landmarks, skin, shapes, skeleton and capsules."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,7 @@ from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array, f
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.preview import Previewed, draw_turn
+from hairkit.types.skin import Blendshape, SkinMaps
 
 LANDMARKS = 68
 """Landmarks of a face, in the order of iBUG (Sagonas et al. 2013)."""
@@ -59,6 +61,12 @@ class Head(Previewed, Stored):
     capsules: Capsules
     density: Float32Array | None = None
     """(V,) density of the hair on the scalp, of that of full hair, 0 to 1; None: full hair."""
+    maps: SkinMaps | None = None
+    """Pictures over the texture coordinates; None: plain skin."""
+    blendshapes: tuple[Blendshape, ...] = ()
+    """Shapes of the head's own vertices, such as expressions."""
+    eye_vertices: Int32Array | None = None
+    """(2, E) vertices of the left and the right eyeball, None on a head without eyeballs."""
 
     def __post_init__(self) -> None:
         vertices = frozen_array(self.vertices, np.float32, (None, 3), "head vertices")
@@ -89,6 +97,22 @@ class Head(Previewed, Stored):
                 self.landmark_vertices, np.int32, (LANDMARKS,), "head landmark_vertices"
             )
             object.__setattr__(self, "landmark_vertices", index)
+        self._check_shapes()
+
+    def _check_shapes(self) -> None:
+        count = len(self.vertices)
+        for shape in self.blendshapes:
+            if len(shape.offsets) != count:
+                raise DataError(
+                    f"blendshape {shape.name!r} has {len(shape.offsets)} vertices, the head {count}"
+                )
+        if len({shape.name for shape in self.blendshapes}) < len(self.blendshapes):
+            raise DataError("two blendshapes of the head have the same name")
+        if self.eye_vertices is not None:
+            eyes = frozen_array(self.eye_vertices, np.int32, (2, None), "head eye_vertices")
+            if not eyes.size or eyes.min() < 0 or eyes.max() >= count:
+                raise DataError("head eye_vertices are missing or name vertices that do not exist")
+            object.__setattr__(self, "eye_vertices", eyes)
 
     def __repr__(self) -> str:
         marked = "with" if self.landmark_vertices is not None else "without"
@@ -106,6 +130,34 @@ class Head(Previewed, Stored):
         density: Float32Array = (self.density[self.faces[face]] * weights).sum(axis=1)
         return np.clip(density, 0, 1)
 
+    def eye_centres(self) -> Float64Array | None:
+        """Return (2, 3) the middles of the left and the right eyeball, metres, or None."""
+        if self.eye_vertices is None:
+            return None
+        return np.asarray(self.vertices[self.eye_vertices].mean(axis=1, dtype=np.float64))
+
+    def carried(self, carry: Callable[[Float32Array], Float32Array], scale: float = 1.0) -> Head:
+        """Return the head whose points a map moves: vertices, shapes, joints and capsules.
+
+        Parameters
+        ----------
+        carry
+            Returns the new places (N, 3) of points (N, 3).
+        scale
+            By which the map enlarges; radii of the capsules are multiplied by it.
+        """
+        vertices, first, second, joints = _carry_all(
+            carry, self.vertices, self.capsules.first, self.capsules.second, self.joints
+        )
+        shapes = tuple(
+            replace(shape, offsets=carry(self.vertices + shape.offsets) - vertices)
+            for shape in self.blendshapes
+        )
+        capsules = Capsules(first, second, np.float32(scale) * self.capsules.radius)
+        return replace(
+            self, vertices=vertices, blendshapes=shapes, joints=joints, capsules=capsules
+        )
+
     def normals(self) -> Float64Array:
         """Return (V, 3) unit vertex normals, outward, weighted by face area."""
         corners = self.vertices.astype(np.float64)[self.faces]
@@ -116,6 +168,14 @@ class Head(Previewed, Stored):
         length = np.linalg.norm(total, axis=1, keepdims=True)
         result: Float64Array = total / np.maximum(length, 1e-20)
         return result
+
+
+def _carry_all(
+    carry: Callable[[Float32Array], Float32Array], *groups: Float32Array
+) -> list[Float32Array]:
+    """Return the groups of points after one call of the map."""
+    moved = carry(np.concatenate(groups))
+    return np.split(moved, np.cumsum([len(group) for group in groups])[:-1])
 
 
 @dataclass(frozen=True, eq=False)

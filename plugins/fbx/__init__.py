@@ -2,7 +2,8 @@
 
 For engines that take hair from elsewhere and the head from FBX: the mesh with normals and uv,
 the root, neck and head joints as limb nodes, smooth skin weights, a bind pose, and the scalp as the
-vertex colour. With `curves` every strand is a NURBS curve of degree 1. Only written, never read.
+vertex colour, texture maps inside the file, blendshapes. With `curves` every strand is a NURBS
+curve of degree 1. Only written, never read.
 Coordinates are Y up and centimetres unless `axis` says otherwise. `axis=unreal` is the same file:
 Unreal turns it on import into the space that the Alembic groom of `axis=unreal` has, where the face
 looks along +Y.
@@ -10,6 +11,7 @@ Source: the layout of Blender's documentation of FBX binary files (Campbell Bart
 
 * `body`: head mesh, skeleton, skin and bind pose
 * `curves`: strands as NURBS curves of degree 1
+* `look`: material, texture maps and blendshapes
 * `records`: binary records of FBX 7.4
 * `scene`: the document: header, objects, connections
 """
@@ -30,7 +32,16 @@ from hairkit.types.groom import Groom
 FORMAT = FileFormat(
     title="FBX",
     suffixes=(".fbx",),
-    written=frozenset({Feature.HEAD, Feature.SKIN, Feature.POINTS, Feature.COUNTS}),
+    written=frozenset(
+        {
+            Feature.HEAD,
+            Feature.MAPS,
+            Feature.SHAPES,
+            Feature.SKIN,
+            Feature.POINTS,
+            Feature.COUNTS,
+        }
+    ),
 )
 
 

@@ -8,15 +8,10 @@ from hairkit.arrays import Float32Array, Float64Array, Int32Array
 from hairkit.head_model.skinning import JOINT_NAMES, head_weights
 from hairkit.types.head import Head
 
+from .look import add_shapes, add_skin_material
 from .records import Record, array, number, record, text
-from .scene import SCENE, Scene, one, properties70
+from .scene import SCENE, Scene, one
 
-SKIN = (0.5, 0.36, 0.29)
-"""Linear RGB of the head, whose colour the photos do not give."""
-
-
-SKIN_SPECULAR = 0.1
-"""Factor of the skin's highlight, of 1: skin is matt."""
 DEFORM_ACCURACY = 50.0
 """`Link_DeformAcuracy` (so spelled in the format), per cent, as other exporters write it."""
 
@@ -27,7 +22,8 @@ def add_body(scene: Scene, head: Head) -> None:
     geometry = _add_geometry(scene, head)
     mesh = scene.add_model("head_mesh", "Mesh", SCENE)
     scene.connect(geometry, mesh)
-    scene.connect(_add_material(scene), mesh)
+    scene.connect(add_skin_material(scene, head.maps), mesh)
+    add_shapes(scene, geometry, head)
     bones = _add_bones(scene, joints)
     _add_bind_pose(scene, mesh, bones, joints)
     _add_skin(scene, geometry, bones, joints, head_weights(head))
@@ -101,21 +97,6 @@ def _layer_list(kinds: list[str]) -> Record:
     ]
     version = record("Version", number("I", 100))
     return record("Layer", number("I", 0), children=[version, *entries])
-
-
-def _add_material(scene: Scene) -> int:
-    return scene.add(
-        "Material",
-        "skin",
-        "",
-        record("Version", number("I", 102)),
-        record("ShadingModel", text("phong")),
-        record("MultiLayer", number("I", 0)),
-        properties70(
-            one("DiffuseColor", "Color", "", "A", *SKIN),
-            one("SpecularFactor", "Number", "", "A", SKIN_SPECULAR),
-        ),
-    )
 
 
 def _add_bones(scene: Scene, joints: Float64Array) -> list[int]:

@@ -39,7 +39,7 @@ class Scene:
 
     space: FileSpace
     objects: list[Record] = field(default_factory=list)
-    connections: list[tuple[int, int]] = field(default_factory=list)
+    connections: list[tuple[int, int, str]] = field(default_factory=list)
 
     def add(self, kind: str, name: str, subkind: str, *children: Record, label: str = "") -> int:
         """Add an object and return its id; `label` is the class in its name, if not `kind`."""
@@ -56,9 +56,9 @@ class Scene:
         self.connect(model, parent)
         return model
 
-    def connect(self, child: int, parent: int) -> None:
-        """Say that an object belongs to another."""
-        self.connections.append((child, parent))
+    def connect(self, child: int, parent: int, drives: str = "") -> None:
+        """Say that an object belongs to another, or drives that property of it."""
+        self.connections.append((child, parent, drives))
 
 
 def scene_pieces(head: Head, strands: Strands | None, space: FileSpace) -> list[bytes]:
@@ -101,8 +101,14 @@ def _of_models() -> tuple[Record, ...]:
 
 def _document(scene: Scene) -> list[Record]:
     connections = [
-        record("C", text("OO"), number("L", child), number("L", parent))
-        for child, parent in scene.connections
+        record(
+            "C",
+            text("OP" if drives else "OO"),
+            number("L", child),
+            number("L", parent),
+            *([text(drives)] if drives else []),
+        )
+        for child, parent, drives in scene.connections
     ]
     return [
         _header(),

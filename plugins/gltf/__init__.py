@@ -12,6 +12,7 @@ and as triangles for viewers, which is not.
 * `reader`: strands from the lines of a file
 * `ribbons`: hair as ribbons or cards
 * `scene`: the document of a groom
+* `skin`: the head's material
 * `streamed`: arrays made while they are written
 * `strips`: ribbons and cards at several levels of detail
 * `texture`: strand and relief pictures for strips
@@ -21,6 +22,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from hairkit.grooming.adopt_strands import ImportOptions
 from hairkit.grooming.prepare_export import AnimationOptions, ExportOptions, prepare_export
@@ -47,8 +49,10 @@ FORMAT = FileFormat(
             Feature.CURL,
             Feature.PHYSICS,
             Feature.SKIN,
+            Feature.SHAPES,
         }
     ),
+    partial=MappingProxyType({Feature.MAPS: "without the bump map"}),
     written=frozenset({Feature.ANIMATION}),
 )
 

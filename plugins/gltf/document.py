@@ -17,6 +17,7 @@ from hairkit.io.byte_writer import as_bytes
 from hairkit.io.glb_file import BINARY_CHUNK, JSON_CHUNK
 from hairkit.io.strand_blocks import bounds as bounds_of
 from hairkit.storage import write_pieces
+from hairkit.types.skin import PNG
 
 from .streamed import Streamed
 
@@ -92,18 +93,19 @@ class Document:
             "bufferViews", buffer=0, byteOffset=start, byteLength=array.nbytes, target=target
         )
 
-    def image(self, png: bytes, name: str) -> int:
-        """Store a picture, if it is new, and return its texture."""
-        if png in self._pictures:
-            return self._pictures[png]
-        view = self.view(np.frombuffer(png, np.uint8))
-        source = self.add("images", bufferView=view, mimeType="image/png", name=name)
+    def image(self, picture: bytes, name: str) -> int:
+        """Store a PNG or JPEG file, if it is new, and return its texture."""
+        if picture in self._pictures:
+            return self._pictures[picture]
+        view = self.view(np.frombuffer(picture, np.uint8))
+        kind = "image/png" if picture.startswith(PNG) else "image/jpeg"
+        source = self.add("images", bufferView=view, mimeType=kind, name=name)
         if "samplers" not in self.json:
             # linear with mipmaps; across and along a strip the picture does not repeat
             clamp = 33071
             self.add("samplers", magFilter=9729, minFilter=9987, wrapS=clamp, wrapT=clamp)
-        self._pictures[png] = self.add("textures", source=source, sampler=0)
-        return self._pictures[png]
+        self._pictures[picture] = self.add("textures", source=source, sampler=0)
+        return self._pictures[picture]
 
     def write(self, path: Path) -> None:
         """Write the .glb file, atomically; equal documents are equal files."""

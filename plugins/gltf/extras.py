@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,7 @@ def groom_extras(groom: Groom) -> dict[str, Any]:
             for tie in groom.ties
         ],
         "landmark_vertices": None if landmarks is None else landmarks.tolist(),
+        "eye_vertices": None if head.eye_vertices is None else head.eye_vertices.tolist(),
     }
 
 
@@ -84,14 +86,16 @@ def capsules_of(extras: dict[str, Any]) -> Capsules:
 
 
 def with_landmarks(head: Head, extras: dict[str, Any]) -> Head:
-    """Return the head with the file's landmarks, checked."""
+    """Return the head with the file's landmarks and eyes, checked."""
+    eyes = extras.get("eye_vertices")
+    head = replace(head, eye_vertices=None if eyes is None else np.array(eyes, np.int32))
     numbers = extras.get("landmark_vertices")
     if numbers is None:
         return head
     index = np.array(numbers, np.int32)
     if index.shape != (68,) or index.min() < 0 or index.max() >= len(head.vertices):
         raise ValueError("landmark_vertices are not 68 vertices of the head")
-    return Head(head.vertices, head.faces, head.uv, head.scalp, index, head.joints, head.capsules)
+    return replace(head, landmark_vertices=index)
 
 
 def _number(value: Any) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,20 +14,20 @@ from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.io.strand_blocks import shares
 from hairkit.types.groom import Groom
+from hairkit.types.skin import SkinMaps
 from hairkit.types.strands import Strands
 
 from .document import INDICES, Document, index_type
+from .skin import SKIN_COLOUR, skin_material
 from .streamed import Streamed, at_points, repeat_row, segments
 from .strips import HairMesh
-from .texture import white_picture
 
 JOINTS = ("root", "neck", "head")
 HEAD_JOINT = JOINTS.index("head")
 LINES = 1
-ROUGHNESS = {"head": 0.7, "hair": 0.45, "guides": 0.6}
+ROUGHNESS = {"hair": 0.45, "guides": 0.6}
 _SCALP_SHADE = 0.6
 """Brightness of the scalp in shares of the roots' colour: hair shades what lies below it."""
-_SKIN_COLOUR = np.array([0.58, 0.4, 0.32])
 
 
 class Meshes:
@@ -38,24 +39,29 @@ class Meshes:
     def head(self) -> int:
         """Add the head and return its mesh; the scalp is tinted like the hair's roots."""
         head, add = self.groom.head, self.document.accessor
-        tint = head.scalp[:, None] * (_SCALP_SHADE * self.groom.material.root_colour / _SKIN_COLOUR)
-        colour = np.clip(tint + 1 - head.scalp[:, None], 0, 1)
-        # a picture of the face may take its place; without one, validators call the uv unused
-        white = self.document.image(white_picture(), "white")
         attributes = {
             "POSITION": add(head.vertices, bounds=True),
             "NORMAL": add(_unit_normals(head.normals())),
             "TEXCOORD_0": add(_upside_down(head.uv)),
-            "COLOR_0": add(_bytes(colour), normalised=True),
+            "COLOR_0": add(_bytes(self._scalp_tint()), normalised=True),
             "_SCALP": add(head.scalp),
             **self._skin(len(head.vertices)),
         }
         primitive = {
             "attributes": attributes,
             "indices": self.document.indices(head.faces, len(head.vertices)),
-            "material": _plain(self.document, "head", _SKIN_COLOUR, white),
+            "material": skin_material(self.document, head.maps or SkinMaps()),
         }
-        return self.document.add("meshes", name="head_mesh", primitives=[primitive])
+        names = [shape.name for shape in head.blendshapes]
+        shapes = [shape.offsets for shape in head.blendshapes]
+        return self._with_shapes("head_mesh", primitive, shapes, names)
+
+    def _scalp_tint(self) -> Float64Array:
+        """Return colours (V, 3) by which the skin is multiplied: the roots' on the scalp."""
+        scalp = self.groom.head.scalp[:, None]
+        tint = scalp * (_SCALP_SHADE * self.groom.material.root_colour / SKIN_COLOUR)
+        shade: Float64Array = np.clip(tint + 1 - scalp, 0, 1)
+        return shade
 
     def hair(self, mesh: HairMesh, material: int, level: int) -> int:
         """Add strips and return their mesh."""
@@ -124,14 +130,20 @@ class Meshes:
         }
         return self._with_shapes("guides", primitive, shapes)
 
-    def _with_shapes(self, name: str, primitive: dict[str, Any], shapes: Float32Array) -> int:
+    def _with_shapes(
+        self,
+        name: str,
+        primitive: dict[str, Any],
+        shapes: Sequence[Float32Array] | Float32Array,
+        names: Sequence[str] | None = None,
+    ) -> int:
         extras = weights = None
         if len(shapes):
             primitive["targets"] = [
                 {"POSITION": self.document.accessor(shape, bounds=True)} for shape in shapes
             ]
             weights = [0.0] * len(shapes)
-            extras = {"targetNames": [f"motion_{number}" for number in range(len(shapes))]}
+            extras = {"targetNames": names or [f"motion_{each}" for each in range(len(shapes))]}
         return self.document.add(
             "meshes", name=name, primitives=[primitive], weights=weights, extras=extras
         )
@@ -183,12 +195,10 @@ def brightest(groom: Groom) -> Float64Array:
     return np.clip(np.maximum(look.root_colour, look.tip_colour).astype(np.float64), 0, 1)
 
 
-def _plain(document: Document, name: str, colour: Float64Array, texture: int | None = None) -> int:
+def _plain(document: Document, name: str, colour: Float64Array) -> int:
     look: dict[str, Any] = {
         "baseColorFactor": [*np.clip(colour, 0, 1).tolist(), 1.0],
         "metallicFactor": 0.0,
         "roughnessFactor": ROUGHNESS[name],
     }
-    if texture is not None:
-        look["baseColorTexture"] = {"index": texture}
     return document.add("materials", name=name, pbrMetallicRoughness=look)

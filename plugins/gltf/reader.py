@@ -15,8 +15,11 @@ from hairkit.errors import FormatError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands
 from hairkit.head_model.scalp import bind
 from hairkit.io.glb_file import GlbFile, readable
+from hairkit.io.glb_skin import material_maps, shape_offsets
+from hairkit.io.textures import as_maps
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head
+from hairkit.types.skin import Blendshape
 from hairkit.types.strands import Strands
 
 from .extras import VERSION, capsules_of, material_of, physics_of, ties_of, with_landmarks
@@ -252,14 +255,14 @@ def _strands(parts: list[_Part], path: object) -> Strands:
 def _own_head(file: GlbFile, own: dict[str, Any]) -> Head | None:
     """Return the head of a file of hairkit's, or None where it was left out."""
     joints = np.zeros((3, 3))
-    primitive = None
+    mesh, primitive = {}, None
     for node, placed in file.nodes_in_place():
         if node.get("name") in JOINTS:
             joints[JOINTS.index(node["name"])] = placed[:3, 3]
         if "mesh" in node:
             for candidate in file.document["meshes"][node["mesh"]]["primitives"]:
                 if "_SCALP" in candidate["attributes"]:
-                    primitive = candidate
+                    mesh, primitive = file.document["meshes"][node["mesh"]], candidate
     if primitive is None:
         return None
     attributes = primitive["attributes"]
@@ -280,5 +283,12 @@ def _own_head(file: GlbFile, own: dict[str, Any]) -> Head | None:
         None,
         joints.astype(np.float32),
         capsules_of(own),
+        maps=as_maps(material_maps(file, file.item("materials", primitive["material"]))),
+        blendshapes=tuple(
+            Blendshape(name, offsets.astype(np.float32))
+            for name, offsets in shape_offsets(
+                file, mesh, primitive, np.eye(4), len(vertices)
+            ).items()
+        ),
     )
     return with_landmarks(head, own)

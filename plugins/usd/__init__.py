@@ -3,7 +3,8 @@
 Written is one component: a SkelRoot with the skeleton (root, neck, head), the head mesh, all
 strands as one BasisCurves and their materials. The strands carry Unreal's `groom_*` primvars, and
 what only hairkit knows (binding, scalp, capsules, curl, physics) is in primvars and custom data
-named `hairkit`, so that the file gives the whole groom back.
+named `hairkit`, so that the file gives the whole groom back. Texture maps of the
+head stand beside the file, which names them; its blendshapes are UsdSkel's. Neither is read back.
 Animated strands are baked: their points are where they are in the world, and they are not bound to
 the skeleton, which would move them twice; the head mesh is skinned to the moving skeleton.
 Read are the BasisCurves of any program, cubic ones as the polylines of their control points. The
@@ -36,12 +37,13 @@ from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
 from hairkit.types.groom import Groom
 
+_WRITTEN = frozenset({Feature.GUIDE_WEIGHTS, Feature.DENSITY, Feature.MAPS, Feature.SHAPES})
 FORMAT = FileFormat(
     title="USD",
     suffixes=(".usdc", ".usda", ".usd"),
-    exact=frozenset(Feature) - {Feature.GUIDE_WEIGHTS, Feature.DENSITY, Feature.ANIMATION},
+    exact=frozenset(Feature) - _WRITTEN - {Feature.ANIMATION},
     partial=MappingProxyType({Feature.ANIMATION: "written; the rest pose is read"}),
-    written=frozenset({Feature.GUIDE_WEIGHTS, Feature.DENSITY}),
+    written=_WRITTEN,
 )
 
 

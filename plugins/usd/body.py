@@ -82,6 +82,7 @@ def add_head(stage: Any, head: Head, space: FileSpace, skeleton: Any, material: 
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     _add_vertex_data(mesh.GetPrim(), head)
     _add_skin(mesh.GetPrim(), head, skeleton)
+    _add_shapes(stage, mesh.GetPrim(), head, space)
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
 
 
@@ -106,3 +107,23 @@ def _add_skin(prim: Any, head: Head, skeleton: Any) -> None:
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
     binding.CreateJointIndicesPrimvar(False, joints).Set(Vt.IntArray.FromNumpy(indices))
     binding.CreateJointWeightsPrimvar(False, joints).Set(Vt.FloatArray.FromNumpy(weights.ravel()))
+
+
+def _add_shapes(stage: Any, prim: Any, head: Head, space: FileSpace) -> None:
+    """Add the head's blendshapes below its mesh."""
+    from pxr import Sdf, Tf, UsdSkel, Vt
+
+    if not head.blendshapes:
+        return
+    paths = []
+    for shape in head.blendshapes:
+        path = prim.GetPath().AppendChild(Tf.MakeValidIdentifier(shape.name))
+        moved = np.flatnonzero(np.abs(shape.offsets).max(axis=1) > 0)
+        offsets = space.directions_to_file(shape.offsets[moved]) / space.metres
+        target = UsdSkel.BlendShape.Define(stage, path)
+        target.CreateOffsetsAttr(Vt.Vec3fArray.FromNumpy(offsets.astype(np.float32)))
+        target.CreatePointIndicesAttr(Vt.IntArray.FromNumpy(moved.astype(np.int32)))
+        paths.append(Sdf.Path(path))
+    binding = UsdSkel.BindingAPI.Apply(prim)
+    binding.CreateBlendShapesAttr(Vt.TokenArray([shape.name for shape in head.blendshapes]))
+    binding.CreateBlendShapeTargetsRel().SetTargets(paths)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
 from hairkit.errors import InputError, MissingExtraError
 from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.io.coordinate_space import FileSpace
+from hairkit.io.textures import picture_names, write_pictures
 from hairkit.storage import replace_file, utf8_name
 
 MISSING = "USD files need usd-core, which is not installed: pip install 'hairkit[usd]'"
@@ -50,13 +52,17 @@ def write_stage(ready: PreparedGroom, path: Path, options: StageOptions) -> None
         raise MissingExtraError(MISSING) from error
     stage = Usd.Stage.CreateInMemory(f"groom{path.suffix.lower()}")
     _describe(stage, ready, space)
-    _fill(stage, ready, space, options)
+    maps = ready.groom.head.maps if options.head_mesh else None
+    pictures = {} if maps is None else picture_names(path, maps)
+    _fill(stage, ready, space, options, pictures)
     with replace_file(path, path.suffix.lower()) as part:
         try:
             stage.GetRootLayer().Export(utf8_name(part))
         except Tf.ErrorException as error:
             reason = " ".join(str(error).split()).partition("'Error occurred ")[2].partition("'")[0]
             raise InputError(f"{path}: the USD library fails {reason or 'to write it'}") from error
+        if maps is not None:
+            write_pictures(path, maps)
 
 
 def _describe(stage: Any, ready: PreparedGroom, space: FileSpace) -> None:
@@ -82,7 +88,13 @@ def time_codes(ready: PreparedGroom) -> list[float]:
     return [round(float(time) * rate, DIGITS) for time in ready.cache.times]
 
 
-def _fill(stage: Any, ready: PreparedGroom, space: FileSpace, options: StageOptions) -> None:
+def _fill(
+    stage: Any,
+    ready: PreparedGroom,
+    space: FileSpace,
+    options: StageOptions,
+    pictures: Mapping[str, str],
+) -> None:
     from pxr import Kind, Usd, UsdSkel
 
     from .body import add_head, add_skeleton
@@ -94,7 +106,7 @@ def _fill(stage: Any, ready: PreparedGroom, space: FileSpace, options: StageOpti
     stage.SetDefaultPrim(root)
     Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
     root.SetCustomData({"hairkit": settings_of(ready.groom)})
-    materials = add_materials(stage, ready.groom)
+    materials = add_materials(stage, ready.groom, pictures)
     skeleton = add_skeleton(stage, ready, space, time_codes(ready))
     if options.head_mesh:
         add_head(stage, ready.groom.head, space, skeleton, materials.skin)

@@ -14,9 +14,11 @@ from rich_groom import rich_groom, with_degenerate
 from hairkit.errors import MissingExtraError
 from hairkit.grooming.prepare_export import complete_groom, select_strands
 from hairkit.head_model.scalp import evaluate, roots_at
+from hairkit.head_model.template import default_head
 from hairkit.io.file_format import Feature
 from hairkit.manager import Manager, PluginInfo
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
+from hairkit.types.head import Head
 
 FORMATS = [info for info in Manager.loaded(autoload=False).plugins() if info.format is not None]
 FILES = [(info, suffix) for info in FORMATS for suffix in info.suffixes]
@@ -57,6 +59,17 @@ def same_values(found: object, wanted: object, names: tuple[str, ...]) -> bool:
     return all(close(getattr(found, name), getattr(wanted, name)) for name in names)
 
 
+def pictures(head: Head) -> dict[str, bytes]:
+    """Return the pixels of a head's texture maps by name."""
+    present = {} if head.maps is None else head.maps.present()
+    return {name: texture.pixels.tobytes() for name, texture in present.items()}
+
+
+def shapes(head: Head) -> dict[str, bytes]:
+    """Return the offsets of a head's blendshapes by name."""
+    return {shape.name: shape.offsets.tobytes() for shape in head.blendshapes}
+
+
 def comes_back(feature: Feature, back: Groom, true: Groom) -> bool:
     """Return whether a feature of the groom is the same after reading."""
     strands, wanted = back.strands, true.strands
@@ -69,6 +82,8 @@ def comes_back(feature: Feature, back: Groom, true: Groom) -> bool:
             evaluate(true.head, true.root_triangle, true.root_barycentric),
         )
     return {
+        Feature.MAPS: pictures(back.head) == pictures(true.head),
+        Feature.SHAPES: shapes(back.head) == shapes(true.head),
         Feature.POINTS: close(strands.points, wanted.points),
         Feature.COUNTS: close(strands.counts, wanted.counts),
         Feature.WIDTHS: close(strands.widths, wanted.widths),
@@ -93,6 +108,8 @@ def is_lost(feature: Feature, back: Groom, true: Groom) -> bool:
     strands = back.strands
     own_uv = roots_at(back.head, back.root_triangle, back.root_barycentric).uv
     return {
+        Feature.MAPS: back.head.maps is None or pictures(back.head) == pictures(default_head()),
+        Feature.SHAPES: not back.head.blendshapes or shapes(back.head) == shapes(default_head()),
         Feature.POINTS: False,
         Feature.COUNTS: len(np.unique(strands.counts)) == 1,
         Feature.WIDTHS: strands.widths is None or np.ptp(strands.widths) == 0,

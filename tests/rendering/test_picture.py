@@ -5,18 +5,22 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from hairkit.colour import srgb_from_linear
 from hairkit.errors import InputError, RenderError
 from hairkit.rendering import Lights, draw, draw_views
 from hairkit.rendering import context as context_module
 from hairkit.rendering.context import BACKENDS, renderer
+from hairkit.rendering.head import SKIN
 from hairkit.rendering.light import hair_density, light_volume
 from hairkit.testing import bristle_groom
 from hairkit.types.camera import Camera
 from hairkit.types.groom import HairMaterial
+from hairkit.types.skin import SkinMaps, Texture
 from hairkit.types.strands import Strands
 
 CAMERA = Camera.on_turn(20.0, distance=0.8, focal=140.0, width=80, height=60)
@@ -118,3 +122,16 @@ def test_both_backends_draw_the_same() -> None:
     assert done.returncode == 0, done.stderr.decode()
     other = np.frombuffer(done.stdout, np.uint8).reshape(60, 80, 3).astype(int)
     assert np.abs(other - draw(bristle_groom(), None, CAMERA)).mean() < 1
+
+
+def test_a_picture_of_one_colour_is_that_colour_of_skin() -> None:
+    """A head whose albedo is white times the skin's colour looks like a head without a picture."""
+    groom = bristle_groom()
+    skin = np.rint(255 * srgb_from_linear(np.array(SKIN, np.float64))).astype(np.uint8)
+    maps = SkinMaps(Texture.encode(np.tile(skin, (8, 8, 1))))
+    plain = draw(groom, None, CAMERA).astype(int)
+    pictured = draw(groom, replace(groom.head, maps=maps), CAMERA).astype(int)
+    assert np.abs(plain - pictured).max() <= 3
+    blue = SkinMaps(Texture.encode(np.tile(np.array([0, 0, 255], np.uint8), (8, 8, 1))))
+    coloured = draw(groom, replace(groom.head, maps=blue), CAMERA).astype(int)
+    assert (coloured[40:44, 38:42, 2] > coloured[40:44, 38:42, 0] + 40).all()

@@ -9,8 +9,12 @@ import numpy as np
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Capsules
+from hairkit.types.skin import Blendshape, SkinMaps, Texture
 from hairkit.types.strands import Strands
 from hairkit.types.tie import Tie
+
+_MAP_SIZES = ((8, 8), (8, 8, 3), (8, 8))
+"""Of roughness, normal and bump."""
 
 
 def rich_groom(strands: int = 40) -> Groom:
@@ -37,6 +41,14 @@ def rich_groom(strands: int = 40) -> Groom:
         capsules=_capsules(),
         joints=bare.head.joints + np.float32(0.01),
         density=rng.uniform(0.2, 1.0, len(bare.head.vertices)),
+        maps=SkinMaps(
+            Texture.encode(rng.integers(0, 255, (16, 16, 3), np.uint8)),
+            *(Texture.encode(rng.integers(0, 255, size, np.uint8)) for size in _MAP_SIZES),
+        ),
+        blendshapes=tuple(
+            Blendshape(name, rng.normal(0, 1e-3, bare.head.vertices.shape).astype(np.float32))
+            for name in ("smile", "jaw_open")
+        ),
     )
     return Groom(
         packed,

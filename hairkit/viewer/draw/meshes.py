@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import moderngl
@@ -10,7 +11,7 @@ import numpy as np
 from hairkit.arrays import Float64Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
-from hairkit.rendering.head import Solid
+from hairkit.rendering.head import ALBEDO_UNIT, Solid, upload_albedo
 from hairkit.types.camera import Camera
 
 
@@ -20,17 +21,20 @@ class SolidPass:
     def __init__(self, gl: Renderer, solid: Solid, *, by_vertex: bool = False) -> None:
         self._gl = gl
         self.solid = solid
-        self._program = gl.program("viewer_skin", "hair") if by_vertex else gl.program("skin")
-        values = np.concatenate([solid.vertices, solid.normals, solid.colours], axis=1)
+        self._program = gl.program("viewer_skin" if by_vertex else "skin")
+        uv = np.zeros((len(solid.vertices), 2)) if solid.uv is None else solid.uv
+        values = np.concatenate([solid.vertices, solid.normals, solid.colours, uv], axis=1)
         self._values = np.ascontiguousarray(values, np.float32)
         self._placed = np.eye(4)
         self._vertices = gl.context.buffer(self._values)
         self._faces = gl.context.buffer(np.ascontiguousarray(solid.faces, np.uint32))
         self._array = gl.context.vertex_array(
             self._program,
-            [(self._vertices, "3f 3f 3f", "in_position", "in_normal", "in_colour")],
+            [(self._vertices, "3f 3f 3f 2f", "in_position", "in_normal", "in_colour", "in_uv")],
             index_buffer=self._faces,
         )
+        self._kept = contextlib.ExitStack()
+        self._albedo = self._kept.enter_context(upload_albedo(gl, solid.albedo))
 
     def place(self, matrix: Float64Array) -> None:
         """Move the mesh by a rigid motion (4, 4) from its original pose."""
@@ -53,11 +57,16 @@ class SolidPass:
             u_push_m=push,
             u_eye=tuple(camera.position.tolist()),
             u_scatter=self.solid.scatter,
+            u_albedo=ALBEDO_UNIT,
+            u_textured=float(self._albedo is not None),
             **lighting,
         )
+        if self._albedo is not None:
+            self._albedo.use(ALBEDO_UNIT)
         self._array.render(moderngl.TRIANGLES)
 
     def release(self) -> None:
         """Free the buffers."""
         for part in (self._array, self._vertices, self._faces):
             part.release()
+        self._kept.close()

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rich_groom import rich_groom
 
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
@@ -314,3 +315,19 @@ def test_a_failed_export_leaves_no_file(
     with pytest.raises(KeyboardInterrupt):
         written(manager, bristle_groom(), tmp_path / "a.fbx")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_ufbx_finds_maps_and_blendshapes(manager: Manager, tmp_path: Path) -> None:
+    """The file holds the four pictures, joined to the material, and a channel for each shape."""
+    ufbx = pytest.importorskip("ufbx", reason="pyufbx is not installed")
+    groom = rich_groom()
+    assert groom.head.maps is not None
+    path = tmp_path / "a.fbx"
+    written(manager, groom, path)
+    scene = ufbx.load_file(str(path))
+    sizes = {texture.name: len(texture.content) for texture in scene.textures}
+    assert sizes == {name: len(each.data) for name, each in groom.head.maps.present().items()}
+    (material,) = scene.materials
+    assert len(material.textures) == 4
+    (deformer,) = scene.meshes[0].blend_deformers
+    assert [channel.name for channel in deformer.channels] == ["smile", "jaw_open"]

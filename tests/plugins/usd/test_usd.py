@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rich_groom import rich_groom as rich_groom_on_ball
 
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError, MissingExtraError
@@ -335,3 +336,28 @@ def test_attributes_can_be_left_out(manager: Manager, tmp_path: Path) -> None:
     assert not [p for p in hair.GetPrimvars() if p.GetPrimvarName().startswith("groom_")]
     curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/Groom/Hair"))
     np.testing.assert_array_equal(curves.GetPointsAttr().Get(), groom.strands.points)
+
+
+def test_the_skin_reads_its_pictures_beside_the_file(tmp_path: Path, manager: Manager) -> None:
+    """Maps stand beside the stage, which reads them over `st`; blendshapes move as they should."""
+    pxr = pytest.importorskip("pxr.Usd", reason="usd-core is not installed")
+    from pxr import UsdShade, UsdSkel
+
+    groom = rich_groom_on_ball()
+    manager.call("export_groom", "usd", groom=groom, path=tmp_path / "a.usda")
+    stage = pxr.Stage.Open(str(tmp_path / "a.usda"))
+    surface = UsdShade.Shader.Get(stage, "/Groom/Materials/Skin/Surface")
+    for slot, name in (
+        ("diffuseColor", "Albedo"),
+        ("roughness", "Roughness"),
+        ("normal", "Normal"),
+    ):
+        assert surface.GetInput(slot).HasConnectedSource()
+        shader = UsdShade.Shader.Get(stage, f"/Groom/Materials/Skin/{name}")
+        assert (tmp_path / shader.GetInput("file").Get().path).is_file()
+    metres = stage.GetMetadata("metersPerUnit")
+    query = UsdSkel.BlendShapeQuery(UsdSkel.BindingAPI(stage.GetPrimAtPath("/Groom/Head")))
+    assert query.GetNumBlendShapes() == 2
+    first = UsdSkel.BlendShape.Get(stage, "/Groom/Head/smile").GetOffsetsAttr().Get()
+    wanted = np.linalg.norm(groom.head.blendshapes[0].offsets, axis=1)
+    np.testing.assert_allclose(np.linalg.norm(first, axis=1) * metres, wanted, rtol=1e-5)
