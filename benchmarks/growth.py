@@ -26,7 +26,11 @@ from hairkit.types.parting import Parting
 from hairkit.types.tie import TiedHair
 from hairkit.types.waves import Waves
 
-TRACKERS = ("hybrid_growth", "certainty_tracker")
+TRACKERS: dict[str, dict[str, object]] = {
+    "hybrid_growth": {"waves": False},
+    "certainty_tracker": {},
+}
+"""Trackers with the options that let them do the same work."""
 
 
 class Listener:
@@ -66,8 +70,8 @@ def main() -> int:
         "tied": TiedHair(),
         "scalp_distance": measure_scalp_distance(scene.head, hull),
     }
-    for name in TRACKERS:
-        options = manager.options(name, {"waves": False})
+    for name, settings in TRACKERS.items():
+        options = manager.options(name, settings)
         times = []
         for _ in range(args.rounds):
             began = time.perf_counter()

@@ -1,75 +1,58 @@
-"""3D orientation field: planes of all views fused by confidence, the rest filled by diffusion.
+"""3D orientation field of the thesis: planes of the views on the hair's surface, diffused inwards.
 
-A 2D orientation and the ray through its pixel span a plane that holds the strand; with plane
-normals N_i the direction D minimises `sum w_i (N_i . D)^2` (Wei et al. 2005; thesis 5.3 with the
-weights the right way round). Every view contributes to a cell with a weight that falls with the
-cell's depth behind the first hair the view sees ("see-through"). D D^T is diffused with its
-certainty (Paris et al. 2008; thesis 5.4); near the scalp, where photos show little, a weak prior
-gives the direction in which hair leaves the head. A potential that grows with the distance from the
-scalp through the hair later tells a strand's root from its tip.
-
-On the crown, which level photos see at a grazing angle, long hair is combed from its parting
-(`hairkit.field.parting`). Photos of tight curls show no strand direction (`hairkit.imaging.waves`):
-there the field hangs down along the head (`hairkit.field.hanging_hair`), and the tracker winds the
-strands about it.
+A 2D orientation and the ray through its pixel span a plane that holds the strand. In outer cells
+that two or more views see, the direction D minimises `sum w_i^2 (N_i . D)^2` over the plane
+normals N_i (Wei et al. 2005; thesis 5.3, with the confidence where it prints its inverse, which
+would favour bad pixels). Cells that the scalp cuts get its normals. Both are kept as they are, and
+D D^T is diffused to all other cells (Paris et al. 2008; thesis 5.4). The direction of a cell is the
+eigenvector of the largest eigenvalue; the text's "smallest" is a slip.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
+from scipy import ndimage
 
 from hairkit import (
+    Head,
     Hull,
     Mask,
     OrientationField,
     OrientationMap,
-    Parting,
     ScalpDistance,
     Scene,
-    Waves,
     hookimpl,
 )
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.field.diffusion import solve_screened
-from hairkit.field.growth_prior import ScalpPrior, add_scalp_prior, growth_potential
-from hairkit.field.hanging_hair import hang_curls
-from hairkit.field.view_fusion import FusionOptions, fuse_views
+from hairkit.field.growth_prior import growth_potential
+from hairkit.field.view_fusion import fuse_planes, plane_directions
+from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.options import option
+from hairkit.types.volume import outer_products
 
-HARD_WEIGHT = 1e3
-"""Weight against `smoothness` that keeps a cell as it is."""
+FIXED = 1e3
+"""Weight of known cells against the differences of neighbours: a Dirichlet condition."""
+TIP_SHARE = 0.6
+"""Cells this far along the longest way from the scalp count as tips, where growth ends."""
 
 
 @dataclass(frozen=True)
-class Options(FusionOptions):
+class Options:
     """Settings of fusion and diffusion."""
 
-    min_views: int = option(1, low=1, high=8, doc="Views a cell needs to be fused.")
-    smoothness: float = option(0.4, low=1e-4, high=100, doc="Weight of the diffusion.")
-    scalp_weight: float = option(
-        0.1, low=0, high=100, doc="Weight of the combing prior at the scalp; large values fix it."
+    min_views: int = option(2, low=2, high=8, doc="Views that a cell needs to be fused.")
+    box: int = option(
+        5,
+        low=1,
+        high=31,
+        unit="px",
+        doc="Edge of the box over which confidence is averaged; a view's weight is its square.",
     )
-    scalp_reach: float = option(
-        0.02, low=0, high=0.1, unit="m", doc="Distance from the scalp within which the prior acts."
-    )
-    scalp: str = option(
-        "combed", choices=("combed", "normal"), doc="Direction at the scalp: combed, or its normal."
-    )
-    hard: bool = option(False, doc="Keep fused cells and the scalp as they are (Dirichlet).")
-    scalp_lift: float = option(
-        0.6, low=0, high=5, doc="Outward part of the prior against its tangential part."
-    )
-    parting_weight: float = option(
-        0.15, low=0, high=10, doc="Weight of the comb from the parting in the hair on the crown."
-    )
-    tip_share: float = option(
-        0.6,
-        low=0.05,
-        high=1,
-        doc="Cells this far along the longest way from the scalp count as tips.",
-    )
-    tolerance: float = option(2e-2, low=1e-8, high=0.1, doc="Relative residual of the solver.")
+    tolerance: float = option(1e-4, low=1e-8, high=0.1, doc="Relative residual of the solver.")
 
 
 @hookimpl
@@ -78,32 +61,53 @@ def solve_field(
     masks: tuple[Mask, ...],
     orientations: tuple[OrientationMap, ...],
     hull: Hull,
-    waves: Waves,
     scalp_distance: ScalpDistance,
-    parting: Parting,
     options: Options,
 ) -> OrientationField:
-    """Fuse the views, add the scalp prior, diffuse over the loose hull."""
-    growth = growth_potential(hull, scalp_distance, options.tip_share)
-    if waves.curly:
-        return hang_curls(scene.head, hull, growth)
-    fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options, options.min_views)
-    tensor, certainty = fused.tensor, fused.certainty
-    prior = ScalpPrior(
-        options.scalp_weight,
-        options.scalp_reach,
-        options.scalp_lift,
-        options.scalp == "normal",
-        options.parting_weight,
-    )
-    data, weight = add_scalp_prior(scene.head, hull, growth, tensor, certainty, prior, parting)
-    if options.hard:
-        weight = np.where(weight > 0, HARD_WEIGHT, 0).astype(np.float32)
-    solved = solve_screened(
-        hull.loose, data, weight, options.smoothness, tolerance=options.tolerance
-    )
+    """Fuse the outer cells, fix the scalp's, diffuse over the loose hull."""
+    weighted = tuple(_weigh(found, options.box) for found in orientations)
+    planes, views = fuse_planes(scene.cameras, masks, weighted, hull, 0.0, hull.grid.spacing)
+    views[~_outer_cells(hull)] = 0
+    tensor, gap = plane_directions(planes, views, options.min_views)
+    weight = np.where(gap > 0, FIXED, 0).astype(np.float32)
+    centres = hull.grid.centres_of(hull.loose)
+    normal = scalp_normals(scene.head, centres, hull.grid.spacing)
+    cut = normal.any(axis=1)
+    tensor[cut], weight[cut] = outer_products(normal[cut]), FIXED
     field = np.zeros((*hull.grid.shape, 6), np.float32)
-    field[hull.loose] = solved
+    field[hull.loose] = solve_screened(hull.loose, tensor, weight, 1.0, tolerance=options.tolerance)
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
+    growth = growth_potential(hull, scalp_distance, TIP_SHARE)
     return OrientationField(hull.grid, field, confidence, growth)
+
+
+def _weigh(found: OrientationMap, box: int) -> OrientationMap:
+    """Return the map with the square of its mean confidence over a box of pixels as confidence."""
+    mean = cv2.blur(found.confidence, (box, box), borderType=cv2.BORDER_REPLICATE)
+    return OrientationMap(found.angle, mean * mean)
+
+
+def _outer_cells(hull: Hull) -> BoolArray:
+    """Return which loose cells (N,) are hair with a face neighbour that is none."""
+    outer: BoolArray = (hull.dense & ~ndimage.binary_erosion(hull.dense))[hull.loose]
+    return outer
+
+
+def scalp_normals(head: Head, points: Float32Array, spacing: float) -> Float64Array:
+    """Return the head's unit normals (N, 3) in the cells that its scalp cuts, zero in others.
+
+    `points` (N, 3) are the centres of cells with edges of `spacing` metres. A cell is cut if the
+    surface's nearest point to its centre lies in it; there the normals of the triangle's corners
+    are interpolated.
+    """
+    result = np.zeros(points.shape)
+    tree = build_tree(head.vertices, head.faces)
+    face, weights, _ = nearest_on_surface(tree, points)
+    corners = head.faces[face]
+    nearest = np.einsum("nc,ncx->nx", weights, head.vertices[corners].astype(np.float64))
+    cut = (np.abs(nearest - points) <= spacing / 2).all(axis=1)
+    cut &= np.einsum("nc,nc->n", weights, head.scalp[corners].astype(np.float64)) > 0.5
+    normal = np.einsum("nc,ncx->nx", weights[cut], head.normals()[corners[cut]])
+    result[cut] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    return result

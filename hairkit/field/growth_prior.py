@@ -90,8 +90,6 @@ class ScalpPrior:
     """Metres from the head."""
     lift: float
     """Outward part against the tangential one."""
-    normal: bool = False
-    """True: hair grows along the head's normal instead of being combed."""
     crown: float = 0.0
     """Weight of the comb from the parting, in all the hair on the crown."""
 
@@ -110,9 +108,7 @@ def add_scalp_prior(
     points = hull.grid.centres_of(hull.loose)
     near = hull.head_distance[hull.loose] < prior.reach
     if prior.weight and near.any():
-        comb = gradient(hull.grid, hull.head_distance, points[near])
-        if not prior.normal:
-            comb = combing_direction(head, hull, growth, points[near], prior.lift, parting)
+        comb = combing_direction(head, hull, growth, points[near], prior.lift, parting)
         _mix(data, weight, near, comb, np.full(len(comb), prior.weight))
     if prior.crown and parts(parting, float(np.ptp(growth[hull.dense]))):
         share = prior.crown * crown_share(head, points)
