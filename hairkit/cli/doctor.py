@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Literal
 
 from hairkit import __version__
@@ -99,12 +100,20 @@ def _requirements() -> tuple[list[str], dict[str, list[str]]]:
 
 def _package(name: str) -> Finding:
     try:
-        version = importlib.metadata.version(name)
-        importlib.import_module(_MODULES.get(name, name.replace("-", "_")))
+        module = importlib.import_module(_MODULES.get(name, name.replace("-", "_")))
+        version = _version(name, module)
     except Exception as error:  # a broken package may raise anything while it is imported
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         return Finding(name, "FAIL", f"{reason}; pip install --force-reinstall {name}")
     return Finding(name, "ok", version)
+
+
+def _version(name: str, module: ModuleType) -> str:
+    """Return the distribution's version, or its module's: OpenCV comes in several distributions."""
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return f"{module.__version__}, of another distribution"
 
 
 def _opencv_wheels(installed: list[str]) -> Finding:

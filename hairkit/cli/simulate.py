@@ -19,6 +19,7 @@ Example: hairkit simulate out/groom.npz -o cache.npz --shake yaw:20:1.5 --wind 3
 
 Simulate a groom's guides and write a point cache (.npz), or a file with the animation in it, by the
 exporter of its ending: -o hair.abc, .usdc, .glb. The captured hair is at rest at the start.
+--guides N chooses N guides from full hair first; all its other strands move with them.
 Shakes are AXIS:DEGREES:HERTZ[:SECONDS] with yaw, pitch or roll; several go together. Wind is where
 the air goes to: +X the subject's left, +Y up, +Z out of the face."""
 
@@ -42,6 +43,7 @@ def register(subparsers: Any) -> None:
     add = parser.add_argument
     add("groom", metavar="GROOM", type=Path, help="groom.npz, or a file that a plugin imports")
     add("-o", "--out", required=True, type=Path, metavar="FILE", help="cache.npz, or hair.abc, ...")
+    add("--guides", type=int, metavar="N", help="choose N guides from full hair (the groom's own)")
     add("--frames", type=int, default=FRAMES, metavar="N", help=f"frames to write ({FRAMES})")
     add("--fps", type=float, default=RATE, metavar="N", help=f"frames per second ({RATE:g})")
     add("--warm-up", type=float, default=0.0, metavar="S", help="seconds before the first frame")
@@ -67,6 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     from hairkit.api import export
+    from hairkit.grooming.decimate import decimate
     from hairkit.manager import Manager
     from hairkit.pipeline.open_groom import load_groom
     from hairkit.progress import progress_for
@@ -87,6 +90,8 @@ def _run(args: argparse.Namespace) -> int:
     groom = load_groom(manager, args.groom, settings["reader"])
     if not len(groom.strands):
         raise InputError(f"{args.groom}: holds no strands, so there is nothing to simulate")
+    if args.guides is not None:
+        groom = decimate(groom, args.guides)
     motion = static_motion() if args.motion is None else read_motion(args.motion)
     motion = add_shakes(args.shake, groom.head, motion)
     simulator = manager.call("make_simulator", using, options, groom=groom)

@@ -19,6 +19,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `mesh_text`: triangle meshes of OBJ and PLY files
 * `number_text`: numbers in text files, fast
 * `photos`: photos, with their headers checked first
+* `ply_elements`: elements of PLY files, and strands from them
 * `polylines`: strands from loose edges
 * `strand_blocks`: large grooms written in blocks of little memory
 * `strokes`: strokes on photos, labelme's JSON

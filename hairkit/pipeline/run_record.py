@@ -9,7 +9,7 @@ import os
 import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -29,8 +29,8 @@ RECORD = "run.json"
 """Name of the record beside the groom."""
 VERSION = 1
 """Version of the record's form; it grows when what is in it changes its meaning."""
-LIBRARIES = ("numpy", "scipy", "numba", "opencv-contrib-python-headless", "moderngl", "pluggy")
-"""Distributions whose versions may change a result."""
+LIBRARIES = ("numpy", "scipy", "numba", "cv2", "moderngl", "pluggy")
+"""Modules whose versions may change a result. OpenCV comes in several distributions."""
 _MAX_RECORD_BYTES = 2**24
 
 
@@ -207,7 +207,8 @@ def hash_file(path: Path, name: str | None = None) -> FileRecord:
 
 def library_versions() -> dict[str, str]:
     """Return the versions of Python and of the libraries that compute results."""
-    return {"python": platform.python_version()} | {name: version(name) for name in LIBRARIES}
+    versions = {name: str(import_module(name).__version__) for name in LIBRARIES}
+    return {"python": platform.python_version()} | versions
 
 
 def _plugins(recipe: Recipe, manager: Manager) -> tuple[PluginRecord, ...]:

@@ -15,6 +15,7 @@ Weights differ from cell to cell: S counts near strands, V away from them, grad(
 Tight curls show no direction; theirs hang down along the head (`hairkit.field.hanging_hair`).
 
 * `four_fields`: the four fields and their weighted sum
+* `given_segments`: oriented 3D segments from a file
 * `photo_lines`: lines through orientation maps, lifted onto the hull
 * `ribbons`: segments widened along the surface
 * `segments`: oriented 3D segments
@@ -23,6 +24,7 @@ Tight curls show no direction; theirs hang down along the head (`hairkit.field.h
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -50,8 +52,9 @@ from .four_fields import (
     internal_distance,
     surface_structure,
 )
+from .given_segments import read_segments, segments_in_hair
 from .ribbons import ribbons
-from .segments import find_segments
+from .segments import find_segments, orient_segments
 
 __all__ = ["Options", "blend", "find_segments", "internal_distance", "ribbons"]
 
@@ -60,6 +63,9 @@ __all__ = ["Options", "blend", "find_segments", "internal_distance", "ribbons"]
 class Options(FusionOptions):
     """Settings of segments, fields and their weights."""
 
+    segments: Path | None = option(
+        None, doc="A .ply or .npz with 3D segments in metres, to use instead of the photos' lines."
+    )
     line_spacing: int = option(
         10, low=2, high=100, unit="px", doc="Distance between lines followed in a photo."
     )
@@ -121,7 +127,11 @@ def solve_field(
     if waves.curly:
         return hang_curls(scene.head, hull, growth)
     fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options)
-    segments = find_segments(scene.cameras, masks, fused, hull, growth, options)
+    if options.segments is None:
+        segments = find_segments(scene.cameras, masks, fused, hull, growth, options)
+    else:
+        given = segments_in_hair(read_segments(options.segments), hull, options.segments)
+        segments = orient_segments(given, hull, growth)
     prior = ScalpPrior(
         options.scalp_weight, options.scalp_reach, options.scalp_lift, crown=options.parting_weight
     )

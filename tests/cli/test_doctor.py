@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
 import os
 from pathlib import Path
 
+import cv2
 import pytest
 
 import hairkit
@@ -43,6 +45,17 @@ def test_two_opencv_wheels_are_a_failure_with_its_cure() -> None:
     assert found.verdict == "FAIL"
     assert "pip uninstall -y opencv-contrib-python-headless opencv-python" in found.text
     assert doctor._opencv_wheels(["opencv-contrib-python-headless"]).verdict == "ok"
+
+
+def test_opencv_of_another_distribution_will_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where another wheel brings cv2, its version is told and nothing fails."""
+
+    def absent(name: str) -> str:
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata, "version", absent)
+    found = doctor._package("opencv-contrib-python-headless")
+    assert (found.verdict, found.text) == ("ok", f"{cv2.__version__}, of another distribution")
 
 
 def test_a_missing_package_is_named_with_pip() -> None:

@@ -49,7 +49,7 @@ def test_the_record_names_all_that_the_result_depends_on(out: Path) -> None:
         assert file.sha256 == hashlib.sha256((out / file.path).read_bytes()).hexdigest()
     assert (record.guides, record.seed, record.max_edge) == (20, 3, 128)
     assert record.hairkit == hairkit.__version__
-    assert {"python", "numpy", "opencv-contrib-python-headless"} <= set(record.libraries)
+    assert {"python", "numpy", "cv2"} <= set(record.libraries)
     assert {plugin.plugin for plugin in record.plugins} == {"ball_plugin"}
     assert all(plugin.options == {"delay": 0.0, "length": 0.05} for plugin in record.plugins)
     assert {"segment", "track"} <= {stage.stage for stage in record.stages}

@@ -77,6 +77,22 @@ def simulate(groom: Groom, folder: Path, *more: str) -> int:
     return cli.main([*words, "--set", "pbd.backend=reference", *more])
 
 
+@pytest.mark.parametrize("simulator", ["pbd", "super_helix"])
+def test_full_hair_moves_with_guides_chosen_from_it(
+    groom: Groom, tmp_path: Path, simulator: str
+) -> None:
+    """From full hair to its motion in one command: few strands are simulated, all are written."""
+    words = ["simulate", str(tmp_path / "full.npz"), "--guides", "5", "--using", simulator]
+    words += ["--frames", "6", "--wind", "9,0,0", "--quiet", "-o"]
+    groom.save(tmp_path / "full.npz")
+    assert cli.main([*words, str(tmp_path / "guides.npz")]) == 0
+    cache = PointCache.load(tmp_path / "guides.npz")
+    assert cache.points.shape[1] == 5 * groom.strands.counts[0] < len(groom.strands.points)
+    assert cli.main([*words, str(tmp_path / "moving.glb")]) == 0
+    assert cli.main(["info", str(tmp_path / "moving.glb")]) == 0
+    assert cli.main([*words, str(tmp_path / "x.npz"), "--guides", "0"]) == 2
+
+
 def test_the_verb_writes_a_cache_of_the_groom(groom: Groom, tmp_path: Path) -> None:
     """The cache belongs to the groom and equal commands write equal bytes."""
     files = []

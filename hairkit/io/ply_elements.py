@@ -9,9 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Int64Array
 from hairkit.errors import FormatError
 from hairkit.io.byte_reader import ByteReader
 from hairkit.io.number_text import read_numbers
+from hairkit.io.polylines import chains
 
 Elements = dict[str, dict[str, npt.NDArray[np.generic]]]
 """Values (N,) by element and property."""
@@ -148,3 +150,26 @@ def _convert(
     if (values < limits.min).any() or (values > limits.max).any() or (values % 1).any():
         raise FormatError(f"{source}: holds numbers beyond the type of their property")
     return values.astype(kind)
+
+
+def strand_order(
+    elements: Elements, vertices: int, path: str | os.PathLike[str]
+) -> tuple[Int64Array, Int64Array]:
+    """Return the vertices (P,) strand after strand, and the points (S,) of each.
+
+    From an element `strand` with `nsegs`, else from the edges. Raises `FormatError` without either.
+    """
+    segments = elements.get("strand", {}).get("nsegs")
+    if segments is not None:
+        counts = segments.astype(np.int64) + 1
+        if (counts < 1).any() or counts.sum() != vertices:
+            raise FormatError(f"{path}: nsegs part {counts.sum()} points, {vertices} vertices")
+        return np.arange(vertices), counts
+    edge = elements.get("edge", {})
+    if not {"vertex1", "vertex2"} <= set(edge) or not len(edge["vertex1"]):
+        raise FormatError(f"{path}: has no strands: neither an element strand nor edges")
+    try:
+        pairs = np.stack([edge["vertex1"], edge["vertex2"]], axis=1).astype(np.int64)
+        return chains(pairs, vertices)
+    except FormatError as error:
+        raise FormatError(f"{path}: {error}") from error

@@ -4,8 +4,6 @@ Binary little-endian. `element vertex` has x, y, z, thickness (the diameter) and
 colour; `element edge` lets mesh programs show the strands; `element strand` with `nsegs`, as
 hairutil writes it, parts them, with root uv, group and guide flag. Read: ascii and both binary
 orders, with strands or with edges alone.
-
-* `elements`: header and rows of PLY elements
 """
 
 from __future__ import annotations
@@ -35,13 +33,11 @@ from hairkit.io.byte_reader import finite
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.io.polylines import chains
+from hairkit.io.ply_elements import read_elements, strand_order
 from hairkit.io.strand_blocks import blocks, colours
 from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
-
-from .elements import Elements, read_elements
 
 FORMAT = FileFormat(
     "PLY",
@@ -95,7 +91,7 @@ def import_groom(path: Path, options: Options) -> Groom:
     with np.errstate(over="ignore"):  # what is not finite is refused below
         points = np.stack([vertex[name] for name in "xyz"], axis=1).astype(np.float32)
     finite(points, path, "vertices")
-    order, counts = _strand_order(elements, len(points), path)
+    order, counts = strand_order(elements, len(points), path)
     strands, kept = pack_strands(options.space.points_to_head(points[order]), counts, path)
     rows = rows_kept(counts, kept)
     widths = None
@@ -149,24 +145,6 @@ def _header(points: int, strands: int) -> str:
         lines.append(f"element {name} {rows}")
         lines += [f"property {_NAMES[kind]} {field}" for field, kind in fields]
     return "\n".join([*lines, "end_header", ""])
-
-
-def _strand_order(elements: Elements, vertices: int, path: Path) -> tuple[Int64Array, Int64Array]:
-    """Return the vertices (P,) strand after strand, and the points (S,) of each."""
-    segments = elements.get("strand", {}).get("nsegs")
-    if segments is not None:
-        counts = segments.astype(np.int64) + 1
-        if (counts < 1).any() or counts.sum() != vertices:
-            raise FormatError(f"{path}: nsegs part {counts.sum()} points, {vertices} vertices")
-        return np.arange(vertices), counts
-    edge = elements.get("edge", {})
-    if not {"vertex1", "vertex2"} <= set(edge) or not len(edge["vertex1"]):
-        raise FormatError(f"{path}: has no strands: neither an element strand nor edges")
-    try:
-        pairs = np.stack([edge["vertex1"], edge["vertex2"]], axis=1).astype(np.int64)
-        return chains(pairs, vertices)
-    except FormatError as error:
-        raise FormatError(f"{path}: {error}") from error
 
 
 def _with_strand_values(
