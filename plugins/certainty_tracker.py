@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from hairkit import Hull, OrientationField, Roots, Strands, hookimpl
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
@@ -218,6 +217,8 @@ def smooth_strands(points: Float32Array, edge: float, length: float, passes: int
     (Iben et al., "Artistic simulation of curly hair", 2013, section 4.1). `edge` and `length` are
     metres. Strands get shorter by what is smoothed off.
     """
+    from scipy import signal  # it loads much of SciPy, which listing the plugins does not need
+
     edges = np.diff(points.astype(np.float64), axis=1)
     kept = np.exp(-edge / length)
     numerator, denominator = [(1 - kept) ** 2], [1.0, -2 * kept, kept**2]

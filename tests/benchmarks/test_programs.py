@@ -25,6 +25,15 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "masks": ({}, ["CAPTURES"]),
     "parting": ({}, ["CAPTURES"]),
     "orientation": ({}, ["CAPTURES", "--only", "structure_tensor"]),
+    "orientation_looks": (
+        {
+            "STRANDS": 60,
+            "SIZE": (120, 160),
+            "STYLES": ("straight",),
+            "COLOURS": {"red": (0.2, 0, 0)},
+        },
+        [],
+    ),
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
     "super_helix": ({"GUIDES": 8, "ELEMENTS": 5, "FRAMES": 2}, []),
