@@ -27,8 +27,8 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "orientation": ({}, ["CAPTURES", "--only", "structure_tensor"]),
     "orientation_looks": (
         {
-            "STRANDS": 60,
-            "SIZE": (120, 160),
+            "STRANDS": 2000,
+            "SIZE": (240, 320),
             "STYLES": ("straight",),
             "COLOURS": {"red": (0.2, 0, 0)},
         },
