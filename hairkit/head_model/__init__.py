@@ -11,5 +11,6 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `skinning`: skin weights of the three joints
 * `template`: the default head
 * `template_shape`: its profile curves and displacements
+* `template_skin`: the painted skin of the default head
 * `torso`: a torso by nine numbers, below a head
 """

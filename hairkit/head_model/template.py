@@ -9,6 +9,7 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from hairkit.arrays import Float64Array, Int32Array
 from hairkit.head_model.template_shape import head_surface, scalp_weight
+from hairkit.head_model.template_skin import template_maps
 from hairkit.types.head import Capsules, Head
 
 FREQUENCY = 34
@@ -87,6 +88,7 @@ def default_head() -> Head:
         landmarks.astype(np.int32),
         (_JOINTS * 1e-3).astype(np.float32),
         Capsules(spheres[:, :3], spheres[:, 4:7], spheres[:, [3, 7]]),
+        maps=template_maps(),
     )
 
 
