@@ -10,6 +10,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `evaluate`: scores against the truth
 * `export`: write a groom for an engine
 * `format_table`: the table of file formats
+* `head`: photos to a head with its skin
 * `info`: what a file holds
 * `models`: networks that plugins use
 * `new_plugin`: a plugin to start from
@@ -45,6 +46,7 @@ from hairkit.errors import HairkitError
 
 VERBS = {
     "reconstruct": "turn photos of a head, or a video, into a groom",
+    "head": "turn photos into a head with the person's skin, without hair",
     "studio": "from a camera to moving hair, in a browser",
     "rerun": "run a reconstruction again from its record",
     "evaluate": "score a groom against the truth",

@@ -5,6 +5,7 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `bare_head`: where a photo shows face, ears and neck
 * `bvh`: nearest points and ray crossings on triangle meshes
 * `hairline`: where the photos show that hair grows
+* `photo_skin`: the skin of a head taken from the photos
 * `placement`: a head placed under given strands
 * `scalp`: roots: sampling, binding to faces, growth mesh
 * `signed_distance`: signed distance to a head, on a grid or at points

@@ -17,6 +17,7 @@ from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.field.ties import measure_ties
 from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.hairline import Hairline, measure_hairline
+from hairkit.head_model.photo_skin import photograph_skin
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.imaging.waves import measure_waves
@@ -41,6 +42,7 @@ from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
+from hairkit.types.skin import SkinMaps
 from hairkit.types.strands import Strands
 from hairkit.types.tie import TiedHair
 from hairkit.types.turnaround import Turnaround
@@ -135,9 +137,9 @@ def _run(
     with work, ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool:
         run = StageRunner(recipe, manager, work, log, pool)
         _sweep(folder, run)
-        _tell_missing(recipe, manager, log)
+        tell_missing(recipe, manager, log)
         try:
-            capture, turn = _find_views(run, given, log)
+            capture, turn = find_views(run, given, log)
             marked = mark_head(_head(head), recipe, manager, log.message)
             made = _grow(run, capture, marked, record.guides, record.seed, turn)
         except BaseException:
@@ -159,7 +161,7 @@ def _run(
     return made.groom, made.health
 
 
-def _tell_missing(recipe: Recipe, manager: Manager, log: RunLog) -> None:
+def tell_missing(recipe: Recipe, manager: Manager, log: RunLog) -> None:
     """Say in one line which plugins work without their networks."""
     missing = missing_networks(recipe, manager)
     if missing:
@@ -198,7 +200,7 @@ def export_paths(
     )
 
 
-def _find_views(
+def find_views(
     run: StageRunner, capture: Capture, log: RunLog
 ) -> tuple[Capture, Turnaround | None]:
     """Find faces, persons and the turn; return the views upright, in its order, and the turn."""
@@ -254,20 +256,17 @@ def _grow(
 ) -> _Made:
     """Run the stages; views are processed in parallel, later stages wait for them."""
     photos, views = Given.of(capture), [Given.of(view) for view in capture.views]
-    masks = run.every_view("segment", Mask, views)
-    if run.has("refine") and not all(view.mask_path for view in capture.views):
-        masks = _refine(run, photos, masks, Given.of(head))
+    masks = label_views(run, photos, head)
     orientations = run.every_view("orient", OrientationMap, views, mask=masks)
-    scene = run.once("scene", Scene, capture=photos, masks=masks, head=Given.of(head))
-    if run.has("head"):
-        scene = run.once("head", Scene, capture=photos, masks=masks, scene=scene)
+    scene = fit_scene(run, photos, masks, head)
     hull = run.once("hull", Hull, scene=scene, masks=masks)
     seen = _measure(run, photos, masks, orientations, scene, hull)
     field = run.once("field", OrientationField, **seen)
     waves, distance = seen["waves"].value, seen["scalp_distance"].value
     parting, tied = seen["parting"].value, seen["tied"].value
     hairline = run.derive("hairline", Hairline, measure_hairline, scene=scene, masks=masks)
-    grown = replace(scene.value.head, density=hairline.value.density)
+    skin = run.derive("skin", SkinMaps, photograph_skin, capture=photos, scene=scene, masks=masks)
+    grown = replace(scene.value.head, density=hairline.value.density, maps=skin.value)
     roots = Given.of(sample_roots(grown, guides, seed, rest=head))
     strands = run.once("track", Strands, **seen, field=field, roots=roots)
     labels = tuple(mask.result().value for mask in masks)
@@ -278,6 +277,25 @@ def _grow(
         parting, tied,
     )  # fmt: skip
     return _Made(labels, angles, hull.value, scene.value, parting, groom, health)
+
+
+def label_views(run: StageRunner, photos: Given[Capture], head: Head) -> list[Future[Given[Mask]]]:
+    """Return the masks of all views, mended by the head where they were not given."""
+    views = photos.value.views
+    masks = run.every_view("segment", Mask, [Given.of(view) for view in views])
+    if run.has("refine") and not all(view.mask_path for view in views):
+        return _refine(run, photos, masks, Given.of(head))
+    return masks
+
+
+def fit_scene(
+    run: StageRunner, photos: Given[Capture], masks: Sequence[Future[Given[Mask]]], head: Head
+) -> Given[Scene]:
+    """Return the cameras, and the head fitted to the photos."""
+    scene = run.once("scene", Scene, capture=photos, masks=masks, head=Given.of(head))
+    if run.has("head"):
+        return run.once("head", Scene, capture=photos, masks=masks, scene=scene)
+    return scene
 
 
 def _measure(

@@ -36,6 +36,7 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     ),
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
+    "skin": ({"HEIGHT": 120}, ["CAPTURES"]),
     "super_helix": ({"GUIDES": 8, "ELEMENTS": 5, "FRAMES": 2}, []),
     "threads": ({"REPETITIONS": 1}, ["--runs", "2"]),
     "turn": ({"SHUFFLES": 1}, ["CAPTURES"]),

@@ -24,7 +24,7 @@ from hairkit.testing import turn_scene
 PROJECT = Path(__file__).parents[2]
 PAGES = [PROJECT / "README.md", *sorted((PROJECT / "docs").rglob("*.md"))]
 PAGES += sorted((PROJECT / "examples").rglob("*.md"))
-NOT_RUN = {"reconstruct", "rerun", "studio", "view", "evaluate", "doctor", "study"}
+NOT_RUN = {"reconstruct", "head", "rerun", "studio", "view", "evaluate", "doctor", "study"}
 """They take long, or need a window, captures or a record: arguments and recipes are checked."""
 ALONE = ("doctor", "plugins")
 """Verbs that are commands without arguments; a page may speak of the others by name."""

@@ -1,0 +1,48 @@
+"""`hairkit head PHOTOS -o head.glb`: the person's head from photos, without hair."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from hairkit.cli.settings import STAGE_HELP, add_setting
+from hairkit.errors import InputError
+
+_DESCRIPTION = """\
+Example: hairkit head photos/ -o head.glb
+
+Fit the head to photos and take its skin from them. PHOTOS is what hairkit reconstruct takes. The
+ending says the format: .glb and .fbx (skeleton and texture inside), .obj (with .mtl and picture) or
+.npz."""
+
+
+def register(subparsers: Any) -> None:
+    """Add the verb to the command line."""
+    parser = subparsers.add_parser("head", help="photos to a head", description=_DESCRIPTION)
+    add = parser.add_argument
+    add("photos", metavar="PHOTOS", help="folder of the photos, or a video")
+    add("-o", "--output", type=Path, required=True, metavar="FILE", help="file of the head")
+    add("--recipe", default="default", metavar="R", help="recipe, of which the first stages run")
+    add_setting(add, STAGE_HELP)
+    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+    add("--quiet", action="store_true", help="print only errors on stderr")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fit, write, and print the file's name."""
+    from hairkit.manager import Manager
+    from hairkit.pipeline.head_alone import ENDINGS, photograph_head, write_head
+    from hairkit.pipeline.recipe import load_recipe
+    from hairkit.progress import progress_for
+
+    if args.output.suffix.lower() not in ENDINGS:
+        raise InputError(f"{args.output}: a head is written as {', '.join(ENDINGS)}")
+    manager = Manager.loaded(args.plugin)
+    recipe = load_recipe(args.recipe).with_set(args.set)
+    with progress_for(sys.stderr, quiet=args.quiet) as shown:
+        scene = photograph_head(args.photos, recipe, manager, progress=shown)
+    write_head(args.output, scene.head, manager)
+    print(args.output)
+    return 0

@@ -1,0 +1,369 @@
+"""The skin of a head taken from the photos: an albedo map with the person's face.
+
+Every photo is projected on the fitted head. A texel takes its colour from the views that see it,
+weighted by the cosine under which they do; hair, what stands before the head, the outline of the
+person and blown-out pixels do not count. Exposure and white balance of the views are evened by one
+gain a channel, least squares over the texels that two views share. Views are blended in two bands
+(Burt and Adelson 1983): coarse colours by their weights, details from the view that sees the
+texel best, so that seams neither show nor blur.
+
+What no view sees is taken from its mirror image where the texture coordinates are symmetric, then
+from the head's own skin, with the tone of the skin that is seen nearest to it: the ratio of the two
+is extended by normalised convolutions of growing reach. The light of the photos stays in the map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, UInt8Array
+from hairkit.cameras.depth_raster import depth_behind, head_depth, mesh_depth
+from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture
+from hairkit.types.head import Head
+from hairkit.types.mask import PERSON, Mask
+from hairkit.types.scene import Scene
+from hairkit.types.skin import SkinMaps, Texture
+
+SIZE = 2048
+"""Edge of the albedo map, texels: 0.25 mm on the face."""
+COARSE = 512
+"""Edge of the maps in which places, visibility and weights are found, texels."""
+TONE = 128
+"""Edge of the map in which tones are extended over what no view sees, texels."""
+LEAST_FACING, WHOLE_FACING = 0.15, 0.8
+"""Cosines of the angle of view up to which a texel is not taken, and from which wholly."""
+HIDDEN = 0.004
+"""Metres behind the first surface from which a texel is hidden."""
+MARGIN = 0.004
+"""Metres of skin beside hair and outline that are left out: masks and cameras are not exact."""
+BAND = 3.0
+"""Sigma between the two bands, texels of the coarse maps: 3 mm on the face."""
+SHARPNESS = 8
+"""Power of the weights from which details are taken: nearly the best view alone."""
+BLOWN, BLOWN_FADE = 250.0, 6.0
+"""Levels of 255 from which a pixel has lost its colour, and over which its weight fades."""
+LEAST_SEEN = 0.08
+"""Weight of all views together from which a texel counts as seen."""
+FILL_FADE = 3.0
+"""Sigma over which seen skin fades into filled skin, texels of the coarse maps."""
+LARGEST_FACE = 0.1
+"""Share of the texture's edge over which a face may reach."""
+MIRRORED = 0.01
+"""Metres that mirrored texels may be apart on heads whose texture coordinates are symmetric."""
+TONE_REACHES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+"""Sigmas of the convolutions that extend tones, texels of `TONE`."""
+TONE_TRUST = 1e-3
+"""Weight of a convolution's result beside that of the next larger one."""
+SKIN_SPREAD = (0.35, 0.12, 0.12)
+"""Spread of skin in one photo: logarithms of green, and of red and blue over green."""
+LEAST = 1e-6
+"""Least weight that colours are divided by."""
+STEP = 4
+"""Every how manieth texel exposures and the tone of skin are measured at."""
+GAIN_PRIOR = 0.05
+"""Weight of the belief that a view needs no gain, in shares of a texel that two views share."""
+FLOOR = 4.0
+"""Levels of 255 added before logarithms."""
+
+
+class _Surface(NamedTuple):
+    """The head's surface over its texture coordinates."""
+
+    places: Float32Array
+    """(C, C, 3) metres."""
+    normals: Float32Array
+    """(C, C, 3)."""
+    known: BoolArray
+    """(C, C) texels that the head covers."""
+
+
+class _Seen(NamedTuple):
+    """One photo on the head."""
+
+    weight: Float32Array
+    """(C, C)."""
+    column: Float32Array
+    """(C, C) pixels of the photo, for `cv2.remap`."""
+    row: Float32Array
+    """(C, C)."""
+    coarse: Float32Array
+    """(C, C, 3) the photo's colours, 0 to 255."""
+
+
+def photograph_skin(capture: Capture, scene: Scene, masks: Sequence[Mask]) -> SkinMaps:
+    """Return the maps of the scene's fitted head, with an albedo taken from the photos."""
+    photos = [view.image for view in capture.views]
+    surface = _unwrap(scene.head)
+    views = [
+        _project(surface, scene.head, camera, photo, mask)
+        for camera, photo, mask in zip(scene.cameras, photos, masks, strict=True)
+    ]
+    views = _without_clothes(views, scene.head, surface)
+    gains = even_exposures(
+        [view.coarse[::STEP, ::STEP] for view in views],
+        [view.weight[::STEP, ::STEP] for view in views],
+    )
+    blended, seen = _blend(views, photos, gains)
+    if _is_symmetric(surface):
+        blended, seen = _mirror(blended, seen)
+    albedo = _fill(blended, seen, surface, _own_skin(scene.head))
+    maps = scene.head.maps or SkinMaps()
+    pixels = np.rint(albedo).clip(0, 255).astype(np.uint8)
+    return SkinMaps(Texture.encode(pixels, lossless=False), maps.roughness, maps.normal, maps.bump)
+
+
+def even_exposures(
+    colours: Sequence[Float32Array], weights: Sequence[Float32Array]
+) -> Float64Array:
+    """Return gains (V, 3) that make the colours of views agree where they overlap.
+
+    `colours` (H, W, 3) and `weights` (H, W) of V views. The logarithms of the gains minimise the
+    weighted squared differences over all pairs, and their weighted mean is 0.
+    """
+    logs = [np.log(colour + FLOOR).reshape(-1, 3).astype(np.float64) for colour in colours]
+    flat = [weight.ravel().astype(np.float64) for weight in weights]
+    count = len(logs)
+    normal, right = np.zeros((count, count)), np.zeros((count, 3))
+    for i in range(count):
+        for j in range(i):
+            both = flat[i] * flat[j]
+            total = both.sum()
+            if total <= 0:
+                continue
+            apart = both @ (logs[j] - logs[i])
+            normal[i, i] += total
+            normal[j, j] += total
+            normal[i, j] -= total
+            normal[j, i] -= total
+            right[i] += apart
+            right[j] -= apart
+    prior = np.array([weight.sum() for weight in flat]) * GAIN_PRIOR
+    gains = np.linalg.solve(normal + np.diag(prior + 1e-9), right)
+    mean = (prior[:, None] * gains).sum(axis=0) / max(prior.sum(), 1e-9)
+    result: Float64Array = np.exp(gains - mean)
+    return result
+
+
+def _without_clothes(views: Sequence[_Seen], head: Head, surface: _Surface) -> list[_Seen]:
+    """Return the views without what has not the colour of skin on the neck, such as collars."""
+    neck = (surface.places[..., 1] < head.joints[1, 1])[..., None]
+    kept = []
+    for view in views:
+        skin = np.where(neck, _like_skin(view.coarse, view.weight)[..., None], 1)[..., 0]
+        kept.append(view._replace(weight=(view.weight * skin).astype(np.float32)))
+    return kept
+
+
+def _unwrap(head: Head) -> _Surface:
+    """Return the surface over the texture coordinates, drawn as a picture of its coordinates."""
+    normals = head.normals()
+    layers = [*head.vertices.astype(np.float64).T, *normals.T]
+    offset = 2.0 + max(float(np.abs(layer).max()) for layer in layers)
+    pictures = [_over_uv(head, layer + offset) for layer in layers]
+    known = np.isfinite(pictures[0])
+    values = np.stack([np.where(known, p - np.float32(offset), 0) for p in pictures], axis=-1)
+    return _Surface(values[..., :3], values[..., 3:], np.asarray(known))
+
+
+def _over_uv(head: Head, values: Float64Array) -> Float32Array:
+    """Return (C, C) positive values (V,) of the vertices, interpolated over the texture."""
+    looking = np.diag([1.0, -1.0, -1.0, 1.0])  # an orthographic camera above the (u, v) plane
+    camera = Camera(looking, COARSE, np.array([0.0, COARSE]), COARSE, COARSE, "orthographic")
+    corners = np.column_stack([head.uv, -values]).astype(np.float32)
+    return mesh_depth(corners, _whole_in_uv(head), camera)
+
+
+def _whole_in_uv(head: Head) -> Int32Array:
+    """Return the faces (F', 3) that do not reach across the texture, as those at a pole do."""
+    corners = head.uv[head.faces]
+    longest = np.ptp(corners, axis=1).max(axis=1)
+    return np.ascontiguousarray(head.faces[longest < LARGEST_FACE])
+
+
+def _project(surface: _Surface, head: Head, camera: Camera, photo: UInt8Array, mask: Mask) -> _Seen:
+    sized = camera.resized(photo.shape[1], photo.shape[0])
+    points = surface.places[surface.known]
+    weight = _view_weight(surface, head, sized, points)
+    pixels = np.nan_to_num(sized.project(points.astype(np.float64)) - 0.5, nan=-1.0)
+    column, row = (np.full(surface.known.shape, -1, np.float32) for _ in range(2))
+    column[surface.known], row[surface.known] = pixels.T
+    usable = _usable(sized, mask, photo)
+    weight *= cv2.remap(usable, column, row, cv2.INTER_LINEAR)
+    coarse = cv2.remap(photo, column, row, cv2.INTER_LINEAR).astype(np.float32)
+    return _Seen(weight, column, row, coarse)
+
+
+def _view_weight(
+    surface: _Surface, head: Head, camera: Camera, points: Float32Array
+) -> Float32Array:
+    """Return (C, C) how well the camera sees each texel, 0 where it does not."""
+    facing = -(surface.normals[surface.known] * camera.view_direction(points)).sum(axis=1)
+    behind = depth_behind(camera, head_depth(head, camera), points)
+    share = np.clip((facing - LEAST_FACING) / (WHOLE_FACING - LEAST_FACING), 0, 1)
+    weight = np.zeros(surface.known.shape, np.float32)
+    weight[surface.known] = np.where(behind < HIDDEN, share**2, 0.0)
+    return weight
+
+
+def _usable(camera: Camera, mask: Mask, photo: UInt8Array) -> Float32Array:
+    """Return (H, W) 1 on skin and clothes away from hair and outline, where colours are whole."""
+    shape = photo.shape[1], photo.shape[0]
+    skin = cv2.resize((mask.labels == PERSON).astype(np.uint8), shape, interpolation=cv2.INTER_AREA)
+    away = cv2.distanceTransform(skin, cv2.DIST_L2, cv2.DIST_MASK_3)
+    distance = 1.0 if camera.model == "orthographic" else float(camera.depth(np.zeros(3)))
+    margin = MARGIN * camera.focal / max(distance, 1e-9)
+    inside = np.clip(away / max(margin, 1.0) - 0.5, 0, 1)
+    brightest = cv2.max(cv2.max(photo[..., 0], photo[..., 1]), photo[..., 2])
+    whole = np.clip((BLOWN - brightest.astype(np.float32)) / BLOWN_FADE, 0, 1)
+    return np.asarray(inside * whole, np.float32)
+
+
+def _blend(
+    views: Sequence[_Seen], photos: Sequence[UInt8Array], gains: Float64Array
+) -> tuple[Float32Array, Float32Array]:
+    """Return (S, S, 3) the blended colours and (C, C) the weight of all views together."""
+    total = np.sum([view.weight for view in views], axis=0)
+    best = np.max([view.weight for view in views], axis=0)
+    low = np.zeros((COARSE, COARSE, 3), np.float32)
+    details = np.zeros((SIZE, SIZE, 3), np.float32)
+    shares = [(view.weight / np.maximum(best, LEAST)) ** SHARPNESS for view in views]
+    share_sum = np.maximum(np.sum(shares, axis=0), LEAST)
+    for view, photo, gain, share in zip(views, photos, gains, shares, strict=True):
+        if not view.weight.any():
+            continue
+        factor = gain.astype(np.float32)
+        smooth = _smooth(view.coarse * factor, view.weight)
+        low += smooth * (view.weight / np.maximum(total, LEAST))[..., None]
+        _add_details(details, view, photo, factor, smooth, (share / share_sum).astype(np.float32))
+    return _upsample(low) + details, total
+
+
+def _add_details(
+    details: Float32Array,
+    view: _Seen,
+    photo: UInt8Array,
+    gain: Float32Array,
+    smooth: Float32Array,
+    share: Float32Array,
+) -> None:
+    """Add a view's share of the details, within the part of the map that it sees."""
+    rows, columns = (np.flatnonzero(share.any(axis=axis)) for axis in (1, 0))
+    part = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    times = SIZE // COARSE
+    column, row, fine_share, fine_smooth = (
+        _enlarge(each[part], times) for each in (view.column, view.row, share, smooth)
+    )
+    pixels = cv2.remap(photo, column, row, cv2.INTER_LINEAR) * gain
+    top, left = part[0].start * times, part[1].start * times
+    target = details[top : top + pixels.shape[0], left : left + pixels.shape[1]]
+    target += fine_share[..., None] * (pixels - fine_smooth)
+
+
+def _enlarge(picture: Float32Array, times: int) -> Float32Array:
+    return np.asarray(
+        cv2.resize(picture, None, fx=times, fy=times, interpolation=cv2.INTER_LINEAR), np.float32
+    )
+
+
+def _smooth(colours: Float32Array, weight: Float32Array) -> Float32Array:
+    """Return (C, C, 3) colours without details, of what the view sees alone."""
+    within = (weight > 0).astype(np.float32)
+    blurred = cv2.GaussianBlur(colours * within[..., None], (0, 0), BAND)
+    share = cv2.GaussianBlur(within, (0, 0), BAND)
+    return np.asarray(blurred / np.maximum(share, LEAST)[..., None], np.float32)
+
+
+def _upsample(picture: Float32Array) -> Float32Array:
+    return np.asarray(cv2.resize(picture, (SIZE, SIZE), interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def _shrink(picture: Float32Array, edge: int) -> Float32Array:
+    shrunk = cv2.resize(picture, (edge, edge), interpolation=cv2.INTER_AREA)
+    return np.asarray(shrunk, np.float32)
+
+
+def _is_symmetric(surface: _Surface) -> bool:
+    """Return whether the mirrored texel shows the mirrored place of the head."""
+    both = surface.known & surface.known[:, ::-1]
+    mirrored = surface.places[:, ::-1] * np.array([-1, 1, 1], np.float32)
+    apart = np.linalg.norm(surface.places - mirrored, axis=-1)[both]
+    return bool(apart.size and np.median(apart) < MIRRORED)
+
+
+def _mirror(blended: Float32Array, seen: Float32Array) -> tuple[Float32Array, Float32Array]:
+    """Return colours and weights, completed by those of the other side."""
+    other = seen[:, ::-1]
+    lacking = _fade(seen < LEAST_SEEN)
+    lacking = np.where(seen < LEAST_SEEN, 1.0, lacking) * (other >= LEAST_SEEN)
+    fine = _upsample(lacking.astype(np.float32))[..., None]
+    mixed = blended + fine * (blended[:, ::-1] - blended)
+    return mixed, np.maximum(seen, lacking * other).astype(np.float32)
+
+
+def _fade(region: BoolArray) -> Float32Array:
+    """Return (C, C) 1 in a region, fading to 0 outside of it."""
+    blurred = cv2.GaussianBlur(region.astype(np.float32), (0, 0), FILL_FADE)
+    return np.asarray(np.clip(2 * blurred, 0, 1), np.float32)
+
+
+def _own_skin(head: Head) -> Float32Array:
+    """Return (S, S, 3) the head's own albedo, 0 to 255; grey without one."""
+    if head.maps is None or head.maps.albedo is None:
+        return np.full((SIZE, SIZE, 3), 128, np.float32)
+    pixels = head.maps.albedo.pixels
+    resized = cv2.resize(pixels, (SIZE, SIZE), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(resized, np.float32)
+
+
+def _fill(
+    blended: Float32Array, seen: Float32Array, surface: _Surface, own: Float32Array
+) -> Float32Array:
+    """Return (S, S, 3) the blended skin, and the head's own in the seen skin's tone elsewhere."""
+    taken = (seen >= LEAST_SEEN) & surface.known
+    if not taken.any():
+        return own
+    mask = taken.astype(np.float32)
+    weight = _shrink(mask, TONE)
+    small = _shrink(_shrink(blended, COARSE) * mask[..., None], TONE)
+    small /= np.maximum(weight, LEAST)[..., None]
+    ratio = np.log(np.maximum(small, 0) + FLOOR) - np.log(_shrink(own, TONE) + FLOOR)
+    tone = extend(ratio, weight * _like_skin(small, weight))
+    filled = _upsample(np.exp(tone)) * (own + FLOOR) - FLOOR
+    share = _upsample(1 - _fade(~taken))[..., None]
+    return np.asarray(filled + share * (blended - filled), np.float32)
+
+
+def _like_skin(colours: Float32Array, weight: Float32Array) -> Float32Array:
+    """Return (T, T) how much colours are like most of the seen ones: collars are not skin."""
+    logs = np.log(np.maximum(colours, 0) + FLOOR)
+    green = logs[..., 1:2]
+    tones = np.concatenate([green, logs[..., :1] - green, logs[..., 2:] - green], axis=-1)
+    sure = tones[weight > 0.5][::STEP]
+    middle = np.median(sure, axis=0) if len(sure) else 0.0
+    away = ((tones - middle) / np.array(SKIN_SPREAD, np.float32)) ** 2
+    return np.asarray(np.exp(-0.5 * away.sum(axis=-1)), np.float32)
+
+
+def extend(values: Float32Array, weight: Float32Array) -> Float32Array:
+    """Return values (H, W, C) smoothed by their weights (H, W), and extended to where those are 0.
+
+    Normalised convolution (Knutsson and Westin 1993) with Gaussians of growing reach: each gives
+    its result where the smaller ones have found nothing.
+    """
+    mixed = np.zeros_like(values)
+    total = np.zeros(weight.shape, np.float32)
+    trust = 1.0
+    for reach in TONE_REACHES:
+        found = cv2.GaussianBlur(weight, (0, 0), reach)
+        sums = cv2.GaussianBlur(values * weight[..., None], (0, 0), reach)
+        mixed += trust * sums
+        total += trust * found
+        trust *= TONE_TRUST
+    mean = (values * weight[..., None]).sum(axis=(0, 1)) / max(float(weight.sum()), LEAST)
+    floor = trust * TONE_TRUST
+    return np.asarray((mixed + floor * mean) / (total + floor)[..., None], np.float32)

@@ -1,0 +1,119 @@
+"""The head of a person from photos, without hair: fitted, with the skin of the photos."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from hairkit.errors import InputError
+from hairkit.head_model.photo_skin import photograph_skin
+from hairkit.head_model.scalp import sample_roots
+from hairkit.head_model.template import default_head
+from hairkit.io.capture_reader import read_capture
+from hairkit.io.head_reader import write_head_obj
+from hairkit.manager import Manager
+from hairkit.parallel import one_blas_thread
+from hairkit.pipeline.own_head import mark_head
+from hairkit.pipeline.recipe import Recipe, load_recipe
+from hairkit.pipeline.reconstruct import find_views, fit_scene, label_views, tell_missing
+from hairkit.pipeline.run_log import RunLog
+from hairkit.pipeline.stage_runner import Given, StageRunner
+from hairkit.pipeline.work_folder import WorkFolder
+from hairkit.progress import Progress, Silent
+from hairkit.types.capture import Capture
+from hairkit.types.groom import Groom
+from hairkit.types.head import Head
+from hairkit.types.scene import Scene
+from hairkit.types.skin import SkinMaps
+from hairkit.types.strands import Strands
+
+EXPORTERS = {".glb": "gltf", ".fbx": "fbx"}
+"""Plugins that write a head without its hair, by the file's ending."""
+ENDINGS = (*EXPORTERS, ".obj", ".npz")
+"""Endings of files that a head is written to."""
+_HEAD_ONLY = {"gltf": {"lines": "none", "hair": "none"}, "fbx": {}}
+_STUB = 0.001
+"""Metres of a strand that exporters are given, and told not to write."""
+
+
+@one_blas_thread()
+def photograph_head(
+    photos: Capture | str | os.PathLike[str],
+    recipe: Recipe | str | os.PathLike[str] = "default",
+    manager: Manager | None = None,
+    *,
+    head: Head | None = None,
+    progress: Progress | None = None,
+) -> Scene:
+    """Return the head fitted to photos, with an albedo map taken from them, and the cameras.
+
+    Parameters
+    ----------
+    photos
+        The folder of a capture, or a capture that was read before.
+    recipe
+        Its stages up to `head` are run.
+    manager
+        The plugins; the installed ones when None.
+    head
+        The head to fit; None for the default head.
+    progress
+        Receives the progress of the run; None reports nothing.
+
+    Raises
+    ------
+    HairkitError
+        The recipe, the photos or a plugin is at fault; the message is one line.
+    """
+    manager = manager or Manager.loaded()
+    recipe = recipe if isinstance(recipe, Recipe) else load_recipe(recipe)
+    recipe.check(manager)
+    given = photos if isinstance(photos, Capture) else read_capture(photos)
+    log = RunLog(progress or Silent())
+    with (
+        tempfile.TemporaryDirectory(prefix="hairkit-head-") as folder,
+        WorkFolder(Path(folder) / "work") as work,
+        ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool,
+    ):
+        run = StageRunner(recipe, manager, work, log, pool)
+        tell_missing(recipe, manager, log)
+        capture, _ = find_views(run, given, log)
+        start = mark_head(head or default_head(), recipe, manager, log.message)
+        views = Given.of(capture)
+        masks = label_views(run, views, start)
+        scene = fit_scene(run, views, masks, start)
+        skin = run.derive(
+            "skin", SkinMaps, photograph_skin, capture=views, scene=scene, masks=masks
+        )
+        work.flush()
+        return replace(scene.value, head=replace(scene.value.head, maps=skin.value))
+
+
+def write_head(path: str | os.PathLike[str], head: Head, manager: Manager | None = None) -> None:
+    """Write a head as .glb, .fbx, .obj with its material, or .npz; `InputError` for others."""
+    file = Path(path)
+    suffix = file.suffix.lower()
+    if suffix == ".obj":
+        write_head_obj(file, head)
+    elif suffix == ".npz":
+        head.save(file)
+    elif suffix in EXPORTERS:
+        plugin = EXPORTERS[suffix]
+        manager = manager or Manager.loaded()
+        options = manager.options(plugin, _HEAD_ONLY[plugin])
+        manager.call("export_groom", plugin, options, groom=_bald(head), path=file)
+    else:
+        raise InputError(f"{file}: a head is written as {', '.join(ENDINGS)}")
+
+
+def _bald(head: Head) -> Groom:
+    """Return the head as a groom of one stub, since exporters refuse grooms without strands."""
+    roots = sample_roots(head, 1)
+    points = np.concatenate([roots.positions, roots.positions + _STUB * roots.normals])
+    strands = Strands(points.astype(np.float32), np.array([0, 2], np.int64))
+    return Groom(strands, head, roots.triangle, roots.barycentric)

@@ -1,0 +1,135 @@
+"""Laws of the skin from photos: it is what the photos show, whatever the views' exposures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairkit.arrays import Float64Array, UInt8Array
+from hairkit.cameras.depth_raster import head_depth
+from hairkit.head_model import photo_skin
+from hairkit.head_model.photo_skin import even_exposures, extend, photograph_skin
+from hairkit.head_model.template import default_head
+from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture, View
+from hairkit.types.head import Head
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.scene import Scene
+
+AZIMUTHS = (0.0, 45.0, 90.0, 180.0, 270.0, 315.0)
+HAIR_ABOVE = 0.055
+"""Metres above which the painted head has hair."""
+
+
+def paint(points: Float64Array) -> Float64Array:
+    """Return colours (N, 3) of places on the head, 0 to 255: skin with broad stripes."""
+    wave = 25 * np.sin(points[:, :1] * 120) + 20 * np.cos(points[:, 1:2] * 90)
+    return np.clip(np.array([185.0, 140.0, 115.0]) + wave * [1.0, 0.8, 0.7], 0, 255)
+
+
+def shot(head: Head, azimuth: float, gain: float) -> tuple[Camera, UInt8Array, Mask]:
+    """Return a camera, the photo that it takes of the painted head, and its labels."""
+    camera = Camera.on_turn(azimuth, distance=0.9, focal=520.0, width=240, height=300)
+    depth = head_depth(head, camera)
+    seen = np.isfinite(depth)
+    row, column = np.nonzero(seen)
+    places = camera.unproject(np.column_stack([column, row]) + 0.5, depth[seen])
+    photo = np.full((300, 240, 3), 90, np.uint8)
+    labels = np.full((300, 240), BACKGROUND, np.uint8)
+    hair = places[:, 1] > HAIR_ABOVE
+    colours = np.where(hair[:, None], 20.0, gain * paint(places))
+    photo[row, column] = np.rint(colours).clip(0, 255)
+    labels[row, column] = np.where(hair, HAIR, PERSON)
+    return camera, photo, Mask(labels, True)
+
+
+@pytest.fixture(scope="module")
+def painted() -> tuple[Capture, Scene, list[Mask]]:
+    """Six photos of the painted default head, some of them darker."""
+    head = default_head()
+    gains = (1.0, 0.8, 1.0, 0.9, 1.0, 0.75)
+    shots = [shot(head, azimuth, gain) for azimuth, gain in zip(AZIMUTHS, gains, strict=True)]
+    names = tuple(f"{azimuth:.0f}" for azimuth in AZIMUTHS)
+    views = tuple(
+        View(name, float(name), photo) for name, (_, photo, _) in zip(names, shots, strict=True)
+    )
+    scene = Scene(names, tuple(camera for camera, _, _ in shots), head)
+    return Capture(views), scene, [mask for _, _, mask in shots]
+
+
+def test_seen_skin_is_what_was_painted(painted: tuple[Capture, Scene, list[Mask]]) -> None:
+    """On the face the map is the paint but for one gain, although exposures differ by a quarter."""
+    capture, scene, masks = painted
+    maps = photograph_skin(capture, scene, masks)
+    assert maps.albedo is not None
+    head = scene.head
+    face = (head.vertices[:, 2] > 0.05) & (np.abs(head.vertices[:, 1] + 0.05) < 0.07)
+    found = 255 * maps.albedo.sample(head.uv[face])
+    wanted = paint(head.vertices[face].astype(np.float64))
+    ratio = np.median(found / wanted)
+    off = np.abs(found / ratio - wanted)
+    assert off.mean() < 4
+    assert np.quantile(off, 0.95) < 12
+
+
+def test_hair_is_not_in_the_skin(painted: tuple[Capture, Scene, list[Mask]]) -> None:
+    """Where hair covers the head the map has the tone of skin, not the hair's."""
+    capture, scene, masks = painted
+    maps = photograph_skin(capture, scene, masks)
+    assert maps.albedo is not None
+    top = scene.head.vertices[:, 1] > HAIR_ABOVE + 0.01
+    assert 255 * maps.albedo.sample(scene.head.uv[top]).min() > 60
+
+
+def test_without_skin_the_head_keeps_its_own(
+    painted: tuple[Capture, Scene, list[Mask]],
+) -> None:
+    """Photos that show only hair leave the head's own albedo as it is."""
+    capture, scene, masks = painted
+    covered = [Mask(np.where(m.labels == PERSON, HAIR, m.labels), True) for m in masks]
+    found = photograph_skin(capture, scene, covered).albedo
+    own = scene.head.maps
+    assert found is not None
+    assert own is not None
+    assert own.albedo is not None
+    uv = scene.head.uv
+    assert np.abs(found.sample(uv) - own.albedo.sample(uv)).mean() < 0.01
+
+
+def test_gains_make_views_agree() -> None:
+    """Views that are multiples of one picture are evened, by gains whose mean logarithm is 0."""
+    generator = np.random.default_rng(3)
+    picture = generator.uniform(40, 200, (20, 20, 3)).astype(np.float32)
+    weights = [generator.uniform(0.2, 1, (20, 20)).astype(np.float32) for _ in range(3)]
+    true = np.array([[1.0, 1.0, 1.0], [0.7, 0.8, 0.9], [1.3, 1.1, 1.0]])
+    gains = even_exposures([picture * each.astype(np.float32) for each in true], weights)
+    apart = np.ptp(np.log(gains * true), axis=0)
+    assert (apart < 0.15 * np.ptp(np.log(true), axis=0)).all()
+    assert abs(np.average(np.log(gains), axis=0, weights=[w.sum() for w in weights])).max() < 1e-6
+
+
+def test_extended_values_stay_and_reach_everywhere() -> None:
+    """A constant stays a constant; values far from all weights are those of the nearest side."""
+    weight = np.zeros((64, 64), np.float32)
+    weight[10:20, 10:20] = 1
+    constant = extend(np.full((64, 64, 3), 0.7, np.float32), weight)
+    np.testing.assert_allclose(constant, 0.7, atol=1e-4)
+    weight[50:60, 50:60] = 1
+    values = np.zeros((64, 64, 3), np.float32)
+    values[40:, 40:] = 1
+    found = extend(values, weight)[..., 0]
+    assert found[15, 15] < 0.01
+    assert found[55, 55] > 0.99
+    assert found[2, 2] < 0.1
+    assert found[62, 62] > 0.9
+
+
+def test_a_head_without_maps_gets_one(painted: tuple[Capture, Scene, list[Mask]]) -> None:
+    """A user's head without a picture gets its skin from the photos all the same."""
+    capture, scene, masks = painted
+    plain = replace(scene, head=replace(scene.head, maps=None))
+    maps = photograph_skin(capture, plain, masks)
+    assert maps.albedo is not None
+    assert maps.albedo.pixels.shape == (photo_skin.SIZE, photo_skin.SIZE, 3)
