@@ -3,12 +3,14 @@
 What field and tracking plugins share: fusing views, priors, diffusion, and sampling of volumes.
 
 * `diffusion`: screened diffusion on masked cells, by conjugate gradients
+* `crown_family`: whether the hair on the crown is parted, combed back or forward, or a whorl
 * `find_parting`: where the parting is, as the user says or the views show
 * `growth_prior`: geodesic distances from scalp and tips, and a direction prior
 * `hanging_hair`: the field of tight curls
 * `isosurface`: the smooth surface of a volume of cells
 * `parting`: how hair on the crown is combed from its parting
 * `sampling_kernels`: compiled look-ups in volumes
+* `scalp_sight`: directions of the hair on the scalp, as all views see them
 * `symmetric_eigen`: eigenvectors of symmetric 3x3 tensors, in closed form
 * `ties`: where hair is tied, and the tube of the tail
 * `view_fusion`: 2D orientations of all views fused into 3D tensors

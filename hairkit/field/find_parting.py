@@ -1,9 +1,10 @@
-"""Find the parting: where the user says it is, or where skin shows between the hair on the crown.
+"""Find how the crown is combed: as the user says, as skin shows a parting, or as directions tell.
 
 Level views see the crown at a grazing angle, so that the 2D orientation of the strands there tells
 little. Skin that shows inside the hair does: its median is the parting; where there is a photo from
 above, it alone is asked. What the user says counts first: `parting` in capture.toml or on the
-command line, then a stroke labelled `parting`.
+command line, then a stroke labelled `parting`. Where no skin shows, and of a fringe,
+the directions of all views tell (`hairkit.field.crown_family`).
 """
 
 from __future__ import annotations
@@ -14,12 +15,16 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float64Array
+from hairkit.field.crown_family import choose_family
+from hairkit.field.scalp_sight import look_at, see_scalp
 from hairkit.io.strokes import read_view_strokes
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.head import Head
 from hairkit.types.mask import PERSON, Mask
+from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
+from hairkit.types.tie import TiedHair
 
 CROWN_DEPTH = 0.045
 """Height of the crown below the top of the head, metres."""
@@ -42,11 +47,17 @@ FROM_ABOVE = 30.0
 
 
 def measure_parting(
-    capture: Capture, masks: Sequence[Mask], cameras: Sequence[Camera], head: Head
+    capture: Capture,
+    masks: Sequence[Mask],
+    orientations: Sequence[OrientationMap],
+    cameras: Sequence[Camera],
+    head: Head,
+    tied: TiedHair,
 ) -> Parting:
-    """Return the parting that the user gives, or that the views show as skin on the crown.
+    """Return the parting that the user gives, or how the views show the crown to be combed.
 
-    Masks and cameras are in the order of the capture's views; a stroke's file is read. Raises
+    Tied hair is combed to its ties, so only skin tells its parting. Masks, maps and cameras are in
+    the order of the capture's views; a stroke's file is read. Raises
     `InputError` where strokes cannot be read.
     """
     if capture.parting is not None:
@@ -59,7 +70,11 @@ def measure_parting(
     above = [(mask, camera) for mask, camera in views if _elevation(camera) > FROM_ABOVE]
     if len(views) < len(masks):
         return Parting()
-    return _measure_skin(above or views, head, LEAST_SKIN_ABOVE if above else LEAST_SKIN)
+    skin = _measure_skin(above or views, head, LEAST_SKIN_ABOVE if above else LEAST_SKIN)
+    if tied.tails:
+        return skin
+    sight = see_scalp(masks, orientations, cameras, head)
+    return choose_family(skin, sight, masks, cameras, head)
 
 
 def _measure_skin(views: Sequence[tuple[Mask, Camera]], head: Head, least: float) -> Parting:
@@ -72,13 +87,8 @@ def _measure_skin(views: Sequence[tuple[Mask, Camera]], head: Head, least: float
         return Parting()
     skin, faced = np.zeros(len(at)), np.zeros(len(at))
     for mask, camera in views:
-        facing = -np.einsum("ij,ij->i", camera.view_direction(at), normals)
-        column, row = np.floor(camera.project(at)).astype(np.int64).T
-        height, width = mask.labels.shape
-        inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
-        weight = np.where(inside & (facing > LEAST_FACING), facing, 0.0)
-        label = mask.labels[np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)]
-        skin += weight * (label == PERSON)
+        weight, row, column = look_at(mask, camera, at, normals, LEAST_FACING)
+        skin += weight * (mask.labels[row, column] == PERSON)
         faced += weight
     share = float(skin.sum() / max(faced.sum(), LEAST_FACING))
     if share < least:

@@ -65,8 +65,8 @@ def combing_direction(
     combed = share * flow + max(1 - share, LEAST_WHORL) * _from_crown(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
     if parts(parting, length):
-        crown = crown_share(head, at)[:, None]
-        combed = (1 - crown) * combed + crown * comb_from_parting(parting, at, outward)
+        crown = crown_share(parting, head, at)[:, None]
+        combed = (1 - crown) * combed + crown * comb_from_parting(parting, head, at, outward)
         combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
     direction = combed + lift * outward
     result: Float64Array = direction / np.maximum(
@@ -76,8 +76,8 @@ def combing_direction(
 
 
 def parts(parting: Parting, hair_length: float) -> bool:
-    """Return whether the hair, of a length in metres, is combed from the parting or back."""
-    return (parting.seen or parting.swept_back) and hair_length >= PARTED_HAIR
+    """Return whether the hair, of a length in metres, is combed as the parting says."""
+    return parting.known and hair_length >= PARTED_HAIR
 
 
 @dataclass(frozen=True)
@@ -111,11 +111,11 @@ def add_scalp_prior(
         comb = combing_direction(head, hull, growth, points[near], prior.lift, parting)
         _mix(data, weight, near, comb, np.full(len(comb), prior.weight))
     if prior.crown and parts(parting, float(np.ptp(growth[hull.dense]))):
-        share = prior.crown * crown_share(head, points)
+        share = prior.crown * crown_share(parting, head, points)
         top = share > 0
         outward = gradient(hull.grid, hull.head_distance, points[top])
         lift = root_lift(hull, points[top])[:, None]
-        comb = comb_from_parting(parting, points[top], outward) + lift * outward
+        comb = comb_from_parting(parting, head, points[top], outward) + lift * outward
         comb /= np.maximum(np.linalg.norm(comb, axis=1, keepdims=True), 1e-9)
         _mix(data, weight, top, comb, share[top])
     return data, weight

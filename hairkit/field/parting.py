@@ -1,7 +1,8 @@
-"""How hair on the crown is combed from its parting (`hairkit.field.find_parting` finds it).
+"""How hair on the crown is combed (`hairkit.field.find_parting` finds which way).
 
-It is combed away to both sides, down and back; behind the line's end the nearest point of the line
-is its end, which makes a whorl.
+From a parting it is combed away to both sides, down and back; behind the line's end the nearest
+point of the line is its end, which makes a whorl. Other hair is combed from a whorl, or all back. A
+fringe is combed forward.
 """
 
 from __future__ import annotations
@@ -23,8 +24,10 @@ SWEEP, SWEEP_SLOPE, SWEEP_AT = 0.6, 5.0, 0.02
 """Part of the direction backwards, its growth per metre towards the back of the head, and the
 height z where it has its mean: hair of the fringe goes sideways."""
 MOST_SWEEP = 2.0
-BACKWARDS = np.array([0.0, -0.5, -1.0])
-"""Direction of hair that is all combed back, before it is laid on the skin."""
+DROP = np.array([0.0, -0.25, 0.0])
+"""Part of the direction down of hair that is combed back or forward over the head, against 1."""
+FRONT_DEPTH, FRONT_WIDTH, FRONT_FADE = 0.035, 0.05, 0.01
+"""The fringe's depth behind the foremost scalp and half its width; metres over which it fades."""
 THINNEST, THICKEST = 0.004, 0.03
 """Bounds of the hair's thickness over which the lift at the roots fades, metres."""
 THICKNESS_BLUR, LEAST_HELD = 2.0, 0.05
@@ -32,18 +35,31 @@ THICKNESS_BLUR, LEAST_HELD = 2.0, 0.05
 a neighbourhood that counts."""
 
 
-def crown_share(head: Head, points: npt.ArrayLike) -> Float64Array:
-    """Return how much the comb of the parting counts at points (N, 3): 1 on top, 0 below."""
+def crown_share(parting: Parting, head: Head, points: npt.ArrayLike) -> Float64Array:
+    """Return how much the comb counts at points (N, 3): 1 on top and in a fringe, 0 below."""
+    at = np.asarray(points, np.float64)
     top = float(head.vertices[:, 1].max())
-    rise: Float64Array = (np.asarray(points, np.float64)[:, 1] - (top - FADE_START)) / FADE_LENGTH
-    share: Float64Array = np.clip(rise, 0.0, 1.0)
+    share: Float64Array = np.clip((at[:, 1] - (top - FADE_START)) / FADE_LENGTH, 0.0, 1.0)
+    if parting.fringe or parting.swept_back:
+        share = np.maximum(share, front_share(head, at))
+    return share
+
+
+def front_share(head: Head, points: npt.ArrayLike) -> Float64Array:
+    """Return how far points (N, 3) are where a fringe grows: 1 behind the hairline, 0 elsewhere."""
+    at = np.asarray(points, np.float64)
+    scalp = head.vertices[head.scalp > 0.5]
+    foremost = float(scalp[:, 2].max())
+    lowest = float(scalp[scalp[:, 2] > foremost - FRONT_FADE, 1].min())
+    margins = [at[:, 2] - foremost + FRONT_DEPTH, FRONT_WIDTH - np.abs(at[:, 0]), at[:, 1] - lowest]
+    share: Float64Array = np.clip(np.min(margins, axis=0) / FRONT_FADE + 1, 0.0, 1.0)
     return share
 
 
 def comb_from_parting(
-    parting: Parting, points: npt.ArrayLike, outward: Float64Array
+    parting: Parting, head: Head, points: npt.ArrayLike, outward: Float64Array
 ) -> Float64Array:
-    """Return unit tangents (N, 3), root to tip, of hair combed from a parting, or back without.
+    """Return unit tangents (N, 3), root to tip, of hair as it is combed on the crown.
 
     Parameters
     ----------
@@ -53,14 +69,34 @@ def comb_from_parting(
         (N, 3) unit normals of the head there.
     """
     at = np.asarray(points, np.float64)
-    if parting.line is None:
-        return _unit(_tangent(np.broadcast_to(BACKWARDS, at.shape), outward))
-    away = np.zeros_like(at)
-    away[:, [0, 2]] = at[:, [0, 2]] - _nearest_on(parting.line, at[:, [0, 2]])
+    combed = _comb_behind_front(parting, at, outward)
+    if parting.fringe:
+        share = front_share(head, at)[:, None]
+        forward = _over_head(outward, -1.0)
+        combed = _unit((1 - share) * combed + share * forward)
+    return combed
+
+
+def _comb_behind_front(parting: Parting, at: Float64Array, outward: Float64Array) -> Float64Array:
+    """Return the comb without a fringe: from the line, from the whorl, or back."""
+    flat, away = at[:, [0, 2]], np.zeros_like(at)
+    if parting.line is not None:
+        away[:, [0, 2]] = flat - _nearest_on(parting.line, flat)
+    elif parting.whorl is not None:
+        away[:, [0, 2]] = flat - parting.whorl
+    else:
+        return _over_head(outward, 1.0)
     away = _unit(_tangent(away, outward))
-    back = np.clip(SWEEP + SWEEP_SLOPE * (SWEEP_AT - at[:, 2]), -MOST_SWEEP, MOST_SWEEP)
-    pull = DOWN * np.array([0.0, -1.0, 0.0]) + back[:, None] * np.array([0.0, 0.0, -1.0])
+    pull = DOWN * np.broadcast_to([0.0, -1.0, 0.0], at.shape)
+    if parting.line is not None:
+        back = np.clip(SWEEP + SWEEP_SLOPE * (SWEEP_AT - at[:, 2]), -MOST_SWEEP, MOST_SWEEP)
+        pull = pull + back[:, None] * np.array([0.0, 0.0, -1.0])
     return _unit(away + _tangent(pull, outward))
+
+
+def _over_head(outward: Float64Array, back: float) -> Float64Array:
+    """Return unit tangents (N, 3) over the head from the face to the nape, or for -1 against it."""
+    return _unit(_tangent(back * np.cross(outward, [1.0, 0.0, 0.0]) + DROP, outward))
 
 
 def _nearest_on(line: Float64Array, at: Float64Array) -> Float64Array:

@@ -17,6 +17,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.field.scalp_sight import ScalpSight, find_convergence, scalp_places, see_scalp
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask
@@ -37,19 +38,9 @@ LEAST_CONVERGENCE, FULL_CONVERGENCE = 0.5, 0.9
 at all and for sure: 0.94 at a ponytail, 0 in the mean of all places."""
 FARTHEST_APART = 0.05
 """Metres between the neck of the hull and the place where directions converge, at most."""
-LEAST_FACING = 0.35
-"""Cosine between a normal and the ray to the camera below which a view does not see the place."""
-HAIR_HEIGHT = 0.008
-"""Metres above the scalp at which a view sees the hair."""
 LEAST_FRINGE, SHORTEST_FRINGE = 4e-6, 0.045
 """Cubic metres of loose hair, and its way from the scalp in metres, that make a fringe: edges of
 masks leave parts of up to 1.8e-6 and 0.034 below the hairline."""
-NEAR_TIE = 0.03
-"""Metres around a tie in which directions do not count: the bundle hides the hair there."""
-CANDIDATES = 400
-"""Places on the scalp at which convergence is measured, 8 mm apart."""
-PROBE = 0.002
-"""Metres of the step whose picture gives a direction's angle in a view."""
 
 
 TIE_SEARCH = 0.045
@@ -91,8 +82,8 @@ def measure_ties(
     bundles = find_bundles(hull, scalp_distance)
     if not bundles:
         return TiedHair()
-    sight = _see_scalp(masks, orientations, cameras, head)
-    places, _ = _scalp_places(head)
+    sight = see_scalp(masks, orientations, cameras, head)
+    places, _ = scalp_places(head)
     bases = places[cKDTree(places).query([bundle.centre for bundle in bundles])[1]]
     nearest = cKDTree(bases).query(sight.places)[1]
     tails = []
@@ -163,94 +154,6 @@ def find_bundles(hull: Hull, scalp_distance: ScalpDistance) -> tuple[Bundle, ...
             centre = hull.grid.centres_of(slab).mean(axis=0, dtype=np.float64)
             found.append(Bundle(cells, centre, area))
     return tuple(found)
-
-
-class ScalpSight(NamedTuple):
-    """Directions of hair on the scalp, seen at N places by all views."""
-
-    places: Float64Array
-    """(N, 3) metres."""
-    normals: Float64Array
-    """(N, 3) unit normals."""
-    directions: Float64Array
-    """(N, 3) unit tangents, undirected."""
-    weight: Float64Array
-    """(N,) confidence times the cosine to the ray."""
-
-
-def _see_scalp(
-    masks: Sequence[Mask],
-    orientations: Sequence[OrientationMap],
-    cameras: Sequence[Camera],
-    head: Head,
-) -> ScalpSight:
-    """Return the 2D orientations of all views, laid on the surface of the hair on the scalp."""
-    places, normals = _scalp_places(head)
-    seen = []
-    for mask, found, camera in zip(masks, orientations, cameras, strict=True):
-        facing = -np.einsum("ij,ij->i", camera.view_direction(places), normals)
-        column, row = np.floor(camera.project(places)).astype(np.int64).T
-        height, width = mask.labels.shape
-        inside = (column >= 0) & (row >= 0) & (column < width) & (row < height)
-        row, column = np.clip(row, 0, height - 1), np.clip(column, 0, width - 1)
-        chosen = inside & (facing > LEAST_FACING) & mask.hair[row, column]
-        pixel = row[chosen], column[chosen]
-        directions = _lay_on_surface(
-            camera, places[chosen], normals[chosen], found.angle[pixel].astype(np.float64)
-        )
-        weight = found.confidence[pixel] * facing[chosen]
-        seen.append(ScalpSight(places[chosen], normals[chosen], directions, weight))
-    return ScalpSight(*(np.concatenate(column) for column in zip(*seen, strict=True)))
-
-
-def _scalp_places(head: Head) -> tuple[Float64Array, Float64Array]:
-    """Return places (N, 3) `HAIR_HEIGHT` above the scalp and its normals (N, 3)."""
-    on_scalp = head.scalp > 0.5
-    normals = head.normals()[on_scalp].astype(np.float64)
-    return head.vertices[on_scalp] + HAIR_HEIGHT * normals, normals
-
-
-def _lay_on_surface(
-    camera: Camera, places: Float64Array, normals: Float64Array, angle: Float64Array
-) -> Float64Array:
-    """Return unit tangents (N, 3) of the surface whose pictures have the angles (N,)."""
-    first = np.cross(normals, [0.0, 1.0, 1e-3])
-    first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-9)
-    second = np.cross(normals, first)
-    here = camera.project(places)
-    picture = np.stack([camera.project(places + PROBE * e) - here for e in (first, second)], axis=2)
-    wanted = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    # the adjugate serves as well as the inverse: lengths do not count
-    a = picture[:, 1, 1] * wanted[:, 0] - picture[:, 0, 1] * wanted[:, 1]
-    b = picture[:, 0, 0] * wanted[:, 1] - picture[:, 1, 0] * wanted[:, 0]
-    tangent = a[:, None] * first + b[:, None] * second
-    length = np.linalg.norm(tangent, axis=1, keepdims=True)
-    unit: Float64Array = tangent / np.maximum(length, 1e-12)
-    return unit
-
-
-def find_convergence(sight: ScalpSight, head: Head) -> tuple[Float64Array, float]:
-    """Return the place (3,) on the scalp at which hair points best, and how well it does.
-
-    The second is the mean cosine of twice the angle between the hair and the way to the place:
-    1 where all hair points there, 0 in the mean of all places.
-    """
-    places, _ = _scalp_places(head)
-    candidates = places[:: -(-len(places) // CANDIDATES)]
-    scores = np.array([_convergence(sight, at) for at in candidates])
-    best = int(np.argmax(scores))
-    return candidates[best], float(scores[best])
-
-
-def _convergence(sight: ScalpSight, at: Float64Array) -> float:
-    """Return the mean cosine of twice the angle between hair and the way to a place (3,)."""
-    way = at - sight.places
-    distance = np.linalg.norm(way, axis=1)
-    way -= np.einsum("ij,ij->i", way, sight.normals)[:, None] * sight.normals
-    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
-    weight = np.where(distance > NEAR_TIE, sight.weight, 0.0)
-    cosine = np.einsum("ij,ij->i", way, sight.directions)
-    return float((weight * (2 * cosine**2 - 1)).sum() / max(float(weight.sum()), 1e-9))
 
 
 def _tail_of(

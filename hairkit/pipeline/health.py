@@ -109,6 +109,9 @@ to 0.25 on most that were shuffled."""
 PARTING_MM = Limits(25.0, 50.0)
 """Width of the middle half of the skin that shows on the crown: 6 to 25 mm around partings, 90 mm
 where a bare hairline is all that shows; evenly spread skin is 66 mm wide."""
+CROWN = Limits(0.2, 0.0)
+"""How well the views' directions agree with the way the crown is combed: 0.25 to 0.92 on drawn
+heads."""
 TIE = Limits(0.4, 0.0)
 """The weakest sign of a tie, see `hairkit.field.ties`: 0.6 at a ponytail."""
 ON_TOP = 0.02
@@ -289,12 +292,22 @@ def compare_hull(hull: Hull, mask: Mask, camera: Camera, scene: Scene) -> tuple[
 
 
 def assess_parting(parting: Parting | None) -> tuple[Figure, ...]:
-    """Return how wide the skin is that shows the parting; nothing where the user says it."""
-    if parting is None or not parting.spread:
+    """Return how sure it is how the crown is combed, and how wide the skin is that shows it.
+
+    Nothing where the user says it, or where nothing is known.
+    """
+    if parting is None:
         return ()
-    width = 1000 * parting.spread
     note = "add a photo from above, draw a stroke `parting` or give --parting"
-    return (Figure("parting", "width of the skin", width, "mm", PARTING_MM.light(width), note, 0),)
+    figures = []
+    if parting.sureness < 1:
+        light = CROWN.light(parting.sureness)
+        figures.append(Figure("parting", "sureness", parting.sureness, "", light, note, 2))
+    if parting.spread:
+        width = 1000 * parting.spread
+        light = PARTING_MM.light(width)
+        figures.append(Figure("parting", "width of the skin", width, "mm", light, note, 0))
+    return tuple(figures)
 
 
 def assess_ties(tied: TiedHair | None, head: Head) -> tuple[Figure, ...]:

@@ -313,10 +313,13 @@ def _measure(
         "waves", Waves, measure_waves, capture=photos, orientations=orientations, **views
     )
     distance = run.derive("distance", ScalpDistance, measure_scalp_distance, head=head, hull=hull)
-    parting = run.derive("parting", Parting, measure_parting, capture=photos, head=head, **views)
     tied = run.derive(
         "ties", TiedHair, measure_ties, orientations=orientations, head=head, hull=hull,
         scalp_distance=distance, **views,
+    )  # fmt: skip
+    parting = run.derive(
+        "parting", Parting, measure_parting, capture=photos, orientations=orientations, head=head,
+        tied=tied, **views,
     )  # fmt: skip
     return {
         "scene": scene, "masks": masks, "orientations": orientations, "hull": hull,

@@ -22,13 +22,21 @@ SIDE = 0.03
 
 @dataclass(frozen=True, eq=False)
 class Parting(Stored):
-    """How hair on the crown is combed: to both sides of a line, back, or as the hull suggests."""
+    """How hair on the crown is combed: to both sides of a line, back, from a whorl, or as the hull
+    suggests; and in front over the forehead, or not.
+    """
 
     line: Float64Array | None = None
     """(N, 2) points x (towards the subject's left) and z (to the front) of the parting, metres in
     the head frame, N at least 2; None without a parting."""
     swept_back: bool = False
     """True when all hair on the crown is combed back."""
+    fringe: bool = False
+    """True when the hair in front is combed forward over the forehead."""
+    whorl: Float64Array | None = None
+    """(2,) x and z of the place from which hair runs to all sides; None where none is found."""
+    sureness: float = 1.0
+    """How well the views' directions agree with this, 0 to 1; 1 where skin or the user says it."""
     skin_share: float = 0.0
     """Share of the crown that the views see as skin; 0 where no parting shows."""
     spread: float = 0.0
@@ -42,6 +50,9 @@ class Parting(Stored):
             if len(line) < 2:
                 raise DataError(f"a parting of {len(line)} points, expected at least 2")
             object.__setattr__(self, "line", line)
+        if self.whorl is not None:
+            whorl = frozen_array(self.whorl, np.float64, (2,), "whorl")
+            object.__setattr__(self, "whorl", whorl)
 
     @classmethod
     def at(cls, x: float, skin_share: float = 0.0, spread: float = 0.0) -> Self:
@@ -70,15 +81,25 @@ class Parting(Stored):
         return 0.0 if self.line is None else float(self.line[:, 0].mean())
 
     @property
+    def known(self) -> bool:
+        """True when it is known how the crown is combed."""
+        return self.seen or self.swept_back or self.fringe or self.whorl is not None
+
+    @property
     def summary(self) -> str:
         """One line for the log.
 
         >>> Parting.at(0.03, spread=0.012).summary
         'parting 30 mm left of the middle, the skin there 12 mm wide (photos)'
+        >>> Parting(fringe=True, sureness=0.7).summary
+        'no parting, fringe, sureness 0.70 (photos)'
         """
-        if self.line is None:
-            how = "combed back" if self.swept_back else "no parting"
-            return f"{how} ({self.source})"
-        side = "left" if self.x > 0 else "right"
+        how = "combed back" if self.swept_back else "no parting"
+        if self.line is not None:
+            side = "left" if self.x > 0 else "right"
+            how = f"parting {1000 * abs(self.x):.0f} mm {side} of the middle"
+        elif self.whorl is not None:
+            how = f"whorl {-1000 * self.whorl[1]:.0f} mm behind the middle"
         width = f", the skin there {1000 * self.spread:.0f} mm wide" if self.spread else ""
-        return f"parting {1000 * abs(self.x):.0f} mm {side} of the middle{width} ({self.source})"
+        sure = f", sureness {self.sureness:.2f}" if self.sureness < 1 else ""
+        return f"{how}{width}{', fringe' if self.fringe else ''}{sure} ({self.source})"

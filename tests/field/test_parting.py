@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,8 +16,11 @@ from hairkit.field.find_parting import measure_parting
 from hairkit.field.parting import comb_from_parting, crown_share, root_lift
 from hairkit.testing import ball_head, shell_hull, turn_capture, turn_scene
 from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
+from hairkit.types.tie import TiedHair
 
 BALL = 0.1
 """Radius of the head, metres."""
@@ -50,21 +54,27 @@ def large_cameras() -> list[Camera]:
     return [camera.resized(4 * camera.width, 4 * camera.height) for camera in CAMERAS]
 
 
+def measure(capture: Capture, masks: Sequence[Mask], cameras: Sequence[Camera]) -> Parting:
+    """Measure the parting in views that show no directions, of hair that is not tied."""
+    blank = [OrientationMap(0 * mask.labels, 0.0 * mask.labels) for mask in masks]
+    return measure_parting(capture, masks, blank, cameras, HEAD, TiedHair())
+
+
 @pytest.mark.parametrize("x", [-0.03, 0.0, 0.02])
 def test_the_parting_is_where_skin_shows(x: float) -> None:
     """Its place is right to half a vertex spacing, whatever side it is on."""
-    parting = measure_parting(turn_capture(), masks_of(x), large_cameras(), HEAD)
+    parting = measure(turn_capture(), masks_of(x), large_cameras())
     assert parting.seen
     assert parting.x == pytest.approx(x, abs=0.004)
 
 
 def test_a_crown_without_skin_has_no_parting() -> None:
     """Hair everywhere, or masks that do not know the person, say nothing."""
-    assert not measure_parting(turn_capture(), masks_of(None), large_cameras(), HEAD).seen
+    assert not measure(turn_capture(), masks_of(None), large_cameras()).seen
     unknown = [
         Mask(np.where(mask.hair, HAIR, BACKGROUND), person_known=False) for mask in masks_of(0.0)
     ]
-    assert not measure_parting(turn_capture(), unknown, large_cameras(), HEAD).seen
+    assert not measure(turn_capture(), unknown, large_cameras()).seen
 
 
 def test_a_view_from_above_alone_tells_the_parting() -> None:
@@ -81,7 +91,7 @@ def test_a_view_from_above_alone_tells_the_parting() -> None:
     masks, cameras = [*masks, parted_mask(above, 0.02)], [*cameras, above]
     turn = turn_capture()
     capture = replace(turn, views=(*turn.views, turn.views[0]))
-    found = measure_parting(capture, masks, cameras, HEAD)
+    found = measure(capture, masks, cameras)
     assert found.x == pytest.approx(0.02, abs=0.003)
     assert found.spread < 2 * LINE
 
@@ -89,7 +99,7 @@ def test_a_view_from_above_alone_tells_the_parting() -> None:
 def test_what_the_user_says_counts_before_the_photos() -> None:
     """A parting in the capture is returned as it is."""
     said = replace(turn_capture(), parting=Parting.named("right"))
-    found = measure_parting(said, masks_of(0.03), large_cameras(), HEAD)
+    found = measure(said, masks_of(0.03), large_cameras())
     assert found.source == "option"
     assert found.x < 0
 
@@ -114,7 +124,7 @@ def test_a_stroke_draws_the_parting(tmp_path: Path) -> None:
         landmarks=None,
     )
     capture = replace(capture, views=(front, *capture.views[1:]))
-    found = measure_parting(capture, masks_of(None), cameras, HEAD)
+    found = measure(capture, masks_of(None), cameras)
     assert found.source == "stroke"
     assert found.x == pytest.approx(0.02, abs=0.006)
 
@@ -137,7 +147,7 @@ def test_an_unknown_word_is_refused() -> None:
 def test_hair_swept_back_runs_back_all_over_the_crown() -> None:
     """Unit tangents that point backwards on both sides and in the middle."""
     points, normals = crown_points()
-    combed = comb_from_parting(Parting.named("back"), points, normals)
+    combed = comb_from_parting(Parting.named("back"), HEAD, points, normals)
     np.testing.assert_allclose(np.sum(combed * normals, axis=1), 0, atol=1e-9)
     assert (combed[:, 2] < -0.5).all()
 
@@ -146,7 +156,7 @@ def test_hair_is_combed_from_a_bent_line() -> None:
     """The nearest point of a line of any number of points counts."""
     points, normals = crown_points()
     bent = Parting(np.array([[0.03, 0.09], [0.03, 0.02], [-0.03, -0.02], [-0.03, -0.09]]))
-    combed = comb_from_parting(bent, points, normals)
+    combed = comb_from_parting(bent, HEAD, points, normals)
     front, back = points[:, 2] > 0.03, points[:, 2] < -0.03
     for part, x in ((front, 0.03), (back, -0.03)):
         beside = part & (np.abs(points[:, 0] - x) > 0.01)
@@ -165,7 +175,7 @@ def crown_points() -> tuple[Float64Array, Float64Array]:
 def test_hair_is_combed_along_the_skin_away_from_the_parting() -> None:
     """Directions are unit tangents; hair to the left of the line goes left, to its right right."""
     points, normals = crown_points()
-    combed = comb_from_parting(Parting.at(0.01), points, normals)
+    combed = comb_from_parting(Parting.at(0.01), HEAD, points, normals)
     np.testing.assert_allclose(np.linalg.norm(combed, axis=1), 1, atol=1e-9)
     np.testing.assert_allclose(np.sum(combed * normals, axis=1), 0, atol=1e-9)
     beside = np.abs(points[:, 0] - 0.01) > 0.005
@@ -176,15 +186,15 @@ def test_the_mirrored_parting_combs_the_mirror_image() -> None:
     """Nothing in the comb prefers a side."""
     points, normals = crown_points()
     mirror = np.array([-1.0, 1.0, 1.0])
-    left = comb_from_parting(Parting.at(0.02), points, normals)
-    right = comb_from_parting(Parting.at(-0.02), points * mirror, normals * mirror)
+    left = comb_from_parting(Parting.at(0.02), HEAD, points, normals)
+    right = comb_from_parting(Parting.at(-0.02), HEAD, points * mirror, normals * mirror)
     np.testing.assert_allclose(left * mirror, right, atol=1e-12)
 
 
 def test_the_comb_counts_on_top_and_fades_below() -> None:
     """1 at the top of the head, 0 at the ears, never growing on the way down."""
     height = np.linspace(0.1, -0.1, 50)
-    share = crown_share(HEAD, np.stack([0 * height, height, 0 * height], axis=1))
+    share = crown_share(Parting.at(0.0), HEAD, np.stack([0 * height, height, 0 * height], axis=1))
     assert share[0] == 1
     assert share[-1] == 0
     assert (np.diff(share) <= 0).all()

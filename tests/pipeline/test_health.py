@@ -105,6 +105,11 @@ def bare_hairline(run: Run) -> None:
     run.parting = Parting(skin_share=0.1, spread=0.09)
 
 
+def unsure_crown(run: Run) -> None:
+    """The views' directions just agree with a parting."""
+    run.parting = Parting(Parting.at(0.0).line, sureness=0.0)
+
+
 def two_heads(run: Run) -> None:
     """Every other mask is that of another, taller head of hair."""
     lifted = [Mask(np.roll(mask.labels, -75, axis=0), True) for mask in run.masks]
@@ -169,6 +174,7 @@ FAULTS = {
     "strands: roots grown": few_strands,
     "turn: margin over the next best": any_turn,
     "parting: width of the skin": bare_hairline,
+    "parting: sureness": unsure_crown,
 }
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera
-from hairkit.types.mask import HAIR, Mask
+from hairkit.types.mask import HAIR, PERSON, Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_products
 
@@ -72,6 +74,16 @@ def way_to(place: Float64Array, points: Float64Array) -> Float64Array:
 
 def seen(camera: Camera, place: Float64Array = TIE) -> tuple[Mask, OrientationMap]:
     """Return a picture full of hair that runs over the ball towards a direction (3,)."""
+    return drawn(camera, lambda points: way_to(place, points))
+
+
+def drawn(
+    camera: Camera, comb: Callable[[Float64Array], Float64Array], bare: float = -np.inf
+) -> tuple[Mask, OrientationMap]:
+    """Return a picture of hair that runs along tangents (N, 3) of the ball at points (N, 3).
+
+    Below the height `bare`, metres, the ball is skin.
+    """
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     rays = np.stack([x - camera.centre[0], y - camera.centre[1]], axis=-1) / camera.focal
     rays = np.concatenate([rays, np.ones((*x.shape, 1))], axis=-1).reshape(-1, 3) @ camera.rotation
@@ -80,10 +92,11 @@ def seen(camera: Camera, place: Float64Array = TIE) -> tuple[Mask, OrientationMa
     along = -(rays @ eye)
     root = along**2 - (eye @ eye - (BALL + THICK) ** 2)
     points = eye + (along - np.sqrt(np.maximum(root, 0)))[:, None] * rays
-    step = camera.project(points + 1e-3 * way_to(place, points)) - camera.project(points)
+    step = camera.project(points + 1e-3 * comb(points)) - camera.project(points)
     angle = wrap_angle(np.arctan2(step[:, 1], step[:, 0])).reshape(x.shape)
-    sure = (root > 0).reshape(x.shape).astype(np.float32)
-    return Mask(np.full(x.shape, HAIR, np.uint8), True), OrientationMap(angle, sure)
+    skin = (points[:, 1] < bare).reshape(x.shape) & (root > 0).reshape(x.shape)
+    sure = ((root > 0).reshape(x.shape) & ~skin).astype(np.float32)
+    return Mask(np.where(skin, PERSON, HAIR).astype(np.uint8), True), OrientationMap(angle, sure)
 
 
 def tied_field() -> OrientationField:
