@@ -39,9 +39,10 @@ CONTRAST_SCALE = 0.014
 """Gaussian over which brightness is brought to equal mean and contrast, metres."""
 LEAST_CONTRAST = 1.0
 """Grey levels added to the standard deviation."""
-PITCH_SQUARE, PITCH_STEP, PITCH_FILLED = 0.096, 0.02, 0.85
-"""Edge and spacing of the squares for the autocorrelation, metres; their least share of hair."""
-SHORTEST_PITCH, LONGEST_PITCH, SMALLEST_LAG = 0.008, 0.078, 0.002
+PITCH_PATCH, PITCH_STEP, PITCH_FILLED = (0.128, 0.064), 0.02, 0.85
+"""Height, width and spacing of the patches for the autocorrelation, metres; their least share of
+hair."""
+SHORTEST_PITCH, LONGEST_PITCH, SMALLEST_LAG = 0.008, 0.105, 0.002
 """Metres. Below the smallest lag there is the noise of pixels."""
 LEAST_CORRELATION = 0.1
 """Autocorrelation at the smallest lag, relative to lag 0, below which the picture is noise."""
@@ -52,12 +53,12 @@ FIRST_PEAK = 0.6
 LEAST_PROMINENCE = 0.08
 """Of a peak over the trough before it, relative to the smallest lag: straight hair has up to 0.03,
 wavy and curly hair 0.24 to 0.31."""
-SLOPE_SQUARE, SLOPE_STEP = 0.048, 0.012
-"""Edge and spacing of the squares, wholly hair, for the spectrum, metres."""
+SLOPE_PATCH, SLOPE_STEP = (0.048, 0.048), 0.012
+"""Height, width and spacing of the patches, wholly hair, for the spectrum, metres."""
 BAND = (150.0, 350.0)
 """Cycles per metre: 3 to 7 mm, coarser than the lattice of pixels, finer than locks."""
-FEWEST_SQUARES = 12
-"""Squares of all views below which nothing is measured."""
+FEWEST_PATCHES = 12
+"""Patches of all views below which nothing is measured."""
 AXIS_SCATTER = 0.12
 """Radians by which axes scatter about the vertical; as much again for each unit of slope."""
 LINE_SHARE, LINE_SPREAD = 0.45, 0.5
@@ -137,30 +138,33 @@ def _normalise(grey: Float32Array, hair: Float32Array) -> tuple[Float32Array, Fl
     return np.asarray(centred / deviation * hair, np.float32), hair
 
 
-def _squares(
-    views: Sequence[tuple[Float32Array, Float32Array]], edge: float, step: float, filled: float
+def _patches(
+    views: Sequence[tuple[Float32Array, Float32Array]],
+    shape: tuple[float, float],
+    step: float,
+    filled: float,
 ) -> Iterator[tuple[Float32Array, Float32Array]]:
-    """Yield squares of pictures and of hair that hold at least a share of hair, metres."""
-    size, stride = round(edge * RESOLUTION), round(step * RESOLUTION)
+    """Yield patches of pictures and of hair that hold at least a share of hair; metres."""
+    height, width, stride = (round(edge * RESOLUTION) for edge in (*shape, step))
     for picture, hair in views:
-        for top in range(0, picture.shape[0] - size + 1, stride):
-            for left in range(0, picture.shape[1] - size + 1, stride):
-                place = np.s_[top : top + size, left : left + size]
+        for top in range(0, picture.shape[0] - height + 1, stride):
+            for left in range(0, picture.shape[1] - width + 1, stride):
+                place = np.s_[top : top + height, left : left + width]
                 if hair[place].mean() >= filled:
                     yield picture[place], hair[place]
 
 
 def _measure_pitch(views: Sequence[tuple[Float32Array, Float32Array]]) -> tuple[float, float]:
     """Return the pitch in metres and its prominence, both 0 where no peak is found."""
-    size = round(PITCH_SQUARE * RESOLUTION)
-    shape, count = (2 * size, 2 * size), 0
-    power, window = np.zeros((2 * size, size + 1)), np.zeros((2 * size, size + 1))
-    for picture, hair in _squares(views, PITCH_SQUARE, PITCH_STEP, PITCH_FILLED):
+    size, width = (round(edge * RESOLUTION) for edge in PITCH_PATCH)
+    shape, count = (2 * size, 2 * width), 0
+    power, window = np.zeros((2 * size, width + 1)), np.zeros((2 * size, width + 1))
+    for picture, hair in _patches(views, PITCH_PATCH, PITCH_STEP, PITCH_FILLED):
         mean = picture.sum() / max(float(hair.sum()), 1.0)
         power += np.abs(np.fft.rfft2((picture - mean) * hair, shape)) ** 2
         window += np.abs(np.fft.rfft2(hair, shape)) ** 2
         count += 1
-    if count < FEWEST_SQUARES:
+    if count < FEWEST_PATCHES:
         return 0.0, 0.0
     overlap = np.maximum(np.fft.irfft2(window, shape), 1.0)
     correlation = np.fft.irfft2(power, shape) / overlap
@@ -193,13 +197,13 @@ def _angular_moments(
     views: Sequence[tuple[Float32Array, Float32Array]],
 ) -> tuple[float, float] | None:
     """Return the means of cos 2 phi and cos 4 phi over the power; phi is off the vertical."""
-    size, count = round(SLOPE_SQUARE * RESOLUTION), 0
+    size, count = round(SLOPE_PATCH[0] * RESOLUTION), 0
     taper = np.outer(np.hanning(size), np.hanning(size))
     power = np.zeros((size, size))
-    for picture, _ in _squares(views, SLOPE_SQUARE, SLOPE_STEP, 1.0):
+    for picture, _ in _patches(views, SLOPE_PATCH, SLOPE_STEP, 1.0):
         power += np.abs(np.fft.fft2((picture - picture.mean()) * taper)) ** 2
         count += 1
-    if count < FEWEST_SQUARES:
+    if count < FEWEST_PATCHES:
         return None
     angle = np.arange(_ANGLES) * np.pi / _ANGLES  # of the wave vector, so of the strand off upright
     frequency = np.linspace(*BAND, _RADII)[:, None] * size / RESOLUTION

@@ -84,6 +84,14 @@ def test_radius_and_pitch_of_drawn_curls_are_found(radius: float, pitch: float) 
     assert waves.curly
 
 
+def test_waves_of_nine_centimetres_are_no_straight_hair() -> None:
+    """Longer pitches than any curl's are measured as well."""
+    waves = measure_waves(*views_of(drawing(0.012, 0.09)))
+    assert waves.pitch == pytest.approx(0.09, rel=0.1)
+    assert waves.radius == pytest.approx(0.012, rel=0.35)
+    assert not waves.curly
+
+
 def test_the_pitch_is_in_metres_whatever_the_size_of_the_pictures() -> None:
     """Photos of another size show the same waves."""
     small, large = (
