@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from hairkit import Capture, Head, Mask, Scene, hookimpl
-from hairkit.cameras.similarity import Similarity
+from hairkit.cameras.similarity import move_head
 from hairkit.cameras.turntable import Turn
 from hairkit.errors import InputError
 from hairkit.io.photos import focal_from_equivalent
@@ -48,8 +46,5 @@ def estimate_scene(
     orthographic = options.model == "orthographic" or capture.orthographic
     perspective = 0.0 if orthographic else 1 / options.distance
     cameras = Turn.of(capture).nominal((view.focal_px or usual) / options.distance, perspective)
-    matrix = capture.head_pose
-    scale = float(np.cbrt(np.linalg.det(matrix[:3, :3])))
-    to_head = Similarity(scale, matrix[:3, :3] / scale, matrix[:3, 3]).inverse()
     names = tuple(view.name for view in capture.views)
-    return Scene(names, tuple(to_head.moved_camera(camera) for camera in cameras), head)
+    return move_head(Scene(names, tuple(cameras), head), capture.head_pose)

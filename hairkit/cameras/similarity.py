@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array, frozen_array
 from hairkit.errors import InputError
 from hairkit.types.camera import Camera
+from hairkit.types.scene import Scene
 
 MIN_LANDMARKS = 3
 
@@ -28,6 +29,12 @@ class Similarity:
     """(3, 3)."""
     translation: Float64Array
     """(3,)."""
+
+    @classmethod
+    def of(cls, matrix: Float64Array) -> Similarity:
+        """Return the similarity of a matrix (4, 4)."""
+        scale = float(np.cbrt(np.linalg.det(matrix[:3, :3])))
+        return cls(scale, matrix[:3, :3] / scale, matrix[:3, 3])
 
     def apply(self, points: npt.ArrayLike) -> Float64Array:
         """Return the moved points (..., 3)."""
@@ -53,6 +60,12 @@ class Similarity:
         orthographic = camera.model == "orthographic"
         focal = camera.focal / self.scale if orthographic else camera.focal
         return Camera(matrix, focal, camera.centre, camera.width, camera.height, camera.model)
+
+
+def move_head(scene: Scene, matrix: Float64Array) -> Scene:
+    """Return the scene whose head was moved by a similarity (4, 4), in the frame of that head."""
+    back = Similarity.of(matrix).inverse()
+    return replace(scene, cameras=tuple(back.moved_camera(camera) for camera in scene.cameras))
 
 
 def fit_similarity(

@@ -75,10 +75,10 @@ def run(args: argparse.Namespace) -> int:
 
     began = time.perf_counter()
     manager = Manager.loaded(args.plugin)
-    recipe = load_recipe(args.recipe).with_set(args.set)
-    recipe.check(manager)
     head = _head(args)
     capture = read_capture(_photos(args), _max_edge(args, WORKING_EDGE))
+    recipe = load_recipe(args.recipe).with_set([*capture.chosen.settings, *args.set])
+    recipe.check(manager)
     if args.parting is not None:
         capture = replace(capture, parting=Parting.named(args.parting))
     with progress_for(sys.stderr, quiet=args.quiet or args.json) as shown:

@@ -13,6 +13,7 @@ from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.colour import linear_from_srgb
 from hairkit.errors import InputError
 from hairkit.types.capture import View
+from hairkit.types.chosen import ChosenHair
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head, Roots
 from hairkit.types.mask import Mask
@@ -39,6 +40,7 @@ def assemble_groom(
     strands: Strands,
     waves: Waves | None = None,
     tied: TiedHair | None = None,
+    chosen: ChosenHair | None = None,
 ) -> Groom:
     """Return the groom of tracked strands, bound to the head, with the colour of the photos.
 
@@ -56,6 +58,8 @@ def assemble_groom(
         What the photos show of the hair's waves; None means straight hair.
     tied
         Where the strands are tied; None means loose hair.
+    chosen
+        Colours and width that the user chose; None means those of the photos.
 
     Raises
     ------
@@ -76,6 +80,7 @@ def assemble_groom(
         _log.warning("%d of %d roots gave no strand", len(roots) - kept, len(roots))
     curl = waves or Waves()
     material = replace(measure_colour(views, masks), curl_radius=curl.radius, curl_pitch=curl.pitch)
+    material = material if chosen is None else chosen.material(material)
     return Groom(
         _as_guides(strands, roots, long_enough, material.width),
         head,

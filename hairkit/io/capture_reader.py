@@ -119,7 +119,13 @@ def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> 
     with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as pool:
         views = tuple(pool.map(view, places))
     return Capture(
-        views, settings.orthographic, settings.head_pose, folder, max_edge, settings.parting
+        views,
+        settings.orthographic,
+        settings.head_pose,
+        folder,
+        max_edge,
+        settings.parting,
+        settings.chosen,
     )
 
 
@@ -291,7 +297,8 @@ def _view(
     image, header = read_photo(place.photo, max_edge)
     height, width = image.shape[:2]
     scale = np.array([width / header.width, height / header.height])
-    focal = _focal(place.entry or ViewEntry(), settings, header)
+    entry = place.entry or ViewEntry()
+    focal = _focal(entry, settings, header)
     return View(
         place.name,
         place.azimuth_deg,
@@ -304,6 +311,8 @@ def _view(
         photo_size=(header.width, header.height),
         elevation_deg=place.elevation_deg,
         named=place.named,
+        brightness=entry.brightness,
+        contrast=entry.contrast,
     )
 
 

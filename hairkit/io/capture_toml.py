@@ -14,6 +14,16 @@ photo = "IMG_0412.jpg"
 azimuth_deg = 0                  # towards the subject's left
 elevation_deg = 0                # from above
 focal_px = 1492
+brightness = 1.2                 # of the photo as the stage `orient` sees it; contrast likewise
+contrast = 1.1
+[fitted_head]                    # moves the head that was fitted; entries as in [head]
+rotation_deg = [0, 3, 0]
+[hair]                           # chosen instead of measured, each
+root_colour = "#3a2418"          # sRGB; tip_colour likewise
+width_mm = 0.07
+curl_radius_mm = 6               # and curl_pitch_mm
+[options]                        # of plugins, where neither recipe nor --set says something else
+structure_tensor.window_sigma = 16.0
 """
 
 from __future__ import annotations
@@ -23,7 +33,7 @@ import math
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -33,9 +43,10 @@ from hairkit.arrays import Float64Array
 from hairkit.errors import DataError, InputError
 from hairkit.options import make_options, option, unknown_name
 from hairkit.storage import read_text, write_text
+from hairkit.types.chosen import Chosen, ChosenHair
 from hairkit.types.parting import Parting
 
-_TABLES = ("parting", "head", "views")
+_TABLES = ("parting", "head", "views", "fitted_head", "hair", "options")
 """Entries that are more than one value."""
 _MAX_BYTES = 2**20
 
@@ -58,6 +69,8 @@ class ViewEntry:
     elevation_deg: float | None = option(None, low=-90, high=90, doc="Elevation.", unit="deg")
     focal_px: float | None = option(None, low=1, high=1e6, doc="Focal length.", unit="px")
     focal_mm_equivalent: float | None = option(None, low=8, high=2000, doc="Same.", unit="mm")
+    brightness: float = option(1.0, low=0.1, high=10, doc="Factor before strands are followed.")
+    contrast: float = option(1.0, low=0.1, high=10, doc="The same about middle grey.")
 
     @property
     def focal(self) -> Focal:
@@ -97,6 +110,8 @@ class CaptureFile:
     views: tuple[ViewEntry, ...] = ()
     parting: Parting | None = None
     """How the crown is combed, or None."""
+    chosen: Chosen = field(default_factory=Chosen)
+    """What is chosen instead of measured."""
 
 
 def read_capture_file(path: Path) -> CaptureFile:
@@ -119,21 +134,27 @@ def read_capture_file(path: Path) -> CaptureFile:
         _head_pose(document["head"], f"{path}: [head]") if "head" in document else None,
         _views(document.get("views", []), path),
         _parting(document["parting"], path) if "parting" in document else None,
+        _chosen(document, path),
     )
 
 
 def write_head_entry(path: Path, entry: HeadEntry) -> None:
     """Put the head's pose into a `capture.toml`, made where there is none; all else in it stays."""
-    kept = _lines_without(path, "[head]")
-    x, y, z = entry.rotation_deg
-    right, up, front = entry.translation_m
-    table = [
-        "[head]",
-        f"scale = {entry.scale!r}",
-        f"rotation_deg = [{x!r}, {y!r}, {z!r}]",
-        f"translation_m = [{right!r}, {up!r}, {front!r}]",
-    ]
-    write_text(path, "\n".join([*kept, *([""] if kept else []), *table]) + "\n")
+    write_table(path, "head", head_values(entry))
+
+
+def head_values(entry: HeadEntry) -> dict[str, object]:
+    """Return the entries of a table that places a head."""
+    return {field.name: getattr(entry, field.name) for field in fields(entry)}
+
+
+def write_table(path: Path, name: str, values: Mapping[str, object]) -> None:
+    """Replace the table `[name]` of a `capture.toml`; all else in it stays.
+
+    Values of None are left out; a table without any goes, and so does an empty file.
+    """
+    said = [f"{key} = {_toml(value)}" for key, value in values.items() if value is not None]
+    _write_lines(path, _lines_without(path, f"[{name}]"), [f"[{name}]", *said] if said else [])
 
 
 def write_view_entries(path: Path, entries: Sequence[ViewEntry]) -> None:
@@ -142,27 +163,41 @@ def write_view_entries(path: Path, entries: Sequence[ViewEntry]) -> None:
     Without entries the tables go, and the file too if nothing else is in it.
     """
     kept = _lines_without(path, "[[views]]")
+    tables: list[str] = []
     for entry in entries:
-        said = [(f.name, getattr(entry, f.name)) for f in fields(entry)]
-        kept += [*([""] if kept else []), "[[views]]"]
-        kept += [
-            f"{name} = {json.dumps(value, ensure_ascii=False)}"
-            for name, value in said
-            if value is not None
-        ]
-    if kept:
-        write_text(path, "\n".join(kept) + "\n")
+        said = [(f.name, getattr(entry, f.name), f.default) for f in fields(entry)]
+        tables += [*([""] if tables else []), "[[views]]"]
+        tables += [f"{name} = {_toml(value)}" for name, value, usual in said if value != usual]
+    _write_lines(path, kept, tables)
+
+
+def _toml(value: object) -> str:
+    """Return a text, a number or a list of numbers as TOML writes it."""
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(repr, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _write_lines(path: Path, kept: list[str], added: list[str]) -> None:
+    """Write kept and added lines with an empty one between them; without any the file goes."""
+    lines = [*kept, *([""] if kept and added else []), *added]
+    if lines:
+        write_text(path, "\n".join(lines) + "\n")
     else:
         path.unlink(missing_ok=True)
 
 
 def _lines_without(path: Path, header: str) -> list[str]:
-    """Return the lines of a file, none where there is no file, without the tables of a header."""
+    """Return the lines of a file, none where there is no file, without the tables of a header.
+
+    `[options.gabor]` goes with `[options]`.
+    """
     text = read_text(path, _MAX_BYTES) if path.exists() else ""
     kept, inside = [], False
     for line in text.splitlines():
         if line.strip().startswith("["):
-            inside = line.split("#")[0].strip() == header
+            found = line.split("#")[0].strip()
+            inside = found == header or found.startswith(f"{header[:-1]}.")
         if not inside:
             kept.append(line)
     while kept and not kept[-1].strip():
@@ -206,7 +241,11 @@ def _views(tables: Any, path: Path) -> tuple[ViewEntry, ...]:
 def _head_pose(table: Any, where: str) -> Float64Array:
     if not isinstance(table, Mapping):
         raise InputError(f"{where} is no table")
-    entry = make_options(HeadEntry, table, where)
+    return head_pose(make_options(HeadEntry, table, where))
+
+
+def head_pose(entry: HeadEntry) -> Float64Array:
+    """Return the similarity (4, 4) of a table that places a head; `head_entry` is its inverse."""
     pose = np.eye(4)
     for axis, angle_deg in enumerate(entry.rotation_deg):
         turn, (i, j) = np.eye(3), ((1, 2), (2, 0), (0, 1))[axis]
@@ -217,3 +256,30 @@ def _head_pose(table: Any, where: str) -> Float64Array:
     pose[:3, :3] *= entry.scale
     pose[:3, 3] = entry.translation_m
     return pose
+
+
+def _chosen(document: Mapping[str, Any], path: Path) -> Chosen:
+    """Return what the tables say that choose something instead of measuring it."""
+    tables = {name: document.get(name, {}) for name in ("fitted_head", "hair", "options")}
+    for name, table in tables.items():
+        if not isinstance(table, Mapping):
+            raise InputError(f"{path}: [{name}] is no table")
+    where = f"{path}: [fitted_head]"
+    head = _head_pose(tables["fitted_head"], where) if tables["fitted_head"] else None
+    try:
+        hair = make_options(ChosenHair, tables["hair"], f"{path}: [hair]")
+    except InputError as error:
+        raise InputError(f"{path}: [hair]: {error}") from error
+    return Chosen(hair, head, _settings(tables["options"], path))
+
+
+def _settings(table: Mapping[str, Any], path: Path) -> tuple[str, ...]:
+    """Return `plugin.option=value` texts of a table of plugins."""
+    texts = []
+    for plugin, options in table.items():
+        if not isinstance(options, Mapping):
+            raise InputError(f"{path}: [options]: expected plugin.option = value, not {plugin!r}")
+        for name, value in options.items():
+            said = ",".join(map(str, value)) if isinstance(value, list) else value
+            texts.append(f"{plugin}.{name}={said}")
+    return tuple(texts)

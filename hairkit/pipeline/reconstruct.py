@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from hairkit.cameras.similarity import move_head
 from hairkit.errors import InputError, RenderError
 from hairkit.field.find_parting import measure_parting
 from hairkit.field.growth_prior import measure_scalp_distance
@@ -34,6 +35,7 @@ from hairkit.pipeline.stage_runner import Given, StageRunner, completed
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
 from hairkit.types.capture import Capture, View
+from hairkit.types.chosen import ChosenHair
 from hairkit.types.face import Face
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head
@@ -80,7 +82,8 @@ def reconstruct(
         `run.json` and `hairkit.log`; its `work/` keeps the results of stages, so that unchanged
         stages are not run again.
     recipe
-        Which plugin does each stage: a shipped recipe's name, a `.toml` file or a recipe.
+        Which plugin does each stage: a shipped recipe's name or a `.toml` file, to which the
+        options of the capture are added; or a recipe, which is run as it is.
     manager
         The plugins; the installed ones when None.
     head
@@ -105,11 +108,12 @@ def reconstruct(
         A file cannot be written. Files are written whole or not at all.
     """
     manager = manager or Manager.loaded()
-    recipe = recipe if isinstance(recipe, Recipe) else load_recipe(recipe)
-    recipe.check(manager)
     if not 1 <= guides <= MAX_GUIDES:
         raise InputError(f"{guides} guides, expected 1 to {MAX_GUIDES}")
     given = photos if isinstance(photos, Capture) else read_capture(photos)
+    if not isinstance(recipe, Recipe):
+        recipe = load_recipe(recipe).with_set(given.chosen.settings)
+    recipe.check(manager)
     head = HeadFile(os.fspath(head)) if isinstance(head, (str, os.PathLike)) else head
     record = describe_run(given, head, recipe, manager, guides, seed)
     log = RunLog(progress or Silent())
@@ -204,7 +208,8 @@ def find_views(
     run: StageRunner, capture: Capture, log: RunLog
 ) -> tuple[Capture, Turnaround | None]:
     """Find faces, persons and the turn; return the views upright, in its order, and the turn."""
-    views = [Given.of(view) for view in capture.views]
+    plain = capture.plain()
+    views = [Given.of(view) for view in plain.views]
     faces = run.every_view("landmarks", Face, views, absent=Face.absent)
     persons = run.every_view("person", Person, views, absent=Person.absent)
     seen = replace(
@@ -216,7 +221,7 @@ def find_views(
     )
     if not run.has("turn"):
         return seen, None
-    photos = Given.of(capture)
+    photos = Given.of(plain)
     turn = run.once("turn", Turnaround, capture=photos, faces=faces, persons=persons).value
     log.message(turn.summary)
     return _with_upright_persons(run, seen.arranged(turn)), turn
@@ -255,12 +260,16 @@ def _grow(
     turn: Turnaround | None,
 ) -> _Made:
     """Run the stages; views are processed in parallel, later stages wait for them."""
-    photos, views = Given.of(capture), [Given.of(view) for view in capture.views]
+    plain = capture.plain()
+    photos = Given.of(plain)
     masks = label_views(run, photos, head)
-    orientations = run.every_view("orient", OrientationMap, views, mask=masks)
+    toned = [Given.of(view.toned()) for view in capture.views]
+    orientations = run.every_view("orient", OrientationMap, toned, mask=masks)
     scene = fit_scene(run, photos, masks, head)
+    if capture.chosen.head is not None:
+        scene = Given.of(move_head(scene.value, capture.chosen.head))
     hull = run.once("hull", Hull, scene=scene, masks=masks)
-    seen = _measure(run, photos, masks, orientations, scene, hull)
+    seen = _measure(run, photos, masks, orientations, scene, hull, capture.chosen.hair)
     field = run.once("field", OrientationField, **seen)
     waves, distance = seen["waves"].value, seen["scalp_distance"].value
     parting, tied = seen["parting"].value, seen["tied"].value
@@ -271,7 +280,9 @@ def _grow(
     strands = run.once("track", Strands, **seen, field=field, roots=roots)
     labels = tuple(mask.result().value for mask in masks)
     angles = tuple(orientation.result().value for orientation in orientations)
-    groom = assemble_groom(capture.views, labels, grown, roots.value, strands.value, waves, tied)
+    groom = assemble_groom(
+        capture.views, labels, grown, roots.value, strands.value, waves, tied, capture.chosen.hair
+    )
     health = assess(
         capture, labels, scene.value, hull.value, groom, guides, distance.hair_length, turn,
         parting, tied,
@@ -305,6 +316,7 @@ def _measure(
     orientations: Sequence[Future[Given[OrientationMap]]],
     scene: Given[Scene],
     hull: Given[Hull],
+    hair: ChosenHair,
 ) -> dict[str, Any]:
     """Return what field and strands are made from: stage results, and what is measured in them."""
     cameras, head = Given.of(scene.value.cameras), Given.of(scene.value.head)
@@ -312,6 +324,7 @@ def _measure(
     waves = run.derive(
         "waves", Waves, measure_waves, capture=photos, orientations=orientations, **views
     )
+    waves = waves if hair == ChosenHair() else Given.of(hair.waves(waves.value))
     distance = run.derive("distance", ScalpDistance, measure_scalp_distance, head=head, hull=hull)
     tied = run.derive(
         "ties", TiedHair, measure_ties, orientations=orientations, head=head, hull=hull,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array, UInt8Array, frozen_array
 from hairkit.errors import DataError
+from hairkit.types.chosen import Chosen
 from hairkit.types.face import Face, turn_points
 from hairkit.types.parting import Parting
 from hairkit.types.person import Person
@@ -48,6 +49,10 @@ class View:
     person: Person | None = None
     """Where the person is, in pixels of `image`; None where no model was run."""
 
+    brightness: float = 1.0
+    contrast: float = 1.0
+    """How the photo is shown to the stage `orient`: see `toned`."""
+
     def __post_init__(self) -> None:
         object.__setattr__(
             self, "image", frozen_array(self.image, np.uint8, (None, None, 3), f"photo {self.name}")
@@ -73,6 +78,19 @@ class View:
     def height(self) -> int:
         """Height of `image` in pixels."""
         return int(self.image.shape[0])
+
+    def toned(self) -> Self:
+        """Return the view with its brightness and contrast applied, as CSS filters apply them."""
+        if (self.brightness, self.contrast) == (1.0, 1.0):
+            return self
+        levels = np.arange(256) / 255 * self.brightness
+        levels = (np.clip(levels, 0, 1) - 1 / 2) * self.contrast + 1 / 2
+        table = np.rint(255 * np.clip(levels, 0, 1)).astype(np.uint8)
+        return replace(self.plain(), image=table[self.image])
+
+    def plain(self) -> Self:
+        """Return the view as all other stages see it."""
+        return replace(self, brightness=1.0, contrast=1.0)
 
     def turned(self, quarter_turns: int) -> Self:
         """Return the view after clockwise quarter turns of its photo."""
@@ -110,6 +128,8 @@ class Capture(Previewed):
     """Long edge in pixels that larger photos were scaled down to."""
     parting: Parting | None = None
     """How the crown is combed, where the user says it; None leaves it to the photos."""
+    chosen: Chosen = field(default_factory=Chosen)
+    """What the user chooses instead of what is measured and fitted."""
 
     def __post_init__(self) -> None:
         if not self.views:
@@ -121,6 +141,10 @@ class Capture(Previewed):
     def __repr__(self) -> str:
         sizes = " or ".join(sorted({f"{view.width} x {view.height}" for view in self.views}))
         return f"Capture({len(self.views)} views of {sizes} px)"
+
+    def plain(self) -> Self:
+        """Return the capture without choices, as stages see it: none of them reads any."""
+        return replace(self, views=tuple(view.plain() for view in self.views), chosen=Chosen())
 
     def arranged(self, turn: Turnaround) -> Self:
         """Return the views upright, in the order, with the names and from where the turn says."""
