@@ -12,11 +12,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
-from hairkit.arrays import BoolArray
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
+from hairkit.imaging.corrections import BRUSHED, Corrections, paint_to_edges
 from hairkit.imaging.hair_network import find_hair, mark_face
 from hairkit.imaging.masked_filters import picture_scale
 from hairkit.imaging.seeded_segmentation import label_from_probability, reduced_size
@@ -62,15 +63,14 @@ def segment(view: View, options: Options) -> Mask:
     return Mask(labels, person_known=True, alpha=alpha)
 
 
-def _corrections(
-    view: View, size: tuple[int, int], thickness: float
-) -> tuple[BoolArray, BoolArray] | None:
-    """Return where strokes say that there is hair, and that there is none, in reduced pixels."""
+def _corrections(view: View, size: tuple[int, int], thickness: float) -> Corrections | None:
+    """Return what strokes say of the reduced picture's pixels."""
     drawn = read_view_strokes(view, *size)
     if drawn is None:
         return None
     hair = np.zeros(size[::-1], np.bool_)
     rest = np.zeros_like(hair)
+    brushed = np.zeros(hair.shape, np.float32)
     if drawn.rectangle is not None:
         (left, top), (right, bottom) = np.clip(np.rint(drawn.rectangle), 0, None).astype(int)
         rest[:] = True
@@ -81,4 +81,8 @@ def _corrections(
         under = rasterise(stroke, *size, thickness * picture_scale(size[1]))
         is_hair = stroke.label == "foreground"
         hair[under], rest[under] = is_hair, not is_hair
-    return hair, rest
+        if stroke.radius is not None:
+            small = cv2.resize(view.image, size, interpolation=cv2.INTER_AREA)
+            painted = paint_to_edges(np.asarray(small, np.uint8), under, stroke.radius)
+            brushed[painted] = BRUSHED if is_hair else -BRUSHED
+    return Corrections(hair, rest, brushed)

@@ -9,12 +9,16 @@ and bald crowns; `training/hair_network` in the repository does that.
 
 from __future__ import annotations
 
+import hashlib
 import os
+from collections.abc import Sequence
 from functools import cache
 from importlib import resources
+from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.imaging.hair_features import hair_features
@@ -29,13 +33,37 @@ MIRRORED = (5, 9)
 the face."""
 
 
+_REMEMBERED = 36
+"""Answers that are remembered: those of the largest capture; each takes 0.2 MB."""
+_ANSWERS: dict[bytes, Float32Array] = {}
+"""Answers by the digest of what was asked, the oldest first."""
 _LIKELY_FACE = 0.8
 """Least presence of a face whose landmarks are used."""
 
 
 def find_hair(view: View) -> Float32Array:
-    """Return `hair_probability` of a view, from the person and the face found in it."""
-    return hair_probability(view.image, _person(view), likely_landmarks(view))
+    """Return `hair_probability` of a view, from the person and the face found in it.
+
+    Answers are remembered, since several steps and every stroke ask for the same one.
+    """
+    parts = (view.image, _person(view), likely_landmarks(view))
+    key = _digest(parts)
+    answer = _ANSWERS.get(key)
+    if answer is None:
+        answer = hair_probability(*parts)
+        answer.flags.writeable = False
+        for oldest in list(_ANSWERS)[: len(_ANSWERS) + 1 - _REMEMBERED]:
+            _ANSWERS.pop(oldest, None)
+        _ANSWERS[key] = answer
+    return answer
+
+
+def _digest(parts: Sequence[npt.NDArray[Any] | None]) -> bytes:
+    state = hashlib.blake2b(digest_size=20)
+    for part in parts:
+        state.update(repr(None if part is None else (part.shape, part.dtype.str)).encode())
+        state.update(b"" if part is None else np.ascontiguousarray(part).data)
+    return state.digest()
 
 
 def mark_face(view: View, size: tuple[int, int]) -> Float32Array:

@@ -19,7 +19,7 @@ import numpy as np
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.imaging.alpha_matting import refine_labels, refine_near_hair
-from hairkit.imaging.corrections import pull_prior
+from hairkit.imaging.corrections import Corrections, pull_prior
 from hairkit.imaging.geodesic import edge_costs, seed_distance
 from hairkit.imaging.masked_filters import blur
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
@@ -181,7 +181,7 @@ def label_from_probability(
     size: tuple[int, int],
     face: BoolArray | None = None,
     settings: LabelSettings | None = None,
-    corrections: tuple[BoolArray, BoolArray] | None = None,
+    corrections: Corrections | None = None,
 ) -> tuple[UInt8Array, UInt8Array]:
     """Return labels (H, W) of the photo's pixels, and the opacity of the hair, 0 to 255.
 
@@ -200,7 +200,7 @@ def label_from_probability(
         Where colours do not count, because a beard, brows and glasses have those of the hair.
     settings : LabelSettings, optional
         Its weights of the distance from seeds are not used.
-    corrections : two (height, width), optional
+    corrections : Corrections, optional
         Where a user says that there is hair, and that there is none; what is like these places and
         near them follows.
     """
@@ -211,14 +211,15 @@ def label_from_probability(
     if corrections is not None:
         smooth = blur(colour, _DENOISE_SIGMA)
         costs = edge_costs(smooth, _COST_PER_PIXEL, _COST_PER_CONTRAST)
-        prior = pull_prior(prior, costs, *corrections)
-    told = [each for each in (face, *(corrections or ())) if each is not None]
+        prior = pull_prior(prior, costs, corrections)
+    said = [] if corrections is None else [corrections.hair, corrections.rest]
+    told = said if face is None else [face, *said]
     posterior = _weigh_colours(prior, flat, told, settings)
     labels = np.take(np.array(_ORDER, np.uint8), posterior.argmax(axis=-1))
     seeds = np.full_like(labels, UNKNOWN)
     if corrections is not None:
-        said = corrections[0] | corrections[1]
-        seeds[said] = labels[said]
+        known = corrections.hair | corrections.rest
+        seeds[known] = labels[known]
     return refine_near_hair(image, labels, seeds)
 
 

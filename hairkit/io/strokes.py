@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -43,6 +43,8 @@ class Stroke:
     """True for a closed outline whose inside counts too."""
     points: Float64Array
     """(N, 2) pixels (x, y); one point is a dot."""
+    radius: float | None = None
+    """Of an edge brush, pixels: it paints up to the strongest edge within; None for a pen."""
 
     def sampled(self, step: float = 2.0) -> Float64Array:
         """Return points (M, 2) at most `step` pixels apart on the stroke; an area is closed."""
@@ -81,7 +83,13 @@ class Strokes:
     def scaled(self, x: float, y: float) -> Strokes:
         """Return the strokes for the photo scaled by `x` across and by `y` down."""
         factor = np.array([x, y])
-        strokes = tuple(Stroke(s.label, s.area, s.points * factor) for s in self.strokes)
+        mean = float(np.sqrt(x * y))
+        strokes = tuple(
+            replace(
+                s, points=s.points * factor, radius=None if s.radius is None else mean * s.radius
+            )
+            for s in self.strokes
+        )
         rectangle = None if self.rectangle is None else self.rectangle * factor
         return Strokes(strokes, rectangle, None, self.corrects)
 
@@ -91,7 +99,7 @@ class Strokes:
         def turn(points: Float64Array) -> Float64Array:
             return turn_points(points, quarter_turns, width, height)
 
-        strokes = tuple(Stroke(s.label, s.area, turn(s.points)) for s in self.strokes)
+        strokes = tuple(replace(s, points=turn(s.points)) for s in self.strokes)
         corners = None if self.rectangle is None else np.sort(turn(self.rectangle), axis=0)
         size = (height, width) if quarter_turns % 2 else (width, height)
         return Strokes(strokes, corners, size, self.corrects)
@@ -117,7 +125,8 @@ def read_strokes(path: str | os.PathLike[str]) -> Strokes:
         if label == _BOX:
             rectangle = np.stack([points.min(axis=0), points.max(axis=0)])
         else:
-            strokes.append(Stroke(label, kind in _AREAS, points))
+            radius = _radius(entry, f"{path}: shape {index}")
+            strokes.append(Stroke(label, kind in _AREAS, points, radius))
     width, height = document.get("imageWidth"), document.get("imageHeight")
     size = (width, height) if isinstance(width, int) and isinstance(height, int) else None
     flags = document.get("flags")
@@ -186,6 +195,16 @@ def _shape(entry: Any, where: str) -> tuple[Any, str, Float64Array]:
     if len(points) < _LEAST_POINTS[kind]:
         raise InputError(f"{where}: {len(points)} points, a {kind} needs {_LEAST_POINTS[kind]}")
     return label, kind, _outline(kind, points)
+
+
+def _radius(entry: dict[str, Any], where: str) -> float | None:
+    """Return the `radius` of an edge brush, an entry beside labelme's own."""
+    radius = entry.get("radius")
+    if radius is None:
+        return None
+    if isinstance(radius, bool) or not isinstance(radius, (int, float)) or not 0 < radius < _FAR:
+        raise InputError(f"{where}: radius is {radius!r}, expected pixels above 0")
+    return float(radius)
 
 
 def _outline(kind: str, points: Float64Array) -> Float64Array:

@@ -101,3 +101,18 @@ def test_a_wrong_file_gets_one_line(tmp_path: Path, text: str, reason: str) -> N
         read_strokes(tmp_path / "a.json")
     assert "a.json" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_the_radius_of_an_edge_brush_scales_with_the_photo(tmp_path: Path) -> None:
+    """A stroke keeps its brush through scaling and turning; a radius must be a length."""
+    shape = {"label": "foreground", "shape_type": "linestrip", "points": [[1, 2], [30, 40]]}
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps({"shapes": [shape | {"radius": 12}], "imageWidth": 100}))
+    strokes = read_strokes(file)
+    assert strokes.strokes[0].radius == 12
+    assert strokes.turned(1, 100, 80).strokes[0].radius == 12
+    assert strokes.scaled(0.5, 0.5).strokes[0].radius == pytest.approx(6)
+    for wrong in (0, -3, "wide", True, 1e9):
+        file.write_text(json.dumps({"shapes": [shape | {"radius": wrong}]}))
+        with pytest.raises(InputError, match="radius"):
+            read_strokes(file)
