@@ -4,6 +4,7 @@ The program that runs the plugins of a recipe. No method of reconstruction is he
 plugins.
 
 * `contact_sheet`: one picture of all stages
+* `draft`: a quick groom after a change by hand
 * `head_alone`: the head with its skin, without hair
 * `health`: figures that tell how good a run is
 * `module_digest`: digests of the code that made a cached result

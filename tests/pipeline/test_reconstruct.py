@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,14 @@ from ball import RECIPE
 from hairkit import Capture, Groom, Mask, Roots, ScalpDistance, Strands, Waves, hookimpl
 from hairkit.errors import InputError, PluginError, RenderError
 from hairkit.manager import Manager
+from hairkit.pipeline.draft import draft
 from hairkit.pipeline.recipe import parse_recipe
 from hairkit.pipeline.reconstruct import export_paths, reconstruct
 from hairkit.pipeline.run_record import RECORD
 from hairkit.progress import Recorder, Silent
 from hairkit.storage import to_arrays
 from hairkit.testing import ball_head, turn_capture, turn_scene
+from hairkit.types.chosen import Chosen, ChosenHair
 from hairkit.types.scene import read_cameras
 
 STAGES = ["segment", "scene", "head", "orient", "hull", "field", "track"]
@@ -106,6 +109,49 @@ def test_unchanged_stages_are_not_run_again(tmp_path: Path) -> None:
     assert ran(tmp_path) == ["export"]
     assert files(tmp_path) == before
     assert ran(tmp_path, reuse=False) == sorted([*STAGES, "export"])
+
+
+def test_what_is_chosen_replaces_what_was_found(tmp_path: Path) -> None:
+    """Cameras follow the moved head, colour and curl are those chosen, and a tone is for `orient`;
+    stages before them are not run again."""
+    run(tmp_path)
+    names, found = read_cameras(tmp_path / "scene.json")
+    pose = np.diag([1.1, 1.1, 1.1, 1.0])
+    pose[:3, 3] = (0.01, 0.02, 0.03)
+    hair = ChosenHair("#ff0000", width_mm=0.2, curl_radius_mm=4.0, curl_pitch_mm=30.0)
+    capture = replace(turn_capture(), chosen=Chosen(hair, pose))
+    assert ran(tmp_path, capture=capture) == ["export", "field", "hull", "track"]
+    groom = Groom.load(tmp_path / "groom.npz")
+    assert groom.material.root_colour == pytest.approx([1, 0, 0])
+    assert groom.material.width == pytest.approx(2e-4)
+    assert (groom.material.curl_radius, groom.material.curl_pitch) == pytest.approx((4e-3, 3e-2))
+    point = np.array([0.02, 0.03, 0.01])
+    moved = pose[:3, :3] @ point + pose[:3, 3]
+    for before, after in zip(found, read_cameras(tmp_path / "scene.json")[1], strict=True):
+        assert after.project(point) == pytest.approx(before.project(moved))
+    views = [replace(v, contrast=1.5 if k == 2 else 1.0) for k, v in enumerate(capture.views)]
+    ball_plugin.CALLS.clear()
+    run(tmp_path, capture=replace(capture, views=tuple(views)))
+    assert [call for call in ball_plugin.CALLS if " " in call] == [f"orient {names[2]}"]
+
+
+def test_a_draft_follows_a_change_without_the_cameras(tmp_path: Path) -> None:
+    """After a stroke one view's mask and strands are made again, and hull, field and strands."""
+    whole = run(tmp_path, guides=50)
+    manager = Manager()
+    manager.register(ball_plugin, "ball_plugin")
+    recipe = parse_recipe(RECIPE.encode(), "ball", "test")
+    views = [replace(v, photo_path=Path(f"{k}.jpg")) for k, v in enumerate(turn_capture().views)]
+    capture = replace(turn_capture(), views=tuple(views))
+    ball_plugin.CALLS.clear()
+    quick = draft(capture, tmp_path / "work", {"3.jpg"}, recipe, manager, 30)
+    steps = [f"{stage} {views[3].name}" for stage in ("segment", "orient")]
+    calls = list(ball_plugin.CALLS)
+    assert calls == [*steps, "hull", "field", "track"]
+    assert len(quick.strands) == 30
+    assert quick.head.vertices.shape == whole.head.vertices.shape
+    with pytest.raises(InputError, match="run all stages first"):
+        draft(capture, tmp_path / "nothing", set(), recipe, manager, 30)
 
 
 def test_what_stages_share_is_kept_and_handed_to_them(tmp_path: Path) -> None:
