@@ -26,7 +26,7 @@ LENS_MM, DISTANCE = 42.0, 0.7
 LOOK_AT = (0.0, -0.02, 0.0)
 """Metres in the head frame in the middle of the picture."""
 HAIR_ABOVE = 0.045
-"""Height of usual hair above the top of the head, metres: the line that it should not pass."""
+"""Thickness of usual hair on the head, metres: its top is the line that hair should not pass."""
 TOLERANCE = 0.7
 """Pixels by which an outline is simplified."""
 
@@ -50,14 +50,14 @@ def _guide(name: str, azimuth_deg: float, elevation_deg: float) -> dict[str, Any
     inside = np.isfinite(head_depth(head, camera)).astype(np.uint8)
     curves, _ = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     smooth = [cv2.approxPolyDP(curve, TOLERANCE, True)[:, 0] for curve in curves]
-    crown = np.array([[0.0, float(head.vertices[:, 1].max()) + HAIR_ABOVE, 0.0]])
+    hair = (head.vertices + HAIR_ABOVE * head.normals())[head.scalp > 0].astype(np.float64)
     return {
         "name": name,
         "azimuth": azimuth_deg,
         "elevation": elevation_deg,
         "outline": [_shares([*curve, curve[0]]) for curve in smooth if len(curve) > 2]
         + _face(camera),
-        "top": float(camera.project(crown)[0, 1] / HEIGHT),
+        "top": float(camera.project(hair)[:, 1].min() / HEIGHT),
     }
 
 

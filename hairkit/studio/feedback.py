@@ -72,6 +72,14 @@ ADVICE = {
 """Text for each kind of feedback."""
 
 
+EXAMPLES = (
+    "good",
+    *map(str, (Feedback.TOO_DARK, Feedback.TOO_BRIGHT, Feedback.BLURRED, Feedback.TOO_NEAR)),
+    *map(str, (Feedback.TOO_FAR, Feedback.OUT_OF_FRAME, Feedback.WRONG_ANGLE)),
+)
+"""Pictures beside the pages that show a right photo and faults: `example-NAME.jpg`."""
+
+
 def judge_photo(image: UInt8Array) -> list[Feedback]:
     """Return what is wrong with the light and the sharpness of a photo (H, W, 3)."""
     height, width = image.shape[:2]
@@ -137,6 +145,7 @@ def for_pages() -> dict[str, object]:
     """Return texts and limits for the pages, which judge the camera's picture alike."""
     return {
         "advice": {code.value: [advice.shown, advice.spoken] for code, advice in ADVICE.items()},
+        "examples": list(EXAMPLES),
         "limits": {
             "dark": DARK, "bright": BRIGHT, "sharp": SHARP, "still": STILL,
             "width": MEASURED_WIDTH, "yaw": YAW_TOLERANCE_DEG,

@@ -3,7 +3,8 @@
     photos/ 001.jpg ...       cleaned photos, named by the studio
     strokes/001.json          what was drawn on a photo, labelme's shape
     landmarks.json            landmarks that were corrected
-    capture.toml              names and order of the photos, where they were given; head's pose
+    capture.toml              names, order and tones of the photos, where they were given; what was
+                              chosen of head, hair and options
     studio.json               the photos in their order: the source of capture.toml's tables
     result/                   what `hairkit reconstruct PROJECT -o PROJECT/result` writes
     .studio/                  pictures for the pages and uploads on their way; may be deleted
@@ -27,12 +28,14 @@ from hairkit.io.capture_reader import FEWEST, MOST, NAMES
 from hairkit.io.capture_toml import (
     HeadEntry,
     ViewEntry,
+    head_values,
     read_capture_file,
-    write_head_entry,
+    write_table,
     write_view_entries,
 )
 from hairkit.io.strokes import read_strokes
 from hairkit.storage import read_text, write_bytes, write_text
+from hairkit.types.chosen import Chosen, ChosenHair
 
 STATE = "studio.json"
 RESULT = "result"
@@ -53,6 +56,9 @@ class Shot:
     """Name in the folder of the photos."""
     view: str | None = None
     """Name of the view, of `NAMES`, where whoever took the photo said so."""
+    brightness: float = 1.0
+    contrast: float = 1.0
+    """How the stage `orient` sees the photo."""
 
 
 class Project:
@@ -71,6 +77,8 @@ class Project:
             leftover.unlink(missing_ok=True)
         self.shots = self._read_shots()
         self._said = self._said_entries()
+        known = {shot.id for shot in self._kept()}
+        self.shots = [shot if shot.id in known else self._toned(shot) for shot in self.shots]
         if self._kept() not in ([], self.shots):  # files came or went while nobody looked
             self._keep(self.shots)
         if shutil.disk_usage(self.folder).free < _LARGEST_STATE:
@@ -182,6 +190,32 @@ class Project:
         finally:
             trial.unlink(missing_ok=True)
 
+    def tone(self, number: int, brightness: float, contrast: float) -> None:
+        """Keep how the stage `orient` sees a photo."""
+        toned = replace(self.shot(number), brightness=brightness, contrast=contrast)
+        self._keep([toned if shot.id == number else shot for shot in self.shots])
+
+    def outline(self, shot: Shot, key: str) -> dict[str, Any] | None:
+        """Return the outline that was kept for a photo, None if it is of another `key`."""
+        try:
+            kept = json.loads(read_text(self._outline_file(shot)))
+            return dict(kept["found"]) if kept["key"] == key else None
+        except (ValueError, KeyError, TypeError, HairkitError, OSError):
+            return None  # found again
+
+    def keep_outline(self, shot: Shot, key: str, found: dict[str, Any]) -> None:
+        """Keep the outline that was found in a photo."""
+        text = json.dumps({"key": key, "found": found})
+        write_bytes(self._outline_file(shot), text.encode(), durable=False)
+
+    def _outline_file(self, shot: Shot) -> Path:
+        return self.pictures / f"{Path(shot.file).stem}-outline.json"
+
+    def _toned(self, shot: Shot) -> Shot:
+        """Return a photo as a capture.toml that somebody wrote says it should be seen."""
+        said = self._said.get(shot.file, ViewEntry())
+        return replace(shot, brightness=said.brightness, contrast=said.contrast)
+
     def landmarks(self) -> dict[str, Any]:
         """Return the landmarks that were given, by the photo's stem."""
         path = self.folder / "landmarks.json"
@@ -208,8 +242,22 @@ class Project:
             path.unlink(missing_ok=True)
 
     def place_head(self, entry: HeadEntry) -> None:
-        """Keep the pose of the head that was set by hand."""
-        write_head_entry(self.folder / "capture.toml", entry)
+        """Keep how the fitted head was moved by hand."""
+        values = {} if entry == HeadEntry() else head_values(entry)
+        write_table(self.folder / "capture.toml", "fitted_head", values)
+
+    @property
+    def chosen(self) -> Chosen:
+        """What was chosen instead of measured."""
+        return read_capture_file(self.folder / "capture.toml").chosen
+
+    def choose(self, plugin: str, options: dict[str, Any], hair: ChosenHair) -> None:
+        """Keep options of a plugin and what was chosen of the hair; both were checked."""
+        settings = dict(text.split("=", 1) for text in self.chosen.settings)
+        kept = {k: v for k, v in settings.items() if not k.startswith(f"{plugin}.")}
+        own = {f"{plugin}.{name}": value for name, value in options.items()}
+        write_table(self.folder / "capture.toml", "options", kept | own)
+        write_table(self.folder / "capture.toml", "hair", asdict(hair))
 
     def inputs(self) -> str:
         """Return a text that changes whenever a file changes that a reconstruction reads."""
@@ -233,6 +281,7 @@ class Project:
     def set_built(self, inputs: str, made: dict[str, Any]) -> None:
         """Say that the result belongs to these inputs, and keep what pages show of it."""
         write_text(self.result / _BUILT, json.dumps({"inputs": inputs, "made": made}))
+        self.draft.unlink(missing_ok=True)
 
     def _built(self) -> dict[str, Any]:
         path = self.result / _BUILT
@@ -247,6 +296,11 @@ class Project:
     def groom(self) -> Path:
         """The file of the groom."""
         return self.result / "groom.npz"
+
+    @property
+    def draft(self) -> Path:
+        """The packet of a quick groom that the whole one will replace."""
+        return self.result / "studio-draft.bin"
 
     @property
     def enough(self) -> bool:
@@ -304,11 +358,16 @@ class Project:
             shots = sorted(shots, key=lambda shot: NAMES.index(shot.view or ""))
         order = [shot.file for shot in shots]
         in_order = order == sorted(order, key=lambda name: _natural(Path(name)))
-        if not named and in_order and not set(order) & set(self._said):
+        toned = any((shot.brightness, shot.contrast) != (1, 1) for shot in shots)
+        if not (named or toned) and in_order and not set(order) & set(self._said):
             return []
         return [
             replace(
-                self._said.get(s.file, ViewEntry()), photo=s.file, name=s.view if named else None
+                self._said.get(s.file, ViewEntry()),
+                photo=s.file,
+                name=s.view if named else None,
+                brightness=s.brightness,
+                contrast=s.contrast,
             )
             for s in shots
         ]
@@ -323,6 +382,7 @@ class Project:
             self.mark(shot.id, None)
         for size in ("small", "large"):
             self.picture(shot, size).unlink(missing_ok=True)
+        self._outline_file(shot).unlink(missing_ok=True)
 
 
 def _is_photo(path: Path) -> bool:

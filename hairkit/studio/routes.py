@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import tempfile
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from starlette.routing import Route
 
 from hairkit.errors import HairkitError
 from hairkit.io.capture_toml import HeadEntry
-from hairkit.options import make_options
+from hairkit.options import make_options, option
 from hairkit.studio.feedback import for_pages
 from hairkit.studio.guard import SESSION_PATH, Sessions
 from hairkit.studio.lan import qr_svg
@@ -24,6 +25,7 @@ from hairkit.studio.project import Shot
 from hairkit.studio.result_page import result_page
 from hairkit.studio.studio import BUILD_S, EXPORT_S, PHOTO_S, Studio
 from hairkit.studio.uploads import receive_file, receive_json
+from hairkit.types.chosen import ChosenHair
 
 TURNS = (8, 12, 16, 24)
 """Numbers of views of a guided turn."""
@@ -31,6 +33,15 @@ MOST_PAIRINGS = 20
 """Links that may wait to be opened."""
 _VIDEO_S = 900.0
 _UNKNOWN = "there is none yet"
+
+
+@dataclass(frozen=True)
+class Tone:
+    """How the stage `orient` sees a photo; in the ranges of the page's sliders."""
+
+    brightness: float = option(1.0, low=0.1, high=10, doc="Factor.")
+    contrast: float = option(1.0, low=0.1, high=10, doc="Factor about middle grey.")
+
 
 Handler = Callable[[Request], Awaitable[Response]]
 
@@ -66,11 +77,17 @@ class Routes:
             ("/api/photos/{id:int}/strokes", "GET", self._strokes),
             ("/api/photos/{id:int}/strokes", "PUT", self._draw),
             ("/api/photos/{id:int}/landmarks", "PUT", self._mark),
+            ("/api/photos/{id:int}/tone", "PUT", self._tone),
+            ("/api/photos/{id:int}/strands", "POST", self._strands),
             ("/api/pose", "GET", self._pose),
             ("/api/head", "PUT", self._place_head),
+            ("/api/head", "POST", self._nudge),
+            ("/api/choices", "GET", self._choices),
+            ("/api/choices", "PUT", self._choose),
             ("/api/build", "POST", self._build),
             ("/api/build", "DELETE", self._stop),
             ("/api/result/hair", "GET", self._hair),
+            ("/api/result/draft", "GET", self._draft),
             ("/api/result/sheet", "GET", self._sheet),
             ("/api/result/page", "GET", self._page),
             ("/api/result/{plugin:str}", "GET", self._file),
@@ -203,9 +220,8 @@ class Routes:
         shot, document = self._shot(request), await receive_json(request)
         async with self._studio.change:
             self._studio.project.draw(shot.id, document)
-        facts = await self._studio.outline(shot)
-        self._studio.changed()
-        return JSONResponse(facts)
+        self._studio.changed(touched=[shot.file])
+        return JSONResponse(await self._studio.outline(shot))
 
     async def _mark(self, request: Request) -> Response:
         shot, points = self._shot(request), (await receive_json(request)).get("points")
@@ -220,12 +236,69 @@ class Routes:
         entry = make_options(HeadEntry, await receive_json(request), "head")
         async with self._studio.change:
             self._studio.project.place_head(entry)
-        self._studio.changed()
+        self._studio.changed(touched=[])
         return JSONResponse({})
 
     async def _pose(self, request: Request) -> Response:
-        result = str(self._studio.project.result)
-        return JSONResponse(await self._studio.editor.call("pose", PHOTO_S, {"result": result}))
+        return JSONResponse(await self._studio.editor.call("pose", PHOTO_S, self._placed()))
+
+    async def _nudge(self, request: Request) -> Response:
+        """Move the head as a hand did in one photo."""
+        nudge = await receive_json(request)
+        async with self._studio.change:
+            values = {**self._placed(), "nudge": nudge}
+            found = await self._studio.editor.call("pose", PHOTO_S, values)
+            entry = make_options(HeadEntry, found.pop("entry"), "head")
+            self._studio.project.place_head(entry)
+        self._studio.changed(touched=[])
+        return JSONResponse(found)
+
+    def _placed(self) -> dict[str, Any]:
+        """Return what the task `pose` takes."""
+        project = self._studio.project
+        return {"folder": str(project.folder), "built": project.made.get("pose")}
+
+    async def _tone(self, request: Request) -> Response:
+        shot = self._shot(request)
+        tone = make_options(Tone, await receive_json(request), "photo")
+        async with self._studio.change:
+            self._studio.project.tone(shot.id, tone.brightness, tone.contrast)
+        self._studio.changed()
+        return JSONResponse({})
+
+    async def _strands(self, request: Request) -> Response:
+        """Draw the strands of a photo with options that need not be kept."""
+        shot, said = self._shot(request), await receive_json(request)
+        if not all(isinstance(said.get(key, {}), dict) for key in ("tone", "options")):
+            raise HTTPException(HTTPStatus.BAD_REQUEST, "expected tone and options")
+        tone = make_options(Tone, said.get("tone", {}), "photo")
+        studio = self._studio
+        with tempfile.TemporaryDirectory(dir=studio.project.incoming) as folder:
+            path = Path(folder) / "strands.png"
+            values = {
+                **studio.drawn(shot),
+                "options": said.get("options", {}),
+                "tone": [tone.brightness, tone.contrast],
+                "path": str(path),
+            }
+            await studio.editor.call("strands", PHOTO_S, values)
+            return Response(path.read_bytes(), media_type="image/png")
+
+    async def _choices(self, request: Request) -> Response:
+        folder = {"folder": str(self._studio.project.folder)}
+        return JSONResponse(await self._studio.editor.call("choices", PHOTO_S, folder))
+
+    async def _choose(self, request: Request) -> Response:
+        said = await receive_json(request)
+        values = {"options": said.get("options", {}), "hair": said.get("hair", {})}
+        if not all(isinstance(value, dict) for value in values.values()):
+            raise HTTPException(HTTPStatus.BAD_REQUEST, "expected options and hair")
+        found = await self._studio.editor.call("check", PHOTO_S, values)
+        async with self._studio.change:
+            hair = make_options(ChosenHair, found["hair"], "hair")
+            self._studio.project.choose(found["plugin"], found["options"], hair)
+        self._studio.changed()
+        return JSONResponse({})
 
     async def _build(self, request: Request) -> Response:
         if not self._studio.project.enough:
@@ -239,6 +312,9 @@ class Routes:
 
     async def _hair(self, request: Request) -> Response:
         return self._made("studio-hair.bin", "application/octet-stream")
+
+    async def _draft(self, request: Request) -> Response:
+        return self._made(self._studio.project.draft.name, "application/octet-stream")
 
     async def _sheet(self, request: Request) -> Response:
         return self._made("contact_sheet.png", "image/png")

@@ -8,16 +8,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
+import hairkit
 from hairkit.errors import HairkitError
+from hairkit.nets.model_folder import model_folder
 from hairkit.studio.events import Events
 from hairkit.studio.project import Project, Shot
 from hairkit.studio.task_process import TaskError, TaskProcess
 
-QUIET_S = 1.2
+QUIET_S = 0.6
 """Seconds without a change before the hair is made again."""
+DRAFT_GUIDES = 300
+"""Roots of the quick groom that is shown until the whole one is made."""
 MEANWHILE = 6
 """Photos from which the hair is made unasked: fewer are a turn that is still being taken."""
 PHOTO_S, BUILD_S, EXPORT_S = 120.0, 3600.0, 900.0
@@ -37,7 +42,7 @@ class Studio:
         self.project = project
         self.guides = guides
         self.events = Events()
-        self.editor, self.builder = TaskProcess(), TaskProcess()
+        self.editor, self.builder, self.drafter = TaskProcess(), TaskProcess(), TaskProcess()
         self.change = asyncio.Lock()
         self.facts: dict[int, dict[str, Any]] = {}
         """What is known of each photo: size, feedback, outline."""
@@ -48,6 +53,8 @@ class Studio:
         self.formats: list[list[str]] = []
         self._wanted = asyncio.Event()
         self._asked = False
+        self._touched: set[str] | None = None
+        """Photos that were drawn on since the last whole run; None when more than that changed."""
         self._tasks: list[asyncio.Task[None]] = []
         self._shares: dict[str, tuple[int, int]] = {}
 
@@ -56,6 +63,7 @@ class Studio:
         self._tasks = [asyncio.create_task(self._look()), asyncio.create_task(self._build_always())]
         if self.project.built == self.project.inputs() and self.project.shots:
             self.build = {"state": "done", **self.project.made}
+            self._touched = set()
         else:
             self.changed()
 
@@ -64,14 +72,22 @@ class Studio:
         for task in self._tasks:
             task.cancel()
         self.events.close()
-        await asyncio.gather(self.editor.close(), self.builder.close())
+        await asyncio.gather(self.editor.close(), self.builder.close(), self.drafter.close())
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    def changed(self, ask: bool = False) -> None:
-        """Say that the project changed, or that somebody asks for the hair."""
+    def changed(self, ask: bool = False, touched: Collection[str] | None = None) -> None:
+        """Say that the project changed, or that somebody asks for the hair.
+
+        `touched` are the files of photos whose strokes are all that changed, none where the head
+        was moved; None for any other change.
+        """
         if ask:
             self.held = False
             self._asked = True
+        elif touched is None or self._touched is None:
+            self._touched = None
+        else:
+            self._touched |= set(touched)
         self._wanted.set()
         self.events.send("project", **self.summary())
 
@@ -84,6 +100,7 @@ class Studio:
                 "view": shot.view,
                 "file": shot.file,
                 "drawn": project.strokes(shot).is_file(),
+                "tone": [shot.brightness, shot.contrast],
                 "version": _version(project.photo(shot)),
                 **{k: v for k, v in self.facts.get(shot.id, {}).items() if k not in _LARGE},
             }
@@ -94,6 +111,7 @@ class Studio:
             "photos": photos,
             "build": self.build,
             "result": _version(project.groom),
+            "draft": _version(project.draft),
             "formats": self.formats,
         }
 
@@ -121,27 +139,30 @@ class Studio:
     async def outline(self, shot: Shot) -> dict[str, Any]:
         """Return the outline of the hair in a photo, with what is drawn on it."""
         project = self.project
-        strokes = project.strokes(shot)
-        mask = project.mask(shot)
-        key = [_version(project.photo(shot)), _version(strokes)]
         facts = self.facts.setdefault(shot.id, {})
+        files = [project.photo(shot), project.strokes(shot), project.mask(shot) or Path()]
+        key = "/".join([hairkit.__version__, *map(_version, files), *_models()])
         if facts.get("outline_of") != key:
-            try:
-                found = await self.editor.call(
-                    "outline",
-                    PHOTO_S,
-                    {
-                        "photo": str(project.photo(shot)),
-                        "strokes": str(strokes) if strokes.is_file() else None,
-                        "mask": None if mask is None else str(mask),
-                    },
-                )
-                facts.pop("problem", None)
-            except TaskError as error:
-                found = {"outline": [], "share": 0.0}
-                facts["problem"] = str(error)
+            found = project.outline(shot, key)
+            if found is None:
+                try:
+                    found = await self.editor.call("outline", PHOTO_S, self.drawn(shot))
+                    project.keep_outline(shot, key, found)
+                    facts.pop("problem", None)
+                except TaskError as error:
+                    found = {"outline": [], "share": 0.0}
+                    facts["problem"] = str(error)
             facts.update(found, outline_of=key)
         return facts
+
+    def drawn(self, shot: Shot) -> dict[str, Any]:
+        """Return the files of a photo as tasks take them."""
+        strokes, mask = self.project.strokes(shot), self.project.mask(shot)
+        return {
+            "photo": str(self.project.photo(shot)),
+            "strokes": str(strokes) if strokes.is_file() else None,
+            "mask": None if mask is None else str(mask),
+        }
 
     async def stop_build(self) -> None:
         """End a build that is running, at the end of its step."""
@@ -178,8 +199,6 @@ class Studio:
         while True:
             await self._wanted.wait()
             self._wanted.clear()
-            if self.build["state"] == "running":
-                await self.stop_build()
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._wanted.wait(), QUIET_S)
                 continue  # it changed again
@@ -189,22 +208,46 @@ class Studio:
                 if not ready:
                     self._set_build(state="none")
                 continue
-            await self._while_unchanged(asyncio.create_task(self._build()))
+            if self._touched is not None and self.project.groom.is_file():
+                await self._draft(sorted(self._touched))
+            if not self._wanted.is_set():
+                await self._while_unchanged(asyncio.create_task(self._build()))
 
     async def _while_unchanged(self, build: asyncio.Task[None]) -> None:
-        """Wait for a build, or for a change that makes it useless."""
+        """Wait for a build, or for a change, which ends it: its process is started anew."""
         change = asyncio.create_task(self._wanted.wait())
         try:
             await asyncio.wait({build, change}, return_when=asyncio.FIRST_COMPLETED)
-            if not build.done():
-                await self.stop_build()
-            await build
         finally:
             change.cancel()
             build.cancel()
+            await asyncio.gather(build, return_exceptions=True)
+
+    async def _draft(self, touched: list[str]) -> None:
+        """Make a quick groom of what a hand changed, unless the next change comes before."""
+        self._set_build(state="running", share=0.0, stage="draft")
+        values = {
+            "folder": str(self.project.folder),
+            "packet": str(self.project.draft),
+            "touched": touched,
+            "guides": min(DRAFT_GUIDES, self.guides),
+        }
+        change = asyncio.create_task(self._stop_on_change())
+        try:
+            await self.drafter.call("draft", BUILD_S, values)
+            self.events.send("project", **self.summary())
+        except TaskError:
+            pass  # the whole run follows, and says what is wrong
+        finally:
+            change.cancel()
+
+    async def _stop_on_change(self) -> None:
+        await self._wanted.wait()
+        await self.drafter.stop()
 
     async def _build(self) -> None:
         project, inputs = self.project, self.project.inputs()
+        touched, self._touched = self._touched, set()
         self._shares = {}
         self._set_build(state="running", share=0.0, stage="starting")
         project.result.mkdir(exist_ok=True)
@@ -221,11 +264,17 @@ class Studio:
                 self._hear,
             )
             project.set_built(inputs, done)
+            touched = set()
             self._set_build(state="done", **done)
             self.events.send("project", **self.summary())
         except (TaskError, OSError) as error:
-            stopped = self._wanted.is_set()
-            self._set_build(state="waiting" if stopped else "failed", reason=str(error))
+            self._set_build(state="failed", reason=str(error))
+        except asyncio.CancelledError:
+            self._set_build(state="waiting")
+            raise
+        finally:
+            both = (touched, self._touched)
+            self._touched = None if None in both else set().union(*filter(None, both))
 
     def _hear(self, event: dict[str, Any]) -> None:
         """Pass the progress of a build on to the pages."""
@@ -250,6 +299,12 @@ class Studio:
 
 
 _LARGE = ("outline", "landmarks", "outline_of")
+
+
+def _models() -> list[str]:
+    """Return the names of the networks that are installed: outlines depend on them."""
+    folder = model_folder()
+    return sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
 
 
 def _version(path: Path) -> str:

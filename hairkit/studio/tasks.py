@@ -6,8 +6,8 @@ their own (`task_child`), so that a picture that crashes a decoder ends one task
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,22 +15,26 @@ from typing import Any
 import cv2
 import numpy as np
 
-from hairkit.arrays import UInt8Array
+from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.errors import HairkitError, InputError
 from hairkit.io.capture_reader import read_capture
+from hairkit.io.capture_toml import head_entry, head_pose, read_capture_file
 from hairkit.io.photos import MAX_BYTES, read_header, read_photo
 from hairkit.io.video import read_video
 from hairkit.manager import Manager
-from hairkit.pipeline.recipe import Recipe, load_recipe
+from hairkit.options import make_options
+from hairkit.pipeline.draft import draft
+from hairkit.pipeline.recipe import Choice, Recipe, load_recipe
 from hairkit.pipeline.reconstruct import add_findings, reconstruct
 from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.storage import read_bytes, write_bytes
 from hairkit.studio.clean_photo import clean_photo
 from hairkit.studio.feedback import judge_photo, judge_view
 from hairkit.types.capture import View
+from hairkit.types.chosen import ChosenHair
 from hairkit.types.face import Face
 from hairkit.types.groom import Groom
-from hairkit.types.mask import HAIR
+from hairkit.types.mask import HAIR, Mask
 from hairkit.types.person import Person
 
 SMALL_EDGE, LARGE_EDGE = 360, 1440
@@ -41,6 +45,8 @@ OUTLINE_TOLERANCE = 0.6
 """Pixels of that photo by which an outline may be simplified."""
 PICTURE_QUALITY, KEPT_QUALITY = 85, 97
 """JPEG qualities of pictures for pages, and of photos that have to be encoded again."""
+DRAFT_SETTINGS = ("visual_hull.voxel_size=0.005",)
+"""Options of a quick groom: with 5 mm instead of 3 the field has a fifth of the cells."""
 VIDEO_EDGE = 1440
 """Long edge in pixels of a video's frames."""
 
@@ -105,23 +111,14 @@ def find_outline(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool
 
     `strokes` and `mask` are the files that belong to the photo, or None.
     """
-    path = Path(request["photo"])
-    seen = _seen(path, path.stat().st_mtime_ns)
-    stage = _recipe().stage("segment")
-    assert stage is not None  # of the recipe `default`
-    files = {
-        key: None if request[key] is None else Path(request[key]) for key in ("strokes", "mask")
-    }
-    view = replace(seen, strokes_path=files["strokes"], mask_path=files["mask"])
-    choices = [(choice.plugin, choice.options) for choice in stage.choices]
-    plugin, mask = _manager().call_first("segment", choices, view=view)
+    view, plugin, mask = _segmented(request)
     scale = view.photo_size[0] / view.width
     curves, _ = cv2.findContours(
         (mask.labels == HAIR).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE
     )
     simple = [cv2.approxPolyDP(curve, OUTLINE_TOLERANCE, True)[:, 0] for curve in curves]
     outline = [((c + 0.5) * scale).round(1).ravel().tolist() for c in simple if len(c) > 2]
-    face = None if view.face is None else view.face
+    face = view.face
     return {
         "outline": outline,
         "plugin": plugin,
@@ -133,6 +130,65 @@ def find_outline(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool
     }
 
 
+def draw_strands(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Draw the strands that `orient` finds in a `photo` into the PNG file `path`.
+
+    `options` are those of its plugin, `tone` is brightness and contrast; the rest is as for
+    `find_outline`.
+    """
+    from hairkit.studio.strand_picture import draw_strand_lines
+
+    view, _, mask = _segmented(request)
+    brightness, contrast = request["tone"]
+    view = replace(view, brightness=brightness, contrast=contrast).toned()
+    plugin = oriented().plugin
+    found = _manager().call("orient", plugin, request["options"], view=view, mask=mask)
+    lines = draw_strand_lines(found)
+    data = cv2.imencode(".png", lines[..., [2, 1, 0, 3]], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
+    write_bytes(request["path"], data.tobytes(), durable=False)
+    return {}
+
+
+def describe_choices(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Return what can be chosen for the project in `folder`, and what is."""
+    chosen = read_capture_file(Path(request["folder"]) / "capture.toml").chosen
+    stage = oriented(chosen.settings)
+    values = asdict(_manager().options(stage.plugin, stage.options))
+    infos = [i for i in _manager().info(stage.plugin).options if i.type in (int, float)]
+    groom = Path(request["folder"]) / "result" / "groom.npz"
+    look = Groom.load(groom).material if groom.is_file() else None
+    return {
+        "plugin": stage.plugin,
+        "options": [
+            {
+                "name": info.name, "doc": info.doc, "unit": info.unit, "low": info.low,
+                "high": info.high, "usual": info.default, "value": values[info.name],
+                "whole": info.type is int,
+            }
+            for info in infos
+        ],
+        "hair": asdict(chosen.hair),
+        "found": None if look is None else asdict(ChosenHair.of(look)),
+    }  # fmt: skip
+
+
+def check_choices(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Return plugin, options and hair of a request as they are kept; `HairkitError` if wrong."""
+    plugin = oriented().plugin
+    options = asdict(_manager().options(plugin, request["options"]))
+    hair = make_options(ChosenHair, request["hair"], "hair")
+    usual = asdict(_manager().options(plugin, oriented().options))
+    changed = {name: value for name, value in options.items() if value != usual[name]}
+    return {"plugin": plugin, "options": changed, "hair": asdict(hair)}
+
+
+def oriented(settings: Sequence[str] = ()) -> Choice:
+    """Return the plugin that follows strands, with its options."""
+    stage = _recipe().with_set(settings).stage("orient")
+    assert stage is not None  # of the recipe `default`
+    return stage.choices[0]
+
+
 def build_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
     """Reconstruct the project in `folder` into its `result`, as `hairkit reconstruct` does."""
     out = Path(request["result"])
@@ -140,7 +196,7 @@ def build_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]
     groom = reconstruct(
         capture,
         out,
-        _recipe(),
+        _recipe().with_set(capture.chosen.settings),
         _manager(),
         guides=request["guides"],
         progress=_Told(tell, stopped),
@@ -151,7 +207,23 @@ def build_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]
         "strands": len(groom.strands),
         "length_cm": round(100 * float(groom.strands.lengths().mean()), 1),
         "health": [[figure.light, figure.line()] for figure in health],
+        "pose": _matrix(capture.chosen.head).tolist(),
     }
+
+
+def draft_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+    """Write the `packet` of a quick groom after strokes on the photos `touched`."""
+
+    def check() -> None:
+        if stopped():
+            raise StoppedError("stopped; another change came")
+
+    capture = read_capture(request["folder"])
+    recipe = _recipe().with_set([*capture.chosen.settings, *DRAFT_SETTINGS])
+    work = Path(request["folder"]) / "result" / "work"
+    touched, guides = request["touched"], request["guides"]
+    _hair_packet(draft(capture, work, touched, recipe, _manager(), guides, check), request)
+    return {}
 
 
 def export_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
@@ -179,10 +251,26 @@ def draw_guides(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]
 
 
 def describe_pose(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
-    """Return the head as every camera of the `result` sees it, and how well they fit."""
-    from hairkit.studio.pose import describe
+    """Return the head as every camera sees it, and how well they fit.
 
-    return describe(Path(request["result"]))
+    `folder` is the project, `built` the pose (4, 4) of the head with which its result was made.
+    With a `nudge` the head is moved first; `entry` tells the new pose.
+    """
+    from hairkit.studio.pose import Nudge, Placed, describe
+
+    folder, built = Path(request["folder"]), _matrix(request["built"])
+    pose = _matrix(read_capture_file(folder / "capture.toml").chosen.head)
+    placed = Placed.read(folder / "result", built, pose)
+    if "nudge" not in request:
+        return describe(placed, folder / "result")
+    entry = head_entry(placed.nudged(make_options(Nudge, request["nudge"], "head")))
+    moved = Placed.read(folder / "result", built, head_pose(entry))
+    return describe(moved, folder / "result") | {"entry": asdict(entry)}
+
+
+def _matrix(pose: Any) -> Float64Array:
+    """Return a pose (4, 4); that of a head which was not moved for None."""
+    return np.eye(4) if pose is None else np.asarray(pose, np.float64)
 
 
 TASKS: dict[str, Callable[[dict[str, Any], Tell, Callable[[], bool]], Any]] = {
@@ -191,7 +279,11 @@ TASKS: dict[str, Callable[[dict[str, Any], Tell, Callable[[], bool]], Any]] = {
     "pictures": draw_pictures,
     "frames": pick_frames,
     "outline": find_outline,
+    "strands": draw_strands,
+    "choices": describe_choices,
+    "check": check_choices,
     "build": build_groom,
+    "draft": draft_groom,
     "export": export_groom,
     "formats": list_formats,
     "guides": draw_guides,
@@ -234,6 +326,27 @@ def _recipe() -> Recipe:
     return load_recipe("default")
 
 
+def _segmented(request: dict[str, Any]) -> tuple[View, str, Mask]:
+    """Return a photo, and plugin and mask by the recipe's `segment`."""
+    path = Path(request["photo"])
+    seen = _seen(path, path.stat().st_mtime_ns)
+    stage = _recipe().stage("segment")
+    assert stage is not None  # of the recipe `default`
+    files = {
+        key: None if request[key] is None else Path(request[key]) for key in ("strokes", "mask")
+    }
+    view = replace(seen, strokes_path=files["strokes"], mask_path=files["mask"])
+    drawn = tuple(None if file is None else file.read_bytes() for file in files.values())
+    kept = _MASKS.get(path)
+    if kept is None or kept[0] is not seen or kept[1] != drawn:
+        choices = [(choice.plugin, choice.options) for choice in stage.choices]
+        kept = (seen, drawn, *_manager().call_first("segment", choices, view=view))
+        _MASKS[path] = kept
+    return view, kept[2], kept[3]
+
+
+_MASKS: dict[Path, tuple[View, tuple[bytes | None, ...], str, Mask]] = {}
+"""Masks and their plugins by the photo's path, with the photo and the files they were made from."""
 _VIEWS: dict[Path, tuple[int, View]] = {}
 """Photos with faces and persons found, by path, with the time of the file."""
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
+import json
 import os
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ import numpy as np
 import pytest
 
 from hairkit.io.capture_reader import read_capture
+from hairkit.studio.project import Project
 
 MOMENTS = 20
 LONGEST_S = 2.0
@@ -54,6 +57,90 @@ def test_a_killed_server_loses_nothing_that_it_confirmed(
         if kept >= 3:
             assert len(read_capture(folder).views) == kept
     assert not list((folder / "photos").glob(".*"))
+
+
+def test_whatever_is_killed_nothing_confirmed_is_lost(
+    tmp_path: Path, start_studio: Callable[..., Any], photos: list[Path]
+) -> None:
+    """Server or worker is killed at random moments while somebody draws, chooses and arranges.
+
+    What was confirmed last, or what was under way then, is in the project that is opened again.
+    """
+    generator = np.random.default_rng(9)
+    folder = tmp_path / "head"
+    first = start_studio(folder).enter()
+    for photo in photos:
+        assert first.ask("POST", "/api/photos", photo.read_bytes()).status == 201
+    first.kill()
+    actions = _actions([1 + index for index in range(len(photos))])
+    kept: dict[str, list[Any]] = {}
+    for moment in range(MOMENTS):
+        server = start_studio(folder).enter()
+        timer = threading.Timer(
+            float(generator.uniform(0, LONGEST_S)), _kill, (server, moment % 2 == 1)
+        )
+        timer.start()
+        with contextlib.suppress(OSError, ValueError):
+            while server.process.poll() is None:
+                method, path, body = next(actions)
+                kept[path] = [*kept.get(path, [])[-1:], body]
+                if server.ask(method, path, body).status < 300:
+                    kept[path] = [body]
+        timer.join()
+        server.kill()
+        capture = read_capture(folder)
+        assert len(capture.views) == len(photos)
+        _check(folder, kept)
+
+
+def _actions(numbers: list[int]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Yield strokes, tones, choices, orders and poses of the head; values never repeat."""
+    for count in itertools.count(1):
+        number = numbers[count % len(numbers)]
+        line = {"label": "foreground", "shape_type": "linestrip", "points": [[1, 1], [9, count]]}
+        drawn = {"flags": {"corrects": True}, "shapes": [line]}
+        yield "PUT", f"/api/photos/{number}/strokes", drawn
+        yield "PUT", f"/api/photos/{number}/tone", {"contrast": 1 + count / 1000}
+        yield "PUT", "/api/choices", {"hair": {"width_mm": 0.05 + count / 10_000}}
+        yield "PUT", "/api/order", {"order": [*numbers[count % 8 :], *numbers[: count % 8]]}
+        yield "PUT", "/api/head", {"scale": 1 + count / 1000}
+
+
+def _kill(server: Any, worker: bool) -> None:
+    """Kill a process of the server, then the server; or the server alone."""
+    if worker:
+        for pid in children(server.process.pid)[:1]:
+            os.kill(pid, signal.SIGKILL)
+        time.sleep(0.5)
+    server.kill()
+
+
+def _check(folder: Path, kept: dict[str, list[Any]]) -> None:
+    """Assert that the files hold what was confirmed last, or what was asked for after that."""
+    project = Project(folder)
+    capture = read_capture(folder)
+    found: dict[str, Any] = {
+        "/api/order": [shot.id for shot in project.shots],
+        "/api/choices": capture.chosen.hair.width_mm,
+        "/api/head": None if capture.chosen.head is None else capture.chosen.head[0, 0],
+    }
+    for shot in project.shots:
+        found[f"/api/photos/{shot.id}/tone"] = shot.contrast
+        if project.strokes(shot).is_file():
+            shapes = json.loads(project.strokes(shot).read_text())["shapes"]
+            found[f"/api/photos/{shot.id}/strokes"] = shapes[0]["points"][1][1]
+    for path, bodies in kept.items():
+        if len(bodies) == 1:  # confirmed, and nothing after it
+            assert found[path] == pytest.approx(_value(path, bodies[0])), path
+
+
+def _value(path: str, body: Any) -> Any:
+    """Return what a request's body asks for."""
+    if path.endswith("strokes"):
+        return body["shapes"][0]["points"][1][1]
+    keys = {"tone": "contrast", "order": "order", "head": "scale", "choices": "hair"}
+    value = body[keys[path.rsplit("/", 1)[1]]]
+    return value["width_mm"] if isinstance(value, dict) else value
 
 
 def _last(server: Any) -> str:

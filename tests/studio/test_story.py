@@ -10,14 +10,21 @@ from typing import Any
 
 import pytest
 
+from hairkit.io.capture_reader import read_capture
+from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
+from hairkit.studio.feedback import ADVICE
 from hairkit.types.groom import Groom
 
 GUIDES = 80
 SLOW_S = 600
 """Seconds for what computes, on a busy machine."""
 SIZES = ((390, 844), (1440, 900))
-PAGES = ("photos", "capture", "annotate", "pose", "hair")
+LISTEN = """window.spoken = [];
+speechSynthesis.speak = (said) => { window.spoken.push(said.text); };"""
+"""What is spoken is written down: browsers without a sound card say nothing."""
+SPOKEN = [advice.spoken for advice in ADVICE.values()] + ["Good"]
+PAGES = ("photos", "capture", "annotate", "pose", "strands", "hair")
 
 
 @pytest.fixture
@@ -44,6 +51,7 @@ def page(browser: Any, project: Any) -> Iterator[Any]:
             r.url.startswith((project.origin, "blob:", "data:")) or opened.foreign.append(r.url)
         ),
     )
+    opened.add_init_script(LISTEN)
     opened.goto(project.link)
     yield opened
     context.close()
@@ -78,9 +86,12 @@ def test_the_whole_story(
     check_photos_become_hair_by_themselves(page, project, photos)
     check_files_equal_those_of_the_command_line(page, project, photos, tmp_path)
     check_a_stroke_moves_the_outline(page, project)
+    check_the_head_is_moved_by_keys(page, project)
+    check_a_parameter_is_that_of_the_command_line(page, project, tmp_path)
     check_the_hair_moves(page, project)
     check_files_are_downloaded(page, project, browser, tmp_path)
     check_a_shot_of_the_camera_becomes_a_photo(page, project)
+    check_the_compass_is_a_hint(page)
     for size in SIZES:
         for name in PAGES:
             check_pages_are_accessible(page, project, name, size)
@@ -131,6 +142,63 @@ def check_a_stroke_moves_the_outline(page: Any, project: Any) -> None:
     page.keyboard.press("Control+z")
     page.get_by_text("Found automatically").wait_for(timeout=1000 * SLOW_S)
     assert not (project.folder / "strokes" / "001.json").exists()
+    page.keyboard.press("Control+Shift+z")
+    page.get_by_text("1 stroke", exact=True).wait_for(timeout=1000 * SLOW_S)
+    page.keyboard.press("s")  # the edge brush
+    page.mouse.move(middle, top)
+    page.mouse.down()
+    page.mouse.move(middle + 30, top, steps=4)
+    page.mouse.up()
+    page.get_by_text("2 strokes", exact=True).wait_for(timeout=1000 * SLOW_S)
+    again = json.loads((project.folder / "strokes" / "001.json").read_text())
+    assert again["shapes"][0] == kept["shapes"][0]
+    assert again["shapes"][1]["radius"] > 0
+    page.keyboard.press("Delete")
+    page.keyboard.press("Control+z")
+    page.get_by_text("Found automatically").wait_for(timeout=1000 * SLOW_S)
+
+
+def check_the_head_is_moved_by_keys(page: Any, project: Any) -> None:
+    """Keys move the head in every photo, the residual follows, and the fit can be had again."""
+    go(page, project, "pose/1")
+    stage = page.locator(".stage")
+    page.locator(".stage[data-residual]:not([data-residual=''])").wait_for()
+    fitted = float(stage.get_attribute("data-residual"))
+    page.get_by_role("button", name="Move the head").click()
+    page.keyboard.press("Shift+ArrowRight")
+    page.keyboard.press("q")
+    page.get_by_role("button", name="As it was fitted").and_(page.locator(":enabled")).wait_for()
+    assert "[fitted_head]" in (project.folder / "capture.toml").read_text()
+    page.wait_for_function(
+        "before => Math.abs(document.querySelector('.stage').dataset.residual - before) > 1",
+        arg=fitted,
+    )
+    page.get_by_role("button", name="As it was fitted").click()
+    page.get_by_role("button", name="As it was fitted").and_(page.locator(":disabled")).wait_for()
+    assert stage.get_attribute("data-residual") == f"{fitted:.2f}"
+
+
+def check_a_parameter_is_that_of_the_command_line(page: Any, project: Any, tmp_path: Path) -> None:
+    """A slider shows its strands, and gives the bytes that `--set` gives."""
+    go(page, project, "strands/1")
+    page.locator(".stage[data-drawn]").wait_for()
+    drawn = page.locator(".stage").get_attribute("data-drawn")
+    slider = page.get_by_label("Narrowest window")
+    slider.focus()
+    for _ in range(8):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_function(
+        "before => document.querySelector('.stage').dataset.drawn !== before", arg=drawn
+    )
+    page.get_by_text("Kept; the hair is made again.").wait_for()
+    wait_ready(page, project)
+    settings = read_capture(project.folder).chosen.settings
+    assert len(settings) == 1
+    assert settings[0].startswith("structure_tensor.finest_window=")
+    recipe = load_recipe("default").with_set(settings)
+    reconstruct(tmp_path / "photos", tmp_path / "out", recipe, guides=GUIDES, sheet=False)
+    made = (project.folder / "result" / "groom.npz").read_bytes()
+    assert made == (tmp_path / "out" / "groom.npz").read_bytes()
 
 
 def check_the_hair_moves(page: Any, project: Any) -> None:
@@ -188,6 +256,7 @@ def check_a_shot_of_the_camera_becomes_a_photo(page: Any, project: Any) -> None:
     """The shutter takes the picture inside the outline; it is the retake of its view."""
     before = (project.folder / "photos" / "001.jpg").read_bytes()
     go(page, project, "capture")
+    point_phone(page, 0)
     page.locator(".ring path.taken").first.wait_for(timeout=1000 * SLOW_S)
     page.locator(".stage[data-feedback]").wait_for()
     count = len(list((project.folder / "photos").iterdir()))
@@ -195,8 +264,32 @@ def check_a_shot_of_the_camera_becomes_a_photo(page: Any, project: Any) -> None:
         page.keyboard.press("Space")
     page.locator(".stage[data-shots]").wait_for()
     after = list((project.folder / "photos").iterdir())
+    spoken = page.evaluate("window.spoken")
+    assert any(text in spoken for text in SPOKEN), spoken
     retaken = (project.folder / "photos" / "001.jpg").read_bytes() != before
     assert retaken or len(after) == count + 1
+
+
+def check_the_compass_is_a_hint(page: Any) -> None:
+    """A phone turned as far as the view is right; turned the other way it is told so."""
+    page.get_by_role("button", name="Back one").click()  # from the view above to the last one
+    stage = page.locator(".stage")
+    for turned, right in ((45, True), (-45, False)):
+        point_phone(page, turned)
+        page.wait_for_function(
+            "off => Number(document.querySelector('.stage').dataset.compass) === off",
+            arg=0 if right else -90,
+        )
+        page.wait_for_timeout(500)
+        assert ("wrong_angle" in stage.get_attribute("data-feedback").split()) != right
+
+
+def point_phone(page: Any, heading_deg: float) -> None:
+    """Turn the upright phone that the page runs on, clockwise seen from above."""
+    page.context.new_cdp_session(page).send(
+        "DeviceOrientation.setDeviceOrientationOverride",
+        {"alpha": -heading_deg % 360, "beta": 90, "gamma": 0},
+    )
 
 
 def check_pages_are_accessible(page: Any, project: Any, name: str, size: tuple[int, int]) -> None:

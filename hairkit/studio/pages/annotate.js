@@ -6,17 +6,20 @@ const tools = {
   background: { name: "Not hair", key: "b", label: "background", type: "linestrip", colour: "#64b5ff" },
   hairArea: { name: "Hair area", key: "g", label: "foreground", type: "polygon", colour: "#ff5fa8" },
   restArea: { name: "Other area", key: "n", label: "background", type: "polygon", colour: "#64b5ff" },
+  edgeHair: { name: "Edge: hair", key: "w", label: "foreground", type: "linestrip", colour: "#ff5fa8", brush: true },
+  edgeRest: { name: "Edge: other", key: "s", label: "background", type: "linestrip", colour: "#64b5ff", brush: true },
   rectangle: { name: "Rectangle", key: "r", label: "rectangle", type: "rectangle", colour: "#f0b45f" },
   parting: { name: "Parting", key: "p", label: "parting", type: "linestrip", colour: "#f0b45f" },
-  erase: { name: "Remove stroke", key: "e", colour: "#eceef0" },
+  erase: { name: "Remove", key: "e", colour: "#eceef0" },
 };
 const NEAR_PX = 14; // a stroke is removed within this distance
 const LEAST_STEP_PX = 2.5; // between two points of a stroke
+const BRUSH = { least: 0.005, most: 0.12, usual: 0.03 }; // radius over the photo's height
 
 export function show(main, argument) {
   let photo = null, image = null, facts = null, shapes = [], undone = [], stroke = null;
   let tool = "foreground", zoom = 1, shift = [0, 0], bright = 1, contrast = 1, turn = 0, saving = null;
-  let pinch = null;
+  let pinch = null, brush = BRUSH.usual, bare = false;
   const pointers = new Map();
 
   const canvas = make("canvas", { tabindex: "0", role: "img", "aria-label": "Photo with the outline of the hair. Draw with the pointer; keys choose tools." });
@@ -26,18 +29,25 @@ export function show(main, argument) {
   }, name, make("kbd", { "aria-hidden": "true" }, letter.toUpperCase())));
   const undo = make("button", { onclick: () => step(-1), title: "Ctrl+Z" }, "Undo");
   const redo = make("button", { onclick: () => step(1), title: "Ctrl+Shift+Z" }, "Redo");
-  const brightness = slider("Brightness", (value) => { bright = value; });
-  const contrasts = slider("Contrast", (value) => { contrast = value; });
+  const size = slider("Brush size  [ ]", BRUSH.least, BRUSH.most, 0.005, (value) => { brush = value; });
+  const brightness = slider("Brightness", 0.5, 2, 0.05, (value) => { bright = value; }, tone);
+  const contrasts = slider("Contrast", 0.5, 2, 0.05, (value) => { contrast = value; }, tone);
+  size.lastChild.value = brush;
   const strip = make("div", { class: "strip", role: "group", "aria-label": "Photos" });
   const stage = make("section", { class: "stage", "aria-label": "Photo" }, canvas);
   main.append(make("div", { class: "split" }, stage, make("section", { class: "side", "aria-label": "Tools" },
     strip, make("div", { class: "tools" }, ...buttons), make("div", { class: "tools" }, undo, redo), status,
-    brightness, contrasts,
-    make("p", { class: "quiet" }, "Correct only what is wrong. Scroll or pinch to zoom, hold Space to move."))));
+    size, brightness, contrasts,
+    make("p", { class: "quiet" }, "Correct only what is wrong: three strokes are usually enough. An edge brush paints up to the strongest edge under it. Scroll or pinch to zoom, hold Space to move, H to see the bare photo. Strands are followed in the photo with this brightness and contrast."))));
 
-  function slider(name, set) {
-    const input = make("input", { type: "range", min: "0.5", max: "2", step: "0.05", value: "1", oninput: () => { set(Number(input.value)); draw(); } });
+  function slider(name, min, max, step, set, keep) {
+    const input = make("input", { type: "range", min, max, step, value: "1", oninput: () => { set(Number(input.value)); draw(); }, onchange: () => keep?.() });
     return make("label", {}, name, input);
+  }
+
+  // The stage that follows strands sees the photo as it is shown here.
+  async function tone() {
+    try { await send("PUT", `/api/photos/${photo.id}/tone`, { brightness: bright, contrast }); } catch (error) { say(error.message); }
   }
 
   function choose(key) {
@@ -51,6 +61,9 @@ export function show(main, argument) {
     history.replaceState(null, "", `#annotate/${photo.id}`);
     const order = ++turn;
     zoom = 1; shift = [0, 0]; shapes = []; undone = []; facts = null; image = null;
+    [bright, contrast] = photo.tone ?? [1, 1];
+    brightness.lastChild.value = bright;
+    contrasts.lastChild.value = contrast;
     thumbnails();
     status.textContent = "Looking for hair…";
     const picture = new Image();
@@ -99,7 +112,7 @@ export function show(main, argument) {
       context.drawImage(image, 0, 0, pw, ph);
       context.filter = "none";
     }
-    if (facts?.outline?.length) {
+    if (facts?.outline?.length && !bare) {
       const path = new Path2D(pathOf(facts.outline));
       context.fillStyle = "rgb(255 95 168 / 26%)";
       context.fill(path, "evenodd");
@@ -107,7 +120,7 @@ export function show(main, argument) {
       context.lineWidth = 1.8 / scale;
       context.stroke(path);
     }
-    for (const shape of stroke ? [...shapes, stroke] : shapes) drawShape(context, shape, scale, ph);
+    for (const shape of stroke ? [...shapes, stroke] : shapes) if (!bare) drawShape(context, shape, scale, ph);
   }
 
   function drawShape(context, shape, scale, height) {
@@ -116,6 +129,11 @@ export function show(main, argument) {
     context.strokeStyle = colour;
     context.lineJoin = context.lineCap = "round";
     context.lineWidth = shape.shape_type === "linestrip" ? Math.max(0.0083 * height, 3 / scale) : 2 / scale;
+    context.globalAlpha = 1;
+    if (shape.radius) {
+      if (shape === stroke) { context.globalAlpha = 0.45; context.lineWidth = 2 * shape.radius; }
+      else context.setLineDash([3 * context.lineWidth, 2 * context.lineWidth]);
+    }
     context.beginPath();
     if (shape.shape_type === "rectangle") {
       const [a, b] = shape.points;
@@ -130,6 +148,8 @@ export function show(main, argument) {
       }
     }
     context.stroke();
+    context.globalAlpha = 1;
+    context.setLineDash([]);
   }
 
   function at(event) {
@@ -148,6 +168,7 @@ export function show(main, argument) {
     const { label, type } = tools[tool];
     const points = type === "rectangle" ? [at(event), at(event)] : [at(event)];
     stroke = { label, shape_type: type, points, group_id: null, flags: {} };
+    if (tools[tool].brush) stroke.radius = Math.round(10 * brush * facts.height) / 10;
   });
   canvas.addEventListener("pointermove", (event) => {
     const before = pointers.get(event.pointerId);
@@ -246,8 +267,9 @@ export function show(main, argument) {
 
   let moving = false;
   function key(event) {
-    if (event.target instanceof HTMLInputElement) return;
+    if (event.target instanceof HTMLInputElement && !event.ctrlKey && !event.metaKey) return;
     const letter = event.key.toLowerCase();
+    if (letter === "h") { bare = event.type === "keydown"; draw(); return; }
     if (event.key === " " && event.target === canvas) { moving = event.type === "keydown"; event.preventDefault(); return; }
     if (event.type === "keyup") return;
     if (event.ctrlKey || event.metaKey) {
@@ -255,7 +277,13 @@ export function show(main, argument) {
       if (letter === "y") { event.preventDefault(); step(1); }
       return;
     }
-    const chosen = Object.keys(tools).find((name) => tools[name].key === letter);
+    if (event.altKey) return;
+    if (letter === "delete" || letter === "backspace") { event.preventDefault(); step(-1); }
+    if (letter === "escape" && stroke) { stroke = null; draw(); }
+    if (letter === "0") { zoom = 1; shift = [0, 0]; draw(); }
+    const wider = { "[": 0.8, "]": 1.25 }[letter];
+    if (wider) { brush = Math.max(BRUSH.least, Math.min(BRUSH.most, brush * wider)); size.lastChild.value = brush; }
+    const chosen = Object.keys(tools).find((name, i) => tools[name].key === letter || letter === String(i + 1));
     if (chosen) choose(chosen);
     const index = state.photos.findIndex((p) => p.id === photo?.id);
     const next = { arrowright: index + 1, arrowleft: index - 1, d: index + 1, a: index - 1 }[letter];

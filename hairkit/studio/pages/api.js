@@ -29,7 +29,7 @@ async function answer(response) {
 }
 
 // One state for all pages: what the server said last.
-export const state = { photos: [], build: { state: "none" }, formats: [], result: "", name: "" };
+export const state = { photos: [], build: { state: "none" }, formats: [], result: "", draft: "", name: "" };
 const listeners = new Set();
 
 export function onChange(listener) {

@@ -4,10 +4,12 @@ import * as photos from "./photos.js";
 import * as capture from "./capture.js";
 import * as annotate from "./annotate.js";
 import * as pose from "./pose.js";
+import * as strands from "./strands.js";
 import * as hair from "./hair.js";
 
-const pages = { photos, capture, annotate, pose, hair };
+const pages = { photos, capture, annotate, pose, strands, hair };
 const stageNames = {
+  draft: "a quick preview",
   landmarks: "looking for faces", person: "looking for the person", turn: "ordering the photos",
   segment: "finding hair", scene: "placing cameras", refine: "comparing masks", head: "fitting the head",
   orient: "following strands in photos", waves: "measuring waves", hull: "carving the volume",

@@ -32,16 +32,20 @@ export function show(main) {
   const finish = make("a", { class: "button primary", href: "#photos" }, "Done");
   const phone = make("button", { onclick: pair }, "Use a phone");
   const paired = make("div", { class: "code" });
+  const examples = make("ul", { class: "examples", "aria-label": "Right and wrong pictures" });
   main.append(make("div", { class: "split" }, stage, make("section", { class: "side", "aria-label": "The turn" },
     make("div", { class: "row" }, make("label", {}, "Turn", count), make("label", {}, "Camera", cameras)),
     make("div", { class: "tools" }, auto, voice, retake, skip), finish, phone, paired,
-    make("p", { class: "quiet" }, "Head into the outline, top of the hair below the dashed line, the same distance all around. Good: window light, plain wall, hair loose. Bad: lamp behind, zoom, a hat."))));
+    make("p", { class: "quiet" }, "Head into the outline, top of the hair below the dashed line, the same distance all around. Good: window light, plain wall, hair loose. Bad: lamp behind, zoom, a hat."), examples)));
 
   async function load() {
     try {
       const [found, said] = await Promise.all([get(`/api/guides/${count.value}?above`), get("/api/feedback")]);
       guides = found.guides;
       ({ advice, limits } = said);
+      examples.replaceChildren(...said.examples.map((name) => make("li", { "data-example": name, class: name === "good" ? "right" : "" },
+        make("img", { src: `/example-${name}.jpg`, alt: "", width: 90, height: 120 }),
+        make("span", {}, name === "good" ? "✓ Right" : `✗ ${advice[name][0].split(":")[0]}`))));
       taken = new Map(guides.flatMap((g, i) => {
         const photo = state.photos.find((p) => p.view === g.name);
         return photo ? [[i, photo.id]] : [];
@@ -199,6 +203,7 @@ export function show(main) {
     if (looked.at === at) found.push(...looked.found);
     guide.classList.toggle("right", !found.length);
     stage.dataset.feedback = found.join(" ");
+    for (const item of examples.children) item.classList.toggle("now", item.dataset.example === (found[0] ?? "good"));
     if (found.length) {
       goodFor = 0;
       const [shown, spoken] = advice[found[0]];

@@ -26,10 +26,11 @@ export function show(main) {
           : make("a", { class: "button primary", href: "#photos" }, "Add photos")));
       return;
     }
-    if (shown === state.result) return;
-    shown = state.result;
+    const version = state.draft || state.result;
+    if (shown === version) return;
+    shown = version;
     try {
-      const response = await fetch(`/api/result/hair?v=${state.result}`);
+      const response = await fetch(`/api/result/${state.draft ? "draft" : "hair"}?v=${version}`);
       if (!response.ok) throw new Error("the hair could not be read");
       const packet = await response.arrayBuffer();
       close();
@@ -45,6 +46,7 @@ export function show(main) {
     const health = (state.build.health ?? []).map(([light, line]) => make("li", { class: light }, line));
     const formats = [...state.formats].sort((a, b) => (engines[b[0]] ? 1 : 0) - (engines[a[0]] ? 1 : 0));
     return make("section", { class: "side", "aria-label": "Files" },
+      state.draft ? make("p", { class: "note-box", role: "status" }, "This is a quick preview of your last change: the cameras are those of the hair before, the grid is coarser, and there are fewer guides. The whole hair is being made and takes its place here; files are those of the hair before until then.") : null,
       make("h2", {}, "Take it with you"),
       make("a", { class: "button primary", href: "/api/result/page", download: "result.html" }, "Save result.html"),
       make("p", { class: "quiet" }, "One file that moves in any browser and needs no server."),
