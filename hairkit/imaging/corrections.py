@@ -48,7 +48,7 @@ def paint_to_edges(picture: UInt8Array, line: BoolArray, radius: float) -> BoolA
     radius
         Pixels.
     """
-    away = cv2.distanceTransform((~line).astype(np.uint8), cv2.DIST_L2, 5)
+    away = cv2.distanceTransform((~line).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     markers = np.where(away > radius, _OUTSIDE, 0).astype(np.int32)
     markers[line] = _PAINTED
     lab = cv2.cvtColor(picture, cv2.COLOR_RGB2Lab)

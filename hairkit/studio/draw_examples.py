@@ -15,6 +15,7 @@ import numpy as np
 
 from hairkit.arrays import UInt8Array
 from hairkit.head_model.template import default_head
+from hairkit.io.capture_reader import TURN
 from hairkit.io.photos import focal_from_equivalent
 from hairkit.rendering import Solid, draw_views
 from hairkit.storage import write_bytes
@@ -32,6 +33,8 @@ FOLDER = Path(__file__).parent / "pages"
 WIDTH, HEIGHT, QUALITY = 180, 240, 80
 """Pixels of a picture, and its JPEG quality."""
 STRANDS = 12_000
+SHIFT = 4
+"""Bits of a pixel's fraction in which OpenCV takes points."""
 WALL = 205
 """Grey level of the wall."""
 CLOTH = (0.045, 0.075, 0.16)
@@ -102,13 +105,13 @@ def _camera(distance: float = DISTANCE, aside: float = 0.0, turn: float = 0.0) -
 
 def write_examples(folder: Path) -> None:
     """Write `example-NAME.jpg` for each picture, with the outline that the head should fill."""
-    front = guides_for(8, above=False)[0]
+    front = guides_for(len(TURN), above=False)[0]
     outline = max(front["outline"], key=len)
-    points = np.array(outline).reshape(-1, 2) * (WIDTH, HEIGHT) * 16
+    points = np.array(outline).reshape(-1, 2) * (WIDTH, HEIGHT) * 2**SHIFT
     for example in draw_examples():
         picture = example.image.copy()
         curve = [np.rint(points).astype(np.int32)]
-        cv2.polylines(picture, curve, False, (255, 255, 255), 1, cv2.LINE_AA, 4)
+        cv2.polylines(picture, curve, False, (255, 255, 255), 1, cv2.LINE_AA, SHIFT)
         data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1]
         write_bytes(folder / f"example-{example.name}.jpg", data.tobytes())
 

@@ -18,6 +18,7 @@ from starlette.routing import Route
 from hairkit.errors import HairkitError
 from hairkit.io.capture_toml import HeadEntry
 from hairkit.options import make_options, option
+from hairkit.storage import read_bytes
 from hairkit.studio.feedback import for_pages
 from hairkit.studio.guard import SESSION_PATH, Sessions
 from hairkit.studio.lan import qr_svg
@@ -282,7 +283,7 @@ class Routes:
                 "path": str(path),
             }
             await studio.editor.call("strands", PHOTO_S, values)
-            return Response(path.read_bytes(), media_type="image/png")
+            return Response(read_bytes(path), media_type="image/png")
 
     async def _choices(self, request: Request) -> Response:
         folder = {"folder": str(self._studio.project.folder)}

@@ -53,6 +53,7 @@ class Studio:
         self.formats: list[list[str]] = []
         self._wanted = asyncio.Event()
         self._asked = False
+        self._warm = False
         self._touched: set[str] | None = None
         """Photos that were drawn on since the last whole run; None when more than that changed."""
         self._tasks: list[asyncio.Task[None]] = []
@@ -64,6 +65,7 @@ class Studio:
         if self.project.built == self.project.inputs() and self.project.shots:
             self.build = {"state": "done", **self.project.made}
             self._touched = set()
+            self._tasks.append(asyncio.create_task(self._warm_up()))
         else:
             self.changed()
 
@@ -212,6 +214,8 @@ class Studio:
                 await self._draft(sorted(self._touched))
             if not self._wanted.is_set():
                 await self._while_unchanged(asyncio.create_task(self._build()))
+            if self.build["state"] == "done" and not (self._wanted.is_set() or self._warm):
+                self._tasks.append(asyncio.create_task(self._warm_up()))
 
     async def _while_unchanged(self, build: asyncio.Task[None]) -> None:
         """Wait for a build, or for a change, which ends it: its process is started anew."""
@@ -226,20 +230,31 @@ class Studio:
     async def _draft(self, touched: list[str]) -> None:
         """Make a quick groom of what a hand changed, unless the next change comes before."""
         self._set_build(state="running", share=0.0, stage="draft")
-        values = {
-            "folder": str(self.project.folder),
-            "packet": str(self.project.draft),
-            "touched": touched,
-            "guides": min(DRAFT_GUIDES, self.guides),
-        }
         change = asyncio.create_task(self._stop_on_change())
         try:
-            await self.drafter.call("draft", BUILD_S, values)
+            await self._call_drafter(touched, self.project.draft)
             self.events.send("project", **self.summary())
         except TaskError:
             pass  # the whole run follows, and says what is wrong
         finally:
             change.cancel()
+
+    async def _warm_up(self) -> None:
+        """Let the process for previews load its kernels, once, by a preview that nobody sees."""
+        self._warm = True
+        unseen = self.project.incoming / "unseen.bin"
+        with contextlib.suppress(TaskError):
+            await self._call_drafter([], unseen)
+        unseen.unlink(missing_ok=True)
+
+    async def _call_drafter(self, touched: list[str], packet: Path) -> None:
+        values = {
+            "folder": str(self.project.folder),
+            "packet": str(packet),
+            "touched": touched,
+            "guides": min(DRAFT_GUIDES, self.guides),
+        }
+        await self.drafter.call("draft", BUILD_S, values)
 
     async def _stop_on_change(self) -> None:
         await self._wanted.wait()

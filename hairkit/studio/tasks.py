@@ -336,7 +336,7 @@ def _segmented(request: dict[str, Any]) -> tuple[View, str, Mask]:
         key: None if request[key] is None else Path(request[key]) for key in ("strokes", "mask")
     }
     view = replace(seen, strokes_path=files["strokes"], mask_path=files["mask"])
-    drawn = tuple(None if file is None else file.read_bytes() for file in files.values())
+    drawn = tuple(None if file is None else read_bytes(file) for file in files.values())
     kept = _MASKS.get(path)
     if kept is None or kept[0] is not seen or kept[1] != drawn:
         choices = [(choice.plugin, choice.options) for choice in stage.choices]

@@ -86,5 +86,5 @@ def _srgb(linear: Float32Array) -> str:
 
 
 def _linear(colour: str) -> Float32Array:
-    srgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    srgb = np.array(list(bytes.fromhex(colour[1:]))) / 255
     return np.asarray(linear_from_srgb(srgb), np.float32)

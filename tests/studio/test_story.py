@@ -183,7 +183,7 @@ def check_a_parameter_is_that_of_the_command_line(page: Any, project: Any, tmp_p
     go(page, project, "strands/1")
     page.locator(".stage[data-drawn]").wait_for()
     drawn = page.locator(".stage").get_attribute("data-drawn")
-    slider = page.get_by_label("Narrowest window")
+    slider = page.get_by_role("slider", name="Narrowest window")
     slider.focus()
     for _ in range(8):
         page.keyboard.press("ArrowRight")

@@ -1,0 +1,117 @@
+"""Laws of what is computed meanwhile: what a change starts, what it ends, and in which order."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hairkit.studio.project import Project
+from hairkit.studio.studio import Studio
+
+LINE = {"label": "background", "shape_type": "linestrip", "points": [[1, 1], [9, 9]]}
+LONGEST_S = 20.0
+
+
+class Process:
+    """A process that only writes down what it is asked; a groom takes as long as `pause_s`."""
+
+    def __init__(self, calls: list[tuple[str, Any]], groom: Path) -> None:
+        self.calls, self.groom, self.pause_s = calls, groom, 0.0
+
+    async def call(self, do: str, limit_s: float, values: Any = None, tell: Any = None) -> Any:
+        """Answer as an empty task would."""
+        if do == "build" or (do == "draft" and values["touched"]):  # not the first, unseen one
+            self.calls.append((do, (values or {}).get("touched")))
+        if do == "build":
+            try:
+                await asyncio.sleep(self.pause_s)
+            except asyncio.CancelledError:
+                self.calls.append(("ended", None))
+                raise
+            self.groom.write_bytes(b"groom")
+        if do == "draft":
+            Path(values["packet"]).write_bytes(b"packet")
+        return {"formats": [["native", ".npz"]], "outline": [], "share": 0.5}
+
+    async def stop(self) -> None:
+        """End nothing."""
+
+    async def close(self) -> None:
+        """End nothing."""
+
+
+@pytest.fixture
+def studio(tmp_path: Path, photos: list[Path]) -> Studio:
+    """A studio on eight photos whose processes do nothing."""
+    folder = tmp_path / "head"
+    (folder / "photos").mkdir(parents=True)
+    for photo in photos:
+        shutil.copy(photo, folder / "photos")
+    made = Studio(Project(folder), 600)
+    calls: list[tuple[str, Any]] = []
+    for name in ("editor", "builder", "drafter"):
+        setattr(made, name, Process(calls, made.project.groom))
+    return made
+
+
+async def until(ready: Callable[[], bool]) -> None:
+    """Wait until something holds."""
+    async with asyncio.timeout(LONGEST_S):
+        while not ready():
+            await asyncio.sleep(0.02)
+
+
+def stroke(studio: Studio, number: int, x: int) -> None:
+    """Draw on a photo, as the route does."""
+    line = LINE | {"points": [[1, 1], [x, 9]]}
+    studio.project.draw(number, {"flags": {"corrects": True}, "shapes": [line]})
+    studio.changed(touched=[studio.project.shot(number).file])
+
+
+def test_a_stroke_is_previewed_before_the_whole_hair_is_made(studio: Studio) -> None:
+    """Photos make hair; a stroke makes a preview of its photo first; any other change does not."""
+    calls = studio.builder.calls  # type: ignore[attr-defined]
+    files = [shot.file for shot in studio.project.shots]
+
+    async def story() -> None:
+        await studio.start()
+        await until(lambda: studio.build["state"] == "done")
+        assert calls == [("build", None)]
+        stroke(studio, 2, 20)
+        stroke(studio, 4, 30)
+        await until(lambda: len(calls) == 3 and studio.build["state"] == "done")
+        assert calls[1:] == [("draft", [files[1], files[3]]), ("build", None)]
+        assert not studio.summary()["draft"]  # the whole hair took its place
+        studio.project.arrange([2, 1, *range(3, len(files) + 1)])
+        studio.changed()
+        await until(lambda: len(calls) == 4 and studio.build["state"] == "done")
+        assert calls[3] == ("build", None)
+        await studio.close()
+
+    asyncio.run(story())
+
+
+def test_a_change_ends_a_build_that_it_makes_useless(studio: Studio) -> None:
+    """The process ends at once; strokes of the build that was ended are previewed again."""
+    calls = studio.builder.calls  # type: ignore[attr-defined]
+    files = [shot.file for shot in studio.project.shots]
+
+    async def story() -> None:
+        await studio.start()
+        await until(lambda: studio.build["state"] == "done")
+        studio.builder.pause_s = LONGEST_S  # type: ignore[attr-defined]
+        stroke(studio, 1, 20)
+        await until(lambda: len(calls) == 3)
+        assert studio.summary()["draft"]
+        studio.builder.pause_s = 0.0  # type: ignore[attr-defined]
+        stroke(studio, 2, 20)
+        await until(lambda: studio.build["state"] == "done")
+        assert calls[3:] == [("ended", None), ("draft", files[:2]), ("build", None)]
+        await studio.close()
+
+    asyncio.run(story())
