@@ -95,7 +95,7 @@ def _measure(studio: Studio, photos: list[Path], strokes: int) -> None:
     last = time.monotonic()
     state = studio.wait(_is_done)
     first = (time.monotonic() - last, studio.busy_s())
-    rows = [_stroke(studio, state["photos"][k % len(photos)]) for k in range(strokes + 1)][1:]
+    rows = [_stroke(studio, state["photos"][k % len(photos)]) for k in range(strokes)]
     print("| from | to | seconds | processor |")
     print("|---|---|---|---|")
     print(f"| first photo | last photo | {last - began:.1f} | |")

@@ -52,7 +52,7 @@ def find_hair(view: View) -> Float32Array:
     if answer is None:
         answer = hair_probability(*parts)
         answer.flags.writeable = False
-        for oldest in list(_ANSWERS)[: len(_ANSWERS) + 1 - _REMEMBERED]:
+        for oldest in list(_ANSWERS)[: max(len(_ANSWERS) + 1 - _REMEMBERED, 0)]:
             _ANSWERS.pop(oldest, None)
         _ANSWERS[key] = answer
     return answer

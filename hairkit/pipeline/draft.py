@@ -34,6 +34,7 @@ from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
+from hairkit.types.skin import SkinMaps
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.waves import Waves
 
@@ -92,7 +93,11 @@ def draft(
     check()
     field = _call(manager, recipe, "field", **seen)
     check()
-    head = replace(scene.head, density=read_latest(Hairline, work, "hairline").density)
+    head = replace(
+        scene.head,
+        density=read_latest(Hairline, work, "hairline").density,
+        maps=read_latest(SkinMaps, work, "skin"),
+    )
     roots = sample_roots(head, guides, 0, rest=default_head())
     strands = _call(manager, recipe, "track", **seen, field=field, roots=roots)
     return assemble_groom(

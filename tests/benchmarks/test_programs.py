@@ -37,6 +37,8 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
     "skin": ({"HEIGHT": 120}, ["CAPTURES"]),
+    "strokes": ({"STROKES": 1}, ["CAPTURES", "--tool", "brush"]),
+    "studio": ({"GUIDES": 30}, ["--photos", "CAPTURES/short/photos", "--strokes", "1"]),
     "super_helix": ({"GUIDES": 8, "ELEMENTS": 5, "FRAMES": 2}, []),
     "threads": ({"REPETITIONS": 1}, ["--runs", "2"]),
     "turn": ({"SHUFFLES": 1}, ["CAPTURES"]),

@@ -8,7 +8,8 @@ import pytest
 
 from hairkit.imaging import hair_network
 from hairkit.imaging.hair_features import CHANNELS, GRID, hair_features
-from hairkit.imaging.hair_network import hair_probability
+from hairkit.imaging.hair_network import find_hair, hair_probability
+from hairkit.types.capture import View
 
 
 def photo(height: int = 160, width: int = 120) -> np.ndarray:
@@ -66,3 +67,24 @@ def test_a_convolution_equals_its_definition() -> None:
     window = x[:, 3:6, 1:4]
     assert result.shape == (len(kernels), 4, 4)
     assert np.allclose(result[:, 2, 1], (kernels * window).sum(axis=(1, 2, 3)) + bias, atol=1e-4)
+
+
+def test_an_answer_is_remembered_by_what_was_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same photo is asked for once, another one again, and only the latest are kept."""
+    asked = []
+
+    def answer(image: np.ndarray, person: object, landmarks: object) -> np.ndarray:
+        asked.append(int(image[0, 0, 0]))
+        return np.full((2, 2, 3), asked[-1], np.float32)
+
+    monkeypatch.setattr(hair_network, "hair_probability", answer)
+    monkeypatch.setattr(hair_network, "_ANSWERS", {})
+    most = hair_network._REMEMBERED
+    views = [View("front", 0.0, np.full((4, 4, 3), k, np.uint8)) for k in range(most + 1)]
+    for view in [*views[:most], *views[:most]]:
+        assert (find_hair(view) == view.image[0, 0, 0]).all()
+    assert asked == list(range(most))
+    find_hair(views[most])
+    find_hair(views[0])
+    assert asked[most:] == [most, 0]
+    assert len(hair_network._ANSWERS) == most
