@@ -286,7 +286,9 @@ def check_the_compass_is_a_hint(page: Any) -> None:
 
 def point_phone(page: Any, heading_deg: float) -> None:
     """Turn the upright phone that the page runs on, clockwise seen from above."""
-    page.context.new_cdp_session(page).send(
+    if not hasattr(page, "phone"):  # one session owns the sensor
+        page.phone = page.context.new_cdp_session(page)
+    page.phone.send(
         "DeviceOrientation.setDeviceOrientationOverride",
         {"alpha": -heading_deg % 360, "beta": 90, "gamma": 0},
     )
