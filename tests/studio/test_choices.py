@@ -191,3 +191,16 @@ def test_every_example_lies_beside_the_pages(project: Path) -> None:
         data = (project / "hairkit" / "studio" / "pages" / f"example-{name}.jpg").read_bytes()
         assert data.startswith(b"\xff\xd8\xff")
         assert len(data) < 10_000
+
+
+def test_turns_are_those_that_the_page_names() -> None:
+    """About the axis to the right the face nods down, about the one that points down it turns left."""
+    seen = placed()
+    vertices = default_head().vertices.astype(np.float64)
+    nose = vertices[vertices[:, 2].argmax()][None]
+    before = seen.scene.cameras[0].project(nose)[0]
+    for axis, along in (((10.0, 0.0, 0.0), (0, 1)), ((0.0, 10.0, 0.0), (-1, 0))):
+        scene = move_head(seen.scene, seen.nudged(Nudge("001.jpg", turn_deg=axis)))
+        moved = scene.cameras[0].project(nose)[0] - before
+        assert moved @ along > 10
+        assert abs(np.cross([*moved, 0], [*along, 0])[2]) < 2

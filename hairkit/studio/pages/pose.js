@@ -9,7 +9,7 @@ const REACH = { turn: [0, -0.2], size: [0.16, 0.12] }; // handles from the head'
 const KEYS = { // one press, in the photo that is shown: millimetres, degrees, growth
   ArrowLeft: { mm: [-1, 0] }, ArrowRight: { mm: [1, 0] }, ArrowUp: { mm: [0, -1] }, ArrowDown: { mm: [0, 1] },
   q: { turn: [0, 0, -1] }, e: { turn: [0, 0, 1] }, r: { turn: [-1, 0, 0] }, f: { turn: [1, 0, 0] },
-  t: { turn: [0, -1, 0] }, g: { turn: [0, 1, 0] }, "+": { grow: 1.005 }, "=": { grow: 1.005 }, "-": { grow: 1 / 1.005 },
+  t: { turn: [0, 1, 0] }, g: { turn: [0, -1, 0] }, "+": { grow: 1.005 }, "=": { grow: 1.005 }, "-": { grow: 1 / 1.005 },
 };
 const STILL = { shift: [0, 0], turn_deg: [0, 0, 0], factor: 1 };
 
