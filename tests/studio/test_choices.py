@@ -194,7 +194,7 @@ def test_every_example_lies_beside_the_pages(project: Path) -> None:
 
 
 def test_turns_are_those_that_the_page_names() -> None:
-    """About the axis to the right the face nods down, about the one that points down it turns left."""
+    """About the axis to the right a face nods down, about the one downwards it turns left."""
     seen = placed()
     vertices = default_head().vertices.astype(np.float64)
     nose = vertices[vertices[:, 2].argmax()][None]
