@@ -24,7 +24,6 @@ from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.recipe import Recipe
-from hairkit.pipeline.reconstruct import add_findings
 from hairkit.pipeline.work_folder import read_latest
 from hairkit.types.capture import Capture
 from hairkit.types.face import Face
@@ -116,7 +115,7 @@ def _arranged(capture: Capture, work: Path, touched: Collection[str], recipe: Re
                 face = read_latest(Face, work, "landmarks", view.name)
             if has["person"]:
                 person = read_latest(Person, work, "person", view.name)
-            views[index] = add_findings(view, face, person)
+            views[index] = view.with_findings(face, person)
     found = replace(capture, views=tuple(views))
     if not has["turn"]:
         return found

@@ -34,7 +34,7 @@ from hairkit.pipeline.run_record import RECORD, RunRecord, describe_run, finish_
 from hairkit.pipeline.stage_runner import Given, StageRunner, completed
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
-from hairkit.types.capture import Capture, View
+from hairkit.types.capture import Capture
 from hairkit.types.chosen import ChosenHair
 from hairkit.types.face import Face
 from hairkit.types.groom import Groom
@@ -137,7 +137,8 @@ def _run(
     sheet: bool,
 ) -> tuple[Groom, tuple[Figure, ...]]:
     """Run the stages in the work folder and write all files; the record comes last."""
-    work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(_waiting(folder)))
+    busy = f"{folder}: another run is working here; waiting for it to end"
+    work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(busy))
     with work, ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool:
         run = StageRunner(recipe, manager, work, log, pool)
         _sweep(folder, run)
@@ -215,7 +216,7 @@ def find_views(
     seen = replace(
         capture,
         views=tuple(
-            add_findings(view, face.result().value, person.result().value)
+            view.with_findings(face.result().value, person.result().value)
             for view, face, person in zip(capture.views, faces, persons, strict=True)
         ),
     )
@@ -225,19 +226,6 @@ def find_views(
     turn = run.once("turn", Turnaround, capture=photos, faces=faces, persons=persons).value
     log.message(turn.summary)
     return _with_upright_persons(run, seen.arranged(turn)), turn
-
-
-def add_findings(view: View, face: Face, person: Person) -> View:
-    """Return the view with what was found in it; landmarks that were given are kept."""
-    landmarks = view.landmarks
-    if landmarks is None and face.sure:
-        landmarks = face.landmarks
-    return replace(
-        view,
-        landmarks=landmarks,
-        face=face if face.presence > 0 else None,
-        person=person if person.alpha.size else None,
-    )
 
 
 def _with_upright_persons(run: StageRunner, capture: Capture) -> Capture:
@@ -369,7 +357,8 @@ def _write(
     (folder / RECORD).unlink(missing_ok=True)
     made.groom.save(folder / "groom.npz")
     photos = [None if v.photo_path is None else v.photo_path.name for v in capture.views]
-    _in_photo_pixels(made.scene, capture).write_json(folder / "scene.json", photos)
+    sizes = [view.photo_size for view in capture.views]
+    made.scene.resized(sizes).write_json(folder / "scene.json", photos)
     for plugin, path in exports:
         run.export(plugin, made.groom, path)
     (folder / SHEET).unlink(missing_ok=True)
@@ -398,13 +387,3 @@ def _sweep(folder: Path, run: StageRunner) -> None:
     for name in ("groom", "scene.json", "hairkit.log", RECORD, SHEET):
         for leftover in folder.glob(f".{name}*.part"):
             leftover.unlink(missing_ok=True)
-
-
-def _in_photo_pixels(scene: Scene, capture: Capture) -> Scene:
-    """Return the scene with cameras for the full-size photos."""
-    pairs = zip(scene.cameras, capture.views, strict=True)
-    return replace(scene, cameras=tuple(c.resized(*view.photo_size) for c, view in pairs))
-
-
-def _waiting(folder: Path) -> str:
-    return f"{folder}: another run is working here; waiting for it to end"

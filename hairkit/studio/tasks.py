@@ -25,7 +25,7 @@ from hairkit.manager import Manager
 from hairkit.options import make_options
 from hairkit.pipeline.draft import draft
 from hairkit.pipeline.recipe import Choice, Recipe, load_recipe
-from hairkit.pipeline.reconstruct import add_findings, reconstruct
+from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.storage import read_bytes, write_bytes
 from hairkit.studio.clean_photo import clean_photo
@@ -372,7 +372,7 @@ def _find(view: View) -> View:
             choices = [(choice.plugin, choice.options) for choice in stage.choices]
             answer = _manager().find_first(stage.hook, choices, view=view)
             found[table] = answer[1] if answer is not None else found[table]
-    return add_findings(view, found["landmarks"], found["person"])
+    return view.with_findings(found["landmarks"], found["person"])
 
 
 def _hair_packet(groom: Groom, request: dict[str, Any]) -> None:

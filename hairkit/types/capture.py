@@ -79,6 +79,18 @@ class View:
         """Height of `image` in pixels."""
         return int(self.image.shape[0])
 
+    def with_findings(self, face: Face, person: Person) -> Self:
+        """Return the view with what was found in it; landmarks that were given are kept."""
+        landmarks = self.landmarks
+        if landmarks is None and face.sure:
+            landmarks = face.landmarks
+        return replace(
+            self,
+            landmarks=landmarks,
+            face=face if face.presence > 0 else None,
+            person=person if person.alpha.size else None,
+        )
+
     def toned(self) -> Self:
         """Return the view with its brightness and contrast applied, as CSS filters apply them."""
         if (self.brightness, self.contrast) == (1.0, 1.0):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 from hairkit.arrays import UInt8Array
 from hairkit.errors import DataError, FormatError
@@ -35,6 +36,11 @@ class Scene(Previewed, Stored):
         misfit = "" if self.residual_px is None else f", residual {self.residual_px:.2f} px"
         head = len(self.head.vertices)
         return f"Scene({len(self.cameras)} cameras, head of {head} vertices{misfit})"
+
+    def resized(self, sizes: Sequence[tuple[int, int]]) -> Self:
+        """Return the scene with cameras for pictures of other sizes (width, height)."""
+        pairs = zip(self.cameras, sizes, strict=True)
+        return replace(self, cameras=tuple(camera.resized(*size) for camera, size in pairs))
 
     def preview(self) -> UInt8Array | None:
         """Return the head as the cameras see it, side by side, (H, W, 3) uint8 RGB."""
