@@ -17,6 +17,7 @@ from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.similarity import triangulate
+from hairkit.head_model.thin_plate_spline import ThinPlateSpline
 from hairkit.options import option
 from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 
@@ -160,9 +161,7 @@ def _bilinear(field: Float32Array, column: Float64Array, row: Float64Array) -> F
 def _warp(head: Head, places: Float64Array, moves: Float64Array, smoothing: Float64Array) -> Head:
     """Return the head, its joints and capsules carried along by the spline through `moves` at
     `places`."""
-    from scipy.interpolate import RBFInterpolator  # loads half of SciPy
-
-    spline = RBFInterpolator(places, moves, smoothing=smoothing, kernel="linear", degree=1)
+    spline = ThinPlateSpline(places, moves, smoothing)
 
     def carry(points: Float32Array) -> Float32Array:
         result: Float32Array = (points + spline(points.astype(np.float64))).astype(np.float32)

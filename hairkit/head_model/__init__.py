@@ -5,6 +5,7 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `bare_head`: where a photo shows face, ears and neck
 * `bvh`: nearest points and ray crossings on triangle meshes
 * `hairline`: where the photos show that hair grows
+* `identity`: shapes by which heads differ, two adults and a child
 * `photo_skin`: the skin of a head taken from the photos
 * `placement`: a head placed under given strands
 * `scalp`: roots: sampling, binding to faces, growth mesh
@@ -13,5 +14,6 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `template`: the default head
 * `template_shape`: its profile curves and displacements
 * `template_skin`: the painted skin of the default head
+* `thin_plate_spline`: smooth maps through given points, in 2D and 3D
 * `torso`: a torso by nine numbers, below a head
 """

@@ -19,6 +19,7 @@ PROGRAMS = sorted({path.stem for path in (PROJECT / "benchmarks").glob("*.py")} 
 SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
+    "head_fit": ({}, ["CAPTURES"]),
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "as_they_are"]),
     "helices": ({"COUNT": 10}, []),
     "looks": ({"GUIDES": 60}, ["CAPTURES", "-o", "CAPTURES/looks.jpg"]),
