@@ -202,7 +202,8 @@ def test_the_plugins_own_file_is_part_of_the_digest(tmp_path: Path) -> None:
             turn_capture(), tmp_path / "out", recipe, manager,
             head=ball_head(), guides=40, progress=record, sheet=False,
         )  # fmt: skip
-        assert [stage["reused"] for stage in record.stages] == [False] * 13
+        assert record.stages
+        assert not any(stage["reused"] for stage in record.stages)
 
 
 @pytest.mark.parametrize("stage", [*STAGES, "export"])
