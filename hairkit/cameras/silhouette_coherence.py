@@ -18,18 +18,18 @@ from hairkit.parallel import compiled, parallel_for
 
 REACH = 0.28
 """Rays are searched this far before and behind the turn's centre, metres: heads are smaller."""
-COARSE = 48
-"""Steps of the first search along a ray."""
-FINE = 8
-"""Halvings of the step after it."""
-FASTEST = 1.6
+STEPS = (0.012, 0.0015)
+"""Steps of two searches along a ray, metres: the second passes over what cannot beat the first."""
+FINE = 5
+"""Halvings of the step after them."""
+FASTEST = 3.0
 """A point on a ray moves at most this times (pixels per metre at the turn's centre) in a view."""
 NEAREST = 1e-3
 """Points less far in front of a camera, metres, are not seen."""
-TOUCHING = 1.0
-"""Silhouettes whose distances differ by less than this, pixels, bound a ray together."""
 CAP = 40.0
-"""Signed distances are cut at this many pixels; outside its picture a silhouette says nothing."""
+"""Signed distances are cut at this many pixels: so far inside a silhouette says nothing."""
+LEAST_SHARE = 1e-3
+"""Silhouettes with less of the soft minimum are left out of its derivative."""
 MIN_RAYS = 16
 """Least number of rays that are worth another thread."""
 MOTIONS = 7
@@ -45,6 +45,7 @@ def coherence(
     focal: Float64Array,
     centre: Float64Array,
     middle: float,
+    softness: float = 1.0,
 ) -> tuple[Float64Array, Float64Array]:
     """Return how far each contour ray stays inside all other silhouettes, and its derivative.
 
@@ -54,6 +55,8 @@ def coherence(
         Cameras (V, 3, 3), (V, 3), (V,), (V, 2).
     middle
         Depth of the turn's centre in all views, metres.
+    softness
+        Of the minimum over silhouettes, pixels: less than the outlines' noise.
 
     Returns
     -------
@@ -68,7 +71,7 @@ def coherence(
     shifts = translation[None] - np.einsum("ovik,ok->ovi", turns, translation)
     views = _Views(
         outlines.fields, outlines.scale, turns, shifts, np.ascontiguousarray(focal, np.float64),
-        np.ascontiguousarray(centre, np.float64), float(middle),
+        np.ascontiguousarray(centre, np.float64), float(middle), float(softness),
     )  # fmt: skip
     parallel_for(
         _search_rays, len(value), views, outlines.points, outlines.views, value, slope,
@@ -94,6 +97,8 @@ class _Views(NamedTuple):
     """(V, 2) principal points, pixels."""
     middle: float
     """Depth of the turn's centre in all views, metres."""
+    softness: float
+    """Of the minimum over silhouettes, pixels."""
 
 
 class _Ray(NamedTuple):
@@ -114,8 +119,6 @@ class _Slopes(NamedTuple):
 
     distance: Float64Array
     """(V,) pixels."""
-    along: Float64Array
-    """(V,) by the point's depth on the ray, pixels per metre."""
     gradient: Float64Array
     """(V, 3) by the point's camera coordinates, pixels per metre."""
     zoom: Float64Array
@@ -163,26 +166,44 @@ def _rotate(turn: Float64Array, vector: Float64Array, result: Float64Array) -> N
 def _best_on_ray(views: _Views, ray: _Ray) -> tuple[float, float]:
     """Return the largest of the rays' smallest distances, pixels, and its depth, metres.
 
-    Coarse steps, then halvings about the best. Distances change along a ray by at most `fastest`
-    pixels a metre, so that steps may be longer where a silhouette is far off.
+    Coarse steps, finer ones where more may be found, then halvings about the best. Distances change
+    along a ray by at most `fastest` pixels a metre, so that steps may be longer where a silhouette
+    is far off.
     """
-    step = 2 * REACH / (COARSE - 1)
     fastest = FASTEST * views.focal[ray.own] / views.middle
-    z, best = views.middle, -np.inf
-    at = views.middle - REACH
-    while at <= views.middle + REACH:
-        here = _smallest_distance(views, ray, at, best)
-        if here > best:
-            best, z = here, at
-        at += max(step, (best - here) / fastest)
+    z, best, step = views.middle, -np.inf, 0.0
+    for step in STEPS:
+        at = views.middle - REACH
+        while at <= views.middle + REACH and best < CAP:
+            here = _smallest_distance(views, ray, at, best)
+            if here > best:
+                best, z = here, at
+            at += max(step, (best - here) / fastest)
+    best = _soft_distance(views, ray, z)
     for _ in range(FINE):
         step *= 0.5
         for side in (-1.0, 1.0):
             at = z + side * step
-            here = _smallest_distance(views, ray, at, best)
+            here = _soft_distance(views, ray, at)
             if here > best:
                 best, z = here, at
     return best, z
+
+
+@compiled
+def _soft_distance(views: _Views, ray: _Ray, z: float) -> float:
+    """Return the soft minimum of all other silhouettes' distances at depth z.
+
+    It equals the minimum where two silhouettes bound the ray equally, so that the derivative does
+    not jump when others come to bound it.
+    """
+    least = _smallest_distance(views, ray, z, -np.inf)
+    total = 0.0
+    for view in range(len(views.fields)):
+        if view != ray.own:
+            total += np.exp((least - _distance(views, ray, view, z)) / views.softness)
+    result: float = least - views.softness * np.log(total / 2.0)
+    return result
 
 
 @compiled
@@ -192,39 +213,46 @@ def _smallest_distance(views: _Views, ray: _Ray, z: float, bar: float) -> float:
     for view in range(len(views.fields)):
         if view == ray.own:
             continue
-        x = z * ray.relative[view, 0] + ray.offset[view, 0]
-        y = z * ray.relative[view, 1] + ray.offset[view, 1]
-        depth = z * ray.relative[view, 2] + ray.offset[view, 2]
-        if depth < NEAREST:
-            continue
-        u = views.focal[view] * x / depth + views.centre[view, 0]
-        v = views.focal[view] * y / depth + views.centre[view, 1]
-        best = min(best, _sample(views.fields[view], views.scale, u, v)[0])
+        best = min(best, _distance(views, ray, view, z))
         if best < bar:
             return best
     return best
 
 
 @compiled
+def _distance(views: _Views, ray: _Ray, view: int, z: float) -> float:
+    """Return the signed distance of a point on a ray to a view's silhouette, pixels."""
+    x = z * ray.relative[view, 0] + ray.offset[view, 0]
+    y = z * ray.relative[view, 1] + ray.offset[view, 1]
+    depth = z * ray.relative[view, 2] + ray.offset[view, 2]
+    if depth < NEAREST:
+        return CAP
+    u = views.focal[view] * x / depth + views.centre[view, 0]
+    v = views.focal[view] * y / depth + views.centre[view, 1]
+    return _sample(views.fields[view], views.scale, u, v)[0]
+
+
+@compiled
 def _sample(field: Float32Array, scale: float, u: float, v: float) -> tuple[float, float, float]:
     """Return the signed distance at a picture pixel and its derivatives by u and v.
 
-    Bilinear; CAP without slope outside the picture and where the distance is larger.
+    Bilinear; CAP without slope where the distance is larger. Outside the picture, of which nothing
+    is known, it grows from that at the edge by the distance from the edge.
     """
-    x, y = u * scale - 0.5, v * scale - 0.5
     height, width = field.shape
-    if not (x >= 0.0 and y >= 0.0 and x < width - 1 and y < height - 1):
-        return CAP, 0.0, 0.0
-    i, j = int(y), int(x)
-    fy, fx = y - i, x - j
+    x, y = u * scale - 0.5, v * scale - 0.5
+    right, down = min(max(x, 0.0), width - 1.001), min(max(y, 0.0), height - 1.001)
+    i, j = int(down), int(right)
+    fy, fx = down - i, right - j
     a, b, c, d = field[i, j], field[i, j + 1], field[i + 1, j], field[i + 1, j + 1]
-    value = (a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy
+    beyond = abs(x - right) + abs(y - down)
+    value = (a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy + beyond / scale
     if value > CAP:
         return CAP, 0.0, 0.0
     return (
         value,
-        ((b - a) * (1 - fy) + (d - c) * fy) * scale,
-        ((c - a) * (1 - fx) + (d - b) * fx) * scale,
+        ((b - a) * (1 - fy) + (d - c) * fy) * scale if x == right else np.sign(x - right),
+        ((c - a) * (1 - fx) + (d - b) * fx) * scale if y == down else np.sign(y - down),
     )
 
 
@@ -232,7 +260,7 @@ def _sample(field: Float32Array, scale: float, u: float, v: float) -> tuple[floa
 def _slopes_at(views: _Views, ray: _Ray, z: float) -> _Slopes:
     """Return how the distances of all other silhouettes change at depth z of a ray."""
     count = len(views.fields)
-    distance, along = np.full(count, CAP), np.zeros(count)
+    distance = np.full(count, CAP)
     gradient, zoom = np.zeros((count, 3)), np.zeros(count)
     for view in range(count):
         local = z * ray.relative[view] + ray.offset[view]
@@ -247,43 +275,25 @@ def _slopes_at(views: _Views, ray: _Ray, z: float) -> _Slopes:
         gradient[view, 1] = by_v * focal / local[2]
         gradient[view, 2] = -(by_u * x + by_v * y) / local[2]
         zoom[view] = by_u * x + by_v * y
-        for axis in range(3):
-            along[view] += gradient[view, axis] * ray.relative[view, axis]
-    return _Slopes(distance, along, gradient, zoom)
-
-
-@compiled
-def _opposite(slopes: _Slopes, first: int) -> int:
-    """Return the nearest silhouette that bounds the ray on the other side than `first`, or -1."""
-    second = -1
-    for view in range(len(slopes.distance)):
-        if view == first or slopes.along[view] * slopes.along[first] >= 0.0:
-            continue
-        if slopes.distance[view] - slopes.distance[first] < TOUCHING and (
-            second < 0 or slopes.distance[view] < slopes.distance[second]
-        ):
-            second = view
-    return second
+    return _Slopes(distance, gradient, zoom)
 
 
 @compiled
 def _add_slopes(views: _Views, ray: _Ray, z: float, slope: Float64Array) -> None:
     """Add to slope (V, MOTIONS) the derivative of the best value, at depth z of a ray.
 
-    One silhouette bounds it, or two on opposite sides: then the best depth moves so that both
-    distances stay equal, and the derivative is the mean by which the depth drops out.
+    Every silhouette has the share that the soft minimum gives it; at the best depth the derivative
+    by depth is 0, so that depth may be held.
     """
     slopes = _slopes_at(views, ray, z)
-    first = int(np.argmin(slopes.distance))
-    if slopes.distance[first] >= CAP:
+    least = slopes.distance.min()
+    if least >= CAP:
         return
-    second = _opposite(slopes, first)
-    share = 1.0
-    if second >= 0:
-        share = slopes.along[second] / (slopes.along[second] - slopes.along[first])
-    for view, weight in ((first, share), (second, 1.0 - share)):
-        if view >= 0 and weight != 0.0:
-            _add_slope(views, ray, z, slopes, view, weight, slope)
+    share = np.exp((least - slopes.distance) / views.softness)
+    share /= share.sum()
+    for view in range(len(share)):
+        if share[view] > LEAST_SHARE:
+            _add_slope(views, ray, z, slopes, view, share[view], slope)
 
 
 @compiled

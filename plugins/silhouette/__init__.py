@@ -14,6 +14,7 @@ Perspective and orthographic cameras are both tried unless the capture or the op
 
 * `landmark_equations`: landmark residuals, marginalised over the head's shape
 * `landmark_transfer`: landmarks matched in neighbouring views
+* `search`: Levenberg-Marquardt from coarse outlines to fine ones, and other starts
 """
 
 from __future__ import annotations
@@ -26,7 +27,13 @@ from hairkit import Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import Float64Array
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.silhouette_coherence import coherence
-from hairkit.cameras.turntable import LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, Turn
+from hairkit.cameras.turntable import (
+    LOG_MAGNIFICATION,
+    MIN_PERSPECTIVE,
+    PERSPECTIVE,
+    SHARED,
+    Turn,
+)
 from hairkit.errors import InputError
 from hairkit.imaging.masked_filters import picture_scale
 from hairkit.options import option
@@ -34,13 +41,14 @@ from hairkit.types.head import LANDMARKS
 
 from .landmark_equations import (
     CameraArrays,
-    LandmarkEquations,
     LandmarkFit,
     Sights,
     shape_precision,
+    soft_l1_cost,
     soft_l1_weight,
 )
 from .landmark_transfer import PatchSettings, transfer_landmarks
+from .search import Fit, Round, Search, precision_cost
 
 USUAL_DISTANCE = 0.7
 """Distance of head portraits, metres."""
@@ -52,13 +60,14 @@ SHARED_SPREAD_BY_MASKS = (0.05, 0.01, 0.01, 0.01, 0.01, 0.01, 0.05, 0.5)
 WIDEST, HAIR_THICKNESS = 0.6, 0.012
 """Without landmarks: depth below the crown over the width there, and how far hair stands off the
 head, metres."""
-SETTLED, WORSE = 1e-3, 1e-9
-"""Stop when the cost falls by less than this share; a step that costs more by the second share
-is taken back."""
-TRIAL = 8
-"""Rounds that orthographic cameras get to show that they fit better."""
+FLAT_NOISE = 4.0
+"""Times the noise of outlines in the first rounds with orthographic cameras."""
 SOFT = 0.3
 """A contour ray counts as missing gradually, over this many times the outline's noise."""
+SOFT_MIN = 0.3
+"""Softness of the minimum over silhouettes, times the outline's noise."""
+NEAR = 6.0
+"""Rays that stay farther inside than this many times the noise tell nothing."""
 FROM_THE_SIDE = 0.35
 """Views this near (radians) to 90 degrees show the face's midline on the outline."""
 PROFILE_PX = 3.0
@@ -117,72 +126,17 @@ def estimate_scene(
     wanted = "orthographic" if capture.orthographic else "perspective"
     if options.model != "auto":
         wanted = options.model
-    fits = [_solve(problem, problem.start(wanted == "orthographic"), options.iterations)]
+    faceless = [i for i, view in enumerate(capture.views) if view.landmarks is None]
+    search = problem.search(options.iterations)
+    best = search.find(problem.start(wanted == "orthographic"), faceless)
     if options.model == "auto" and not capture.orthographic:
-        fits.append(_solve(problem, problem.start(True), min(options.iterations, TRIAL)))
-    best = min(fits, key=lambda fit: fit.cost)
+        flat = search.settle(search.descend(problem.start(True), FLAT_NOISE, options.iterations), 1)
+        best = min(best, flat, key=lambda fit: fit.cost)
     for _ in range(options.carries if problem.landmarks is not None else 0):
-        best = _solve(problem.with_transferred(capture, best), best, options.iterations)
+        transferred = problem.with_transferred(capture, best)
+        best = transferred.search(options.iterations).settle(best, 1)
     names = tuple(view.name for view in capture.views)
     return Scene(names, problem.turn.cameras(best.vector), head, problem.residual_px(best))
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """A solution."""
-
-    vector: Float64Array
-    """Numbers of the turn."""
-    offset: Float64Array
-    """(68, 3) landmarks off the given head's, metres."""
-    flat: bool
-    """True for orthographic cameras: the perspective is held."""
-    prior_mean: Float64Array
-    """The vector of the nominal turn, from which the solution started."""
-    cost: float = np.inf
-
-
-@dataclass(frozen=True, eq=False)
-class _Round:
-    """The problem linearised at one vector."""
-
-    cost: float
-    normal: Float64Array
-    right: Float64Array
-    landmarks: LandmarkEquations | None
-
-    def move(self, damping: float, flat: bool) -> Float64Array:
-        """Return the damped step; the perspective stays when `flat`."""
-        normal = self.normal + damping * np.diag(np.diag(self.normal))
-        free = np.arange(len(self.right))
-        if flat:
-            free = np.delete(free, PERSPECTIVE)
-        result = np.zeros(len(self.right))
-        result[free] = np.linalg.solve(normal[np.ix_(free, free)], self.right[free])
-        return result
-
-
-def _solve(problem: _Problem, start: _Fit, iterations: int) -> _Fit:
-    """Return the best place reached from `start` (Levenberg-Marquardt)."""
-    fit, damping = start, 1e-3
-    here = problem.linearised(fit)
-    for _ in range(iterations):
-        move = here.move(damping, fit.flat)
-        vector = fit.vector + move
-        vector[PERSPECTIVE] = max(vector[PERSPECTIVE], MIN_PERSPECTIVE)
-        offset = fit.offset if here.landmarks is None else here.landmarks.offsets(move)
-        trial = replace(fit, vector=vector, offset=offset)
-        there = problem.linearised(trial)
-        if there.cost > here.cost * (1 + WORSE):
-            damping *= 10
-            if damping > 1e3:
-                break
-            continue
-        settled = here.cost - there.cost < SETTLED * here.cost
-        fit, here, damping = trial, there, damping / 5
-        if settled:
-            break
-    return replace(fit, cost=here.cost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +184,7 @@ class _Problem:
         focal = None if None in focals else focals[0]
         return cls(turn, outlines, head, landmarks, noise, spread, focal)
 
-    def with_transferred(self, capture: Capture, fit: _Fit) -> _Problem:
+    def with_transferred(self, capture: Capture, fit: Fit) -> _Problem:
         """Return the problem with landmarks transferred to other views by a solution."""
         assert self.landmarks is not None
         places = self.landmarks.landmarks + fit.offset
@@ -239,7 +193,11 @@ class _Problem:
         sights = self.landmarks.sights.joined(more)
         return replace(self, landmarks=replace(self.landmarks, sights=sights))
 
-    def start(self, flat: bool) -> _Fit:
+    def search(self, iterations: int) -> Search:
+        """Return the search for the cameras."""
+        return Search(self.linearised, self.prior_spread, iterations)
+
+    def start(self, flat: bool) -> Fit:
         """Return the nominal turn, its place and magnification as landmarks or masks suggest."""
         vector = np.zeros(self.turn.size)
         vector[PERSPECTIVE] = 1 / USUAL_DISTANCE
@@ -253,7 +211,7 @@ class _Problem:
             vector[PERSPECTIVE] = max(magnification / self.focal, MIN_PERSPECTIVE)
         if flat:
             vector[PERSPECTIVE] = MIN_PERSPECTIVE
-        return _Fit(vector, np.zeros((LANDMARKS, 3)), flat, vector)
+        return Fit(vector, np.zeros((LANDMARKS, 3)), flat, vector)
 
     def cameras(self, vector: Float64Array) -> CameraArrays:
         """Return the cameras as arrays."""
@@ -300,24 +258,27 @@ class _Problem:
         place = np.linalg.lstsq(axes, axes @ crown - seen.ravel(), rcond=None)[0]
         return magnification, place
 
-    def linearised(self, fit: _Fit) -> _Round:
-        """Return the normal equations, and the cost, at a place."""
+    def linearised(self, fit: Fit, coarseness: float) -> Round:
+        """Return the normal equations, and the cost, with the outlines' noise times a number."""
         vector = fit.vector
         cameras, tangents = self.cameras(vector), self.turn.tangents(vector)
-        prior = (fit.prior_mean - vector) / self.prior_spread
-        normal, right = np.diag(self.prior_spread**-2.0), prior / self.prior_spread
-        cost = float(prior @ prior)
-        rows, residual = self._coherence_rows(vector, cameras, tangents)
+        spread = self.prior_spread.copy()
+        spread[SHARED:] /= np.sqrt(fit.precision)
+        prior = (fit.prior_mean - vector) / spread
+        normal, right = np.diag(spread**-2.0), prior / spread
+        cost = float(prior @ prior) + precision_cost(fit.precision, len(vector) - SHARED)
+        noise = coarseness * self.noise
+        rows, residual, missed = self._coherence_rows(vector, cameras, tangents, noise)
         normal, right = normal + rows.T @ rows, right + rows.T @ residual
-        cost += float(residual @ residual)
+        cost += soft_l1_cost(missed)
         if self.focal is not None and not fit.flat:
             row, off = self._focal_row(vector, self.focal)
             normal, right = normal + np.outer(row, row), right + row * off
             cost += off**2
         if self.landmarks is None:
-            return _Round(cost, normal, right, None)
+            return Round(cost, normal, right, None)
         seen = self.landmarks.equations(fit.offset, cameras, tangents)
-        return _Round(cost + seen.cost, normal + seen.normal, right + seen.right, seen)
+        return Round(cost + seen.cost, normal + seen.normal, right + seen.right, seen)
 
     def _focal_row(self, vector: Float64Array, focal: float) -> tuple[Float64Array, float]:
         """Return the row that keeps magnification over perspective near the known focal length."""
@@ -328,28 +289,35 @@ class _Problem:
         return row / FOCAL_SPREAD, float(np.log(focal) - found) / FOCAL_SPREAD
 
     def _coherence_rows(
-        self, vector: Float64Array, cameras: CameraArrays, tangents: Float64Array
-    ) -> tuple[Float64Array, Float64Array]:
-        """Return rows that bring contour rays into the silhouettes they miss, or nearly miss."""
-        value, slope = self._coherence(vector, cameras)
-        near = np.nonzero(value < 6 * self.noise)[0]
-        soft = SOFT * self.noise
-        missed = np.logaddexp(0, -value[near] / soft) * soft / self.noise
+        self,
+        vector: Float64Array,
+        cameras: CameraArrays,
+        tangents: Float64Array,
+        noise: float,
+    ) -> tuple[Float64Array, Float64Array, Float64Array]:
+        """Return rows that bring contour rays into the silhouettes they miss, or nearly miss.
+
+        Then their right sides, and by how much they miss, in standard deviations.
+        """
+        value, slope = self._coherence(vector, cameras, noise)
+        near = np.nonzero(value < NEAR * noise)[0]
+        soft = SOFT * noise
+        missed = np.logaddexp(0, -value[near] / soft) * soft / noise
         share = 1 / (1 + np.exp(value[near] / soft))
         weight = np.sqrt(soft_l1_weight(missed))
         rows = np.tensordot(slope[near], tangents, 2)
-        return rows * (share * weight / self.noise)[:, None], missed * weight
+        return rows * (share * weight / noise)[:, None], missed * weight, missed
 
     def _coherence(
-        self, vector: Float64Array, cameras: CameraArrays
+        self, vector: Float64Array, cameras: CameraArrays, noise: float
     ) -> tuple[Float64Array, Float64Array]:
         middle = 1 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE)
-        return coherence(self.outlines, *cameras, middle)
+        return coherence(self.outlines, *cameras, middle, SOFT_MIN * noise)
 
-    def residual_px(self, fit: _Fit) -> float:
+    def residual_px(self, fit: Fit) -> float:
         """Return the root mean square misfit of landmarks and missed contour rays, pixels."""
         cameras = self.cameras(fit.vector)
-        value, _ = self._coherence(fit.vector, cameras)
+        value, _ = self._coherence(fit.vector, cameras, self.noise)
         misfit = value[value < 0]
         if self.landmarks is not None:
             misfit = np.append(misfit, self.landmarks.misfit(fit.offset, cameras))

@@ -1,0 +1,159 @@
+"""The search for the cameras of least cost: Levenberg-Marquardt, from coarse outlines to fine ones.
+
+How carefully the turn was taken is found with the cameras: the prior's precision is the mean of its
+posterior, a gamma distribution, given the deviations found and their covariance (expectation
+maximisation; MacKay, "Bayesian interpolation", 1992). A careful turn is held to even steps; in a
+careless one single views are started again from other azimuths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hairkit.arrays import Float64Array
+from hairkit.cameras.turntable import MIN_PERSPECTIVE, PER_VIEW, PERSPECTIVE, SHARED
+
+from .landmark_equations import LandmarkEquations
+
+SETTLED, WORSE = 1e-3, 1e-9
+"""Stop when the cost falls by less than this share; a step that costs more by the second share
+is taken back."""
+FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e3
+"""Of Levenberg-Marquardt, times the diagonal of the normal equations."""
+COARSE_TO_FINE = (8.0, 4.0, 2.0)
+"""Times the noise of outlines in the rounds before the last: over four careless turns their cost
+falls by up to 109 against a start with the last noise, over careful ones by up to 58."""
+CARE_ROUNDS = 2
+"""Updates of the precision at the last noise: it settles to 5 %."""
+CARE_FREEDOM = 4.0
+"""Degrees of freedom of the prior of the precision, whose mean is 1; a turn of eight has 48
+deviations."""
+CARELESS = 0.7
+"""Precision below which single views are started again; it is 0.8 to 5 in careful turns, and 0.15
+to 0.6 in nine whose steps were up to 12 degrees off."""
+RESTART = 2.5
+"""How far from where it is found a view is started again, standard deviations of its azimuth."""
+RESTART_NOISE, RESTART_ROUNDS = (2.0, 1.0), 6
+"""Times the noise of outlines, and rounds at each, by which starts are compared."""
+MOST_RESTARTED = 12
+"""Views of turns of more are not started again: their neighbours are near and hold them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A solution."""
+
+    vector: Float64Array
+    """Numbers of the turn."""
+    offset: Float64Array
+    """(68, 3) landmarks off the given head's, metres."""
+    flat: bool
+    """True for orthographic cameras: the perspective is held."""
+    prior_mean: Float64Array
+    """The vector of the nominal turn, from which the solution started."""
+    precision: float = 1.0
+    """Of the views' deviations from the nominal turn, over that of a usual turn."""
+    cost: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """The problem linearised at one vector."""
+
+    cost: float
+    normal: Float64Array
+    right: Float64Array
+    landmarks: LandmarkEquations | None
+
+    def move(self, damping: float, flat: bool) -> Float64Array:
+        """Return the damped step; the perspective stays when `flat`."""
+        normal = self.normal + damping * np.diag(np.diag(self.normal))
+        free = np.arange(len(self.right))
+        if flat:
+            free = np.delete(free, PERSPECTIVE)
+        result = np.zeros(len(self.right))
+        result[free] = np.linalg.solve(normal[np.ix_(free, free)], self.right[free])
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """A problem to be solved."""
+
+    linearised: Callable[[Fit, float], Round]
+    """The normal equations at a solution, with the noise of outlines times a number."""
+    spread: Float64Array
+    """(P,) standard deviations of the prior."""
+    iterations: int
+    """Most rounds of Levenberg-Marquardt."""
+
+    def find(self, start: Fit, restarted: Iterable[int]) -> Fit:
+        """Return the best solution; `restarted` are the views that may be anywhere."""
+        fit = start
+        for noise in COARSE_TO_FINE:
+            fit = self._with_care(self.descend(fit, noise, self.iterations))
+        fit = self.settle(fit)
+        views = (len(self.spread) - SHARED) // PER_VIEW
+        if fit.precision < CARELESS and views <= MOST_RESTARTED:
+            fit = self.settle(self._restart(fit, restarted), 1)
+        return fit
+
+    def settle(self, fit: Fit, updates: int = CARE_ROUNDS) -> Fit:
+        """Return the solution with the precision that its deviations tell."""
+        for _ in range(updates):
+            fit = self._with_care(self.descend(fit, 1.0, self.iterations))
+        return self.descend(fit, 1.0, self.iterations)
+
+    def descend(self, fit: Fit, noise: float, iterations: int) -> Fit:
+        """Return the best place reached from a solution (Levenberg-Marquardt)."""
+        damping = FIRST_DAMPING
+        here = self.linearised(fit, noise)
+        for _ in range(iterations):
+            move = here.move(damping, fit.flat)
+            vector = fit.vector + move
+            vector[PERSPECTIVE] = max(vector[PERSPECTIVE], MIN_PERSPECTIVE)
+            offset = fit.offset if here.landmarks is None else here.landmarks.offsets(move)
+            trial = replace(fit, vector=vector, offset=offset)
+            there = self.linearised(trial, noise)
+            if there.cost > here.cost * (1 + WORSE):
+                damping *= 10
+                if damping > MOST_DAMPING:
+                    break
+                continue
+            settled = here.cost - there.cost < SETTLED * here.cost
+            fit, here, damping = trial, there, damping / 5
+            if settled:
+                break
+        return replace(fit, cost=here.cost)
+
+    def _with_care(self, fit: Fit) -> Fit:
+        """Return the solution with the mean of the precision's posterior."""
+        covariance = np.linalg.inv(self.linearised(fit, 1.0).normal)
+        squared = (fit.vector - fit.prior_mean) ** 2 + np.diag(covariance)
+        own = (squared / self.spread**2)[SHARED:]
+        precision = (len(own) + CARE_FREEDOM) / (float(own.sum()) + CARE_FREEDOM)
+        return replace(fit, precision=precision)
+
+    def _restart(self, fit: Fit, views: Iterable[int]) -> Fit:
+        """Return the best of the solutions to which starts at other azimuths of one view lead."""
+        best = fit
+        for view in views:
+            place = SHARED + PER_VIEW * view
+            away = RESTART * self.spread[place] / np.sqrt(fit.precision)
+            for side in (-away, away):
+                vector = fit.vector.copy()
+                vector[place] += side
+                trial = replace(fit, vector=vector)
+                for noise in RESTART_NOISE:
+                    trial = self.descend(trial, noise, RESTART_ROUNDS)
+                if trial.cost < best.cost:
+                    best = trial
+        return best
+
+
+def precision_cost(precision: float, numbers: int) -> float:
+    """Return the cost of a precision of so many deviations, without that of the deviations."""
+    return CARE_FREEDOM * precision - (numbers + CARE_FREEDOM) * float(np.log(precision))
