@@ -23,6 +23,10 @@ class DataError(InputError):
     """A value or array breaks the rules of its type: shape, range, finiteness."""
 
 
+class DivergedError(DataError):
+    """A simulation has left what hair can do; the command line then ends with exit code 3."""
+
+
 class PluginError(HairkitError, LookupError):
     """A plugin is missing, fails, or does not implement the stage asked of it."""
 

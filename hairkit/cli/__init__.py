@@ -3,7 +3,7 @@
 `register(subparsers)` adds the verb's parser, its description beginning with an example;
 `run(args)` does the work and returns the exit code. Only the verb that is asked for is imported.
 Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 2 one line says why,
-130 ended by a second Ctrl-C.
+3 a simulation diverged, 130 ended by a second Ctrl-C.
 
 * `convert`: read hair of one format, write another
 * `doctor`: check this machine
@@ -42,7 +42,7 @@ import traceback
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from hairkit.errors import HairkitError
+from hairkit.errors import DivergedError, HairkitError
 
 VERBS = {
     "reconstruct": "turn photos of a head, or a video, into a groom",
@@ -121,6 +121,8 @@ def explain(error: BaseException) -> tuple[str, int]:
     if _is_interrupt(error):
         said = str(error) if isinstance(error, KeyboardInterrupt) else ""
         return f"interrupted; {said or 'run it again to continue where it stopped'}", 2
+    if isinstance(error, DivergedError):
+        return _one_line(error), 3
     if isinstance(error, HairkitError):
         return _one_line(error), 2
     if isinstance(error, MemoryError):

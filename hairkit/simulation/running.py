@@ -9,13 +9,15 @@ from time import perf_counter
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.errors import DataError, InputError
+from hairkit.errors import DataError, DivergedError, InputError
 from hairkit.parallel import one_blas_thread
 from hairkit.progress import Progress, Silent
 from hairkit.simulation.motion import HeadMotion
 from hairkit.simulation.simulator import Simulator, Surroundings
 from hairkit.types.point_cache import PointCache
 
+LONGEST = 0.01
+"""Largest stretch of hair that a recording may keep for a second."""
 STAGE = "simulate"
 """Name of the progress bar."""
 
@@ -63,7 +65,9 @@ def run(
     Raises
     ------
     DataError
-        A point is not finite, or there are not as many points as in `simulator.strands`.
+        There are not as many points as in `simulator.strands`.
+    DivergedError
+        A point is not finite, or hair is stretched by more than `LONGEST` for a second on end.
     InputError
         `frames` or `frames_per_second` is not positive, or the frames do not fit into memory.
     """
@@ -77,7 +81,7 @@ def run(
     told.started(STAGE, before + frames)
     times = np.arange(before + frames) / frames_per_second
     heads = np.empty((frames, 4, 4))
-    points = _allocate_frames(frames, len(simulator.strands.points))
+    points, stretched = _allocate_frames(frames, len(simulator.strands.points)), 0
     for frame, time in enumerate(times):
         head = motion(float(time))
         if not frame:
@@ -87,6 +91,7 @@ def run(
             simulator.advance(1.0 / frames_per_second, around)
         if frame >= before:
             _check_points(simulator.points, points.shape[1:], float(time))
+            stretched = _check_stretch(simulator, stretched, frames_per_second, float(time))
             points[frame - before], heads[frame - before] = simulator.points, head
         told.stepped(STAGE)
     told.finished(STAGE, perf_counter() - began, False)
@@ -116,6 +121,18 @@ def _check_points(points: Float32Array, shape: tuple[int, ...], time: float) -> 
     if np.shape(points) != shape:
         raise DataError(f"points has shape {np.shape(points)} at {time:.3f} s, expected {shape}")
     if not np.isfinite(points).all():
-        raise DataError(
+        raise DivergedError(
             f"the simulation diverged at {time:.3f} s; use more substeps or less stiffness"
         )
+
+
+def _check_stretch(simulator: Simulator, stretched: int, rate: float, time: float) -> int:
+    """Return how many frames on end hair is stretched; raises `DivergedError` after a second."""
+    if simulator.measure().stretch <= LONGEST:
+        return 0
+    if stretched >= rate:
+        raise DivergedError(
+            f"hair is stretched by more than {100 * LONGEST:g} % at {time:.3f} s and does not come"
+            " back; use more substeps or less stiffness"
+        )
+    return stretched + 1

@@ -15,8 +15,9 @@ from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.simulation import quaternion
 from hairkit.types.strands import Strands
 
-SHORTEST = 1e-4
-"""Length at which shorter guides are simulated, straight from the root, metres."""
+SHORTEST = 0.015
+"""Length, metres, of the straight rods that shorter guides are part of: between nodes that are much
+less than a millimetre apart, what a head moves in a substep is more than a segment."""
 LARGEST_TURN = 0.7
 """Largest angle between segments at rest, radians; beyond, the coupling to twist is stiff."""
 _ROUNDS = 60
@@ -110,7 +111,8 @@ def embed_points(strands: Strands, position: Float64Array, frames: Float64Array)
     segments = position.shape[1] - 1
     rod = strands.strand_of_point
     arc = strands.arc_lengths()
-    total = np.maximum(arc[strands.offsets[1:] - 1], 1e-12)[rod]
+    length = np.linalg.norm(np.diff(position, axis=1), axis=-1).sum(axis=1)
+    total = np.maximum(arc[strands.offsets[1:] - 1], length)[rod]
     along = arc / total * segments
     segment = np.minimum(along.astype(np.int64), segments - 1)
     share = along - segment

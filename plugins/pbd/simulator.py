@@ -24,7 +24,7 @@ from .backend import Engine, ReferenceEngine
 from .energies import elastic_energy, largest_stretch
 from .grab import GrabForces
 from .hair_grid import HairGrid, make_hair_grid
-from .head_interpolation import interpolate_motion, inverse_motion, motion_steps
+from .head_interpolation import finer_steps, interpolate_motion, inverse_motion, motion_steps
 from .linear_system import Rates, System, assemble
 from .reference import Contact, Load, rest_state, transform_points
 from .resampling import embed_points, max_stiffness, node_points
@@ -41,6 +41,9 @@ SINGLE_HAIR = 1.2e-3
 """m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""
 HELD = 4e4
 """1/s^2: squared frequency, of 32 Hz, at which hair before its tie is pulled to the head."""
+FIRMEST = 6e3
+"""Largest bending stiffness, as EI / (rho A) h^2 / l^4 of segments of length l in substeps of h:
+more has tones above 50 Hz, and float32 loses the lengths. Hair cut short is stiffer than that."""
 _KEPT_SYSTEMS = 4
 
 
@@ -196,6 +199,8 @@ class PbdSimulator:
         """Make the rods, whose natural shape balances gravity at the captured shape."""
         density = HAIR_DENSITY * np.pi / 4 * self._width[:, None] ** 2
         most = max_stiffness(self._nodes, FRAME / options.substeps)[:, None]
+        length = np.linalg.norm(np.diff(self._nodes, axis=1), axis=-1).min(axis=1, keepdims=True)
+        most = np.minimum(most, FIRMEST * length**4 / (FRAME / options.substeps) ** 2)
         bending = density * np.minimum(SINGLE_HAIR * options.firmness(), most)
         rods = make_rods(self._nodes, density, bending, bending * options.twist)
         down = np.array([0.0, -self._groom.physics.gravity, 0.0])
@@ -213,7 +218,11 @@ class PbdSimulator:
         self, seconds: float, around: Surroundings, start: Float64Array, end: Float64Array
     ) -> None:
         """Advance by up to `FRAME`: update wind and hair grid once, then do substeps."""
-        count = max(1, math.ceil(self._options.substeps * seconds / FRAME - 1e-6))
+        segment = float(np.median(self._rods.length))
+        finer = finer_steps(start, end, self._rods.points[:, 0], segment)
+        if finer == 0:
+            start, finer = end, 1  # hair goes with a head that is elsewhere at once
+        count = max(1, math.ceil(self._options.substeps * seconds / FRAME - 1e-6)) * finer
         step = seconds / count
         system = self._system(step)
         gravity, air = self._gravity(around), self._air(around, start)

@@ -55,7 +55,7 @@ class Options:
         0.02, low=0.0, high=1.0, doc="Damping of changes of shape, as a time.", unit="s"
     )
     air_drag: float = option(
-        1.0, low=0.0, high=100.0, doc="Rate at which hair takes on the air's speed.", unit="1/s"
+        3.0, low=0.0, high=100.0, doc="Rate at which hair takes on the air's speed.", unit="1/s"
     )
     friction: float | None = option(
         None, low=0.0, high=2.0, doc="Coulomb friction on the head; none takes the groom's."

@@ -15,6 +15,10 @@ from hairkit.parallel import compiled
 
 CELL = 0.01
 """Edge of a cell in metres: about the width of a lock."""
+ROOM = 0.3
+"""Metres around the hair at rest that the grid covers."""
+INSIDE = 1.001
+"""Cells between the last corner and the farthest point that is spread on it."""
 WIDEST = 256
 """Cells along an edge of the grid at most; points beyond are clamped to its border."""
 
@@ -26,7 +30,12 @@ class Neighbours:
         """Keep the density at rest: `rest` (E, NODES, 3) in the head frame."""
         self._masses = np.ascontiguousarray(masses.ravel())
         points = np.ascontiguousarray(rest.reshape(-1, 3))
-        found = _around(points, np.zeros_like(points), self._masses)
+        self._low = points.min(axis=0) - ROOM if len(points) else np.zeros(3)
+        self._size = np.zeros(3, np.int64)
+        if len(points):
+            wide = (points.max(axis=0) + ROOM - self._low) / CELL
+            self._size = np.minimum(wide, WIDEST).astype(np.int64) + 2
+        found = self._around(points, np.zeros_like(points), 1.0)
         self._rest = found[:, 0]
         self._floor = float(np.median(self._rest)) if len(found) else 1.0
 
@@ -38,6 +47,7 @@ class Neighbours:
         air: Float64Array,
         friction: float,
         push: float,
+        head: Float64Array,
     ) -> tuple[Float64Array, Float64Array]:
         """Return a drag (E, NODES) and the velocity (E, NODES, 3) it pulls to, the hair's included.
 
@@ -52,29 +62,33 @@ class Neighbours:
             speed of its neighbours.
         push
             Acceleration, metres per second squared, at twice the density of rest.
+        head
+            (4, 4) from the head frame to the world. Cells go with the head: in cells that stand
+            elsewhere at each step hair would never come to rest.
         """
-        flat = points.reshape(-1, 3)
-        found = _around(flat, velocity.reshape(-1, 3), self._masses)
+        flat = (points.reshape(-1, 3) - head[:3, 3]) @ head[:3, :3]
+        found = self._around(flat, velocity.reshape(-1, 3), self._floor)
         density, around, away = found[:, 0], found[:, 1:4], found[:, 4:]
         rate = friction * np.minimum(density / self._floor, 1.0) * self._masses
         crowded = np.clip(density / np.maximum(self._rest, self._floor) - 1.0, 0.0, 1.0)
-        force = (push * crowded * self._masses)[:, None] * away
+        force = (push * crowded * self._masses)[:, None] * (away @ head[:3, :3].T)
         total = drag + rate.reshape(drag.shape)
         pulled = (rate[:, None] * around + force).reshape(air.shape) + drag[..., None] * air
         return total, pulled / np.maximum(total, 1e-30)[..., None]
 
+    def _around(self, points: Float64Array, velocity: Float64Array, floor: float) -> Float64Array:
+        """Return (P, 7) density, mean velocity, and the direction of falling density.
 
-def _around(points: Float64Array, velocity: Float64Array, masses: Float64Array) -> Float64Array:
-    """Return (P, 7) density, mean velocity, and the unit direction of falling density."""
-    if not len(points):
-        return np.zeros((0, 7))
-    low = points.min(axis=0)
-    size = np.minimum((points.max(axis=0) - low) / CELL, WIDEST - 3).astype(np.int64) + 3
-    corners = np.zeros((*size, 4))
-    spread(points, low, velocity, masses, corners)
-    result = np.empty((len(points), 7))
-    gather(points, low, corners, result)
-    return result
+        The direction is shorter than 1 where the density hardly falls: within a cell by less than
+        `floor`.
+        """
+        corners = np.zeros((*self._size, 4))
+        result = np.empty((len(points), 7))
+        if len(points):
+            inside = np.clip(points, self._low, self._low + CELL * (self._size - INSIDE))
+            spread(inside, self._low, velocity, self._masses, corners)
+            gather(inside, self._low, corners, floor, result)
+        return result
 
 
 @compiled
@@ -104,7 +118,11 @@ def spread(
 
 @compiled
 def gather(
-    points: Float64Array, low: Float64Array, corners: Float64Array, result: Float64Array
+    points: Float64Array,
+    low: Float64Array,
+    corners: Float64Array,
+    floor: float,
+    result: Float64Array,
 ) -> None:
     """Write density, mean velocity and the direction of falling density at the points."""
     value, slope = np.empty(4), np.empty(3)
@@ -126,7 +144,7 @@ def gather(
             slope[0] += (2 * a - 1) * g * h * density
             slope[1] += (2 * b - 1) * f * h * density
             slope[2] += (2 * c - 1) * f * g * density
-        size = np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
+        size = np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2 + floor**2)
         result[p, 0] = value[0]
         for axis in range(3):
             result[p, 1 + axis] = value[1 + axis] / max(value[0], 1e-30)

@@ -183,6 +183,7 @@ class SuperHelices:
                 air,
                 self._options.hair_friction,
                 self._options.hair_push,
+                self._head,
             )
         spring, anchor = np.zeros(shape), np.zeros_like(motion.points)
         drawn = self._drawn() if around.grabs else None

@@ -13,7 +13,7 @@ import pytest
 from hairkit import cli
 from hairkit.errors import HairkitError, InputError
 from hairkit.manager import Manager
-from hairkit.simulation import Weather, add_shakes, run, static_motion
+from hairkit.simulation import Measures, Weather, add_shakes, run, static_motion
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache, read_cache
@@ -64,10 +64,33 @@ def test_what_is_not_finite_is_an_error(manager: Manager, groom: Groom) -> None:
         def reset(self, head: object) -> None: ...
         def advance(self, seconds: float, around: object) -> None: ...
 
-    with pytest.raises(HairkitError, match="diverged"):
+    with pytest.raises(HairkitError, match="diverged") as caught:
         run(Exploding(), static_motion(), 2)
+    assert cli.explain(caught.value)[1] == 3
     with pytest.raises(InputError, match="frames"):
         run(simulator, static_motion(), 0)
+
+
+@pytest.mark.parametrize(("stretch", "frames"), [(0.02, 60), (0.5, 200), (0.009, 200)])
+def test_hair_that_stays_stretched_is_an_error(
+    manager: Manager, groom: Groom, stretch: float, frames: int
+) -> None:
+    """More than 1 % for more than a second on end ends a run; a jerk or less does not."""
+    simulator = made(manager, groom)
+
+    class Torn:
+        strands, points = simulator.strands, simulator.points
+
+        def reset(self, head: object) -> None: ...
+        def advance(self, seconds: float, around: object) -> None: ...
+        def measure(self) -> Measures:
+            return Measures(stretch, 0.0, 0.0)
+
+    if stretch > 0.01 and frames > 60:
+        with pytest.raises(HairkitError, match="stretched"):
+            run(Torn(), static_motion(), frames)
+    else:
+        assert len(run(Torn(), static_motion(), frames)) == frames
 
 
 def simulate(groom: Groom, folder: Path, *more: str) -> int:

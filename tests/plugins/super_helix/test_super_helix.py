@@ -189,11 +189,11 @@ def test_hair_around_drags_to_its_own_speed(rng: np.random.Generator) -> None:
     around = Neighbours(points, masses)
     none, still = np.zeros((2000, 3)), np.zeros((2000, 3, 3))
     same = np.broadcast_to([1.0, 2.0, 3.0], still.shape)
-    rate, pulled = around.act(points, same.copy(), none, still, 5.0, 0.0)
+    rate, pulled = around.act(points, same.copy(), none, still, 5.0, 0.0, np.eye(4))
     np.testing.assert_allclose(pulled, same, rtol=1e-12)
     assert 0 < rate.min() <= rate.max() <= 5.0
     mixed = np.where(np.arange(2000)[:, None, None] % 2, 1.0, -1.0) * np.ones((1, 3, 3))
-    _, pulled = around.act(points, mixed, none, still, 5.0, 0.0)
+    _, pulled = around.act(points, mixed, none, still, 5.0, 0.0, np.eye(4))
     assert np.abs(pulled).mean() < 0.2
 
 
@@ -202,10 +202,10 @@ def test_crowded_hair_is_pushed_apart(rng: np.random.Generator) -> None:
     points, masses = rng.uniform(-0.05, 0.05, (2000, 3, 3)), np.ones((2000, 3))
     around = Neighbours(points, masses)
     zero, still = np.full((2000, 3), 1e-9), np.zeros((2000, 3, 3))
-    rate, pulled = around.act(points, still, zero, still, 0.0, 5.0)
+    rate, pulled = around.act(points, still, zero, still, 0.0, 5.0, np.eye(4))
     np.testing.assert_allclose(rate[..., None] * pulled, 0, rtol=0, atol=1e-12)
     tight = 0.6 * points
-    rate, pulled = around.act(tight, still, zero, still, 0.0, 5.0)
+    rate, pulled = around.act(tight, still, zero, still, 0.0, 5.0, np.eye(4))
     outward = (rate[..., None] * pulled * tight).sum(-1)[np.linalg.norm(tight, axis=-1) > 0.025]
     assert outward.mean() > 0
 
