@@ -45,9 +45,17 @@ class Studio:
         answer = line.getresponse()
         self.cookie = (answer.headers["Set-Cookie"] or self.cookie).split(";")[0]
         document = json.loads(answer.read())
+        line.close()
         if answer.status >= http.client.BAD_REQUEST:
             raise SystemExit(f"{path}: {document}")
         return document
+
+    def close(self) -> None:
+        """End the process."""
+        self.process.terminate()
+        self.process.wait()
+        if self.process.stderr is not None:
+            self.process.stderr.close()
 
     def wait(self, ready: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         """Return the project's state once it is ready."""
@@ -84,8 +92,7 @@ def main() -> None:
         try:
             _measure(studio, sorted(arguments.photos.iterdir()), arguments.strokes)
         finally:
-            studio.process.terminate()
-            studio.process.wait()
+            studio.close()
 
 
 def _measure(studio: Studio, photos: list[Path], strokes: int) -> None:
