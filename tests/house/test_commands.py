@@ -33,6 +33,8 @@ LIGHTER = {
     "render": ["--size", "48x64", "--hairs", "100"],
 }
 """Further arguments that make a run quick."""
+FEW_GUIDES = "10"
+"""Guides where a page chooses some from full hair: the stand-in has few strands."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +157,8 @@ def run(page: Path, command: Command, groom: hairkit.Groom) -> None:
         return
     for name in (after for word, after in itertools.pairwise(words) if word == "--plugin"):
         Path(name).write_text(code_block(page, "python", "@hookimpl"))
-    assert main([*words, *LIGHTER.get(command.verb, [])]) == 0, words
+    fewer = ["--guides", FEW_GUIDES] if {"simulate", "--guides"} <= set(words) else []
+    assert main([*words, *LIGHTER.get(command.verb, []), *fewer]) == 0, words
 
 
 def test_pages_print_commands() -> None:
