@@ -27,6 +27,7 @@ from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
+from hairkit.types.volume import ScalpDistance
 from hairkit.types.waves import Waves
 
 RESOLUTION = 1500.0
@@ -80,11 +81,13 @@ def measure_waves(
     orientations: Sequence[OrientationMap],
     masks: Sequence[Mask],
     cameras: Sequence[Camera],
+    scalp_distance: ScalpDistance | None = None,
 ) -> Waves:
     """Return the radius, pitch and slant of the waves that all views show together.
 
     The cameras see the head at the origin; orientations, masks and cameras are in the capture's
-    order.
+    order. Hair shorter than a turn, by `scalp_distance`, has no waves: what repeats in its picture
+    is something else.
     """
     scaled = [
         _scale(view, mask, camera)
@@ -94,7 +97,7 @@ def measure_waves(
     pitch, prominence = _measure_pitch(views)
     moments = _angular_moments(views) if prominence >= LEAST_PROMINENCE else None
     slope = 0.0 if moments is None else _fit_slope(*moments)
-    if slope < LEAST_SLOPE:
+    if slope < LEAST_SLOPE or (scalp_distance and scalp_distance.hair_length < pitch):
         return Waves()
     return Waves(slope * pitch / (2 * np.pi), pitch, _measure_slant(orientations, masks))
 

@@ -309,11 +309,12 @@ def _measure(
     """Return what field and strands are made from: stage results, and what is measured in them."""
     cameras, head = Given.of(scene.value.cameras), Given.of(scene.value.head)
     views: dict[str, Any] = {"masks": masks, "cameras": cameras}
-    waves = run.derive(
-        "waves", Waves, measure_waves, capture=photos, orientations=orientations, **views
-    )
-    waves = waves if hair == ChosenHair() else Given.of(hair.waves(waves.value))
     distance = run.derive("distance", ScalpDistance, measure_scalp_distance, head=head, hull=hull)
+    waves = run.derive(
+        "waves", Waves, measure_waves, capture=photos, orientations=orientations,
+        scalp_distance=distance, **views,
+    )  # fmt: skip
+    waves = waves if hair == ChosenHair() else Given.of(hair.waves(waves.value))
     tied = run.derive(
         "ties", TiedHair, measure_ties, orientations=orientations, head=head, hull=hull,
         scalp_distance=distance, **views,

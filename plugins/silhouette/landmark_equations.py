@@ -31,7 +31,7 @@ SIZE_SPREAD = 0.012
 their scale. The circumference of heads is 568 +- 15 mm for men and 546 +- 15 mm for women (Gordon
 et al., "1988 anthropometric survey of U.S. Army personnel", 1989), 3.3 % in all; deformations as
 above let it vary by 3.6 %. Cameras pull it, too, all one way: with 0.02 the scale of captures is
-0.93 to 0.99, with 0.012 it is 0.95 to 0.99."""
+0.93 to 0.99, with 0.012 it is 0.95 to 1.00."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from hairkit.types.capture import Capture, View
 from hairkit.types.mask import HAIR, Mask
 from hairkit.types.orientation import OrientationMap, angle_between, wrap_angle
 from hairkit.types.strands import Strands
+from hairkit.types.volume import ScalpDistance
 from hairkit.types.waves import Waves
 
 WIDTH, HEIGHT, PIXELS_PER_METRE = 0.2, 0.24, 1500.0
@@ -90,6 +91,14 @@ def test_waves_of_nine_centimetres_are_no_straight_hair() -> None:
     assert waves.pitch == pytest.approx(0.09, rel=0.1)
     assert waves.radius == pytest.approx(0.012, rel=0.35)
     assert not waves.curly
+
+
+def test_hair_shorter_than_a_turn_has_no_waves() -> None:
+    """What repeats every 27 mm in the picture of hair of 20 mm is no wave of it."""
+    views = views_of(drawing(0.0068, 0.027))
+    short, long = (ScalpDistance(np.zeros((1, 1, 1), np.float32), n) for n in (0.02, 0.05))
+    assert measure_waves(*views, short) == Waves()
+    assert measure_waves(*views, long) == measure_waves(*views) != Waves()
 
 
 def test_the_pitch_is_in_metres_whatever_the_size_of_the_pictures() -> None:
