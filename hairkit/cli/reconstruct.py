@@ -76,8 +76,10 @@ def run(args: argparse.Namespace) -> int:
     began = time.perf_counter()
     manager = Manager.loaded(args.plugin)
     head = _head(args)
+    recipe = load_recipe(args.recipe)
+    recipe.with_set(args.set).check(manager)  # before minutes of reading photos or a video
     capture = read_capture(_photos(args), _max_edge(args, WORKING_EDGE))
-    recipe = load_recipe(args.recipe).with_set([*capture.chosen.settings, *args.set])
+    recipe = recipe.with_set([*capture.chosen.settings, *args.set])
     recipe.check(manager)
     if args.parting is not None:
         capture = replace(capture, parting=Parting.named(args.parting))
