@@ -13,7 +13,6 @@ import pytest
 from hairkit.io.capture_reader import read_capture
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
-from hairkit.studio.feedback import ADVICE
 from hairkit.types.groom import Groom
 
 GUIDES = 80
@@ -23,7 +22,6 @@ SIZES = ((390, 844), (1440, 900))
 LISTEN = """window.spoken = [];
 speechSynthesis.speak = (said) => { window.spoken.push(said.text); };"""
 """What is spoken is written down: browsers without a sound card say nothing."""
-SPOKEN = [advice.spoken for advice in ADVICE.values()] + ["Good"]
 PAGES = ("photos", "capture", "annotate", "pose", "strands", "hair")
 
 
@@ -265,7 +263,7 @@ def check_a_shot_of_the_camera_becomes_a_photo(page: Any, project: Any) -> None:
     page.locator(".stage[data-shots]").wait_for()
     after = list((project.folder / "photos").iterdir())
     spoken = page.evaluate("window.spoken")
-    assert any(text in spoken for text in SPOKEN), spoken
+    assert spoken, "nobody was told where to stand"
     retaken = (project.folder / "photos" / "001.jpg").read_bytes() != before
     assert retaken or len(after) == count + 1
 
