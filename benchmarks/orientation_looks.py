@@ -20,11 +20,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 from hairkit_plugins import gabor, structure_tensor
-from orientation import plugin, read_samples, score
+from orientation import Sample, plugin, read_samples, score
 
 from hairkit.head_model.template import default_head
 from hairkit.rendering import context
-from hairkit.synth import grow, photograph
+from hairkit.synth import StyleName, grow, photograph
 
 COLOURS = {
     "black": (0.010, 0.008, 0.007),
@@ -38,7 +38,7 @@ TIP = 1.25
 """Colour at the tip over that at the root."""
 GLOSS = {"matt": (0.0, 1.0), "usual": (1.0, 1.0), "greasy": (3.0, 0.6)}
 """Factors of strength and width of the light that the surface reflects."""
-STYLES = ("straight", "wavy")
+STYLES: tuple[StyleName, ...] = ("straight", "wavy")
 STRANDS, SIZE, VIEWS = 8000, (540, 720), 3
 METHODS = {"structure_tensor": plugin(structure_tensor), "gabor": plugin(gabor)}
 STRENGTH, WIDTH = "FRESNEL = 0.0465", "ROUGHNESS_R = 0.14"
@@ -65,7 +65,7 @@ def main() -> int:
     return 0
 
 
-def _photographed(style: str, colour: str, gloss: str) -> list:  # type: ignore[type-arg]
+def _photographed(style: StyleName, colour: str, gloss: str) -> list[Sample]:
     with tempfile.TemporaryDirectory() as folder:
         spawn = multiprocessing.get_context("spawn")  # a process compiles its shaders once
         with ProcessPoolExecutor(1, mp_context=spawn) as pool:
@@ -75,7 +75,7 @@ def _photographed(style: str, colour: str, gloss: str) -> list:  # type: ignore[
 
 
 def _photograph(
-    style: str,
+    style: StyleName,
     colour: tuple[float, float, float],
     gloss: tuple[float, float],
     strands: int,
@@ -92,7 +92,7 @@ def _photograph(
         return text.replace(WIDTH, f"ROUGHNESS_R = {width:.4f}")
 
     context.shader_source = scaled
-    groom = grow(style, default_head(), strands)  # type: ignore[arg-type]
+    groom = grow(style, default_head(), strands)
     root = np.array(colour)
     material = replace(groom.material, root_colour=root, tip_colour=np.minimum(TIP * root, 1))
     photograph(replace(groom, material=material), folder, views=VIEWS, size=size)

@@ -64,7 +64,7 @@ SKIN_SPREAD = (0.35, 0.12, 0.12)
 LEAST = 1e-6
 """Least weight that colours are divided by."""
 STEP = 4
-"""Every how manieth texel exposures and the tone of skin are measured at."""
+"""Texels between those at which exposures and the tone of skin are measured."""
 GAIN_PRIOR = 0.05
 """Weight of the belief that a view needs no gain, in shares of a texel that two views share."""
 FLOOR = 4.0

@@ -15,6 +15,7 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.cameras.depth_raster import HEAD_TOLERANCE, SPLAT_CELLS, head_depth, point_depth
+from hairkit.field.growth_prior import PARTED_HAIR
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.groom import Groom
@@ -145,7 +146,8 @@ def assess(
     turn
         How the photos were arranged; None when their names were believed.
     parting
-        How the crown is combed; None when nothing was measured.
+        How the crown is combed, which counts for nothing in short hair; None when nothing was
+        measured.
     tied
         The ties that were found; None of loose hair.
     """
@@ -155,7 +157,7 @@ def assess(
         *assess_cameras(scene),
         *assess_masks(masks, scene),
         *assess_hull(hull, masks, scene),
-        *assess_parting(parting),
+        *(assess_parting(parting) if hair_length >= PARTED_HAIR else ()),
         *assess_ties(tied, scene.head),
         *assess_strands(groom, roots, hair_length),
     )

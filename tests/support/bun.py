@@ -34,11 +34,11 @@ def turn(model: CameraModel = "perspective") -> tuple[Camera, ...]:
     )
 
 
-def bun() -> Hull:
-    """The bun in a grid that is symmetric about the vertical axis."""
+def bun(spacing: float = SPACING) -> Hull:
+    """The bun in a grid that is symmetric about the vertical axis; cells in metres."""
     low, high = CENTRE - 0.08, CENTRE + 0.08
     low[1] -= 0.04
-    grid = VoxelGrid.around(low, high, SPACING)
+    grid = VoxelGrid.around(low, high, spacing)
     centres = grid.centres().astype(np.float64)
     distance = np.linalg.norm(centres, axis=-1) - 0.1
     hair = (np.linalg.norm(centres - CENTRE, axis=-1) < RADIUS) & (distance > 0)
@@ -63,7 +63,8 @@ def all_hair(camera: Camera) -> Mask:
 
 def off_deg(directions: Float64Array, along: Float64Array = ALONG) -> Float64Array:
     """Angles in degrees between undirected directions and one known."""
-    cosine = np.abs(directions @ along) / np.linalg.norm(along)
+    length = np.linalg.norm(directions, axis=-1) * np.linalg.norm(along)
+    cosine = np.abs(directions @ along) / length
     return np.degrees(np.arccos(np.clip(cosine, 0, 1)))
 
 

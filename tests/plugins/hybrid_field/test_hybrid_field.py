@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from bun import ALONG, CENTRE, all_hair, bun, off_deg, seen, turn
 from hairkit_plugins.hybrid_field import Options, solve_field
 from hairkit_plugins.hybrid_field.four_fields import internal_distance, surface_structure
 from hairkit_plugins.hybrid_field.photo_lines import (
@@ -22,12 +23,11 @@ from hairkit_plugins.hybrid_field.ribbons import SURFACE, Band, ribbons
 from hairkit_plugins.hybrid_field.segments import find_segments, orient_segments
 from scipy import ndimage
 
-from hairkit.arrays import Float64Array
 from hairkit.field.growth_prior import growth_potential, measure_scalp_distance
 from hairkit.field.view_fusion import DEPTH_SHRINK, fuse_views
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera
-from hairkit.types.mask import HAIR, Mask
+from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
@@ -35,63 +35,23 @@ from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull, VoxelGrid, cell_slopes, outer_products
 from hairkit.types.waves import Waves
 
-CENTRE = np.array([0.0, 0.16, 0.0])
-ALONG = np.array([0.5, -0.75, 0.433])
 SPACING = 0.006
 PLAIN = Options(scalp_weight=0.0, pool=0.0, unslant=False, outward=0.0)
 
 
-def cameras() -> tuple[Camera, ...]:
-    """Eight cameras around a bun on top of the head, on two levels."""
-    return tuple(
-        Camera.on_turn(
-            45.0 * i,
-            elevation_deg=12.0 * (i % 2),
-            distance=0.6,
-            target=CENTRE,
-            focal=540.0,
-            width=120,
-            height=120,
-        )
-        for i in range(8)
-    )
-
-
-def bun() -> Hull:
-    """A ball of hair of 6 cm radius above the head."""
-    low, high = CENTRE - 0.08, CENTRE + 0.08
-    low[1] -= 0.04
-    grid = VoxelGrid.around(low, high, SPACING)
-    centres = grid.centres().astype(np.float64)
-    distance = np.linalg.norm(centres, axis=-1) - 0.1
-    hair = (np.linalg.norm(centres - CENTRE, axis=-1) < 0.06) & (distance > 0)
-    return Hull(grid, hair, hair, distance.astype(np.float32))
-
-
-def seen(camera: Camera) -> OrientationMap:
-    """The exact image angle of strands along `ALONG`."""
-    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    dx, dy, dz = camera.rotation @ ALONG
-    dx = dx - dz * (x - camera.centre[0]) / camera.focal
-    dy = dy - dz * (y - camera.centre[1]) / camera.focal
-    return OrientationMap(wrap_angle(np.arctan2(dy, dx)), np.ones(x.shape, np.float32))
+def hair() -> Hull:
+    """The bun, in finer cells."""
+    return bun(SPACING)
 
 
 def photos() -> tuple[tuple[Camera, ...], tuple[Mask, ...], tuple[OrientationMap, ...]]:
-    views = cameras()
-    labels = np.full((views[0].height, views[0].width), HAIR, np.uint8)
-    return views, tuple(Mask(labels, True) for _ in views), tuple(map(seen, views))
-
-
-def off_deg(directions: Float64Array) -> Float64Array:
-    """Angles in degrees between directions and `ALONG`, signs ignored."""
-    length = np.linalg.norm(directions, axis=-1) * np.linalg.norm(ALONG)
-    return np.degrees(np.arccos(np.clip(np.abs(directions @ ALONG) / length, 0, 1)))
+    views = turn()
+    return views, tuple(map(all_hair, views)), tuple(map(seen, views))
 
 
 def segments(options: Options = PLAIN) -> tuple[Strands, Hull]:
     views, masks, maps = photos()
-    hull = bun()
+    hull = hair()
     growth = growth_potential(hull, measure_scalp_distance(ball_head(), hull), 0.6)
     fused = fuse_views(views, masks, maps, hull, Waves(), options)
     return find_segments(views, masks, fused, hull, growth, options), hull
@@ -115,7 +75,7 @@ def test_segments_are_no_longer_than_allowed() -> None:
 def test_a_line_is_lifted_and_smoothed_the_same_wherever_it_stands_in_the_pack() -> None:
     """The compiled lift of many lines is, line by line, a truncated Gaussian along points that
     the camera sees where the line was followed."""
-    camera = cameras()[0]
+    camera = turn()[0]
     rng = np.random.default_rng(3)
     lines = rng.uniform(40, 80, (5, 30, 3)).astype(np.float32)
     lines[..., 2] = rng.uniform(0.4, 0.6, (5, 30))
@@ -136,7 +96,7 @@ def test_a_line_is_lifted_and_smoothed_the_same_wherever_it_stands_in_the_pack()
 
 def test_lines_agree_with_the_tensors_along_them_only() -> None:
     """A line along the field stays; one square to it, and one where nothing is known, go."""
-    hull = bun()
+    hull = hair()
     volume = np.zeros((*hull.grid.shape, 6), np.float32)
     volume[hull.loose] = outer_products([0.0, 1.0, 0.0])
     course = np.linspace(-0.02, 0.02, 9)[:, None]
@@ -147,7 +107,7 @@ def test_lines_agree_with_the_tensors_along_them_only() -> None:
 
 def test_segments_agree_on_which_end_is_the_root() -> None:
     """Parallel segments of mixed signs come out with one sign, that of the growth."""
-    hull = bun()
+    hull = hair()
     rng = np.random.default_rng(1)
     roots = (CENTRE + rng.uniform(-0.03, 0.03, (60, 3))).astype(np.float32)
     course = np.linspace(0, 0.02, 8)[:, None] * np.array([0.0, 1.0, 0.0])
@@ -163,7 +123,7 @@ def test_segments_agree_on_which_end_is_the_root() -> None:
 
 def test_ribbons_widen_segments_along_the_surface() -> None:
     """A wider ribbon covers more cells, all directions unit where one segment runs alone."""
-    hull = bun()
+    hull = hair()
     course = CENTRE + [0, 0, 0.055] + np.linspace(-0.02, 0.02, 21)[:, None] * [0, 1.0, 0]
     lone = Strands.from_list([course])
     thin, wide = (ribbons(lone, hull, reach) for reach in (0.0, 0.012))
@@ -175,7 +135,7 @@ def test_ribbons_widen_segments_along_the_surface() -> None:
 
 def test_surface_structure_keeps_ribbons_and_spreads_them() -> None:
     """Dirichlet on ribbons; everywhere else of the bun the one direction there is."""
-    hull = bun()
+    hull = hair()
     course = CENTRE + [0, 0, 0.05] + np.linspace(-0.02, 0.02, 21)[:, None] * [0, 1.0, 0]
     band = ribbons(Strands.from_list([course]), hull, 0.0)
     field = surface_structure(hull, band, 1e-4)
@@ -207,7 +167,7 @@ def test_one_direction_everywhere_comes_back_signed() -> None:
     """Exact angles: the blend lies along the hair, with one sign over nearly all of the bun."""
     views, masks, maps = photos()
     scene = Scene(tuple("abcdefgh"), views, ball_head())
-    hull = bun()
+    hull = hair()
     field = solve_field(
         scene,
         masks,
@@ -231,7 +191,7 @@ def test_without_segments_the_inner_field_alone_speaks() -> None:
     views, masks, maps = photos()
     blank = tuple(OrientationMap(found.angle, 0 * found.confidence) for found in maps)
     scene = Scene(tuple("abcdefgh"), views, ball_head())
-    hull = bun()
+    hull = hair()
     distance = measure_scalp_distance(scene.head, hull)
     options = Options(pool=0.0, unslant=False)
     field = solve_field(scene, masks, blank, hull, Waves(), distance, Parting(), options)
@@ -242,7 +202,7 @@ def test_without_segments_the_inner_field_alone_speaks() -> None:
 
 def test_an_empty_band_has_no_direction() -> None:
     """No segments, no ribbons."""
-    hull = bun()
+    hull = hair()
     band = ribbons(Strands(np.zeros((0, 3), np.float32), np.zeros(1, np.int64)), hull, 0.004)
     assert isinstance(band, Band)
     assert not band.cells.any()
