@@ -28,6 +28,8 @@ NEAREST = 1e-3
 """Points less far in front of a camera, metres, are not seen."""
 CAP = 40.0
 """Signed distances are cut at this many pixels: so far inside a silhouette says nothing."""
+BORDER = 1.001
+"""Samples are taken at most this many pixels before the last, so that the next pixel exists."""
 LEAST_SHARE = 1e-3
 """Silhouettes with less of the soft minimum are left out of its derivative."""
 MIN_RAYS = 16
@@ -241,7 +243,7 @@ def _sample(field: Float32Array, scale: float, u: float, v: float) -> tuple[floa
     """
     height, width = field.shape
     x, y = u * scale - 0.5, v * scale - 0.5
-    right, down = min(max(x, 0.0), width - 1.001), min(max(y, 0.0), height - 1.001)
+    right, down = min(max(x, 0.0), width - BORDER), min(max(y, 0.0), height - BORDER)
     i, j = int(down), int(right)
     fy, fx = down - i, right - j
     a, b, c, d = field[i, j], field[i, j + 1], field[i + 1, j], field[i + 1, j + 1]

@@ -33,7 +33,7 @@ def test_the_shipped_picture_is_what_the_program_paints() -> None:
 
 
 def test_eyes_brows_and_lips_lie_at_their_landmarks() -> None:
-    """Brows are darker than the forehead, lips redder than the forehead, eyes have dark pupils."""
+    """Brows are darker than the forehead, lips redder and a little darker, eyes have dark pupils."""
     head = default_head()
     marks = head.landmark_vertices
     assert marks is not None
@@ -42,7 +42,7 @@ def test_eyes_brows_and_lips_lie_at_their_landmarks() -> None:
     assert _colour(marks[BROWS]).mean() < skin.mean() - 0.12
     lips = _colour(marks[LIPS]).mean(axis=0)
     assert lips[0] / lips[1] > 1.03 * skin[0] / skin[1]
-    assert lips.mean() < skin.mean() - 0.06
+    assert lips.mean() < skin.mean() - 0.02
     for eye in (LEFT_EYE, RIGHT_EYE):
         middle = head.uv[marks[eye]].mean(axis=0)
         assert head.maps is not None
