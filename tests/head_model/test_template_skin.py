@@ -33,7 +33,7 @@ def test_the_shipped_picture_is_what_the_program_paints() -> None:
 
 
 def test_eyes_brows_and_lips_lie_at_their_landmarks() -> None:
-    """Brows are darker than the forehead, lips redder and a little darker, eyes have dark pupils."""
+    """Brows are darker than the forehead, lips darker and redder, eyes have dark pupils."""
     head = default_head()
     marks = head.landmark_vertices
     assert marks is not None
