@@ -59,14 +59,14 @@ class Options:
         None,
         low=0.0,
         high=1.0,
-        doc="Pull to the captured shape, strongest at the root: 0 off, 0.5 about 6 Hz, 1 stiff;"
+        doc="Pull of the first centimetres to the captured shape: 0 off, 0.5 about 6 Hz, 1 stiff;"
         " by default the groom's.",
     )
     bend: float | None = option(
         None,
         low=0.0,
         high=1.0,
-        doc="Bending stiffness: 0 a single hair, 1 a thousand times that, like a lock; by default"
+        doc="Bending stiffness: 0 a single hair, 1 ten times that, like a lock; by default"
         " the groom's.",
     )
     twist: float = option(
@@ -153,7 +153,7 @@ class Options:
 
     def firmness(self) -> float:
         """Return the bending stiffness over that of a single hair of the same mass."""
-        return float(1000.0 ** (self.bend or 0.0))
+        return float(10.0 ** (self.bend or 0.0))
 
     def damping_share(self) -> float:
         """Return the share of relative velocity lost in 1/60 s."""

@@ -44,6 +44,13 @@ HELD = 4e4
 FIRMEST = 6e3
 """Largest bending stiffness, as EI / (rho A) h^2 / l^4 of segments of length l in substeps of h:
 more has tones above 50 Hz, and float32 loses the lengths. Hair cut short is stiffer than that."""
+REACH = 0.04
+"""Length from the root over which hair is pulled to its captured shape, metres: there skin and the
+hair around hold it."""
+STANDING = 2.5
+"""Squared frequency, in g / L, of the pull that bears hair which stands or lies out, since other
+hair is beneath it: a column that carries its own weight buckles by pi^2 / 4 of it at most. Hair
+that hangs needs none."""
 _KEPT_SYSTEMS = 4
 
 
@@ -174,7 +181,7 @@ class PbdSimulator:
             mass = self._rods.mass.reshape(-1)
             self._hair_grid: HairGrid = make_hair_grid(self._nodes.reshape(-1, 3), mass)
         self._options = resolved
-        self._rates = _rates(resolved, self._rods, self._width, self._held)
+        self._rates = self._rates_of(resolved)
         self._systems: dict[float, System] = {}
         self._rest_energy = None
         self._contact = _contact(resolved, self._obstacles, self._near, self._deepest)
@@ -205,6 +212,20 @@ class PbdSimulator:
         rods = make_rods(self._nodes, density, bending, bending * options.twist)
         down = np.array([0.0, -self._groom.physics.gravity, 0.0])
         self._rods = balance_load(rods, rods.mass[..., None] * down)
+
+    def _rates_of(self, options: Options) -> Rates:
+        """Convert options to rates; drag goes as area over mass, which is 1 / width."""
+        rods, width = self._rods, self._width
+        drag = options.drag * width.mean() / width
+        arc = np.pad(np.cumsum(rods.length, axis=1), ((0, 0), (1, 0)))
+        total = arc[:, -1:]
+        pull = options.pull() * np.maximum(1 - arc / REACH, 0.0) ** 2
+        falls = (rods.points[:, :1, 1] - rods.points[:, -1:, 1]) / total
+        weight = abs(self._groom.physics.gravity)
+        pull += STANDING * np.clip(1 - falls, 0.0, 1.0) * weight / total
+        pull = np.where(arc / total < self._held[:, None], HELD, pull)
+        damping = -math.log(1 - options.damping_share()) / FRAME
+        return Rates(np.repeat(drag[:, None], rods.nodes, axis=1), damping, pull)
 
     def _system(self, step: float) -> System:
         key = round(step, 9)
@@ -296,21 +317,6 @@ def _engine(name: str, rods: Rods, contact: Contact) -> Engine:
     from .numba_backend import FastEngine  # Numba loads where it is used
 
     return FastEngine(rods, contact)
-
-
-def _rates(options: Options, rods: Rods, width: Float64Array, held: Float64Array) -> Rates:
-    """Convert options to rates; drag goes as area over mass, which is 1 / width.
-
-    `held` (S,) is the share of each rod that its tie holds to the head.
-    """
-    share = np.linspace(0.0, 1.0, rods.nodes)
-    drag = options.drag * width.mean() / width
-    shape = options.pull() * (1 - share) ** 2
-    return Rates(
-        np.repeat(drag[:, None], rods.nodes, axis=1),
-        -math.log(1 - options.damping_share()) / FRAME,
-        np.where(share < held[:, None], HELD, np.broadcast_to(shape, rods.mass.shape)),
-    )
 
 
 def _contact(
