@@ -194,7 +194,7 @@ def render(
     if not isinstance(camera, Camera):
         points = np.concatenate([shown.head.vertices, hair.points])
         camera = framing_cameras(points, [_direction(camera)], *size)[0]
-    picture = draw(hair, shown.head, camera, material=shown.material)
+    picture = draw(hair, shown.head, camera, material=shown.material, bust=True)
     if path is not None:
         write_picture(path, picture)
     return picture

@@ -77,7 +77,9 @@ def run(args: argparse.Namespace) -> int:
     paths = _paths(args.output, len(cameras))
     light = Lights.at_camera(cameras[0]) if len(cameras) > 1 else None
     for path, camera in zip(paths, cameras, strict=True):
-        picture = draw_views(hair, groom.head, [camera], material=groom.material, lights=light)[0]
+        [picture] = draw_views(
+            hair, groom.head, [camera], material=groom.material, lights=light, bust=True
+        )
         write_picture(path, picture)
         print(path)
         print(f"{path.name}: {len(hair)} strands, {camera.width}x{camera.height}", file=sys.stderr)

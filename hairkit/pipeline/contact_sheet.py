@@ -148,13 +148,21 @@ def _hull_pictures(hull: Hull, cameras: Sequence[Camera]) -> list[UInt8Array]:
 def _guide_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
     guides = groom.strands.resampled(GUIDE_POINTS)
     return draw_views(
-        guides, groom.head, cameras, material=groom.material, lights=_lights(), show_direction=True
+        guides,
+        groom.head,
+        cameras,
+        material=groom.material,
+        lights=_lights(),
+        bust=True,
+        show_direction=True,
     )
 
 
 def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
     hair = densify(groom, HAIRS).resampled(GUIDE_POINTS)
-    return draw_views(hair, groom.head, cameras, material=groom.material, lights=_lights())
+    return draw_views(
+        hair, groom.head, cameras, material=groom.material, lights=_lights(), bust=True
+    )
 
 
 def _lights() -> Lights:

@@ -11,12 +11,14 @@ import moderngl
 import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array
+from hairkit.head_model.bust import CLOTH, bust_under
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
 from hairkit.types.camera import Camera
 from hairkit.types.groom import HairMaterial
 from hairkit.types.head import Head
 from hairkit.types.skin import Texture
+from hairkit.types.strands import Strands
 
 SKIN = (0.42, 0.24, 0.17)
 """Linear RGB of skin."""
@@ -68,6 +70,15 @@ def head_solid(head: Head, material: HairMaterial) -> Solid:
         colours = colours / skin  # the picture has the skin's colour
     normals = head.normals().astype(np.float32)
     return Solid(head.vertices, head.faces, normals, colours, uv=head.uv, albedo=albedo)
+
+
+def bust_solid(head: Head, strands: Strands | None = None) -> Solid | None:
+    """Return a clothed bust under a head that ends at its neck; None under other heads."""
+    bust = bust_under(head, strands)
+    if bust is None:
+        return None
+    colours = np.tile(np.array(CLOTH, np.float32), (len(bust.vertices), 1))
+    return Solid(bust.vertices, bust.faces, bust.normals, colours, scatter=0.0)
 
 
 @contextlib.contextmanager

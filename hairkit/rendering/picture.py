@@ -16,7 +16,7 @@ from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.framebuffer import SUPERSAMPLE, average_samples, supersample_camera, target
 from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.hair import RibbonBuffers, draw_ribbons, ribbons
-from hairkit.rendering.head import Solid, draw_solid, head_solid
+from hairkit.rendering.head import Solid, bust_solid, draw_solid, head_solid
 from hairkit.rendering.light import Lights, LightVolume, hair_density, light_volume
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom, HairMaterial
@@ -46,6 +46,7 @@ def draw(
     lights: Lights | None = None,
     background: UInt8Array | None = None,
     solids: Sequence[Solid] = (),
+    bust: bool = False,
     supersample: int = SUPERSAMPLE,
 ) -> UInt8Array:
     """Return a picture (H, W, 3) uint8 RGB of hair on a head, antialiased.
@@ -68,6 +69,8 @@ def draw(
         (H, W, 3) picture behind; None: a neutral grey.
     solids
         Other shaded meshes, such as shoulders.
+    bust
+        Draw a clothed bust under a head that ends at its neck.
     supersample
         Samples along each edge of a pixel.
     """
@@ -80,6 +83,7 @@ def draw(
         lights=lights,
         backgrounds=None if background is None else [background],
         solids=solids,
+        bust=bust,
         supersample=supersample,
     )[0]
 
@@ -93,6 +97,7 @@ def draw_views(
     lights: Lights | None = None,
     backgrounds: Sequence[UInt8Array] | None = None,
     solids: Sequence[Solid] = (),
+    bust: bool = False,
     supersample: int = SUPERSAMPLE,
     show_direction: bool = False,
 ) -> list[UInt8Array]:
@@ -106,7 +111,9 @@ def draw_views(
         head = hair.head if head is None else head
         material = material or hair.material
     material = material or HairMaterial()
-    shown = (*([head_solid(head, material)] if head is not None else []), *solids)
+    below = bust_solid(head, strands) if bust and head is not None else None
+    own = [head_solid(head, material)] if head is not None else []
+    shown = (*own, *([below] if below is not None else []), *solids)
     density = hair_density(strands, shown)
     look = {
         "u_root_colour": tuple(material.root_colour.tolist()),

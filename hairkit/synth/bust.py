@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 from hairkit.arrays import Float32Array, Float64Array, Int32Array
 from hairkit.head_model.signed_distance import signed_distance
 from hairkit.head_model.torso import EXPONENT, RINGS, loft, power, profile
-from hairkit.types.head import Head
+from hairkit.types.head import Head, vertex_normals
 from hairkit.types.volume import VoxelGrid
 
 _AROUND, _RINGS_DRAWN = 96, 72
@@ -45,7 +45,8 @@ class Bust:
         rings = np.stack([x, np.broadcast_to(height[:, None], x.shape), z], axis=-1) * 1e-3 + joint
         faces = loft(_RINGS_DRAWN, _AROUND)
         vertices = rings.reshape(-1, 3)
-        return cls(vertices.astype(np.float32), faces, _smooth_normals(vertices, faces), joint)
+        normals = vertex_normals(vertices, faces).astype(np.float32)
+        return cls(vertices.astype(np.float32), faces, normals, joint)
 
     def contains(self, points: Float64Array) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
         """Return (...,) whether points (..., 3) lie inside."""
@@ -83,13 +84,3 @@ class Obstacle:
         """Return distances (N, 1) and gradients (N, 3) at points (N, 3)."""
         values = self.grid.sample(self.field, points)
         return values[:, :1], values[:, 1:]
-
-
-def _smooth_normals(vertices: Float64Array, faces: Int32Array) -> Float32Array:
-    corners = vertices[faces]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    total = np.zeros_like(vertices)
-    for corner in range(3):
-        np.add.at(total, faces[:, corner], flat)
-    length = np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-20)
-    return np.asarray(total / length, np.float32)

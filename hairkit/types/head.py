@@ -160,14 +160,20 @@ class Head(Previewed, Stored):
 
     def normals(self) -> Float64Array:
         """Return (V, 3) unit vertex normals, outward, weighted by face area."""
-        corners = self.vertices.astype(np.float64)[self.faces]
-        face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        total = np.zeros((len(self.vertices), 3))
-        for corner in range(3):
-            np.add.at(total, self.faces[:, corner], face_normals)
-        length = np.linalg.norm(total, axis=1, keepdims=True)
-        result: Float64Array = total / np.maximum(length, 1e-20)
-        return result
+        return vertex_normals(self.vertices, self.faces)
+
+
+def vertex_normals(vertices: npt.ArrayLike, faces: Int32Array) -> Float64Array:
+    """Return (V, 3) unit normals of a mesh at its vertices (V, 3), weighted by face area."""
+    points = np.asarray(vertices, np.float64)
+    corners = points[faces]
+    face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    total = np.zeros_like(points)
+    for corner in range(3):
+        np.add.at(total, faces[:, corner], face_normals)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    result: Float64Array = total / np.maximum(length, 1e-20)
+    return result
 
 
 def _carry_all(

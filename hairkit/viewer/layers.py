@@ -19,9 +19,7 @@ from hairkit.io.capture_reader import read_capture
 from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.rendering.head import Solid
 from hairkit.storage import Stored, from_arrays, read_npz
-from hairkit.synth.bust import Bust
 from hairkit.types.camera import Camera
-from hairkit.types.head import Head
 from hairkit.types.mask import HAIR, PERSON, Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import Scene
@@ -36,8 +34,6 @@ FRUSTUM = 0.35
 """Distance from a camera to its billboard, metres."""
 CLAY = (0.30, 0.28, 0.26)
 """Linear RGB of the hull."""
-CLOTH = (0.05, 0.06, 0.08)
-"""Linear RGB of the torso."""
 FIELD_LINES = 4000
 """Line segments drawn of an orientation field at most."""
 FIELD_LINE_HALF = 1.6
@@ -116,12 +112,6 @@ class Layers:
         vertices, faces, normals = volume_surface(hull.grid, hull.dense)
         colours = np.tile(np.array(CLAY, np.float32), (len(vertices), 1))
         return Solid(vertices, faces, normals, colours, scatter=0.0)
-
-    def torso(self, head: Head) -> Solid:
-        """Return a generic torso under a head."""
-        bust = Bust.under(head)
-        colours = np.tile(np.array(CLOTH, np.float32), (len(bust.vertices), 1))
-        return Solid(bust.vertices, bust.faces, bust.normals, colours, scatter=0.0)
 
     def field_lines(self) -> LineSet | None:
         """Return short lines along the field, coloured by direction; None without a field."""

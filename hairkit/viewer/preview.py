@@ -11,7 +11,7 @@ import numpy as np
 
 from hairkit.arrays import UInt8Array
 from hairkit.rendering.context import Renderer
-from hairkit.rendering.head import Solid, head_solid
+from hairkit.rendering.head import Solid, bust_solid, head_solid
 from hairkit.viewer.draw.colouring import point_values, ramp
 from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
 from hairkit.viewer.draw.frame_budget import LEVELS, Budget
@@ -201,9 +201,10 @@ class Preview:
 
     def _load_solids(self, frame_renderer: FrameRenderer) -> tuple[str, ...]:
         session = self.session
+        groom = session.opened.groom
         finders: dict[str, Callable[[], Solid | None]] = {
             "hull": session.layers.hull,
-            "torso": lambda: session.layers.torso(session.opened.groom.head),
+            "torso": lambda: bust_solid(groom.head, groom.strands),
         }
         names = [name for name in finders if name in session.shown.layers]
         for name in names:

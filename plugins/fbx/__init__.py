@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
+from hairkit.head_model.bust import bust_under
 from hairkit.hookspecs import hookimpl
 from hairkit.io.coordinate_space import SPACES, FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
@@ -56,6 +57,10 @@ class Options(SpaceOptions, ExportOptions):
     )
     curves: bool = option(False, doc="Write the strands too, each as a NURBS curve.")
 
+    bust: bool = option(
+        False, doc="Write a clothed bust under a head that ends at the neck, without bones."
+    )
+
     @property
     def written_space(self) -> FileSpace:
         """The axes and unit of the file, which is never left-handed."""
@@ -69,5 +74,6 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     from .scene import scene_pieces
 
     strands = prepare_export(groom, options).groom.strands if options.curves else None
-    write_pieces(path, scene_pieces(groom.head, strands, options.written_space))
+    bust = bust_under(groom.head, groom.strands) if options.bust else None
+    write_pieces(path, scene_pieces(groom.head, strands, options.written_space, bust))
     return True

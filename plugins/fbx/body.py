@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array
+from hairkit.head_model.bust import CLOTH, Bust
 from hairkit.head_model.skinning import JOINT_NAMES, head_weights
 from hairkit.types.head import Head
 
-from .look import add_shapes, add_skin_material
+from .look import add_material, add_shapes, add_skin_material
 from .records import Record, array, number, record, text
 from .scene import SCENE, Scene, one
 
@@ -30,36 +33,52 @@ def add_body(scene: Scene, head: Head) -> None:
 
 
 def _add_geometry(scene: Scene, head: Head) -> int:
-    space = scene.space
-    faces = space.faces_to_file(head.faces)
-    polygons = faces.copy()
-    polygons[:, 2] = -polygons[:, 2] - 1  # the last corner of each polygon is marked so
+    faces = scene.space.faces_to_file(head.faces)
     scalp = np.repeat(head.scalp[:, None], 4, axis=1)
     scalp[:, 3] = 1.0
     layers = {
-        "Normal": _layer(
-            "Normal", "", "ByVertice", "Direct", _normals_record("Normals", head, scene)
-        ),
         "Color": _indexed_layer("Color", "scalp", "Colors", "ColorIndex", scalp, faces),
         "UV": _indexed_layer("UV", "map1", "UV", "UVIndex", head.uv, faces),
-        "Material": _layer(
-            "Material", "", "AllSame", "IndexToDirect", record("Materials", array("i", [0]))
-        ),
+    }
+    return _add_mesh(scene, "head_mesh", head.vertices, head.faces, head.normals(), layers)
+
+
+def add_bust(scene: Scene, bust: Bust) -> None:
+    """Add the bust as a mesh of its own, without bones."""
+    mesh = scene.add_model("torso", "Mesh", SCENE)
+    scene.connect(_add_mesh(scene, "torso", *bust, {}), mesh)
+    scene.connect(add_material(scene, "cloth", CLOTH), mesh)
+
+
+def _add_mesh(
+    scene: Scene,
+    name: str,
+    vertices: Float32Array,
+    faces: Int32Array,
+    normals: Float32Array | Float64Array,
+    layers: Mapping[str, Record],
+) -> int:
+    """Add a mesh of triangles with normals, one material and more layers; return its id."""
+    space = scene.space
+    polygons = space.faces_to_file(faces).copy()
+    polygons[:, 2] = -polygons[:, 2] - 1  # the last corner of each polygon is marked so
+    upright = record("Normals", array("d", space.directions_to_file(normals)))
+    alike = record("Materials", array("i", [0]))
+    layers = {
+        "Normal": _layer("Normal", "", "ByVertice", "Direct", upright),
+        **layers,
+        "Material": _layer("Material", "", "AllSame", "IndexToDirect", alike),
     }
     return scene.add(
         "Geometry",
-        "head_mesh",
+        name,
         "Mesh",
         record("GeometryVersion", number("I", 124)),
-        record("Vertices", array("d", space.points_to_file(head.vertices))),
+        record("Vertices", array("d", space.points_to_file(vertices))),
         record("PolygonVertexIndex", array("i", polygons)),
         *layers.values(),
         _layer_list(list(layers)),
     )
-
-
-def _normals_record(name: str, head: Head, scene: Scene) -> Record:
-    return record(name, array("d", scene.space.directions_to_file(head.normals())))
 
 
 def _indexed_layer(

@@ -28,21 +28,26 @@ _SLOTS = {
 def add_skin_material(scene: Scene, maps: SkinMaps | None) -> int:
     """Add the material and its maps; return its id."""
     present = {} if maps is None else maps.present()
-    material = scene.add(
+    material = add_material(scene, "skin", (1, 1, 1) if "albedo" in present else SKIN)
+    for kind, texture in present.items():
+        scene.connect(_add_texture(scene, kind, texture), material, _SLOTS[kind])
+    return material
+
+
+def add_material(scene: Scene, name: str, colour: tuple[float, float, float]) -> int:
+    """Add a matt material of one colour, linear RGB; return its id."""
+    return scene.add(
         "Material",
-        "skin",
+        name,
         "",
         record("Version", number("I", 102)),
         record("ShadingModel", text("phong")),
         record("MultiLayer", number("I", 0)),
         properties70(
-            one("DiffuseColor", "Color", "", "A", *((1, 1, 1) if "albedo" in present else SKIN)),
+            one("DiffuseColor", "Color", "", "A", *colour),
             one("SpecularFactor", "Number", "", "A", SKIN_SPECULAR),
         ),
     )
-    for kind, texture in present.items():
-        scene.connect(_add_texture(scene, kind, texture), material, _SLOTS[kind])
-    return material
 
 
 def _add_texture(scene: Scene, kind: str, texture: Texture) -> int:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
 
+from hairkit.head_model.bust import Bust
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
@@ -61,13 +62,17 @@ class Scene:
         self.connections.append((child, parent, drives))
 
 
-def scene_pieces(head: Head, strands: Strands | None, space: FileSpace) -> list[bytes]:
-    """Return the file, in pieces, of a head, and of strands where there are some."""
-    from .body import add_body
+def scene_pieces(
+    head: Head, strands: Strands | None, space: FileSpace, bust: Bust | None = None
+) -> list[bytes]:
+    """Return the file, in pieces, of a head, and of strands and a bust where there are some."""
+    from .body import add_body, add_bust
     from .curves import add_curves
 
     scene = Scene(space)
     add_body(scene, head)
+    if bust is not None:
+        add_bust(scene, bust)
     if strands is not None:
         add_curves(scene, strands)
     return file_pieces(_document(scene))

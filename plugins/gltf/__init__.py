@@ -89,6 +89,7 @@ class Options(ExportOptions, AnimationOptions, ImportOptions):
         "MASK", choices=("OPAQUE", "MASK", "BLEND"), doc="How the strips' texture is cut out."
     )
     head_mesh: bool = option(True, doc="Write the head.")
+    bust: bool = option(True, doc="Write a clothed bust under a head that ends at the neck.")
     animation: str = option(
         "morph",
         choices=("morph", "skin", "none"),

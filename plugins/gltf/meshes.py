@@ -12,6 +12,7 @@ from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
+from hairkit.head_model.bust import CLOTH, Bust
 from hairkit.io.strand_blocks import shares
 from hairkit.types.groom import Groom
 from hairkit.types.skin import SkinMaps
@@ -23,9 +24,9 @@ from .streamed import Streamed, at_points, repeat_row, segments
 from .strips import HairMesh
 
 JOINTS = ("root", "neck", "head")
-HEAD_JOINT = JOINTS.index("head")
+ROOT_JOINT, HEAD_JOINT = JOINTS.index("root"), JOINTS.index("head")
 LINES = 1
-ROUGHNESS = {"hair": 0.45, "guides": 0.6}
+ROUGHNESS = {"hair": 0.45, "guides": 0.6, "cloth": 0.9}
 _SCALP_SHADE = 0.6
 """Brightness of the scalp in shares of the roots' colour: hair shades what lies below it."""
 
@@ -55,6 +56,21 @@ class Meshes:
         names = [shape.name for shape in head.blendshapes]
         shapes = [shape.offsets for shape in head.blendshapes]
         return self._with_shapes("head_mesh", primitive, shapes, names)
+
+    def torso(self, bust: Bust) -> int:
+        """Add the bust, which stays with the root joint, and return its mesh."""
+        add, count = self.document.accessor, len(bust.vertices)
+        attributes = {
+            "POSITION": add(bust.vertices, bounds=True),
+            "NORMAL": add(bust.normals),
+            **self._skin(count, ROOT_JOINT),
+        }
+        primitive = {
+            "attributes": attributes,
+            "indices": self.document.indices(bust.faces, count),
+            "material": _plain(self.document, "cloth", np.array(CLOTH)),
+        }
+        return self._with_shapes("torso", primitive, ())
 
     def _scalp_tint(self) -> Float64Array:
         """Return colours (V, 3) by which the skin is multiplied: the roots' on the scalp."""
@@ -148,10 +164,10 @@ class Meshes:
             "meshes", name=name, primitives=[primitive], weights=weights, extras=extras
         )
 
-    def _skin(self, count: int) -> dict[str, int]:
-        """Return the attributes that tie vertices to the head joint alone."""
+    def _skin(self, count: int, joint: int = HEAD_JOINT) -> dict[str, int]:
+        """Return the attributes that tie vertices to one joint alone."""
         joints, weights = np.zeros((2, 4), np.uint8)
-        joints[0], weights[0] = HEAD_JOINT, 255
+        joints[0], weights[0] = joint, 255
         add = self.document.accessor
         bound, whole = repeat_row(joints, count), repeat_row(weights, count)
         return {"JOINTS_0": add(bound), "WEIGHTS_0": add(whole, normalised=True)}

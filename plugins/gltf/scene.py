@@ -10,6 +10,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.grooming.prepare_export import PreparedGroom
+from hairkit.head_model.bust import bust_under
 from hairkit.types.groom import Groom
 
 from .baking import Baked, bake
@@ -19,6 +20,8 @@ from .meshes import HEAD_JOINT, JOINTS, ROUGHNESS, Meshes, brightest
 from .strips import StripOptions, hair_meshes
 from .texture import strand_pictures, white_picture
 
+BODY = ("head_mesh", "torso")
+"""Meshes without the hair's shapes."""
 _CUTOFF = 0.4
 _STRANDS_ON = {"ribbons": 6, "cards": 22}
 """Strands in the picture of each strip."""
@@ -33,6 +36,8 @@ class SceneOptions(StripOptions, Protocol):
     def alpha(self) -> str: ...
     @property
     def head_mesh(self) -> bool: ...
+    @property
+    def bust(self) -> bool: ...
     @property
     def animation(self) -> str: ...
     @property
@@ -58,6 +63,9 @@ def groom_document(ready: PreparedGroom, options: SceneOptions) -> Document:
     )
     meshes = Meshes(document, groom)
     shared = [("head_mesh", meshes.head())] if options.head_mesh else []
+    bust = bust_under(groom.head, groom.strands) if options.head_mesh and options.bust else None
+    if bust is not None:
+        shared.append(("torso", meshes.torso(bust)))
     levels = []
     if options.hair != "none":
         material = _hair_material(document, groom, options)
@@ -109,7 +117,7 @@ def _scene(
     )
     nodes = [document.add("nodes", name=name, mesh=mesh, skin=skin) for name, mesh in parts]
     document.add("scenes", name=f"LOD{level}", nodes=[numbers[0], *nodes])
-    moving = [node for node, (name, _) in zip(nodes, parts, strict=True) if name != "head_mesh"]
+    moving = [node for node, (name, _) in zip(nodes, parts, strict=True) if name not in BODY]
     return numbers[HEAD_JOINT], moving if morphs else []
 
 

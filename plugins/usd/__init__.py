@@ -56,6 +56,7 @@ class Options(SpaceOptions, ImportOptions, AnimationOptions, ExportOptions):
     """
 
     head_mesh: bool = option(True, doc="Write the head's mesh.")
+    bust: bool = option(True, doc="Write a clothed bust under a head that ends at the neck.")
     attributes: bool = option(
         True,
         doc="Write ids, groups, guides and their weights, uv and colours of the strands; false"

@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.arrays import Float64Array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array
 from hairkit.grooming.prepare_export import PreparedGroom
+from hairkit.head_model.bust import bust_under
 from hairkit.head_model.skinning import JOINT_NAMES, head_weights
 from hairkit.io.coordinate_space import FileSpace
+from hairkit.types.groom import Groom
 from hairkit.types.head import Head
 from hairkit.types.point_cache import PointCache
 
@@ -69,21 +71,45 @@ def _add_motion(
 
 def add_head(stage: Any, head: Head, space: FileSpace, skeleton: Any, material: Any) -> None:
     """Add the head mesh with normals, uv, skin, and what hairkit reads back."""
-    from pxr import UsdGeom, UsdShade, Vt
+    from pxr import UsdShade
 
-    mesh = UsdGeom.Mesh.Define(stage, "/Groom/Head")
-    points = Vt.Vec3fArray.FromNumpy(space.points_to_file(head.vertices))
-    mesh.CreatePointsAttr(points)
-    mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(head.faces), 3))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(head.faces.ravel()))
-    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(space.directions_to_file(head.normals())))
-    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh = _add_mesh(stage, "/Groom/Head", head.vertices, head.faces, head.normals(), space)
     _add_vertex_data(mesh.GetPrim(), head)
     _add_skin(mesh.GetPrim(), head, skeleton)
     _add_shapes(stage, mesh.GetPrim(), head, space)
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def add_bust(stage: Any, groom: Groom, space: FileSpace, material: Any) -> None:
+    """Add the bust under a head that ends at its neck; it keeps still."""
+    from pxr import UsdShade
+
+    bust = bust_under(groom.head, groom.strands)
+    if bust is not None:
+        mesh = _add_mesh(stage, "/Groom/Torso", bust.vertices, bust.faces, bust.normals, space)
+        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+
+
+def _add_mesh(
+    stage: Any,
+    path: str,
+    vertices: Float32Array,
+    faces: Int32Array,
+    normals: Float32Array | Float64Array,
+    space: FileSpace,
+) -> Any:
+    from pxr import UsdGeom, Vt
+
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    points = Vt.Vec3fArray.FromNumpy(space.points_to_file(vertices))
+    mesh.CreatePointsAttr(points)
+    mesh.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(faces), 3))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(faces.ravel()))
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(space.directions_to_file(normals)))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    return mesh
 
 
 def _add_vertex_data(prim: Any, head: Head) -> None:

@@ -7,23 +7,25 @@ from dataclasses import dataclass
 from typing import Any
 
 from hairkit.arrays import Float32Array
+from hairkit.head_model.bust import CLOTH
 from hairkit.types.groom import Groom
 
 SKIN = (0.5, 0.36, 0.29)
 """Linear RGB of the head mesh, whose colour the photos do not give."""
-_HAIR_ROUGHNESS, _SKIN_ROUGHNESS = 0.35, 0.6
+_HAIR_ROUGHNESS, _SKIN_ROUGHNESS, _CLOTH_ROUGHNESS = 0.35, 0.6, 0.9
 
 
 @dataclass(frozen=True)
 class Materials:
-    """The stage's UsdShade.Material of hair and of skin."""
+    """The stage's UsdShade.Material of hair, skin and clothes."""
 
     hair: Any
     skin: Any
+    cloth: Any
 
 
 def add_materials(stage: Any, groom: Groom, pictures: Mapping[str, str]) -> Materials:
-    """Add both; hair has the mean of its root's and tip's colour, `displayColor` the gradient.
+    """Add them; hair has the mean of its root's and tip's colour, `displayColor` the gradient.
 
     `pictures` are the file names of the skin's maps, beside the stage's own file.
     """
@@ -36,7 +38,8 @@ def add_materials(stage: Any, groom: Groom, pictures: Mapping[str, str]) -> Mate
     hair = _add(stage, "/Groom/Materials/Hair", colour, _HAIR_ROUGHNESS)
     skin = _add(stage, "/Groom/Materials/Skin", SKIN, _SKIN_ROUGHNESS)
     _add_pictures(stage, "/Groom/Materials/Skin", pictures)
-    return Materials(hair, skin)
+    cloth = _add(stage, "/Groom/Materials/Cloth", CLOTH, _CLOTH_ROUGHNESS)
+    return Materials(hair, skin, cloth)
 
 
 def _add(stage: Any, path: str, colour: tuple[float, float, float], roughness: float) -> Any:

@@ -27,6 +27,8 @@ class StageOptions(Protocol):
     @property
     def head_mesh(self) -> bool: ...
     @property
+    def bust(self) -> bool: ...
+    @property
     def attributes(self) -> bool: ...
 
 
@@ -97,7 +99,7 @@ def _fill(
 ) -> None:
     from pxr import Kind, Usd, UsdSkel
 
-    from .body import add_head, add_skeleton
+    from .body import add_bust, add_head, add_skeleton
     from .curves import add_hair
     from .look import add_materials
     from .settings import settings_of
@@ -110,6 +112,8 @@ def _fill(
     skeleton = add_skeleton(stage, ready, space, time_codes(ready))
     if options.head_mesh:
         add_head(stage, ready.groom.head, space, skeleton, materials.skin)
+        if options.bust:
+            add_bust(stage, ready.groom, space, materials.cloth)
     add_hair(
         stage,
         ready,
