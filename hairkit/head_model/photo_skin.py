@@ -234,7 +234,7 @@ def _blend(
     shares = [(view.weight / np.maximum(best, LEAST)) ** SHARPNESS for view in views]
     share_sum = np.maximum(np.sum(shares, axis=0), LEAST)
     for view, photo, gain, share in zip(views, photos, gains, shares, strict=True):
-        if not view.weight.any():
+        if not share.any():
             continue
         factor = gain.astype(np.float32)
         smooth = _smooth(view.coarse * factor, view.weight)

@@ -98,6 +98,20 @@ def test_without_skin_the_head_keeps_its_own(
     assert np.abs(found.sample(uv) - own.albedo.sample(uv)).mean() < 0.01
 
 
+def test_a_view_that_sees_next_to_nothing_changes_nothing() -> None:
+    """A view whose weight vanishes beside another's neither fails nor shows in the colours."""
+    size = photo_skin.COARSE
+    photo = np.full((size, size, 3), 120, np.uint8)
+    row, column = np.indices((size, size)).astype(np.float32)
+    whole = photo_skin._Seen(
+        np.ones((size, size), np.float32), column, row, photo.astype(np.float32)
+    )
+    faint = whole._replace(weight=1e-9 * whole.weight, coarse=whole.coarse + 100)
+    alone, _ = photo_skin._blend([whole], [photo], np.ones((1, 3)))
+    both, _ = photo_skin._blend([whole, faint], [photo, photo + 100], np.ones((2, 3)))
+    np.testing.assert_allclose(both, alone, atol=1e-3)
+
+
 def test_gains_make_views_agree() -> None:
     """Views that are multiples of one picture are evened, by gains whose mean logarithm is 0."""
     generator = np.random.default_rng(3)
