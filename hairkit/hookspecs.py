@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from hairkit.types.parting import Parting
     from hairkit.types.person import Person
     from hairkit.types.scene import Scene
+    from hairkit.types.skin import Texture
     from hairkit.types.strands import Strands
+    from hairkit.types.texture_example import TextureExample
     from hairkit.types.tie import TiedHair
     from hairkit.types.turnaround import Turnaround
     from hairkit.types.volume import Hull, OrientationField, ScalpDistance
@@ -35,7 +37,7 @@ PROJECT = "hairkit"
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
 
-HOOKSPEC_VERSION = (1, 2)
+HOOKSPEC_VERSION = (1, 3)
 """Version of this contract. The second number grows when hooks or arguments are added, the first
 when one is removed or changes; a plugin may check it when it is imported."""
 
@@ -79,6 +81,13 @@ def refine_masks(
 @hookspec(firstresult=True)
 def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: Any) -> Scene | None:
     """Fit the shape of the scene's head to the photos, refine the cameras; its mesh is kept."""
+
+
+@hookspec(firstresult=True)
+def enhance_texture(
+    texture: Texture, example: TextureExample | None, options: Any
+) -> Texture | None:
+    """Make a texture of the head finer, or filter it, after an example; it keeps its shape."""
 
 
 @hookspec(firstresult=True)

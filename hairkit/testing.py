@@ -24,7 +24,9 @@ from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
+from hairkit.types.skin import Texture
 from hairkit.types.strands import Strands
+from hairkit.types.texture_example import TextureExample
 from hairkit.types.tie import TiedHair
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_products
 from hairkit.types.waves import Waves
@@ -50,6 +52,8 @@ _FINE_STRIPES, _COARSE_STRIPES = (60, 6), (20, 17)
 """Amplitude in grey levels and period in pixels: strands, and locks of them."""
 _NECK = -0.1
 """Height of the neck's joint, metres; the root is as far below it as the head's joint above."""
+_TEXTURE, _TEXTURE_STRIPES, _EXAMPLE_STRIPES = 64, 20.0, 70.0
+"""Edge of a texture in pixels, and the directions of its stripes and its example's, degrees."""
 _BRISTLE, _BRISTLE_POINTS = 0.03, 5
 """Length of the straight strands in metres, and their points."""
 
@@ -68,6 +72,8 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
     masks = tuple(ball_mask(camera) for camera in scene.cameras)
     if stage in ("make_simulator", "export_groom", "import_groom"):
         return _groom_arguments(stage, folder)
+    if stage == "enhance_texture":
+        return _texture_arguments()
     hull = shell_hull()
     every: dict[str, Any] = {
         "capture": capture,
@@ -236,6 +242,15 @@ def _shell(grid: VoxelGrid, radius: float) -> tuple[Float32Array, BoolArray]:
     distance = np.linalg.norm(centres, axis=-1)
     hair = (distance > _BALL) & (distance < radius) & (centres[..., 1] > 0)
     return (distance - _BALL).astype(np.float32), hair
+
+
+def _texture_arguments() -> dict[str, Any]:
+    """Return stripes as the texture, and stripes of another direction as its example."""
+    texture, filtered = (
+        Texture.encode(striped_view(angle).image[:_TEXTURE, :_TEXTURE])
+        for angle in (_TEXTURE_STRIPES, _EXAMPLE_STRIPES)
+    )
+    return {"texture": texture, "example": TextureExample(filtered)}
 
 
 def _groom_arguments(stage: str, folder: Path | None) -> dict[str, Any]:

@@ -25,6 +25,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `studio`: photos to moving hair in a browser
 * `synth`: procedural captures
 * `study`: questionnaires
+* `texture`: textures made finer, filtered, or turned into bump and normal maps
 * `view`: the viewer
 """
 
@@ -52,6 +53,7 @@ VERBS = {
     "evaluate": "score a groom against the truth",
     "synth": "make a procedural groom and photos of it, with their truth",
     "study": "make a questionnaire: which hair is whose",
+    "texture": "sharpen or filter a texture, make bump and normal maps",
     "render": "draw a groom on its head",
     "view": "show a groom in motion, in a window or by a script",
     "export": "write a groom in an engine's format",

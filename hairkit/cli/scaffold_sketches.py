@@ -134,6 +134,20 @@ return Masks(tuple(refined))""",
 head = replace(scene.head, vertices=scene.head.vertices * options.scale)
 return replace(scene, head=head)""",
     ),
+    "enhance_texture": Sketch(
+        "More contrast.",
+        (
+            _NUMPY,
+            "from hairkit.types.skin import Texture",
+        ),
+        'gain: float = option(1.2, low=0.1, high=10.0, doc="Of the contrast.")',
+        "texture: Texture, options: Options) -> Texture",
+        """
+pixels = texture.pixels.astype(np.float32)
+mean = pixels.mean(axis=(0, 1))
+stronger = np.clip(mean + options.gain * (pixels - mean), 0, 255)
+return Texture.encode(np.rint(stronger).astype(np.uint8))""",
+    ),
     "orient": Sketch(
         "Strands run across the gradient of brightness.",
         (

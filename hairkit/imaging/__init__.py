@@ -11,5 +11,6 @@ measured over all views.
 * `hair_network`: probability of hair, person and background by a small network
 * `masked_filters`: filters that respect a mask, means of undirected angles
 * `seeded_segmentation`: hair, person and background from seeds
+* `relief`: bump and normal maps, pictures of differences
 * `waves`: radius and pitch of waves in the orientation maps
 """

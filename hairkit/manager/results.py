@@ -21,6 +21,7 @@ from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
+from hairkit.types.skin import Texture
 from hairkit.types.strands import Strands
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid
@@ -108,6 +109,17 @@ def _head_keeps_its_mesh(scene: Scene, call: Call) -> None:
     for name in ("faces", "uv"):
         if not np.array_equal(getattr(old, name), getattr(new, name)):
             raise DataError(f"head {name} changed, expected those of the head that came in")
+
+
+def _texture_keeps_its_shape(texture: Texture, call: Call) -> None:
+    height, width = call.arguments["texture"].pixels.shape[:2]
+    found = texture.pixels.shape[:2]
+    factor = max(found[0] // height, 1)
+    if found != (factor * height, factor * width):
+        raise DataError(
+            f"the texture has {found[1]} x {found[0]} pixels,"
+            f" expected {width} x {height} or a multiple of it"
+        )
 
 
 def _field_is_on_the_hull(field: OrientationField, call: Call) -> None:
@@ -201,6 +213,7 @@ RESULTS: dict[str, tuple[type, tuple[Check, ...]]] = {
     "estimate_scene": (Scene, (_scene_has_a_camera_per_photo,)),
     "refine_masks": (Masks, (_masks_have_photo_sizes,)),
     "fit_head": (Scene, (_scene_has_a_camera_per_photo, _head_keeps_its_mesh)),
+    "enhance_texture": (Texture, (_texture_keeps_its_shape,)),
     "orient": (OrientationMap, (_angles_have_photo_size,)),
     "build_hull": (Hull, ()),
     "solve_field": (OrientationField, (_field_is_on_the_hull,)),

@@ -5,6 +5,7 @@ plugins.
 
 * `contact_sheet`: one picture of all stages
 * `draft`: a quick groom after a change by hand
+* `find_skin`: the skin of the head, from the photos and after an example
 * `head_alone`: the head with its skin, without hair
 * `health`: figures that tell how good a run is
 * `module_digest`: digests of the code that made a cached result

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.errors import InputError
-from hairkit.head_model.photo_skin import photograph_skin
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import read_capture
 from hairkit.io.head_reader import write_head_obj
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
+from hairkit.pipeline.find_skin import find_skin
 from hairkit.pipeline.own_head import mark_head
 from hairkit.pipeline.recipe import Recipe, load_recipe
 from hairkit.pipeline.reconstruct import find_views, fit_scene, label_views, tell_missing
@@ -29,7 +29,6 @@ from hairkit.types.capture import Capture
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head
 from hairkit.types.scene import Scene
-from hairkit.types.skin import SkinMaps
 from hairkit.types.strands import Strands
 
 EXPORTERS = {".glb": "gltf", ".fbx": "fbx"}
@@ -87,11 +86,9 @@ def photograph_head(
         views = Given.of(capture)
         masks = label_views(run, views, start)
         scene = fit_scene(run, views, masks, start)
-        skin = run.derive(
-            "skin", SkinMaps, photograph_skin, capture=views, scene=scene, masks=masks
-        )
+        skin = find_skin(run, views, masks, scene)
         work.flush()
-        return replace(scene.value, head=replace(scene.value.head, maps=skin.value))
+        return replace(scene.value, head=replace(scene.value.head, maps=skin))
 
 
 def write_head(path: str | os.PathLike[str], head: Head, manager: Manager | None = None) -> None:

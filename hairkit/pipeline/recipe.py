@@ -42,6 +42,7 @@ HOOKS = {
     "scene": "estimate_scene",
     "refine": "refine_masks",
     "head": "fit_head",
+    "texture": "enhance_texture",
     "orient": "orient",
     "hull": "build_hull",
     "field": "solve_field",
@@ -188,7 +189,7 @@ def parse_recipe(data: bytes, name: str, source: str) -> Recipe:
         if content is False and key not in NEEDED:
             del tables[key]
         elif isinstance(content, dict) and "plugin" not in content:
-            tables[key] = {**_default_tables()[key], **content}
+            tables[key] = {**_default_tables().get(key, {}), **content}
     stages = tuple(_stage(key, tables[key], source) for key in HOOKS if key in tables)
     return Recipe(name, source, str(description), stages)
 
@@ -244,7 +245,7 @@ def _stage(table: str, content: object, source: str) -> Stage:
     if not isinstance(content, dict):
         also = "" if table in NEEDED else f", or {table} = false to leave the stage out"
         raise InputError(f"{source}: {table} is {content!r}, expected a table [{table}]{also}")
-    named = content["plugin"]
+    named = content.get("plugin")
     names = [named] if isinstance(named, str) else named
     if not isinstance(names, list) or not all(isinstance(n, str) and n for n in names):
         raise InputError(f"{source}: {table}.plugin is {named!r}, expected a plugin's name")

@@ -18,7 +18,6 @@ from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.field.ties import measure_ties
 from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.hairline import Hairline, measure_hairline
-from hairkit.head_model.photo_skin import photograph_skin
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.imaging.waves import measure_waves
@@ -26,6 +25,7 @@ from hairkit.io.capture_reader import read_capture
 from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
+from hairkit.pipeline.find_skin import find_skin
 from hairkit.pipeline.health import RED, Figure, assess
 from hairkit.pipeline.own_head import mark_head
 from hairkit.pipeline.recipe import Recipe, load_recipe, missing_networks
@@ -44,7 +44,6 @@ from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
-from hairkit.types.skin import SkinMaps
 from hairkit.types.strands import Strands
 from hairkit.types.tie import TiedHair
 from hairkit.types.turnaround import Turnaround
@@ -262,8 +261,8 @@ def _grow(
     waves, distance = seen["waves"].value, seen["scalp_distance"].value
     parting, tied = seen["parting"].value, seen["tied"].value
     hairline = run.derive("hairline", Hairline, measure_hairline, scene=scene, masks=masks)
-    skin = run.derive("skin", SkinMaps, photograph_skin, capture=photos, scene=scene, masks=masks)
-    grown = replace(scene.value.head, density=hairline.value.density, maps=skin.value)
+    skin = find_skin(run, photos, masks, scene)
+    grown = replace(scene.value.head, density=hairline.value.density, maps=skin)
     roots = Given.of(sample_roots(grown, guides, seed, rest=head))
     strands = run.once("track", Strands, **seen, field=field, roots=roots)
     labels = tuple(mask.result().value for mask in masks)

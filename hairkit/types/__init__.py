@@ -18,6 +18,7 @@ the packages named after the subject.
 * `scene`: cameras and fitted head
 * `skin`: texture maps and blendshapes of a head
 * `strands`: packed polylines
+* `texture_example`: what a texture is to become
 * `tie`: ties, and the tails that hang from them
 * `turnaround`: from where each photo was taken
 * `volume`: grid, hull, orientation field, distance from the scalp

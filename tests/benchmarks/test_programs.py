@@ -13,10 +13,11 @@ import pytest
 from hairkit.cli import main as hairkit
 
 PROJECT = Path(__file__).parents[2]
-SHARED = {"captures_argument"}
+SHARED = {"captures_argument", "example_textures", "plain_analogies"}
 """Modules that programs import."""
 PROGRAMS = sorted({path.stem for path in (PROJECT / "benchmarks").glob("*.py")} - SHARED)
 SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
+    "analogies": ({"SMALL": 16, "LARGE": 24, "SEEDS": 1, "ROWS": 1}, []),
     "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "head_fit": ({}, ["CAPTURES"]),
@@ -41,6 +42,7 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "strokes": ({"STROKES": 1}, ["CAPTURES", "--tool", "brush"]),
     "studio": ({"GUIDES": 30}, ["--photos", "CAPTURES/short/photos", "--strokes", "1"]),
     "super_helix": ({"GUIDES": 8, "ELEMENTS": 5, "FRAMES": 2}, []),
+    "texture_gallery": ({"SIZE": 64}, ["-o", "CAPTURES/gallery"]),
     "threads": ({"REPETITIONS": 1}, ["--runs", "2"]),
     "turn": ({"SHUFFLES": 1}, ["CAPTURES"]),
     "viewer": (

@@ -20,6 +20,7 @@ from hairkit.cli import VERBS, main
 from hairkit.head_model.template import default_head
 from hairkit.synth import grow
 from hairkit.testing import turn_scene
+from hairkit.types.skin import Texture
 
 PROJECT = Path(__file__).parents[2]
 PAGES = [PROJECT / "README.md", *sorted((PROJECT / "docs").rglob("*.md"))]
@@ -33,6 +34,11 @@ LIGHTER = {
     "render": ["--size", "48x64", "--hairs", "100"],
 }
 """Further arguments that make a run quick."""
+PICTURES = (
+    "scan", "close_up", "albedo", "plain", "painted", "labels", "map", "photo", "bump",
+    "other_albedo", "other_normal",
+)  # fmt: skip
+"""Textures that pages speak of, all .png."""
 FEW_GUIDES = "10"
 """Guides where a page chooses some from full hair: the stand-in has few strands."""
 
@@ -117,6 +123,9 @@ def folder(tmp_path: Path, groom: hairkit.Groom, monkeypatch: pytest.MonkeyPatch
         still.save(name)
     turn_scene().write_json("out/scene.json")
     hairkit.export(groom, "hair.abc")
+    for name in PICTURES:
+        grain = np.random.default_rng(len(name)).integers(60, 200, (48, 48, 3), np.uint8)
+        Path(f"{name}.png").write_bytes(Texture.encode(grain).data.tobytes())
     return tmp_path
 
 

@@ -27,6 +27,7 @@ from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
+from hairkit.types.skin import SkinMaps, Texture
 from hairkit.types.strands import Strands
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull, VoxelGrid
@@ -43,6 +44,8 @@ def right(hook: str, given: Arguments) -> Any:
         return stage_arguments("make_simulator")["groom"]
     if hook == "fit_head":
         return given["scene"]
+    if hook == "enhance_texture":
+        return given["texture"]
     function = getattr(ball_plugin, hook)
     names = function.__code__.co_varnames[: function.__code__.co_argcount]
     return function(**{name: OPTIONS if name == "options" else given[name] for name in names})
@@ -185,6 +188,15 @@ WRONG: dict[str, dict[str, Callable[[Arguments], Any]]] = {
     "fit_head": {
         "camera of view 'front' has 48 x 64 pixels": scene(small_cameras, "fit_head"),
         "head faces changed": scene(turned_faces, "fit_head"),
+    },
+    "enhance_texture": {
+        "the texture has 64 x 32 pixels, expected 64 x 64": lambda given: Texture.encode(
+            given["texture"].pixels[:32]
+        ),
+        "the texture has 65 x 64 pixels": lambda given: Texture.encode(
+            np.pad(given["texture"].pixels, ((0, 0), (0, 1), (0, 0)))
+        ),
+        "returned SkinMaps, expected Texture": lambda given: SkinMaps(given["texture"]),
     },
     "orient": {
         "angle has 1 values that are not finite": angles("angle", np.nan),
