@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import logging
 import re
-import runpy
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -180,48 +177,3 @@ def test_equal_grooms_are_equal_files_and_failures_leave_none(
     with pytest.raises(KeyboardInterrupt):
         written(manager, bristle_groom(), tmp_path / "c")
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a", "b"]
-
-
-class Stand:
-    """Stands for `maya.cmds`: notes the commands, and knows the nodes of one imported scene."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene, self.done = scene, []
-
-    def __getattr__(self, name: str) -> Any:
-        return lambda *values, **flags: self.done.append((name, values, flags))
-
-    def ls(self, pattern: str, **flags: Any) -> list[str]:
-        """Return the groups, as full paths."""
-        start = pattern.rstrip("*")
-        return [p for p in self.scene.transforms if p.rpartition("|")[2].startswith(start)]
-
-    def listRelatives(self, groups: list[str], **flags: Any) -> list[str]:  # noqa: N802 - Maya's name
-        """Return the curves below the groups."""
-        return [p for p in self.scene.curves if any(p.startswith(g + "|") for g in groups)]
-
-
-def test_the_maya_script_asks_for_each_file_and_selects_guides(
-    manager: Manager, tmp_path: Path, project: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Every kind of file goes to its command and plug-in; guides, no hair, are selected."""
-    groom = rich_groom()
-    stand = Stand(written(manager, groom, tmp_path / "a.ma"))
-    module = ModuleType("maya")
-    module.cmds = stand  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "maya", module)
-    script = runpy.run_path(str(project / "examples/maya/import_hairkit.py"))
-    curves = script["import_files"]("a.ma", "b.fbx", "c.abc", "d.usdc")
-    assert groom.strands.guide is not None
-    assert len(curves) == np.count_nonzero(groom.strands.guide)
-    assert all("|guide_" in path for path in curves)
-    names = [name for name, _, _ in stand.done]
-    assert names == [
-        "file",
-        *["loadPlugin", "file"],
-        *["loadPlugin", "AbcImport"],
-        *["loadPlugin", "mayaUSDImport"],
-        "select",
-    ]
-    with pytest.raises(ValueError, match="expected"):
-        script["import_files"]("e.obj")
