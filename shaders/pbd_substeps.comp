@@ -8,6 +8,7 @@
 #include "pbd_substep_schedule.glsl"
 
 const float SHARPEST = 0.3, LARGEST_SPIN = 0.3, SOFTEST = 1e-3, SINGULAR = 1e-6;
+const float FASTEST_TURN = 1.0, TINY = 1e-20;
 
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
 uniform sampler2D u_wind;      // of each node, world, m/s
@@ -192,6 +193,19 @@ void go_on() {
 
 #include "pbd_contact.glsl"
 
+// Give segments their exact lengths, from the root to the tip, and bound how fast they turn.
+void keep_lengths() {
+    for (int j = 0; j < EACH_SEGMENT; j++) {
+        vec3 now = place[j + 1] - place[j];
+        float size = banded(j).w;
+        vec3 way = (size / sqrt(dot(now, now) + TINY) - 1.0) * now;
+        place[j + 1] += way;
+        vec3 apart = speed[j + 1] + way / u_seconds - speed[j];
+        float share = FASTEST_TURN * size / (u_seconds * sqrt(dot(apart, apart) + TINY));
+        speed[j + 1] = speed[j] + min(share, 1.0) * apart;
+    }
+}
+
 void main() {
     rod = invocation();
     if (rod >= u_rods) return;
@@ -213,6 +227,7 @@ void main() {
         add_elastic();
         go_on();
         if (u_obstacles) resolve_contacts(k);
+        keep_lengths();
     }
     for (int j = 0; j < EACH_NODE; j++) {
         imageStore(u_new_state, texel(rod, 2 * j, STATE_ROWS), vec4(place[j], slack[j]));

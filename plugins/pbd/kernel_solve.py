@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .simd import load, pick, store
+from .simd import lane_root, load, pick, store
 from .simd_math import dot, load_three, minus, plus, row, store_three, times
 
 LENGTH, FIRST, SECOND, PIVOT = 0, 8, 9, 10
 EDGE, DIRECTION = 0, 3
+PLACE, SPEED = 0, 3
 ONE, ZERO, LEAST = np.float32(1), np.float32(0), np.float32(1e-6)
+FASTEST_TURN, TINY = np.float32(1.0), np.float32(1e-20)
 
 
 @row
@@ -119,3 +121,21 @@ def tension_to_force(tension, segment, force) -> None:  # type: ignore[no-untype
         store_three(force, j, 0, minus(before, after))
         before = after
     store_three(force, m, 0, before)
+
+
+@row
+def keep_lengths(x, element, h) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Give segments their exact lengths, from the root to the tip; bound how fast they turn."""
+    over = ONE / h
+    place, speed = load_three(x, 0, PLACE), load_three(x, 0, SPEED)
+    for j in range(x.shape[0] - 1):
+        length, beyond = load(element, (j, LENGTH)), load_three(x, j + 1, PLACE)
+        edge = minus(beyond, place)
+        whole = times(length / lane_root(dot(edge, edge) + TINY), edge)
+        place = plus(place, whole)
+        way = times(over, minus(place, beyond))
+        apart = minus(plus(load_three(x, j + 1, SPEED), way), speed)
+        share = FASTEST_TURN * over * length / lane_root(dot(apart, apart) + TINY)
+        speed = plus(speed, times(pick(share, ONE, share, ONE), apart))
+        store_three(x, j + 1, PLACE, place)
+        store_three(x, j + 1, SPEED, speed)

@@ -24,7 +24,7 @@ from .kernel_rows import (
     transport_frame,
     twist_torque,
 )
-from .kernel_solve import excess_of, solve_banded, solve_lengths, tension_to_force
+from .kernel_solve import excess_of, keep_lengths, solve_banded, solve_lengths, tension_to_force
 from .simd import LANES, lane_root, load, store
 from .simd_math import dot, load_four, load_three, minus, plus, row, store_three, times
 
@@ -138,6 +138,7 @@ def _substep(  # type: ignore[no-untyped-def]
         for _ in range(int(settings[6] if touching else min(settings[6], ONE))):
             apply_friction(x, constants, settings, normals, line[GRIP])
             restore_lengths(x, node, element, segment, normals, line, settings)
+    keep_lengths(x, element, constants[5][0])
 
 
 @row

@@ -22,6 +22,11 @@ SOFTEST = 1e-3
 """Compliance added to the lengths of nodes in contact, as a share of a free one's."""
 LARGEST_SPIN = 0.3
 """Largest rotation of a frame by torsion in a substep, radians; limits the Newton step."""
+FASTEST_TURN = 1.0
+"""Largest rotation of a segment in a substep, radians: more than hair does, less than what linear
+solves cannot follow."""
+TINY = 1e-20
+"""Added to squares before a division."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,11 +94,9 @@ def substep(
     default substeps, since positions and directions are predicted to second order.
     """
     new, _ = solve_substep(rods, system, state, load, iterations)
-    return (
-        new
-        if contact is None
-        else resolve_contacts(rods, new, contact, load.head_step, system.step)[0]
-    )
+    if contact is not None:
+        new, _ = resolve_contacts(rods, new, contact, load.head_step, system.step)
+    return keep_lengths(rods, new, system.step)
 
 
 def solve_substep(
@@ -259,6 +262,25 @@ def friction_change(
     slowed = np.clip(grip, 0.0, speed) / np.maximum(speed, 1e-12)
     result: Float64Array = -slowed[..., None] * along
     return result
+
+
+def keep_lengths(rods: Rods, state: State, step: float) -> State:
+    """Return a state whose segments have their exact lengths, from the root to the tip.
+
+    They turn by no more than `FASTEST_TURN` in a substep. Linear solves leave little to do here;
+    after jumps this is what keeps hair whole.
+    """
+    position, velocity = state.position.copy(), state.velocity.copy()
+    for j in range(rods.nodes - 1):
+        edge = position[:, j + 1] - position[:, j]
+        size = np.sqrt((edge * edge).sum(axis=1, keepdims=True) + TINY)
+        way = (rods.length[:, j, None] / size - 1.0) * edge
+        position[:, j + 1] += way
+        apart = velocity[:, j + 1] + way / step - velocity[:, j]
+        speed = np.sqrt((apart * apart).sum(axis=1, keepdims=True) + TINY)
+        share = np.minimum(FASTEST_TURN * rods.length[:, j, None] / (step * speed), 1.0)
+        velocity[:, j + 1] = velocity[:, j] + share * apart
+    return replace(state, position=position, velocity=velocity)
 
 
 def push_out_points(points: Float64Array, contact: Contact) -> Float64Array:

@@ -245,12 +245,12 @@ def test_the_natural_shape_rests_to_rounding(rng: np.random.Generator) -> None:
 
 
 def test_inverse_statics_keeps_any_shape(rng: np.random.Generator) -> None:
-    """A curled rod loaded by gravity stays where it is for a second, to 0.1 micrometres."""
+    """A curled rod loaded by gravity stays where it is for a second, to 2 micrometres."""
     rods, _ = tangled(rng)
     state, system = rest_state(rods), system_of(rods, 1 / 240)
     for _ in range(240):
         state = substep(rods, system, state, load_of(DOWN))
-    assert np.abs(state.position - rods.points).max() < 1e-7
+    assert np.abs(state.position - rods.points).max() < 2e-6
 
 
 @pytest.mark.parametrize("curl", [0.1, 0.3, 0.7])
