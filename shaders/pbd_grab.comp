@@ -9,6 +9,8 @@ struct Grab { int rod, node; float target[3]; };         // world
 struct Learnt { vec4 standing, hoped; };                 // force; place, and 1 where it is known
 layout(std430, binding = 0) readonly buffer Grabs { Grab grabs[]; };
 layout(std430, binding = 1) buffer Known { Learnt known[]; };
+layout(std430, binding = 2) buffer Factors { float factors[]; };  // of each grab; compilers of graphics
+                                                                  // cards refuse local arrays that long
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_force;
 uniform int u_grabs;
 uniform int u_step;
@@ -52,9 +54,10 @@ void respond(int rod, int node) {
 }
 
 // The part of a free node's compliance that the length constraints remove: C^T M^-1 C with M = L D L^T, row by row.
-mat3 held_back(int rod) {
-    float factor[MANY * (MANY - 1) / 2], scaled[MANY], pivot[MANY];
+mat3 held_back(int rod, int own) {
+    float scaled[MANY], pivot[MANY];
     vec3 solved[MANY];
+    int start = own * ((u_nodes - 1) * (u_nodes - 2) / 2);
     mat3 sum = mat3(0.0);
     for (int i = 0; i < u_nodes - 1; i++) {
         vec3 way = normalize(expected[i + 1] - expected[i]);
@@ -64,11 +67,13 @@ mat3 held_back(int rod) {
         for (int j = 0; j <= i; j++) {
             float here = constant(rod, METRIC_ROW + (row + j) / 4)[(row + j) % 4]
                 * dot(way, normalize(expected[j + 1] - expected[j]));
-            for (int k = 0; k < j; k++) here -= scaled[k] * factor[j * (j + 1) / 2 + k];
+            for (int k = 0; k < j; k++) here -= scaled[k] * factors[start + j * (j - 1) / 2 + k];
             scaled[j] = here;
-            factor[row + j] = j < i ? here * pivot[j] : 1.0;
-            if (j < i) right -= factor[row + j] * solved[j];
             last = here;
+            if (j == i) break;
+            float low = here * pivot[j];
+            factors[start + i * (i - 1) / 2 + j] = low;
+            right -= low * solved[j];
         }
         // all columns before are eliminated from scaled[j]
         pivot[i] = 1.0 / max(last, LEAST_SIZE);
@@ -111,7 +116,7 @@ void main() {
     expect(rod, node);
     respond(rod, node);
     float free = column[node];
-    mat3 stiff = inverse(mat3((1.0 + u_softest) * free) - held_back(rod));
+    mat3 stiff = inverse(mat3((1.0 + u_softest) * free) - held_back(rod, first));
     vec3 sum = vec3(0.0);
     for (int i = first; i < u_grabs && same_node(i, first); i++) sum += pull(i, stiff, free);
     imageStore(u_new_force, texel(rod, node, NODES), vec4(sum, 0.0));

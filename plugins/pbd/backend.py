@@ -11,7 +11,7 @@ from hairkit.arrays import Float32Array, Float64Array
 
 from .hair_grid import HairGrid
 from .linear_system import System
-from .reference import Contact, Load, State, push_out_points, rest_state, substep, transform_points
+from .reference import Contact, Load, State, draw_points, rest_state, substep, transform_points
 from .resampling import Embedding
 from .rods import Rods
 
@@ -65,7 +65,6 @@ class ReferenceEngine:
 
     def points(self, embedding: Embedding, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
-        local = embedding.points(self.state.position, self.state.frames).astype(np.float64)
-        if self._contact is not None and not embedding.identity:
-            local = push_out_points(local, self._contact)
+        curve = embedding.curve(self.state.position, self.state.frames)
+        local = draw_points(embedding, curve, self._contact)
         return transform_points(head, local).astype(np.float32)

@@ -19,7 +19,7 @@ from hairkit.rendering.context import renderer
 from hairkit.simulation import Grab, quaternion
 
 from .gl_buffers import Store
-from .gl_constants import constant_rows, offset_words, rider_words, share_words
+from .gl_constants import constant_rows, kind_words, offset_words, share_words
 from .gl_grab import GpuGrabs
 from .gl_obstacles import contact_uniforms, faces
 from .gl_uniforms import MOST_STEPS, AirWaves, Units, air_uniforms, step_words, steps_at_once
@@ -49,7 +49,7 @@ class ComputeEngine:
             self._store.put_grid("u_distances", faces(contact))
             for name in ("u_wind", "u_force"):
                 self._store.put_rods(name, np.zeros((self._count, 1, 3)))
-        self._held = GpuGrabs(self._store)
+        self._held = GpuGrabs(self._store, self._nodes)
         self.state = rest_state(rods)
         weakref.finalize(self, self._store.release).atexit = False
 
@@ -165,14 +165,11 @@ class ComputeEngine:
 
         This call writes it and the engine owns it; use it inside `renderer()`.
         """
-        count = len(embedding.rod)
         with renderer():
             uniforms = self._upload_embedding(embedding)
-            if "points" not in self._store:
-                self._store.make_words("points", 3 * count)
-            self._store.read_by("embedding", "offsets", "points")
-            uniforms |= {"u_count": count, "u_head": [tuple(row) for row in head[:3]]}
-            self._store.dispatch("pbd_points", count, uniforms)
+            self._store.read_by("offsets", "kinds", "starts", "local", "points")
+            uniforms["u_head"] = [tuple(row) for row in head[:3]]
+            self._store.dispatch("pbd_points", self._count, uniforms)
             return self._store["points"]
 
     def rows_buffer(
@@ -187,15 +184,13 @@ class ComputeEngine:
         when `before` is another object than in the last call. Otherwise as `points_buffer`.
         """
         with renderer():
-            uniforms = self._upload_embedding(embedding)
+            self.points_buffer(embedding, np.eye(4))
             if self._before is not before:
                 self._store.put_words("between", share_words(before, part))
                 self._store.make_words("rows", 3 * before.size)
                 self._before = before
-            self._store.read_by("embedding", "offsets", "rows", "between")
-            self._store.dispatch(
-                "pbd_guide_samples", before.size, uniforms | {"u_count": before.size}
-            )
+            self._store.read_by("local", "rows", "between")
+            self._store.dispatch("pbd_guide_samples", before.size, {"u_count": before.size})
             return self._store["rows"]
 
     def _settings(self, system: System, load: Load, iterations: int) -> dict[str, Any]:
@@ -239,8 +234,11 @@ class ComputeEngine:
         """Upload the embedding unless it is there; return the uniforms of its points."""
         deepest = None if self._contact is None else self._contact.deepest
         if self._embedding is not embedding:
-            self._store.put_words("embedding", rider_words(embedding, deepest))
+            self._store.put_words("kinds", kind_words(embedding, deepest))
             self._store.put_words("offsets", offset_words(embedding))
+            self._store.put_words("starts", embedding.starts.astype(np.int32))
+            for name in ("local", "points"):
+                self._store.make_words(name, 3 * len(embedding.rod))
             self._embedding = embedding
         if deepest is None or embedding.identity:
             return {"u_obstacles": False}

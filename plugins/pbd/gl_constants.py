@@ -48,19 +48,17 @@ def constant_rows(
     return rows
 
 
-def rider_words(embedding: Embedding, deepest: Float64Array | None) -> npt.NDArray[np.int32]:
-    """Return (P, 2): 64 rod + segment; the bits of the float32 least distance."""
+def kind_words(embedding: Embedding, deepest: Float64Array | None) -> Float32Array:
+    """Return (P, 4): segment, least distance, distance to the point before, 0."""
     least = np.full(len(embedding.rod), NOWHERE) if deepest is None else deepest
-    words = np.empty((len(embedding.rod), 2), np.int32)
-    words[:, 0] = 64 * embedding.rod + embedding.segment
-    words[:, 1] = least.astype(np.float32).view(np.int32)
-    return words
+    words = np.stack([embedding.segment, least, embedding.length, 0 * least], axis=1)
+    return words.astype(np.float32)
 
 
 def offset_words(embedding: Embedding) -> Float32Array:
     """Return (P, 4): offset in the rod's frame, fraction of the segment."""
-    _, _, share, offset = embedding.packed()
-    return np.concatenate([offset, share[:, None]], axis=1)
+    words = np.concatenate([embedding.offset, embedding.share[:, None]], axis=1)
+    return words.astype(np.float32)
 
 
 def share_words(

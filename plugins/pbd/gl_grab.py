@@ -21,8 +21,8 @@ class GpuGrabs:
     True if there is any. Use its methods, except `clear`, inside `renderer()`.
     """
 
-    def __init__(self, store: Store) -> None:
-        self._store = store
+    def __init__(self, store: Store, nodes: int) -> None:
+        self._store, self._segments = store, nodes - 1
         self._back: Float64Array = np.eye(4)
         self._speed = 0.0
         self.clear()
@@ -56,7 +56,7 @@ class GpuGrabs:
         `head_step` (4, 4) is how the head axes move in it, `seconds` how long it is.
         """
         self._back = head_step @ self._back
-        self._store.read_by("grabs", "learnt")
+        self._store.read_by("grabs", "learnt", "factors")
         self._store.written_by("u_force")
         uniforms: dict[str, Any] = {
             "u_grabs": len(self._points),
@@ -89,4 +89,6 @@ class GpuGrabs:
         self._points, self._sorted = points, index[self._order].tolist()
         if points:
             self._store.put_words("learnt", learnt)
+            entries = self._segments * (self._segments - 1) // 2
+            self._store.make_words("factors", len(points) * entries)
             self._store.clear_rods("u_force")

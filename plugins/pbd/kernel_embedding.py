@@ -10,20 +10,25 @@ from .simd_math import dot, minus, plus, rotate, row, rows_of, times, transform_
 
 ONE, ZERO = np.float32(1), np.float32(0)
 SLACK = 6
+CHASE, TINY = np.float32(0.3), np.float32(1e-20)
 
 
 @njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
 def embed_points(  # type: ignore[no-untyped-def]
-    first, last, x, q, clear, rod, segment, weight, offset, deepest, head, grid, out
+    first, last, x, q, clear, starts, segment, weight, offset, length, deepest, head, grid, out
 ) -> None:  # pragma: no cover - compiled
-    """Write embedded points `first` to before `last`, world (see `resampling.Embedding`).
+    """Write the embedded points of rods `first` to before `last`, world.
+
+    Each follows the rod's curve at its own distance from the point before, out of the obstacles
+    (see `reference.draw_points`).
 
     Parameters
     ----------
     x, q, clear
         (B, n, STATE, W) nodes, (B, n - 1, 4, W) frames, (B, n, W) least distances of the nodes.
-    rod, segment, weight, offset
-        (P,), (P,), (P, 6) of the four nodes around and of the two frames, (P, 3) in the frame.
+    starts, segment, weight, offset, length
+        (S + 1,), (P,), (P, 6) of the four nodes around and of the two frames, (P, 3) in the frame,
+        (P,) distance to the point before.
     deepest
         (P,) least distance of each point, or (0,) without such limits.
     head
@@ -33,38 +38,58 @@ def embed_points(  # type: ignore[no-untyped-def]
     out
         (P, 3).
     """
-    motion, n, wide = rows_of(head, 0), x.shape[1], x.shape[2] * LANES
-    for i in range(first, last):
-        j, lane = segment[i], rod[i] % LANES
-        node, one = rod[i] // LANES * n + j, np.int64(6 * i)
-        start = node * wide + lane
-        before, after = start - (wide if j > 0 else 0), start + wide
-        beyond = after + (wide if j + 2 < n else 0)
-        place = _on_curve(x, before, start, after, beyond, weight, one)
-        frame = (node - rod[i] // LANES) * 4 * LANES + lane  # there is one less than nodes
-        other = (-1 if j > 0 else 0) if load_number(weight, one + 4) > ZERO else int(j + 2 < n)
-        turn = _frame(q, frame, frame + other * 4 * LANES, weight, one)
-        away = (offset[i, 0], offset[i, 1], offset[i, 2])
-        place = plus(place, rotate(turn, away))
-        if deepest.shape[0] > 0:
-            later = load_number(weight, one + 1) <= load_number(weight, one + 2)
-            near, number = (after, node + 1) if later else (start, node)
-            far = load_number(x, near + SLACK * LANES) + load_number(clear, number * LANES + lane)
-            place = _push_out(place, _vector(x, near), far, deepest[i], grid)
-        out[i, 0], out[i, 1], out[i, 2] = transform_rows(motion, place)
+    motion, n = rows_of(head, 0), x.shape[1]
+    for rod in range(first, last):
+        place = before = (ZERO, ZERO, ZERO)
+        for i in range(starts[rod], starts[rod + 1]):
+            curve = _carried(x, q, rod, segment[i], weight, offset, i)
+            start, size = place, length[i]
+            if i == starts[rod]:
+                place = curve
+            else:
+                way = plus(minus(curve, before), times(CHASE, minus(before, start)))
+                place = _along(start, way, size)
+            before = curve
+            if deepest.shape[0] > 0 and size > ZERO:
+                near = segment[i] + (1 if weight[i, 1] <= weight[i, 2] else 0)
+                if _may_touch(x, clear, rod // LANES * n + near, rod % LANES, place, deepest[i]):
+                    for _ in range(2):
+                        distance, normal = distance_to(grid, place, deepest[i])
+                        depth = deepest[i] - distance
+                        if depth > ZERO:
+                            way = minus(plus(place, times(depth, normal)), start)
+                            place = _along(start, way, size)
+            out[i, 0], out[i, 1], out[i, 2] = transform_rows(motion, place)
 
 
 @row
-def _push_out(place, node, far, deepest, grid):  # type: ignore[no-untyped-def] # pragma: no cover
-    """Push a point out of the obstacles if it is nearer than `deepest`.
+def _along(start, way, size):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Return a place at a distance from `start` along `way`."""
+    return plus(start, times(size / np.sqrt(dot(way, way) + TINY), way))
 
-    The grid is not read near a node that is known to be `far` away from the obstacles.
-    """
-    away, room = minus(place, node), far - deepest
-    if room > ZERO and dot(away, away) < room * room:
-        return place
-    distance, normal = distance_to(grid, place, deepest)
-    return plus(place, times(max(deepest - distance, ZERO), normal))
+
+@row
+def _may_touch(x, clear, node, lane, place, deepest):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Return False where a point is near a node that is known to be far from the obstacles."""
+    start = node * x.shape[2] * LANES + lane
+    far = load_number(x, start + SLACK * LANES) + load_number(clear, node * LANES + lane)
+    away, room = minus(place, _vector(x, start)), far - deepest
+    return room <= ZERO or dot(away, away) >= room * room
+
+
+@row
+def _carried(x, q, rod, j, weight, offset, i):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Return where a rod carries a point to."""
+    n, wide, lane = x.shape[1], x.shape[2] * LANES, rod % LANES
+    node, one = rod // LANES * n + j, np.int64(6 * i)
+    start = node * wide + lane
+    before, after = start - (wide if j > 0 else 0), start + wide
+    beyond = after + (wide if j + 2 < n else 0)
+    place = _on_curve(x, before, start, after, beyond, weight, one)
+    frame = (node - rod // LANES) * 4 * LANES + lane  # there is one less than nodes
+    other = (-1 if j > 0 else 0) if load_number(weight, one + 4) > ZERO else int(j + 2 < n)
+    turn = _frame(q, frame, frame + other * 4 * LANES, weight, one)
+    return plus(place, rotate(turn, (offset[i, 0], offset[i, 1], offset[i, 2])))
 
 
 @row

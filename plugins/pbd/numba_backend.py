@@ -174,27 +174,22 @@ class FastEngine:
         if self._packed_embedding is None or self._packed_embedding[0] is not embedding:
             self._packed_embedding = (
                 embedding,
-                _pack_embedding(embedding, self._count, self._x.shape[1]),
+                _pack_embedding(embedding, self._x.shape[1]),
             )
-        out = np.empty((len(self._packed_embedding[1][0]), 3), np.float32)
+        out = np.empty((len(embedding.rod), 3), np.float32)
         deepest = NOWHERE if embedding.identity else self._deepest
-        motion = head[:3].astype(np.float32)
-        rod, segment, weight, offset = self._packed_embedding[1]
         parallel_for(
             embed_points,
-            len(out),
+            self._count,
             self._x,
             self._q,
             self._clear,
-            rod,
-            segment,
-            weight,
-            offset,
+            *self._packed_embedding[1],
             deepest,
-            motion,
+            head[:3].astype(np.float32),
             self._grid,
             out,
-            min_chunk=4096,
+            min_chunk=256,
         )
         return out
 
@@ -253,15 +248,8 @@ def _pack_motions(loads: Sequence[Load]) -> tuple[Float32Array, Float32Array]:
     return head_steps.astype(np.float32), turns.astype(np.float32)
 
 
-def _pack_embedding(embedding: Embedding, rods: int, nodes: int) -> tuple[Array, ...]:
-    """Return rod, segment, weights (P, 6) of four nodes and two frames, and offset of points."""
-    if embedding.identity:
-        rod = np.repeat(np.arange(rods, dtype=np.int32), nodes)
-        segment = np.tile(np.minimum(np.arange(nodes, dtype=np.int32), nodes - 2), rods)
-        weight = np.zeros((len(rod), 6), np.float32)
-        weight[:, 1] = np.tile(np.arange(nodes) < nodes - 1, rods)
-        weight[:, 2] = 1.0 - weight[:, 1]
-        return rod, segment, weight, np.zeros((len(rod), 3), np.float32)
+def _pack_embedding(embedding: Embedding, nodes: int) -> tuple[Array, ...]:
+    """Return starts, segment, weights (P, 6) of four nodes and two frames, offset and length."""
     t, last = embedding.share, nodes - 2
     one, two = t * t * (3 - 2 * t), t * (1 - t)
     start, end = two * (1 - t), -two * t  # of the slopes, per segment
@@ -277,9 +265,10 @@ def _pack_embedding(embedding: Embedding, rods: int, nodes: int) -> tuple[Array,
         ],
         axis=1,
     )
+    parts = (weight, embedding.offset, embedding.length)
     return (
-        embedding.rod.astype(np.int32), embedding.segment.astype(np.int32),
-        weight.astype(np.float32), embedding.offset.astype(np.float32),
+        embedding.starts, embedding.segment.astype(np.int32),
+        *(part.astype(np.float32) for part in parts),
     )  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.simulation import quaternion
 from hairkit.types.strands import Strands
 
@@ -87,23 +87,21 @@ class Embedding:
     """(P,) fraction along the segment."""
     offset: Float64Array
     """(P, 3) offset from the rod, in its frame there, metres."""
-    _cast: tuple[Int64Array, Int64Array, Float32Array, Float32Array] | None = None
+    length: Float64Array
+    """(P,) distance to the point before, metres; 0 at roots."""
+    starts: Int64Array
+    """(S + 1,) where the points of each rod begin."""
 
-    def packed(self) -> tuple[Int64Array, Int64Array, Float32Array, Float32Array]:
-        """Return rod, segment, share and offset for the kernels, cast once."""
-        if self._cast is None:
-            cast = (self.rod, self.segment, self.share.astype("f4"), self.offset.astype("f4"))
-            object.__setattr__(self, "_cast", cast)
-        assert self._cast is not None
-        return self._cast
+    def curve(self, position: Float64Array, frames: Float64Array) -> Float64Array:
+        """Return the places (P, 3) that rods at `position` (S, n, 3) carry the points to.
 
-    def points(self, position: Float64Array, frames: Float64Array) -> Float32Array:
-        """Return the points (P, 3) for rods at `position` (S, n, 3)."""
+        They are farther apart or closer than the points where a rod bends; see
+        `reference.draw_points`.
+        """
         if self.identity:
-            return position.reshape(-1, 3).astype(np.float32)
+            return position.reshape(-1, 3)
         place, frame = _places(position, frames, self.rod, self.segment, self.share)
-        moved: Float32Array = (place + quaternion.rotate(frame, self.offset)).astype(np.float32)
-        return moved
+        return place + quaternion.rotate(frame, self.offset)
 
 
 def embed_points(strands: Strands, position: Float64Array, frames: Float64Array) -> Embedding:
@@ -119,7 +117,11 @@ def embed_points(strands: Strands, position: Float64Array, frames: Float64Array)
     place, frame = _places(position, frames, rod, segment, share)
     apart = strands.points - place
     same = (strands.counts == segments + 1).all() and float(np.abs(apart).max(initial=0)) < 1e-7
-    return Embedding(same, rod, segment, share, quaternion.rotate(quaternion.inverse(frame), apart))
+    offset = quaternion.rotate(quaternion.inverse(frame), apart)
+    own = strands.points.astype(np.float64)
+    size = np.linalg.norm(np.diff(own, axis=0, prepend=own[:1]), axis=1)
+    size[strands.offsets[:-1]] = 0.0
+    return Embedding(same, rod, segment, share, offset, size, strands.offsets)
 
 
 def _places(

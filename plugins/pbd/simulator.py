@@ -51,6 +51,8 @@ STANDING = 2.5
 """Squared frequency, in g / L, of the pull that bears hair which stands or lies out, since other
 hair is beneath it: a column that carries its own weight buckles by pi^2 / 4 of it at most. Hair
 that hangs needs none."""
+SMALLEST = 2e-5
+"""Metres between points of which float32 has digits enough for a stretch of 1 %."""
 _KEPT_SYSTEMS = 4
 
 
@@ -149,7 +151,7 @@ class PbdSimulator:
         self._points = None
 
     def measure(self) -> Measures:
-        """Return the present stretch and energies; potential energy is 0 at rest."""
+        """Return the stretch of rods and points, and energies; potential energy is 0 at rest."""
         rods, shape = self._rods, self._rates.shape
         if self._rest_energy is None:
             self._rest_energy = elastic_energy(rods, rest_state(rods), shape)
@@ -164,7 +166,15 @@ class PbdSimulator:
             elastic = elastic_energy(rods, state, shape)
             found = largest_stretch(rods, state), kinetic, weight, elastic
         stretch, kinetic, weight, elastic = found
-        return Measures(stretch, kinetic, weight + elastic - self._rest_energy)
+        energy = weight + elastic - self._rest_energy
+        return Measures(max(stretch, self._drawn_stretch()), kinetic, energy)
+
+    def _drawn_stretch(self) -> float:
+        """Return the largest stretch between points, in head axes: far away float32 is coarse."""
+        points = self._engine.points(self._embedding, np.eye(4)).astype(np.float64)
+        now = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1)
+        long = self._embedding.length > SMALLEST
+        return float(np.abs(now[long] / self._embedding.length[long] - 1).max(initial=0.0))
 
     def _tune(self, options: Options) -> None:
         """Set the options; rebuild only what the changed ones affect."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from hairkit.arrays import Float64Array, Int64Array
-from hairkit.errors import InputError
 from hairkit.helices import adaptive_counts, fit_arcs
 from hairkit.helices.arc_length import Path
 from hairkit.helices.helix_strands import travelling
@@ -21,7 +21,7 @@ from .rods import Rods
 SHAPE, FEWEST, MOST = 0.0015, 8, 32
 """Mean distance in metres to which elements fit a guide's shape, and bounds of their number."""
 SHORTEST = 1e-4
-"""Guides shorter than this, metres, are refused."""
+"""Length, metres, of the straight rods that shorter guides are bound to."""
 
 
 class Binding(NamedTuple):
@@ -49,12 +49,8 @@ def bind_rods(strands: Strands, elements: int) -> tuple[Rods, Binding]:
     elements
         Elements a strand; 0 for as many as each strand's shape needs.
     """
-    short = np.flatnonzero(strands.lengths() < SHORTEST)
-    if len(short):
-        raise InputError(
-            f"{len(short)} guides are shorter than {SHORTEST * 1e3} mm (the first is {short[0]}); "
-            "remove them"
-        )
+    wanted = strands.points.astype(np.float64)
+    strands = _without_points(strands)
     counts = np.full(len(strands), elements)
     if not elements:
         counts = np.maximum(adaptive_counts(strands, SHAPE, most=MOST), FEWEST)
@@ -77,9 +73,19 @@ def bind_rods(strands: Strands, elements: int) -> tuple[Rods, Binding]:
     rank = np.minimum(place.astype(np.int64), counts[strand] - 1)
     element = arcs.offsets[:-1][strand] + rank
     arc = (place - rank) * arcs.lengths[element]
-    step = np.linalg.norm(np.diff(path.points, axis=0, prepend=0.0), axis=1)
+    step = np.linalg.norm(np.diff(wanted, axis=0, prepend=0.0), axis=1)
     binding = Binding(element, arc, np.zeros((len(arc), 3)), strands.offsets, step)
-    return rods, binding._replace(offset=_offsets(rods, binding, path.points))
+    return rods, binding._replace(offset=_offsets(rods, binding, wanted))
+
+
+def _without_points(strands: Strands) -> Strands:
+    """Return strands of which those shorter than `SHORTEST` are straight and that long."""
+    points, offsets = strands.points.copy(), strands.offsets
+    for strand in np.flatnonzero(strands.lengths() < SHORTEST):
+        own = slice(offsets[strand], offsets[strand + 1])
+        points[own] = points[offsets[strand]]
+        points[own, 1] += np.linspace(0.0, SHORTEST, offsets[strand + 1] - offsets[strand])
+    return replace(strands, points=points)
 
 
 def _offsets(rods: Rods, binding: Binding, wanted: Float64Array) -> Float64Array:

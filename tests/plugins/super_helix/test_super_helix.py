@@ -220,11 +220,17 @@ def test_retuning_keeps_positions() -> None:
 
 
 def test_bad_input_is_refused() -> None:
-    """Times go on, and guides have a length."""
+    """Times go on."""
     simulator = SuperHelices(hanging(), FEW)
     with pytest.raises(InputError, match="above 0"):
         simulator.advance(0.0, Surroundings())
-    groom = hanging()
+
+
+def test_guides_without_length_ride_on_the_head() -> None:
+    """Their points stay at their roots, wherever the head goes."""
+    groom, head = hanging(), turned(0.2)
     dots = Strands(np.repeat(groom.strands.roots, 2, axis=0), np.arange(len(groom.strands) + 1) * 2)
-    with pytest.raises(InputError, match="shorter"):
-        SuperHelices(dataclasses.replace(groom, strands=dots), FEW)
+    simulator = SuperHelices(dataclasses.replace(groom, strands=dots), FEW)
+    simulator.advance(1 / 60, Surroundings(head))
+    wanted = dots.points @ head[:3, :3].T + head[:3, 3]
+    np.testing.assert_allclose(simulator.points, wanted, atol=1e-6)
