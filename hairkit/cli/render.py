@@ -25,6 +25,7 @@ from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import read_cache
 from hairkit.types.scene import read_cameras
+from hairkit.types.skin_look import LOBES, SkinLook
 from hairkit.types.strands import Strands
 
 _DESCRIPTION = """\
@@ -58,6 +59,9 @@ def register(subparsers: Any) -> None:
     parser.add_argument("--hairs", type=int, default=HAIRS, metavar="N", help=f"strands ({HAIRS})")
     parser.add_argument("--size", metavar="WxH", help="pixels (1280x720; the scene's own size)")
     parser.add_argument("--turntable", type=int, metavar="N", help="N pictures all around")
+    parser.add_argument(
+        "--lobe", default=LOBES[0], choices=LOBES, help=f"of the oil on skin: {', '.join(LOBES)}"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the interpolated hair (0)")
     parser.add_argument("--cache", type=Path, metavar="FILE", help="simulation of the groom (.npz)")
     parser.add_argument("--frame", type=int, metavar="N", help="its frame, -1 is the last (0)")
@@ -78,7 +82,13 @@ def run(args: argparse.Namespace) -> int:
     light = Lights.at_camera(cameras[0]) if len(cameras) > 1 else None
     for path, camera in zip(paths, cameras, strict=True):
         [picture] = draw_views(
-            hair, groom.head, [camera], material=groom.material, lights=light, bust=True
+            hair,
+            groom.head,
+            [camera],
+            material=groom.material,
+            lights=light,
+            bust=True,
+            skin=SkinLook(args.lobe),
         )
         write_picture(path, picture)
         print(path)

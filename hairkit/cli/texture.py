@@ -23,9 +23,10 @@ WORK is one of
   bump        make a bump map of an albedo
   normal      make a normal map of a bump map; with --example and --filtered, of an albedo after
               an albedo and its normal map
+  tint        change an albedo by maps of --blood and --melanin, of which 128 changes nothing
 Pictures are PNG, JPEG, WebP or TIFF; OUT is a .png."""
 
-WORKS = ("sharpen", "filter", "by-numbers", "bump", "normal")
+WORKS = ("sharpen", "filter", "by-numbers", "bump", "normal", "tint")
 _READY: dict[str, dict[str, object]] = {
     "sharpen": {"alpha": 0.1},
     "by-numbers": {"colours": True, "remap": False},
@@ -46,6 +47,8 @@ def register(subparsers: Any) -> None:
     add("--filtered", type=Path, metavar="FILE", help="what became of the example")
     add("--using", default="image_analogies", metavar="P", help="plugin: super_resolution")
     add("--depth", type=float, default=4.0, metavar="N", help="of a bump map, pixels (default 4)")
+    add("--blood", type=Path, metavar="FILE", help="grey map of blood, for tint")
+    add("--melanin", type=Path, metavar="FILE", help="grey map of melanin, for tint")
     add("--difference", type=Path, metavar="FILE", help="write what changed, in false colours")
     add_setting(add, SET_HELP)
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
@@ -63,7 +66,9 @@ def run(args: argparse.Namespace) -> int:
         if path.suffix.lower() != ".png":
             raise InputError(f"{path}: textures are written as .png")
     given = read_texture(args.file)
-    made = _relief(args, given) or _enhance(args, given)
+    made = (
+        _tint(args, given) if args.work == "tint" else _relief(args, given) or _enhance(args, given)
+    )
     write_bytes(args.output, made.data.tobytes())
     if args.difference is not None:
         drawn = Texture.encode(draw_difference(given.pixels, made.pixels))
@@ -71,6 +76,19 @@ def run(args: argparse.Namespace) -> int:
     for path in outputs:
         print(path)
     return 0
+
+
+def _tint(args: argparse.Namespace, given: Texture) -> Texture:
+    """Return the albedo with the blood and the melanin of two maps."""
+    from hairkit.imaging.skin_colour import tint_albedo
+    from hairkit.io.textures import grey, read_texture
+    from hairkit.types.skin import Texture
+
+    if args.blood is None and args.melanin is None:
+        raise InputError("tint needs --blood FILE or --melanin FILE")
+    paths = args.blood, args.melanin
+    blood, melanin = (None if path is None else grey(read_texture(path)) for path in paths)
+    return Texture.encode(tint_albedo(given.pixels, blood, melanin))
 
 
 def _relief(args: argparse.Namespace, given: Texture) -> Texture | None:

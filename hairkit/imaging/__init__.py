@@ -12,5 +12,6 @@ measured over all views.
 * `masked_filters`: filters that respect a mask, means of undirected angles
 * `seeded_segmentation`: hair, person and background from seeds
 * `relief`: bump and normal maps, pictures of differences
+* `skin_colour`: blood and melanin in an albedo
 * `waves`: radius and pitch of waves in the orientation maps
 """

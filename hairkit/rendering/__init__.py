@@ -13,6 +13,8 @@ The viewer shares its OpenGL context, cameras and lights.
 * `osmesa`: OSMesa contexts for moderngl
 * `picture`: shaded pictures
 * `picture_file`: PNG and JPEG files
+* `skin_lobe`: the two layers of skin, and twins of their shaders
+* `skin_passes`: skin on the GPU
 """
 
 from __future__ import annotations

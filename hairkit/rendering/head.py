@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -17,15 +17,21 @@ from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
 from hairkit.types.camera import Camera
 from hairkit.types.groom import HairMaterial
 from hairkit.types.head import Head
-from hairkit.types.skin import Texture
+from hairkit.types.skin import SkinMaps, Texture
 from hairkit.types.strands import Strands
 
 SKIN = (0.42, 0.24, 0.17)
 """Linear RGB of skin."""
 SCALP_TINT = 0.75
 """Weight of the hair colour on the scalp."""
-ALBEDO_UNIT = 6
-"""Texture unit of the albedo, which no other picture is bound to."""
+MAP_UNITS = {"albedo": 6, "normal": 7, "roughness": 8}
+"""Texture units of a head's maps, which no other pictures are bound to."""
+MAP_UNIFORMS = {
+    "albedo": ("u_albedo", "u_textured"),
+    "normal": ("u_normals", "u_has_normals"),
+    "roughness": ("u_rough", "u_has_rough"),
+}
+"""Sampler of each map, and the uniform that says whether there is one."""
 
 
 class Mesh(Protocol):
@@ -56,8 +62,8 @@ class Solid:
     """Subsurface scattering: 1 for skin, 0 for cloth."""
     uv: Float32Array | None = None
     """(V, 2) texture coordinates."""
-    albedo: Texture | None = None
-    """Picture by which the colours are multiplied."""
+    maps: SkinMaps | None = None
+    """Pictures of the surface; the colours are multiplied by the albedo."""
 
 
 def head_solid(head: Head, material: HairMaterial) -> Solid:
@@ -69,7 +75,7 @@ def head_solid(head: Head, material: HairMaterial) -> Solid:
     if albedo is not None:
         colours = colours / skin  # the picture has the skin's colour
     normals = head.normals().astype(np.float32)
-    return Solid(head.vertices, head.faces, normals, colours, uv=head.uv, albedo=albedo)
+    return Solid(head.vertices, head.faces, normals, colours, uv=head.uv, maps=head.maps)
 
 
 def bust_solid(head: Head, strands: Strands | None = None) -> Solid | None:
@@ -82,30 +88,37 @@ def bust_solid(head: Head, strands: Strands | None = None) -> Solid | None:
 
 
 @contextlib.contextmanager
-def albedo_texture(gl: Renderer, solid: object) -> Iterator[dict[str, Any]]:
-    """Bind a solid's picture, if it has one, and yield the uniforms that name it."""
-    picture = solid.albedo if isinstance(solid, Solid) else None
-    with upload_albedo(gl, picture) as texture:
-        if texture is not None:
-            texture.use(ALBEDO_UNIT)
-        yield {"u_albedo": ALBEDO_UNIT, "u_textured": float(texture is not None)}
+def upload_maps(gl: Renderer, solid: object) -> Iterator[dict[str, moderngl.Texture]]:
+    """Yield the pictures of a solid on the GPU with their mipmaps, by kind."""
+    maps = solid.maps if isinstance(solid, Solid) and solid.maps is not None else SkinMaps()
+    uploaded = {}
+    try:
+        for kind, picture in maps.present().items():
+            if kind in MAP_UNITS:
+                uploaded[kind] = _upload(gl, picture)
+        yield uploaded
+    finally:
+        for texture in uploaded.values():
+            texture.release()
 
 
-@contextlib.contextmanager
-def upload_albedo(gl: Renderer, picture: Texture | None) -> Iterator[moderngl.Texture | None]:
-    """Yield the picture on the GPU with its mipmaps, or None."""
-    if picture is None:
-        yield None
-        return
+def bind_maps(maps: Mapping[str, moderngl.Texture]) -> dict[str, Any]:
+    """Bind the pictures, and return the uniforms that name them."""
+    uniforms: dict[str, Any] = {}
+    for kind, (sampler, present) in MAP_UNIFORMS.items():
+        uniforms |= {sampler: MAP_UNITS[kind], present: float(kind in maps)}
+        if kind in maps:
+            maps[kind].use(MAP_UNITS[kind])
+    return uniforms
+
+
+def _upload(gl: Renderer, picture: Texture) -> moderngl.Texture:
     pixels = np.ascontiguousarray(picture.pixels[::-1])  # v runs upwards
     texture = gl.context.texture(pixels.shape[1::-1], 3, pixels, alignment=1)
     texture.build_mipmaps()
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     texture.repeat_x = texture.repeat_y = False
-    try:
-        yield texture
-    finally:
-        texture.release()
+    return texture
 
 
 def draw_solid(
@@ -132,8 +145,8 @@ def draw_solid(
     ]
     faces = gl.context.buffer(np.ascontiguousarray(mesh.faces, np.uint32))
     array = gl.context.vertex_array(program, used, index_buffer=faces)
-    with albedo_texture(gl, mesh) as picture:
-        set_uniforms(program, **picture)
+    with upload_maps(gl, mesh) as maps:
+        set_uniforms(program, **bind_maps(maps))
         array.render(moderngl.TRIANGLES)
     array.release()
     for buffer in (faces, *[buffer for buffer, _, _ in used]):

@@ -16,11 +16,13 @@ from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.framebuffer import SUPERSAMPLE, average_samples, supersample_camera, target
 from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.hair import RibbonBuffers, draw_ribbons, ribbons
-from hairkit.rendering.head import Solid, bust_solid, draw_solid, head_solid
+from hairkit.rendering.head import Solid, bust_solid, head_solid
 from hairkit.rendering.light import Lights, LightVolume, hair_density, light_volume
+from hairkit.rendering.skin_passes import draw_skin
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head
+from hairkit.types.skin_look import SkinLook
 from hairkit.types.strands import Strands
 
 BACKDROP_TOP, BACKDROP_BOTTOM = (176, 180, 184), (214, 216, 218)
@@ -48,6 +50,7 @@ def draw(
     solids: Sequence[Solid] = (),
     bust: bool = False,
     supersample: int = SUPERSAMPLE,
+    skin: SkinLook | None = None,
 ) -> UInt8Array:
     """Return a picture (H, W, 3) uint8 RGB of hair on a head, antialiased.
 
@@ -73,6 +76,8 @@ def draw(
         Draw a clothed bust under a head that ends at its neck.
     supersample
         Samples along each edge of a pixel.
+    skin
+        How skin reflects and scatters light; None: `SkinLook()`.
     """
     sized = _resize_camera(camera, width, height)
     return draw_views(
@@ -85,6 +90,7 @@ def draw(
         solids=solids,
         bust=bust,
         supersample=supersample,
+        skin=skin,
     )[0]
 
 
@@ -100,6 +106,7 @@ def draw_views(
     bust: bool = False,
     supersample: int = SUPERSAMPLE,
     show_direction: bool = False,
+    skin: SkinLook | None = None,
 ) -> list[UInt8Array]:
     """Return one picture for each camera, as `draw` does, but upload hair and head once.
 
@@ -110,7 +117,7 @@ def draw_views(
     if isinstance(hair, Groom):
         head = hair.head if head is None else head
         material = material or hair.material
-    material = material or HairMaterial()
+    material, skin = material or HairMaterial(), skin or SkinLook()
     below = bust_solid(head, strands) if bust and head is not None else None
     own = [head_solid(head, material)] if head is not None else []
     shown = (*own, *([below] if below is not None else []), *solids)
@@ -135,7 +142,7 @@ def draw_views(
                 kept.close()
                 volume = light_volume(density, shot.lights)
                 kept.enter_context(_light_texture(gl, volume))
-            samples = _shoot(gl, shot, strands, buffers, look, shown, volume)
+            samples = _shoot(gl, shot, strands, buffers, look, shown, volume, skin)
             background = backgrounds[index] if backgrounds is not None else backdrop(camera)
             pictures.append(_over(average_samples(samples, camera), background))
     return pictures
@@ -196,6 +203,7 @@ def _shoot(
     look: dict[str, Any],
     solids: Sequence[Solid],
     light: LightVolume,
+    skin: SkinLook,
 ) -> UInt8Array:
     """Return the samples (k H, k W, 4), alpha 255 where something was drawn."""
     camera = shot.camera
@@ -207,9 +215,8 @@ def _shoot(
         "u_eye": tuple(camera.position.tolist()),
     }
     with target(gl, camera) as picture:
-        for solid in solids:
-            skin = uniforms | {"u_scatter": solid.scatter}
-            draw_solid(gl, solid, gl.program("skin"), camera, depth, HEAD_PUSH, **skin)
+        if solids:
+            draw_skin(gl, solids, camera, depth, HEAD_PUSH, skin, uniforms)
         draw_ribbons(
             gl,
             buffers,

@@ -17,6 +17,7 @@ the packages named after the subject.
 * `preview`: the pictures of these types that a notebook shows
 * `scene`: cameras and fitted head
 * `skin`: texture maps and blendshapes of a head
+* `skin_look`: how skin reflects and scatters light
 * `strands`: packed polylines
 * `texture_example`: what a texture is to become
 * `tie`: ties, and the tails that hang from them

@@ -9,14 +9,17 @@ import numpy as np
 from hairkit.io.glb_skin import ROUGHNESS_CHANNEL
 from hairkit.io.textures import grey
 from hairkit.types.skin import SkinMaps, Texture
+from hairkit.types.skin_look import SkinLook
 
 from .document import Document
 from .texture import white_picture
 
 SKIN_COLOUR = np.array([0.58, 0.4, 0.32])
 """Linear RGB of skin without an albedo map."""
-ROUGHNESS = 0.7
-"""Of skin without a roughness map."""
+LOOK = SkinLook()
+"""Roughness of skin without a roughness map, and its refractive index."""
+_INDEX = "KHR_materials_ior"
+"""Extension of glTF that takes that index."""
 
 
 def skin_material(document: Document, maps: SkinMaps) -> int:
@@ -28,7 +31,7 @@ def skin_material(document: Document, maps: SkinMaps) -> int:
         "baseColorFactor": [*colour, 1.0],
         "baseColorTexture": {"index": document.image(albedo, "albedo")},
         "metallicFactor": 0.0,
-        "roughnessFactor": ROUGHNESS,
+        "roughnessFactor": LOOK.roughness,
     }
     if maps.roughness is not None:
         packed = _pack_roughness(maps.roughness)
@@ -37,7 +40,15 @@ def skin_material(document: Document, maps: SkinMaps) -> int:
     normal = None
     if maps.normal is not None:
         normal = {"index": document.image(maps.normal.data.tobytes(), "normal")}
-    return document.add("materials", name="head", pbrMetallicRoughness=look, normalTexture=normal)
+    index = {_INDEX: {"ior": LOOK.ior}}
+    document.json.setdefault("extensionsUsed", []).append(_INDEX)
+    return document.add(
+        "materials",
+        name="head",
+        pbrMetallicRoughness=look,
+        normalTexture=normal,
+        extensions=index,
+    )
 
 
 def _pack_roughness(roughness: Texture) -> bytes:

@@ -9,10 +9,11 @@ from typing import Any
 from hairkit.arrays import Float32Array
 from hairkit.head_model.bust import CLOTH
 from hairkit.types.groom import Groom
+from hairkit.types.skin_look import SkinLook
 
 SKIN = (0.5, 0.36, 0.29)
 """Linear RGB of the head mesh, whose colour the photos do not give."""
-_HAIR_ROUGHNESS, _SKIN_ROUGHNESS, _CLOTH_ROUGHNESS = 0.35, 0.6, 0.9
+_HAIR_ROUGHNESS, _CLOTH_ROUGHNESS = 0.35, 0.9
 
 
 @dataclass(frozen=True)
@@ -36,13 +37,19 @@ def add_materials(stage: Any, groom: Groom, pictures: Mapping[str, str]) -> Mate
     mean: Float32Array = 0.5 * (look.root_colour + look.tip_colour)
     colour = (float(mean[0]), float(mean[1]), float(mean[2]))
     hair = _add(stage, "/Groom/Materials/Hair", colour, _HAIR_ROUGHNESS)
-    skin = _add(stage, "/Groom/Materials/Skin", SKIN, _SKIN_ROUGHNESS)
+    skin = _add(stage, "/Groom/Materials/Skin", SKIN, SkinLook().roughness, SkinLook().ior)
     _add_pictures(stage, "/Groom/Materials/Skin", pictures)
     cloth = _add(stage, "/Groom/Materials/Cloth", CLOTH, _CLOTH_ROUGHNESS)
     return Materials(hair, skin, cloth)
 
 
-def _add(stage: Any, path: str, colour: tuple[float, float, float], roughness: float) -> Any:
+def _add(
+    stage: Any,
+    path: str,
+    colour: tuple[float, float, float],
+    roughness: float,
+    ior: float | None = None,
+) -> Any:
     from pxr import Gf, Sdf, UsdShade
 
     material = UsdShade.Material.Define(stage, path)
@@ -51,6 +58,8 @@ def _add(stage: Any, path: str, colour: tuple[float, float, float], roughness: f
     shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(Gf.Vec3f(*colour))
     shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(roughness)
     shader.CreateInput("metallic", Sdf.ValueTypeNames.Float).Set(0.0)
+    if ior is not None:
+        shader.CreateInput("ior", Sdf.ValueTypeNames.Float).Set(ior)
     surface = shader.CreateOutput("surface", Sdf.ValueTypeNames.Token)
     material.CreateSurfaceOutput().ConnectToSource(surface)
     return material

@@ -39,6 +39,7 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
     "skin": ({"HEIGHT": 120}, ["CAPTURES"]),
+    "skin_looks": ({"HEIGHT": 80}, ["-o", "CAPTURES/looks_of_skin.jpg"]),
     "strokes": ({"STROKES": 1}, ["CAPTURES", "--tool", "brush"]),
     "studio": ({"GUIDES": 30}, ["--photos", "CAPTURES/short/photos", "--strokes", "1"]),
     "super_helix": ({"GUIDES": 8, "ELEMENTS": 5, "FRAMES": 2}, []),

@@ -91,6 +91,8 @@ def test_filters_and_numbers_follow_a_pair(tmp_path: Path, skin: str, close_up: 
         (["sharpen", "SKIN", "--example", "DAMAGED"], "damaged.png"),
         (["sharpen", "SKIN", "--example", "EMPTY"], "empty.png"),
         (["filter", "SKIN", "--example", "SKIN", "--filtered", "CLOSE"], "40 x 32 pixels"),
+        (["tint", "SKIN"], "tint needs --blood"),
+        (["tint", "SKIN", "--melanin", "DAMAGED"], "damaged.png"),
         (["normal", "SKIN", "--depth", "0"], "--depth 0, expected"),
         (["sharpen", "SKIN", "--example", "CLOSE", "--using", "gabor"], "enhance_texture"),
         (["sharpen", "SKIN", "--example", "CLOSE", "--set", "kapa=1"], "kappa"),
@@ -113,6 +115,16 @@ def test_damage_is_one_line(
     assert error.count("\n") == 1
     assert said in error
     assert not out.exists()
+
+
+def test_tint_reddens_with_blood(tmp_path: Path, skin: str) -> None:
+    """More blood takes green and blue, and hardly any red."""
+    blood = write(tmp_path / "blood.png", np.full((8, 8, 3), 200, np.uint8))
+    out = tmp_path / "out.png"
+    assert main(["texture", "tint", skin, "--blood", blood, "-o", str(out)]) == 0
+    before, after = (pixels(path).mean(axis=(0, 1)) for path in (Path(skin), out))
+    assert after[0] > 0.88 * before[0]
+    assert (after[1:] < 0.86 * before[1:]).all()
 
 
 def test_textures_are_png(skin: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -36,7 +36,7 @@ LIGHTER = {
 """Further arguments that make a run quick."""
 PICTURES = (
     "scan", "close_up", "albedo", "plain", "painted", "labels", "map", "photo", "bump",
-    "other_albedo", "other_normal",
+    "other_albedo", "other_normal", "blood", "melanin",
 )  # fmt: skip
 """Textures that pages speak of, all .png."""
 FEW_GUIDES = "10"

@@ -11,8 +11,9 @@ import numpy as np
 from hairkit.arrays import Float64Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
-from hairkit.rendering.head import ALBEDO_UNIT, Solid, upload_albedo
+from hairkit.rendering.head import Solid, bind_maps, upload_maps
 from hairkit.types.camera import Camera
+from hairkit.types.skin_look import SkinLook
 
 
 class SolidPass:
@@ -34,7 +35,7 @@ class SolidPass:
             index_buffer=self._faces,
         )
         self._kept = contextlib.ExitStack()
-        self._albedo = self._kept.enter_context(upload_albedo(gl, solid.albedo))
+        self._maps = self._kept.enter_context(upload_maps(gl, solid))
 
     def place(self, matrix: Float64Array) -> None:
         """Move the mesh by a rigid motion (4, 4) from its original pose."""
@@ -57,12 +58,11 @@ class SolidPass:
             u_push_m=push,
             u_eye=tuple(camera.position.tolist()),
             u_scatter=self.solid.scatter,
-            u_albedo=ALBEDO_UNIT,
-            u_textured=float(self._albedo is not None),
+            u_wrapped=1.0,
+            **SkinLook().uniforms(),
+            **bind_maps(self._maps),
             **lighting,
         )
-        if self._albedo is not None:
-            self._albedo.use(ALBEDO_UNIT)
         self._array.render(moderngl.TRIANGLES)
 
     def release(self) -> None:
