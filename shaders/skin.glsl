@@ -42,8 +42,3 @@ Layers skin_layers(vec3 position, vec3 normal, float rough) {
     add_light(sum, normal, to_eye, u_rim_direction, u_rim_colour * reached.g, rough);
     return sum;
 }
-
-vec3 skin_light(vec3 position, vec3 normal, vec3 albedo) {
-    Layers layers = skin_layers(position, normal, u_roughness);
-    return albedo * layers.diffuse + layers.specular;
-}
