@@ -9,5 +9,6 @@ It passes events to the actions and shows the frames that the preview draws.
 * `mouse`: mouse events to actions
 * `panel`: the option panel, if imgui-bundle is installed
 * `splash`: the wait screen until the first frame
+* `stillness`: when the window sleeps
 * `window`: the main loop
 """

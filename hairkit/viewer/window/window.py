@@ -32,11 +32,12 @@ from hairkit.viewer.window.keyboard import key_name
 from hairkit.viewer.window.mouse import Mouse
 from hairkit.viewer.window.panel import Panel
 from hairkit.viewer.window.splash import AbandonedError, WaitScreen, warm_up
+from hairkit.viewer.window.stillness import Stillness
 
 TEXT_EVERY = 0.25
 """Seconds between two updates of the read-outs; messages appear at once."""
 IDLE = 0.1
-"""Seconds between frames while the simulation is paused and no event arrives."""
+"""Seconds between frames while the simulation is paused, and between looks at files in sleep."""
 MAX_FRAME_STEP = 0.1
 """Longest time step of a frame, seconds; slower frames slow the simulation down."""
 SIMULATION_SHARE = 0.4
@@ -139,6 +140,7 @@ class Window:
             self._text = gl.context.texture((1, 1), 4, b"\0\0\0\0")
             self._screen = gl.context.detect_framebuffer(0)
             self._panel = Panel(self._window)
+        self._stillness = Stillness(session, time.monotonic())
         self._warnings = _Warnings(session)
         logging.getLogger("hairkit").addHandler(self._warnings)
         self._listen()
@@ -146,6 +148,7 @@ class Window:
 
     def perform(self, name: str, values: Mapping[str, object]) -> None:
         """Perform an action; show its error as a message."""
+        self._stir()
         self.session.message = ""
         try:
             with renderer():
@@ -159,6 +162,11 @@ class Window:
         """Draw until the window is closed; `next(steps)` performs an action of a script."""
         before = time.perf_counter()
         while not (self.session.finished or self._glfw.window_should_close(self._window)):
+            if steps is None and self._stillness.asleep(time.monotonic()):
+                self._glfw.wait_events_timeout(IDLE)
+                self._reload_changed()
+                before = time.perf_counter()
+                continue
             self._listen_for_events()
             steps = self._next(steps)
             passed = time.perf_counter() - before
@@ -169,6 +177,10 @@ class Window:
             passed = min(passed, MAX_FRAME_STEP)
             self.picture(passed)
             self.session.pending = max(self.session.pending - passed, 0.0)
+
+    def _stir(self, *_: object) -> None:
+        """Draw for a while: an event has arrived."""
+        self._stillness.stir(time.monotonic())
 
     def _listen_for_events(self) -> None:
         """Handle mouse and keys; wait for them a little if nothing moves."""
@@ -281,6 +293,7 @@ class Window:
         elif self._watch_groom.changed(now):
             self.perform("reload", {})
         if self._watch_shaders.changed(now):
+            self._stir()
             try:
                 with renderer() as gl:
                     self.preview.restart()
@@ -297,10 +310,13 @@ class Window:
         glfw.set_cursor_pos_callback(window, self.on_move)
         glfw.set_scroll_callback(window, self.on_scroll)
         glfw.set_drop_callback(window, self.on_drop)
+        glfw.set_window_refresh_callback(window, self._stir)
+        glfw.set_framebuffer_size_callback(window, self._stir)
         self._panel.listen()
 
     def on_key(self, window: Any, key: int, scancode: int, event: int, mods: int) -> None:
         """Handle a pressed, released or repeated key."""
+        self._stir()
         self._panel.on_key(key, event, mods)
         name = key_name(self._glfw, key, mods)
         if name is not None and name not in self._keys:
@@ -313,6 +329,7 @@ class Window:
 
     def on_button(self, window: Any, button: int, event: int, mods: int) -> None:
         """Handle a pressed or released mouse button."""
+        self._stir()
         self._panel.on_button(button, event)
         if event == self._glfw.RELEASE:
             self.mouse.release(time.monotonic())
@@ -321,6 +338,7 @@ class Window:
 
     def on_move(self, window: Any, x: float, y: float) -> None:
         """Handle a mouse motion to (x, y), in screen units."""
+        self._stir()
         width, height = self._glfw.get_window_size(self._window)
         self._panel.on_move(x, y)
         scale = self.session.size[0] / max(width, 1), self.session.size[1] / max(height, 1)
@@ -328,6 +346,7 @@ class Window:
 
     def on_scroll(self, window: Any, right: float, up: float) -> None:
         """Handle a turn of the wheel."""
+        self._stir()
         self._panel.on_scroll(right, up)
         if not self._panel.wants_mouse:
             self.mouse.scroll(up)
