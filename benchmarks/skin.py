@@ -5,8 +5,9 @@ python benchmarks/skin.py captures/
 Fits the head of every capture and takes its skin from the photos, then draws the albedo as it is,
 without light, at the input cameras. Compared are pixels above the neck where the head is seen and
 the mask shows neither hair nor background, 4 mm from both. "Evened" gives each view the gain a
-channel that suits it best, as exposures differ. Prints a Markdown table: PSNR in decibels, and
-seconds of the processor for the skin.
+channel that suits it best, as exposures differ; "relit" the light from all sides that does, a
+polynomial of second degree in the normal for each channel. Prints a Markdown table: PSNR in
+decibels, and seconds of the processor for the skin.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from captures_argument import NO_CAPTURES, add_captures
 
 from hairkit.arrays import BoolArray, Float64Array
 from hairkit.cameras.depth_raster import head_depth
+from hairkit.head_model.delighting import GAMMA, harmonics
 from hairkit.head_model.photo_skin import photograph_skin
 from hairkit.head_model.scalp import bind
 from hairkit.hookspecs import hookimpl
@@ -63,7 +65,7 @@ def main() -> int:
     if captures is None:
         print(NO_CAPTURES)
         return 0
-    print("| capture | PSNR | evened | worst view | skin, s |\n|---|---|---|---|---|")
+    print("| capture | PSNR | evened | relit | worst relit | skin, s |\n|---|---|---|---|---|---|")
     rows = []
     for folder in sorted(path.parent for path in captures.glob("*/photos")):
         rows.append(figures(folder))
@@ -78,7 +80,7 @@ def row(name: str, values: Float64Array) -> str:
 
 
 def figures(folder: Path) -> Float64Array:
-    """Return mean PSNR, mean evened PSNR, worst view's, and seconds of the skin."""
+    """Return mean PSNR as it is, evened and relit, the worst view's, and seconds of the skin."""
     capture, scene, masks = fit(folder)
     photograph_skin(capture, scene, masks)  # compiles its kernels
     began = time.process_time()
@@ -93,12 +95,13 @@ def figures(folder: Path) -> Float64Array:
         skin = _skin(scene.head, small, mask)
         if skin.sum() < LEAST_PIXELS:
             continue
-        drawn = _draw(scene.head, small, skin, maps.albedo.sample)
+        drawn, normals = _draw(scene.head, small, skin, maps.albedo.sample)
         wanted = photo[skin]
         gain = (drawn * wanted).sum(axis=0) / (drawn**2).sum(axis=0)
-        scores.append([_psnr(drawn, wanted), _psnr(drawn * gain, wanted)])
+        lit = _relight(drawn, normals, wanted)
+        scores.append([_psnr(drawn, wanted), _psnr(drawn * gain, wanted), _psnr(lit, wanted)])
     mean = np.mean(scores, axis=0)
-    return np.array([*mean, np.min(scores, axis=0)[1], seconds])
+    return np.array([*mean, np.min(scores, axis=0)[2], seconds])
 
 
 def fit(folder: Path) -> tuple[Capture, Scene, tuple[Mask, ...]]:
@@ -135,14 +138,28 @@ def _skin(head: Head, camera: Camera, mask: Mask) -> BoolArray:
     return np.asarray(seen)
 
 
-def _draw(head: Head, camera: Camera, skin: BoolArray, sample: Any) -> Float64Array:
-    """Return (N, 3) the albedo at pixels, 0 to 255."""
+def _draw(
+    head: Head, camera: Camera, skin: BoolArray, sample: Any
+) -> tuple[Float64Array, Float64Array]:
+    """Return (N, 3) the albedo at pixels, 0 to 255, and (N, 3) normals."""
     row, column = np.nonzero(skin)
     depth = head_depth(head, camera)[skin]
     places = camera.unproject(np.column_stack([column, row]) + 0.5, depth)
     face, weights = bind(places, head)
     uv = (head.uv[head.faces[face]] * weights[..., None]).sum(axis=1)
-    return np.asarray(255 * sample(uv), np.float64)
+    normals = (head.normals()[head.faces[face]] * weights[..., None]).sum(axis=1)
+    return np.asarray(255 * sample(uv), np.float64), normals
+
+
+def _relight(drawn: Float64Array, normals: Float64Array, wanted: Float64Array) -> Float64Array:
+    """Return the albedo in the smooth light that makes it most like the photo."""
+    basis = harmonics(normals)
+    linear, photo = (drawn / 255) ** GAMMA, (wanted / 255) ** GAMMA
+    lit = [
+        albedo * (basis @ np.linalg.lstsq(basis * albedo[:, None], seen, rcond=None)[0])
+        for albedo, seen in zip(linear.T, photo.T, strict=True)
+    ]
+    return np.asarray(255 * np.maximum(np.stack(lit, axis=1), 0) ** (1 / GAMMA))
 
 
 def _psnr(drawn: Float64Array, wanted: Float64Array) -> float:

@@ -5,6 +5,7 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `bare_head`: where a photo shows face, ears and neck
 * `bust`: a clothed bust under a head, for pictures and exports
 * `bvh`: nearest points and ray crossings on triangle meshes
+* `delighting`: the light of photos taken out of colours
 * `hairline`: where the photos show that hair grows
 * `identity`: shapes by which heads differ, two adults and a child
 * `photo_skin`: the skin of a head taken from the photos

@@ -9,7 +9,8 @@ texel best, so that seams neither show nor blur.
 
 What no view sees is taken from its mirror image where the texture coordinates are symmetric, then
 from the head's own skin, with the tone of the skin that is seen nearest to it: the ratio of the two
-is extended by normalised convolutions of growing reach. The light of the photos stays in the map.
+is extended by normalised convolutions of growing reach. The light of the photos is taken out of the
+seen skin before (`hairkit.head_model.delighting`).
 """
 
 from __future__ import annotations
@@ -19,12 +20,14 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, UInt8Array
 from hairkit.cameras.depth_raster import depth_behind, head_depth, mesh_depth
+from hairkit.head_model.delighting import find_shading
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
-from hairkit.types.head import Head
+from hairkit.types.head import JAW_LANDMARKS, Head
 from hairkit.types.mask import PERSON, Mask
 from hairkit.types.scene import Scene
 from hairkit.types.skin import SkinMaps, Texture
@@ -59,8 +62,12 @@ TONE_REACHES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Sigmas of the convolutions that extend tones, texels of `TONE`."""
 TONE_TRUST = 1e-3
 """Weight of a convolution's result beside that of the next larger one."""
+FEATURE = 0.014
+"""Metres from landmarks of brows, nose, eyes and mouth within which colours may be any."""
 SKIN_SPREAD = (0.35, 0.12, 0.12)
 """Spread of skin in one photo: logarithms of green, and of red and blue over green."""
+SURE_SKIN = 4
+"""Power of the likeness to skin from which tones are extended: half the spread of one photo's."""
 LEAST = 1e-6
 """Least weight that colours are divided by."""
 STEP = 4
@@ -103,12 +110,13 @@ def photograph_skin(capture: Capture, scene: Scene, masks: Sequence[Mask]) -> Sk
         _project(surface, scene.head, camera, photo, mask)
         for camera, photo, mask in zip(scene.cameras, photos, masks, strict=True)
     ]
-    views = _without_clothes(views, scene.head, surface)
+    views = _skin_alone(views, scene.head, surface)
     gains = even_exposures(
         [view.coarse[::STEP, ::STEP] for view in views],
         [view.weight[::STEP, ::STEP] for view in views],
     )
     blended, seen = _blend(views, photos, gains)
+    blended = _delight(blended, seen, surface)
     if _is_symmetric(surface):
         blended, seen = _mirror(blended, seen)
     albedo = _fill(blended, seen, surface, _own_skin(scene.head))
@@ -149,14 +157,32 @@ def even_exposures(
     return result
 
 
-def _without_clothes(views: Sequence[_Seen], head: Head, surface: _Surface) -> list[_Seen]:
-    """Return the views without what has not the colour of skin on the neck, such as collars."""
-    neck = (surface.places[..., 1] < head.joints[1, 1])[..., None]
+def _skin_alone(views: Sequence[_Seen], head: Head, surface: _Surface) -> list[_Seen]:
+    """Return the views without what has not the colour of skin beside eyes, nose and mouth: collars
+    on the neck, strands and their shadow on the temples."""
+    features = _features(head, surface)
     kept = []
     for view in views:
-        skin = np.where(neck, _like_skin(view.coarse, view.weight)[..., None], 1)[..., 0]
+        skin = np.where(features, 1, _like_skin(view.coarse, view.weight))
         kept.append(view._replace(weight=(view.weight * skin).astype(np.float32)))
     return kept
+
+
+def _features(head: Head, surface: _Surface) -> BoolArray:
+    """Return (C, C) texels near landmarks of brows, nose, eyes and mouth; above the neck without
+    landmarks."""
+    if head.landmark_vertices is None:
+        return np.asarray(surface.places[..., 1] >= head.joints[1, 1])
+    inner = head.vertices[head.landmark_vertices[JAW_LANDMARKS:]]
+    distance = cKDTree(inner).query(surface.places.reshape(-1, 3), distance_upper_bound=FEATURE)[0]
+    return np.asarray(np.isfinite(distance).reshape(surface.known.shape))
+
+
+def _delight(blended: Float32Array, seen: Float32Array, surface: _Surface) -> Float32Array:
+    """Return the colours (S, S, 3) without the light of the photos."""
+    coarse = _shrink(blended, COARSE)
+    shading = find_shading(coarse, seen * _like_skin(coarse, seen), surface.normals)
+    return blended / _upsample(shading)[..., None]
 
 
 def _unwrap(head: Head) -> _Surface:
@@ -332,7 +358,7 @@ def _fill(
     small = _shrink(_shrink(blended, COARSE) * mask[..., None], TONE)
     small /= np.maximum(weight, LEAST)[..., None]
     ratio = np.log(np.maximum(small, 0) + FLOOR) - np.log(_shrink(own, TONE) + FLOOR)
-    tone = extend(ratio, weight * _like_skin(small, weight))
+    tone = extend(ratio, weight * _like_skin(small, weight) ** SURE_SKIN)
     filled = _upsample(np.exp(tone)) * (own + FLOOR) - FLOOR
     share = _upsample(1 - _fade(~taken))[..., None]
     return np.asarray(filled + share * (blended - filled), np.float32)

@@ -40,7 +40,6 @@ GUIDE_POINTS = 20
 """Points a strand in the pictures."""
 CLAY = (0.16, 0.15, 0.14)
 """Linear RGB of the hull."""
-EXPOSURE = 1.0
 KEY_DIRECTION, RIM_DIRECTION = (0.4, 0.8, 0.6), (-0.4, 0.7, -0.6)
 """Towards the lights: one before the face, one behind the head, both from above."""
 
@@ -166,8 +165,8 @@ def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
 
 
 def _lights() -> Lights:
-    """Return lights from front and back alike, bright as a window: the photos go around."""
-    lights = Lights.studio(KEY_DIRECTION, RIM_DIRECTION, EXPOSURE)
+    """Return lights from front and back alike: the photos go around."""
+    lights = Lights.studio(KEY_DIRECTION, RIM_DIRECTION)
     return replace(lights, rim_colour=lights.key_colour)
 
 

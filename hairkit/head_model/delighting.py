@@ -1,0 +1,104 @@
+"""The light of the photos taken out of a head's colours.
+
+Seen skin is taken to have nearly one albedo. What its brightness owes to the direction of its
+surface is the irradiance, a polynomial of second degree in the normal (Ramamoorthi and Hanrahan
+2001), fitted by robust least squares, so that brows, eyes and lips do not count. What is left over
+centimetres is light too, such as the shadow below the chin or of the hair (Horn 1974). The map is
+divided by both.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from hairkit.arrays import Float32Array, Float64Array
+
+GAMMA = 2.2
+"""Exponent from sRGB to linear light, close enough for ratios."""
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Weights of linear red, green and blue (ITU-R BT.709)."""
+ROUNDS = 12
+"""Rounds of reweighted least squares."""
+SPREAD = 0.18
+"""Relative difference from the fit from which a texel counts less: pores and noise are below."""
+RIDGE = 0.01
+"""Weight of the belief that light is even, in shares of the weight of all texels, times the squared
+degree: directions that no view sees stay at the mean. From 0.003 to 0.03 the map hardly changes."""
+DARKEST, BRIGHTEST = 0.3, 2.5
+"""Bounds of the irradiance, in shares of its mean."""
+REACH = 14.0
+"""Sigma over which leftover brightness is light, texels of 1 mm: broader than brows and lips."""
+TAKEN, LARGEST = 0.8, 0.6
+"""Share of the leftover that is taken out, and its largest logarithm."""
+LEAST = 1e-6
+"""Least weight that is divided by."""
+
+
+def find_shading(
+    colours: Float32Array, weight: Float32Array, normals: Float32Array
+) -> Float32Array:
+    """Return the factor (H, W) of the light in a map of colours, of mean 1 where skin is seen.
+
+    Parameters
+    ----------
+    colours
+        (H, W, 3) sRGB, 0 to 255.
+    weight
+        (H, W) how well each texel is seen, and how much it is skin; 0: not at all.
+    normals
+        (H, W, 3) unit normals of the head.
+
+    Returns
+    -------
+    shading
+        Factor of sRGB values: the linear light to the power of 1 / 2.2.
+    """
+    seen = weight > 0
+    if not seen.any():
+        return np.ones(weight.shape, np.float32)
+    linear = (np.maximum(colours, 1.0) / 255.0) ** GAMMA
+    brightness = (linear @ np.array(LUMINANCE, np.float32)).astype(np.float64)
+    basis = harmonics(normals)
+    light, trust = _fit_light(basis[seen], brightness[seen], weight[seen].astype(np.float64))
+    mean = float(np.average(basis[seen] @ light, weights=weight[seen]))
+    shading = np.clip(basis @ light, DARKEST * mean, BRIGHTEST * mean)
+    skin = np.zeros(weight.shape, np.float32)
+    skin[seen] = weight[seen] * trust
+    shading *= np.exp(TAKEN * _leftover(brightness / shading, skin))
+    level = np.average(np.log(shading[seen]), weights=weight[seen])
+    return np.asarray((shading / np.exp(level)) ** (1 / GAMMA), np.float32)
+
+
+def harmonics(normals: Float32Array | Float64Array) -> Float64Array:
+    """Return (..., 9) the real spherical harmonics up to degree 2, without their factors."""
+    x, y, z = np.moveaxis(np.asarray(normals, np.float64), -1, 0)
+    terms = [np.ones_like(x), y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y]
+    return np.stack(terms, axis=-1)
+
+
+def _fit_light(
+    basis: Float64Array, brightness: Float64Array, weight: Float64Array
+) -> tuple[Float64Array, Float64Array]:
+    """Return the light (9,) and how far each texel agrees with it (N,)."""
+    degree = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2])
+    ridge = np.diag(RIDGE * weight.sum() * degree**2)
+    trust = np.ones(len(weight))
+    for _ in range(ROUNDS):
+        weighted = basis * (weight * trust)[:, None]
+        light = np.linalg.solve(weighted.T @ basis + ridge, weighted.T @ brightness)
+        fitted = np.maximum(basis @ light, DARKEST * np.median(brightness))
+        trust = 1 / (1 + ((brightness / fitted - 1) / SPREAD) ** 2) ** 2
+    result: Float64Array = np.asarray(light, np.float64)
+    return result, trust
+
+
+def _leftover(ratio: Float64Array, skin: Float32Array) -> Float64Array:
+    """Return the smooth logarithm (H, W) of brightness over fitted light, 0 far from skin."""
+    logs = np.log(np.clip(ratio, np.exp(-2 * LARGEST), np.exp(2 * LARGEST)))
+    level = np.average(logs, weights=skin)
+    total = cv2.GaussianBlur(skin, (0, 0), REACH)
+    mean = cv2.GaussianBlur(((logs - level) * skin).astype(np.float32), (0, 0), REACH)
+    peak = float(total.max())
+    smooth: Float64Array = np.clip(mean / np.maximum(total, LEAST * peak), -LARGEST, LARGEST)
+    return smooth.astype(np.float64)
