@@ -67,7 +67,9 @@ FEWEST_HEADS = 3
 class Options:
     """Settings of the fit."""
 
-    shapes: str = option("", doc="Folder of OBJ heads of one topology; empty: hairkit's shapes.")
+    shapes: Path | None = option(
+        None, doc="Folder of OBJ heads of one topology; none: hairkit's shapes."
+    )
     modes: int = option(30, low=1, high=200, doc="Shapes that are fitted at most.")
     prior: float = option(
         1.0, low=0.01, high=100, doc="How strongly weights are drawn to the average head."
@@ -121,8 +123,8 @@ def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: O
 
 def _modes(head: Head, options: Options) -> Float64Array:
     """Return (K, V, 3) moves by one deviation of each shape, in the size of the head."""
-    if options.shapes:
-        return _folder_modes(Path(options.shapes), head)[: options.modes]
+    if options.shapes is not None:
+        return _folder_modes(options.shapes, head)[: options.modes]
     model = default_head()
     if not np.array_equal(head.faces, model.faces):
         raise InputError(

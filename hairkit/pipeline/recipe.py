@@ -215,9 +215,9 @@ def _read_shipped(name: str) -> bytes:
 def stage_digest(manager: Manager, stage: Stage) -> str:
     """Return a hex digest of plugins, versions and options: equal digests, equal behaviour.
 
-    Options are taken with their defaults filled in; a file that an option names counts with its
-    content. A plugin counts with its distribution, with every module that it imports and with the
-    networks that it finds installed.
+    Options are taken with their defaults filled in; files that an option names, and those in a
+    folder that it names, count with their content. A plugin counts with its distribution, with
+    every module that it imports and with the networks that it finds installed.
     """
     digest = hashlib.sha256(stage.hook.encode())
     for choice in stage.choices:
@@ -229,9 +229,18 @@ def stage_digest(manager: Manager, stage: Stage) -> str:
         for field in dataclasses.fields(options) if options is not None else ():
             value = getattr(options, field.name)
             digest.update(f"\n{field.name}={value!r}".encode())
-            if isinstance(value, Path) and value.is_file():
-                digest.update(hashlib.sha256(value.read_bytes()).digest())
+            for file in _files_of(value):
+                digest.update(f"\n{file.name} ".encode())
+                digest.update(hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()
+
+
+def _files_of(value: Any) -> list[Path]:
+    """Return the file that an option names, or the files in the folder that it names, sorted."""
+    if not isinstance(value, Path):
+        return []
+    inside = sorted(value.iterdir()) if value.is_dir() else [value]
+    return [path for path in inside if path.is_file()]
 
 
 def missing_networks(recipe: Recipe, manager: Manager) -> dict[str, tuple[str, ...]]:

@@ -233,6 +233,24 @@ def test_the_digest_knows_values_not_spelling(manager: Manager) -> None:
     assert digest("") != digest(f"{first.name} = {other}")
 
 
+def test_the_digest_knows_the_files_in_a_folder(tmp_path: Path) -> None:
+    """A folder that an option names counts with the files in it."""
+    manager = Manager.loaded([])
+    recipe = load_recipe("default").with_set(["head=blendshapes", f"blendshapes.shapes={tmp_path}"])
+
+    def digest() -> str:
+        return stage_digest(manager, stage_of(recipe, "head"))
+
+    seen = {digest()}
+    (tmp_path / "a.obj").write_text("v 0 0 0")
+    seen.add(digest())
+    (tmp_path / "a.obj").write_text("v 0 0 1")
+    seen.add(digest())
+    (tmp_path / "a.obj").rename(tmp_path / "b.obj")
+    seen.add(digest())
+    assert len(seen) == 4
+
+
 def test_the_digest_knows_the_networks_that_are_there(
     manager: Manager, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

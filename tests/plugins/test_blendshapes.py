@@ -99,7 +99,7 @@ def test_shapes_come_from_a_folder(tmp_path: Path) -> None:
     for number, head in enumerate(heads):
         write_head_obj(tmp_path / f"{number}.obj", head)
     true = _mixed({"nose_protrusion": 1.2, "jaw_breadth": -1.0})
-    fitted = _fit(true, Options(shapes=str(tmp_path), prior=0.2, outlines=False))
+    fitted = _fit(true, Options(shapes=tmp_path, prior=0.2, outlines=False))
     assert _error(fitted, true) < 0.4 * _error(default_head(), true)
 
 
@@ -107,10 +107,10 @@ def test_unfit_shapes_are_one_line(tmp_path: Path) -> None:
     """Too few heads, another topology, and a head of one's own without shapes are refused."""
     true = default_head()
     with pytest.raises(InputError, match=r"0 \.obj heads, expected 3 or more"):
-        _fit(true, Options(shapes=str(tmp_path)))
+        _fit(true, Options(shapes=tmp_path))
     for number in range(3):
         write_head_obj(tmp_path / f"{number}.obj", ball_head())
     with pytest.raises(InputError, match="all need one topology"):
-        _fit(true, Options(shapes=str(tmp_path)))
+        _fit(true, Options(shapes=tmp_path))
     with pytest.raises(InputError, match=r"give blendshapes\.shapes"):
         _fit(true, Options(), start=ball_head())
