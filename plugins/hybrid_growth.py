@@ -7,7 +7,8 @@ field without signs the tensors are followed in the direction in which the growt
 Added to the patent, and off in the recipe `patent`: a strand that leaves the hair goes on for a
 while (`patience`, the uncertain steps of the thesis) and is cut where it left; a strand that slides
 is turned back to the surface (`pull`) and ends farther outside (`bound`), because its tip hangs
-below what all views agree on. Inertia, too, is an addition.
+below what all views agree on; and a strand that meets the shoulders turns along them (`turn_sine`).
+Inertia, too, is an addition.
 """
 
 from __future__ import annotations
@@ -18,10 +19,22 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from hairkit import Hull, OrientationField, Roots, ScalpDistance, Strands, TiedHair, Waves, hookimpl
+from hairkit import (
+    Hull,
+    OrientationField,
+    Roots,
+    ScalpDistance,
+    Scene,
+    Strands,
+    TiedHair,
+    Waves,
+    hookimpl,
+)
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.field.growth_prior import long_share
 from hairkit.field.sampling_kernels import gradient_at, make_unit, sample_at
 from hairkit.grooming.postprocess import FinishOptions, finish
+from hairkit.head_model.torso import Torso
 from hairkit.options import option
 from hairkit.parallel import compiled, parallel_for
 from hairkit.types.volume import cell_slopes, symmetric_matrices
@@ -33,6 +46,8 @@ MIN_STRANDS = 32
 """Least number of strands worth a call on another thread."""
 DISTANCE = 3
 """Channel of the internal distance after the three of the direction."""
+GROWTH = 4
+"""Channel of the growth potential."""
 CENTIMETRES = 100
 """Of a metre: the unit of the internal distance where the field has none of its own."""
 
@@ -79,6 +94,13 @@ class Options(FinishOptions):
         doc="Sine of the angle by which a sliding strand turns back, for each unit of internal"
         " distance beyond slide_from.",
     )
+    turn_sine: float = option(
+        0.7,
+        low=0,
+        high=1,
+        doc="Strands that meet the shoulders turn along them where the way to the tips leads along"
+        " the surface: at an angle of a larger sine to its normal; 1 never.",
+    )
     inertia: float = option(
         0.9, low=0, high=0.99, doc="Share of the previous direction in the next step's."
     )
@@ -92,6 +114,7 @@ class Options(FinishOptions):
 
 @hookimpl
 def track(
+    scene: Scene,
     hull: Hull,
     field: OrientationField,
     roots: Roots,
@@ -107,7 +130,13 @@ def track(
         inertia = max(options.inertia, 1 - options.step / memory)
         options = replace(options, inertia=inertia)
     strands = grow(
-        field, _sign_directions(field), _distance(field, hull), roots.positions, way, options
+        field,
+        _sign_directions(field),
+        _distance(field, hull),
+        roots.positions,
+        way,
+        options,
+        float(Torso.under(scene.head).joint[1]),
     )
     return finish(replace(strands, root_uv=roots.uv), waves, tied, hull, field, options)
 
@@ -119,6 +148,7 @@ def grow(
     starts: Float32Array,
     way: float,
     options: Options,
+    shoulders: float = -np.inf,
 ) -> Strands:
     """Return the strands grown from `starts` (N, 3), metres.
 
@@ -129,9 +159,15 @@ def grow(
     distance
         (X, Y, Z) internal distance.
     way
-        Longest way through the hair, metres; strands slide only up to this length.
+        Longest way from the scalp through the hair, metres. Strands slide only up to this length,
+        or up to that of the way from their root to the tips, by the growth potential.
+    shoulders
+        Height below which strands that leave the hair may have met the shoulders, metres.
     """
-    steps = max(int(min(options.max_length, options.reach * way) / options.step), 2)
+    left = -field.grid.sample(field.growth, starts).astype(np.float64)
+    ways = way + long_share(way) * np.maximum(left - way, 0)
+    steps = np.maximum(np.minimum(options.max_length, options.reach * ways) / options.step, 2)
+    limits = np.stack([steps, ways / options.step], axis=1).astype(np.int64)
     points = np.zeros((len(starts), options.points, 3), np.float32)
     rules = Rules(
         options.step,
@@ -139,16 +175,16 @@ def grow(
         options.inertia,
         int(options.blind / options.step),
         int(options.patience / options.step),
-        steps,
         options.slide_sine,
+        options.turn_sine,
+        shoulders,
         options.slide_from,
         options.pull,
-        int(way / options.step),
     )
-    values = np.concatenate([direction, distance[..., None]], axis=3)
+    values = np.concatenate([direction, distance[..., None], field.growth[..., None]], axis=3)
     volume = SignedVolume(field.grid.origin, field.grid.spacing, values)
     order = np.lexsort((field.grid.nearest_cell(starts) // BLOCK).T)
-    growth = (volume, rules, starts, order, points)
+    growth = (volume, rules, starts, limits, order, points)
     parallel_for(_grow_strands, len(starts), *growth, min_chunk=MIN_STRANDS)
     return Strands(points.reshape(-1, 3), np.arange(len(starts) + 1) * options.points)
 
@@ -183,7 +219,8 @@ class SignedVolume(NamedTuple):
     spacing: float
     """Edge of a cell, metres."""
     values: Float32Array
-    """(X, Y, Z, 4): direction, 0 where nothing is known, and internal distance (`DISTANCE`)."""
+    """(X, Y, Z, 5): direction, 0 where nothing is known, internal distance (`DISTANCE`) and growth
+    potential (`GROWTH`)."""
 
 
 class Rules(NamedTuple):
@@ -199,16 +236,17 @@ class Rules(NamedTuple):
     """Steps from the root on which nothing ends a strand."""
     patience_steps: int
     """Steps in a row outside the hair that do not end a strand."""
-    steps: int
-    """Most steps of a strand."""
     slide_sine: float
     """Of the angle to the hair's surface, below which a strand slides along it; 0 for never."""
+    turn_sine: float
+    """Of the angle between the surface's normal and the way to the tips, above which strands that
+    meet the shoulders turn along the surface."""
+    shoulders: float
+    """Height below which strands turn, metres."""
     slide_from: float
     """Internal distance from which strands slide."""
     pull: float
     """Sine of the turn back for each unit of internal distance beyond `slide_from`."""
-    slide_steps: int
-    """Steps from the root on which strands may slide."""
 
 
 @compiled
@@ -218,14 +256,18 @@ def _grow_strands(
     volume: SignedVolume,
     rules: Rules,
     starts: Float32Array,
+    limits: Int64Array,
     order: Int64Array,
     points: Float32Array,
 ) -> None:
-    """Write strands order[first:last] into points (N, M, 3) of equal steps; `starts` is (N, 3)."""
-    path = np.empty((rules.steps + 1, 3))
+    """Write strands order[first:last] into points (N, M, 3) of equal steps; `starts` is (N, 3).
+
+    `limits` (N, 2) are the most steps of each strand, and those on which it may slide.
+    """
+    path = np.empty((limits[:, 0].max() + 1, 3))
     for k in range(first, last):
         s = order[k]
-        count = _grow_strand(volume, rules, starts[s], path)
+        count = _grow_strand(volume, rules, starts[s], limits[s], path)
         _resample(path[:count], points[s])
 
 
@@ -242,14 +284,18 @@ def _resample(path: Float64Array, points: Float32Array) -> None:
 
 @compiled
 def _grow_strand(
-    volume: SignedVolume, rules: Rules, start: Float32Array, path: Float64Array
+    volume: SignedVolume,
+    rules: Rules,
+    start: Float32Array,
+    limits: Int64Array,
+    path: Float64Array,
 ) -> int:
     """Write one strand's points into path (M, 3); return their number, at least 2."""
-    p, d, found = np.empty(3), np.zeros(3), np.empty(4)
+    p, d, found = np.empty(3), np.zeros(3), np.empty(5)
     p[:] = start
     path[0] = p
     count, inside = 1, 1
-    for i in range(1, rules.steps + 1):
+    for i in range(1, limits[0] + 1):
         sample_at(volume.origin, volume.spacing, volume.values, p, found)
         known = make_unit(found[:3])
         if i <= rules.blind_steps or (known and found[DISTANCE] <= rules.bound):
@@ -263,10 +309,10 @@ def _grow_strand(
             d[:] = found[:3]
         if not make_unit(d):
             break
-        slides = rules.slide_sine > 0 and i < rules.slide_steps
+        slides = rules.slide_sine > 0 and i < limits[1]
         if slides and found[DISTANCE] >= rules.slide_from:
             back = rules.pull * (found[DISTANCE] - rules.slide_from)
-            _slide(volume, rules.slide_sine, back, p, d)
+            _slide(volume, rules, back, p, d)
         for axis in range(3):
             p[axis] += rules.step * d[axis]
         path[count] = p
@@ -281,13 +327,37 @@ def _grow_strand(
 
 @compiled
 def _slide(
-    volume: SignedVolume, sine: float, back: float, p: Float64Array, d: Float64Array
+    volume: SignedVolume, rules: Rules, back: float, p: Float64Array, d: Float64Array
 ) -> None:
-    """Bend d along the hair's surface, and `back` into the hair, if it leaves at a smaller sine."""
+    """Bend d along the hair's surface, and `back` into the hair, where it slides or turns."""
     normal = np.empty(3)
-    gradient_at(volume.origin, volume.spacing, volume.values[..., DISTANCE:], p, normal)
+    distance = volume.values[..., DISTANCE : DISTANCE + 1]
+    gradient_at(volume.origin, volume.spacing, distance, p, normal)
     outward = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]
-    if outward < sine:
+    if outward < rules.slide_sine:
         for axis in range(3):
             d[axis] -= (max(outward, 0.0) + back) * normal[axis]
+        make_unit(d)
+    elif p[1] < rules.shoulders:
+        _turn(volume, rules, back, p, normal, d)
+
+
+@compiled
+def _turn(
+    volume: SignedVolume,
+    rules: Rules,
+    back: float,
+    p: Float64Array,
+    normal: Float64Array,
+    d: Float64Array,
+) -> None:
+    """Bend d along the surface of a normal (3,) where the way to the tips leads along it."""
+    way = np.empty(3)
+    gradient_at(volume.origin, volume.spacing, volume.values[..., GROWTH : GROWTH + 1], p, way)
+    known = way[0] * way[0] + way[1] * way[1] + way[2] * way[2] > 0
+    rise = way[0] * normal[0] + way[1] * normal[1] + way[2] * normal[2]
+    if known and 1 - rise * rise > rules.turn_sine**2:
+        outward = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]
+        for axis in range(3):
+            d[axis] += way[axis] - (outward + rise + back) * normal[axis]
         make_unit(d)

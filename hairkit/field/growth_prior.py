@@ -61,7 +61,7 @@ def combing_direction(
     flow = gradient(hull.grid, growth, at)
     flow -= np.sum(flow * outward, axis=1, keepdims=True) * outward
     length = float(np.ptp(growth[hull.dense]))
-    share = _long_share(length)
+    share = long_share(length)
     combed = share * flow + max(1 - share, LEAST_WHORL) * _from_crown(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
     if parts(parting, length):
@@ -184,14 +184,14 @@ def growth_potential(hull: Hull, from_scalp: ScalpDistance, tip_share: float) ->
     known = np.isfinite(left)
     weight = ndimage.gaussian_filter(known.astype(np.float32), FLOW_SMOOTHING)
     beyond = np.maximum(from_scalp.values - tip_share * length, 0)
-    left -= _long_share(length) * TIP_SLOPE * beyond
+    left -= long_share(length) * TIP_SLOPE * beyond
     total = ndimage.gaussian_filter(np.where(known, left, 0).astype(np.float32), FLOW_SMOOTHING)
     smooth = total / np.maximum(weight, 1e-6)
     growth: Float32Array = np.where(weight > 1e-3, -smooth, -smooth.max()).astype(np.float32)
     return growth
 
 
-def _long_share(length: float) -> float:
+def long_share(length: float) -> float:
     """Return 0 for short hair, 1 for long hair, of its length in metres."""
     return float(np.clip((length - SHORT_HAIR) / (LONG_HAIR - SHORT_HAIR), 0.0, 1.0))
 

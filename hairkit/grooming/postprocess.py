@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hairkit.grooming.head_collision import push_out_of_head
+from hairkit.grooming.make_room import make_room
 from hairkit.grooming.tie_strands import lead_to_ties
 from hairkit.grooming.wind_waves import add_waves
 from hairkit.helices import smooth_strands
@@ -47,5 +48,5 @@ def finish(
     if options.helix_tolerance > 0:
         strands = smooth_strands(strands, options.helix_tolerance)
     if options.waves:
-        strands = add_waves(strands, waves)
+        strands = add_waves(make_room(strands, waves, hull), waves)
     return push_out_of_head(strands, hull, options.clearance)

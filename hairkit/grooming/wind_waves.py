@@ -20,9 +20,14 @@ RADIUS_SPREAD, PITCH_SPREAD = 0.2, 0.1
 """Standard deviations between wisps, as shares: 0.21 and 0.22, 0.07 and 0.14 on wavy and curly
 heads. They leave F at 4 mm within 1 of what it is without."""
 
+LARGEST_RADIUS = 1 + np.sqrt(2) * RADIUS_SPREAD
+"""Of the widest wisps, as a share of the mean: a sine's amplitude is root 2 of its spread."""
+RAMP = 0.03
+"""Metres from the root over which the radius grows from 0."""
+
 
 def add_waves(
-    strands: Strands, waves: Waves, seed: int = 0, ramp: float = 0.03, spread: float = 1.0
+    strands: Strands, waves: Waves, seed: int = 0, ramp: float = RAMP, spread: float = 1.0
 ) -> Strands:
     """Wind strands of equal point counts into helices around their own axes.
 

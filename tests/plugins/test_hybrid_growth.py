@@ -16,7 +16,9 @@ from hairkit.testing import (
     scalp_roots,
     shell_hull,
 )
+from hairkit.types.camera import Camera
 from hairkit.types.head import Roots
+from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
 from hairkit.types.tie import TiedHair
 from hairkit.types.volume import OrientationField, VoxelGrid
@@ -25,6 +27,8 @@ from hairkit.types.waves import Waves
 FREE = Options(slide_sine=0.0, waves=False, clearance=0.0)
 DISTANCE = measure_scalp_distance(ball_head(), shell_hull())
 LOOSE = TiedHair()
+CAMERA = Camera.on_turn(0.0, distance=1.0, focal=100.0, width=80, height=60)
+SCENE = Scene(("front",), (CAMERA,), ball_head())
 GRID = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.01)
 
 
@@ -81,6 +85,46 @@ def test_strands_slide_along_the_surface_they_meet_at_a_small_angle() -> None:
     assert steep.tips[0, 1] > 0.03
 
 
+def falling(growth: tuple[float, float, float]) -> OrientationField:
+    """Hair that falls straight down, whose growth potential rises along `growth`."""
+    potential = (GRID.centres() @ np.array(growth)).astype(np.float32)
+    return replace(constant((0, -1, 0)), growth=potential)
+
+
+@pytest.mark.parametrize(("growth", "turns"), [((1, -0.5, 0), True), ((0.2, -1, 0), False)])
+def test_strands_that_meet_the_shoulders_turn_where_the_hair_goes_on(
+    growth: tuple[float, float, float], turns: bool
+) -> None:
+    """Under the hair at y = 0, below the shoulders' height: along x if the tips lie there."""
+    distance = (1 - 10 * GRID.centres()[..., 1]).astype(np.float32)
+    options = replace(FREE, slide_sine=0.35, reach=1.0, inertia=0.0, blind=0.0, bound=1.3)
+    starts = np.array([[-0.05, 0.03, 0.0]], np.float32)
+    field = falling(growth)
+    assert field.direction is not None
+    below, above = (
+        grow(field, field.direction, distance, starts, 0.15, options, height).tips[0]
+        for height in (0.05, -0.1)
+    )
+    np.testing.assert_allclose(above, [-0.05, -0.03, 0], atol=2e-3)
+    if turns:
+        assert below[0] > 0.03
+        assert abs(below[1]) < 0.012
+    else:
+        np.testing.assert_allclose(below, above, atol=1e-6)
+
+
+def test_long_strands_grow_as_far_as_their_own_tips() -> None:
+    """The longest way is that from the nearest scalp: hair of the crown has farther to go."""
+    inside = np.full(GRID.shape, 0.5, np.float32)
+    field = falling((0, -1, 0))
+    assert field.direction is not None
+    starts = np.array([[0.0, 0.15, 0], [0.0, -0.15, 0]], np.float32)
+    options = replace(FREE, reach=1.0)
+    far, near = grow(field, field.direction, inside, starts, 0.12, options).lengths()
+    assert far == pytest.approx(0.15, abs=2e-3)
+    assert near == pytest.approx(0.12, abs=2e-3)
+
+
 def test_a_root_where_nothing_is_known_keeps_its_place() -> None:
     """One strand a root, whatever the field: a stub of two points."""
     inside = np.zeros(GRID.shape, np.float32)
@@ -91,7 +135,8 @@ def test_a_root_where_nothing_is_known_keeps_its_place() -> None:
 
 def follow_ball(options: Options, roots: Roots) -> Strands:
     hull = shell_hull()
-    return track(hull, combed_field(hull.grid), roots, Waves(), DISTANCE, LOOSE, options)
+    field = combed_field(hull.grid)
+    return track(SCENE, hull, field, roots, Waves(), DISTANCE, LOOSE, options)
 
 
 def test_a_field_without_signs_is_followed_along_its_growth() -> None:
@@ -190,7 +235,9 @@ def test_strands_can_be_smoothed_by_helix_arcs() -> None:
     hull = shell_hull()
     options = replace(FREE, inertia=0.0, reach=2.0)
     rough, calm = (
-        track(hull, noisy, roots, Waves(), DISTANCE, LOOSE, replace(options, helix_tolerance=t))
+        track(
+            SCENE, hull, noisy, roots, Waves(), DISTANCE, LOOSE, replace(options, helix_tolerance=t)
+        )
         for t in (0.0, 0.0005)
     )
 
@@ -217,6 +264,7 @@ def test_a_strand_does_not_depend_on_how_many_others_are_grown() -> None:
     )
     among, alone = (
         track(
+            SCENE,
             hull,
             combed_field(hull.grid),
             r,
