@@ -43,7 +43,7 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
 @pytest.mark.parametrize(
     ("changed", "again"),
     [
-        ("hairkit/types/camera.py", "scene head hull field"),
+        ("hairkit/types/camera.py", "scene head hull field track"),
         ("hairkit/types/mask.py", "segment scene head orient hull field"),
         ("hairkit/storage.py", "segment scene head orient hull field track"),
         ("hairkit/cameras/silhouette_coherence.py", "scene"),
