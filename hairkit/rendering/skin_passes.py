@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import moderngl
+import numpy as np
 
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import DepthRange, set_uniforms
@@ -17,6 +18,8 @@ from hairkit.types.skin_look import SkinLook
 
 FIRST_UNIT = 1
 """First of the texture units of the layers; 0 is the light volume's."""
+Box = tuple[int, int, int, int]
+"""Left, top, width and height, pixels."""
 _WAYS = ((1.0, 0.0), (0.0, 1.0))
 
 
@@ -45,13 +48,17 @@ def draw_skin(
             program = gl.program("skin", "skin_layers")
             draw_solid(gl, solid, program, camera, depth, push, **own)
         gl.context.disable(moderngl.DEPTH_TEST)
-        _diffuse(gl, layers, camera, look)
+        skins = [solid for solid in solids if solid.scatter > 0]
+        if skins and max(look.mean_free_path) > 0:
+            _diffuse(gl, layers, camera, look, _box(skins, camera))
         shown.use()
+        shown.scissor = _box(solids, camera)
         front.release()
         depths.release()
         gl.context.enable_only(moderngl.DEPTH_TEST)
         names = ("u_diffuse", "u_surface", "u_specular")
         _fill(gl, "skin_combine", dict(zip(names, layers, strict=False)), uniforms)
+        shown.scissor = (0, 0, camera.width, camera.height)
 
 
 @contextlib.contextmanager
@@ -67,14 +74,22 @@ def _layers(gl: Renderer, size: tuple[int, int]) -> Iterator[list[moderngl.Textu
             texture.release()
 
 
-def _diffuse(gl: Renderer, layers: list[moderngl.Texture], camera: Camera, look: SkinLook) -> None:
-    """Replace the diffuse layer by itself under the kernel, along rows and then columns."""
+def _diffuse(
+    gl: Renderer, layers: list[moderngl.Texture], camera: Camera, look: SkinLook, box: Box
+) -> None:
+    """Replace the diffuse layer by itself under the kernel, along rows and then columns.
+
+    `box` holds all that scatters.
+    """
     taps = [tuple(row) for row in diffusion_kernel(look).tolist()]
     ends = (layers[0], layers[3]), (layers[3], layers[0])
     before = gl.context.fbo
     for way, (given, made) in zip(_WAYS, ends, strict=True):
         framebuffer = gl.context.framebuffer([made])
         framebuffer.use()
+        if made is layers[3]:
+            framebuffer.clear()  # neighbours beyond the box are read
+        framebuffer.scissor = box
         lens = {
             "u_taps": taps,
             "u_way": way,
@@ -84,6 +99,17 @@ def _diffuse(gl: Renderer, layers: list[moderngl.Texture], camera: Camera, look:
         _fill(gl, "skin_diffuse", {"u_diffuse": given, "u_surface": layers[1]}, lens)
         before.use()  # one that is in use cannot be released
         framebuffer.release()
+
+
+def _box(solids: Sequence[Solid], camera: Camera) -> Box:
+    """Return the part of the picture that meshes are in; all of it where one is behind the eye."""
+    whole = np.array([camera.width, camera.height])
+    places = np.concatenate([camera.project(solid.vertices) for solid in solids])
+    if not np.isfinite(places).all():
+        return (0, 0, camera.width, camera.height)
+    low = np.clip(np.floor(places.min(axis=0)) - 1, 0, whole).astype(int)
+    high = np.clip(np.ceil(places.max(axis=0)) + 1, low, whole).astype(int)
+    return (int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1]))
 
 
 def _fill(

@@ -189,7 +189,7 @@ def test_both_passes_of_the_shader_are_the_twin() -> None:
         layers[0].write(np.dstack([light, np.ones((48, 64))]).astype(np.float32))
         layers[1].write(np.ones((48, 64, 4), np.float32))
         gl.context.disable(gl.context.DEPTH_TEST)
-        _diffuse(gl, layers, flat, look)
+        _diffuse(gl, layers, flat, look, (0, 0, 64, 48))
         found = np.frombuffer(layers[0].read(), np.float32).reshape(48, 64, 4)
         for layer in layers:
             layer.release()
