@@ -3,22 +3,23 @@
     python benchmarks/simulation.py [--guides 1000 10000] [--frames 60] [--referee PYTHON]
 
 One scene for all: the same guides of 16 points, from their captured shape, on a head that is
-shaken (`yaw:20:1.5`), under gravity, at 60 frames a second. Beside pbd there run a plain scheme of
-distance constraints (Mueller et al. 2007; Macklin et al. 2016), in NumPy over all strands at once,
-and, where `--referee` names a Python that has it, pyPBD (C++), with the same constraints: each node
-to the next one rigidly, to the next but one by a spring, which is their bending. Their first two
-nodes go with the head in every substep. They have neither obstacles nor neighbours; pbd has both,
-as always.
+shaken (`yaw:20:1.5`), under gravity, at 60 frames a second. Beside pbd there run extended
+position-based dynamics (Mueller et al. 2007; Macklin et al. 2016), compiled, with contact with the
+head (`xpbd_peer`), and, where `--referee` names a Python that has it, pyPBD (C++), without contact.
+Both have the same constraints: each node to the next one rigidly, to the next but one by a spring,
+which is their bending. Their first two nodes go with the head in every substep. pbd also has twist,
+friction and neighbours, as always.
 
 | column | what |
 |---|---|
 | steps/s | steps of 1/60 s a second of wall clock, of all guides, the best of three rounds |
+| CPU ms | processor time of a step, of all threads, the best of three rounds |
 | stretch | largest of any segment at any frame, of up to 1000 guides |
 | off | root mean square distance from the converged motion of the same material |
 
-The converged motion is that of many substeps: of pbd for pbd, of the plain scheme in float64 for
-both others. Of pyPBD the time of its own step is counted, with all threads or with one,
-whichever is faster, and not the loops in Python that set roots.
+The converged motion is that of many substeps: of pbd for pbd; of XPBD in float64 for itself, and
+without the head for pyPBD. Of pyPBD the time of its own step is counted, with all threads or with
+one, whichever is faster, and not the loops in Python that set roots.
 """
 
 from __future__ import annotations
@@ -37,24 +38,23 @@ import numpy as np
 import numpy.typing as npt
 from hairkit_plugins.pbd import Options
 from hairkit_plugins.pbd.simulator import PbdSimulator
+from xpbd_peer import BENDING, CompiledXpbd
 
 from hairkit.errors import RenderError
 from hairkit.grooming.prepare_export import dense_groom
 from hairkit.head_model.template import default_head
 from hairkit.rendering.context import renderer
 from hairkit.simulation import Surroundings, add_shakes
+from hairkit.simulation.obstacles import head_obstacles
 from hairkit.synth import grow
 from hairkit.types.groom import Groom
 
 Array = npt.NDArray[Any]
 NODES, FRAME = 16, 1 / 60
 SHAKE = ["yaw:20:1.5"]
-GRAVITY = np.array([0.0, -9.81, 0.0])
-BENDING = 1000.0
-"""N/m for each kilogram of a node: the spring between every node and the next but one."""
 SCENE, FEW = 1000, 40
 """Most guides whose error is measured; of the peers', whose strands do not meet, so many."""
-CONVERGED, CONVERGED_PLAIN = 64, (512, 2)
+CONVERGED, CONVERGED_PEER = 64, (512, 2)
 """Substeps of pbd's converged motion; substeps and iterations of the others'."""
 SETTINGS = ((4, 20), (16, 5), (16, 20), (32, 2), (32, 8), (64, 1), (64, 4), (128, 1), (128, 4))
 """Substeps and iterations of the peers, of which the cheapest that is as good is taken."""
@@ -96,9 +96,13 @@ np.savez(result, taken=taken, points=np.array(found))
 """
 
 
-PLAIN, PYPBD_NAME = "plain distances", "pyPBD distances"
+XPBD, PYPBD_NAME = "XPBD, compiled", "pyPBD distances"
 Way = tuple[str, int, int]
 """Method, substeps, iterations."""
+Setting = tuple[int, int]
+"""Substeps and iterations."""
+Speed = tuple[float, float]
+"""Steps of 1/60 s a second, and processor seconds of a step."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,8 @@ class Row:
     way: Way
     speed: float
     """Steps of 1/60 s a second."""
+    cpu: float
+    """Processor seconds of a step, of all threads."""
     stretch: float
     """Largest, as a share."""
     off: float
@@ -143,15 +149,16 @@ def off_by(points: Array, converged: Array) -> float:
     return float(np.sqrt(((points - converged) ** 2).sum(axis=-1).mean()))
 
 
-def rate(step: Callable[[int], None], steps: int, rounds: int = 3) -> float:
-    """Return steps per second, the best of several rounds."""
-    best = 0.0
+def rate(step: Callable[[int], None], steps: int, rounds: int = 3) -> Speed:
+    """Return how fast steps are, the best of several rounds."""
+    wall = cpu = np.inf
     for turn in range(rounds):
-        start = time.perf_counter()
+        start, used = time.perf_counter(), time.process_time()
         for k in range(steps):
             step(turn * steps + k)
-        best = max(best, steps / (time.perf_counter() - start))
-    return best
+        cpu = min(cpu, (time.process_time() - used) / steps)
+        wall = min(wall, (time.perf_counter() - start) / steps)
+    return 1 / wall, cpu
 
 
 def ours_moved(groom: Groom, backend: str, substeps: int, frames: int) -> tuple[Array, float]:
@@ -165,8 +172,8 @@ def ours_moved(groom: Groom, backend: str, substeps: int, frames: int) -> tuple[
     return np.stack(found), stretch
 
 
-def ours_speed(groom: Groom, backend: str, substeps: int, steps: int) -> float:
-    """Return pbd's steps a second."""
+def ours_speed(groom: Groom, backend: str, substeps: int, steps: int) -> Speed:
+    """Return how fast pbd is."""
     simulator = PbdSimulator(groom, Options(backend=backend, substeps=substeps))
     motion = add_shakes(SHAKE, groom.head)
     simulator.advance(FRAME, Surroundings())
@@ -179,81 +186,25 @@ def ours_speed(groom: Groom, backend: str, substeps: int, steps: int) -> float:
     return rate(step, steps)
 
 
-class Plain:
-    """Distance constraints by Gauss-Seidel in six colours: (n, 3, S), a colour at once."""
-
-    def __init__(self, rest: Array, substeps: int, iterations: int, kind: Any = np.float32) -> None:
-        self._rest = np.ascontiguousarray(rest.transpose(1, 2, 0), kind)
-        self._x, self._v = self._rest.copy(), np.zeros_like(self._rest)
-        self._h, self._iterations = kind(FRAME / substeps), iterations
-        self._down = GRAVITY.astype(kind)[:, None]
-        soft = kind(1 / (BENDING * self._h**2))
-        self._colours = [
-            *(self._colour(first, 1, 2, kind(0)) for first in (1, 2)),
-            *(self._colour(first, 2, 4, soft) for first in range(4)),
-        ]
-
-    def _colour(self, first: int, apart: int, every: int, soft: Any) -> tuple[Any, ...]:
-        """Nodes at either end, softness, rest lengths and free ends of constraints at once."""
-        start, end = slice(first, NODES - apart, every), slice(first + apart, NODES, every)
-        free = (np.arange(NODES) >= 2).astype(self._rest.dtype)[:, None, None]
-        length = np.linalg.norm(self._rest[end] - self._rest[start], axis=1, keepdims=True)
-        return start, end, soft, length, free[start], free[end]
-
-    @property
-    def points(self) -> Array:
-        """(S, n, 3) present positions."""
-        return self._x.transpose(2, 0, 1)
-
-    def substep(self, head: Array) -> None:
-        """Go on by a substep, to where the head is then."""
-        old = self._x.copy()
-        self._v[2:] += self._h * self._down
-        self._x[2:] += self._h * self._v[2:]
-        turn, shift = head[:3, :3].astype(old.dtype), head[:3, 3:].astype(old.dtype)
-        self._x[:2] = turn @ self._rest[:2] + shift
-        pulls = [np.zeros_like(colour[3]) for colour in self._colours]
-        for _ in range(self._iterations):
-            for colour, pull in zip(self._colours, pulls, strict=True):
-                self._hold(*colour, pull)
-        self._v = (self._x - old) / self._h
-
-    def _hold(
-        self, start: Any, end: Any, soft: Any, rest: Array, a: Array, b: Array, pull: Array
-    ) -> None:
-        """Move the ends of constraints (equations 17 and 18 of XPBD); rigid where soft is 0."""
-        edge = self._x[end] - self._x[start]
-        size = np.sqrt((edge * edge).sum(axis=1, keepdims=True))
-        change = (size - rest - soft * pull) / (a + b + soft)
-        pull += change
-        edge *= change / size
-        self._x[start] += a * edge
-        self._x[end] -= b * edge
-
-
-def plain_moved(
-    groom: Groom, setting: tuple[int, int], frames: int, kind: Any = np.float32
+def peer_moved(
+    groom: Groom, setting: Setting, frames: int, kind: Any = np.float32, contact: bool = True
 ) -> Array:
-    """Return points (F, S, n, 3) of some strands by the plain scheme."""
-    scheme, found = Plain(few(rest_of(groom)), *setting, kind), []
-    heads = heads_of(groom, frames, setting[0]).reshape(frames, setting[0], 4, 4)
-    for frame in heads:
-        for head in frame:
-            scheme.substep(head)
+    """Return points (F, S, n, 3) of some strands by compiled XPBD."""
+    obstacles, rest = head_obstacles(groom.head) if contact else None, few(rest_of(groom))
+    scheme, found = CompiledXpbd(rest, obstacles, FRAME / setting[0], setting[1], kind), []
+    for heads in heads_of(groom, frames, setting[0]).reshape(frames, setting[0], 4, 4):
+        scheme.advance(heads)
         found.append(scheme.points.copy())
     return np.stack(found)
 
 
-def plain_speed(groom: Groom, setting: tuple[int, int], steps: int) -> float:
-    """Return the plain scheme's steps a second."""
-    scheme, substeps = Plain(rest_of(groom), *setting), setting[0]
-    heads = heads_of(groom, 3 * steps, substeps)
-
-    def step(frame: int) -> None:
-        for k in range(substeps):
-            scheme.substep(heads[frame * substeps + k])
-
-    return rate(step, steps)
+def peer_speed(groom: Groom, setting: Setting, steps: int) -> Speed:
+    """Return how fast compiled XPBD is."""
+    obstacles, substeps = head_obstacles(groom.head), setting[0]
+    scheme = CompiledXpbd(rest_of(groom), obstacles, FRAME / substeps, setting[1], np.float32)
+    heads = heads_of(groom, 3 * steps, substeps).reshape(3 * steps, substeps, 4, 4)
+    scheme.advance(heads[0])  # compiles
+    return rate(lambda frame: scheme.advance(heads[frame]), steps)
 
 
 def referee(
@@ -277,12 +228,13 @@ def referee(
             return found["taken"], found["points"].reshape(-1, *rest.shape)
 
 
-def referee_speed(python: str, groom: Groom, setting: tuple[int, int], steps: int) -> float:
-    """Return pyPBD's steps a second: by all threads or by one, whichever is faster."""
+def referee_speed(python: str, groom: Groom, setting: Setting, steps: int) -> Speed:
+    """Return how fast pyPBD is, by all threads or by one; processor time is that of one."""
     rest, heads = rest_of(groom), heads_of(groom, 3 * steps, setting[0])
-    return float(
-        max(1 / referee(python, rest, heads, setting, threads)[0].min() for threads in ("1", ""))
+    one, all_ = (
+        float(referee(python, rest, heads, setting, threads)[0].min()) for threads in ("1", "")
     )
+    return 1 / min(one, all_), one
 
 
 def few(strands: Array) -> Array:
@@ -301,23 +253,25 @@ def errors(
             points, stretch = ours_moved(scene, backend, substeps, frames)
             found["pbd " + backend, substeps, 1] = stretch, off_by(points, converged)
     rest = few(rest_of(scene))
-    converged = plain_moved(scene, CONVERGED_PLAIN, frames, np.float64)
+    touching, free = (
+        peer_moved(scene, CONVERGED_PEER, frames, np.float64, contact) for contact in (True, False)
+    )
     for setting in SETTINGS:
-        points = plain_moved(scene, setting, frames)
-        found[PLAIN, *setting] = stretch_of(points, rest), off_by(points, converged)
+        points = peer_moved(scene, setting, frames)
+        found[XPBD, *setting] = stretch_of(points, rest), off_by(points, touching)
         if python:
             _, points = referee(python, rest, heads_of(scene, frames, setting[0]), setting, "1")
-            found[PYPBD_NAME, *setting] = stretch_of(points, rest), off_by(points, converged)
+            found[PYPBD_NAME, *setting] = stretch_of(points, rest), off_by(points, free)
     return found
 
 
-def speed_of(way: Way, groom: Groom, frames: int, python: str | None) -> float:
-    """Return steps of 1/60 s a second."""
+def speed_of(way: Way, groom: Groom, frames: int, python: str | None) -> Speed:
+    """Return how fast a method is."""
     method, substeps, iterations = way
     steps = max(1, frames * 1000 // max(len(groom.strands), 1000))
     few_steps = max(1, steps // 30)
-    if method == PLAIN:
-        return plain_speed(groom, (substeps, iterations), few_steps)
+    if method == XPBD:
+        return peer_speed(groom, (substeps, iterations), few_steps)
     if method == PYPBD_NAME:
         assert python is not None
         return referee_speed(python, groom, (substeps, iterations), few_steps)
@@ -333,7 +287,7 @@ def cheapest(rows: list[Row], stretch: float, off: float) -> Row | None:
 def verdicts(rows: list[Row]) -> list[str]:
     """Return, for each peer, how much faster the first row is at no more of an error."""
     ours, lines = rows[0], []
-    for name in dict.fromkeys(row.way[0] for row in rows if row.way[0] in (PLAIN, PYPBD_NAME)):
+    for name in dict.fromkeys(row.way[0] for row in rows if row.way[0] in (XPBD, PYPBD_NAME)):
         peers = [row for row in rows if row.way[0] == name]
         for words, stretch, off in (
             ("no more stretch than pbd", ours.stretch, np.inf),
@@ -344,9 +298,10 @@ def verdicts(rows: list[Row]) -> list[str]:
             if best is None:
                 lines.append(f"{name}, {words}: no setting gets there")
             else:
-                ratio = ours.speed / best.speed
+                wall, cpu = ours.speed / best.speed, best.cpu / ours.cpu
                 setting = f"{best.way[1]} x {best.way[2]}, {best.speed:.1f} steps/s"
-                lines.append(f"{name}, {words}: {setting}; pbd is {ratio:.1f} times as fast")
+                ratio = f"{wall:.1f} times as fast, by processor time {cpu:.1f}"
+                lines.append(f"{name}, {words}: {setting}; pbd is {ratio}")
     return lines
 
 
@@ -372,16 +327,18 @@ def main() -> None:
     backends = ["fast", *([] if args.without_shaders else _shaders())]
     scene = groom_of(min(*args.guides, SCENE))
     found = errors(scene, args.frames, backends, args.referee)
-    print(f"{'guides':>7} {'method':<30} {'steps/s':>8} {'stretch %':>9} {'off mm':>7} ratio")
+    head = f"{'guides':>7} {'method':<30} {'steps/s':>8} {'CPU ms':>8} {'stretch %':>9}"
+    print(f"{head} {'off mm':>7} ratio")
     for count in args.guides:
         groom, rows = groom_of(count), []
         for way, error in found.items():
-            row = Row(way, speed_of(way, groom, args.frames, args.referee), *error)
+            row = Row(way, *speed_of(way, groom, args.frames, args.referee), *error)
             rows.append(row)
             name = f"{way[0]}, {way[1]} x {way[2]}"
+            speeds = f"{row.speed:>8.1f} {1000 * row.cpu:>8.2f}"
             figures = f"{100 * row.stretch:>9.3f} {1000 * row.off:>7.2f}"
             ratio = rows[0].speed / row.speed
-            print(f"{count:>7} {name:<30} {row.speed:>8.1f} {figures} {ratio:>5.1f}", flush=True)
+            print(f"{count:>7} {name:<30} {speeds} {figures} {ratio:>5.1f}", flush=True)
         for line in verdicts(rows):
             print(f"{count:>7} {line}", flush=True)
 

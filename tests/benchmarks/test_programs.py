@@ -13,7 +13,7 @@ import pytest
 from hairkit.cli import main as hairkit
 
 PROJECT = Path(__file__).parents[2]
-SHARED = {"captures_argument", "example_textures", "plain_analogies"}
+SHARED = {"captures_argument", "example_textures", "plain_analogies", "xpbd_peer"}
 """Modules that programs import."""
 PROGRAMS = sorted({path.stem for path in (PROJECT / "benchmarks").glob("*.py")} - SHARED)
 SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
