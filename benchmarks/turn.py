@@ -2,16 +2,19 @@
 
 python benchmarks/turn.py captures/ --photos-alone
 python benchmarks/turn.py --seconds turn/     # hairkit synth straight --views 36 -o turn
+python benchmarks/turn.py captures/ --scores  # F of whole runs
 
 Faces and persons are those of the capture (landmarks.json, masks/) unless `--photos-alone` asks the
 networks (`hairkit models install`). Names of files are ignored. A turn counts as found when no
 photo is more than 30 degrees off; the true turn is in truth/. `--seconds` prints instead what
-whole runs on 3 to 36 of the photos of one turn take.
+whole runs on 3 to 36 of the photos of one turn take, `--scores` how well whole runs on the photos
+alone score in each order.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import resource
 import shutil
 import tempfile
@@ -20,6 +23,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from captures_argument import NO_CAPTURES, add_captures
@@ -27,7 +31,7 @@ from hairkit_plugins import face_mesh, landmark_files, mask_files, photo_turn, s
 
 from hairkit import Capture, View
 from hairkit.errors import InputError
-from hairkit.evaluation import read_truth
+from hairkit.evaluation import evaluate, read_prediction, read_truth
 from hairkit.io.capture_reader import read_capture
 from hairkit.options import make_options
 from hairkit.pipeline.reconstruct import reconstruct
@@ -41,6 +45,18 @@ SHUFFLES = 8
 """Random orders tried of each capture."""
 COUNTS = (3, 8, 12, 24, 36)
 """Numbers of photos of which runs are timed."""
+
+
+GUIDES = 8000
+"""Strands of the runs that are scored."""
+ORDERS = {
+    "as taken": lambda count: np.arange(count),
+    "other way": lambda count: np.arange(count)[::-1],
+    "other first": lambda count: np.roll(np.arange(count), 3),
+    "shuffled": lambda count: np.random.default_rng(0).permutation(count),
+    "on their side": lambda count: np.arange(count),
+}
+"""Orders of a capture's photos of which whole runs are scored."""
 
 
 @dataclass(frozen=True)
@@ -59,12 +75,17 @@ def main() -> None:
     add_captures(parser)
     parser.add_argument("--photos-alone", action="store_true", help="faces and persons by networks")
     parser.add_argument("--seconds", type=Path, metavar="FOLDER", help="capture of runs to time")
+    parser.add_argument("--scores", action="store_true", help="F of whole runs in each order")
+    parser.add_argument("--guides", type=int, default=GUIDES, help="strands of a scored run")
     arguments = parser.parse_args()
     if arguments.seconds is not None:
         print_seconds(arguments.seconds)
         return
     if arguments.captures is None:
         print(NO_CAPTURES)
+        return
+    if arguments.scores:
+        print_scores(arguments.captures, arguments.guides)
         return
     print(
         "| capture | azimuth | worst | margin | turned about | on its side | shuffled | one out |"
@@ -90,6 +111,57 @@ def print_seconds(folder: Path) -> None:
         more = "" if before is None else f"{(spent - before[1]) / (count - before[0]):.2f}"
         print(f"| {count} | {seconds:.1f} | {spent:.1f} | {more} |", flush=True)
         before = (count, spent)
+
+
+def print_scores(captures: Path, guides: int) -> None:
+    """Print F 4 mm/40 (2 mm/20) of runs on photos of neutral names in every order of `ORDERS`.
+
+    "=" marks a groom that is the first order's, byte for byte. The last columns are processor
+    seconds of the first run, and of one with the capture's own masks and landmarks.
+    """
+    print("| capture | " + " | ".join(ORDERS) + " | photos alone, s | with masks, s |")
+    print("|---|" + "---|" * (len(ORDERS) + 2))
+    for folder in sorted(path.parent for path in captures.glob("*/truth")):
+        cells: list[str] = []
+        seconds: list[float] = []
+        first = ""
+        with tempfile.TemporaryDirectory() as place:
+            began = _processor_seconds()
+            reconstruct(folder, Path(place, "out"), guides=guides, sheet=False)
+            given = _processor_seconds() - began
+        for name, order in ORDERS.items():
+            photos = sorted(path for path in (folder / "photos").iterdir() if path.is_file())
+            chosen = [photos[i] for i in order(len(photos))]
+            score, groom, spent = _score_run(folder, chosen, name == "on their side", guides)
+            cells.append(score + (" =" if groom == first else ""))
+            first, seconds = first or groom, [*seconds, spent]
+        print(f"| {folder.name} | " + " | ".join(cells), end="")
+        print(f" | {seconds[0]:.1f} | {given:.1f} |", flush=True)
+
+
+def _score_run(
+    folder: Path, photos: list[Path], lying: bool, guides: int
+) -> tuple[str, str, float]:
+    """Return a run's scores on renamed copies of the photos, its groom's SHA-256, and seconds."""
+    with tempfile.TemporaryDirectory() as place:
+        given, out = Path(place, "photos"), Path(place, "out")
+        given.mkdir()
+        for i, photo in enumerate(photos):
+            if lying:
+                picture = cv2.rotate(cv2.imread(str(photo)), cv2.ROTATE_90_CLOCKWISE)
+                cv2.imwrite(str(given / f"{i:02}.png"), picture)
+            else:
+                shutil.copy(photo, given / f"{i:02}{photo.suffix}")
+        began = _processor_seconds()
+        try:
+            reconstruct(given, out, guides=guides, sheet=False)
+        except InputError as error:
+            return f"refused: {error}", "", 0.0
+        spent = _processor_seconds() - began
+        result = evaluate(read_prediction(out), read_truth(folder / "truth"))
+        f2, _, f4 = (100 * score.f for score in result.scores.all)
+        digest = hashlib.sha256((out / "groom.npz").read_bytes()).hexdigest()
+        return f"{f4:.1f} ({f2:.1f})", digest, spent
 
 
 def _time_run(photos: list[Path]) -> tuple[float, float]:

@@ -66,9 +66,12 @@ def segment(view: View, options: Any) -> Mask | None:
 
 @hookspec(firstresult=True)
 def estimate_scene(
-    capture: Capture, masks: tuple[Mask, ...], head: Head, options: Any
+    capture: Capture, masks: tuple[Mask, ...], head: Head, start: Scene | None, options: Any
 ) -> Scene | None:
-    """Estimate the cameras of all views and the head's size and pose; `head` is not fitted yet."""
+    """Estimate the cameras of all views and the head's size and pose; `head` is not fitted yet.
+
+    `start` is the scene of the masks before they were mended; None the first time.
+    """
 
 
 @hookspec(firstresult=True)

@@ -7,6 +7,7 @@ Refinement methods solve for that vector.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,8 @@ SHARED, PER_VIEW = 8, 6
 """Numbers of a turn that all views share, and numbers of each view."""
 LOG_MAGNIFICATION, PERSPECTIVE = 6, 7
 """Indices of log(pixels per metre at the turn's centre) and 1 / distance in the shared numbers."""
+ONE_SHAPE = 0.03
+"""Photos are of one shape if the logarithms of long over short sides differ by no more."""
 MIN_PERSPECTIVE = 0.01
 """Cameras are at most 1 / this away, metres: there pictures are orthographic to 0.1 pixels."""
 
@@ -47,9 +50,15 @@ class Turn:
 
     @classmethod
     def of(cls, capture: Capture) -> Turn:
-        """Return the nominal turn of a capture, with focal lengths by EXIF or size."""
+        """Return the nominal turn of a capture, with focal lengths by EXIF, size or shape.
+
+        Without EXIF, photos of one shape are enlarged or reduced ones of a lens, and photos of
+        several shapes are cropped: their pixels are of one size.
+        """
         sizes = np.array([(view.width, view.height) for view in capture.views])
-        focal = np.hypot(*sizes.T)
+        shape = sizes.max(1) / sizes.min(1)
+        cropped = np.ptp(np.log(shape)) > ONE_SHAPE
+        focal = np.ones(len(sizes)) if cropped else np.hypot(*sizes.T)
         known = [view.focal_px for view in capture.views if view.focal_px is not None]
         if len(known) == len(sizes):
             focal = np.array(known, np.float64)
@@ -128,6 +137,29 @@ class Turn:
             else:
                 cameras.append(Camera(matrix, float(f), centre, int(width), int(height)))
         return tuple(cameras)
+
+    def vector_of(self, cameras: Sequence[Camera]) -> Float64Array:
+        """Return a vector whose cameras these are; the head is not tilted, nor views cropped."""
+        rotation = np.stack([camera.rotation for camera in cameras])
+        translation = np.stack([camera.translation for camera in cameras])
+        focal = np.array([camera.focal for camera in cameras])
+        if cameras[0].model == "orthographic":  # nearer views have more pixels a metre
+            zoom = focal / self.focal_ratios
+            translation[:, 2] = np.exp(np.log(zoom).mean()) / zoom / MIN_PERSPECTIVE
+            focal = focal * translation[:, 2]
+        across = rotation[:, :2].reshape(-1, 3)
+        centre = np.linalg.lstsq(across, -translation[:, :2].ravel(), rcond=None)[0]
+        offset = translation + rotation @ centre
+        far = np.exp(np.log(offset[:, 2]).mean())
+        angles = np.array([view_angles(each) for each in rotation])
+        angles -= np.stack([self.azimuths, self.elevations, 0 * self.azimuths], axis=1)
+        angles[:, 0] = (angles[:, 0] + np.pi) % (2 * np.pi) - np.pi
+        vector = np.zeros(self.size)
+        vector[3:6], vector[PERSPECTIVE] = centre, 1 / far
+        vector[LOG_MAGNIFICATION] = np.log(focal / self.focal_ratios / far).mean()
+        views = [angles, np.log(offset[:, 2:] / far), offset[:, :2]]
+        vector[SHARED:] = np.concatenate(views, axis=1).ravel()
+        return vector
 
 
 def view_angles(rotation: Float64Array) -> Float64Array:

@@ -8,6 +8,7 @@ plugins.
 * `find_skin`: the skin of the head, from the photos and after an example
 * `head_alone`: the head with its skin, without hair
 * `health`: figures that tell how good a run is
+* `masks_and_scene`: masks and cameras, each found by the other
 * `module_digest`: digests of the code that made a cached result
 * `open_groom`: grooms by any name that a user may give
 * `own_head`: landmarks for a head that has none

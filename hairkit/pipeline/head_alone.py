@@ -18,9 +18,10 @@ from hairkit.io.head_reader import write_head_obj
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.find_skin import find_skin
+from hairkit.pipeline.masks_and_scene import fit_scene, label_views
 from hairkit.pipeline.own_head import mark_head
 from hairkit.pipeline.recipe import Recipe, load_recipe
-from hairkit.pipeline.reconstruct import find_views, fit_scene, label_views, tell_missing
+from hairkit.pipeline.reconstruct import find_views, tell_missing
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.stage_runner import Given, StageRunner
 from hairkit.pipeline.work_folder import WorkFolder
@@ -84,8 +85,8 @@ def photograph_head(
         capture, _ = find_views(run, given, log)
         start = mark_head(head or default_head(), recipe, manager, log.message)
         views = Given.of(capture)
-        masks = label_views(run, views, start)
-        scene = fit_scene(run, views, masks, start)
+        masks, first = label_views(run, views, start)
+        scene = fit_scene(run, views, masks, start, first)
         skin = find_skin(run, views, masks, scene)
         work.flush()
         return replace(scene.value, head=replace(scene.value.head, maps=skin))

@@ -27,11 +27,12 @@ from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.find_skin import find_skin
 from hairkit.pipeline.health import RED, Figure, assess
+from hairkit.pipeline.masks_and_scene import fit_scene, label_views
 from hairkit.pipeline.own_head import mark_head
 from hairkit.pipeline.recipe import Recipe, load_recipe, missing_networks
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.run_record import RECORD, RunRecord, describe_run, finish_record
-from hairkit.pipeline.stage_runner import Given, StageRunner, completed
+from hairkit.pipeline.stage_runner import Given, StageRunner
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
 from hairkit.types.capture import Capture
@@ -39,7 +40,7 @@ from hairkit.types.chosen import ChosenHair
 from hairkit.types.face import Face
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head
-from hairkit.types.mask import Mask, Masks
+from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
 from hairkit.types.person import Person
@@ -249,10 +250,10 @@ def _grow(
     """Run the stages; views are processed in parallel, later stages wait for them."""
     plain = capture.plain()
     photos = Given.of(plain)
-    masks = label_views(run, photos, head)
+    masks, first = label_views(run, photos, head)
     toned = [Given.of(view.toned()) for view in capture.views]
     orientations = run.every_view("orient", OrientationMap, toned, mask=masks)
-    scene = fit_scene(run, photos, masks, head)
+    scene = fit_scene(run, photos, masks, head, first)
     if capture.chosen.head is not None:
         scene = Given.of(move_head(scene.value, capture.chosen.head))
     hull = run.once("hull", Hull, scene=scene, masks=masks)
@@ -275,25 +276,6 @@ def _grow(
         parting, tied,
     )  # fmt: skip
     return _Made(labels, angles, hull.value, scene.value, parting, groom, health)
-
-
-def label_views(run: StageRunner, photos: Given[Capture], head: Head) -> list[Future[Given[Mask]]]:
-    """Return the masks of all views, mended by the head where they were not given."""
-    views = photos.value.views
-    masks = run.every_view("segment", Mask, [Given.of(view) for view in views])
-    if run.has("refine") and not all(view.mask_path for view in views):
-        return _refine(run, photos, masks, Given.of(head))
-    return masks
-
-
-def fit_scene(
-    run: StageRunner, photos: Given[Capture], masks: Sequence[Future[Given[Mask]]], head: Head
-) -> Given[Scene]:
-    """Return the cameras, and the head fitted to the photos."""
-    scene = run.once("scene", Scene, capture=photos, masks=masks, head=Given.of(head))
-    if run.has("head"):
-        return run.once("head", Scene, capture=photos, masks=masks, scene=scene)
-    return scene
 
 
 def _measure(
@@ -326,24 +308,6 @@ def _measure(
         "scene": scene, "masks": masks, "orientations": orientations, "hull": hull,
         "waves": waves, "scalp_distance": distance, "parting": parting, "tied": tied,
     }  # fmt: skip
-
-
-def _refine(
-    run: StageRunner,
-    photos: Given[Capture],
-    masks: Sequence[Future[Given[Mask]]],
-    head: Given[Head],
-) -> list[Future[Given[Mask]]]:
-    """Return the masks after the first scene has shown where the head is in every view.
-
-    Views that came with a mask keep it.
-    """
-    scene = run.once("scene", Scene, "first_scene", capture=photos, masks=masks, head=head)
-    refined = run.once("refine", Masks, capture=photos, masks=masks, scene=scene)
-    return [
-        mask if view.mask_path else completed(Given.of(new))
-        for view, mask, new in zip(photos.value.views, masks, refined.value.views, strict=True)
-    ]
 
 
 def _write(

@@ -81,7 +81,7 @@ class Adjustment:
         """Return the photos' cameras in the head frame for the present pose."""
         capture = replace(self.capture, head_pose=self.pose)
         scene = self.manager.call(
-            "estimate_scene", PLUGIN, None, capture=capture, masks=(), head=self.head
+            "estimate_scene", PLUGIN, None, capture=capture, masks=(), head=self.head, start=None
         )
         return dict(zip(scene.names, scene.cameras, strict=True))
 

@@ -19,11 +19,12 @@ Perspective and orthographic cameras are both tried unless the capture or the op
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hairkit import Capture, Head, Mask, Scene, hookimpl
+from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import Float64Array
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.silhouette_coherence import coherence
@@ -119,24 +120,33 @@ class Options:
 
 @hookimpl
 def estimate_scene(
-    capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
+    capture: Capture, masks: tuple[Mask, ...], head: Head, start: Scene | None, options: Options
 ) -> Scene:
     """Solve for all cameras; the head keeps its shape and gives the world its frame and scale."""
     problem = _Problem.of(capture, masks, head, options)
-    wanted = "orthographic" if capture.orthographic else "perspective"
-    if options.model != "auto":
-        wanted = options.model
-    faceless = [i for i, view in enumerate(capture.views) if view.landmarks is None]
     search = problem.search(options.iterations)
-    best = search.find(problem.start(wanted == "orthographic"), faceless)
-    if options.model == "auto" and not capture.orthographic:
-        flat = search.settle(search.descend(problem.start(True), FLAT_NOISE, options.iterations), 1)
-        best = min(best, flat, key=lambda fit: fit.cost)
+    if start is None:
+        best = _from_nothing(problem, search, capture, options)
+    else:
+        best = search.settle(problem.from_cameras(start.cameras))
     for _ in range(options.carries if problem.landmarks is not None else 0):
         transferred = problem.with_transferred(capture, best)
         best = transferred.search(options.iterations).settle(best, 1)
     names = tuple(view.name for view in capture.views)
     return Scene(names, problem.turn.cameras(best.vector), head, problem.residual_px(best))
+
+
+def _from_nothing(problem: _Problem, search: Search, capture: Capture, options: Options) -> Fit:
+    """Return the best cameras, perspective or orthographic, from the nominal turn on."""
+    wanted = "orthographic" if capture.orthographic else "perspective"
+    if options.model != "auto":
+        wanted = options.model
+    faceless = [i for i, view in enumerate(capture.views) if view.landmarks is None]
+    best = search.find(problem.start(wanted == "orthographic"), faceless)
+    if options.model == "auto" and not capture.orthographic:
+        flat = search.settle(search.descend(problem.start(True), FLAT_NOISE, options.iterations), 1)
+        best = min(best, flat, key=lambda fit: fit.cost)
+    return best
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +222,11 @@ class _Problem:
         if flat:
             vector[PERSPECTIVE] = MIN_PERSPECTIVE
         return Fit(vector, np.zeros((LANDMARKS, 3)), flat, vector)
+
+    def from_cameras(self, cameras: Sequence[Camera]) -> Fit:
+        """Return the solution of known cameras, whose prior is still the nominal turn."""
+        start = self.start(cameras[0].model == "orthographic")
+        return replace(start, vector=self.turn.vector_of(cameras))
 
     def cameras(self, vector: Float64Array) -> CameraArrays:
         """Return the cameras as arrays."""

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hairkit import Camera
+from hairkit import Camera, Capture, View
 from hairkit.arrays import Float64Array
 from hairkit.cameras.similarity import Similarity, fit_similarity, triangulate
 from hairkit.cameras.turntable import MIN_PERSPECTIVE, PERSPECTIVE, Turn, rotation_matrix
@@ -107,6 +107,32 @@ def test_angles_turn_the_camera_as_the_conventions_say() -> None:
         3.0, elevation_deg=-2.0, roll_deg=1.5, distance=0.7, focal=560.0, width=300, height=400
     )
     assert np.allclose(turn.cameras(vector)[0].camera_from_head, want.camera_from_head)
+
+
+@pytest.mark.parametrize("perspective", [1 / 0.7, 0.0])
+def test_cameras_give_a_vector_that_gives_them_back(
+    rng: np.random.Generator, perspective: float
+) -> None:
+    """`vector_of` finds other numbers, since tilt and angles trade off, but the same cameras."""
+    turn = _turn()
+    vector = _vector(turn, rng)
+    vector[PERSPECTIVE] = perspective
+    points = 0.1 * rng.standard_normal((20, 3))
+    cameras = turn.cameras(vector)
+    for found, want in zip(turn.cameras(turn.vector_of(cameras)), cameras, strict=True):
+        assert found.model == want.model
+        assert np.allclose(found.project(points), want.project(points), atol=0.1)
+
+
+def test_photos_of_several_shapes_have_pixels_of_one_size() -> None:
+    """Cropped photos share the focal length; enlarged ones of one shape have one by their size."""
+
+    def ratios(*sizes: tuple[int, int]) -> list[float]:
+        views = [View(str(i), 0.0, np.zeros((h, w, 3), np.uint8)) for i, (w, h) in enumerate(sizes)]
+        return list(Turn.of(Capture(tuple(views))).focal_ratios)
+
+    assert ratios((300, 400), (300, 340), (280, 400)) == [1.0, 1.0, 1.0]
+    assert ratios((300, 400), (600, 800), (400, 300)) == [1.0, 2.0, 1.0]
 
 
 def test_far_cameras_become_orthographic(rng: np.random.Generator) -> None:
