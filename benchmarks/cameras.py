@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import inspect
 import time
 from pathlib import Path
 from typing import Any
@@ -78,7 +79,9 @@ def _figures(folder: Path, plugin: Any, options: Any) -> np.ndarray[Any, np.dtyp
 
 
 def _run(plugin: Any, capture: Capture, masks: tuple[Mask, ...], head: Head, options: Any) -> Scene:
-    scene: Scene = plugin.estimate_scene(capture, masks, head, options)
+    every = {"capture": capture, "masks": masks, "head": head, "start": None, "options": options}
+    taken = inspect.signature(plugin.estimate_scene).parameters
+    scene: Scene = plugin.estimate_scene(**{name: every[name] for name in taken})
     return scene
 
 

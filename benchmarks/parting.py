@@ -83,7 +83,7 @@ def _found(folder: Path, truth: Truth) -> list[str]:
     capture = read_capture(folder)
     masks = tuple(_mask(mask_files.segment(view)) for view in capture.views)
     head = default_head()
-    scene = silhouette.estimate_scene(capture, masks, head, silhouette.Options())
+    scene = silhouette.estimate_scene(capture, masks, head, None, silhouette.Options())
     bent = thin_plate.fit_head(capture, masks, scene, thin_plate.Options()).head
     level = [k for k, name in enumerate(scene.names) if name in truth.names]
     cameras = [scene.cameras[k] for k in level]
