@@ -46,7 +46,7 @@ def coherence(
     translation: Float64Array,
     focal: Float64Array,
     centre: Float64Array,
-    middle: float,
+    middle: Float64Array,
     softness: float = 1.0,
 ) -> tuple[Float64Array, Float64Array]:
     """Return how far each contour ray stays inside all other silhouettes, and its derivative.
@@ -56,7 +56,7 @@ def coherence(
     rotation, translation, focal, centre
         Cameras (V, 3, 3), (V, 3), (V,), (V, 2).
     middle
-        Depth of the turn's centre in all views, metres.
+        (V,) depth of the turn's centre in each view, metres.
     softness
         Of the minimum over silhouettes, pixels: less than the outlines' noise.
 
@@ -73,7 +73,8 @@ def coherence(
     shifts = translation[None] - np.einsum("ovik,ok->ovi", turns, translation)
     views = _Views(
         outlines.fields, outlines.scale, turns, shifts, np.ascontiguousarray(focal, np.float64),
-        np.ascontiguousarray(centre, np.float64), float(middle), float(softness),
+        np.ascontiguousarray(centre, np.float64), np.ascontiguousarray(middle, np.float64),
+        float(softness),
     )  # fmt: skip
     parallel_for(
         _search_rays, len(value), views, outlines.points, outlines.views, value, slope,
@@ -97,8 +98,8 @@ class _Views(NamedTuple):
     """(V,) pixels."""
     centre: Float64Array
     """(V, 2) principal points, pixels."""
-    middle: float
-    """Depth of the turn's centre in all views, metres."""
+    middle: Float64Array
+    """(V,) depth of the turn's centre in each view, metres."""
     softness: float
     """Of the minimum over silhouettes, pixels."""
 
@@ -172,11 +173,12 @@ def _best_on_ray(views: _Views, ray: _Ray) -> tuple[float, float]:
     along a ray by at most `fastest` pixels a metre, so that steps may be longer where a silhouette
     is far off.
     """
-    fastest = FASTEST * views.focal[ray.own] / views.middle
-    z, best, step = views.middle, -np.inf, 0.0
+    middle = views.middle[ray.own]
+    fastest = FASTEST * views.focal[ray.own] / middle
+    z, best, step = middle, -np.inf, 0.0
     for step in STEPS:
-        at = views.middle - REACH
-        while at <= views.middle + REACH and best < CAP:
+        at = middle - REACH
+        while at <= middle + REACH and best < CAP:
             here = _smallest_distance(views, ray, at, best)
             if here > best:
                 best, z = here, at

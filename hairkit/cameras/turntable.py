@@ -19,8 +19,8 @@ from hairkit.types.capture import Capture
 
 SHARED, PER_VIEW = 8, 6
 """Numbers of a turn that all views share, and numbers of each view."""
-LOG_MAGNIFICATION, PERSPECTIVE = 6, 7
-"""Indices of log(pixels per metre at the turn's centre) and 1 / distance in the shared numbers."""
+CENTRE, LOG_MAGNIFICATION, PERSPECTIVE = slice(3, 6), 6, 7
+"""Indices in the shared numbers: the turn's centre, log(pixels per metre there), 1 / distance."""
 ONE_SHAPE = 0.03
 """Photos are of one shape if the logarithms of long over short sides differ by no more."""
 MIN_PERSPECTIVE = 0.01
@@ -80,7 +80,7 @@ class Turn:
         )
         rotation = view_rotation @ rotation_matrix(vector[:3])
         offset = np.stack([views[:, 4], views[:, 5], far * np.exp(views[:, 3])], axis=1)
-        translation = offset - rotation @ vector[3:6]
+        translation = offset - rotation @ vector[CENTRE]
         return rotation, translation, np.exp(vector[LOG_MAGNIFICATION]) * far * self.focal_ratios
 
     def tangents(self, vector: Float64Array) -> Float64Array:
@@ -155,7 +155,7 @@ class Turn:
         angles -= np.stack([self.azimuths, self.elevations, 0 * self.azimuths], axis=1)
         angles[:, 0] = (angles[:, 0] + np.pi) % (2 * np.pi) - np.pi
         vector = np.zeros(self.size)
-        vector[3:6], vector[PERSPECTIVE] = centre, 1 / far
+        vector[CENTRE], vector[PERSPECTIVE] = centre, 1 / far
         vector[LOG_MAGNIFICATION] = np.log(focal / self.focal_ratios / far).mean()
         views = [angles, np.log(offset[:, 2:] / far), offset[:, :2]]
         vector[SHARED:] = np.concatenate(views, axis=1).ravel()

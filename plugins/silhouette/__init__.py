@@ -29,6 +29,7 @@ from hairkit.arrays import Float64Array
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.silhouette_coherence import coherence
 from hairkit.cameras.turntable import (
+    CENTRE,
     LOG_MAGNIFICATION,
     MIN_PERSPECTIVE,
     PERSPECTIVE,
@@ -326,7 +327,10 @@ class _Problem:
     def _coherence(
         self, vector: Float64Array, cameras: CameraArrays, noise: float
     ) -> tuple[Float64Array, Float64Array]:
-        middle = 1 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE)
+        rotation, translation, *_ = cameras
+        middle = np.full(len(rotation), 1 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE))
+        if vector[PERSPECTIVE] <= MIN_PERSPECTIVE:  # there distances are zooms, metres apart
+            middle = (rotation @ vector[CENTRE] + translation)[:, 2]
         return coherence(self.outlines, *cameras, middle, SOFT_MIN * noise)
 
     def residual_px(self, fit: Fit) -> float:

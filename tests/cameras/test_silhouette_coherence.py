@@ -14,7 +14,7 @@ from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.silhouette_coherence import CAP, REACH, coherence
 from hairkit.cameras.turntable import rotation_matrix
 
-MIDDLE = 0.7
+MIDDLE = np.full(8, 0.7)
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +41,7 @@ def _arrays(bust: Turntable) -> CameraArrays:
 
 def _searched(bust: Turntable, outlines: Outlines) -> Float64Array:
     """Return the best depth's smallest signed distance by trying 4,000 depths a ray."""
-    depths = np.linspace(MIDDLE - REACH, MIDDLE + REACH, 4000)
+    depths = np.linspace(MIDDLE[0] - REACH, MIDDLE[0] + REACH, 4000)
     values = []
     for point, own in zip(outlines.points, outlines.views, strict=True):
         places = bust.cameras[own].unproject(np.tile(point, (len(depths), 1)), depths)

@@ -10,7 +10,7 @@ from hairkit_plugins.silhouette import Options, _Problem, estimate_scene
 from turntable import Turntable, azimuth_errors, turntable
 
 from hairkit import Camera, Capture, Face, Mask, View
-from hairkit.cameras.turntable import LOG_MAGNIFICATION
+from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, SHARED
 
 
 @pytest.fixture(scope="module")
@@ -151,3 +151,16 @@ def test_a_start_leads_to_the_cameras_found_from_nothing(bust: Turntable) -> Non
     found = estimate_scene(bust.capture, bust.masks, bust.head, None, Options())
     again = estimate_scene(bust.capture, bust.masks, bust.head, found, Options())
     assert azimuth_errors(again.cameras, found.cameras).max() < 0.5
+
+
+def test_rays_of_orthographic_views_meet_the_head_at_any_zoom(bust: Turntable) -> None:
+    """Views of several zooms give the evidence of equal ones: rays are searched at the head."""
+    problem = _Problem.of(bust.capture, bust.masks, bust.head, Options())
+    fit = problem.start(True)
+    zoomed = fit.vector.copy()
+    zoomed[SHARED + 3 :: PER_VIEW] = np.linspace(-0.05, 0.05, 8)
+    near = [
+        np.count_nonzero(np.abs(problem._coherence(v, problem.cameras(v), 3.0)[0]) < 20)
+        for v in (fit.vector, zoomed)
+    ]
+    assert near[1] > 0.8 * near[0] > 100
