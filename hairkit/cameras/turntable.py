@@ -139,7 +139,10 @@ class Turn:
         return tuple(cameras)
 
     def vector_of(self, cameras: Sequence[Camera]) -> Float64Array:
-        """Return a vector whose cameras these are; the head is not tilted, nor views cropped."""
+        """Return a vector that `cameras` turns into these, with the head not tilted in the turn.
+
+        Views keep the focal ratios of the turn: what differs from them becomes distance.
+        """
         rotation = np.stack([camera.rotation for camera in cameras])
         translation = np.stack([camera.translation for camera in cameras])
         focal = np.array([camera.focal for camera in cameras])
@@ -150,7 +153,8 @@ class Turn:
         across = rotation[:, :2].reshape(-1, 3)
         centre = np.linalg.lstsq(across, -translation[:, :2].ravel(), rcond=None)[0]
         offset = translation + rotation @ centre
-        far = np.exp(np.log(offset[:, 2]).mean())
+        flat = cameras[0].model == "orthographic"
+        far = 1 / MIN_PERSPECTIVE if flat else np.exp(np.log(offset[:, 2]).mean())
         angles = np.array([view_angles(each) for each in rotation])
         angles -= np.stack([self.azimuths, self.elevations, 0 * self.azimuths], axis=1)
         angles[:, 0] = (angles[:, 0] + np.pi) % (2 * np.pi) - np.pi

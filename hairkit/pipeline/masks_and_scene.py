@@ -35,7 +35,7 @@ def fit_scene(
     photos: Given[Capture],
     masks: Sequence[Future[Given[Mask]]],
     head: Head,
-    start: Given[Scene] | None = None,
+    start: Given[Scene] | None,
 ) -> Given[Scene]:
     """Return the cameras, found from those of `start`, and the head fitted to the photos."""
     scene = run.once(

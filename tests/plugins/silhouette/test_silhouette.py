@@ -146,11 +146,14 @@ def test_equal_input_gives_equal_cameras(bust: Turntable) -> None:
         assert first.camera_from_head.tobytes() == second.camera_from_head.tobytes()
 
 
-def test_a_start_leads_to_the_cameras_found_from_nothing(bust: Turntable) -> None:
-    """From the cameras that were found, the search stays there within half a degree."""
-    found = estimate_scene(bust.capture, bust.masks, bust.head, None, Options())
-    again = estimate_scene(bust.capture, bust.masks, bust.head, found, Options())
-    assert azimuth_errors(again.cameras, found.cameras).max() < 0.5
+def test_a_start_is_searched_from_and_keeps_its_kind(bust: Turntable) -> None:
+    """Orthographic cameras stay so and within a degree, where the search from nothing ends with
+    perspective ones."""
+    given = (bust.capture, bust.masks, bust.head)
+    start = estimate_scene(*given, None, Options(model="orthographic"))
+    again = estimate_scene(*given, start, Options())
+    assert {camera.model for camera in again.cameras} == {"orthographic"}
+    assert azimuth_errors(again.cameras, start.cameras).max() < 1
 
 
 def test_zooms_and_distances_of_orthographic_views_are_the_same(bust: Turntable) -> None:
