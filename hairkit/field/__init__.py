@@ -14,4 +14,5 @@ What field and tracking plugins share: fusing views, priors, diffusion, and samp
 * `symmetric_eigen`: eigenvectors of symmetric 3x3 tensors, in closed form
 * `ties`: where hair is tied, and the tube of the tail
 * `view_fusion`: 2D orientations of all views fused into 3D tensors
+* `wisps`: single locks off the rest of the hair, thinner than the opened masks hold
 """

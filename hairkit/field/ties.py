@@ -10,6 +10,7 @@ places must agree. The bundle behind the neck becomes a tube of elliptic section
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,12 +18,14 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.field.scalp_sight import ScalpSight, find_convergence, scalp_places, see_scalp
+from hairkit.field.wisps import find_wisps
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
-from hairkit.types.tie import Tail, Tie, TiedHair
+from hairkit.types.tie import LooseHair, Tail, Tie, TiedHair
 from hairkit.types.volume import Hull, ScalpDistance
 
 OFF_SCALP = 0.025
@@ -86,7 +89,7 @@ def measure_ties(
     places, _ = scalp_places(head)
     bases = places[cKDTree(places).query([bundle.centre for bundle in bundles])[1]]
     nearest = cKDTree(bases).query(sight.places)[1]
-    tails = []
+    tails, tied = [], []
     for number, bundle in enumerate(bundles):
         own = ScalpSight(*(column[nearest == number] for column in sight))
         where, score = find_convergence(own, head)
@@ -96,34 +99,38 @@ def measure_ties(
             (score - LEAST_CONVERGENCE) / (FULL_CONVERGENCE - LEAST_CONVERGENCE),
             1 - apart / FARTHEST_APART,
         )
-        if sureness > 0:
-            tails.append(_tail_of(bundle, hull, scalp_distance, min(sureness, 1.0)))
-    found = tuple(tail for tail in tails if tail is not None)
-    if not found:
+        tail = _tail_of(bundle, hull, scalp_distance, min(sureness, 1.0)) if sureness > 0 else None
+        if tail is not None:
+            tails.append(tail)
+            tied.append(bundle)
+    if not tails:
         return TiedHair()
-    fringe = find_fringe(head, hull, scalp_distance, bundles)
-    return TiedHair(found, fringe, len(fringe) / int(hull.dense.sum()))
+    fringe = find_fringe(head, hull, scalp_distance, tied)
+    return TiedHair(tuple(tails), fringe + find_wisps(masks, cameras, head, hull))
 
 
 def find_fringe(
     head: Head, hull: Hull, scalp_distance: ScalpDistance, bundles: Sequence[Bundle]
-) -> Float32Array:
-    """Return cells (K, 4) of hair that hangs over bare skin: centres, and ways from the scalp."""
-    way = scalp_distance.values
-    cells = hull.dense & (way > 0)
+) -> tuple[LooseHair, ...]:
+    """Return the dense hair that hangs over bare skin, pinholes in it closed."""
+    cells = hull.dense & (scalp_distance.values > 0)
     for bundle in bundles:
         cells &= ~bundle.cells
     nearest = cKDTree(head.vertices).query(hull.grid.centres_of(cells))[1]
     hanging = np.zeros(hull.grid.shape, bool)
     hanging[cells] = head.scalp[nearest] <= 0.5
+    hanging |= _without_pinholes(hanging) & (hull.head_distance > 0)
+    closed = replace(hull, dense=hull.dense | hanging, loose=hull.loose | hanging)
+    way = measure_scalp_distance(head, closed).values
     parts, count = ndimage.label(hanging, np.ones((3, 3, 3)))
-    if not count:
-        return np.zeros((0, 4), np.float32)
-    number = np.arange(1, count + 1)
-    volume = ndimage.sum(hanging, parts, number) * hull.grid.spacing**3
-    longest = ndimage.maximum(way, parts, number)
-    keep = np.append(False, (volume >= LEAST_FRINGE) & (longest >= SHORTEST_FRINGE))[parts]
-    return np.column_stack([hull.grid.centres_of(keep), way[keep]]).astype(np.float32)
+    found = []
+    for part in (parts == number for number in range(1, count + 1)):
+        volume = int(part.sum()) * hull.grid.spacing**3
+        if volume >= LEAST_FRINGE and way[part].max() >= SHORTEST_FRINGE:
+            rows = np.column_stack([hull.grid.centres_of(part), way[part]])
+            share = (part & hull.dense).sum() / hull.dense.sum()
+            found.append(LooseHair(rows.astype(np.float32), float(share)))
+    return tuple(found)
 
 
 class Bundle(NamedTuple):

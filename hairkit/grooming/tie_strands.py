@@ -11,9 +11,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.field.growth_prior import gradient
 from hairkit.grooming.fringe import hang_fringe
 from hairkit.types.strands import Strands
@@ -37,6 +38,9 @@ THICKEST = 0.02
 THICK_PERCENTILE = 60
 """Percentile of the thickness over the scalp that bounds it everywhere, times `THICK_SPREAD`."""
 THICK_SPREAD = 1.3
+SMOOTH_CELLS, SMOOTH_STEPS = 1.0, 4.0
+"""Standard deviations, in cells and in steps along a strand, that make the height above the skin
+smooth."""
 NEIGHBOURS = 24
 """Points of other strands among which the farthest-come tells how much hair lies underneath."""
 LEADERS = 1500
@@ -63,7 +67,7 @@ def lead_to_ties(strands: Strands, tied: TiedHair, hull: Hull, field: Orientatio
         own = np.flatnonzero(nearest == number)
         if len(own):
             points[own] = _tied_paths(roots[own], tail, hull, field, count)
-    loose, hanging = hang_fringe(roots, tied, field, count)
+    loose, hanging = hang_fringe(roots, tied, count)
     points[loose] = hanging
     group = (nearest + 1).astype(np.int32)
     group[loose] = 0
@@ -127,22 +131,35 @@ def _lay_over(ways: Float64Array, last: Int64Array, hull: Hull) -> Float64Array:
     points = ways[real]
     near = cKDTree(ways[known]).query(points, k=NEIGHBOURS)[1]
     farthest = arc[known][np.minimum(near, known.sum() - 1)].max(axis=1)
-    height = _thickness(points, hull) * np.clip(arc[real] / np.maximum(farthest, STEP), 0, 1)
+    height = np.zeros((count, steps))
+    height[real] = _thickness(points, hull) * np.clip(arc[real] / np.maximum(farthest, STEP), 0, 1)
+    height = _smooth_along(height, real)
     lifted = ways.copy()
-    lifted[real] = points + np.maximum(height - SKIN, 0)[:, None] * _outward(hull, points)
+    lifted[real] = points + np.maximum(height[real] - SKIN, 0)[:, None] * _outward(hull, points)
     lifted[:, 0] = ways[:, 0]
     return lifted
 
 
+def _smooth_along(values: Float64Array, real: BoolArray) -> Float64Array:
+    """Return values (N, M) of points smoothed along their ways, by the real (N, M) ones alone."""
+    total = ndimage.gaussian_filter1d(np.where(real, values, 0), SMOOTH_STEPS, 1, mode="constant")
+    weight = ndimage.gaussian_filter1d(real.astype(float), SMOOTH_STEPS, 1, mode="constant")
+    smooth: Float64Array = total / np.maximum(weight, 1e-9)
+    return smooth
+
+
 def _thickness(points: Float64Array, hull: Hull) -> Float64Array:
-    """Return the thickness (N,) of the hair above points (N, 3) on the skin, metres."""
+    """Return the thickness (N,) of the hair above points (N, 3) on the skin, metres.
+
+    It is the integral of the smoothed hull along the normal, so that cells leave no steps.
+    """
     outward = _outward(hull, points)
-    inside = np.ones(len(points), bool)
-    thickness = np.full(len(points), SKIN)
-    for height in np.arange(SKIN, THICKEST, MARCH):
-        cell = hull.grid.nearest_cell(points + height * outward)
-        inside &= hull.dense[tuple(cell.T)]
-        thickness[inside] = height
+    hair = (hull.dense | (hull.head_distance < 0)).astype(np.float32)
+    hair = ndimage.gaussian_filter(hair, SMOOTH_CELLS)
+    thickness, filled = np.full(len(points), SKIN), np.ones(len(points))
+    for height in np.arange(SKIN + MARCH, THICKEST, MARCH):
+        filled = np.minimum(filled, hull.grid.sample(hair, points + height * outward))
+        thickness += MARCH * filled
     usual = THICK_SPREAD * float(np.percentile(thickness, THICK_PERCENTILE))
     result: Float64Array = np.minimum(thickness, usual)
     return result

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -67,17 +67,26 @@ class Tail(Stored):
 
 
 @dataclass(frozen=True, eq=False)
+class LooseHair(Stored):
+    """Connected hair beside a tie that does not run to it: a fringe, or a wisp."""
+
+    cells: Float32Array
+    """(K, 4) centres of its cells and their ways through it from its root end, metres."""
+    share: float
+    """Share of the strands that hang in it."""
+
+    def __post_init__(self) -> None:
+        cells = frozen_array(self.cells, np.float32, (None, 4), "cells of loose hair")
+        object.__setattr__(self, "cells", cells)
+        if not len(cells):
+            raise DataError("loose hair has no cells")
+
+
+@dataclass(frozen=True, eq=False)
 class TiedHair(Stored):
-    """The ties that the photos and the hull show; none of loose hair."""
+    """The ties that the photos and the hull show; none of hair that is not tied."""
 
     tails: tuple[Tail, ...] = ()
     """The largest first."""
-    fringe: Float32Array = field(default_factory=lambda: np.zeros((0, 4), np.float32))
-    """(K, 4) centres of cells of hair that hangs loose over bare skin, and their ways through the
-    hair from the scalp, metres."""
-    fringe_share: float = 0.0
-    """Share of the hair's volume that hangs loose."""
-
-    def __post_init__(self) -> None:
-        fringe = frozen_array(self.fringe, np.float32, (None, 4), "fringe of tied hair")
-        object.__setattr__(self, "fringe", fringe)
+    loose: tuple[LooseHair, ...] = ()
+    """Hair that hangs over bare skin, in any order."""
