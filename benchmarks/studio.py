@@ -28,9 +28,9 @@ LONGEST_S = 1200.0
 class Studio:
     """A studio in a process of its own, asked as its pages ask it."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, guides: int | None = None) -> None:
         command = [sys.executable, "-m", "hairkit", "studio", str(folder), "--no-browser"]
-        command += ["--guides", str(GUIDES)]
+        command += ["--guides", str(guides or GUIDES)]
         self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         assert self.process.stderr is not None
         self.host, token = self.process.stderr.readline().split("//")[1].split("/#t=")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -138,11 +140,18 @@ class Torso:
 
 def profile(height: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Return half breadth, half depth and backward shift of an adult at heights, millimetres."""
+    values = _between_rings()(height)
+    return values[..., 0], values[..., 1], values[..., 2]
+
+
+@cache
+def _between_rings() -> Callable[[Float64Array], Float64Array]:
+    """Return the function from heights (...) to the numbers (..., 3) of `profile`."""
     from scipy.interpolate import PchipInterpolator  # here, since it takes as long to load as NumPy
 
     rings = RINGS[::-1].astype(np.float64)
-    values = PchipInterpolator(rings[:, 0], rings[:, 1:])(height)
-    return values[..., 0], values[..., 1], values[..., 2]
+    found: Callable[[Float64Array], Float64Array] = PchipInterpolator(rings[:, 0], rings[:, 1:])
+    return found
 
 
 def power(wave: Float64Array) -> Float64Array:

@@ -1,7 +1,9 @@
 """The process that runs networks, seen from hairkit: started when needed, replaced when it dies.
 
 OpenCV 5.0 ends with a segmentation fault on some model files, so no model is loaded into hairkit's
-own process. A crash or a hang is one `ModelError`; the next call starts a new process.
+own process. A crash or a hang is one `ModelError`; the next call starts a new process. A process
+that somebody else killed, such as a system without memory, says nothing of the model: its work is
+given to another, once.
 """
 
 from __future__ import annotations
@@ -56,16 +58,21 @@ class NetProcess:
             The network cannot be loaded or run, crashes, or takes longer than the time limit.
         """
         with self._lock:
-            process = self._started()
-            timer = threading.Timer(self._time_limit_s, process.kill)
-            timer.start()
-            answer = _ask(process, str(Path(model).resolve()), batch)
-            timed_out = timer.finished.is_set()
-            timer.cancel()
-            if answer is None:
+            for last in (False, True):
+                process = self._started()
+                timer = threading.Timer(self._time_limit_s, process.kill)
+                timer.start()
+                answer = _ask(process, str(Path(model).resolve()), batch)
+                timed_out = timer.finished.is_set()
+                timer.cancel()
+                if answer is not None:
+                    break
                 self._end()
-                reason = f"no answer within {self._time_limit_s:g} s" if timed_out else ""
-                raise ModelError(f"{model}: {reason or _how_it_ended(process)}")
+                if timed_out:
+                    raise ModelError(f"{model}: no answer within {self._time_limit_s:g} s")
+                if last or process.returncode != -signal.SIGKILL:
+                    raise ModelError(f"{model}: {_how_it_ended(process)}")
+        assert answer is not None
         head, arrays = answer
         if "error" in head:
             raise ModelError(f"{model}: OpenCV cannot run this network: {head['error']}")

@@ -3,15 +3,22 @@
 A stroke changes one mask. A whole run then solves the cameras again, because they follow from all
 masks; a draft keeps cameras, fitted head, waves, parting and hairline, and follows strands again in
 the photos that were drawn on alone. Hull, field and strands are made anew, on a coarser grid where
-the recipe says so. What a draft shows is replaced by the run that follows it.
+the recipe says so and from smaller pictures where the capture was read so. What a process has once
+read of a run it keeps, so that only the first of its drafts waits for the disk. What a draft shows
+is replaced by the run that follows it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
+
+import cv2
+import numpy as np
+import numpy.typing as npt
 
 from hairkit.cameras.similarity import move_head
 from hairkit.errors import InputError
@@ -21,11 +28,13 @@ from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.hairline import Hairline
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
+from hairkit.io.capture_reader import WORKING_EDGE
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.recipe import Recipe
-from hairkit.pipeline.work_folder import read_latest
-from hairkit.types.capture import Capture
+from hairkit.pipeline.work_folder import read_latest, stage_file
+from hairkit.storage import Stored
+from hairkit.types.capture import Capture, View
 from hairkit.types.face import Face
 from hairkit.types.groom import Groom
 from hairkit.types.mask import Mask, Masks
@@ -36,6 +45,10 @@ from hairkit.types.scene import Scene
 from hairkit.types.skin import SkinMaps
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.waves import Waves
+
+_Result = TypeVar("_Result", bound=Stored)
+MOST_KEPT = 64
+"""Results of each kind that a process keeps: those of a turn of 36 photos, and spare ones."""
 
 
 @one_blas_thread()
@@ -53,7 +66,7 @@ def draft(
     Parameters
     ----------
     capture
-        As it is now, with the photos of that run.
+        As it is now, with the photos of that run, at their size or smaller.
     work
         The work folder.
     touched
@@ -74,9 +87,10 @@ def draft(
     """
     capture = _arranged(capture, work, touched, recipe)
     masks, orientations = _seen(capture, work, touched, recipe, manager)
-    scene = read_latest(Scene, work, "head" if recipe.stage("head") else "scene")
+    scene = _read(Scene, work, "head" if recipe.stage("head") else "scene")
     if capture.chosen.head is not None:
         scene = move_head(scene, capture.chosen.head)
+    scene = _reduced(scene, capture)
     check()
     hull = _call(manager, recipe, "hull", scene=scene, masks=masks)
     distance = measure_scalp_distance(scene.head, hull)
@@ -84,18 +98,18 @@ def draft(
         orientations=orientations, head=scene.head, hull=hull, scalp_distance=distance,
         masks=masks, cameras=scene.cameras,
     )  # fmt: skip
-    waves = capture.chosen.hair.waves(read_latest(Waves, work, "waves"))
+    waves = capture.chosen.hair.waves(_read(Waves, work, "waves"))
     seen = {
         "scene": scene, "masks": masks, "orientations": orientations, "hull": hull, "waves": waves,
-        "scalp_distance": distance, "parting": read_latest(Parting, work, "parting"), "tied": tied,
+        "scalp_distance": distance, "parting": _read(Parting, work, "parting"), "tied": tied,
     }  # fmt: skip
     check()
     field = _call(manager, recipe, "field", **seen)
     check()
     head = replace(
         scene.head,
-        density=read_latest(Hairline, work, "hairline").density,
-        maps=read_latest(SkinMaps, work, "skin"),
+        density=_read(Hairline, work, "hairline").density,
+        maps=_read(SkinMaps, work, "skin"),
     )
     roots = sample_roots(head, guides, 0, rest=default_head())
     strands = _call(manager, recipe, "track", **seen, field=field, roots=roots)
@@ -107,41 +121,106 @@ def draft(
 def _arranged(capture: Capture, work: Path, touched: Collection[str], recipe: Recipe) -> Capture:
     """Return the views in the order of the turn; those that were touched with what is in them."""
     has = {table: recipe.stage(table) is not None for table in ("landmarks", "person", "turn")}
+    turn = _read(Turnaround, work, "turn") if has["turn"] else None
+    if turn is not None and len(turn.order) != len(capture.views):
+        count = len(capture.views)
+        raise InputError(f"{work}: the last run had {len(turn.order)} photos, now {count}")
     views = list(capture.views)
     for index, view in enumerate(views):
         if view.photo_path is not None and view.photo_path.name in touched:
             face, person = Face.absent(), Person.absent()
-            if has["landmarks"]:
-                face = read_latest(Face, work, "landmarks", view.name)
             if has["person"]:
-                person = read_latest(Person, work, "person", view.name)
-            views[index] = view.with_findings(face, person)
+                person = _read(Person, work, "person", view.name)
+            if has["landmarks"]:
+                face = _read(Face, work, "landmarks", view.name)
+            views[index] = _with_findings(view, face, person)
     found = replace(capture, views=tuple(views))
-    if not has["turn"]:
-        return found
-    turn = read_latest(Turnaround, work, "turn")
-    if len(turn.order) != len(views):
-        raise InputError(f"{work}: the last run had {len(turn.order)} photos, now {len(views)}")
-    return found.arranged(turn)
+    return found if turn is None else found.arranged(turn)
+
+
+def _with_findings(view: View, face: Face, person: Person) -> View:
+    """Return a view with what was found in its photo at the size of the last run."""
+    factor = max(view.image.shape) / min(max(view.photo_size), WORKING_EDGE)
+    face = replace(face, landmarks=factor * face.landmarks, noise_px=factor * face.noise_px)
+    if person.alpha.size:
+        size = (view.width, view.height)
+        small = cv2.resize(person.alpha, size, interpolation=cv2.INTER_AREA)
+        person = Person(np.asarray(small, np.uint8))
+    return view.with_findings(face, person)
+
+
+def _reduced(scene: Scene, capture: Capture) -> Scene:
+    """Return the scene for pictures of the views' sizes."""
+    factor = capture.views[0].height / scene.cameras[0].height
+    misfit = None if scene.residual_px is None else factor * scene.residual_px
+    sizes = [(view.width, view.height) for view in capture.views]
+    return replace(scene.resized(sizes), residual_px=misfit)
 
 
 def _seen(
     capture: Capture, work: Path, touched: Collection[str], recipe: Recipe, manager: Manager
 ) -> tuple[tuple[Mask, ...], tuple[OrientationMap, ...]]:
     """Return masks and orientations of all views, made again where a photo was touched."""
-    refined = read_latest(Masks, work, "refine").views if (work / "refine.npz").is_file() else None
+    is_refined = (work / "refine.npz").is_file()
     masks, orientations = [], []
     for index, view in enumerate(capture.views):
+        size = (view.width, view.height)
         if view.photo_path is not None and view.photo_path.name in touched:
             mask = _call(manager, recipe, "segment", view=view.plain())
             orientation = _call(manager, recipe, "orient", view=view.toned(), mask=mask)
         else:
-            kept = refined if view.mask_path is None else None
-            mask = read_latest(Mask, work, "segment", view.name) if kept is None else kept[index]
-            orientation = read_latest(OrientationMap, work, "orient", view.name)
+            if is_refined and view.mask_path is None:
+                mask = _small_refined(_time(work, "refine"), work, index, size)
+            else:
+                mask = _small_mask(_time(work, "segment", view.name), work, view.name, size)
+            time = _time(work, "orient", view.name)
+            orientation = _small_orientation(time, work, view.name, size)
         masks.append(mask)
         orientations.append(orientation)
     return tuple(masks), tuple(orientations)
+
+
+def _read(kind: type[_Result], work: Path, stage: str, view: str = "") -> _Result:
+    """Return what a stage of the last run made; read once."""
+    read: Any = _read_once  # of every kind
+    return cast(_Result, read(_time(work, stage, view), kind, work, stage, view))
+
+
+def _time(work: Path, stage: str, view: str = "") -> int:
+    """Return when a stage's file was written."""
+    path = stage_file(work, stage, view)
+    return path.stat().st_mtime_ns if path.is_file() else 0
+
+
+@lru_cache(MOST_KEPT)
+def _read_once(time: int, kind: type[Stored], work: Path, stage: str, view: str) -> Stored:
+    return read_latest(kind, work, stage, view)
+
+
+@lru_cache(MOST_KEPT)
+def _small_refined(time: int, work: Path, index: int, size: tuple[int, int]) -> Mask:
+    return _small(_read(Masks, work, "refine").views[index], size)
+
+
+@lru_cache(MOST_KEPT)
+def _small_mask(time: int, work: Path, view: str, size: tuple[int, int]) -> Mask:
+    return _small(read_latest(Mask, work, "segment", view), size)
+
+
+def _small(mask: Mask, size: tuple[int, int]) -> Mask:
+    alpha = None if mask.alpha is None else np.asarray(cv2.resize(mask.alpha, size), np.uint8)
+    return Mask(_every_few(mask.labels, size), mask.person_known, alpha)
+
+
+@lru_cache(MOST_KEPT)
+def _small_orientation(time: int, work: Path, view: str, size: tuple[int, int]) -> OrientationMap:
+    found = read_latest(OrientationMap, work, "orient", view)
+    return OrientationMap(_every_few(found.angle, size), _every_few(found.confidence, size))
+
+
+def _every_few(picture: npt.NDArray[Any], size: tuple[int, int]) -> Any:
+    """Return a picture reduced to a size (width, height) by leaving pixels out."""
+    return cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST)
 
 
 def _call(manager: Manager, recipe: Recipe, table: str, **values: Any) -> Any:

@@ -142,12 +142,12 @@ class WorkFolder:
             write.result()
 
     def _file(self, stage: str, view: str) -> Path:
-        return _stage_file(self.path, stage, view)
+        return stage_file(self.path, stage, view)
 
 
 def read_latest(kind: type[_Result], work: Path, stage: str, view: str = "") -> _Result:
     """Return what a stage of the last run made, whatever it was made from; `InputError` if none."""
-    path = _stage_file(work, stage, view)
+    path = stage_file(work, stage, view)
     if not path.is_file():
         raise InputError(f"{path}: no result of this stage; run all stages first")
     arrays = read_npz(path)
@@ -155,7 +155,8 @@ def read_latest(kind: type[_Result], work: Path, stage: str, view: str = "") -> 
     return from_arrays(kind, arrays, str(path))
 
 
-def _stage_file(folder: Path, stage: str, view: str) -> Path:
+def stage_file(folder: Path, stage: str, view: str = "") -> Path:
+    """Return the path of a stage's result, which need not exist."""
     name = "".join(c if c.isalnum() or c in "-_" else "_" for c in view)
     return folder / (f"{stage}-{name}.npz" if view else f"{stage}.npz")
 

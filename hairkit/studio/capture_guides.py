@@ -43,6 +43,11 @@ def guides_for(count: int, above: bool) -> list[dict[str, Any]]:
     return [*guides, _guide("top", 0.0, TOP_DEG)] if above else guides
 
 
+def hair_line(azimuth_deg: float) -> float:
+    """Return the height of the line of a view of the turn that the hair should stay below."""
+    return float(_guide("", azimuth_deg, 0.0)["top"])
+
+
 @cache
 def _guide(name: str, azimuth_deg: float, elevation_deg: float) -> dict[str, Any]:
     camera = camera_at(azimuth_deg, elevation_deg)

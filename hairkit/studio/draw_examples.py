@@ -35,14 +35,16 @@ WIDTH, HEIGHT, QUALITY = 180, 240, 80
 STRANDS = 12_000
 SHIFT = 4
 """Bits of a pixel's fraction in which OpenCV takes points."""
+DASH, LINE = 6, (214, 120, 10)
+"""Pixels of a dash, and colour of the line that the hair should stay below."""
 WALL = 205
 """Grey level of the wall."""
 CLOTH = (0.045, 0.075, 0.16)
 """Linear RGB."""
 DIM, GLARE, BLUR = 0.14, 105.0, 7.0
 """Factor of too little light, levels that too much adds, and pixels of a blurred picture."""
-NEAR, FAR, ASIDE, TURNED_DEG = 0.42, 2.8, 0.17, -38.0
-"""Metres to the head and beside it, and degrees, in pictures of a wrong place."""
+NEAR, FAR, ASIDE, HIGH, TURNED_DEG = 0.42, 2.8, 0.17, -0.06, -38.0
+"""Metres to the head, beside and above it, and degrees, in pictures of a wrong place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +64,16 @@ def draw_examples() -> Iterator[Example]:
     bust = Bust.under(groom.head)
     colours = np.tile(np.array(CLOTH, np.float32), (len(bust.vertices), 1))
     cloth = Solid(bust.vertices, bust.faces, bust.normals, colours, scatter=0.0)
-    names = [GOOD, Feedback.TOO_NEAR, Feedback.TOO_FAR, Feedback.OUT_OF_FRAME, Feedback.WRONG_ANGLE]
-    cameras = [_camera(), _camera(NEAR), _camera(FAR), _camera(aside=ASIDE)]
-    cameras.append(_camera(turn=TURNED_DEG))
-    pictures = _draw(groom, cloth, cameras)
-    for name, (picture, person) in zip(names, pictures, strict=True):
+    cameras = {
+        GOOD: _camera(),
+        Feedback.TOO_NEAR: _camera(NEAR),
+        Feedback.TOO_FAR: _camera(FAR),
+        Feedback.OUT_OF_FRAME: _camera(aside=ASIDE),
+        Feedback.ABOVE_LINE: _camera(above=HIGH),
+        Feedback.WRONG_ANGLE: _camera(turn=TURNED_DEG),
+    }
+    pictures = _draw(groom, cloth, list(cameras.values()))
+    for name, (picture, person) in zip(cameras, pictures, strict=True):
         yield Example(str(name), picture, person)
     good, person = pictures[0]
     light = {
@@ -92,11 +99,13 @@ def _draw(groom: Groom, cloth: Solid, cameras: list[Camera]) -> list[tuple[UInt8
     return found
 
 
-def _camera(distance: float = DISTANCE, aside: float = 0.0, turn: float = 0.0) -> Camera:
+def _camera(
+    distance: float = DISTANCE, aside: float = 0.0, above: float = 0.0, turn: float = 0.0
+) -> Camera:
     return Camera.on_turn(
         turn,
         distance=distance,
-        target=(LOOK_AT[0] + aside, *LOOK_AT[1:]),
+        target=(LOOK_AT[0] + aside, LOOK_AT[1] + above, LOOK_AT[2]),
         focal=focal_from_equivalent(LENS_MM, WIDTH, HEIGHT),
         width=WIDTH,
         height=HEIGHT,
@@ -112,6 +121,9 @@ def write_examples(folder: Path) -> None:
         picture = example.image.copy()
         curve = [np.rint(points).astype(np.int32)]
         cv2.polylines(picture, curve, False, (255, 255, 255), 1, cv2.LINE_AA, SHIFT)
+        if example.name in (GOOD, Feedback.ABOVE_LINE):
+            row = round(front["top"] * HEIGHT)
+            picture[row : row + 2, np.arange(WIDTH) // DASH % 2 == 0] = LINE
         data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1]
         write_bytes(folder / f"example-{example.name}.jpg", data.tobytes())
 

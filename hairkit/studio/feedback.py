@@ -22,6 +22,9 @@ NEAR, FAR = 0.62, 0.2
 """Width of the head over the picture's that is too large, and too small; the outline's is 0.4."""
 TOP, ASIDE = 0.02, 0.16
 """Height above the head that must be free, and distance of the head from the middle, as shares."""
+OVER_LINE = 0.01
+"""Share of the picture's height by which hair may pass the dashed line: outlines are that uncertain
+in pictures of `MEASURED_WIDTH`."""
 HEAD_ROWS = 0.6
 """Height of the part of a person that is taken for the head, over the width of the picture."""
 LIKELY, LEAST_PERSON = 0.5, 0.02
@@ -44,6 +47,7 @@ class Feedback(enum.StrEnum):
     TOO_NEAR = "too_near"
     TOO_FAR = "too_far"
     OUT_OF_FRAME = "out_of_frame"
+    ABOVE_LINE = "above_line"
     WRONG_ANGLE = "wrong_angle"
     NO_FACE = "no_face"
     NO_HAIR = "no_hair"
@@ -65,6 +69,9 @@ ADVICE = {
     Feedback.TOO_NEAR: Advice("Too near: take a step back", "A step back"),
     Feedback.TOO_FAR: Advice("Too far: come closer", "Come closer"),
     Feedback.OUT_OF_FRAME: Advice("Put the head into the outline", "Head into the outline"),
+    Feedback.ABOVE_LINE: Advice(
+        "Hair above the dashed line: lower the head or step back", "A little lower"
+    ),
     Feedback.WRONG_ANGLE: Advice("Turn on to the drawn direction", "Turn a little more"),
     Feedback.NO_FACE: Advice("No face found: look at the camera", "Look at the camera"),
     Feedback.NO_HAIR: Advice("No hair found: mark it on the Mask page", "No hair found"),
@@ -75,7 +82,8 @@ ADVICE = {
 EXAMPLES = (
     "good",
     *map(str, (Feedback.TOO_DARK, Feedback.TOO_BRIGHT, Feedback.BLURRED, Feedback.TOO_NEAR)),
-    *map(str, (Feedback.TOO_FAR, Feedback.OUT_OF_FRAME, Feedback.WRONG_ANGLE)),
+    *map(str, (Feedback.TOO_FAR, Feedback.OUT_OF_FRAME, Feedback.ABOVE_LINE)),
+    str(Feedback.WRONG_ANGLE),
 )
 """Pictures beside the pages that show a right photo and faults: `example-NAME.jpg`."""
 
@@ -96,7 +104,7 @@ def judge_photo(image: UInt8Array) -> list[Feedback]:
     return found
 
 
-def judge_view(view: View, azimuth_deg: float) -> list[Feedback]:
+def judge_view(view: View, azimuth_deg: float, line: float = 0.0) -> list[Feedback]:
     """Return what is wrong with the framing and the direction of a picture of the turn.
 
     Parameters
@@ -105,11 +113,14 @@ def judge_view(view: View, azimuth_deg: float) -> list[Feedback]:
         With face and person, where the networks for them are installed.
     azimuth_deg
         From where the picture should be taken.
+    line
+        Height of the line that the top of the hair should stay below, as a share of the picture's
+        from its top; 0 where none is drawn.
     """
-    return _judge_framing(view) + _judge_angle(view, azimuth_deg)
+    return _judge_framing(view, line) + _judge_angle(view, azimuth_deg)
 
 
-def _judge_framing(view: View) -> list[Feedback]:
+def _judge_framing(view: View, line: float) -> list[Feedback]:
     if view.person is None:
         return []
     person = view.person.alpha > LIKELY * 255
@@ -128,6 +139,8 @@ def _judge_framing(view: View) -> list[Feedback]:
         found.append(Feedback.TOO_FAR)
     if top < TOP * height or abs(middle - 1 / 2) > ASIDE:
         found.append(Feedback.OUT_OF_FRAME)
+    elif top < (line - OVER_LINE) * height:
+        found.append(Feedback.ABOVE_LINE)
     return found
 
 

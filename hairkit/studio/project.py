@@ -73,16 +73,22 @@ class Project:
         self.photo_folder = self.folder if bare else self.folder / "photos"
         for made in (self.photo_folder, self.folder / "strokes", self.incoming, self.pictures):
             made.mkdir(parents=True, exist_ok=True)
-        for leftover in self.incoming.iterdir():  # uploads that a crash cut short
-            leftover.unlink(missing_ok=True)
+        self._clean_up()
         self.shots = self._read_shots()
         self._said = self._said_entries()
         known = {shot.id for shot in self._kept()}
         self.shots = [shot if shot.id in known else self._toned(shot) for shot in self.shots]
-        if self._kept() not in ([], self.shots):  # files came or went while nobody looked
+        if self._kept() not in ([], self.shots):  # files came or went meanwhile
             self._keep(self.shots)
         if shutil.disk_usage(self.folder).free < _LARGEST_STATE:
             raise InputError(f"{self.folder}: no room on this disk; free some")
+
+    def _clean_up(self) -> None:
+        """Remove uploads, and files on their way to a name, that a crash cut short."""
+        own, result = (self.folder, self.pictures), self.result
+        unfinished = [path for folder in own for path in folder.glob(".*.part")]
+        for path in (*unfinished, *result.glob(".*"), *self.incoming.iterdir()):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
 
     @property
     def incoming(self) -> Path:
@@ -307,10 +313,6 @@ class Project:
         """Whether there are photos enough for a groom."""
         return len(self.shots) >= FEWEST
 
-    def write_picture(self, shot: Shot, size: str, data: bytes) -> None:
-        """Keep the picture of a photo that pages show."""
-        write_bytes(self.picture(shot, size), data, durable=False)
-
     def _read_shots(self) -> list[Shot]:
         """Return the photos that are there, in the order that was kept; new ones come last."""
         files = sorted(filter(_is_photo, self.photo_folder.iterdir()), key=_natural)
@@ -330,11 +332,10 @@ class Project:
         if not path.is_file():
             return []
         try:
-            return [
-                Shot(**entry) for entry in json.loads(read_text(path, _LARGEST_STATE))["photos"]
-            ]
+            kept = json.loads(read_text(path, _LARGEST_STATE))["photos"]
+            return [Shot(**entry) for entry in kept]
         except (ValueError, KeyError, TypeError, HairkitError):
-            return []  # a file that somebody else wrote; the photos themselves are what counts
+            return []  # somebody else wrote it; the photos are what counts
 
     def _keep(self, shots: list[Shot]) -> None:
         """Write the state, then the tables of capture.toml that follow from it."""

@@ -197,15 +197,16 @@ class Routes:
         return JSONResponse({})
 
     async def _small(self, request: Request) -> Response:
-        return self._picture(request, "small")
+        return await self._picture(request, "small")
 
     async def _large(self, request: Request) -> Response:
-        return self._picture(request, "large")
+        return await self._picture(request, "large")
 
-    def _picture(self, request: Request, size: str) -> Response:
-        path = self._studio.project.picture(self._shot(request), size)
+    async def _picture(self, request: Request, size: str) -> Response:
+        shot = self._shot(request)
+        path = self._studio.project.picture(shot, size)
         if not path.is_file():
-            raise HTTPException(HTTPStatus.NOT_FOUND, _UNKNOWN)
+            await self._studio.draw_pictures(shot)
         return FileResponse(path, media_type="image/jpeg")
 
     async def _outline(self, request: Request) -> Response:

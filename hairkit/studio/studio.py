@@ -62,8 +62,8 @@ class Studio:
     async def start(self) -> None:
         """Begin to work on what is in the project."""
         self._tasks = [asyncio.create_task(self._look()), asyncio.create_task(self._build_always())]
-        if self.project.built == self.project.inputs() and self.project.shots:
-            self.build = {"state": "done", **self.project.made}
+        self.build = self._standing()
+        if self.build["state"] == "done":
             self._touched = set()
             self._tasks.append(asyncio.create_task(self._warm_up()))
         else:
@@ -91,7 +91,23 @@ class Studio:
         else:
             self._touched |= set(touched)
         self._wanted.set()
+        if self._due():
+            self.build = {"state": "waiting"}
         self.events.send("project", **self.summary())
+
+    def _due(self) -> bool:
+        """Return whether hair is to be made that has not been."""
+        project = self.project
+        fewest = 0 if self._asked else MEANWHILE
+        ready = project.enough and len(project.shots) >= fewest and not self.held
+        return ready and project.built != project.inputs()
+
+    def _standing(self) -> dict[str, Any]:
+        """Return what is said of the hair while none is made."""
+        project = self.project
+        if project.shots and project.built == project.inputs():
+            return {"state": "done", **project.made}
+        return {"state": "none"}
 
     def summary(self) -> dict[str, Any]:
         """Return the state of the project for pages."""
@@ -181,7 +197,7 @@ class Studio:
                 large = self.project.picture(shot, "large")
                 with contextlib.suppress(HairkitError, OSError, KeyError):  # it may go
                     if not large.is_file():
-                        await self._draw_pictures(shot)
+                        await self.draw_pictures(shot)
                     if "outline_of" not in facts:
                         await self.outline(shot)
                         self.events.send("project", **self.summary())
@@ -189,12 +205,12 @@ class Studio:
             else:
                 await asyncio.sleep(QUIET_S / 3)
 
-    async def _draw_pictures(self, shot: Shot) -> None:
+    async def draw_pictures(self, shot: Shot) -> None:
+        """Draw the pictures of a photo that pages show."""
         pictures = {size: str(self.project.picture(shot, size)) for size in ("small", "large")}
         photo = str(self.project.photo(shot))
-        self.facts[shot.id] |= await self.editor.call(
-            "pictures", PHOTO_S, {"photo": photo, **pictures}
-        )
+        drawn = await self.editor.call("pictures", PHOTO_S, {"photo": photo, **pictures})
+        self.facts.setdefault(shot.id, {}).update(drawn)
 
     async def _build_always(self) -> None:
         """Make the hair whenever the project has changed and the changes have paused."""
@@ -204,18 +220,16 @@ class Studio:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._wanted.wait(), QUIET_S)
                 continue  # it changed again
-            fewest = 0 if self._asked else MEANWHILE
-            ready = self.project.enough and len(self.project.shots) >= fewest
-            if not ready or self.held or self.project.built == self.project.inputs():
-                if not ready:
-                    self._set_build(state="none")
+            if not self._due():
+                self._set_build(**self._standing())
                 continue
             if self._touched is not None and self.project.groom.is_file():
                 await self._draft(sorted(self._touched))
             if not self._wanted.is_set():
                 await self._while_unchanged(asyncio.create_task(self._build()))
-            if self.build["state"] == "done" and not (self._wanted.is_set() or self._warm):
-                self._tasks.append(asyncio.create_task(self._warm_up()))
+            if self.build["state"] == "done" and not self._warm:
+                self.builder, self.drafter = self.drafter, self.builder  # its kernels are loaded
+                self._warm = True
 
     async def _while_unchanged(self, build: asyncio.Task[None]) -> None:
         """Wait for a build, or for a change, which ends it: its process is started anew."""

@@ -15,6 +15,11 @@ from hairkit.errors import HairkitError
 
 LONGEST_LINE = 64 * 2**20
 """Bytes of an answer."""
+COMMAND = (sys.executable, "-P", "-m", "hairkit.studio.task_child")
+"""What is started."""
+TRIES = 6
+"""Processes that are given a task before it counts as what ends them: one that the system killed
+for its memory, or that somebody killed, says nothing of the task."""
 
 
 class TaskError(HairkitError):
@@ -39,28 +44,32 @@ class TaskProcess:
     ) -> Any:
         """Return the result of a task; `tell` hears what it says on its way.
 
+        A task whose process dies is given to a new one, so tasks must be such that they can be
+        done twice.
+
         Raises
         ------
         TaskError
-            The task failed, took longer than `limit_s`, or its process died.
+            The task failed, took longer than `limit_s`, or ended `TRIES` processes.
         """
         async with self._turn:
-            number = self._running = next(self._numbers)
-            try:
-                process = await self._started()
-                await _send(process, {"id": number, "do": do, **(values or {})})
-                return await asyncio.wait_for(_answer(process, number, tell), limit_s)
-            except TimeoutError as error:
-                await self._end()
-                raise TaskError(f"not done within {limit_s:g} s") from error
-            except (OSError, EOFError, ValueError) as error:
-                await self._end()
-                raise TaskError("the process for it ended; the file may be damaged") from error
-            except asyncio.CancelledError:
-                await self._end()
-                raise
-            finally:
-                self._running = 0
+            for _ in range(TRIES):
+                number = self._running = next(self._numbers)
+                try:
+                    process = await self._started()
+                    await _send(process, {"id": number, "do": do, **(values or {})})
+                    return await asyncio.wait_for(_answer(process, number, tell), limit_s)
+                except TimeoutError as error:
+                    await self._end()
+                    raise TaskError(f"not done within {limit_s:g} s") from error
+                except (OSError, EOFError, ValueError):
+                    await self._end()
+                except asyncio.CancelledError:
+                    await self._end()
+                    raise
+                finally:
+                    self._running = 0
+            raise TaskError("the process for it ended again and again; a file may be damaged")
 
     async def stop(self) -> None:
         """Ask the task that is running to end early, as if it had failed."""
@@ -75,10 +84,7 @@ class TaskProcess:
     async def _started(self) -> asyncio.subprocess.Process:
         if self._process is None or self._process.returncode is not None:
             self._process = await asyncio.create_subprocess_exec(
-                sys.executable,
-                "-P",
-                "-m",
-                "hairkit.studio.task_child",
+                *COMMAND,
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 limit=LONGEST_LINE,

@@ -55,7 +55,8 @@ OUTLINE_SMOOTHING = 1.0
 FAR = 1e4
 """Distance to an outline where a picture has none, pixels."""
 DIFFERENCE, TOLERANCE, MOST_STEPS = 1e-3, 1e-4, 40
-"""Of the solver: relative step of derivatives, relative change at which it stops, evaluations."""
+"""Of the solver: step of derivatives in standard deviations, relative change at which it stops,
+evaluations."""
 FEWEST_VIEWS, LEAST_CLOTHES = 3, 0.01
 """Views that must show clothes below the head, and on which share of their pixels."""
 COVERED, STRAY = 0.75, 0.1
@@ -83,11 +84,11 @@ def fit_torso(head: Head, cameras: Sequence[Camera], masks: Sequence[Mask]) -> T
     if len(views) < FEWEST_VIEWS:
         return None
     solved = least_squares(
-        lambda numbers: _misfits(_torso(usual, numbers), numbers, views),
+        lambda numbers: _misfits(usual, numbers[None], views)[0],
         np.zeros(len(USUAL)),
+        lambda numbers: _derivatives(usual, numbers, views),
         loss="soft_l1",
         f_scale=SOFT,
-        diff_step=DIFFERENCE,
         xtol=TOLERANCE,
         ftol=TOLERANCE,
         max_nfev=MOST_STEPS,
@@ -170,14 +171,27 @@ def _torso(usual: Torso, numbers: Float64Array) -> Torso:
     return replace(usual, **values)
 
 
-def _misfits(torso: Torso, numbers: Float64Array, views: Sequence[_View]) -> Float64Array:
-    """Return metres by which the outline misses that of every view, then the pull to an adult."""
-    surface = torso.surface(HEIGHTS, AROUND)
-    around = np.roll(surface, -1, axis=1) - np.roll(surface, 1, axis=1)
-    normal = np.cross(np.gradient(surface, axis=0), around)
-    parts = [_look_up(view, *_outline(surface, normal, view.camera)) for view in views]
-    weight = PULL * np.sqrt(sum(len(part) for part in parts))
-    return np.concatenate([*parts, weight * numbers])
+def _derivatives(usual: Torso, numbers: Float64Array, views: Sequence[_View]) -> Float64Array:
+    """Return (N, 9) how the misfits change with each of the numbers (9,), all found at once."""
+    steps = np.concatenate([np.zeros((1, len(numbers))), DIFFERENCE * np.eye(len(numbers))])
+    found = _misfits(usual, numbers + steps, views)
+    change: Float64Array = (found[1:] - found[0]).T / DIFFERENCE
+    return change
+
+
+def _misfits(usual: Torso, numbers: Float64Array, views: Sequence[_View]) -> Float64Array:
+    """Return (T, N) metres by which the outlines of the torsos miss those of every view, then the
+    pull to an adult, for T rows of numbers (T, 9)."""
+    surface = np.stack([_torso(usual, row).surface(HEIGHTS, AROUND) for row in numbers])
+    around = np.roll(surface, -1, axis=2) - np.roll(surface, 1, axis=2)
+    normal = np.cross(np.gradient(surface, axis=1), around)
+    rows = (-1, AROUND, 3)
+    ends = [_outline(surface.reshape(rows), normal.reshape(rows), view.camera) for view in views]
+    found = [_look_up(view, *end) for view, end in zip(views, ends, strict=True)]
+    either = np.stack(found).reshape(len(views), 2, len(numbers), len(HEIGHTS))
+    parts = either.transpose(2, 0, 1, 3).reshape(len(numbers), -1)
+    weight = PULL * np.sqrt(parts.shape[1])
+    return np.concatenate([parts, weight * numbers], axis=1)
 
 
 def _outline(

@@ -23,6 +23,11 @@ while (message := net_child.read_message(sys.stdin.buffer)) is not None:
     head, arrays = message
     if head["model"].endswith("crash"):
         os.kill(os.getpid(), signal.SIGSEGV)
+    if head["model"].endswith("slain"):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if head["model"].endswith("killed") and not os.path.exists(head["model"]):
+        open(head["model"], "w").close()
+        os.kill(os.getpid(), signal.SIGKILL)
     if head["model"].endswith("hang"):
         time.sleep(60)
     if head["model"].endswith("leave"):
@@ -55,6 +60,16 @@ def test_a_crash_is_one_error_and_the_next_call_works(
     with pytest.raises(ModelError, match=f"{model}: .*{said}"):
         nets.run(model, BATCH)
     assert np.array_equal(nets.run("fine", BATCH)[0], 2 * BATCH)
+    nets.close()
+
+
+def test_a_kill_from_outside_is_no_fault_of_the_network(nets: NetProcess, tmp_path: Path) -> None:
+    """Work whose process somebody killed is done by another; a second kill is an error."""
+    trace = tmp_path / "once.killed"
+    assert np.array_equal(nets.run(trace, BATCH)[0], 2 * BATCH)
+    assert trace.is_file()
+    with pytest.raises(ModelError, match="SIGKILL"):
+        nets.run("always.slain", BATCH)
     nets.close()
 
 

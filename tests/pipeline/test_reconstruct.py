@@ -14,6 +14,7 @@ from ball import RECIPE
 
 from hairkit import Capture, Groom, Mask, Roots, ScalpDistance, Strands, Waves, hookimpl
 from hairkit.errors import InputError, PluginError, RenderError
+from hairkit.field.ties import measure_ties
 from hairkit.manager import Manager
 from hairkit.pipeline.draft import draft
 from hairkit.pipeline.recipe import parse_recipe
@@ -152,6 +153,34 @@ def test_a_draft_follows_a_change_without_the_cameras(tmp_path: Path) -> None:
     assert quick.head.vertices.shape == whole.head.vertices.shape
     with pytest.raises(InputError, match="run all stages first"):
         draft(capture, tmp_path / "nothing", set(), recipe, manager, 30)
+
+
+def test_a_draft_may_see_smaller_pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a run found at full size is used at that of the draft's pictures, cameras too."""
+    run(tmp_path, guides=50)
+    manager = Manager()
+    manager.register(ball_plugin, "ball_plugin")
+    recipe = parse_recipe(RECIPE.encode(), "ball", "test")
+    whole = turn_capture().views
+    views = [
+        replace(v, image=v.image[::2, ::2], photo_size=(v.width, v.height), photo_path=Path(f"{k}"))
+        for k, v in enumerate(whole)
+    ]
+    seen: dict[str, Any] = {}
+
+    def look(**values: Any) -> Any:
+        seen.update(values)
+        return measure_ties(**values)
+
+    monkeypatch.setattr("hairkit.pipeline.draft.measure_ties", look)
+    capture = replace(turn_capture(), views=tuple(views))
+    assert len(draft(capture, tmp_path / "work", set(), recipe, manager, 30).strands) == 30
+    size = views[0].image.shape[:2]
+    assert {mask.labels.shape for mask in seen["masks"]} == {size}
+    assert {found.angle.shape for found in seen["orientations"]} == {size}
+    point = np.array([0.02, 0.03, 0.01])
+    for small, camera in zip(seen["cameras"], turn_scene().cameras, strict=True):
+        assert 2 * small.project(point) == pytest.approx(camera.project(point))
 
 
 def test_what_stages_share_is_kept_and_handed_to_them(tmp_path: Path) -> None:

@@ -13,11 +13,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import cv2
 import pytest
 
 from hairkit.io.capture_reader import sample_folder
 
 START_S = 60
+SIZE = (360, 480)
+"""Pixels of the photos: a third of the time of the sample's own."""
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 
@@ -119,9 +122,13 @@ def server(tmp_path: Path) -> Iterator[Server]:
 
 
 @pytest.fixture(scope="session")
-def photos() -> list[Path]:
-    """The photos of the sample, in their order."""
-    return sorted((sample_folder() / "photos").iterdir())
+def photos(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """The photos of the sample, in their order, small."""
+    folder = tmp_path_factory.mktemp("photos")
+    for path in sorted((sample_folder() / "photos").iterdir()):
+        picture = cv2.resize(cv2.imread(str(path)), SIZE, interpolation=cv2.INTER_AREA)
+        cv2.imwrite(str(folder / path.name), picture, [cv2.IMWRITE_JPEG_QUALITY, 95])
+    return sorted(folder.iterdir())
 
 
 @pytest.fixture(scope="session")

@@ -170,18 +170,21 @@ def test_outlines_survive_a_restart(tmp_path: Path, start_studio: Any, photos: l
         second.kill()
 
 
-def test_examples_show_what_they_are_named_after() -> None:
+def test_examples_show_what_they_are_named_after(monkeypatch: pytest.MonkeyPatch) -> None:
     """The right picture has no fault; each wrong one has its own."""
+    from hairkit.studio import draw_examples as drawing
+    from hairkit.studio.capture_guides import hair_line
     from hairkit.studio.draw_examples import GOOD, draw_examples
     from hairkit.types.face import Face
 
+    monkeypatch.setattr(drawing, "STRANDS", 400)
     drawn = {example.name: example for example in draw_examples()}
     assert set(drawn) == set(EXAMPLES)
     for name, example in drawn.items():
         yaw = -38.0 if name == Feedback.WRONG_ANGLE else 0.0
         face = Face(0.99, np.zeros((68, 2)), np.zeros(68), yaw, 0.0, 0.0)
         view = View("front", 0.0, example.image, person=example.person, face=face)
-        codes = judge_photo(example.image) + judge_view(view, 0.0)
+        codes = judge_photo(example.image) + judge_view(view, 0.0, hair_line(0.0))
         assert (codes == []) if name == GOOD else (Feedback(name) in codes), (name, codes)
 
 

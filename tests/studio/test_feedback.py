@@ -85,6 +85,14 @@ def test_faults_of_framing_are_named(
     assert code in judge_view(view(person, face), azimuth)
 
 
+@pytest.mark.parametrize(("top", "above"), [(0.18, True), (0.195, False), (0.22, False)])
+def test_hair_above_the_dashed_line_is_named(top: float, above: bool) -> None:
+    """Hair may touch the line, and is called too high where it passes it; never without a line."""
+    seen = view(person(top=top), face(0))
+    assert (Feedback.ABOVE_LINE in judge_view(seen, 0, line=0.2)) == above
+    assert judge_view(seen, 0) == []
+
+
 def test_without_networks_nothing_is_held_back() -> None:
     """Where neither faces nor persons are looked for, there is no fault of framing."""
     assert judge_view(view(None, None), 0) == []

@@ -7,7 +7,7 @@ const tools = {
   hairArea: { name: "Hair area", key: "g", label: "foreground", type: "polygon", colour: "#ff5fa8" },
   restArea: { name: "Other area", key: "n", label: "background", type: "polygon", colour: "#64b5ff" },
   edgeHair: { name: "Edge: hair", key: "w", label: "foreground", type: "linestrip", colour: "#ff5fa8", brush: true },
-  edgeRest: { name: "Edge: other", key: "s", label: "background", type: "linestrip", colour: "#64b5ff", brush: true },
+  edgeRest: { name: "Edge: rest", key: "s", label: "background", type: "linestrip", colour: "#64b5ff", brush: true },
   rectangle: { name: "Rectangle", key: "r", label: "rectangle", type: "rectangle", colour: "#f0b45f" },
   parting: { name: "Parting", key: "p", label: "parting", type: "linestrip", colour: "#f0b45f" },
   erase: { name: "Remove", key: "e", colour: "#eceef0" },

@@ -39,7 +39,7 @@ function showBuild(state) {
   const { state: phase, stage, share, reason } = state.build;
   const text = {
     running: stageNames[stage] ? `Making hair: ${stageNames[stage]}` : "Making hair",
-    waiting: "Photos changed, starting again", done: "Hair is ready", failed: reason,
+    waiting: "Changed: the hair is made again", done: "Hair is ready", failed: reason,
   }[phase] ?? "";
   const place = document.getElementById("build-text");
   if (place.textContent !== text) place.textContent = text;

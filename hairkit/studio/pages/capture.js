@@ -33,9 +33,9 @@ export function show(main) {
   const phone = make("button", { onclick: pair }, "Use a phone");
   const paired = make("div", { class: "code" });
   const examples = make("ul", { class: "examples", "aria-label": "Right and wrong pictures" });
-  main.append(make("div", { class: "split" }, stage, make("section", { class: "side", "aria-label": "The turn" },
+  main.append(make("div", { class: "split" }, stage, make("section", { class: "side", "aria-label": "The turn", id: "turn" },
     make("div", { class: "row" }, make("label", {}, "Turn", count), make("label", {}, "Camera", cameras)),
-    make("div", { class: "tools" }, auto, voice, retake, skip), finish, phone, paired,
+    make("div", { class: "tools" }, auto, voice, retake, skip), make("div", { class: "pair" }, finish, phone), paired,
     make("p", { class: "quiet" }, "Head into the outline, top of the hair below the dashed line, the same distance all around. Good: window light, plain wall, hair loose. Bad: lamp behind, zoom, a hat."), examples)));
 
   async function load() {
@@ -202,6 +202,7 @@ export function show(main) {
     if (!found.length && !looking) look();
     if (looked.at === at) found.push(...looked.found);
     guide.classList.toggle("right", !found.length);
+    guide.classList.toggle("above", found.includes("above_line"));
     stage.dataset.feedback = found.join(" ");
     for (const item of examples.children) item.classList.toggle("now", item.dataset.example === (found[0] ?? "good"));
     if (found.length) {

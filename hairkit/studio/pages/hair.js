@@ -43,7 +43,7 @@ export function show(main) {
   }
 
   function side() {
-    const health = (state.build.health ?? []).map(([light, line]) => make("li", { class: light }, line));
+    const health = (state.build.health ?? []).map(([light, line]) => make("li", { class: light }, line.replace(`${light} `, "").trim()));
     const formats = [...state.formats].sort((a, b) => (engines[b[0]] ? 1 : 0) - (engines[a[0]] ? 1 : 0));
     return make("section", { class: "side", "aria-label": "Files" },
       state.draft ? make("p", { class: "note-box", role: "status" }, "This is a quick preview of your last change: the cameras are those of the hair before, the grid is coarser, and there are fewer guides. The whole hair is being made and takes its place here; files are those of the hair before until then.") : null,
@@ -51,7 +51,8 @@ export function show(main) {
       make("a", { class: "button primary", href: "/api/result/page", download: "result.html" }, "Save result.html"),
       make("p", { class: "quiet" }, "One file that moves in any browser and needs no server."),
       make("div", { class: "tools" }, ...formats.map(([plugin, suffix]) =>
-        make("a", { class: "button", href: `/api/result/${plugin}`, download: `groom${suffix}`, title: engines[plugin] ?? plugin }, suffix))),
+        make("a", { href: `/api/result/${plugin}`, download: `groom${suffix}`, class: "button file" },
+          make("strong", {}, suffix), make("small", {}, engines[plugin] ?? plugin)))),
       make("a", { href: "/api/result/sheet", target: "_blank" }, "Overview of all steps"),
       health.length ? make("h2", {}, "How good it is") : null,
       make("ul", { class: "lights" }, ...health),

@@ -58,8 +58,8 @@ void main() {
   float white = pow(along(normalize(t + (0.06 + shift) * out_of_head), half_way), 90.0);
   float tinted = pow(along(normalize(t - (0.10 + shift) * out_of_head), half_way), 22.0);
   float rim = pow(1.0 - abs(dot(out_of_head, eye)), 3.0);
-  vec3 colour = base * (0.30 + 0.95 * along(t, key) * facing) * depth;
-  colour += facing * depth * (0.035 * white + 0.8 * tinted * base) + 0.2 * rim * base;
+  vec3 colour = base * (0.42 + 1.1 * along(t, key) * facing) * depth;
+  colour += facing * depth * (0.035 * white + 0.8 * tinted * base) + rim * (0.35 * base + 0.02);
   colour *= 1.0 - 0.25 * v_side * v_side;
   out_colour = vec4(pow(colour / (1.0 + 0.35 * colour), vec3(1.0 / 2.2)), 1.0);
 }`;
@@ -93,6 +93,23 @@ void main() {
   out_colour = vec4(pow(colour / (1.0 + 0.35 * colour), vec3(1.0 / 2.2)), 1.0);
 }`;
 
+// One triangle over the whole picture: a wall that is lighter behind the head.
+const WALL_VERTEX = `#version 300 es
+out vec2 v_place;
+void main() {
+  v_place = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+  gl_Position = vec4(v_place, 1.0, 1.0);
+}`;
+
+const WALL_FRAGMENT = `#version 300 es
+precision highp float;
+in vec2 v_place;
+out vec4 out_colour;
+void main() {
+  float near = exp(-1.1 * dot(v_place - vec2(0.0, 0.15), v_place - vec2(0.0, 0.15)));
+  out_colour = vec4(mix(vec3(0.075, 0.087, 0.1), vec3(0.35, 0.385, 0.42), near), 1.0);
+}`;
+
 const COLUMNS = 128; // strands in a row of the texture: 16 points each make 2048 texels
 const SHOWN_WIDTH = 0.0007; // metres: few strands stand for a hundred thousand
 const NEAR = 0.05, FAR = 10, VIEW_ANGLE = 0.5; // metres, metres, radians
@@ -120,6 +137,7 @@ export class HairView {
     const { arrays } = packet;
     [this.hairs, this.points] = arrays.hair.shape;
     this.hairProgram = program(gl, HAIR_VERTEX, HAIR_FRAGMENT);
+    this.wallProgram = program(gl, WALL_VERTEX, WALL_FRAGMENT);
     this.headProgram = program(gl, HEAD_VERTEX, HEAD_FRAGMENT);
     this.hair = texture(gl, this.points * COLUMNS, Math.ceil(this.hairs / COLUMNS));
     this.moved = texture(gl, this.points, arrays.guides.shape[0]);
@@ -175,9 +193,12 @@ export class HairView {
     const { facts } = this.packet;
     const key = view.right.map((value, k) => 0.55 * value + 0.75 * view.up[k] + 0.6 * view.back[k]);
     gl.viewport(0, 0, width, height);
-    gl.clearColor(0.075, 0.087, 0.1, 1);
+    gl.clear(gl.DEPTH_BUFFER_BIT);
+    gl.disable(gl.DEPTH_TEST);
+    gl.bindVertexArray(null);
+    gl.useProgram(this.wallProgram);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.enable(gl.DEPTH_TEST);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     use(gl, this.headProgram, { u_clip_from_head: view.matrix, u_eye: view.eye, u_key: key, u_root: facts.root_colour });
     gl.bindVertexArray(this.headArray);
     gl.drawElements(gl.TRIANGLES, this.corners, gl.UNSIGNED_INT, 0);

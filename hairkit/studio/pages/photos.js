@@ -12,7 +12,7 @@ export function show(main) {
   const drop = make("div", { class: "drop", id: "drop" },
     make("h2", {}, "Photos from all around a head"),
     make("p", { class: "quiet" }, "Eight are usual, every 45 degrees, in any order. Or a video of one turn."),
-    make("div", { class: "row" },
+    make("div", { class: "row pair" },
       make("button", { class: "primary", onclick: () => picker.click() }, "Choose photos"),
       make("a", { class: "button", href: "#capture" }, "Take them now")),
     make("p", { class: "quiet" }, "They stay on this machine; place and time are removed from the files."),

@@ -32,7 +32,7 @@ export function show(main, argument) {
   const headTools = make("div", { class: "tools", hidden: true }, ...nudges, fitted);
   const pointTools = make("div", { class: "tools" }, keep, drop);
   const residual = make("p", { class: "quiet", "aria-live": "polite" });
-  main.append(make("div", { class: "split" }, stage, make("section", { class: "side", "aria-label": "Pose" },
+  main.append(make("div", { class: "split" }, stage, make("section", { class: "side", "aria-label": "Pose", id: "head" },
     make("h2", {}, "Head and cameras"), status, make("div", { class: "tools" }, ...modes), pointTools, headTools, residual, lights,
     make("h2", {}, "Order of the turn"),
     make("p", { class: "quiet" }, "Towards the subject's left. Drag a photo, press ‹ or ›, or hold Alt and press an arrow key."), list)));
@@ -107,7 +107,7 @@ export function show(main, argument) {
     if (state.result) {
       try { pose = await get("/api/pose"); } catch (error) { say(error.message); }
     }
-    lights.replaceChildren(...(pose?.health ?? []).map(([light, line]) => make("li", { class: light }, line)));
+    lights.replaceChildren(...(pose?.health ?? []).map(([light, line]) => make("li", { class: light }, line.replace(`${light} `, "").trim())));
     order();
     tell();
     draw();
