@@ -23,7 +23,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hairkit import Capture, Head, Mask, Scene, hookimpl
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.cameras.similarity import Similarity, fit_similarity
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.thin_plate_spline import ThinPlateSpline
@@ -33,7 +33,7 @@ from hairkit.io.mesh_text import read_obj, read_ply
 from hairkit.io.ply_elements import read_elements
 from hairkit.options import option
 from hairkit.storage import read_bytes, read_text
-from hairkit.types.head import LANDMARKS
+from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 
 STIFFNESS = (0.2, 0.05, 0.02, 0.01)
 """Falling weights of the difference between neighbouring maps (Amberg's alpha). The head is scaled
@@ -164,7 +164,7 @@ def bend(head: Head, scan: Scan, options: Options) -> Head:
     import trimesh
     from trimesh import registration
 
-    used, faces = np.unique(head.faces, return_inverse=True)
+    used, faces = np.unique(head.skin_faces(), return_inverse=True)
     source = trimesh.Trimesh(head.vertices[used], faces.reshape(-1, 3), process=False)
     marked: dict[str, Any] = {}
     if scan.landmarks is not None and head.landmark_vertices is not None:
@@ -183,11 +183,25 @@ def bend(head: Head, scan: Scan, options: Options) -> Head:
             for s, w in zip(stiffness, MARKED, strict=True)
         ]
         moved = register.nricp_sumner(source, target, steps=steps, **common)
-    vertices = head.vertices.copy()
-    vertices[used] = moved
-    if not np.isfinite(vertices).all():
+    if not np.isfinite(moved).all():
         raise InputError("nonrigid_icp: the registration failed; raise nonrigid_icp.stiffness")
-    return replace(_carried(head, vertices), vertices=vertices)
+    skin = ~_behind_eyes(head)[used]
+    carried = _carried(head, used[skin], moved[skin])
+    vertices = carried.vertices.copy()
+    vertices[used[skin]] = moved[skin]
+    return replace(carried, vertices=vertices)
+
+
+def _behind_eyes(head: Head) -> BoolArray:
+    """Return (V,) what lies within the eyeballs, and would be drawn before them: the skin that is
+    pushed back between the lids."""
+    within = np.zeros(len(head.vertices), np.bool_)
+    centres = head.eye_centres()
+    if head.eye_vertices is not None and centres is not None:
+        for ball, centre in zip(head.eye_vertices, centres, strict=True):
+            radius = np.linalg.norm(head.vertices[ball] - centre, axis=1).max()
+            within |= np.linalg.norm(head.vertices - centre, axis=1) < radius
+    return within
 
 
 def _spread_points(scan: Scan) -> Float64Array:
@@ -205,11 +219,15 @@ def _spread_points(scan: Scan) -> Float64Array:
     return np.concatenate([scan.points[np.unique(scan.faces)], spread])
 
 
-def _carried(head: Head, vertices: Float32Array) -> Head:
-    """Return the head with joints, capsules and shapes carried as its vertices are moved."""
-    chosen = np.unique(np.linspace(0, len(vertices) - 1, CONTROLS).astype(np.int64))
-    places = head.vertices[chosen].astype(np.float64)
-    spline = ThinPlateSpline(places, vertices[chosen] - places, np.zeros(len(chosen)))
+def _carried(head: Head, used: Int32Array, moved: Float64Array) -> Head:
+    """Return the head with everything carried as its vertices `used` are moved."""
+    chosen = np.linspace(0, len(used) - 1, CONTROLS).astype(np.int64)
+    if head.landmark_vertices is not None:
+        marks = np.isin(used, head.landmark_vertices[JAW_LANDMARKS:])
+        chosen = np.concatenate([chosen, np.flatnonzero(marks)])
+    chosen = np.unique(chosen)
+    places = head.vertices[used[chosen]].astype(np.float64)
+    spline = ThinPlateSpline(places, moved[chosen] - places, np.zeros(len(chosen)))
 
     def carry(points: Float32Array) -> Float32Array:
         moved: Float32Array = (points + spline(points.astype(np.float64))).astype(np.float32)

@@ -87,7 +87,7 @@ def blend_head(weights: Mapping[str, float]) -> Head:
     """Return the default head changed by modes, in standard deviations, and base shapes, in shares.
 
     >>> blend_head({"man": 0.5, "nose_length": -1.0})
-    Head(11562 vertices, 23120 faces, with landmarks)
+    Head(12190 vertices, 24368 faces, with landmarks)
 
     Raises
     ------

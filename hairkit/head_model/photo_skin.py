@@ -25,6 +25,8 @@ from scipy.spatial import cKDTree
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, UInt8Array
 from hairkit.cameras.depth_raster import depth_behind, head_depth, mesh_depth
 from hairkit.head_model.delighting import find_shading
+from hairkit.head_model.eye_colours import find_eye_colours, mark_beside_eyes
+from hairkit.head_model.eyes import has_default_eyes, paint_over
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.head import JAW_LANDMARKS, Head
@@ -122,6 +124,8 @@ def photograph_skin(capture: Capture, scene: Scene, masks: Sequence[Mask]) -> Sk
     albedo = _fill(blended, seen, surface, _own_skin(scene.head))
     maps = scene.head.maps or SkinMaps()
     pixels = np.rint(albedo).clip(0, 255).astype(np.uint8)
+    if has_default_eyes(scene.head):
+        pixels = paint_over(pixels, *find_eye_colours(capture.views, gains))
     return SkinMaps(Texture.encode(pixels, lossless=False), maps.roughness, maps.normal, maps.bump)
 
 
@@ -206,9 +210,9 @@ def _over_uv(head: Head, values: Float64Array) -> Float32Array:
 
 def _whole_in_uv(head: Head) -> Int32Array:
     """Return the faces (F', 3) that do not reach across the texture, as those at a pole do."""
-    corners = head.uv[head.faces]
-    longest = np.ptp(corners, axis=1).max(axis=1)
-    return np.ascontiguousarray(head.faces[longest < LARGEST_FACE])
+    faces = head.skin_faces()
+    longest = np.ptp(head.uv[faces], axis=1).max(axis=1)
+    return np.ascontiguousarray(faces[longest < LARGEST_FACE])
 
 
 def _project(surface: _Surface, head: Head, camera: Camera, photo: UInt8Array, mask: Mask) -> _Seen:
@@ -218,7 +222,7 @@ def _project(surface: _Surface, head: Head, camera: Camera, photo: UInt8Array, m
     pixels = np.nan_to_num(sized.project(points.astype(np.float64)) - 0.5, nan=-1.0)
     column, row = (np.full(surface.known.shape, -1, np.float32) for _ in range(2))
     column[surface.known], row[surface.known] = pixels.T
-    usable = _usable(sized, mask, photo)
+    usable = _usable(sized, mask, photo) * mark_beside_eyes(head, sized)
     weight *= cv2.remap(usable, column, row, cv2.INTER_LINEAR)
     coarse = cv2.remap(photo, column, row, cv2.INTER_LINEAR).astype(np.float32)
     return _Seen(weight, column, row, coarse)

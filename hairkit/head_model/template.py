@@ -8,17 +8,20 @@ import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
 from hairkit.arrays import Float64Array, Int32Array
+from hairkit.head_model.eyes import eyeballs, near_edge, nearest_edge, open_lids
 from hairkit.head_model.template_shape import head_surface, scalp_weight
 from hairkit.head_model.template_skin import template_maps
 from hairkit.types.head import Capsules, Head
 
 FREQUENCY = 34
-"""Edges along a side of the icosahedron: 10 * 34^2 + 2 = 11,562 vertices."""
+"""Edges along a side of the icosahedron: 10 * 34^2 + 2 = 11,562 vertices of skin."""
 _FINE_REGIONS = np.array(
     [  # direction (3) of a finer region, share by which angles to it shrink, its reach in radians
         [0.0, -0.40, 0.92, 0.45, 0.75],
         [0.93, -0.36, -0.10, 0.45, 0.26],
         [-0.93, -0.36, -0.10, 0.45, 0.26],
+        [0.394, -0.153, 0.900, 0.75, 0.24],
+        [-0.394, -0.153, 0.900, 0.75, 0.24],
     ]
 )
 
@@ -63,7 +66,7 @@ _CAPSULES = np.array(
 
 @cache
 def default_head() -> Head:
-    """Return the average adult head, 11,562 vertices, breadth 0.155 m, watertight.
+    """Return the average adult head with two eyeballs, breadth 0.155 m, watertight.
 
     Its texture coordinates are the azimuthal projection from the crown (radius 0.5 at the middle
     of the neck's cut, the face below the middle), so they are injective. Every call returns
@@ -75,20 +78,23 @@ def default_head() -> Head:
     targets = _landmarks()
     landmarks = cKDTree(vertices).query(targets)[1]
     directions[landmarks] = _fit_directions(directions[landmarks], targets)
+    directions = _trace_lids(directions, landmarks)
     polar, azimuth = _angles(directions)
-    vertices[landmarks] = head_surface(polar[landmarks], azimuth[landmarks])
+    vertices = open_lids(head_surface(polar, azimuth))
     radius = 0.5 * polar / np.pi
     uv = np.stack([0.5 + radius * np.sin(azimuth), 0.5 - radius * np.cos(azimuth)], axis=1)
     spheres = (_CAPSULES * 1e-3).astype(np.float32)
+    balls, skin = eyeballs(), len(vertices)
     return Head(
-        vertices.astype(np.float32),
-        faces,
-        uv.astype(np.float32),
-        scalp_weight(vertices).astype(np.float32),
+        np.concatenate([vertices, balls.vertices]).astype(np.float32),
+        np.concatenate([faces, balls.faces + skin]),
+        np.concatenate([uv, balls.uv]).astype(np.float32),
+        np.pad(scalp_weight(vertices), (0, len(balls.vertices))).astype(np.float32),
         landmarks.astype(np.int32),
         (_JOINTS * 1e-3).astype(np.float32),
         Capsules(spheres[:, :3], spheres[:, 4:7], spheres[:, [3, 7]]),
         maps=template_maps(),
+        eye_vertices=skin + np.arange(len(balls.vertices), dtype=np.int32).reshape(2, -1),
     )
 
 
@@ -120,6 +126,16 @@ def _refine_regions(directions: Float64Array) -> Float64Array:
         across /= np.maximum(np.sin(angle), 1e-9)[:, None]
         directions = np.cos(turned)[:, None] * middle + np.sin(turned)[:, None] * across
     return directions
+
+
+def _trace_lids(directions: Float64Array, landmarks: Int32Array) -> Float64Array:
+    """Return the directions (N, 3), those of vertices near a lid's edge moved onto it."""
+    points = head_surface(*_angles(directions))
+    near = near_edge(points)
+    near[landmarks] = False
+    traced = directions.copy()
+    traced[near] = _fit_directions(directions[near], nearest_edge(points[near]))
+    return traced
 
 
 def _fit_directions(directions: Float64Array, targets: Float64Array) -> Float64Array:

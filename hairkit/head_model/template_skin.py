@@ -1,4 +1,4 @@
-"""The skin of the default head, painted by code: eyes, brows, lashes, lips, cheeks, ears.
+"""The skin of the default head, painted by code: brows, lashes, lips, cheeks, ears, and eyeballs.
 
 `python -m hairkit.head_model.template_skin OUT.jpg` paints the picture that the package ships.
 Each texel is a point of the head's surface, and colours are laid over each other where that point
@@ -15,6 +15,7 @@ from importlib import resources
 import numpy as np
 
 from hairkit.arrays import Float64Array, UInt8Array
+from hairkit.head_model.eyes import LOWER_LID, UPPER_LID, paint_over
 from hairkit.head_model.template_shape import EAR_CENTRE, head_surface
 from hairkit.types.skin import SkinMaps, Texture
 
@@ -35,18 +36,9 @@ _MOUTH = np.array([92, 44, 42], np.float64)
 _SHADE = np.array([150, 104, 86], np.float64)
 _HAIR = np.array([62, 43, 32], np.float64)
 _LASH = np.array([32, 22, 18], np.float64)
-_SCLERA = np.array([226, 219, 212], np.float64)
-_IRIS = np.array([86, 62, 42], np.float64)
-_IRIS_EDGE = np.array([42, 30, 22], np.float64)
-_PUPIL = np.array([10, 8, 8], np.float64)
-_GLINT = np.array([250, 250, 250], np.float64)
 _TEAR = np.array([196, 122, 112], np.float64)
 
 _Curve = list[tuple[float, float]]
-_UPPER_LID: _Curve = [(17.5, -37.6), (20, -34.6), (27, -31), (32, -30.6), (37, -31.5), (43.5, -36)]
-_LOWER_LID: _Curve = [
-    (17.5, -37.6), (21, -38.6), (26.5, -39.6), (32, -40.2), (37, -39.5), (43.5, -36),
-]  # fmt: skip
 _BROW_TOP: _Curve = [(12, -9.5), (22, -6.6), (36, -5.2), (47, -9.1), (57, -18)]
 _BROW_FOOT: _Curve = [(12, -16), (22, -15.2), (36, -12.6), (47, -14), (57, -19)]
 _LIP_TOP: _Curve = [(0, -95), (5, -93.2), (10, -95), (16, -97.8), (24, -102.6)]
@@ -70,22 +62,14 @@ _REGIONS = [  # colour, cover, upper and lower rim, millimetres over which each 
 ]
 _LINES: list[_Line] = [  # colour, cover, curve, lift, half widths inside and outside
     (_MOUTH, 0.85, _LIP_LINE, 0.0, 0.9, 0.7),
-    (_SHADE, 0.55, _UPPER_LID, 3.6, 1.0, 1.1),  # crease of the lid
+    (_SHADE, 0.55, UPPER_LID, 3.6, 1.0, 1.1),  # crease of the lid
 ]
 _LASHES: list[_Line] = [
-    (_LASH, 0.95, _UPPER_LID, 0.3, 0.7, 1.6),
-    (_LASH, 0.40, _LOWER_LID, -0.3, 0.3, 0.6),
+    (_LASH, 0.95, UPPER_LID, 0.3, 0.7, 1.6),
+    (_LASH, 0.40, LOWER_LID, -0.3, 0.3, 0.6),
 ]
-_LID_SHADOW: _Line = (_SHADE, 0.45, _UPPER_LID, 0.0, 1.8, 1.8)
 _LIDS_FADE = 0.8
-"""Millimetres over which the eyeball fades into the lids."""
-_DISCS = [  # colour, cover, middle (x, y), radius, millimetres over which it fades
-    (_TEAR, 0.8, (18.0, -37.4), 2.2, 1.6),  # inner corner of the eye
-    (_IRIS_EDGE, 1.0, (30.8, -35.2), 6.0, 0.9),
-    (_IRIS, 1.0, (30.8, -35.2), 4.9, 1.4),
-    (_PUPIL, 1.0, (30.8, -35.2), 2.1, 0.7),
-    (_GLINT, 0.9, (31.8, -33.2), 0.9, 0.6),
-]
+"""Millimetres over which the lids' edges fade into what is between them."""
 _BROW_COVER, _BROW_FADE, _BROW_GAPS = 0.95, 2.0, 0.2
 """Of the brow: its cover, millimetres over which its rims fade, cover lost between its hairs."""
 _BROW_SLANT = np.array([[2.2, -0.11], [0.9, 0.45], [0.0, 0.0]])
@@ -115,7 +99,7 @@ def template_maps() -> SkinMaps:
 def paint_skin(size: int = SIZE) -> UInt8Array:
     """Return the albedo (size, size, 3), sRGB, over the default head's texture coordinates."""
     rows = [_paint_rows(first, min(first + _BLOCK, size), size) for first in range(0, size, _BLOCK)]
-    return np.concatenate(rows)
+    return paint_over(np.concatenate(rows))
 
 
 def _paint_rows(first: int, stop: int, size: int) -> UInt8Array:
@@ -156,13 +140,8 @@ def _layers(points: Float64Array) -> Iterator[_Layer]:
 
 
 def _eye(place: Float64Array, face: Float64Array) -> Iterator[_Layer]:
-    """Yield the eyeball with iris, pupil and glint, the shadow of its lid, and lashes."""
-    opening = face * _between(place, _UPPER_LID, _LOWER_LID, _LIDS_FADE, _LIDS_FADE)
-    yield _SCLERA, opening
-    for colour, cover, middle, radius, fade in _DISCS:
-        away = np.hypot(place[:, 0] - middle[0], place[:, 1] - middle[1])
-        yield colour, cover * opening * _ramp(radius - away, fade)
-    yield _along(place, opening, _LID_SHADOW)
+    """Yield what is between the lids, beside and behind the eyeball, and lashes."""
+    yield _TEAR, face * _between(place, UPPER_LID, LOWER_LID, _LIDS_FADE, _LIDS_FADE)
     for line in _LASHES:
         yield _along(place, face, line)
 

@@ -130,6 +130,13 @@ class Head(Previewed, Stored):
         density: Float32Array = (self.density[self.faces[face]] * weights).sum(axis=1)
         return np.clip(density, 0, 1)
 
+    def skin_faces(self) -> Int32Array:
+        """Return the faces (F', 3) that are not those of eyeballs."""
+        if self.eye_vertices is None:
+            return self.faces
+        kept: Int32Array = self.faces[~np.isin(self.faces, self.eye_vertices).any(axis=1)]
+        return kept
+
     def eye_centres(self) -> Float64Array | None:
         """Return (2, 3) the middles of the left and the right eyeball, metres, or None."""
         if self.eye_vertices is None:

@@ -103,7 +103,7 @@ def test_only_under_necks() -> None:
     index[used] = np.arange(len(used))
     neckless = replace(
         head, vertices=head.vertices[used], faces=index[neckless.faces], uv=head.uv[used],
-        scalp=head.scalp[used], landmark_vertices=None,
+        scalp=head.scalp[used], landmark_vertices=None, eye_vertices=None,
     )  # fmt: skip
     assert bust_under(ball_head()) is None
     assert bust_under(whole) is None

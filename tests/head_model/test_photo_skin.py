@@ -66,6 +66,10 @@ def test_seen_skin_is_what_was_painted(painted: tuple[Capture, Scene, list[Mask]
     assert maps.albedo is not None
     head = scene.head
     face = (head.vertices[:, 2] > 0.05) & (np.abs(head.vertices[:, 1] + 0.05) < 0.07)
+    assert head.landmark_vertices is not None
+    eyes = head.vertices[head.landmark_vertices[36:48]]
+    face &= np.linalg.norm(head.vertices[:, None] - eyes, axis=2).min(axis=1) > 0.012
+    face[head.eye_vertices] = False
     found = 255 * maps.albedo.sample(head.uv[face])
     wanted = paint(head.vertices[face].astype(np.float64))
     ratio = np.median(found / wanted)

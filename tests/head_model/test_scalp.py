@@ -103,7 +103,7 @@ def test_rounding_of_the_rest_shape_moves_no_root() -> None:
 def test_the_sequence_is_the_same_on_every_machine() -> None:
     """The first roots of seed 0 lie on known faces, whatever libraries compute them."""
     first = sample_roots(default_head(), 6).triangle
-    np.testing.assert_array_equal(first, [14639, 302, 2920, 8232, 1512, 22785])
+    np.testing.assert_array_equal(first, [14640, 302, 6464, 4162, 8102, 1648])
 
 
 def test_taking_free_points_equals_the_slow_rule() -> None:
