@@ -18,6 +18,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.field.braids import measure_crossing
 from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.field.scalp_sight import ScalpSight, find_convergence, scalp_places, see_scalp
 from hairkit.field.wisps import find_wisps
@@ -68,9 +69,9 @@ THINNEST = 0.003
 """Least radius of a bundle, metres."""
 BUN = 2.5
 """Length of a bundle over its width below which it is a bun."""
-BRAIDED = 0.45
-"""Mean cosine of twice the angle between the hair of a tail and its spine below which it is a
-braid: strands that cross at 30 degrees have 0.5, parallel ones 0.9."""
+BRAIDED = np.radians(25.0)
+"""Mean angle between the hair of a tail and its spine from which it is a braid: 11 and 16 degrees
+on ponytails, 30 to 45 in a braid of three."""
 
 
 def measure_ties(
@@ -101,12 +102,27 @@ def measure_ties(
         )
         tail = _tail_of(bundle, hull, scalp_distance, min(sureness, 1.0)) if sureness > 0 else None
         if tail is not None:
-            tails.append(tail)
+            tails.append(_with_braid(tail, masks, orientations, cameras, head))
             tied.append(bundle)
     if not tails:
         return TiedHair()
     fringe = find_fringe(head, hull, scalp_distance, tied)
     return TiedHair(tuple(tails), fringe + find_wisps(masks, cameras, head, hull))
+
+
+def _with_braid(
+    tail: Tail,
+    masks: Sequence[Mask],
+    orientations: Sequence[OrientationMap],
+    cameras: Sequence[Camera],
+    head: Head,
+) -> Tail:
+    """Return the tail, named a braid where its hair crosses its spine in the pictures."""
+    spine, spokes = tail.spine.astype(np.float64), tail.spokes.astype(np.float64)
+    crossing = measure_crossing(spine, spokes, masks, orientations, cameras, head)
+    if tail.tie.kind != "tail" or crossing < BRAIDED:
+        return tail
+    return replace(tail, tie=replace(tail.tie, kind="braid"), crossing=crossing)
 
 
 def find_fringe(
@@ -190,8 +206,8 @@ def _tail_of(
     axis = spine[1] - spine[0]
     axis /= np.linalg.norm(axis)
     ring = Tie(spine[0].astype(np.float32), axis.astype(np.float32), radius, kind)
-    rest = (value.astype(np.float32) for value in (spine, spokes, share))
-    return Tail(ring, sureness, *rest)
+    columns = [value.astype(np.float32) for value in (spine, spokes, share)]
+    return Tail(ring, sureness, columns[0], columns[1], columns[2])
 
 
 def _with_root(bundle: Bundle, hull: Hull, scalp_distance: ScalpDistance) -> BoolArray:

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.field.growth_prior import gradient
 from hairkit.grooming.fringe import hang_fringe
+from hairkit.grooming.plait import plait
 from hairkit.types.strands import Strands
 from hairkit.types.tie import Tail, TiedHair
 from hairkit.types.volume import Hull, OrientationField, symmetric_matrices
@@ -83,9 +84,8 @@ def _tied_paths(
     place = _places_in_section(ways, arrived, tail)
     paths = []
     for way, last, (u, v), end in zip(ways, arrived, place, _ends(len(roots), tail), strict=True):
-        hanging = (
-            tail.spine[: end + 1] + u * tail.spokes[: end + 1, 0] + v * tail.spokes[: end + 1, 1]
-        )
+        course = plait(u, v, tail)[: end + 1]
+        hanging = tail.spine[: end + 1] + np.einsum("ms,msk->mk", course, tail.spokes[: end + 1])
         paths.append(_join(way[: last + 1], hanging.astype(np.float64)))
     return Strands.from_list(paths).resampled(count).points.reshape(len(roots), count, 3)
 

@@ -53,6 +53,8 @@ class Tail(Stored):
     """(M, 2, 3) conjugate half diameters of each section, metres."""
     share: Float32Array
     """(M,) share of the strands that reach each section, 1 at the tie, never rising."""
+    crossing: float = 0.0
+    """Angle between hair and spine of a braid, radians; 0 where the hair runs along the spine."""
 
     def __post_init__(self) -> None:
         spine = frozen_array(self.spine, np.float32, (None, 3), "spine of a tail")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hairkit.arrays import Float64Array
+from hairkit.grooming.plait import plait
 from hairkit.grooming.tie_strands import lead_to_ties
 from hairkit.types.strands import Strands
 from hairkit.types.tie import Tail, Tie, TiedHair
@@ -80,3 +83,19 @@ def test_loose_hair_is_left_alone() -> None:
     """Without ties the strands are the same object."""
     strands = bristles()
     assert lead_to_ties(strands, TiedHair(), ball.tied_hull(), ball.tied_field()) is strands
+
+
+def test_a_braid_crosses_its_spine_at_the_measured_angle() -> None:
+    """Bundles stay in the tube, weave to both sides, and run at the angle in the mean square."""
+    turn = np.linspace(0, 2 * np.pi, 60, endpoint=False)
+    spine = np.stack([0 * np.arange(400), -5e-4 * np.arange(400), 0 * np.arange(400)], axis=1)
+    spokes = np.broadcast_to([[0.02, 0, 0], [0, 0, 0.02]], (400, 2, 3))
+    tie = Tie(np.zeros(3, np.float32), np.array([0, -1, 0], np.float32), 0.02, "braid")
+    braid = Tail(tie, 1.0, spine, spokes, np.ones(400), crossing=0.6)
+    courses = np.array([plait(float(np.cos(a)), float(np.sin(a)), braid) for a in turn])
+    assert np.linalg.norm(courses, axis=2).max() < 1.1
+    sideways = 0.02 * np.diff(courses[..., 0], axis=1) / 5e-4
+    assert np.sqrt((sideways**2).mean()) == pytest.approx(np.tan(0.6), rel=0.05)
+    assert 0.4 < (sideways > 0).mean() < 0.6
+    plain = replace(braid, crossing=0.0)
+    assert np.ptp(plait(0.3, 0.4, plain), axis=0) == pytest.approx([0, 0])

@@ -73,8 +73,19 @@ def way_to(place: Float64Array, points: Float64Array) -> Float64Array:
 
 
 def seen(camera: Camera, place: Float64Array = TIE) -> tuple[Mask, OrientationMap]:
-    """Return a picture full of hair that runs over the ball towards a direction (3,)."""
-    return drawn(camera, lambda points: way_to(place, points))
+    """Return a view full of hair that runs over the ball to a direction (3,), with its tail."""
+    mask, found = drawn(camera, lambda points: way_to(place, points))
+    angle = found.angle.copy()
+    course, radii = tail_course()
+    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    here, depth = camera.project(course), camera.depth(course)
+    behind = camera.depth(np.zeros((1, 3)))[0]
+    for k in np.argsort(-depth[:-1]):
+        if np.hypot(*(here[k] - camera.centre)) > BALL * camera.focal / behind or depth[k] < behind:
+            step = here[k + 1] - here[k]
+            disc = np.hypot(x - here[k, 0], y - here[k, 1]) < radii[k] * camera.focal / depth[k]
+            angle[disc] = wrap_angle(np.arctan2(step[1:], step[:1]))
+    return mask, OrientationMap(angle, found.confidence)
 
 
 def drawn(
