@@ -22,6 +22,7 @@ SMALL: dict[str, tuple[dict[str, int], list[str]]] = {
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "head_fit": ({}, ["CAPTURES"]),
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "as_they_are"]),
+    "held_out": ({"GUIDES": 60, "MEASURED": 5}, ["CAPTURES"]),
     "helices": ({"COUNT": 10}, []),
     "looks": ({"GUIDES": 60}, ["CAPTURES", "-o", "CAPTURES/looks.jpg"]),
     "masks": ({}, ["CAPTURES"]),
