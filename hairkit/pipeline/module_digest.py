@@ -12,6 +12,7 @@ import ast
 import functools
 import hashlib
 import importlib.util
+import os
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
@@ -59,15 +60,16 @@ def module_digest(module: str, roots: Roots | None = None) -> str:
 def imported_modules(module: str, roots: Roots | None = None) -> dict[str, Path]:
     """Return a module and all that it imports, directly or not, with their source files."""
     known = _default_roots(module) if roots is None else roots
-    found: dict[str, Path] = {}
+    found: dict[str, Path | None] = {}
     waiting = [*_with_packages(module, known)]
     while waiting:
         name = waiting.pop()
-        path = _source(name, known)
-        if name not in found and path is not None:
-            found[name] = path
+        if name in found:
+            continue
+        path = found[name] = _source(name, known)
+        if path is not None:
             waiting += _direct_imports(name, path, known)
-    return found
+    return {name: path for name, path in found.items() if path is not None}
 
 
 def _direct_imports(name: str, path: Path, roots: Roots) -> Iterator[str]:
@@ -135,9 +137,10 @@ def _source(module: str, roots: Roots) -> Path | None:
     top, *inner = module.split(".")
     if top not in roots:
         return None
-    base = roots[top].joinpath(*inner)
-    file = base if base.suffix == ".py" else base.with_name(f"{base.name}.py")
-    return next((path for path in (base / "__init__.py", file) if path.is_file()), None)
+    base = os.path.join(roots[top], *inner)  # many names are tried: strings are fast
+    file = base if base.endswith(".py") else f"{base}.py"
+    sources = (os.path.join(base, "__init__.py"), file)
+    return next((Path(path) for path in sources if os.path.isfile(path)), None)
 
 
 @dataclass(frozen=True)
