@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import hypothesis
 import numpy as np
 import pytest
 
+from hairkit.head_model import photo_skin
 from hairkit.manager import Manager
 
 # No deadline: what is slow on a busy machine is not wrong.
@@ -25,6 +27,15 @@ def captures() -> Path:
     if not named:
         pytest.skip("HAIRKIT_CAPTURES names no folder of captures with truth")
     return Path(named)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def small_skins() -> Iterator[None]:
+    """Skins from photos of a quarter of the edge: the work of whole runs is mostly their texels."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(photo_skin, "SIZE", 512)
+        patch.setattr(photo_skin, "COARSE", 256)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -19,6 +19,7 @@ from ball import PLUGIN_FILE, RECIPE, write_capture, write_grey
 from waiting import wait_for
 
 from hairkit.cli import main
+from hairkit.head_model import photo_skin
 
 
 @pytest.fixture
@@ -29,14 +30,16 @@ def words(tmp_path: Path) -> list[str]:
     capture = write_capture(tmp_path / "capture", masks=True)
     return [
         "reconstruct", str(capture), "-o", str(tmp_path / "out"), "--recipe", str(recipe),
-        "--plugin", str(PLUGIN_FILE), "--guides", "30",
+        "--plugin", str(PLUGIN_FILE), "--guides", "30", "--no-sheet",
     ]  # fmt: skip
 
 
 def start(words: list[str]) -> subprocess.Popen[str]:
-    """Start hairkit as a process of its own."""
+    """Start hairkit as a process of its own, with skins as small as here."""
     code = (
-        "import signal, sys; from hairkit.cli import main\n"
+        "import signal, sys\nfrom hairkit.cli import main\n"
+        "from hairkit.head_model import photo_skin\n"
+        f"photo_skin.SIZE, photo_skin.COARSE = {photo_skin.SIZE}, {photo_skin.COARSE}\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # ignored in background jobs
         "sys.exit(main())"
     )
@@ -59,6 +62,7 @@ def test_results_on_stdout_progress_on_stderr(
     words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Files and figures are printed; stages are told on stderr, unless --quiet."""
+    words.remove("--no-sheet")
     assert main(words) == 0
     printed = capsys.readouterr()
     assert printed.out.startswith("30 guides of 30 roots, mean length 3.0 cm")
@@ -68,19 +72,18 @@ def test_results_on_stdout_progress_on_stderr(
     assert told[told.index("track") + 1 :][:2] == ["ball_plugin", "sheet"]
     assert told[-1] in ("green", "amber", "red")
     assert "\nhealth: " in printed.out
-    assert main([*words, "--quiet"]) == 0
+    assert main([*words, "--no-sheet", "--quiet"]) == 0
     assert capsys.readouterr().err == ""
 
 
 def test_json_is_for_machines(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     """With --json stdout is one JSON document, and a second run says what it has kept."""
-    made_again = ("ball_plugin", "sheet")
     for reused in (False, True):
         assert main([*words, "--json"]) == 0
         document = json.loads(capsys.readouterr().out)
         assert document["strands"] == document["roots"] == 30
         assert Path(document["groom"]).is_file()
-        kept = {s["stage"]: s["reused"] for s in document["stages"] if s["stage"] not in made_again}
+        kept = {s["stage"]: s["reused"] for s in document["stages"] if s["stage"] != "ball_plugin"}
         assert set(kept.values()) == {reused}
     assert main([*words, "--json", "--no-cache"]) == 0
     assert not any(s["reused"] for s in json.loads(capsys.readouterr().out)["stages"])

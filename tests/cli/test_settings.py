@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -30,15 +31,24 @@ VERBS = {
 FILE_VERBS = sorted(set(VERBS) - {"reconstruct"})
 
 
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with what the commands name, not to be changed."""
+    folder = tmp_path_factory.mktemp("inputs")
+    write_capture(folder / "capture")
+    (folder / "ball.toml").write_text(RECIPE)
+    (folder / "steps.toml").write_text("hairs = 100\n")
+    bristle_groom().save(folder / "groom.npz")
+    words = [str(folder / "groom.npz"), "-o", str(folder / "bare.data"), "--set", "scale=0.01"]
+    assert main(["export", *words]) == 0
+    return folder
+
+
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with what the commands name; it is the current one."""
+def folder(inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the folder with what the commands name; it is the current one."""
     monkeypatch.chdir(tmp_path)
-    write_capture(tmp_path / "capture")
-    (tmp_path / "ball.toml").write_text(RECIPE)
-    (tmp_path / "steps.toml").write_text("hairs = 100\n")
-    bristle_groom().save("groom.npz")
-    assert main(["export", "groom.npz", "-o", "bare.data", "--set", "scale=0.01"]) == 0
+    shutil.copytree(inputs, tmp_path, dirs_exist_ok=True)
     return tmp_path
 
 

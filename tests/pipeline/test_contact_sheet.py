@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 
 from hairkit.pipeline.contact_sheet import (
     GAP,
@@ -25,7 +26,9 @@ from hairkit.testing import (
 from hairkit.types.orientation import OrientationMap
 
 
-def test_the_sheet_shows_every_stage_of_every_view(tmp_path: Path) -> None:
+def test_the_sheet_shows_every_stage_of_every_view(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Eight columns and six rows, none of them blank; the file holds the same picture."""
     scene, capture = turn_scene(), turn_capture()
     masks = [ball_mask(camera) for camera in scene.cameras]
@@ -39,6 +42,7 @@ def test_the_sheet_shows_every_stage_of_every_view(tmp_path: Path) -> None:
             tile = sheet[top + 20 : top + height, left : left + TILE_WIDTH]
             assert tile.std() > 3, (row, column)
     path = tmp_path / "sheet.png"
+    monkeypatch.setattr("hairkit.pipeline.contact_sheet.contact_sheet", lambda *_: sheet)
     write_contact_sheet(path, capture, masks, maps, shell_hull(), bristle_groom(), scene)
     stored = cv2.imread(str(path))
     assert stored is not None
@@ -51,13 +55,12 @@ def test_the_hue_tells_the_angle() -> None:
     masks = [ball_mask(camera) for camera in scene.cameras]
     shape = masks[0].labels.shape
 
-    def row_of(angle: float, confidence: float) -> np.ndarray:
-        map_ = OrientationMap(np.full(shape, angle), np.full(shape, confidence))
-        sheet = contact_sheet(capture, masks, [map_] * 8, shell_hull(), bristle_groom(), scene)
-        tall = (sheet.shape[0] - HEADER) // 6
-        return np.asarray(sheet[HEADER + 2 * tall + tall // 2, GAP + TILE_WIDTH // 2])
-
-    level, upright, unsure = row_of(0.0, 1.0), row_of(np.pi / 2, 1.0), row_of(0.0, 0.0)
+    shown = [(0.0, 1.0), (np.pi / 2, 1.0), *[(0.0, 0.0)] * 6]
+    maps = [OrientationMap(np.full(shape, a), np.full(shape, sure)) for a, sure in shown]
+    sheet = contact_sheet(capture, masks, maps, shell_hull(), bristle_groom(), scene)
+    tall = (sheet.shape[0] - HEADER) // 6
+    middles = GAP + TILE_WIDTH // 2 + np.arange(3) * (TILE_WIDTH + GAP)
+    level, upright, unsure = sheet[HEADER + 2 * tall + tall // 2, middles]
     assert level.argmax() != upright.argmax()
     assert level.max() > 240
     assert unsure.max() == 0

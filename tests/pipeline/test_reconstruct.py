@@ -78,7 +78,8 @@ def test_without_opengl_only_the_sheet_is_missing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The rest is made, one line says why, and no sheet of another groom is left."""
-    run(tmp_path, sheet=True)
+    run(tmp_path)
+    (tmp_path / "contact_sheet.png").write_bytes(b"of this groom")
 
     def refuse(*_: object) -> None:
         raise RenderError("no OpenGL 4.3 context")
@@ -235,12 +236,19 @@ def test_the_plugins_own_file_is_part_of_the_digest(tmp_path: Path) -> None:
         assert not any(stage["reused"] for stage in record.stages)
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """The files of a run that nothing disturbs."""
+    out = tmp_path_factory.mktemp("whole")
+    run(out)
+    return files(out)
+
+
 @pytest.mark.parametrize("stage", [*STAGES, "export"])
 def test_a_run_that_was_interrupted_goes_on_to_the_same_result(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stage: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: dict[str, bytes], stage: str
 ) -> None:
     """Ctrl-C in any stage leaves no result; the next run keeps what was done and ends the same."""
-    run(tmp_path / "whole")
     original = ball_plugin._begin
     ball_plugin.CALLS.clear()
 
@@ -259,15 +267,14 @@ def test_a_run_that_was_interrupted_goes_on_to_the_same_result(
     ball_plugin.CALLS.clear()
     run(tmp_path / "out")
     assert not done & set(ball_plugin.CALLS)
-    assert files(tmp_path / "out") == files(tmp_path / "whole")
+    assert files(tmp_path / "out") == whole
 
 
 @pytest.mark.parametrize("writes", [0, 5, 12, 20, 21, 22, 23])
 def test_a_full_disk_leaves_nothing_half_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, writes: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: dict[str, bytes], writes: int
 ) -> None:
     """Wherever the disk fills up, an error names a file, and the next run is whole."""
-    run(tmp_path / "whole")
     count, original = iter(range(1000)), Path.open
 
     def nearly_full(path: Path, mode: str = "r", *rest: Any, **words: Any) -> Any:
@@ -281,7 +288,7 @@ def test_a_full_disk_leaves_nothing_half_written(
     assert str(tmp_path / "out") in str(caught.value.filename)
     assert not list((tmp_path / "out").rglob("*.part"))
     run(tmp_path / "out")
-    assert files(tmp_path / "out") == files(tmp_path / "whole")
+    assert files(tmp_path / "out") == whole
 
 
 class FullFile:

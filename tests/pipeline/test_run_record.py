@@ -23,17 +23,22 @@ from hairkit.storage import write_text
 from hairkit.testing import ball_head, turn_capture
 
 
-@pytest.fixture
-def out(tmp_path: Path) -> Path:
+def run_in(folder: Path) -> Path:
     """The results of the small capture, with masks, strokes, a head's file and an option."""
-    capture = write_capture(tmp_path / "capture", masks=True)
-    (tmp_path / "ball.toml").write_text(RECIPE)
-    write_head_obj(tmp_path / "head.obj", ball_head())
-    words = ["reconstruct", str(capture), "-o", str(tmp_path / "out"), "--guides", "20"]
-    words += ["--recipe", str(tmp_path / "ball.toml"), "--plugin", str(PLUGIN_FILE), "--quiet"]
-    words += ["--head", str(tmp_path / "head.obj"), "--set", "ball_plugin.length=0.05"]
+    capture = write_capture(folder / "capture", masks=True)
+    (folder / "ball.toml").write_text(RECIPE)
+    write_head_obj(folder / "head.obj", ball_head())
+    words = ["reconstruct", str(capture), "-o", str(folder / "out"), "--guides", "20"]
+    words += ["--recipe", str(folder / "ball.toml"), "--plugin", str(PLUGIN_FILE), "--quiet"]
+    words += ["--head", str(folder / "head.obj"), "--set", "ball_plugin.length=0.05"]
     assert main([*words, "--no-sheet", "--seed", "3", "--max-edge", "128"]) == 0
-    return tmp_path / "out"
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of a run, which tests only read."""
+    return run_in(tmp_path_factory.mktemp("run"))
 
 
 def test_the_record_names_all_that_the_result_depends_on(out: Path) -> None:
@@ -56,9 +61,11 @@ def test_the_record_names_all_that_the_result_depends_on(out: Path) -> None:
     assert {"strands", "hull"} <= {figure.stage for figure in record.health}
 
 
-def test_a_rerun_gives_the_same_bytes(out: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_rerun_gives_the_same_bytes(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Groom, scene and exports of the second run are those of the first, its record too."""
-    again = out.parent / "again"
+    again = tmp_path / "again"
     assert main(["rerun", str(out / RECORD), "-o", str(again), "--quiet"]) == 0
     assert capsys.readouterr().out.count(": the same bytes") == 3
     for name in ("groom.npz", "scene.json", "groom.ball"):
@@ -69,8 +76,11 @@ def test_a_rerun_gives_the_same_bytes(out: Path, capsys: pytest.CaptureFixture[s
 
 
 @pytest.mark.parametrize("name", ["capture/photos/4_back.png", "capture/masks/0_front.png"])
-def test_a_changed_input_is_named(out: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_changed_input_is_named(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     """One line says which file has changed; --force takes it as it is, a missing one is missing."""
+    out = run_in(tmp_path)
     file = out.parent / name
     file.write_bytes(
         file.with_name(file.name.replace("4_back", "3_back-left")).read_bytes() + b"\0"
@@ -94,13 +104,13 @@ def test_the_scene_names_the_photo_of_every_view(out: Path) -> None:
     assert all(view["photo"].endswith(f"_{view['name']}.png") for view in views)
 
 
-def test_other_versions_are_told(out: Path) -> None:
+def test_other_versions_are_told(out: Path, tmp_path: Path) -> None:
     """Whatever is of another version than in the record has a line."""
     document = json.loads((out / RECORD).read_text())
     document["libraries"]["numpy"] = "1.0"
     document["hairkit"] = "0.0.1"
-    write_text(out / RECORD, json.dumps(document))
-    record = read_record(out / RECORD)
+    write_text(tmp_path / RECORD, json.dumps(document))
+    record = read_record(tmp_path / RECORD)
     lines = changed_versions(record, Manager.loaded(record.plugin_files()))
     assert [line.partition(":")[0] for line in lines] == ["hairkit", "numpy"]
 
