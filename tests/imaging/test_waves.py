@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import cv2
@@ -23,7 +24,7 @@ from hairkit.types.waves import Waves
 
 WIDTH, HEIGHT, PIXELS_PER_METRE = 0.2, 0.24, 1500.0
 """Of a made-up photo: metres, and its resolution."""
-VIEWS = 8
+VIEWS = 4
 SEGMENT = 0.0015
 """Length of the straight pieces of a drawn strand, metres."""
 
@@ -36,6 +37,7 @@ def orthographic(azimuth: float = 0.0, scale: float = PIXELS_PER_METRE) -> Camer
     )  # fmt: skip
 
 
+@functools.cache
 def drawing(radius: float, pitch: float, seed: int = 0, scale: float = PIXELS_PER_METRE) -> View:
     """Return a photo of hair that hangs in helices, near halves bright and in front of dark ones.
 

@@ -12,7 +12,7 @@ from random import Random
 from hypothesis import settings
 from hypothesis import strategies as st
 
-CASES = int(os.environ.get("HAIRKIT_FUZZ_CASES", "100"))
+CASES = int(os.environ.get("HAIRKIT_FUZZ_CASES", "60"))
 """Damaged files for each reader; set the environment variable for a long run."""
 
 _INTEGERS = (0, 1, 2, 7, 255, 65_535, 2**31 - 1, 2**31, 2**32 - 1, -1, -(2**31))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -21,7 +22,9 @@ THICK, RING, WIDE = 0.012, 0.01, 0.02
 """Metres of hair on the scalp; radius of the tail at the tie and at its widest."""
 LENGTH = 0.2
 """Of the tail behind the ball, metres; it leaves along `TIE` and turns down."""
-GRID = VoxelGrid.around([-0.16, -0.2, -0.26], [0.16, 0.16, 0.16], 0.004)
+CELL = 0.004
+"""Edge of a voxel, metres."""
+GRID = VoxelGrid.around([-0.16, -0.2, -0.26], [0.16, 0.16, 0.16], CELL)
 
 
 def tail_course() -> tuple[Float64Array, Float64Array]:
@@ -36,6 +39,7 @@ def tail_course() -> tuple[Float64Array, Float64Array]:
     return np.array(points), swell
 
 
+@functools.cache
 def tied_hull(curtain: bool = False) -> Hull:
     """Return hair tight on the ball with a tail; with `curtain` it hangs loose all around."""
     centres = GRID.centres().astype(np.float64)
@@ -53,7 +57,9 @@ def tied_hull(curtain: bool = False) -> Hull:
 def _tube(centres: Float64Array) -> BoolArray:
     inside = np.zeros(centres.shape[:3], bool)
     for centre, radius in zip(*tail_course(), strict=True):
-        inside |= np.linalg.norm(centres - centre, axis=-1) < radius
+        low, high = ((centre + side * radius - centres[0, 0, 0]) / CELL for side in (-1, 1))
+        box = tuple(slice(max(int(a), 0), int(b) + 2) for a, b in zip(low, high, strict=True))
+        inside[box] |= np.linalg.norm(centres[box] - centre, axis=-1) < radius
     return inside
 
 
