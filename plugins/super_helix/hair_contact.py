@@ -35,6 +35,7 @@ class Neighbours:
         if len(points):
             wide = (points.max(axis=0) + ROOM - self._low) / CELL
             self._size = np.minimum(wide, WIDEST).astype(np.int64) + 2
+        self._corners = np.zeros((*self._size, 4))
         found = self._around(points, np.zeros_like(points), 1.0)
         self._rest = found[:, 0]
         self._floor = float(np.median(self._rest)) if len(found) else 1.0
@@ -82,12 +83,12 @@ class Neighbours:
         The direction is shorter than 1 where the density hardly falls: within a cell by less than
         `floor`.
         """
-        corners = np.zeros((*self._size, 4))
         result = np.empty((len(points), 7))
         if len(points):
             inside = np.clip(points, self._low, self._low + CELL * (self._size - INSIDE))
-            spread(inside, self._low, velocity, self._masses, corners)
-            gather(inside, self._low, corners, floor, result)
+            spread(inside, self._low, velocity, self._masses, self._corners)
+            gather(inside, self._low, self._corners, floor, result)
+            clear(inside, self._low, self._corners)
         return result
 
 
@@ -149,3 +150,16 @@ def gather(
         for axis in range(3):
             result[p, 1 + axis] = value[1 + axis] / max(value[0], 1e-30)
             result[p, 4 + axis] = -slope[axis] / max(size, 1e-30)
+
+
+@compiled
+def clear(points: Float64Array, low: Float64Array, corners: Float64Array) -> None:
+    """Set the corners (X, Y, Z, 4) of the points' cells to 0: far fewer than the grid has."""
+    for p in range(len(points)):
+        x, y, z = (points[p] - low) / CELL
+        i, j, k = (
+            min(int(x), corners.shape[0] - 2),
+            min(int(y), corners.shape[1] - 2),
+            min(int(z), corners.shape[2] - 2),
+        )
+        corners[i : i + 2, j : j + 2, k : k + 2] = 0.0
