@@ -14,6 +14,9 @@ DISPLAYS := xvfb chromium
 
 .PHONY: test test-clients demo lint docs matrix bench clean
 
+# A worker has one core: threads of matrix products would wait for each other.
+test test-clients: export OPENBLAS_NUM_THREADS := 1
+
 test: $(VENV)/.tests $(VENV)/.models
 	@sh .ci/libraries $(DISPLAYS)
 	@sh .ci/validator $(CLIENTS)
