@@ -52,11 +52,11 @@ def groom() -> Groom:
     )
 
 
-@pytest.mark.parametrize("backend", ["reference", "fast"])
-def test_captured_hair_does_not_sag(groom: Groom, backend: str) -> None:
-    """Two seconds under gravity move no point by 0.1 mm."""
+@pytest.mark.parametrize(("backend", "tenths"), [("reference", 5), ("fast", 20)])
+def test_captured_hair_does_not_sag(groom: Groom, backend: str, tenths: int) -> None:
+    """Two seconds under gravity, half of one by the slow reference, move no point by 0.1 mm."""
     simulator = PbdSimulator(groom, Options(backend=backend))
-    for _ in range(20):
+    for _ in range(tenths):
         simulator.advance(0.1, Surroundings())
     assert np.abs(simulator.points - groom.strands.points).max() < 1e-4
 
@@ -165,7 +165,7 @@ def test_a_grabbed_point_is_at_the_hand(groom: Groom, backend: str, share: float
 
 def test_a_hand_out_of_reach_stretches_nothing(groom: Groom) -> None:
     """A tip drawn a metre away ends on a taut strand of its own length."""
-    simulator = PbdSimulator(groom, Options(backend="reference"))
+    simulator = PbdSimulator(groom, Options(backend="fast"))
     tip = int(groom.strands.offsets[9]) - 1
     for _ in range(60):
         simulator.advance(1 / 60, Surroundings(grabs=(Grab(tip, (1.0, 0.5, 0.3)),)))
@@ -189,7 +189,7 @@ def test_more_stiffness_moves_less(groom: Groom) -> None:
 @pytest.mark.parametrize("bend", [0.0, 1.0])
 def test_the_stiffest_torsion_is_stable(groom: Groom, bend: float) -> None:
     """At the upper bound of twist, shaken hair calms down in a second and a half."""
-    simulator = PbdSimulator(groom, Options(backend="reference", twist=1.0, bend=bend))
+    simulator = PbdSimulator(groom, Options(backend="fast", twist=1.0, bend=bend))
     motion, energy = add_shakes(["yaw:30:2:0.5", "roll:25:3:0.5"], groom.head), []
     for frame in range(1, 121):
         simulator.advance(1 / 60, Surroundings(motion(frame / 60)))
