@@ -32,9 +32,11 @@ HEADINGS = (
     "fps idle machine",
 )  # fmt: skip
 ROWS = ((False, 0), (False, 1), (True, 0), (True, 1), (True, 3), (None, None))
-"""Whether hair is drawn by the processor, and the level of quality."""
+"""Whether hair is drawn by the processor, and the level of quality; None lets the budget choose."""
 WARM = 12
 """Pictures before the measured ones."""
+SETTLING = 80
+"""Further pictures after which the budget has chosen its level."""
 
 
 def main() -> int:
@@ -54,14 +56,7 @@ def main() -> int:
                 simulator=simulator,
                 hairs=args.hairs,
             )
-            for soft, level in (
-                (False, 0),
-                (False, 1),
-                (True, 0),
-                (True, 1),
-                (True, 3),
-                (None, None),
-            ):
+            for soft, level in ROWS:
                 _row(args, gl, session, level, soft)
     return 0
 
@@ -74,7 +69,7 @@ def _row(
     session.max_seconds = 0.4 * budget.seconds
     preview = Preview(gl, session, budget, soft)
     walls, processors = [], []
-    for picture in range(WARM + args.pictures + (80 if level is None else 0)):
+    for picture in range(WARM + args.pictures + (SETTLING if level is None else 0)):
         if picture % 60 == 0:
             perform(session, "shake", {"seconds": 3.0})
             perform(session, "wind", {"on": True})
