@@ -113,7 +113,7 @@ def endure(simulator: Simulator, happening: Happening, rng: np.random.Generator,
 
 
 @METHODS
-@settings(max_examples=12)
+@settings(max_examples=8)
 @given(STRANDS, HAPPENINGS, st.integers(0, 2**31))
 def test_any_hair_is_whole_a_second_after_anything(
     method: str, strands: list[tuple[str, float, int]], happening: Happening, seed: int
@@ -129,7 +129,7 @@ def test_any_hair_is_whole_a_second_after_anything(
 
 
 @METHODS
-@settings(max_examples=6)
+@settings(max_examples=4)
 @given(
     st.lists(st.tuples(st.just("straight"), st.floats(-3, -1.6), st.integers(2, 20)), min_size=1),
     HAPPENINGS,
