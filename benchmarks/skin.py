@@ -4,8 +4,8 @@ python benchmarks/skin.py captures/
 
 Fits the head of every capture and takes its skin from the photos, then draws the albedo as it is,
 without light, at the input cameras. Compared are pixels above the neck where the head is seen and
-the mask shows neither hair nor background, 4 mm from both. "Evened" gives each view the gain a
-channel that suits it best, as exposures differ; "relit" the light from all sides that does, a
+the mask shows neither hair nor background, 4 mm from both, without the eyes. "Evened" gives each
+view the gain a channel that suits it best, as exposures differ; "relit" the light from all sides that does, a
 polynomial of second degree in the normal for each channel. Prints a Markdown table: PSNR in
 decibels, and seconds of the processor for the skin.
 """
@@ -25,6 +25,7 @@ from captures_argument import NO_CAPTURES, add_captures
 from hairkit.arrays import BoolArray, Float64Array
 from hairkit.cameras.depth_raster import head_depth
 from hairkit.head_model.delighting import GAMMA, harmonics
+from hairkit.head_model.eye_colours import mark_beside_eyes
 from hairkit.head_model.photo_skin import photograph_skin
 from hairkit.head_model.scalp import bind
 from hairkit.hookspecs import hookimpl
@@ -131,7 +132,7 @@ def _skin(head: Head, camera: Camera, mask: Mask) -> BoolArray:
         metre = camera.focal
     away = cv2.distanceTransform(person, cv2.DIST_L2, cv2.DIST_MASK_3)
     depth = head_depth(head, camera)
-    seen = np.isfinite(depth) & (away > MARGIN * metre)
+    seen = np.isfinite(depth) & (away > MARGIN * metre) & (mark_beside_eyes(head, camera) > 0)
     row, column = np.nonzero(seen)
     places = camera.unproject(np.column_stack([column, row]) + 0.5, depth[seen])
     seen[row, column] = places[:, 1] > head.joints[1, 1]

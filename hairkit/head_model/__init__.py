@@ -8,6 +8,7 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `delighting`: the light of photos taken out of colours
 * `eye_colours`: the colours of a person's eyes, from photos
 * `eyes`: eyeballs in open lids, and the picture of them
+* `gradient_blend`: pictures joined in their gradients
 * `hairline`: where the photos show that hair grows
 * `identity`: shapes by which heads differ, two adults and a child
 * `photo_skin`: the skin of a head taken from the photos

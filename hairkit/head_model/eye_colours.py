@@ -2,7 +2,8 @@
 
 The six landmarks of an eye enclose what is seen between the lids. The iris is the darkest disc in
 there whose size suits the distance of the eye's corners; its colour is the median of a ring in it,
-beyond the pupil and the glint, and the white's is that of the brighter pixels beside it.
+beyond the pupil and the glint, and the white's is that of the brighter pixels beside it. Eyes lie
+in shadow; since whites are much alike, theirs says how deep it is, and is taken out of both.
 """
 
 from __future__ import annotations
@@ -36,6 +37,8 @@ SHARE = IRIS_RADIUS / (LOWER_LID[-1][0] - LOWER_LID[0][0])
 FEWEST = 6
 """Pixels that a colour is measured on at least."""
 
+DEEPEST = 1.5
+"""Largest factor by which lids and brows darken the eyes: the white tells how much they do."""
 EYE_MARGIN = 0.0015
 """Metres beside the lids' edges that are left out: the eyeball would be painted on the lids."""
 FARTHEST = 1e5
@@ -61,7 +64,8 @@ def find_eye_colours(views: Sequence[View], gains: Float64Array) -> tuple[Colour
         _as_colour(np.median(colours, axis=0)) if colours else usual
         for colours, usual in zip(found, (IRIS, SCLERA), strict=True)
     )
-    return iris, white
+    lit = float(np.clip(np.mean(SCLERA) / np.mean(white), 1.0, DEEPEST))
+    return _as_colour(lit * np.array(iris)), _as_colour(lit * np.array(white))
 
 
 def mark_beside_eyes(head: Head, camera: Camera) -> Float32Array:

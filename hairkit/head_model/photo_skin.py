@@ -4,8 +4,8 @@ Every photo is projected on the fitted head. A texel takes its colour from the v
 weighted by the cosine under which they do; hair, what stands before the head, the outline of the
 person and blown-out pixels do not count. Exposure and white balance of the views are evened by one
 gain a channel, least squares over the texels that two views share. Views are blended in two bands
-(Burt and Adelson 1983): coarse colours by their weights, details from the view that sees the
-texel best, so that seams neither show nor blur.
+(Burt and Adelson 1983): coarse colours in their gradients, details directly, both from the view
+that sees the texel best, so that seams neither show nor blur.
 
 What no view sees is taken from its mirror image where the texture coordinates are symmetric, then
 from the head's own skin, with the tone of the skin that is seen nearest to it: the ratio of the two
@@ -27,6 +27,7 @@ from hairkit.cameras.depth_raster import depth_behind, head_depth, mesh_depth
 from hairkit.head_model.delighting import find_shading
 from hairkit.head_model.eye_colours import find_eye_colours, mark_beside_eyes
 from hairkit.head_model.eyes import has_default_eyes, paint_over
+from hairkit.head_model.gradient_blend import join_gradients
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.head import JAW_LANDMARKS, Head
@@ -258,19 +259,19 @@ def _blend(
 ) -> tuple[Float32Array, Float32Array]:
     """Return (S, S, 3) the blended colours and (C, C) the weight of all views together."""
     total = np.sum([view.weight for view in views], axis=0)
-    best = np.max([view.weight for view in views], axis=0)
-    low = np.zeros((COARSE, COARSE, 3), np.float32)
-    details = np.zeros((SIZE, SIZE, 3), np.float32)
-    shares = [(view.weight / np.maximum(best, LEAST)) ** SHARPNESS for view in views]
+    best = np.maximum(np.max([view.weight for view in views], axis=0), LEAST)
+    shares = [(view.weight / best) ** SHARPNESS for view in views]
     share_sum = np.maximum(np.sum(shares, axis=0), LEAST)
-    for view, photo, gain, share in zip(views, photos, gains, shares, strict=True):
-        if not share.any():
-            continue
-        factor = gain.astype(np.float32)
-        smooth = _smooth(view.coarse * factor, view.weight)
-        low += smooth * (view.weight / np.maximum(total, LEAST))[..., None]
-        _add_details(details, view, photo, factor, smooth, (share / share_sum).astype(np.float32))
-    return _upsample(low) + details, total
+    shares = [(share / share_sum).astype(np.float32) for share in shares]
+    factors = gains.astype(np.float32)
+    smooth = [_smooth(view.coarse * f, view.weight) for view, f in zip(views, factors, strict=True)]
+    mean = np.sum([s * v.weight[..., None] for s, v in zip(smooth, views, strict=True)], axis=0)
+    mean = extend(mean / np.maximum(total, LEAST)[..., None], (total > 0).astype(np.float32))
+    details = np.zeros((SIZE, SIZE, 3), np.float32)
+    for view, photo, factor, low, share in zip(views, photos, factors, smooth, shares, strict=True):
+        if share.any():
+            _add_details(details, view, photo, factor, low, share)
+    return _upsample(join_gradients(mean, smooth, shares)) + details, total
 
 
 def _add_details(

@@ -42,6 +42,11 @@ CLAY = (0.16, 0.15, 0.14)
 """Linear RGB of the hull."""
 KEY_DIRECTION, RIM_DIRECTION = (0.4, 0.8, 0.6), (-0.4, 0.7, -0.6)
 """Towards the lights: one before the face, one behind the head, both from above."""
+KEY, SKY, GROUND = (1.3, 1.26, 1.2), (1.15, 1.15, 1.17), (0.72, 0.71, 0.7)
+"""Linear RGB of lights, sky and floor, chosen so that skin has the brightness that it has in the
+photos of evenly lit rooms."""
+EXPOSURE = 0.68
+"""Factor of all light in these pictures."""
 
 PAPER, INK = 250, 60
 _HAIR_TINT, _PERSON_TINT = (232, 60, 132), (70, 130, 235)
@@ -165,9 +170,10 @@ def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
 
 
 def _lights() -> Lights:
-    """Return lights from front and back alike: the photos go around."""
-    lights = Lights.studio(KEY_DIRECTION, RIM_DIRECTION)
-    return replace(lights, rim_colour=lights.key_colour)
+    """Return lights from front and back alike, under a bright sky: photos go around, and are taken
+    in rooms rather than in a studio's light."""
+    lights = Lights.studio(KEY_DIRECTION, RIM_DIRECTION, EXPOSURE)
+    return replace(lights, key_colour=KEY, rim_colour=KEY, sky_colour=SKY, ground_colour=GROUND)
 
 
 def _arrange(
