@@ -39,6 +39,9 @@ PLUGINS = ("thin_plate", "blendshapes")
 FACE_FRONT, FACE_MIDDLE, FACE_HALF = 0.05, -0.035, 0.085
 """Metres: the face lies farther in front, and no farther above or below its middle."""
 
+EYE = 0.0125
+"""Metres from the middle of an eyeball within which nothing is compared: the truth has other eyes."""
+
 
 class Probe:
     """Takes the place of a plugin that fits heads, and keeps what it is given."""
@@ -110,6 +113,8 @@ def errors(scene: Scene, truth: Truth) -> tuple[float, float]:
     distance = 1e3 * np.abs(distance_to(truth.head, similarity.apply(head.vertices)))
     _, y, z = head.vertices.T
     face = (z > FACE_FRONT) & (np.abs(y - FACE_MIDDLE) < FACE_HALF)
+    for centre in () if (centres := head.eye_centres()) is None else centres:
+        face &= np.linalg.norm(head.vertices - centre, axis=1) > EYE
     return float(distance[head.scalp > 0.5].mean()), float(distance[face].mean())
 
 

@@ -5,9 +5,9 @@ python benchmarks/skin.py captures/
 Fits the head of every capture and takes its skin from the photos, then draws the albedo as it is,
 without light, at the input cameras. Compared are pixels above the neck where the head is seen and
 the mask shows neither hair nor background, 4 mm from both, without the eyes. "Evened" gives each
-view the gain a channel that suits it best, as exposures differ; "relit" the light from all sides that does, a
-polynomial of second degree in the normal for each channel. Prints a Markdown table: PSNR in
-decibels, and seconds of the processor for the skin.
+view the gain a channel that suits it best, as exposures differ; "relit" the light from all sides
+that does, a polynomial of second degree in the normal for each channel. Prints a Markdown table:
+PSNR in decibels, and seconds of the processor for the skin.
 """
 
 from __future__ import annotations
