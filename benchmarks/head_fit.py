@@ -40,7 +40,7 @@ FACE_FRONT, FACE_MIDDLE, FACE_HALF = 0.05, -0.035, 0.085
 """Metres: the face lies farther in front, and no farther above or below its middle."""
 
 EYE = 0.0125
-"""Metres from the middle of an eyeball within which nothing is compared: the truth has other eyes."""
+"""Metres from the middle of an eyeball within which nothing is compared."""
 
 
 class Probe:
