@@ -53,10 +53,6 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "skin_looks": ({"HEIGHT": 80}, ["-o", "CAPTURES/looks_of_skin.jpg"]),
     "strokes": ({"STROKES": 1}, ["CAPTURES", "--tool", "brush"]),
     "studio": ({"GUIDES": 30}, ["--photos", "CAPTURES/short/photos", "--strokes", "1"]),
-    "studio_kills": (
-        {"GUIDES": 30, "SPACING_S": (0.1, 0.3), "MOST_WAIT_S": 0.1},
-        ["--photos", "CAPTURES/short/photos", "--kills", "2"],
-    ),
     "super_helix": ({"GUIDES": 8, "ELEMENTS": 5, "FRAMES": 2}, []),
     "texture_gallery": ({"SIZE": 64}, ["-o", "CAPTURES/gallery"]),
     "threads": ({"REPETITIONS": 1}, ["--runs", "2"]),
@@ -67,7 +63,14 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     ),
 }
 """Constants and arguments that make a program quick. CAPTURES is a folder with one capture."""
-ELSEWHERE = {"blender_picture", "export", "face_landmarks", "fidelity", "simulation"}
+ELSEWHERE = {
+    "blender_picture",
+    "export",
+    "face_landmarks",
+    "fidelity",
+    "simulation",
+    "studio_kills",
+}
 """Programs with tests of their own beside this one, or that need Blender."""
 
 
