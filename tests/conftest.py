@@ -30,12 +30,16 @@ def captures() -> Path:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def small_skins() -> Iterator[None]:
-    """Skins from photos of a quarter of the edge: the work of whole runs is mostly their texels."""
+def small_skins() -> Iterator[dict[str, int]]:
+    """Skins from photos of a quarter of the edge: the work of whole runs is mostly their texels.
+
+    The sizes of whole skins, for tests that compare with other processes.
+    """
+    whole = {"SIZE": photo_skin.SIZE, "COARSE": photo_skin.COARSE}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(photo_skin, "SIZE", 512)
         patch.setattr(photo_skin, "COARSE", 256)
-        yield
+        yield whole
 
 
 @pytest.fixture(scope="session")

@@ -102,13 +102,17 @@ def test_every_program_is_run_by_a_test() -> None:
 
 @pytest.mark.parametrize("name", SMALL)
 def test_it_prints_its_table(
-    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    name: str,
+    folder: Path,
+    small_skins: dict[str, int],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     """A program prints at least one row of as many cells as its heading has."""
     module = program(name, monkeypatch)
     if name == "studio_kills":  # it compares with processes, whose skins are whole
-        monkeypatch.setattr(photo_skin, "SIZE", 2048)
-        monkeypatch.setattr(photo_skin, "COARSE", 512)
+        for constant, value in small_skins.items():
+            monkeypatch.setattr(photo_skin, constant, value)
     constants, words = SMALL[name]
     for constant, value in constants.items():
         monkeypatch.setattr(module, constant, value)

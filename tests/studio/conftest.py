@@ -16,12 +16,20 @@ from typing import Any
 import cv2
 import pytest
 
+from hairkit.head_model import photo_skin
 from hairkit.io.capture_reader import sample_folder
 
 START_S = 60
 SIZE = (360, 480)
 """Pixels of the photos: a third of the time of the sample's own."""
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+
+
+@pytest.fixture(autouse=True)
+def _whole_skins(small_skins: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make skins as large as those of the studio's processes, whose files are compared."""
+    for name, value in small_skins.items():
+        monkeypatch.setattr(photo_skin, name, value)
 
 
 @dataclass
