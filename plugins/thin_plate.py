@@ -17,6 +17,7 @@ from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.similarity import triangulate
+from hairkit.head_model.spread_vertices import spread_vertices
 from hairkit.head_model.thin_plate_spline import ThinPlateSpline
 from hairkit.options import option
 from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
@@ -75,7 +76,9 @@ def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head
     cameras = [camera for camera, has in zip(scene.cameras, seen, strict=True) if has]
     points = triangulate(cameras, pixels)
     source = head.vertices[head.landmark_vertices].astype(np.float64)
-    anchors = head.vertices[_farthest(head, _cranium(head), options.anchors)].astype(np.float64)
+    anchors = head.vertices[spread_vertices(head, _cranium(head), options.anchors)].astype(
+        np.float64
+    )
     loose = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_LOOSENESS, 1.0) * options.smoothing
     smoothing = np.concatenate([loose, np.full(len(anchors), options.anchor_smoothing)])
     places = np.concatenate([source, anchors])
@@ -93,18 +96,7 @@ def _cranium(head: Head) -> Int64Array:
 def _spread(head: Head, count: int) -> Int64Array:
     """Return `count` vertices spread evenly over the head above the neck."""
     low = head.joints[1, 1]
-    return _farthest(head, np.nonzero(head.vertices[:, 1] > low)[0], count)
-
-
-def _farthest(head: Head, candidates: Int64Array, count: int) -> Int64Array:
-    """Return vertices chosen one by one, each farthest from those before (Gonzalez 1985)."""
-    points = head.vertices[candidates].astype(np.float64)
-    chosen = [0]
-    distance = ((points - points[0]) ** 2).sum(1)
-    while len(chosen) < min(count, len(points)):
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(1))
-    return candidates[chosen]
+    return spread_vertices(head, np.nonzero(head.vertices[:, 1] > low)[0], count)
 
 
 def _bend_to_outlines(

@@ -16,6 +16,7 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `scalp`: roots: sampling, binding to faces, growth mesh
 * `signed_distance`: signed distance to a head, on a grid or at points
 * `skinning`: skin weights of the three joints
+* `spread_vertices`: vertices chosen evenly over a part of a head
 * `template`: the default head
 * `template_shape`: its profile curves and displacements
 * `template_skin`: the painted skin of the default head

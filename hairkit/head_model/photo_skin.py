@@ -296,9 +296,8 @@ def _add_details(
 
 
 def _enlarge(picture: Float32Array, times: int) -> Float32Array:
-    return np.asarray(
-        cv2.resize(picture, None, fx=times, fy=times, interpolation=cv2.INTER_LINEAR), np.float32
-    )
+    larger = cv2.resize(picture, None, fx=times, fy=times, interpolation=cv2.INTER_LINEAR)
+    return np.asarray(larger, np.float32)
 
 
 def _smooth(colours: Float32Array, weight: Float32Array) -> Float32Array:

@@ -4,14 +4,16 @@ Unknown are the turn's shared place, tilt, magnification and perspective, and si
 (`hairkit.cameras.turntable.Turn`). Levenberg-Marquardt with soft-L1 weights on
 
 * landmarks, marginalised over the unknown shape of the head (`.landmark_equations`), those that
-  patches of skin carry to the neighbours (`.landmark_transfer`), and the face's midline on the
-  outline of views from the side;
+  patches of skin carry to the neighbours (`.landmark_transfer`), the face's midline on the outline
+  of views from the side, and the rim of the cranium on the outline where no hair covers it
+  (`.cranium`);
 * silhouette coherence (`hairkit.cameras.silhouette_coherence`; Hernandez, Schmitt and Cipolla
   2007): the viewing ray of every contour point touches all other silhouettes;
 * a prior that keeps to the nominal turn.
 
 Perspective and orthographic cameras are both tried unless the capture or the options say which.
 
+* `cranium`: the cranium's rim and where outlines are bare
 * `landmark_equations`: landmark residuals, marginalised over the head's shape
 * `landmark_transfer`: landmarks matched in neighbouring views
 * `search`: Levenberg-Marquardt from coarse outlines to fine ones, and other starts
@@ -41,6 +43,7 @@ from hairkit.imaging.masked_filters import picture_scale
 from hairkit.options import option
 from hairkit.types.head import LANDMARKS
 
+from .cranium import Cranium
 from .landmark_equations import (
     CameraArrays,
     LandmarkFit,
@@ -183,8 +186,13 @@ class _Problem:
             fields, scale = outlines.fields, outlines.scale
             if not all(mask.person_known for mask in masks):
                 side = side[:0]
+            cranium = None
+            if all(mask.person_known for mask in masks):
+                cranium = Cranium.of(head, masks, scale)
+                places = np.concatenate([places, cranium.points])
+            shape = shape_precision(places)
             landmarks = LandmarkFit(
-                places, shape_precision(places), sights, fields, scale, side, PROFILE_PX * pixel
+                places, shape, sights, fields, scale, side, PROFILE_PX * pixel, cranium
             )
         shared = SHARED_SPREAD if landmarks is not None else SHARED_SPREAD_BY_MASKS
         own = np.tile(each, (len(capture.views), 1))
@@ -198,7 +206,7 @@ class _Problem:
     def with_transferred(self, capture: Capture, fit: Fit) -> _Problem:
         """Return the problem with landmarks transferred to other views by a solution."""
         assert self.landmarks is not None
-        places = self.landmarks.landmarks + fit.offset
+        places = (self.landmarks.landmarks + fit.offset)[:LANDMARKS]
         cameras = self.turn.cameras(fit.vector)
         more = transfer_landmarks(capture, cameras, self.head, places, PatchSettings())
         sights = self.landmarks.sights.joined(more)
@@ -222,7 +230,8 @@ class _Problem:
             vector[PERSPECTIVE] = max(magnification / self.focal, MIN_PERSPECTIVE)
         if flat:
             vector[PERSPECTIVE] = MIN_PERSPECTIVE
-        return Fit(vector, np.zeros((LANDMARKS, 3)), flat, vector)
+        points = LANDMARKS if self.landmarks is None else len(self.landmarks.landmarks)
+        return Fit(vector, np.zeros((points, 3)), flat, vector)
 
     def from_cameras(self, cameras: Sequence[Camera]) -> Fit:
         """Return the solution of known cameras, whose prior is still the nominal turn."""

@@ -17,6 +17,8 @@ from hairkit.types.capture import Capture
 from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 from hairkit.types.mask import HAIR, Mask
 
+from .cranium import Cranium
+
 JAW_NOISE, COVERED_NOISE = 2.0, 3.0
 """Times the noise of given landmarks of the jaw, and of those under hair: detectors guess them."""
 MIDLINE = np.array([27, 28, 29, 30, 33, 51, 57, 8])
@@ -102,9 +104,9 @@ class LandmarkEquations:
     _shape: Float64Array
 
     def offsets(self, move: Float64Array) -> Float64Array:
-        """Return the best landmark offsets (68, 3) after a step of the cameras, metres."""
+        """Return the best offsets (N, 3) of the points after a step of the cameras, metres."""
         best = np.linalg.solve(self._shape, self._pull - self._coupling @ move)
-        return np.asarray(best.reshape(LANDMARKS, 3), np.float64)
+        return np.asarray(best.reshape(-1, 3), np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,9 +114,9 @@ class LandmarkFit:
     """The landmarks of a head, how those of people differ, and what is seen of them."""
 
     landmarks: Float64Array
-    """(68, 3) in the head frame."""
+    """(68 + K, 3) in the head frame; behind the 68 those of the cranium."""
     precision: Float64Array
-    """(204, 204) inverse covariance of the offsets."""
+    """(3 (68 + K), 3 (68 + K)) inverse covariance of the offsets."""
     sights: Sights
     fields: Float32Array
     """(V, H, W) signed distance to the silhouettes in pixels, see `Outlines`."""
@@ -124,6 +126,8 @@ class LandmarkFit:
     """Views from the side, where the midline of the face lies on the outline."""
     profile_noise: float
     """Standard deviation of that, pixels."""
+    cranium: Cranium | None = None
+    """What outlines show of it; none where masks tell no person."""
 
     def project(
         self, point: Int64Array, view: Int64Array, offset: Float64Array, cameras: CameraArrays
@@ -165,32 +169,41 @@ class LandmarkFit:
             (residual * (weight * sights.noise)[:, None]).ravel(),
             np.repeat(sights.point, 2),
         )
-        *outline, missed = self._outline_rows(offset, cameras, tangents)
+        *outline, outline_cost = self._outline_rows(offset, cameras, tangents)
         rows, by_shape, residual, point = (
             np.concatenate(pair) for pair in zip(seen, outline, strict=True)
         )
         found = self._marginalised(rows, by_shape, residual, point, offset)
         unlike = float(offset.ravel() @ self.precision @ offset.ravel())
-        return replace(found, cost=soft_l1_cost(length) + soft_l1_cost(missed) + unlike)
+        return replace(found, cost=soft_l1_cost(length) + outline_cost + unlike)
 
     def _outline_rows(
         self, offset: Float64Array, cameras: CameraArrays, tangents: Float64Array
-    ) -> tuple[Float64Array, Float64Array, Float64Array, Int64Array, Float64Array]:
+    ) -> tuple[Float64Array, Float64Array, Float64Array, Int64Array, float]:
         """Return rows that bring the face's midline on to the outline of views from the side.
 
-        Last come the residuals in standard deviations, before they are weighted.
+        So they do the cranium's rim on to the outline where that is bare. Last comes the cost.
         """
         view = np.repeat(self.profiles, len(MIDLINE))
         point = np.tile(MIDLINE, len(self.profiles))
+        share = np.ones(len(view))
+        if self.cranium is not None:
+            rim_view, rim_point, rim_share = self.cranium.rims(cameras)
+            view, point = np.append(view, rim_view), np.append(point, LANDMARKS + rim_point)
+            share = np.append(share, rim_share)
         pixels, by_camera, by_point = self.project(point, view, offset, cameras)
         value, slope = _sample(self.fields, self.scale, view, pixels)
+        if self.cranium is not None:
+            bare = self.cranium.bare(view, pixels - value[:, None] * slope)
+            share = np.where(point < LANDMARKS, share, share * bare)
         residual = -value / self.profile_noise
-        weight = np.sqrt(soft_l1_weight(residual)) / self.profile_noise
+        weight = np.sqrt(share * soft_l1_weight(residual)) / self.profile_noise
         weight = np.where(np.abs(residual) < GATE, weight, 0.0)
         along = np.einsum("ni,nik->nk", slope, by_camera)
         rows = np.einsum("nk,nkp->np", along, tangents[view]) * weight[:, None]
         by_shape = np.einsum("ni,nik->nk", slope, by_point) * weight[:, None]
-        return rows, by_shape, -value * weight, point, np.minimum(np.abs(residual), GATE)
+        cost = soft_l1_cost(np.minimum(np.abs(residual), GATE), share)
+        return rows, by_shape, -value * weight, point, cost
 
     def _marginalised(
         self,
@@ -203,16 +216,17 @@ class LandmarkFit:
         """Eliminate the offsets: the Schur complement of their block."""
         unknowns = rows.shape[1]
         residual = residual + (by_shape * offset[point]).sum(1)
-        blocks = np.zeros((LANDMARKS, 3, 3))
+        count = len(self.landmarks)
+        blocks = np.zeros((count, 3, 3))
         np.add.at(blocks, point, by_shape[:, :, None] * by_shape[:, None, :])
-        coupling = np.zeros((LANDMARKS, 3, unknowns))
+        coupling = np.zeros((count, 3, unknowns))
         np.add.at(coupling, point, by_shape[:, :, None] * rows[:, None, :])
-        pull = np.zeros((LANDMARKS, 3))
+        pull = np.zeros((count, 3))
         np.add.at(pull, point, by_shape * residual[:, None])
         shape = self.precision.copy()
-        diagonal = np.arange(LANDMARKS)
-        shape.reshape(LANDMARKS, 3, LANDMARKS, 3)[diagonal, :, diagonal] += blocks
-        flat = coupling.reshape(3 * LANDMARKS, unknowns)
+        diagonal = np.arange(count)
+        shape.reshape(count, 3, count, 3)[diagonal, :, diagonal] += blocks
+        flat = coupling.reshape(3 * count, unknowns)
         solved = np.linalg.solve(shape, np.column_stack([flat, pull.ravel()]))
         normal = rows.T @ rows - flat.T @ solved[:, :-1]
         right = rows.T @ residual - flat.T @ solved[:, -1]
@@ -231,13 +245,17 @@ OUTSIDE = 1e6
 
 
 def shape_precision(landmarks: Float64Array) -> Float64Array:
-    """Return (204, 204), 1 / m^2: the inverse covariance of people's landmarks about these."""
+    """Return (3 N, 3 N), 1 / m^2: the inverse covariance of people's heads at these points.
+
+    The first 68 are the landmarks, whose size has a prior of its own.
+    """
     squared = ((landmarks[:, None] - landmarks[None]) ** 2).sum(2)
     kernel = AFFINE_SPREAD**2 * (landmarks @ landmarks.T) / AFFINE_LENGTH**2
     kernel += SMOOTH_SPREAD**2 * np.exp(-squared / (2 * SMOOTH_LENGTH**2))
     kernel += PLACE_SPREAD**2 + LOOSE_SPREAD**2 * np.eye(len(landmarks))
     precision: Float64Array = np.kron(np.linalg.inv(kernel), np.eye(3))
-    centred = landmarks - landmarks.mean(axis=0)
+    centred = np.zeros_like(landmarks)
+    centred[:LANDMARKS] = landmarks[:LANDMARKS] - landmarks[:LANDMARKS].mean(axis=0)
     growth = (centred / (centred**2).sum()).ravel()  # growth @ offsets: how much larger they are
     variance = np.einsum("ic,ij,jc->", growth.reshape(-1, 3), kernel, growth.reshape(-1, 3))
     tighter = max(0.0, SIZE_SPREAD**-2 - float(variance) ** -1)
@@ -250,10 +268,13 @@ def soft_l1_weight(scaled: Float64Array) -> Float64Array:
     return weights
 
 
-def soft_l1_cost(scaled: Float64Array) -> float:
-    """Return the soft-L1 cost of residuals over their noise: their squared sum where small."""
+def soft_l1_cost(scaled: Float64Array, share: Float64Array | float = 1.0) -> float:
+    """Return the soft-L1 cost of residuals over their noise: their squared sum where small.
+
+    Each counts for its `share`.
+    """
     bent = np.sqrt(1 + (scaled / SOFT_L1_BEND) ** 2) - 1
-    return float(2 * SOFT_L1_BEND**2 * bent.sum())
+    return float(2 * SOFT_L1_BEND**2 * (share * bent).sum())
 
 
 def _sample(

@@ -13,7 +13,6 @@ import pytest
 from hairkit_plugins import landmarks
 
 from hairkit.cli import main as hairkit
-from hairkit.head_model import photo_skin
 
 PROJECT = Path(__file__).parents[2]
 SHARED = {"captures_argument", "example_textures", "plain_analogies", "xpbd_peer"}
@@ -104,15 +103,11 @@ def test_every_program_is_run_by_a_test() -> None:
 def test_it_prints_its_table(
     name: str,
     folder: Path,
-    small_skins: dict[str, int],
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """A program prints at least one row of as many cells as its heading has."""
     module = program(name, monkeypatch)
-    if name == "studio_kills":  # it compares with processes, whose skins are whole
-        for constant, value in small_skins.items():
-            monkeypatch.setattr(photo_skin, constant, value)
     constants, words = SMALL[name]
     for constant, value in constants.items():
         monkeypatch.setattr(module, constant, value)
