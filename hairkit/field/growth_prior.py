@@ -26,13 +26,10 @@ WHORL_SLOPE = 0.7
 LEAST_WHORL = 0.05
 """Share of the direction from the crown in long hair, which decides where the flow vanishes."""
 SHORT_HAIR, LONG_HAIR = 0.03, 0.06
-"""Longest ways through the hair from the nearest scalp, metres: strands of shorter hair grow as
-far, those of longer hair to its tips. They are 0.015 in hair of 3.3 cm and 0.058 in a bob of 15 cm,
-whose strands end too soon where the second is 0.1 (mean length 0.80 of the true one, not 0.88)."""
-COMBED_HAIR = 0.1
-"""Range of the potential in metres from which hair is combed along it alone; below `SHORT_HAIR` it
-is combed from the crown. The range is 0.06 in hair of 3.3 cm that has a few longer ways, and with
-0.06 here its F 4 mm/40 degrees falls from 92 to 85 %."""
+"""Longest ways through the hair from the nearest scalp, metres: shorter hair is combed from the
+crown, longer hair along the potential, up to its tips. They are 0.015 to 0.018 in hair of 3.3 cm
+and 0.058 in a bob of 15 cm, whose strands end too soon where the second is 0.1 (mean length 0.80 of
+the true one, not 0.88)."""
 PARTED_HAIR = 0.09
 """Longest way through the hair, in metres, from which hair is combed from a parting."""
 TIP_SLOPE = 0.2
@@ -54,23 +51,24 @@ def combing_direction(
     points: npt.ArrayLike,
     lift: float,
     parting: Parting,
+    hair_length: float,
 ) -> Float64Array:
     """Return unit directions (N, 3), root to tip, of hair on the scalp near points (N, 3).
 
-    Long hair: the tangential part of the growth potential's gradient. Hair shorter than
-    `SHORT_HAIR`, which ends everywhere: `WHORL_SLOPE` away from the crown's axis and 1 down. In
-    between a blend; made unit, plus `lift` times the outward normal. On the crown of long hair
-    with a parting, `comb_from_parting` takes the place of the gradient.
+    Long hair: the tangential part of the growth potential's gradient. Hair of a longest way
+    (`hair_length`, metres) shorter than `SHORT_HAIR`, which ends everywhere: `WHORL_SLOPE` away
+    from the crown's axis and 1 down. In between a blend; made unit, plus `lift` times the outward
+    normal. On the crown of long hair with a parting, `comb_from_parting` takes the place of the
+    gradient.
     """
     at = np.asarray(points, np.float64)
     outward = gradient(hull.grid, hull.head_distance, at)
     flow = gradient(hull.grid, growth, at)
     flow -= np.sum(flow * outward, axis=1, keepdims=True) * outward
-    length = float(np.ptp(growth[hull.dense]))
-    share = long_share(length, COMBED_HAIR)
+    share = long_share(hair_length)
     combed = share * flow + max(1 - share, LEAST_WHORL) * _from_crown(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
-    if parts(parting, length):
+    if parts(parting, float(np.ptp(growth[hull.dense]))):
         crown = crown_share(parting, head, at)[:, None]
         combed = (1 - crown) * combed + crown * comb_from_parting(parting, head, at, outward)
         combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
@@ -108,13 +106,15 @@ def add_scalp_prior(
     certainty: Float32Array,
     prior: ScalpPrior,
     parting: Parting,
+    hair_length: float,
 ) -> tuple[Float32Array, Float32Array]:
     """Add the prior to tensors (N, 6) and certainty (N,) of the loose cells; return new ones."""
     data, weight = tensor.copy(), certainty.copy()
     points = hull.grid.centres_of(hull.loose)
     near = hull.head_distance[hull.loose] < prior.reach
     if prior.weight and near.any():
-        comb = combing_direction(head, hull, growth, points[near], prior.lift, parting)
+        at = points[near]
+        comb = combing_direction(head, hull, growth, at, prior.lift, parting, hair_length)
         _mix(data, weight, near, comb, np.full(len(comb), prior.weight))
     if prior.crown and parts(parting, float(np.ptp(growth[hull.dense]))):
         share = prior.crown * crown_share(parting, head, points)
@@ -197,9 +197,9 @@ def growth_potential(hull: Hull, from_scalp: ScalpDistance, tip_share: float) ->
     return growth
 
 
-def long_share(length: float, long: float = LONG_HAIR) -> float:
-    """Return 0 for short hair, 1 for hair of at least the length `long`, both in metres."""
-    return float(np.clip((length - SHORT_HAIR) / (long - SHORT_HAIR), 0.0, 1.0))
+def long_share(length: float) -> float:
+    """Return 0 for short hair, 1 for long hair, of its longest way in metres."""
+    return float(np.clip((length - SHORT_HAIR) / (LONG_HAIR - SHORT_HAIR), 0.0, 1.0))
 
 
 def chamfer_distance(occupied: BoolArray, start: BoolArray, spacing: float) -> Float32Array:

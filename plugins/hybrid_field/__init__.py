@@ -124,6 +124,7 @@ def solve_field(
 ) -> OrientationField:
     """Return the blended field with its signs and the internal distance."""
     growth = growth_potential(hull, scalp_distance, options.tip_share)
+    length = scalp_distance.hair_length
     if waves.curly:
         return hang_curls(scene.head, hull, growth)
     fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options)
@@ -136,10 +137,10 @@ def solve_field(
         options.scalp_weight, options.scalp_reach, options.scalp_lift, crown=options.parting_weight
     )
     wanted, weight = add_scalp_prior(
-        scene.head, hull, growth, fused.tensor, fused.certainty, prior, parting
+        scene.head, hull, growth, fused.tensor, fused.certainty, prior, parting, length
     )
     band = ribbons(segments, hull, options.ribbon)
-    signs = growth_direction(scene.head, hull, growth, band, parting, options)
+    signs = growth_direction(scene.head, hull, growth, band, parting, length, options)
     inner = internal_direction(hull, wanted, weight, band, options)
     distance = internal_distance(hull, segments, options.tolerance)
     surface = surface_structure(hull, band, options.tolerance)

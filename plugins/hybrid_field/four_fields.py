@@ -65,6 +65,7 @@ def growth_direction(
     growth: Float32Array,
     band: Band,
     parting: Parting,
+    hair_length: float,
     options: FieldOptions,
 ) -> Float32Array:
     """Return O (N, 3) of the loose cells: ribbons and the scalp prior, diffused as vectors."""
@@ -73,7 +74,9 @@ def growth_direction(
     near = (hull.head_distance[hull.loose] < options.scalp_reach) & (weight == 0)
     at = hull.grid.centres_of(hull.loose)[near]
     if len(at):
-        data[near] = combing_direction(head, hull, growth, at, options.scalp_lift, parting)
+        data[near] = combing_direction(
+            head, hull, growth, at, options.scalp_lift, parting, hair_length
+        )
         weight[near] = 1.0
     if not (weight > 0).any():
         return data

@@ -162,7 +162,8 @@ def test_combed_hair_leaves_the_scalp_at_the_angle_of_the_lift(hull: Hull, lift:
     at = scalp_roots(head).positions * 1.05
     at = at[at[:, 1] < 0.08]
     growth = potential(hull)
-    combed = combing_direction(head, hull, growth, at, lift, Parting())
+    length = measure_scalp_distance(head, hull).hair_length
+    combed = combing_direction(head, hull, growth, at, lift, Parting(), length)
     np.testing.assert_allclose(np.linalg.norm(combed, axis=1), 1, atol=1e-6)
     outward = gradient(hull.grid, hull.head_distance, at)
     rise = np.sum(combed * outward, axis=1)
@@ -179,7 +180,7 @@ def test_short_hair_is_combed_away_from_a_whorl_behind_the_crown() -> None:
     whorl = np.array([0, 0.095, -0.03])
     around = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], axis=-1)
     points = whorl + 0.02 * around
-    combed = combing_direction(head, hull, flat, points, 0.0, Parting())
+    combed = combing_direction(head, hull, flat, points, 0.0, Parting(), 0.0)
     assert (np.sum(combed * around, axis=1) > 0.3).all()
 
 
@@ -188,7 +189,7 @@ def test_combing_of_long_hair_follows_the_flow_wherever_it_leads() -> None:
     head, hull = ball_head(), curtain()
     sideways = (2 * hull.grid.centres()[..., 0]).astype(np.float32)
     points = [[0.0, 0.11, 0.0], [0.0, 0.08, 0.08]]
-    combed = combing_direction(head, hull, sideways, points, 0.0, Parting())
+    combed = combing_direction(head, hull, sideways, points, 0.0, Parting(), 1.0)
     assert (combed[:, 0] > 0.95).all()
 
 
@@ -215,12 +216,13 @@ def test_long_hair_is_combed_from_its_parting_on_the_crown_only() -> None:
     head, hull = ball_head(), curtain(hem=-0.3)
     growth, parting = potential(hull), Parting.at(0.02)
     top = [[0.0, 0.098, 0.02], [0.04, 0.092, 0.02]]
-    combed = combing_direction(head, hull, growth, top, 0.0, parting)
+    combed = combing_direction(head, hull, growth, top, 0.0, parting, 1.0)
     assert combed[0, 0] < -0.3
     assert combed[1, 0] > 0.3
     below = [[0.1, 0.02, 0.0], [-0.1, 0.0, 0.02]]
     plain, parted = (
-        combing_direction(head, hull, growth, below, 0.3, line) for line in (Parting(), parting)
+        combing_direction(head, hull, growth, below, 0.3, line, 1.0)
+        for line in (Parting(), parting)
     )
     np.testing.assert_array_equal(plain, parted)
 
@@ -230,7 +232,7 @@ def test_short_hair_has_no_parting() -> None:
     head, hull = ball_head(), curtain(0.005, hem=0.0, thickness=0.015)
     growth, at = potential(hull), scalp_roots(head).positions
     plain, parted = (
-        combing_direction(head, hull, growth, at, 0.3, line)
+        combing_direction(head, hull, growth, at, 0.3, line, 1.0)
         for line in (Parting(), Parting.at(0.02))
     )
     np.testing.assert_array_equal(plain, parted)

@@ -9,6 +9,7 @@ import pytest
 
 from hairkit.cli import main
 from hairkit.errors import InputError
+from hairkit.head_model import photo_skin
 from hairkit.head_model.template import default_head
 from hairkit.io.head_reader import read_head
 from hairkit.pipeline.head_alone import ENDINGS, photograph_head, write_head
@@ -52,6 +53,6 @@ def test_photos_give_cameras_and_a_skin(tmp_path: Path) -> None:
     assert scene.head.maps.albedo is not None
     assert own is not None
     assert own.albedo is not None
-    assert scene.head.maps.albedo.pixels.shape == (2048, 2048, 3)
+    assert scene.head.maps.albedo.pixels.shape == (photo_skin.SIZE, photo_skin.SIZE, 3)
     uv = scene.head.uv
     assert np.abs(scene.head.maps.albedo.sample(uv) - own.albedo.sample(uv)).mean() > 0.02
