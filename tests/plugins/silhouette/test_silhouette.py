@@ -146,7 +146,7 @@ def test_without_landmarks_the_head_stands_under_its_hair(
 
 def test_equal_input_gives_equal_cameras(bust: Turntable) -> None:
     """Two runs give the same bytes."""
-    options = replace(FAST, iterations=3, carries=1)
+    options = replace(FAST, iterations=2, carries=1)
     one, two = (
         estimate_scene(bust.capture, bust.masks, bust.head, None, options) for _ in range(2)
     )
@@ -155,13 +155,18 @@ def test_equal_input_gives_equal_cameras(bust: Turntable) -> None:
 
 
 def test_a_start_is_searched_from_and_keeps_its_kind(bust: Turntable) -> None:
-    """Orthographic cameras stay so and within a degree, where the search from nothing ends with
-    perspective ones."""
-    given = (bust.capture, bust.masks, bust.head)
-    start = estimate_scene(*given, None, replace(FAST, model="orthographic"))
-    again = estimate_scene(*given, start, FAST)
+    """Orthographic cameras stay so and fit no worse, where a search from nothing ends with others.
+
+    Within a round or two they stay near, too.
+    """
+    given, few = (bust.capture, bust.masks, bust.head), replace(FAST, iterations=5, carries=0)
+    start = estimate_scene(*given, None, replace(few, model="orthographic"))
+    again = estimate_scene(*given, start, replace(few, iterations=1))
     assert {camera.model for camera in again.cameras} == {"orthographic"}
-    assert azimuth_errors(again.cameras, start.cameras).max() < 1
+    assert start.residual_px is not None
+    assert again.residual_px is not None
+    assert again.residual_px < 1.05 * start.residual_px
+    assert azimuth_errors(again.cameras, start.cameras).max() < 3
 
 
 def test_zooms_and_distances_of_orthographic_views_are_the_same(bust: Turntable) -> None:
