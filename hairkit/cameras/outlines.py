@@ -52,6 +52,8 @@ class Outlines:
     """(N, 2) contour points in picture pixels."""
     views: Int64Array
     """(N,) their views."""
+    whole: bool
+    """The silhouettes are those of persons; of their hair where a mask knows no person."""
 
     @classmethod
     def of(cls, masks: Sequence[Mask], count: int) -> Outlines:
@@ -73,6 +75,7 @@ class Outlines:
             scale,
             np.concatenate(points),
             np.concatenate(views).astype(np.int64),
+            whole,
         )
 
     def crowns(self, ratio: float) -> tuple[Float64Array, Float64Array, Float64Array]:

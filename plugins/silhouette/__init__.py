@@ -184,15 +184,10 @@ class _Problem:
             places = head.vertices[head.landmark_vertices].astype(np.float64)
             side = np.nonzero(np.abs(np.cos(turn.azimuths)) < np.sin(FROM_THE_SIDE))[0]
             fields, scale = outlines.fields, outlines.scale
-            if not all(mask.person_known for mask in masks):
+            if not outlines.whole:
                 side = side[:0]
-            cranium = None
-            if all(mask.person_known for mask in masks):
-                cranium = Cranium.of(head, masks, scale)
-                places = np.concatenate([places, cranium.points])
-            shape = shape_precision(places)
             landmarks = LandmarkFit(
-                places, shape, sights, fields, scale, side, PROFILE_PX * pixel, cranium
+                places, shape_precision(places), sights, fields, scale, side, PROFILE_PX * pixel
             )
         shared = SHARED_SPREAD if landmarks is not None else SHARED_SPREAD_BY_MASKS
         own = np.tile(each, (len(capture.views), 1))
@@ -201,7 +196,12 @@ class _Problem:
         noise = options.silhouette_px * pixel
         focals = [view.focal_px for view in capture.views]
         focal = None if None in focals else focals[0]
-        return cls(turn, outlines, head, landmarks, noise, spread, focal)
+        problem = cls(turn, outlines, head, landmarks, noise, spread, focal)
+        if landmarks is None or not outlines.whole:
+            return problem
+        start = problem.cameras(problem.start(flat=False).vector)
+        cranium = Cranium.of(head, masks, outlines.scale)
+        return replace(problem, landmarks=landmarks.with_cranium(cranium, start))
 
     def with_transferred(self, capture: Capture, fit: Fit) -> _Problem:
         """Return the problem with landmarks transferred to other views by a solution."""

@@ -7,7 +7,7 @@ face, which no landmark tells.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -51,6 +51,10 @@ class Cranium:
         fields = np.stack([_far_from_hair(mask, size) for mask in masks])
         normals = head.normals()[chosen].astype(np.float64)
         return cls(head.vertices[chosen].astype(np.float64), normals, fields, scale)
+
+    def select(self, points: Int64Array) -> Cranium:
+        """Return the cranium of some of its points."""
+        return replace(self, points=self.points[points], normals=self.normals[points])
 
     def rims(
         self, cameras: tuple[Float64Array, ...]

@@ -127,7 +127,24 @@ class LandmarkFit:
     profile_noise: float
     """Standard deviation of that, pixels."""
     cranium: Cranium | None = None
-    """What outlines show of it; none where masks tell no person."""
+    """What outlines show of it; none where they show nothing."""
+
+    def with_cranium(self, cranium: Cranium, cameras: CameraArrays) -> LandmarkFit:
+        """Return the fit with those points of a cranium that cameras see on a bare outline.
+
+        The others would tell nothing: most heads have hair all round, and gain no point.
+        """
+        every = replace(self, landmarks=np.concatenate([self.landmarks, cranium.points]))
+        view, point, share = cranium.rims(cameras)
+        pixels, *_ = every.project(LANDMARKS + point, view, np.zeros((1, 3)), cameras)
+        value, slope = _sample(self.fields, self.scale, view, pixels)
+        share = share * cranium.bare(view, pixels - value[:, None] * slope)
+        near = np.abs(value) < GATE * self.profile_noise
+        shown = cranium.select(np.unique(point[near & (share > 0)]))
+        if not len(shown.points):
+            return self
+        points = np.concatenate([self.landmarks, shown.points])
+        return replace(self, landmarks=points, precision=shape_precision(points), cranium=shown)
 
     def project(
         self, point: Int64Array, view: Int64Array, offset: Float64Array, cameras: CameraArrays
