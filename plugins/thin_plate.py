@@ -76,9 +76,8 @@ def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head
     cameras = [camera for camera, has in zip(scene.cameras, seen, strict=True) if has]
     points = triangulate(cameras, pixels)
     source = head.vertices[head.landmark_vertices].astype(np.float64)
-    anchors = head.vertices[spread_vertices(head, _cranium(head), options.anchors)].astype(
-        np.float64
-    )
+    held = spread_vertices(head, _cranium(head), options.anchors)
+    anchors = head.vertices[held].astype(np.float64)
     loose = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_LOOSENESS, 1.0) * options.smoothing
     smoothing = np.concatenate([loose, np.full(len(anchors), options.anchor_smoothing)])
     places = np.concatenate([source, anchors])

@@ -146,14 +146,14 @@ class Turn:
         rotation = np.stack([camera.rotation for camera in cameras])
         translation = np.stack([camera.translation for camera in cameras])
         focal = np.array([camera.focal for camera in cameras])
-        if cameras[0].model == "orthographic":  # nearer views have more pixels a metre
+        flat = cameras[0].model == "orthographic"
+        if flat:  # nearer views have more pixels a metre
             zoom = focal / self.focal_ratios
             translation[:, 2] = np.exp(np.log(zoom).mean()) / zoom / MIN_PERSPECTIVE
             focal = focal * translation[:, 2]
         across = rotation[:, :2].reshape(-1, 3)
         centre = np.linalg.lstsq(across, -translation[:, :2].ravel(), rcond=None)[0]
         offset = translation + rotation @ centre
-        flat = cameras[0].model == "orthographic"
         far = 1 / MIN_PERSPECTIVE if flat else np.exp(np.log(offset[:, 2]).mean())
         angles = np.array([view_angles(each) for each in rotation])
         angles -= np.stack([self.azimuths, self.elevations, 0 * self.azimuths], axis=1)

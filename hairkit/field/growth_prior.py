@@ -29,8 +29,8 @@ SHORT_HAIR, LONG_HAIR = 0.03, 0.06
 """Longest ways through the hair from the nearest scalp, metres: shorter hair is combed from the
 crown, longer hair along the potential, up to its tips. They are 0.015 to 0.018 in hair of 3.3 cm
 and 0.058 in a bob of 15 cm, whose strands end too soon where the second is 0.1 (mean length 0.80 of
-the true one, not 0.88)."""
-PARTED_HAIR = 0.09
+the true one, not 0.86)."""
+PARTED_HAIR = 0.05
 """Longest way through the hair, in metres, from which hair is combed from a parting."""
 TIP_SLOPE = 0.2
 """Slope of the growth potential among the tips; 1 before them."""
@@ -68,7 +68,7 @@ def combing_direction(
     share = long_share(hair_length)
     combed = share * flow + max(1 - share, LEAST_WHORL) * _from_crown(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
-    if parts(parting, float(np.ptp(growth[hull.dense]))):
+    if parts(parting, hair_length):
         crown = crown_share(parting, head, at)[:, None]
         combed = (1 - crown) * combed + crown * comb_from_parting(parting, head, at, outward)
         combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
@@ -80,7 +80,7 @@ def combing_direction(
 
 
 def parts(parting: Parting, hair_length: float) -> bool:
-    """Return whether the hair, of a length in metres, is combed as the parting says."""
+    """Return whether the hair, of a longest way in metres, is combed as the parting says."""
     return parting.known and hair_length >= PARTED_HAIR
 
 
@@ -116,7 +116,7 @@ def add_scalp_prior(
         at = points[near]
         comb = combing_direction(head, hull, growth, at, prior.lift, parting, hair_length)
         _mix(data, weight, near, comb, np.full(len(comb), prior.weight))
-    if prior.crown and parts(parting, float(np.ptp(growth[hull.dense]))):
+    if prior.crown and parts(parting, hair_length):
         share = prior.crown * crown_share(parting, head, points)
         top = share > 0
         outward = gradient(hull.grid, hull.head_distance, points[top])

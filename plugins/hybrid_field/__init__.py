@@ -124,9 +124,9 @@ def solve_field(
 ) -> OrientationField:
     """Return the blended field with its signs and the internal distance."""
     growth = growth_potential(hull, scalp_distance, options.tip_share)
-    length = scalp_distance.hair_length
     if waves.curly:
         return hang_curls(scene.head, hull, growth)
+    length = scalp_distance.hair_length
     fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options)
     if options.segments is None:
         segments = find_segments(scene.cameras, masks, fused, hull, growth, options)

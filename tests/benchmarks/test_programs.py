@@ -101,10 +101,7 @@ def test_every_program_is_run_by_a_test() -> None:
 
 @pytest.mark.parametrize("name", SMALL)
 def test_it_prints_its_table(
-    name: str,
-    folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A program prints at least one row of as many cells as its heading has."""
     module = program(name, monkeypatch)

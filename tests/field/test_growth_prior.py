@@ -231,8 +231,9 @@ def test_short_hair_has_no_parting() -> None:
     """Hair that ends before it could lie down is combed as before."""
     head, hull = ball_head(), curtain(0.005, hem=0.0, thickness=0.015)
     growth, at = potential(hull), scalp_roots(head).positions
+    length = measure_scalp_distance(head, hull).hair_length
     plain, parted = (
-        combing_direction(head, hull, growth, at, 0.3, line, 1.0)
+        combing_direction(head, hull, growth, at, 0.3, line, length)
         for line in (Parting(), Parting.at(0.02))
     )
     np.testing.assert_array_equal(plain, parted)
