@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from waiting import run
 
 from hairkit.studio.project import Project
 from hairkit.studio.studio import Studio
@@ -93,7 +94,7 @@ def test_a_stroke_is_previewed_before_the_whole_hair_is_made(studio: Studio) -> 
         assert calls[3] == ("build", None)
         await studio.close()
 
-    asyncio.run(story())
+    run(story)
 
 
 def test_a_change_ends_a_build_that_it_makes_useless(studio: Studio) -> None:
@@ -114,4 +115,4 @@ def test_a_change_ends_a_build_that_it_makes_useless(studio: Studio) -> None:
         assert calls[3:] == [("ended", None), ("draft", files[:2]), ("build", None)]
         await studio.close()
 
-    asyncio.run(story())
+    run(story)

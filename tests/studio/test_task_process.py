@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 import sys
 from pathlib import Path
 
 import pytest
+from waiting import run
 
 from hairkit.studio import task_process
 from hairkit.studio.task_process import TRIES, TaskError, TaskProcess
@@ -44,7 +44,7 @@ def test_a_task_whose_process_is_killed_is_done_by_another(
         await process.close()
         return done
 
-    assert asyncio.run(ask()) == kills + 1
+    assert run(ask) == kills + 1
 
 
 def test_a_task_that_ends_every_process_is_given_up(process: TaskProcess, tmp_path: Path) -> None:
@@ -58,4 +58,4 @@ def test_a_task_that_ends_every_process_is_given_up(process: TaskProcess, tmp_pa
         await process.close()
         return done
 
-    assert asyncio.run(ask()) == TRIES + 1
+    assert run(ask) == TRIES + 1
