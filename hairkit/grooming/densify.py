@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import InputError
-from hairkit.head_model.scalp import sample_roots
+from hairkit.head_model.scalp import roots_at, sample_roots
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Roots
 from hairkit.types.strands import Strands
@@ -67,7 +67,7 @@ def densify(
         Equal seeds give equal hair.
     roots
         Where the new strands start, count - S at least, as `Roots` or positions (N, 3). By
-        default sampled on the groom's scalp, or between neighbouring guides of bare strands.
+        default those of `roots_between`, or between neighbouring guides of bare strands.
     scatter
         Root mean square wander of a new strand's tip, metres; 0 mixes the guides exactly.
     material
@@ -90,6 +90,12 @@ def densify(
         shapes += _wander(len(positions), bundle.points, scatter, generator)
         shapes *= 1 - SHORTENED * generator.random((len(positions), 1, 1), dtype=np.float32) ** 3
     return _join(even, positions[:, None] + shapes, mix.guides[:, 0], uv, material)
+
+
+def roots_between(guides: Groom, count: int, seed: int = 0) -> Roots:
+    """Return `count` roots on the groom's head, only where its strands are near enough."""
+    own = roots_at(guides.head, guides.root_triangle, guides.root_barycentric)
+    return sample_roots(guides.head, count, seed, first=len(own), guides=own)
 
 
 @dataclass(frozen=True)
@@ -152,7 +158,7 @@ def _new_roots(
     generator: np.random.Generator,
 ) -> tuple[Float32Array, Float32Array | None]:
     if roots is None and isinstance(guides, Groom):
-        roots = sample_roots(guides.head, count, seed, first=len(bundle.roots))
+        roots = roots_between(guides, count, seed)
     if isinstance(roots, Roots):
         positions, uv = roots.positions, roots.uv
     elif roots is not None:

@@ -13,9 +13,9 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array
 from hairkit.errors import InputError
-from hairkit.grooming.densify import densify
+from hairkit.grooming.densify import densify, roots_between
 from hairkit.grooming.guide_weights import follow, guide_mask
-from hairkit.head_model.scalp import roots_at, sample_roots
+from hairkit.head_model.scalp import roots_at
 from hairkit.io.strand_blocks import colours
 from hairkit.options import option
 from hairkit.types.groom import Groom
@@ -106,8 +106,7 @@ def dense_groom(groom: Groom, count: int, seed: int = 0) -> Groom:
     guides = _guides_of(groom)
     if count <= len(guides.strands):
         return guides
-    own = len(guides.strands)
-    roots = sample_roots(guides.head, count - own, seed, first=own)
+    roots = roots_between(guides, count - len(guides.strands), seed)
     strands = densify(guides, count, seed, roots=roots)
     return replace(
         guides,

@@ -12,6 +12,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
+from hairkit.head_model.reach import Reach
 from hairkit.head_model.template import default_head
 from hairkit.types.head import Head, Roots
 
@@ -41,7 +42,13 @@ _STEPS = np.array(
 
 
 def sample_roots(
-    head: Head, count: int, seed: int = 0, *, first: int = 0, rest: Head | None = None
+    head: Head,
+    count: int,
+    seed: int = 0,
+    *,
+    first: int = 0,
+    rest: Head | None = None,
+    guides: Roots | None = None,
 ) -> Roots:
     """Return `count` roots of a sequence whose every beginning covers the scalp evenly.
 
@@ -67,6 +74,9 @@ def sample_roots(
     rest : Head, optional
         The head before it was fitted; by default the template where `head` has its faces, else
         `head` itself.
+    guides : Roots, optional
+        Roots of guides, between which hair is wanted: only where they stand near enough to each
+        other (`hairkit.head_model.reach`), on the scalp or off it. None: on all the scalp.
 
     Raises
     ------
@@ -75,7 +85,10 @@ def sample_roots(
     """
     if not (count >= 1 and first >= 0 and first + count <= MAX_ROOTS):
         raise InputError(f"{count} roots asked for, expected 1 to {MAX_ROOTS}")
-    triangle, barycentric = _growing_roots(_at_rest(head, rest), first + count, seed)
+    at_rest, reach = _at_rest(head, rest), None
+    if guides is not None:
+        at_rest, reach = _growing_between(at_rest, guides)
+    triangle, barycentric = _growing_roots(at_rest, first + count, seed, reach)
     return roots_at(head, triangle[first:], barycentric[first:])
 
 
@@ -151,11 +164,25 @@ def _at_rest(head: Head, rest: Head | None) -> Head:
     return head
 
 
-def _growing_roots(head: Head, count: int, seed: int) -> tuple[Int32Array, Float64Array]:
+def _growing_between(head: Head, guides: Roots) -> tuple[Head, Reach]:
+    """Return the head with scalp under guides that stand off it, and the reach of all guides."""
+    reach = Reach.of(evaluate(head, guides.triangle, guides.barycentric))
+    on_scalp = (head.scalp[head.faces[guides.triangle]] * guides.barycentric).sum(axis=1) > 0.5
+    if on_scalp.all():
+        return head, reach
+    off = Reach(cKDTree(reach.tree.data[~on_scalp]), reach.radius[~on_scalp])
+    scalp = np.maximum(head.scalp, off.covers(head.vertices))
+    scalp[head.faces[guides.triangle[~on_scalp]]] = 1
+    return replace(head, scalp=scalp), reach
+
+
+def _growing_roots(
+    head: Head, count: int, seed: int, reach: Reach | None
+) -> tuple[Int32Array, Float64Array]:
     """Return the first `count` roots of a seed's sequence that its density keeps."""
     wanted = count
     while True:
-        triangle, barycentric = _progressive_roots(head, wanted, seed)
+        triangle, barycentric = _progressive_roots(head, wanted, seed, reach)
         chance = np.arange(1, wanted + 1) * _GOLDEN % 1.0
         kept = np.flatnonzero(head.density_at(triangle, barycentric) > chance)[:count]
         if len(kept) == count:
@@ -168,9 +195,11 @@ def _growing_roots(head: Head, count: int, seed: int) -> tuple[Int32Array, Float
         wanted = min(int(count / share * _SPARE) + 1, MAX_ROOTS)
 
 
-def _progressive_roots(head: Head, count: int, seed: int) -> tuple[Int32Array, Float64Array]:
+def _progressive_roots(
+    head: Head, count: int, seed: int, reach: Reach | None
+) -> tuple[Int32Array, Float64Array]:
     """Return the first `count` roots of a seed's sequence: faces (N,) and weights (N, 3)."""
-    area = _scalp_area(head)
+    area = _scalp_area(head, reach)
     shift = np.random.PCG64(seed).random_raw(3)  # raw bits are the same in every NumPy (NEP 19)
     faces, weights, points = np.empty(0, np.int32), np.empty((0, 3)), np.empty((0, 3))
     apart, tried = np.empty(0), 0  # metres to the root that is known to be nearest
@@ -179,7 +208,7 @@ def _progressive_roots(head: Head, count: int, seed: int) -> tuple[Int32Array, F
     while found < count:
         radius *= SHRINK
         wanted = int(CANDIDATES_PER_ROOT * PACKING * area.sum() / radius**2) + FIRST_CANDIDATES
-        face, weight = _candidates(head, area, tried, wanted, shift)
+        face, weight = _candidates(head, area, tried, wanted, shift, reach)
         tried = wanted
         faces, weights = np.concatenate([faces, face]), np.concatenate([weights, weight])
         points = np.concatenate([points, evaluate(head, face, weight)])
@@ -188,11 +217,15 @@ def _progressive_roots(head: Head, count: int, seed: int) -> tuple[Int32Array, F
     return faces[taken], weights[taken]
 
 
-def _scalp_area(head: Head) -> Float64Array:
+def _scalp_area(head: Head, reach: Reach | None) -> Float64Array:
     """Return the area (F,) of each face, 0 of those that bear no hair."""
     corners = head.vertices.astype(np.float64)[head.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     bears = head.scalp[head.faces].max(axis=1) > 0.5
+    if reach is not None:
+        middle = corners.mean(axis=1)
+        size = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+        bears &= reach.covers(middle, size)
     area: Float64Array = 0.5 * np.linalg.norm(normal, axis=1) * bears
     if not area.sum() > 0:
         raise InputError("the head's scalp has no area: mark whole faces, not single vertices")
@@ -200,7 +233,12 @@ def _scalp_area(head: Head) -> Float64Array:
 
 
 def _candidates(
-    head: Head, area: Float64Array, first: int, last: int, shift: npt.NDArray[np.uint64]
+    head: Head,
+    area: Float64Array,
+    first: int,
+    last: int,
+    shift: npt.NDArray[np.uint64],
+    reach: Reach | None,
 ) -> tuple[Int32Array, Float64Array]:
     """Return points `first` to `last` of an even sequence that lie on the scalp: faces, weights."""
     index = np.arange(first, last, dtype=np.uint64)[:, None]
@@ -210,6 +248,8 @@ def _candidates(
     root = np.sqrt(root)
     weight = np.stack([1 - root, root * (1 - share), root * share], axis=1)
     on_scalp = (head.scalp[head.faces[face]] * weight).sum(axis=1) > 0.5
+    if reach is not None:
+        on_scalp &= reach.covers(evaluate(head, face, weight))
     return face[on_scalp].astype(np.int32), weight[on_scalp]
 
 

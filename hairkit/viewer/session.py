@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -283,9 +283,9 @@ class Session:
             self._make_body()
 
     def _take(self, opened: Opened) -> None:
-        guides, self._own = split_guides(opened.groom)
+        self._guides, self._own = split_guides(opened.groom)
         self.opened = opened
-        self.simulation = TunableSimulator(self.manager, guides, self._simulator)
+        self.simulation = TunableSimulator(self.manager, self._guides, self._simulator)
         self.motion = HeadMotion(opened.groom.head.joints[1].astype(np.float64))
         self.adjustment, self.adjusted = None, None
         self.layers = Layers(opened.results, self._capture)
@@ -294,9 +294,10 @@ class Session:
         self._make_body()
 
     def _make_body(self) -> None:
-        groom, strands = self.opened.groom, self.simulation.simulator.strands
+        strands = self.simulation.simulator.strands
         hairs = max(self.shown.hairs, len(strands))
-        self.body = HairBody.of(strands, groom.head, groom.material, hairs, self._own, self.seed)
+        moving = replace(self._guides, strands=strands)
+        self.body = HairBody.of(moving, hairs, self._own, self.seed)
         self._sampler = GuideSampler(strands, self.body.shares)
 
 

@@ -10,9 +10,7 @@ from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.grooming.guide_weights import closest_guides, guide_mask
-from hairkit.head_model.scalp import sample_roots
-from hairkit.types.groom import Groom, HairMaterial
-from hairkit.types.head import Head
+from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 MOST_POINTS = 64
@@ -60,31 +58,31 @@ class HairBody:
     @classmethod
     def of(
         cls,
-        guides: Strands,
-        head: Head,
-        material: HairMaterial,
+        groom: Groom,
         hairs: int,
         own: Strands | None = None,
         seed: int = 0,
     ) -> HairBody:
         """Return `hairs` strands: the guides, then hair of `own` or, without it, interpolated hair.
 
-        After the guides the order is random, so that any first part covers the scalp evenly. Raises
-        `InputError` if there are no guides or `hairs` is out of range.
+        All strands of the groom are guides. After them the order is random, so that any first part
+        covers the scalp evenly. Raises `InputError` if there are no guides or `hairs` is out of
+        range.
         """
+        guides = groom.strands
         if not len(guides):
             raise InputError("the groom has 0 guides, expected at least 1")
         if not 0 <= hairs <= MAX_HAIRS:
             raise InputError(f"hairs is {hairs}, expected 0 to {MAX_HAIRS}")
         shares = choose_shares(guides)
         rest = GuideSampler(guides, shares)(guides.points)
-        hair = _arrange_hair(guides, head, material, hairs, own, seed, shares)
+        hair = _arrange_hair(groom, hairs, own, seed, shares)
         mix = closest_guides(hair)
         shape = hair.points.reshape(-1, len(shares), 3)
         course = np.einsum("sk,skmc->smc", mix.weights, rest[mix.guides], optimize=True)
         offsets = (shape - course).astype(np.float32)
         offsets[: len(guides)] = 0  # a guide is where it is
-        widths = np.full(shape.shape[:2], material.width, np.float32)
+        widths = np.full(shape.shape[:2], groom.material.width, np.float32)
         return cls(guides, shares, rest, mix.guides, mix.weights, offsets, widths)
 
 
@@ -178,24 +176,17 @@ def _places(guides: Strands, shares: Float64Array) -> tuple[Int64Array, Float32A
 
 
 def _arrange_hair(
-    guides: Strands,
-    head: Head,
-    material: HairMaterial,
-    hairs: int,
-    own: Strands | None,
-    seed: int,
-    shares: Float64Array,
+    groom: Groom, hairs: int, own: Strands | None, seed: int, shares: Float64Array
 ) -> Strands:
     """Return the guides, marked as such, then other hair in tufts in random order."""
-    count = len(guides)
+    guides, count = groom.strands, len(groom.strands)
     parts = [_sample_rows(_resample_fine(guides), shares)]
     order = np.random.default_rng(seed)
     if own is not None:
         chosen = _shuffle_tufts(own.roots, order)[: max(hairs - count, 0)]
         parts.append(_sample_rows(_resample_fine(own.select(chosen)), shares))
     elif hairs > count:
-        roots = sample_roots(head, hairs - count, seed, first=count)
-        new = densify(guides, hairs, seed, roots=roots, material=material)
+        new = densify(groom, hairs, seed)
         shuffled = new.select(count + _shuffle_tufts(new.roots[count:], order))
         parts.append(_sample_rows(_resample_fine(shuffled), shares))
     total = sum(len(part) for part in parts)

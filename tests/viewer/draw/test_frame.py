@@ -36,7 +36,7 @@ def frame_renderer(request: pytest.FixtureRequest) -> Iterator[FrameRenderer]:
 
 def make_frame_renderer(gl: Renderer, *, soft: bool) -> FrameRenderer:
     """Return a frame renderer with the ball head and 3000 bristles."""
-    body = HairBody.of(GROOM.strands, GROOM.head, GROOM.material, 3000)
+    body = HairBody.of(GROOM, 3000)
     return FrameRenderer(gl, head_solid(GROOM.head, GROOM.material), body, soft)
 
 

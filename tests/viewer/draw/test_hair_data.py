@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hairkit.errors import InputError
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
@@ -21,7 +22,7 @@ from hairkit.viewer.draw.hair_data import (
 def test_hair_lies_at_rest_where_it_was_made() -> None:
     """The guides' mix with the offsets gives a hair of about the guides' length on the scalp."""
     groom = bristle_groom()
-    body = HairBody.of(groom.strands, groom.head, groom.material, 500)
+    body = HairBody.of(groom, 500)
     course = np.einsum("sk,skmc->smc", body.weights, body.guide_rest[body.followed])
     hair = course + body.offsets
     radius = np.linalg.norm(hair[:, 0], axis=1)
@@ -33,7 +34,7 @@ def test_hair_lies_at_rest_where_it_was_made() -> None:
 def test_the_guides_come_first_and_follow_themselves() -> None:
     """A guide's own hair is the guide."""
     groom = bristle_groom()
-    body = HairBody.of(groom.strands, groom.head, groom.material, 400)
+    body = HairBody.of(groom, 400)
     count = len(groom.strands)
     assert (body.followed[:count, 0] == np.arange(count)).all()
     assert (body.weights[:count, 0] == 1).all()
@@ -44,7 +45,7 @@ def test_the_guides_come_first_and_follow_themselves() -> None:
 def test_fewer_hairs_are_a_first_part_of_more_hairs_of_the_same_spread() -> None:
     """The hairs after the guides are in random order: a tenth of them covers the head like all."""
     groom = bristle_groom()
-    body = HairBody.of(groom.strands, groom.head, groom.material, 3000)
+    body = HairBody.of(groom, 3000)
     course = np.einsum("sk,skc->sc", body.weights, body.guide_rest[body.followed][:, :, 0])
     roots = (course + body.offsets[:, 0])[len(groom.strands) :]
     some = roots[: len(roots) // 10]
@@ -81,7 +82,7 @@ def test_marked_guides_are_the_guides_and_the_rest_follows() -> None:
     assert own is not None
     assert len(alone.strands) == guide.sum()
     assert len(own) == (~guide).sum()
-    body = HairBody.of(alone.strands, groom.head, groom.material, 10_000, own)
+    body = HairBody.of(alone, 10_000, own)
     assert len(body) == len(strands)
 
 
@@ -96,6 +97,6 @@ def test_many_unmarked_strands_give_some_guides() -> None:
 def test_a_groom_without_strands_is_refused() -> None:
     """One line says what is missing."""
     groom = bristle_groom()
-    nothing = groom.strands.select(np.zeros(0, int))
+    nothing = select_strands(groom, np.zeros(len(groom.strands), bool))
     with pytest.raises(InputError, match="0 guides"):
-        HairBody.of(nothing, groom.head, groom.material, 10)
+        HairBody.of(nothing, 10)
