@@ -23,6 +23,7 @@ from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR, PERSON, Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import Scene
+from hairkit.types.skin_look import SkinLook
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
 
@@ -47,6 +48,8 @@ KEY, SKY, GROUND = (1.3, 1.26, 1.2), (1.15, 1.15, 1.17), (0.72, 0.71, 0.7)
 photos of evenly lit rooms."""
 EXPOSURE = 0.68
 """Factor of all light in these pictures."""
+LOOK = SkinLook(mean_free_path=(0.0, 0.0, 0.0))
+"""Skin that scatters no light sideways: a pixel is as wide as light goes in the flesh."""
 
 PAPER, INK = 250, 60
 _HAIR_TINT, _PERSON_TINT = (232, 60, 132), (70, 130, 235)
@@ -159,13 +162,20 @@ def _guide_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]
         lights=_lights(),
         bust=True,
         show_direction=True,
+        skin=LOOK,
     )
 
 
 def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
     hair = densify(groom, HAIRS).resampled(GUIDE_POINTS)
     return draw_views(
-        hair, groom.head, cameras, material=groom.material, lights=_lights(), bust=True
+        hair,
+        groom.head,
+        cameras,
+        material=groom.material,
+        lights=_lights(),
+        bust=True,
+        skin=LOOK,
     )
 
 

@@ -128,9 +128,13 @@ def draw_solid(
     camera: Camera,
     depth: DepthRange,
     push: float,
+    maps: Mapping[str, moderngl.Texture] | None = None,
     **uniforms: Any,
 ) -> None:
-    """Draw a mesh with `program` (`solid.vert` or `skin.vert`), its depth `push` metres behind."""
+    """Draw a mesh with `program` (`solid.vert` or `skin.vert`), its depth `push` metres behind.
+
+    `maps` are its pictures from `upload_maps`; None draws it without them.
+    """
     set_camera(program, camera, depth)
     set_uniforms(program, u_push_m=push, **uniforms)
     attributes = {"in_position": mesh.vertices}
@@ -145,9 +149,8 @@ def draw_solid(
     ]
     faces = gl.context.buffer(np.ascontiguousarray(mesh.faces, np.uint32))
     array = gl.context.vertex_array(program, used, index_buffer=faces)
-    with upload_maps(gl, mesh) as maps:
-        set_uniforms(program, **bind_maps(maps))
-        array.render(moderngl.TRIANGLES)
+    set_uniforms(program, **bind_maps(maps or {}))
+    array.render(moderngl.TRIANGLES)
     array.release()
     for buffer in (faces, *[buffer for buffer, _, _ in used]):
         buffer.release()

@@ -127,8 +127,8 @@ def light_volume(density: Density, lights: Lights) -> LightVolume:
     transmittance = np.ones((*grid.shape, 3), np.float32)
     inside = uniform_filter(extinction, 3, mode="constant") > 0
     for channel, direction in enumerate((lights.key_direction, lights.rim_direction)):
-        depth = _optical_depth_towards(extinction, grid, inside, np.array(direction))
-        transmittance[inside, channel] = np.exp(-depth)
+        depth = _optical_depth_towards(extinction, grid.spacing, np.array(direction))
+        transmittance[inside, channel] = np.exp(-depth[inside])
     transmittance[..., :2] = uniform_filter(transmittance[..., :2], (3, 3, 3, 1))
     transmittance[..., 2] = _sky_visibility(extinction, grid.spacing)
     return LightVolume(grid, transmittance)
@@ -161,21 +161,22 @@ def _mark_below_surface(marks: Float32Array, grid: VoxelGrid, solid: Mesh) -> No
 
 
 def _optical_depth_towards(
-    extinction: Float32Array,
-    grid: VoxelGrid,
-    inside: npt.NDArray[np.bool_],
-    direction: npt.NDArray[np.float64],
+    extinction: Float32Array, spacing: float, direction: npt.NDArray[np.float64]
 ) -> Float32Array:
-    """Return the optical depth (N,) from each cell of `inside` to the light, in growing steps."""
-    start = np.argwhere(inside).astype(np.float32)
+    """Return the optical depth (X, Y, Z) from each cell to the light, in growing steps.
+
+    A step leads all cells by the same whole number of cells: the grid is added to itself, shifted.
+    """
     edges = np.cumsum(STEP_GROWTH ** np.arange(STEPS + 1)) * FIRST_STEP
-    limit = np.array(grid.shape)
-    total = np.zeros(len(start), np.float32)
-    padded = np.pad(extinction, 1)
+    total = np.zeros_like(extinction)
     for near, far in pairwise(edges):
-        at = np.rint(start + (0.5 * (near + far) * direction).astype(np.float32)).astype(np.int32)
-        at = np.clip(at, -1, limit) + 1
-        total += padded[at[:, 0], at[:, 1], at[:, 2]] * np.float32((far - near) * grid.spacing)
+        shift = np.rint(0.5 * (near + far) * direction).astype(int)
+        if (np.abs(shift) >= extinction.shape).any():
+            break  # beyond the grid there is nothing
+        size = zip(shift.tolist(), total.shape, strict=True)
+        here = tuple(slice(max(-s, 0), n - max(s, 0)) for s, n in size)
+        there = tuple(slice(p.start + s, p.stop + s) for p, s in zip(here, shift, strict=True))
+        total[here] += extinction[there] * np.float32((far - near) * spacing)
     return total
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,7 +16,7 @@ from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.framebuffer import SUPERSAMPLE, average_samples, supersample_camera, target
 from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.hair import RibbonBuffers, draw_ribbons, ribbons
-from hairkit.rendering.head import Solid, bust_solid, head_solid
+from hairkit.rendering.head import Solid, bust_solid, head_solid, upload_maps
 from hairkit.rendering.light import Lights, LightVolume, hair_density, light_volume
 from hairkit.rendering.skin_passes import draw_skin
 from hairkit.types.camera import Camera
@@ -131,8 +131,10 @@ def draw_views(
     with (
         renderer() as gl,
         ribbons(gl, strands, display_width(strands, material)) as buffers,
+        contextlib.ExitStack() as uploads,
         contextlib.ExitStack() as kept,
     ):
+        maps = [uploads.enter_context(upload_maps(gl, solid)) for solid in shown]
         volume: LightVolume | None = None
         for index, camera in enumerate(cameras):
             shot = _Shot(
@@ -142,7 +144,7 @@ def draw_views(
                 kept.close()
                 volume = light_volume(density, shot.lights)
                 kept.enter_context(_light_texture(gl, volume))
-            samples = _shoot(gl, shot, strands, buffers, look, shown, volume, skin)
+            samples = _shoot(gl, shot, strands, buffers, look, shown, maps, volume, skin)
             background = backgrounds[index] if backgrounds is not None else backdrop(camera)
             pictures.append(_over(average_samples(samples, camera), background))
     return pictures
@@ -202,6 +204,7 @@ def _shoot(
     buffers: RibbonBuffers | None,
     look: dict[str, Any],
     solids: Sequence[Solid],
+    maps: Sequence[Mapping[str, moderngl.Texture]],
     light: LightVolume,
     skin: SkinLook,
 ) -> UInt8Array:
@@ -216,7 +219,7 @@ def _shoot(
     }
     with target(gl, camera) as picture:
         if solids:
-            draw_skin(gl, solids, camera, depth, HEAD_PUSH, skin, uniforms)
+            draw_skin(gl, solids, maps, camera, depth, HEAD_PUSH, skin, uniforms)
         draw_ribbons(
             gl,
             buffers,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import moderngl
@@ -26,6 +26,7 @@ _WAYS = ((1.0, 0.0), (0.0, 1.0))
 def draw_skin(
     gl: Renderer,
     solids: Sequence[Solid],
+    maps: Sequence[Mapping[str, moderngl.Texture]],
     camera: Camera,
     depth: DepthRange,
     push: float,
@@ -34,7 +35,8 @@ def draw_skin(
 ) -> None:
     """Draw meshes into the bound frame buffer, with the depth that hides what is behind them.
 
-    `push` metres are added to their depth; `uniforms` are those of light, eye and exposure.
+    `maps` are those of each mesh (`upload_maps`), `push` metres are added to their depth;
+    `uniforms` are those of light, eye and exposure.
     """
     shown = gl.context.fbo
     with _layers(gl, (camera.width, camera.height)) as layers:
@@ -43,10 +45,10 @@ def draw_skin(
         front.use()
         front.clear()
         gl.context.enable_only(moderngl.DEPTH_TEST)
-        for solid in solids:
+        for solid, pictures in zip(solids, maps, strict=True):
             own = {**uniforms, **look.uniforms(), "u_scatter": solid.scatter, "u_wrapped": 0.0}
             program = gl.program("skin", "skin_layers")
-            draw_solid(gl, solid, program, camera, depth, push, **own)
+            draw_solid(gl, solid, program, camera, depth, push, pictures, **own)
         gl.context.disable(moderngl.DEPTH_TEST)
         skins = [solid for solid in solids if solid.scatter > 0]
         if skins and max(look.mean_free_path) > 0:
