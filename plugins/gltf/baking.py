@@ -1,7 +1,8 @@
-"""A point cache as morph targets: few shapes whose mixture is the motion.
+"""A point cache as morph targets: shapes whose mixture is the motion, with weights from 0 to 1.
 
-The shapes are the principal components of the frames (Alexa and Mueller, Representing Animations
-by Principal Components, 2000), about the shape at rest and in the frame of the moving head.
+The shapes are those of the frames or, where few are enough, the principal components of the frames
+(Alexa and Mueller, Representing Animations by Principal Components, 2000), in the frame of the
+moving head.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.types.point_cache import PointCache
 
 _STILL = 1e-7
+"""Metres: frames whose points shift less from rest need no shape."""
 _WORTH_SAYING = 1e-4
+"""Metres: losses up to this are within what the files promise (docs/engines/web.md)."""
 
 _log = logging.getLogger("hairkit")
 
@@ -31,10 +34,17 @@ class Baked:
     shapes: Float32Array
     """(M, P, 3) shifts of the strands' points from rest, head frame, metres."""
     weights: Float32Array
-    """(T, M) of the shapes; the largest of each shape is 1."""
+    """(T, M) of the shapes, 0 to 1."""
 
 
-def bake(cache: PointCache, rest: Float32Array, step: int, morphs: int, deform: bool) -> Baked:
+def bake(
+    cache: PointCache,
+    rest: Float32Array,
+    step: int,
+    morphs: int,
+    deform: bool,
+    tolerance: float = _WORTH_SAYING,
+) -> Baked:
     """Return the motion in at most `morphs` shapes; a warning states the error.
 
     Parameters
@@ -46,16 +56,18 @@ def bake(cache: PointCache, rest: Float32Array, step: int, morphs: int, deform: 
     step
         Every how manieth frame is taken, from the first.
     morphs
-        As many as frames, or more: the frames themselves are the shapes.
+        As many as moving frames, or more: the motion is kept within the tolerance.
     deform
         False leaves the hair rigid on the head: no shapes.
+    tolerance
+        Metres by which a point may be off where that saves shapes.
     """
     times = cache.times[::step]
     motion = cache.head_from_rest[::step]
     shapes, weights = np.zeros((0, *rest.shape), np.float32), np.zeros((len(times), 0), np.float32)
     if deform:
         shifts = _shifts(cache.points[::step], motion, rest)
-        shapes, weights = _principal(shifts, morphs)
+        shapes, weights = _mixed(shifts, morphs, tolerance)
     return Baked((times - times[0]).astype(np.float32), motion, shapes, weights)
 
 
@@ -69,34 +81,85 @@ def _shifts(points: Float32Array, motion: Float64Array, rest: Float32Array) -> F
     return shifts
 
 
-def _principal(shifts: Float32Array, morphs: int) -> tuple[Float32Array, Float32Array]:
-    """Return shapes (M, P, 3) and weights (T, M) whose product is nearest to the shifts."""
+def _mixed(
+    shifts: Float32Array, morphs: int, tolerance: float
+) -> tuple[Float32Array, Float32Array]:
+    """Return shapes (M, P, 3) and weights (T, M), 0 to 1, whose product is near the shifts.
+
+    They are the moving frames themselves, or the fewest components within the tolerance where
+    those are fewer.
+    """
     flat = shifts.reshape(len(shifts), -1)
     moving = np.flatnonzero(np.abs(flat).max(axis=1) > _STILL)
-    if len(moving) <= morphs:
+    mean = flat.mean(axis=0)
+    flat -= mean
+    components = _components(flat)
+    most = min(morphs, len(moving)) - 1
+    count = _fewest(flat, components, most, tolerance) if most > 0 else max(most, 0)
+    if count == most and len(moving) <= morphs:
+        flat += mean
         return shifts[moving], np.eye(len(shifts), dtype=np.float32)[:, moving]
+    weights = components[:, :count]
+    shapes = weights.T @ flat
+    if count == most:
+        _say_loss(flat, weights, shapes, len(moving))
+    shapes, weights = _not_negative(shapes, weights, mean)
+    return shapes.reshape(-1, *shifts.shape[1:]), weights
+
+
+def _components(flat: Float32Array) -> Float32Array:
+    """Return (T, T) orthonormal weights of the frames' components, the largest first."""
     # eigenvectors of the small matrix of products between frames, not of the large one of points
     products = (flat @ flat.T).astype(np.float64)
-    weights = np.linalg.eigh(products)[1][:, ::-1][:, :morphs]
-    largest = np.abs(weights).argmax(axis=0)
-    scale = weights[largest, np.arange(weights.shape[1])]
-    shapes = ((weights * scale).T.astype(np.float32) @ flat).reshape(-1, *shifts.shape[1:])
-    mix = (weights / scale).astype(np.float32)
-    _say_loss(flat, mix, shapes.reshape(len(shapes), -1))
-    return shapes, mix
+    vectors: Float32Array = np.linalg.eigh(products)[1][:, ::-1].astype(np.float32)
+    return vectors
 
 
-def _say_loss(flat: Float32Array, mix: Float32Array, shapes: Float32Array) -> None:
+def _fewest(flat: Float32Array, components: Float32Array, most: int, tolerance: float) -> int:
+    """Return how many components keep every point within the tolerance; `most` if none do."""
+    low, high = 0, most
+    while low < high:
+        middle = (low + high) // 2
+        weights = components[:, :middle]
+        if _loss(flat, weights, weights.T @ flat)[0] <= tolerance:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+def _not_negative(
+    shapes: Float32Array, weights: Float32Array, mean: Float32Array
+) -> tuple[Float32Array, Float32Array]:
+    """Return the same mixtures with weights from 0 to 1, the first of them 1 in every frame.
+
+    Shape keys of Blender and blend shapes of engines take no other weights. The first shape is
+    what all frames have in common: the mean, and each component at its lowest weight.
+    """
+    low, high = weights.min(axis=0), weights.max(axis=0)
+    span = np.maximum(high - low, 1e-12)
+    common = mean + low @ shapes
+    mix = np.concatenate([np.ones((len(weights), 1)), (weights - low) / span], axis=1)
+    return np.concatenate([common[None], span[:, None] * shapes]), mix.astype(np.float32)
+
+
+def _loss(flat: Float32Array, weights: Float32Array, shapes: Float32Array) -> tuple[float, float]:
+    """Return the largest and the root mean square distance of a point from the frames, metres."""
     worst = total = 0.0
-    for row, weight in zip(flat, mix, strict=True):
+    for row, weight in zip(flat, weights, strict=True):
         off = ((row - weight @ shapes).reshape(-1, 3) ** 2).sum(axis=1)
         worst, total = max(worst, float(off.max())), total + float(off.mean())
-    if np.sqrt(worst) > _WORTH_SAYING:
+    return float(np.sqrt(worst)), float(np.sqrt(total / len(flat)))
+
+
+def _say_loss(flat: Float32Array, weights: Float32Array, shapes: Float32Array, exact: int) -> None:
+    worst, mean = _loss(flat, weights, shapes)
+    if worst > _WORTH_SAYING:
         _log.warning(
             "%d frames in %d morph targets are off by %.2g mm, %.2g mm at most; more morphs=%d",
             len(flat),
-            len(shapes),
-            1000 * np.sqrt(total / len(flat)),
-            1000 * np.sqrt(worst),
-            len(flat),
+            len(shapes) + 1,
+            1000 * mean,
+            1000 * worst,
+            exact,
         )

@@ -32,7 +32,7 @@ _SCALP_SHADE = 0.6
 
 
 class Meshes:
-    """Adds meshes to a document, all skinned to the head joint."""
+    """Adds meshes to a document; triangles are skinned, lines hang on the head joint."""
 
     def __init__(self, document: Document, groom: Groom) -> None:
         self.document, self.groom = document, groom
@@ -103,7 +103,7 @@ class Meshes:
         return self._with_shapes(f"hair_LOD{level}", primitive, mesh.shapes)
 
     def lines(self, groom: Groom, shapes: Float32Array, which: str) -> int:
-        """Add one indexed LINES primitive of strands and return its mesh."""
+        """Add one indexed LINES primitive of strands, without skin, and return its mesh."""
         if which == "guides":
             keep = guide_mask(groom.strands)
             if not keep.any():
@@ -115,7 +115,6 @@ class Meshes:
             "POSITION": add(strands.points, bounds=True),
             "_STRAND_ID": add(_at_points(strands, np.arange(len(strands)))),
             "_STRAND_T": add(_shares(strands)),
-            **self._skin(len(strands.points)),
         }
         described: dict[str, Any] = {"strands": len(strands)}
         if (strands.counts == strands.counts[0]).all():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from typing import Protocol
 
@@ -22,6 +23,8 @@ from .texture import strand_pictures, white_picture
 
 BODY = ("head_mesh", "torso")
 """Meshes without the hair's shapes."""
+LINES = "guides"
+"""The mesh that no client skins: three.js skins triangles alone."""
 _CUTOFF = 0.4
 _STRANDS_ON = {"ribbons": 6, "cards": 22}
 """Strands in the picture of each strip."""
@@ -73,7 +76,7 @@ def groom_document(ready: PreparedGroom, options: SceneOptions) -> Document:
             levels.append([(f"hair_LOD{level}", meshes.hair(mesh, material, level))])
     first = levels[0] if levels else []
     if options.lines != "none":
-        first = [("guides", meshes.lines(groom, shapes, options.lines)), *first]
+        first = [(LINES, meshes.lines(groom, shapes, options.lines)), *first]
     if not (first or shared):
         raise InputError("lines=none, hair=none and head_mesh=false leave nothing to write")
     scenes = [[*shared, *first], *([*shared, *level] for level in levels[1:])]
@@ -108,17 +111,37 @@ def _scene(
         numbers.append(document.add("nodes", name=name, translation=offset.tolist()))
     for above, below in itertools.pairwise(numbers):
         document.json["nodes"][above]["children"] = [below]
-    skin = document.add(
-        "skins",
-        name="skeleton",
-        joints=numbers,
-        skeleton=numbers[0],
-        inverseBindMatrices=_inverse_bind(document, joints),
-    )
-    nodes = [document.add("nodes", name=name, mesh=mesh, skin=skin) for name, mesh in parts]
-    document.add("scenes", name=f"LOD{level}", nodes=[numbers[0], *nodes])
+    nodes, at_top = [], []
+    skin = _skin(document, numbers, joints) if any(name != LINES for name, _ in parts) else None
+    for name, mesh in parts:
+        if name == LINES:
+            node = document.add("nodes", name=name, mesh=mesh, translation=_back(offsets))
+            document.json["nodes"][numbers[HEAD_JOINT]]["children"] = [node]
+        else:
+            node = document.add("nodes", name=name, mesh=mesh, skin=skin)
+            at_top.append(node)
+        nodes.append(node)
+    document.add("scenes", name=f"LOD{level}", nodes=[numbers[0], *at_top])
     moving = [node for node, (name, _) in zip(nodes, parts, strict=True) if name not in BODY]
     return numbers[HEAD_JOINT], moving if morphs else []
+
+
+def _back(offsets: Float64Array) -> list[float]:
+    """Return the translation that leads from the head joint to the origin, without a remainder."""
+    # summed in the order in which readers multiply the nodes' transforms
+    place = functools.reduce(np.add, offsets)
+    back: list[float] = (-place).tolist()
+    return back
+
+
+def _skin(document: Document, nodes: list[int], joints: Float64Array) -> int:
+    return document.add(
+        "skins",
+        name="skeleton",
+        joints=nodes,
+        skeleton=nodes[0],
+        inverseBindMatrices=_inverse_bind(document, joints),
+    )
 
 
 def _inverse_bind(document: Document, joints: Float64Array) -> int:

@@ -50,6 +50,24 @@ def nodding(groom: Groom, frames: int = 3) -> PointCache:
     return PointCache(moved(motion, guides.points), np.arange(frames) / 24, motion)
 
 
+def swinging(groom: Groom, frames: int, speeds: Float64Array) -> PointCache:
+    """Return 24 frames a second: a nodding head whose hair is a sum of waves.
+
+    `speeds` are radians a frame; every wave moves the points in directions of its own, the more the
+    farther they are from the root.
+    """
+    rng, still = np.random.default_rng(7), nodding(groom, frames)
+    guides = groom.strands.select(guide_mask(groom.strands))
+    arc = guides.arc_lengths()
+    size = (len(speeds), *guides.points.shape)
+    shapes = rng.normal(scale=0.02 / np.sqrt(len(speeds)), size=size) * (arc / arc.max())[:, None]
+    phase = rng.uniform(0, 2 * np.pi, len(speeds))
+    shifts = np.einsum("tw,wpc->tpc", np.sin(np.arange(frames)[:, None] * speeds + phase), shapes)
+    turns, places = still.head_from_rest[:, :3, :3], still.head_from_rest[:, None, :3, 3]
+    points = np.einsum("tij,tpj->tpi", turns, guides.points + shifts) + places
+    return PointCache(points, still.times, still.head_from_rest)
+
+
 def moved(motion: Float64Array, points: Float32Array) -> Float32Array:
     """Return points (P, 3) under each of the rigid motions (T, 4, 4): (T, P, 3)."""
     turned = np.einsum("tij,pj->tpi", motion[:, :3, :3], points) + motion[:, None, :3, 3]
