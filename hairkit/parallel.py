@@ -17,6 +17,7 @@ from itertools import pairwise
 from typing import Any, TypeVar, cast
 
 from numba import config, njit
+from numba.core.caching import FunctionCache
 
 TASKS_PER_THREAD = 3
 """Ranges for each thread: what one that is held up leaves is taken by the others."""
@@ -26,8 +27,24 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 def compiled(function: _Function) -> _Function:
     """Compile a function that releases Python's lock and divides as NumPy does."""
-    made: Any = njit(cache=True, nogil=True, error_model="numpy")(function)
+    made: Any = njit(nogil=True, error_model="numpy")(function)
+    made._cache = _Cache(function)  # type: ignore[no-untyped-call]
     return cast(_Function, made)
+
+
+class _Cache(FunctionCache):
+    """Numba's cache of a function, empty where its index names types that are no more.
+
+    Numba reads the types of all that is in the index before it looks whether the source is older,
+    so that after an update with a type renamed every call would fail.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except (AttributeError, ImportError):
+            self.flush()  # type: ignore[no-untyped-call]
+            return None
 
 
 def thread_count() -> int:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
+import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,3 +56,32 @@ def test_an_error_on_any_thread_is_raised() -> None:
 
     with pytest.raises(ValueError, match=r"\d"):
         parallel_for(fail, 1000)
+
+
+def test_a_cache_that_names_a_type_of_an_older_version_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A module updated with a type renamed compiles again, and finds its own cache afterwards."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    for name in ("Older", "Newer", "Newer"):
+        (tmp_path / "updated_kernels.py").write_text(KERNELS.format(name=name))
+        monkeypatch.delitem(sys.modules, "updated_kernels", raising=False)
+        importlib.invalidate_caches()
+        kernels = importlib.import_module("updated_kernels")
+        assert kernels.total(getattr(kernels, name)(1.5, 2.0)) == 3.5
+    assert sum(kernels.total.stats.cache_hits.values()) == 1
+
+
+KERNELS = """
+from typing import NamedTuple
+from hairkit.parallel import compiled
+
+class {name}(NamedTuple):
+    first: float
+    second: float
+
+@compiled
+def total(both):
+    return both.first + both.second
+"""
+"""A module with one compiled function of a type whose name changes."""

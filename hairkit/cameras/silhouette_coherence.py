@@ -18,12 +18,14 @@ from hairkit.parallel import compiled, parallel_for
 
 REACH = 0.28
 """Rays are searched this far before and behind the turn's centre, metres: heads are smaller."""
-STEPS = (0.012, 0.0015)
+STEPS = (0.03, 0.0015)
 """Steps of two searches along a ray, metres: the second passes over what cannot beat the first."""
 FINE = 5
 """Halvings of the step after them."""
-FASTEST = 3.0
-"""A point on a ray moves at most this times (pixels per metre at the turn's centre) in a view."""
+STEEPEST = 1.5
+"""Bound of the slope of signed distances: 1, but more between pixels and off the picture."""
+FOREVER = 9.0
+"""A step longer than any ray, metres."""
 NEAREST = 1e-3
 """Points less far in front of a camera, metres, are not seen."""
 CAP = 40.0
@@ -38,6 +40,10 @@ MOTIONS = 7
 """Small motions of a camera: turns about its axes, shifts along them, log of the focal length."""
 ZOOM = 6
 """The motion that scales the focal length."""
+LINE = 7
+"""Numbers of a ray's line in a view: at depth z it is at `((z a + b) / w, (z c + d) / w)` with
+`w = z e + f`, in pixels of the field (Hartley and Zisserman, "Multiple view geometry", 2004, 9.1);
+the last, over w^2, bounds by how many pixels the signed distance changes per metre of depth."""
 
 
 def coherence(
@@ -104,30 +110,6 @@ class _Views(NamedTuple):
     """Of the minimum over silhouettes, pixels."""
 
 
-class _Ray(NamedTuple):
-    """A viewing ray in all views; a point on it at depth z is `z * relative + offset`."""
-
-    own: int
-    """The view whose outline it goes through."""
-    direction: Float64Array
-    """(3,) in camera axes of that view, depth 1."""
-    relative: Float64Array
-    """(V, 3) direction in camera axes of all views."""
-    offset: Float64Array
-    """(V, 3) camera coordinates of its start, metres."""
-
-
-class _Slopes(NamedTuple):
-    """Gradients of the other silhouettes' distances at a point on a ray."""
-
-    distance: Float64Array
-    """(V,) pixels."""
-    gradient: Float64Array
-    """(V, 3) by the point's camera coordinates, pixels per metre."""
-    zoom: Float64Array
-    """(V,) by the logarithm of the view's focal length, pixels."""
-
-
 @compiled
 def _search_rays(
     first: int,
@@ -139,116 +121,145 @@ def _search_rays(
     slope: Float64Array,
 ) -> None:
     """Write value (N,) and slope (N, V, MOTIONS) of the contour points `first` to `last`."""
+    count = len(views.focal)
+    lines, distance = np.empty((count, LINE)), np.empty(count)
+    ray = np.ones(3)
     for n in range(first, last):
-        ray = _ray(views, owners[n], points[n])
-        value[n], z = _best_on_ray(views, ray)
-        _add_slopes(views, ray, z, slope[n])
+        own = owners[n]
+        for axis in range(2):
+            ray[axis] = (points[n, axis] - views.centre[own, axis]) / views.focal[own]
+        _draw_ray(views, own, ray, lines)
+        value[n], z = _best_on_ray(views, own, lines, distance)
+        _add_slopes(views, own, lines, ray, z, distance, slope[n])
 
 
 @compiled
-def _ray(views: _Views, own: int, point: Float64Array) -> _Ray:
-    """Return the ray through a picture point (2,) of a view."""
-    direction = np.empty(3)
-    direction[0] = (point[0] - views.centre[own, 0]) / views.focal[own]
-    direction[1] = (point[1] - views.centre[own, 1]) / views.focal[own]
-    direction[2] = 1.0
-    relative = np.empty((len(views.focal), 3))
-    for view in range(len(relative)):
-        _rotate(views.turns[own, view], direction, relative[view])
-    return _Ray(own, direction, relative, views.shifts[own])
+def _draw_ray(views: _Views, own: int, ray: Float64Array, lines: Float64Array) -> None:
+    """Write the lines (V, LINE) of a ray (3,), in camera axes of `own`, in all views."""
+    for view in range(len(lines)):
+        turn, line, scale = views.turns[own, view], lines[view], views.scale
+        line[4] = turn[2, 0] * ray[0] + turn[2, 1] * ray[1] + turn[2, 2]
+        line[5] = views.shifts[own, view, 2]
+        for axis in range(2):
+            along = turn[axis, 0] * ray[0] + turn[axis, 1] * ray[1] + turn[axis, 2]
+            focal = views.focal[view] * scale
+            middle = views.centre[view, axis] * scale - 0.5
+            line[2 * axis] = focal * along + middle * line[4]
+            line[2 * axis + 1] = focal * views.shifts[own, view, axis] + middle * line[5]
+        right = line[0] * line[5] - line[1] * line[4]
+        down = line[2] * line[5] - line[3] * line[4]
+        line[6] = STEEPEST * np.hypot(right, down) / scale
 
 
 @compiled
-def _rotate(turn: Float64Array, vector: Float64Array, result: Float64Array) -> None:
-    """Write turn (3, 3) times vector (3,)."""
-    for i in range(3):
-        result[i] = turn[i, 0] * vector[0] + turn[i, 1] * vector[1] + turn[i, 2] * vector[2]
-
-
-@compiled
-def _best_on_ray(views: _Views, ray: _Ray) -> tuple[float, float]:
+def _best_on_ray(
+    views: _Views, own: int, lines: Float64Array, distance: Float64Array
+) -> tuple[float, float]:
     """Return the largest of the rays' smallest distances, pixels, and its depth, metres.
 
-    Coarse steps, finer ones where more may be found, then halvings about the best. Distances change
-    along a ray by at most `fastest` pixels a metre, so that steps may be longer where a silhouette
-    is far off.
+    Coarse steps, finer ones where more may be found, then halvings about the best. `distance` (V,)
+    is work space, and has the distances at that depth in the end.
     """
-    middle = views.middle[ray.own]
-    fastest = FASTEST * views.focal[ray.own] / middle
-    z, best, step = middle, -np.inf, 0.0
+    middle = views.middle[own]
+    z, best, step, nearest = middle, -np.inf, 0.0, own
     for step in STEPS:
         at = middle - REACH
         while at <= middle + REACH and best < CAP:
-            here = _smallest_distance(views, ray, at, best)
+            here, nearest = _smallest_distance(views, own, lines, at, best, nearest)
             if here > best:
                 best, z = here, at
-            at += max(step, (best - here) / fastest)
-    best = _soft_distance(views, ray, z)
+                at += step
+            else:
+                at += max(step, _hopeless(lines[nearest], at, best - here))
+    best = _soft_distance(views, own, lines, z, distance)
     for _ in range(FINE):
         step *= 0.5
         for side in (-1.0, 1.0):
             at = z + side * step
-            here = _soft_distance(views, ray, at)
+            here = _soft_distance(views, own, lines, at, distance)
             if here > best:
                 best, z = here, at
-    return best, z
+    return _soft_distance(views, own, lines, z, distance), z
 
 
 @compiled
-def _soft_distance(views: _Views, ray: _Ray, z: float) -> float:
-    """Return the soft minimum of all other silhouettes' distances at depth z.
+def _hopeless(line: Float64Array, z: float, short: float) -> float:
+    """Return how far behind depth z a view's distance stays too small by `short` pixels, metres."""
+    depth = z * line[4] + line[5]
+    rest = line[6] - short * depth * line[4]
+    if depth < NEAREST or rest <= 0:
+        return FOREVER if depth >= NEAREST else 0.0
+    result: float = short * depth * depth / rest
+    return result
+
+
+@compiled
+def _soft_distance(
+    views: _Views, own: int, lines: Float64Array, z: float, distance: Float64Array
+) -> float:
+    """Return the soft minimum of all other silhouettes' distances (V,) at depth z, and write them.
 
     It equals the minimum where two silhouettes bound the ray equally, so that the derivative does
     not jump when others come to bound it.
     """
-    least = _smallest_distance(views, ray, z, -np.inf)
+    least = CAP
+    for view in range(len(lines)):
+        distance[view] = CAP if view == own else _distance(views, lines, view, z)
+        least = min(least, distance[view])
     total = 0.0
-    for view in range(len(views.fields)):
-        if view != ray.own:
-            total += np.exp((least - _distance(views, ray, view, z)) / views.softness)
+    for view in range(len(lines)):
+        if view != own:
+            total += np.exp((least - distance[view]) / views.softness)
     result: float = least - views.softness * np.log(total / 2.0)
     return result
 
 
 @compiled
-def _smallest_distance(views: _Views, ray: _Ray, z: float, bar: float) -> float:
-    """Return the smallest distance of all other silhouettes at depth z; below `bar`, any such."""
-    best = CAP
-    for view in range(len(views.fields)):
-        if view == ray.own:
-            continue
-        best = min(best, _distance(views, ray, view, z))
+def _smallest_distance(
+    views: _Views, own: int, lines: Float64Array, z: float, bar: float, likely: int
+) -> tuple[float, int]:
+    """Return the smallest distance of all other silhouettes at depth z, and whose it is.
+
+    Below `bar`, any such; the view that is `likely` to have it is tried before the others.
+    """
+    best, nearest = CAP, likely
+    if likely != own:
+        best = _distance(views, lines, likely, z)
+    for view in range(len(lines)):
         if best < bar:
-            return best
-    return best
+            break
+        if view != own and view != likely:
+            here = _distance(views, lines, view, z)
+            if here < best:
+                best, nearest = here, view
+    return best, nearest
 
 
 @compiled
-def _distance(views: _Views, ray: _Ray, view: int, z: float) -> float:
+def _distance(views: _Views, lines: Float64Array, view: int, z: float) -> float:
     """Return the signed distance of a point on a ray to a view's silhouette, pixels."""
-    x = z * ray.relative[view, 0] + ray.offset[view, 0]
-    y = z * ray.relative[view, 1] + ray.offset[view, 1]
-    depth = z * ray.relative[view, 2] + ray.offset[view, 2]
-    if depth < NEAREST:
-        return CAP
-    u = views.focal[view] * x / depth + views.centre[view, 0]
-    v = views.focal[view] * y / depth + views.centre[view, 1]
-    return _sample(views.fields[view], views.scale, u, v)[0]
+    return _sample(views, lines, view, z)[0]
 
 
 @compiled
-def _sample(field: Float32Array, scale: float, u: float, v: float) -> tuple[float, float, float]:
-    """Return the signed distance at a picture pixel and its derivatives by u and v.
+def _sample(views: _Views, lines: Float64Array, view: int, z: float) -> tuple[float, float, float]:
+    """Return a view's signed distance at depth z of a ray and its derivatives by the pixel.
 
     Bilinear; CAP without slope where the distance is larger. Outside the picture, of which nothing
     is known, it grows from that at the edge by the distance from the edge.
     """
-    height, width = field.shape
-    x, y = u * scale - 0.5, v * scale - 0.5
-    right, down = min(max(x, 0.0), width - BORDER), min(max(y, 0.0), height - BORDER)
+    depth = z * lines[view, 4] + lines[view, 5]
+    if depth < NEAREST:
+        return CAP, 0.0, 0.0
+    x = (z * lines[view, 0] + lines[view, 1]) / depth
+    y = (z * lines[view, 2] + lines[view, 3]) / depth
+    field, scale = views.fields, views.scale
+    right = min(max(x, 0.0), field.shape[2] - BORDER)
+    down = min(max(y, 0.0), field.shape[1] - BORDER)
     i, j = int(down), int(right)
     fy, fx = down - i, right - j
-    a, b, c, d = field[i, j], field[i, j + 1], field[i + 1, j], field[i + 1, j + 1]
+    a, b = field[view, i, j], field[view, i, j + 1]
+    c, d = field[view, i + 1, j], field[view, i + 1, j + 1]
     beyond = abs(x - right) + abs(y - down)
     value = (a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy + beyond / scale
     if value > CAP:
@@ -261,62 +272,56 @@ def _sample(field: Float32Array, scale: float, u: float, v: float) -> tuple[floa
 
 
 @compiled
-def _slopes_at(views: _Views, ray: _Ray, z: float) -> _Slopes:
-    """Return how the distances of all other silhouettes change at depth z of a ray."""
-    count = len(views.fields)
-    distance = np.full(count, CAP)
-    gradient, zoom = np.zeros((count, 3)), np.zeros(count)
-    for view in range(count):
-        local = z * ray.relative[view] + ray.offset[view]
-        if view == ray.own or local[2] < NEAREST:
-            continue
-        focal = views.focal[view]
-        x, y = focal * local[0] / local[2], focal * local[1] / local[2]
-        distance[view], by_u, by_v = _sample(
-            views.fields[view], views.scale, x + views.centre[view, 0], y + views.centre[view, 1]
-        )
-        gradient[view, 0] = by_u * focal / local[2]
-        gradient[view, 1] = by_v * focal / local[2]
-        gradient[view, 2] = -(by_u * x + by_v * y) / local[2]
-        zoom[view] = by_u * x + by_v * y
-    return _Slopes(distance, gradient, zoom)
-
-
-@compiled
-def _add_slopes(views: _Views, ray: _Ray, z: float, slope: Float64Array) -> None:
+def _add_slopes(
+    views: _Views,
+    own: int,
+    lines: Float64Array,
+    ray: Float64Array,
+    z: float,
+    distance: Float64Array,
+    slope: Float64Array,
+) -> None:
     """Add to slope (V, MOTIONS) the derivative of the best value, at depth z of a ray.
 
-    Every silhouette has the share that the soft minimum gives it; at the best depth the derivative
-    by depth is 0, so that depth may be held.
+    Every silhouette has the share that the soft minimum gives its distance (V,); at the best depth
+    the derivative by depth is 0, so that depth may be held.
     """
-    slopes = _slopes_at(views, ray, z)
-    least = slopes.distance.min()
+    least = distance.min()
     if least >= CAP:
         return
-    share = np.exp((least - slopes.distance) / views.softness)
+    share = np.exp((least - distance) / views.softness)
+    share[own] = 0.0
     share /= share.sum()
     for view in range(len(share)):
         if share[view] > LEAST_SHARE:
-            _add_slope(views, ray, z, slopes, view, share[view], slope)
+            _add_slope(views, own, lines, ray, z, view, share[view], slope)
 
 
 @compiled
 def _add_slope(
     views: _Views,
-    ray: _Ray,
+    own: int,
+    lines: Float64Array,
+    ray: Float64Array,
     z: float,
-    slopes: _Slopes,
     view: int,
     weight: float,
     slope: Float64Array,
 ) -> None:
     """Add a silhouette's share: its own camera moves the point, the ray's camera the ray."""
-    own, g, back = ray.own, slopes.gradient[view], np.empty(3)
-    local, seen = z * ray.relative[view] + ray.offset[view], z * ray.direction
-    _rotate(views.turns[view, own], g, back)
-    _add_moment(local, g, weight, slope[view])
+    _, by_u, by_v = _sample(views, lines, view, z)
+    seen, turn, focal = z * ray, views.turns[own, view], views.focal[view]
+    local = views.shifts[own, view].copy()
+    for i in range(3):
+        local[i] += turn[i, 0] * seen[0] + turn[i, 1] * seen[1] + turn[i, 2] * seen[2]
+    zoom = focal * (by_u * local[0] + by_v * local[1]) / local[2]
+    force = np.array([by_u * focal, by_v * focal, -zoom]) / local[2]
+    back = np.zeros(3)
+    for i in range(3):
+        back[i] = turn[0, i] * force[0] + turn[1, i] * force[1] + turn[2, i] * force[2]
+    _add_moment(local, force, weight, slope[view])
     _add_moment(seen, back, -weight, slope[own])
-    slope[view, ZOOM] += weight * slopes.zoom[view]
+    slope[view, ZOOM] += weight * zoom
     slope[own, ZOOM] -= weight * (seen[0] * back[0] + seen[1] * back[1])
 
 

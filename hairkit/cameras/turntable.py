@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from hairkit.arrays import Float64Array
 from hairkit.types.camera import Camera
@@ -72,45 +73,45 @@ class Turn:
         return SHARED + PER_VIEW * len(self.azimuths)
 
     def unpack(self, vector: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
-        """Return rotations (V, 3, 3), translations (V, 3) and focal lengths (V,) in pixels."""
-        views = vector[SHARED:].reshape(-1, PER_VIEW)
-        far = 1.0 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE)
-        view_rotation = _view_rotations(
-            self.azimuths + views[:, 0], self.elevations + views[:, 1], views[:, 2]
-        )
-        rotation = view_rotation @ rotation_matrix(vector[:3])
-        offset = np.stack([views[:, 4], views[:, 5], far * np.exp(views[:, 3])], axis=1)
-        translation = offset - rotation @ vector[CENTRE]
-        return rotation, translation, np.exp(vector[LOG_MAGNIFICATION]) * far * self.focal_ratios
+        """Return rotations (..., V, 3, 3), translations (..., V, 3) and focal lengths (..., V).
+
+        Focal lengths are in pixels; of vectors (..., size).
+        """
+        shared = vector[..., :SHARED]
+        views = vector[..., SHARED:].reshape(*vector.shape[:-1], -1, PER_VIEW)
+        far = 1.0 / np.maximum(shared[..., PERSPECTIVE, None], MIN_PERSPECTIVE)
+        tilt = Rotation.from_rotvec(shared[..., :3].reshape(-1, 3)).as_matrix()
+        rotation = _view_rotations(
+            self.azimuths + views[..., 0], self.elevations + views[..., 1], views[..., 2]
+        ) @ tilt.reshape(*vector.shape[:-1], 1, 3, 3)
+        aim = np.stack([views[..., 4], views[..., 5], far * np.exp(views[..., 3])], axis=-1)
+        translation = aim - (rotation @ shared[..., None, CENTRE, None])[..., 0]
+        focal = np.exp(shared[..., LOG_MAGNIFICATION, None]) * far * self.focal_ratios
+        return rotation, translation, focal
 
     def tangents(self, vector: Float64Array) -> Float64Array:
         """Return (V, 7, size): how camera motions follow the vector's numbers.
 
         Rows: small rotation w and move t of camera coordinates, `dx = w x x + t`, then log of the
-        focal length.
+        focal length. Differences: no two views share a number of their own, so that all views
+        move at once.
         """
-        step = 1e-6
-        result = np.zeros((len(self.azimuths), 7, self.size))
-        for column in range(SHARED):
-            moved = vector.copy()
-            moved[column] += step
-            result[:, :, column] = self._tangent(vector, moved) / step
-        own = np.arange(len(self.azimuths))
-        for column in range(PER_VIEW):
-            moved = vector.copy()
-            moved[SHARED + column :: PER_VIEW] += step
-            places = SHARED + PER_VIEW * own + column
-            result[own, :, places] = self._tangent(vector, moved) / step
-        return result
-
-    def _tangent(self, vector: Float64Array, moved: Float64Array) -> Float64Array:
-        """Return (V, 7) the small motions from the cameras of one vector to another's."""
+        step, views = 1e-6, len(self.azimuths)
+        moves = np.zeros((SHARED + PER_VIEW, self.size))
+        moves[:SHARED, :SHARED] = step * np.eye(SHARED)
+        moves[SHARED:, SHARED:] = np.tile(step * np.eye(PER_VIEW), views)
         rotation, translation, focal = self.unpack(vector)
-        turned, shifted, zoomed = self.unpack(moved)
+        turned, shifted, zoomed = self.unpack(vector + moves)
         spin = (turned - rotation) @ rotation.transpose(0, 2, 1)
-        w = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
+        w = np.stack([spin[..., 2, 1], spin[..., 0, 2], spin[..., 1, 0]], axis=-1)
         move = shifted - translation - np.cross(w, translation)
-        return np.concatenate([w, move, np.log(zoomed / focal)[:, None]], axis=1)
+        motions = np.concatenate([w, move, np.log(zoomed / focal)[..., None]], axis=-1) / step
+        result = np.zeros((views, motions.shape[-1], self.size))
+        result[:, :, :SHARED] = motions[:SHARED].transpose(1, 2, 0)
+        own = np.arange(views)
+        places = SHARED + PER_VIEW * own[:, None] + np.arange(PER_VIEW)
+        result[own[:, None], :, places] = motions[SHARED:].transpose(1, 0, 2)
+        return result
 
     def nominal(self, magnification: float, perspective: float) -> tuple[Camera, ...]:
         """Return level cameras on the nominal turn about the origin.
@@ -179,34 +180,14 @@ def view_angles(rotation: Float64Array) -> Float64Array:
     return np.array([azimuth, elevation, roll])
 
 
-def rotation_matrix(vector: npt.ArrayLike) -> Float64Array:
-    """Return the rotation (3, 3) about `vector` by its length in radians (Rodrigues)."""
-    axis = np.asarray(vector, np.float64)
-    angle = float(np.linalg.norm(axis))
-    if angle < 1e-12:
-        return np.eye(3) + _cross_matrix(axis)
-    cross = _cross_matrix(axis / angle)
-    result: Float64Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-    return result
-
-
-def _cross_matrix(v: Float64Array) -> Float64Array:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-
-
 def _view_rotations(
     azimuth: Float64Array, elevation: Float64Array, roll: Float64Array
 ) -> Float64Array:
-    """Return (V, 3, 3), as `Camera.on_turn` sets its axes."""
-    zero = np.zeros_like(azimuth)
-    sin_a, cos_a, sin_e, cos_e = (
-        np.sin(azimuth),
-        np.cos(azimuth),
-        np.sin(elevation),
-        np.cos(elevation),
-    )
-    back = np.stack([sin_a * cos_e, sin_e, cos_a * cos_e], axis=1)
-    right = np.stack([cos_a, zero, -sin_a], axis=1)
-    down = np.stack([sin_a * sin_e, -cos_e, cos_a * sin_e], axis=1)
-    cosine, sine = np.cos(roll)[:, None], np.sin(roll)[:, None]
-    return np.stack([cosine * right - sine * down, sine * right + cosine * down, -back], axis=1)
+    """Return (..., 3, 3), as `Camera.on_turn` sets its axes, of angles (...) in radians."""
+    sin_a, cos_a = np.sin(azimuth), np.cos(azimuth)
+    sin_e, cos_e = np.sin(elevation), np.cos(elevation)
+    back = np.stack([sin_a * cos_e, sin_e, cos_a * cos_e], axis=-1)
+    right = np.stack([cos_a, np.zeros_like(azimuth), -sin_a], axis=-1)
+    down = np.stack([sin_a * sin_e, -cos_e, cos_a * sin_e], axis=-1)
+    cosine, sine = np.cos(roll)[..., None], np.sin(roll)[..., None]
+    return np.stack([cosine * right - sine * down, sine * right + cosine * down, -back], axis=-2)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hairkit_plugins.silhouette.landmark_equations import CameraArrays
 from scipy.ndimage import map_coordinates
+from scipy.spatial.transform import Rotation
 from turntable import Turntable, turntable
 
 from hairkit import Mask
 from hairkit.arrays import Float64Array
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.silhouette_coherence import CAP, REACH, coherence
-from hairkit.cameras.turntable import rotation_matrix
 
 MIDDLE = np.full(8, 0.7)
 
@@ -98,7 +98,7 @@ def test_slopes_are_derivatives(bust: Turntable, outlines: Outlines) -> None:
     motion = rng.normal(0, 3e-5, (8, 7))
 
     def value(sign: float) -> Float64Array:
-        turns = np.stack([rotation_matrix(sign * m[:3]) for m in motion])
+        turns = np.stack([Rotation.from_rotvec(sign * m[:3]).as_matrix() for m in motion])
         moved = np.einsum("vij,vj->vi", turns, translation) + sign * motion[:, 3:6]
         zoomed = focal * np.exp(sign * motion[:, 6])
         return coherence(outlines, turns @ rotation, moved, zoomed, centre, MIDDLE)[0]

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from hairkit import Camera, Capture, View
 from hairkit.arrays import Float64Array
 from hairkit.cameras.similarity import Similarity, fit_similarity, triangulate
-from hairkit.cameras.turntable import MIN_PERSPECTIVE, PERSPECTIVE, Turn, rotation_matrix
+from hairkit.cameras.turntable import MIN_PERSPECTIVE, PERSPECTIVE, Turn
 from hairkit.errors import InputError
 
 numbers = st.floats(-3, 3)
@@ -34,7 +35,7 @@ def test_a_similarity_is_found_again(
     """Points moved by a similarity give that similarity, whatever the weights."""
     rng = np.random.default_rng(seed)
     points = rng.normal(size=(9, 3))
-    true = Similarity(scale, rotation_matrix(axis), rng.normal(size=3))
+    true = Similarity(scale, Rotation.from_rotvec(axis).as_matrix(), rng.normal(size=3))
     found = fit_similarity(points, true.apply(points), rng.uniform(0.1, 1, 9))
     assert np.allclose(found.apply(points), true.apply(points), atol=1e-8 * scale)
     assert np.allclose(found.inverse().apply(true.apply(points)), points, atol=1e-8)
@@ -69,7 +70,9 @@ def test_a_camera_moved_along_sees_the_same(model: str, rng: np.random.Generator
     """The moved camera sees moved points where the camera saw the points."""
     focal = 900.0 if model == "perspective" else 1500.0
     camera = Camera.on_turn(30, focal=focal, width=300, height=400, model=model)  # type: ignore[arg-type]
-    move = Similarity(1.7, rotation_matrix([0.2, -0.4, 0.1]), np.array([0.1, 0.2, -0.3]))
+    move = Similarity(
+        1.7, Rotation.from_rotvec([0.2, -0.4, 0.1]).as_matrix(), np.array([0.1, 0.2, -0.3])
+    )
     points = rng.normal(0, 0.1, (20, 3))
     seen = move.moved_camera(camera).project(move.apply(points))
     assert np.allclose(seen, camera.project(points), atol=1e-6)

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.manual import Options, estimate_scene
+from scipy.spatial.transform import Rotation
 from turntable import turntable
 
-from hairkit.cameras.turntable import Turn, rotation_matrix
+from hairkit.cameras.turntable import Turn
 from hairkit.errors import InputError
 
 
@@ -17,7 +18,7 @@ def test_the_head_is_seen_where_it_was_put() -> None:
     """A point of the head is seen where the nominal camera sees the posed point."""
     table = turntable(np.random.default_rng(0))
     pose = np.eye(4)
-    pose[:3, :3] = 1.2 * rotation_matrix([0.1, 0.2, -0.1])
+    pose[:3, :3] = 1.2 * Rotation.from_rotvec([0.1, 0.2, -0.1]).as_matrix()
     pose[:3, 3] = [0.01, 0.05, -0.02]
     capture = replace(table.capture, head_pose=pose)
     scene = estimate_scene(capture, table.masks, table.head, Options(distance=0.7))
