@@ -5,6 +5,7 @@ the packages named after the subject.
 
 * `camera`: pinhole and orthographic cameras
 * `capture`: the photos and what is known about each
+* `carried`: what a file held beyond a groom
 * `chosen`: what a user chooses instead of what is measured
 * `face`: landmarks and direction of a face
 * `groom`: strands on a head with material and physics

@@ -11,6 +11,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, Int32Array, UInt8Array, check_reach, frozen_array
 from hairkit.errors import DataError, FormatError
 from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
+from hairkit.types.carried import Carried
 from hairkit.types.head import Head
 from hairkit.types.preview import Previewed, draw_turn
 from hairkit.types.strands import Strands
@@ -90,6 +91,8 @@ class Groom(Previewed, Stored):
     physics: HairPhysics = field(default_factory=HairPhysics)
     ties: tuple[Tie, ...] = ()
     """Rings that hold strands; the strands of tie k have the group k + 1."""
+    carried: Carried | None = None
+    """What the file that the groom was read from held beyond it; None where nothing is known."""
 
     def __post_init__(self) -> None:
         count = len(self.strands)

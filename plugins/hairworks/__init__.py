@@ -7,8 +7,10 @@ of a groom read back), groups, widths along the strand, and points beyond `point
 
 * `asset`: the content of an .apx file
 * `from_groom`: groom to asset
+* `kept`: values of the file that a groom was read from
 * `reader`: strict reader of .apx files
 * `schema`: classes, fields and defaults of HairWorks 1.1
+* `space`: unit, axes and handedness
 * `to_groom`: asset to groom
 * `writer`: writer of .apx files
 """
@@ -19,18 +21,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
+import numpy as np
+
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
-from hairkit.storage import write_text
+from hairkit.storage import read_bytes, write_text
+from hairkit.types.carried import Carried
 from hairkit.types.groom import Groom
 
 from .asset import ApxAsset
-from .from_groom import groom_to_asset
-from .reader import read_apx
+from .from_groom import Layout, groom_to_asset
+from .kept import FORMAT as CARRIED
+from .kept import asset_carried_by, with_kept_values
+from .reader import MAX_BYTES, read_apx
+from .space import CENTIMETRES, RIGHT_HANDED, UP_AXIS
 from .to_groom import asset_to_groom
 from .writer import asset_text
 
@@ -40,7 +48,7 @@ __all__ = [
     "Options",
     "asset_text",
     "asset_to_groom",
-    "groom_to_asset",
+    "exported_asset",
     "read_apx",
 ]
 
@@ -60,6 +68,11 @@ FORMAT = FileFormat(
 )
 
 
+_POINTS, _HAIRS = 16, 100_000
+"""Points of a guide and hairs in all, of grooms that were not read from an .apx; files in use have
+5 to 10 points."""
+
+
 @dataclass(frozen=True)
 class Options:
     """Settings of .apx files."""
@@ -69,12 +82,28 @@ class Options:
     )
 
     points_per_strand: int = option(
-        16, low=2, high=64, doc="Points of every guide; HairWorks wants one number for all."
+        0,
+        low=0,
+        high=64,
+        doc="Points of every guide, 2 or more; HairWorks wants one number for all. 0: those of the"
+        " .apx that the groom was read from, else 16.",
     )
-    unit: str = option("cm", choices=("cm", "m"), doc="Unit of length in the file.")
-    axis: str = option("y_up", choices=("y_up", "z_up"), doc="Axis that points up in the file.")
+    unit: str = option(
+        "kept",
+        choices=("kept", "cm", "m"),
+        doc="Unit of length in the file; kept: that of the .apx that was read, else cm.",
+    )
+    axis: str = option(
+        "kept",
+        choices=("kept", "y_up", "z_up"),
+        doc="Axis that points up in the file; kept: that of the .apx that was read, else y_up.",
+    )
     hairs: int = option(
-        100_000, low=100, high=5_000_000, doc="Hairs that HairWorks is to draw in all."
+        0,
+        low=0,
+        high=5_000_000,
+        doc="Hairs that HairWorks is to draw in all; 0: by the density of the .apx that was read,"
+        " else 100,000.",
     )
     author: str = option("", doc="Author's name in the file.")
     last_modified: str = option(
@@ -89,21 +118,45 @@ class Options:
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the groom's guides as .apx."""
-    chosen = prepare_export(groom, ExportOptions(strands=options.strands)).groom
-    write_text(path, asset_text(groom_to_asset(chosen, options)))
+    write_text(path, asset_text(exported_asset(groom, options)))
     return True
+
+
+def exported_asset(groom: Groom, options: Options) -> ApxAsset:
+    """Return what is written of a groom; one that was read from an .apx keeps what it can."""
+    chosen = prepare_export(groom, ExportOptions(strands=options.strands)).groom
+    kept = asset_carried_by(groom)
+    layout = _layout(options, kept)
+    asset = groom_to_asset(chosen, layout)
+    return asset if kept is None else with_kept_values(asset, chosen, kept, layout)
+
+
+def _layout(options: Options, kept: ApxAsset | None) -> Layout:
+    if options.points_per_strand == 1:
+        raise InputError("points_per_strand is 1, expected 0 or at least 2")
+    unit, axis = options.unit, options.axis
+    return Layout(
+        points=options.points_per_strand or (kept.points_per_guide if kept else _POINTS),
+        centimetres=kept.scene_unit if kept and unit == "kept" else CENTIMETRES.get(unit, 1.0),
+        up_axis=kept.up_axis if kept and axis == "kept" else UP_AXIS.get(axis, UP_AXIS["y_up"]),
+        handedness=kept.handedness if kept else RIGHT_HANDED,
+        hairs=options.hairs or (0 if kept else _HAIRS),
+        author=options.author or (kept.info[3] if kept else ""),
+        last_modified=options.last_modified,
+    )
 
 
 @hookimpl
 def import_groom(path: Path, options: Options) -> Groom:
     """Read an .apx file; the growth mesh becomes the head, if no other is named."""
     asset = read_apx(path)
+    content = np.frombuffer(read_bytes(path, MAX_BYTES), np.uint8)
     try:
-        groom = asset_to_groom(asset)
+        groom = replace(asset_to_groom(asset), carried=Carried(CARRIED, content))
     except InputError as error:
         raise FormatError(f"{path}: {error}") from error
     groom.check_reach(path)
     if options.head is None:
         return groom
     bound = adopt(groom.strands, ImportOptions(options.head), path, groom.material)
-    return replace(bound, physics=groom.physics)
+    return replace(bound, physics=groom.physics, carried=groom.carried)

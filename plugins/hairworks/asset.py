@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
@@ -53,6 +53,8 @@ class ApxAsset:
     info: tuple[str, ...] = ("1.1", "", "", "", "")
     """fileVersion, toolVersion, sourcePath, authorName, lastModified."""
     textures: tuple[str, ...] = ("",) * 16
+    pins: Float64Array = field(default_factory=lambda: np.zeros((0, 5)))
+    """(N, 5) pin constraints: bone, radius, centre in the bone's frame."""
 
     def __post_init__(self) -> None:
         self._check_guides()
@@ -106,8 +108,9 @@ class ApxAsset:
             _check_range("boneIndices", self.bone_indices, 0, count)
             _check_range("boneParents", self.bone_parents, -1, count)
             _check_range("boneSphereIndex", self.spheres[:, 0], 0, count)
-        elif len(self.spheres):
-            raise FormatError("collision spheres need bones, the file has none")
+            _check_range("pinConstraints", self.pins[:, 0], 0, count)
+        elif len(self.spheres) or len(self.pins):
+            raise FormatError("collision spheres and pins need bones, the file has none")
         if len(self.spheres) and self.spheres[:, 1].min() < 0:
             raise FormatError("a collision sphere has a radius below 0")
         _check_range("boneCapsuleIndices", self.capsules, 0, len(self.spheres))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Protocol
 
 import numpy as np
 
 import hairkit
 from hairkit.arrays import Float64Array, Int64Array
+from hairkit.colour import srgb_from_linear
 from hairkit.head_model.scalp import growth_mesh, roots_at
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head, Roots
@@ -16,54 +17,51 @@ from hairkit.types.strands import Strands
 
 from . import schema
 from .asset import ApxAsset, Material, MaterialValue
+from .space import LEFT_HANDED, file_from_head
 
-CENTIMETRES = {"cm": 1.0, "m": 100.0}
-UP_AXIS = {"y_up": 1, "z_up": 2}
-RIGHT_HANDED = 1
 BONES = ("root", "neck", "head")
 PARENTS = (-1, 0, 1)
-
-FILE_FROM_HEAD = {
-    "y_up": np.eye(3),
-    "z_up": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
-}
-"""Rotations from the head frame to the file's axes: z_up is (x, -z, y)."""
 
 STANDARD_GRAVITY = 9.81
 _WAVE_POINTS = 4
 _MIN_DENSITY, _MAX_DENSITY = 0.01, 10.0
 
 
-class ApxOptions(Protocol):
-    """Options of the plugin that `groom_to_asset` uses."""
+@dataclass(frozen=True)
+class Layout:
+    """How an asset is laid out: the plugin's options, or what the file said that was read."""
+
+    points: int
+    """Points of every guide."""
+    centimetres: float
+    """Of one unit of the file."""
+    up_axis: int
+    handedness: int
+    hairs: int
+    """Drawn in all."""
+    author: str
+    last_modified: str
 
     @property
-    def points_per_strand(self) -> int: ...
-    @property
-    def unit(self) -> str: ...
-    @property
-    def axis(self) -> str: ...
-    @property
-    def hairs(self) -> int: ...
-    @property
-    def author(self) -> str: ...
-    @property
-    def last_modified(self) -> str: ...
+    def turn(self) -> Float64Array:
+        """(3, 3) from metres in the head frame."""
+        return file_from_head(self.centimetres, self.up_axis, self.handedness)
 
 
-def groom_to_asset(groom: Groom, options: ApxOptions) -> ApxAsset:
-    """Return the asset of a groom, all its strands guides, in the unit and axes of `options`.
+def groom_to_asset(groom: Groom, layout: Layout) -> ApxAsset:
+    """Return the asset of a groom, all its strands guides.
 
     Raises
     ------
     InputError
         There are fewer than three guides, or they stand on one line.
     """
-    head = groom.head
-    turn = FILE_FROM_HEAD[options.axis] * (100.0 / CENTIMETRES[options.unit])
-    strands = groom.strands.resampled(options.points_per_strand)
+    head, turn = groom.head, layout.turn
+    strands = groom.strands
+    if (strands.counts != layout.points).any():
+        strands = strands.resampled(layout.points)
     roots = _roots(groom)
-    faces = _every_root_used(growth_mesh(roots, head).astype(np.int64), roots)
+    faces = _parted(growth_mesh(roots, head).astype(np.int64), roots, strands)
     uv = roots.uv[faces].astype(np.float64)
     uv[..., 1] = 1.0 - uv[..., 1]
     joints = head.joints.astype(np.float64) @ turn.T
@@ -72,8 +70,8 @@ def groom_to_asset(groom: Groom, options: ApxOptions) -> ApxAsset:
     return ApxAsset(
         vertices=strands.points.astype(np.float64) @ turn.T,
         end_indices=strands.offsets[1:] - 1,
-        faces=faces,
-        face_uvs=uv,
+        faces=faces[:, ::-1] if layout.handedness == LEFT_HANDED else faces,
+        face_uvs=uv[:, ::-1] if layout.handedness == LEFT_HANDED else uv,
         bone_indices=np.tile([float(BONES.index("head")), 0.0, 0.0, 0.0], (count, 1)),
         bone_weights=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
         bone_names=BONES,
@@ -81,11 +79,11 @@ def groom_to_asset(groom: Groom, options: ApxOptions) -> ApxAsset:
         bone_parents=np.array(PARENTS),
         spheres=spheres,
         capsules=capsules,
-        scene_unit=CENTIMETRES[options.unit],
-        up_axis=UP_AXIS[options.axis],
-        handedness=RIGHT_HANDED,
-        materials=_materials(groom, strands, len(faces), len(capsules) > 0, options),
-        info=("1.1", f"hairkit {hairkit.__version__}", "", options.author, options.last_modified),
+        scene_unit=layout.centimetres,
+        up_axis=layout.up_axis,
+        handedness=layout.handedness,
+        materials=_materials(groom, strands, len(faces), len(capsules) > 0, layout),
+        info=("1.1", f"hairkit {hairkit.__version__}", "", layout.author, layout.last_modified),
     )
 
 
@@ -102,19 +100,35 @@ def _roots(groom: Groom) -> Roots:
     )
 
 
-def _every_root_used(faces: Int64Array, roots: Roots) -> Int64Array:
-    """Return the faces and one more for each root without any: its nearest neighbour's, moved."""
+def _parted(faces: Int64Array, roots: Roots, strands: Strands) -> Int64Array:
+    """Return the growth mesh cut where hair parts, with every root in a face.
+
+    HairWorks interpolates hair over each face ("Using HairWorks", NVIDIA: cut a gap where hair
+    parts), so that no edge may join guides that run more than a right angle apart. A root that is
+    left without a face gets one with the nearest roots that run as it does.
+    """
+    way = (strands.tips - strands.roots).astype(np.float64)
+    way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
+    agree = np.stack([(way[faces[:, k]] * way[faces[:, k - 1]]).sum(axis=1) for k in range(3)])
+    faces = faces[(agree >= 0).all(axis=0)]
     idle = np.setdiff1d(np.arange(len(roots)), faces)
-    if not len(idle):
-        return faces
-    used = np.unique(faces)
-    added = []
-    for root in idle:
-        offset = roots.positions[used] - roots.positions[root]
-        twin = used[np.einsum("nc,nc->n", offset, offset).argmin()]
-        face = faces[(faces == twin).any(axis=1)][0]
-        added.append(np.where(face == twin, root, face))
-    return np.concatenate([faces, added])
+    added = [_own_face(root, roots, way) for root in idle]
+    return np.concatenate([faces, np.array(added, np.int64).reshape(-1, 3)])
+
+
+def _own_face(root: int, roots: Roots, way: Float64Array) -> Int64Array:
+    """Return a face of a root and the two nearest that run as it does, or the two nearest."""
+    offset = roots.positions.astype(np.float64) - roots.positions[root]
+    order = np.argsort((offset**2).sum(axis=1), kind="stable")
+    order = order[order != root]
+    agreeing = order[(way[order] @ way[root] >= 0)]
+    second = agreeing[0] if len(agreeing) else order[0]
+    third = agreeing[way[agreeing] @ way[second] >= 0]
+    third = third[third != second]
+    corners = np.array([root, second, third[0] if len(third) else order[order != second][0]])
+    a, b, c = roots.positions[corners].astype(np.float64)
+    outward = roots.normals[corners].sum(axis=0)
+    return corners if np.cross(b - a, c - a) @ outward >= 0 else corners[::-1]
 
 
 def _bind_poses(joints: Float64Array) -> Float64Array:
@@ -138,21 +152,22 @@ def _collision(
 
 
 def _materials(
-    groom: Groom, strands: Strands, faces: int, collide: bool, options: ApxOptions
+    groom: Groom, strands: Strands, faces: int, collide: bool, layout: Layout
 ) -> tuple[Material, ...]:
     """Return the captured material and three unused ones."""
-    up = FILE_FROM_HEAD[options.axis] @ np.array([0.0, 1.0, 0.0])
+    up = layout.turn[:, 1] / np.linalg.norm(layout.turn[:, 1])
     strength = groom.physics.gravity / STANDARD_GRAVITY
     gravity = tuple(float(value) + 0.0 for value in -up * strength)
     defaults = {f.name: _default(f) for f in schema.MATERIAL_FIELDS} | {"gravity": gravity}
-    density = options.hairs / (schema.HAIRS_PER_FACE * faces)
+    density = layout.hairs / (schema.HAIRS_PER_FACE * faces)
     look, physics = groom.material, groom.physics
     captured: dict[str, MaterialValue] = {
         "width": look.width * 1000,
         "density": float(np.clip(density, _MIN_DENSITY, _MAX_DENSITY)),
         "lengthNoise": 0.0,  # lengths are captured; no random trimming
-        "rootColor": (*map(float, look.root_colour), 1.0),
-        "tipColor": (*map(float, look.tip_colour), 1.0),
+        # colours as pickers show them: files of NVIDIA's tools hold sRGB
+        "rootColor": (*map(float, srgb_from_linear(look.root_colour)), 1.0),
+        "tipColor": (*map(float, srgb_from_linear(look.tip_colour)), 1.0),
         "stiffness": physics.stiffness,
         "bendStiffness": physics.bend_stiffness,
         "damping": physics.damping,

@@ -19,7 +19,7 @@ from hairkit.storage import read_bytes
 from . import schema
 from .asset import ApxAsset, Material, MaterialValue
 
-_MAX_BYTES = 256 * 2**20
+MAX_BYTES = 256 * 2**20
 _MAX_DEPTH, _MAX_ELEMENTS, _MAX_ATTRIBUTES = 8, 20_000, 16
 _NUMBERS = re.compile(r"[0-9+\-.eE,\s]*")
 _CHUNK = 2**20
@@ -48,16 +48,20 @@ def read_apx(path: str | os.PathLike[str]) -> ApxAsset:
         The file cannot be read, is no .apx, declares entities, is nested or large beyond reason,
         lies about sizes, or holds what HairWorks would not load.
     """
-    data = read_bytes(path, _MAX_BYTES)
     try:
-        classes = _classes(_parse(data))
-        texts = _fields(classes["HairSceneDescriptor"])
-        info = _fields(classes["HairWorksInfo"])
-        fields = _fields(classes["HairAssetDescriptor"])
-        materials = _fields(classes["HairInstanceDescriptor"]).get("materials")
-        return _asset(fields, materials, _strings(info, schema.INFO_FIELDS), texts)
+        return parse_apx(read_bytes(path, MAX_BYTES))
     except FormatError as error:
         raise FormatError(f"{path}: {error}") from error
+
+
+def parse_apx(data: bytes) -> ApxAsset:
+    """Return the asset in the bytes of an .apx file; raises `FormatError` as `read_apx` does."""
+    classes = _classes(_parse(data))
+    texts = _fields(classes["HairSceneDescriptor"])
+    info = _fields(classes["HairWorksInfo"])
+    fields = _fields(classes["HairAssetDescriptor"])
+    materials = _fields(classes["HairInstanceDescriptor"]).get("materials")
+    return _asset(fields, materials, _strings(info, schema.INFO_FIELDS), texts)
 
 
 def _asset(
@@ -69,6 +73,7 @@ def _asset(
     guides, points = _whole(fields, "numGuideHairs"), _whole(fields, "numVertices")
     faces, bones = _whole(fields, "numFaces"), _whole(fields, "numBones")
     spheres, capsules = _whole(fields, "numBoneSpheres"), _whole(fields, "numBoneCapsules")
+    pins = _whole(fields, "numPinConstraints")
     bound = guides if bones else None
     return ApxAsset(
         vertices=_array(fields, "vertices", "Vec3", points),
@@ -88,6 +93,7 @@ def _asset(
         materials=_materials(materials),
         info=info,
         textures=_strings(texts, schema.TEXTURES),
+        pins=_array(fields, "pinConstraints", "Struct", pins),
     )
 
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
+from hairkit.colour import linear_from_srgb
 from hairkit.errors import FormatError
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Capsules, Head
 from hairkit.types.strands import Strands
 
 from .asset import ApxAsset, Material
-from .from_groom import BONES, FILE_FROM_HEAD, STANDARD_GRAVITY
+from .from_groom import BONES, STANDARD_GRAVITY
+from .space import file_from_head
 
-Z_UP, LEFT_HANDED = 2, 2
 _SMALLEST_WIDTH_MM = 1e-3
 _FARTHEST = 1e6
 
@@ -26,7 +27,7 @@ def asset_to_groom(asset: ApxAsset) -> Groom:
     FormatError
         A guide is on no face of the growth mesh, so nothing says where it is bound.
     """
-    turn = _head_from_file(asset)
+    turn = head_from_file(asset)
     points = asset.vertices @ turn.T
     counts = np.full(asset.guides, asset.points_per_guide)
     offsets = np.concatenate([[0], np.cumsum(counts)])
@@ -40,7 +41,7 @@ def asset_to_groom(asset: ApxAsset) -> Groom:
         _float32("faceUVs", uv),
         np.ones(asset.guides, np.float32),
         None,
-        _float32("bindPoses", _joints(asset.bone_names, bones)),
+        _float32("bindPoses", _joints(asset, bones)),
         _capsules(asset, turn),
     )
     triangle, barycentric = _binding(faces, asset.guides)
@@ -51,13 +52,10 @@ def asset_to_groom(asset: ApxAsset) -> Groom:
     return Groom(strands, head, triangle, barycentric, look, physics)
 
 
-def _head_from_file(asset: ApxAsset) -> Float64Array:
+def head_from_file(asset: ApxAsset) -> Float64Array:
     """Return the (3, 3) matrix to metres in the head frame; left-handed files are mirrored."""
-    name = "z_up" if asset.up_axis == Z_UP else "y_up"
-    turn: Float64Array = FILE_FROM_HEAD[name].T * (asset.scene_unit / 100.0)
-    if asset.handedness == LEFT_HANDED:
-        turn = np.diag([-1.0, 1.0, 1.0]) @ turn
-    return turn
+    turn = file_from_head(asset.scene_unit, asset.up_axis, asset.handedness)
+    return np.asarray(np.linalg.inv(turn), np.float64)
 
 
 def _root_uv(asset: ApxAsset) -> Float64Array:
@@ -78,15 +76,23 @@ def _binding(faces: Int64Array, guides: int) -> tuple[Int32Array, Float32Array]:
     return (first // 3).astype(np.int32), np.eye(3, dtype=np.float32)[first % 3]
 
 
-def _joints(names: tuple[str, ...], bones: Float64Array) -> Float64Array:
-    """Return root, neck and head: bones of those names, the last bone for those not there."""
-    joints = np.zeros((len(BONES), 3))
-    lowered = [name.lower() for name in names]
-    for index, wanted in enumerate(BONES):
-        if lowered:
-            found = [k for k, name in enumerate(lowered) if wanted in name]
-            joints[index] = bones[found[0] if found else -1]
-    return joints
+def _joints(asset: ApxAsset, bones: Float64Array) -> Float64Array:
+    """Return root, neck and head: the bone that the hair hangs on most, or that is named head.
+
+    The neck is the bone so named on the way from there up, or the one above; the root is where the
+    way ends.
+    """
+    if not len(bones):
+        return np.zeros((len(BONES), 3))
+    lowered = [name.lower() for name in asset.bone_names]
+    held = np.zeros(len(bones))
+    np.add.at(held, asset.bone_indices.astype(np.int64), asset.bone_weights)
+    named = [k for k, name in enumerate(lowered) if "head" in name]
+    way = [max(named, key=lambda k: held[k]) if named else int(held.argmax())]
+    while asset.bone_parents[way[-1]] >= 0 and len(way) < len(bones):
+        way.append(int(asset.bone_parents[way[-1]]))
+    necks = [k for k in way if "neck" in lowered[k]]
+    return bones[[way[-1], necks[0] if necks else way[min(1, len(way) - 1)], way[0]]]
 
 
 def _capsules(asset: ApxAsset, turn: Float64Array) -> Capsules:
@@ -108,8 +114,8 @@ def _look(material: Material, length: float) -> HairMaterial:
     waves = _number(material, "waveFreq")
     waved = _number(material, "waveScale") > 0 and waves > 0 and length > 0
     return HairMaterial(
-        _float32("rootColor", _vector(material, "rootColor")[:3]),
-        _float32("tipColor", _vector(material, "tipColor")[:3]),
+        _float32("rootColor", linear_from_srgb(_vector(material, "rootColor")[:3])),
+        _float32("tipColor", linear_from_srgb(_vector(material, "tipColor")[:3])),
         max(_number(material, "width"), _SMALLEST_WIDTH_MM) / 1000,
         _number(material, "waveScale") / 100 if waved else 0.0,
         length / waves if waved else 0.0,

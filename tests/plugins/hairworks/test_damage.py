@@ -27,7 +27,7 @@ def good_text() -> str:
         groom.root_triangle[:12],
         groom.root_barycentric[:12],
     )
-    return hairworks.asset_text(hairworks.groom_to_asset(few, hairworks.Options()))
+    return hairworks.asset_text(hairworks.exported_asset(few, hairworks.Options()))
 
 
 EDITS = {
