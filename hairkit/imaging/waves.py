@@ -20,7 +20,7 @@ from collections.abc import Iterator, Sequence
 
 import cv2
 import numpy as np
-from scipy import ndimage
+from scipy import fft, ndimage
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.types.camera import Camera
@@ -160,23 +160,34 @@ def _patches(
 def _measure_pitch(views: Sequence[tuple[Float32Array, Float32Array]]) -> tuple[float, float]:
     """Return the pitch in metres and its prominence, both 0 where no peak is found."""
     size, width = (round(edge * RESOLUTION) for edge in PITCH_PATCH)
-    shape, count = (2 * size, 2 * width), 0
-    power, window = np.zeros((2 * size, width + 1)), np.zeros((2 * size, width + 1))
+    across = round(PROFILE_HALF_WIDTH * RESOLUTION)
+    shape = (2 * size, fft.next_fast_len(width + across, real=True))  # padded by the lags that are read
+    power, window = np.zeros((2, shape[0], shape[1] // 2 + 1))
+    count, filled = 0, 0
     for picture, hair in _patches(views, PITCH_PATCH, PITCH_STEP, PITCH_FILLED):
         mean = picture.sum() / max(float(hair.sum()), 1.0)
-        power += np.abs(np.fft.rfft2((picture - mean) * hair, shape)) ** 2
-        window += np.abs(np.fft.rfft2(hair, shape)) ** 2
+        power += _power((picture - mean) * hair, shape)
+        if hair.all():
+            filled += 1  # their windows are alike
+        else:
+            window += _power(hair, shape)
         count += 1
     if count < FEWEST_PATCHES:
         return 0.0, 0.0
-    overlap = np.maximum(np.fft.irfft2(window, shape), 1.0)
-    correlation = np.fft.irfft2(power, shape) / overlap
-    across = round(PROFILE_HALF_WIDTH * RESOLUTION)
+    window += filled * _power(np.ones((size, width), np.float32), shape)
+    overlap = np.maximum(fft.irfft2(window, shape), 1.0)
+    correlation = fft.irfft2(power, shape) / overlap
     near = [correlation[:size, column] for column in range(-across, across + 1)]
     sharp = np.mean(near, axis=0)
     if sharp[round(SMALLEST_LAG * RESOLUTION)] < LEAST_CORRELATION * sharp[0]:
         return 0.0, 0.0
     return _first_peak(ndimage.gaussian_filter1d(sharp, PROFILE_BLUR * RESOLUTION))
+
+
+def _power(values: Float32Array, shape: tuple[int, int]) -> Float32Array:
+    """Return the power spectrum (H, W / 2 + 1) of values padded to (H, W)."""
+    spectrum = fft.rfft2(values, shape)
+    return np.asarray(spectrum.real**2 + spectrum.imag**2, np.float32)
 
 
 def _first_peak(profile: Float64Array) -> tuple[float, float]:
@@ -204,14 +215,14 @@ def _angular_moments(
     taper = np.outer(np.hanning(size), np.hanning(size))
     power = np.zeros((size, size))
     for picture, _ in _patches(views, SLOPE_PATCH, SLOPE_STEP, 1.0):
-        power += np.abs(np.fft.fft2((picture - picture.mean()) * taper)) ** 2
+        power += np.abs(fft.fft2((picture - picture.mean()) * taper)) ** 2
         count += 1
     if count < FEWEST_PATCHES:
         return None
     angle = np.arange(_ANGLES) * np.pi / _ANGLES  # of the wave vector, so of the strand off upright
     frequency = np.linspace(*BAND, _RADII)[:, None] * size / RESOLUTION
     place = [size // 2 + frequency * np.sin(angle), size // 2 + frequency * np.cos(angle)]
-    polar = ndimage.map_coordinates(np.fft.fftshift(power), place, order=1)
+    polar = ndimage.map_coordinates(fft.fftshift(power), place, order=1)
     strength = (polar * frequency).sum(axis=0)
     second, fourth = ((strength * np.cos(n * angle)).sum() / strength.sum() for n in (2, 4))
     return float(second), float(fourth)
