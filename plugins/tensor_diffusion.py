@@ -29,7 +29,7 @@ from hairkit import (
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.field.diffusion import solve_screened
 from hairkit.field.growth_prior import growth_potential
-from hairkit.field.view_fusion import fuse_planes, plane_directions
+from hairkit.field.view_fusion import Fading, front_depths, fuse_planes, plane_directions
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.options import option
 from hairkit.types.volume import outer_products
@@ -66,7 +66,9 @@ def solve_field(
 ) -> OrientationField:
     """Fuse the outer cells, fix the scalp's, diffuse over the loose hull."""
     weighted = tuple(_weigh(found, options.box) for found in orientations)
-    planes, views = fuse_planes(scene.cameras, masks, weighted, hull, 0.0, hull.grid.spacing)
+    fronts = front_depths(scene.cameras, weighted, hull)
+    fading = Fading(see_through=0.0, free_depth=hull.grid.spacing)
+    planes, views = fuse_planes(scene.cameras, masks, weighted, fronts, hull, fading)
     views[~_outer_cells(hull)] = 0
     tensor, gap = plane_directions(planes, views, options.min_views)
     weight = np.where(gap > 0, FIXED, 0).astype(np.float32)

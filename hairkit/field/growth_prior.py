@@ -14,6 +14,7 @@ from scipy import ndimage
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.field.parting import comb_from_parting, crown_share, root_lift
+from hairkit.field.smooth_volume import smooth_volume
 from hairkit.parallel import compiled
 from hairkit.types.head import Head
 from hairkit.types.parting import Parting
@@ -188,10 +189,10 @@ def growth_potential(hull: Hull, from_scalp: ScalpDistance, tip_share: float) ->
     tips = hull.dense & (from_scalp.values >= tip_share * length)
     left = chamfer_distance(hull.loose, tips, hull.grid.spacing)
     known = np.isfinite(left)
-    weight = ndimage.gaussian_filter(known.astype(np.float32), FLOW_SMOOTHING)
+    weight = smooth_volume(known.astype(np.float32), FLOW_SMOOTHING)
     beyond = np.maximum(from_scalp.values - tip_share * length, 0)
     left -= long_share(length) * TIP_SLOPE * beyond
-    total = ndimage.gaussian_filter(np.where(known, left, 0).astype(np.float32), FLOW_SMOOTHING)
+    total = smooth_volume(np.where(known, left, 0).astype(np.float32), FLOW_SMOOTHING)
     smooth = total / np.maximum(weight, 1e-6)
     growth: Float32Array = np.where(weight > 1e-3, -smooth, -smooth.max()).astype(np.float32)
     return growth
@@ -206,29 +207,29 @@ def chamfer_distance(occupied: BoolArray, start: BoolArray, spacing: float) -> F
     """Return the shortest paths through occupied cells from the start cells, (X, Y, Z).
 
     Infinite where no path leads. Steps go along edges and diagonals of cells; sweeps in the eight
-    diagonal orders are repeated until nothing changes.
+    diagonal orders are repeated until a round of them changes nothing.
     """
-    distance: Float32Array = _chamfer(occupied, start, np.float32(spacing))
-    return distance
+    result = np.full(occupied.shape, np.inf, np.float32)
+    if occupied.any():
+        box = tuple(slice(cells.min(), cells.max() + 1) for cells in np.nonzero(occupied))
+        inside = np.pad(occupied[box], 1)  # no step of a sweep leaves the padded box
+        distance = np.where(inside & np.pad(start[box], 1), 0, np.inf).astype(np.float32)
+        _chamfer(inside, np.float32(spacing), distance)
+        result[box] = distance[1:-1, 1:-1, 1:-1]
+    result[start] = 0
+    return result
 
 
 @compiled
-def _chamfer(occupied: BoolArray, start: BoolArray, spacing: np.float32) -> Float32Array:
-    """Return the result of `chamfer_distance`: sweeps in eight directions until none changes."""
-    distance = np.full(occupied.shape, np.inf, np.float32)
-    for ix in range(occupied.shape[0]):
-        for iy in range(occupied.shape[1]):
-            for iz in range(occupied.shape[2]):
-                if start[ix, iy, iz]:
-                    distance[ix, iy, iz] = 0
+def _chamfer(occupied: BoolArray, spacing: np.float32, distance: Float32Array) -> None:
+    """Lower distances (X, Y, Z), infinite in unoccupied cells, until a round changes none."""
     cost = np.sqrt(np.arange(4)).astype(np.float32) * spacing
-    for _ in range(MOST_SWEEPS):
-        changed = False
-        for octant in range(8):
-            changed |= _sweep(occupied, cost, octant, distance)
-        if not changed:
+    unchanged = 0
+    for sweep in range(8 * MOST_SWEEPS):
+        changed = _sweep(occupied, cost, sweep % 8, distance)
+        unchanged = 0 if changed else unchanged + 1
+        if unchanged == 8:
             break
-    return distance
 
 
 @compiled
@@ -236,7 +237,7 @@ def _sweep(occupied: BoolArray, cost: Float32Array, octant: int, distance: Float
     """Lower distances (X, Y, Z) in one sweep of the grid; returns whether any changed.
 
     The bits of `octant` give the direction along x, y and z; `cost` (4,) are metres of a step to a
-    cell across a face, an edge and a corner.
+    cell across a face, an edge and a corner. The outermost cells are not occupied.
     """
     nx, ny, nz = occupied.shape
     sx = 1 if octant & 1 else -1
@@ -254,11 +255,9 @@ def _sweep(occupied: BoolArray, cost: Float32Array, octant: int, distance: Float
                 best = distance[ix, iy, iz]
                 for corner in range(1, 8):
                     a, b, c = corner & 1, corner >> 1 & 1, corner >> 2 & 1
-                    jx, jy, jz = ix - sx * a, iy - sy * b, iz - sz * c
-                    if jx < 0 or jy < 0 or jz < 0 or jx >= nx or jy >= ny or jz >= nz:
-                        continue
-                    if occupied[jx, jy, jz]:
-                        best = min(best, distance[jx, jy, jz] + cost[a + b + c])
+                    best = min(
+                        best, distance[ix - sx * a, iy - sy * b, iz - sz * c] + cost[a + b + c]
+                    )
                 if best < distance[ix, iy, iz] - LEAST_CHANGE:
                     distance[ix, iy, iz] = best
                     changed = True

@@ -70,6 +70,8 @@ class FusedViews:
 
     orientations: tuple[OrientationMap, ...]
     """The maps, corrected for the slant of waves if enabled."""
+    fronts: tuple[Float32Array, ...]
+    """(h, w) of each view, see `front_depths`."""
     tensor: Float32Array
     """(N, 6) D D^T of every loose cell."""
     certainty: Float32Array
@@ -89,36 +91,30 @@ def fuse_views(
     maps = tuple(orientations)
     if options.unslant:
         maps = tuple(remove_slant(found, waves) for found in orientations)
-    planes, views = fuse_planes(cameras, masks, maps, hull, options.see_through, options.free_depth)
+    fronts = front_depths(cameras, maps, hull)
+    fading = Fading(float(options.see_through), float(options.free_depth))
+    planes, views = fuse_planes(cameras, masks, maps, fronts, hull, fading)
     planes = pool_planes(planes, hull, options.pool * waves.pitch)
-    return FusedViews(maps, *plane_directions(planes, views, min_views))
+    return FusedViews(maps, fronts, *plane_directions(planes, views, min_views))
 
 
 def fuse_planes(
     cameras: Sequence[Camera],
     masks: Sequence[Mask],
     orientations: Sequence[OrientationMap],
+    fronts: Sequence[Float32Array],
     hull: Hull,
-    see_through: float,
-    free_depth: float,
+    fading: Fading,
 ) -> tuple[Float64Array, Int64Array]:
     """Return `sum w N N^T` (N, 6) of every loose cell and the number of contributing views (N,).
 
-    Parameters
-    ----------
-    see_through
-        Depth in metres behind the first hair at which a view's weight falls to 1/e; 0: only what
-        it sees.
-    free_depth
-        Depth in metres behind the first hair that costs no weight.
+    `fronts` are the views' `front_depths`.
     """
     cells = LooseCells(hull.grid.centres_of(hull.loose), hull.dense[hull.loose])
     planes = np.zeros((len(cells.points), 6))
     count = np.zeros(len(cells.points), np.int64)
-    fronts = front_depths(cameras, orientations, hull)
     for camera, mask, found, front in zip(cameras, masks, orientations, fronts, strict=True):
         view = OrientedView(pack_camera(camera), found.angle, found.confidence * mask.hair, front)
-        fading = Fading(float(see_through), float(free_depth))
         parallel_for(
             add_planes, len(planes), view, fading, cells, planes, count, min_chunk=MIN_CELLS
         )
@@ -127,7 +123,7 @@ def fuse_planes(
 
 def front_depths(
     cameras: Sequence[Camera], orientations: Sequence[OrientationMap], hull: Hull
-) -> list[Float32Array]:
+) -> tuple[Float32Array, ...]:
     """Return for each view the axial depth of the first dense cell, infinite where none is.
 
     The maps are `DEPTH_SHRINK` times smaller than the views' orientation maps.
@@ -139,7 +135,7 @@ def front_depths(
         front = np.full((height // DEPTH_SHRINK, width // DEPTH_SHRINK), np.inf, np.float32)
         splat_depth(pack_camera(camera), surface, SPLAT_CELLS * hull.grid.spacing, front)
         fronts.append(front)
-    return fronts
+    return tuple(fronts)
 
 
 def pool_planes(planes: Float64Array, hull: Hull, sigma: float) -> Float64Array:

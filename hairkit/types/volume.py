@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -78,17 +79,19 @@ class VoxelGrid(Stored):
         """
         index = np.clip(self.index_from_head(points), 0, np.array(self.shape) - 1)
         low = np.minimum(index.astype(np.int64), np.maximum(np.array(self.shape) - 2, 0))
-        t = (index - low).astype(np.float32)
-        high = np.minimum(low + 1, np.array(self.shape) - 1)
+        t = (index - low).astype(np.float32).T
+        shares = [(1 - share, share) for share in t]
+        _, ny, nz = self.shape
+        strides = np.array([ny * nz, nz, 1])
+        first = low @ strides
+        steps = np.where(np.array(self.shape) > 1, strides, 0)  # one cell is its own neighbour
+        flat = values.reshape(-1, *values.shape[3:])
         result = np.zeros((len(index), *values.shape[3:]), np.float32)
-        for corner in range(8):
-            pick = [high[:, i] if corner >> i & 1 else low[:, i] for i in range(3)]
-            weight = np.prod(
-                [t[:, i] if corner >> i & 1 else 1 - t[:, i] for i in range(3)], axis=0
-            )
-            result += (
-                weight.reshape(-1, *[1] * (values.ndim - 3)) * values[pick[0], pick[1], pick[2]]
-            )
+        for corner in product((0, 1), repeat=3):
+            x, y, z = corner
+            weight = shares[0][x] * shares[1][y] * shares[2][z]
+            picked = flat[first + steps @ corner]
+            result += weight.reshape(-1, *[1] * (values.ndim - 3)) * picked
         return result
 
 

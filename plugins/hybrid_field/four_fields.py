@@ -120,8 +120,21 @@ def internal_distance(hull: Hull, segments: Strands, tolerance: float) -> Float3
     solved = solve_screened(
         np.ones(shape, bool), value.reshape(-1, 1), weight, 1.0, tolerance=tolerance
     ).reshape(shape)
-    fine = ndimage.zoom(solved, COARSE, order=1, grid_mode=True, mode="nearest")
-    result: Float32Array = fine[tuple(slice(n) for n in hull.grid.shape)].astype(np.float32)
+    for axis in range(3):
+        solved = _refine(solved, axis)
+    return np.ascontiguousarray(solved[tuple(slice(n) for n in hull.grid.shape)])
+
+
+def _refine(values: Float32Array, axis: int) -> Float32Array:
+    """Return values of `COARSE` times as many cells along an axis, interpolated linearly."""
+    count = values.shape[axis]
+    at = np.clip((np.arange(COARSE * count) + 0.5) / COARSE - 0.5, 0, count - 1)
+    low = np.minimum(at.astype(int), max(count - 2, 0))
+    share = (at - low).astype(np.float32).reshape(-1, *[1] * (values.ndim - 1 - axis))
+    first = values.take(low, axis)
+    result: Float32Array = first + share * (
+        values.take(np.minimum(low + 1, count - 1), axis) - first
+    )
     return result
 
 
@@ -157,7 +170,7 @@ def blend(
     scalp, O a little everywhere. V takes its sign from O.
     """
     spacing = hull.grid.spacing
-    off = ndimage.distance_transform_edt(~band.cells)[hull.loose] * spacing
+    off = _distance_to(band.cells, hull.loose) * spacing
     main = smallest_eigenvectors(-fields.inner.astype(np.float64))[0]  # V's largest eigenvector
     main *= np.where((main * fields.growth).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     slope = cell_slopes(fields.distance)[hull.loose]
@@ -173,6 +186,13 @@ def blend(
     tensor = np.zeros((*hull.grid.shape, 6), np.float32)
     tensor[hull.loose] = outer_products(direction[hull.loose])
     return direction, tensor
+
+
+def _distance_to(cells: BoolArray, around: BoolArray) -> Float32Array:
+    """Return the distance (N,) of marked cells to the nearest of `cells`, which are among them."""
+    box = tuple(slice(index.min(), index.max() + 1) for index in np.nonzero(around))
+    away = ndimage.distance_transform_edt(~cells[box])
+    return np.asarray(away[around[box]], np.float32)
 
 
 def _unit(vectors: Float32Array | Float64Array) -> Float64Array:

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from hairkit import Camera, Hull, Mask, OrientationMap, Strands
+from hairkit import Camera, Hull, Mask, Strands
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.cameras.projection_kernels import PackedCamera, pack_camera, perspective_divisor
 from hairkit.field.sampling_kernels import sample_at
-from hairkit.field.view_fusion import DEPTH_SHRINK, front_depths
+from hairkit.field.view_fusion import DEPTH_SHRINK, FusedViews
 from hairkit.parallel import compiled, parallel_for
 from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
 
@@ -50,14 +50,13 @@ class LineOptions(Protocol):
 def lift_photo_lines(
     cameras: Sequence[Camera],
     masks: Sequence[Mask],
-    orientations: Sequence[OrientationMap],
-    hull: Hull,
+    fused: FusedViews,
     options: LineOptions,
 ) -> Strands:
     """Return lines that follow the 2D orientation in each photo, lifted to the hull's front."""
     found = []
-    fronts = front_depths(cameras, orientations, hull)
-    for camera, mask, oriented, front in zip(cameras, masks, orientations, fronts, strict=True):
+    views = zip(cameras, masks, fused.orientations, fused.fronts, strict=True)
+    for camera, mask, oriented, front in views:
         weight = (oriented.confidence * mask.hair).astype(np.float32)
         rows, columns = _seeds(weight, options.line_spacing)
         steps = int(options.longest / PIXELS * camera.focal / _median_depth(front))

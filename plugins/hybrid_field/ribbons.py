@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from hairkit import Hull, Strands
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
 from hairkit.field.sampling_kernels import sample_at
+from hairkit.field.smooth_volume import smooth_volume
 from hairkit.parallel import compiled
 from hairkit.types.volume import cell_slopes
 
@@ -43,7 +43,7 @@ def ribbons(segments: Strands, hull: Hull, reach: float) -> Band:
     share = np.arange(-steps, steps + 1) / max(steps, 1)
     rank = np.full(grid.shape, -1, np.int32)
     rank[hull.loose] = np.arange(np.count_nonzero(hull.loose))
-    occupancy = ndimage.gaussian_filter(hull.dense.astype(np.float32), SURFACE)
+    occupancy = smooth_volume(hull.dense.astype(np.float32), SURFACE)
     cells = Cells(grid.origin, grid.spacing, rank, cell_slopes(occupancy))
     profile = Profile(reach * share, np.exp(-0.5 * (EDGE_SIGMAS * share) ** 2))
     total = np.zeros((rank.max() + 1, 3))

@@ -69,7 +69,7 @@ def find_segments(
     certainty = fused.certainty
     volume = np.zeros((*hull.grid.shape, 6), np.float32)
     volume[hull.loose] = fused.tensor * np.minimum(certainty, 1)[:, None]
-    lines = lift_photo_lines(cameras, masks, fused.orientations, hull, options)
+    lines = lift_photo_lines(cameras, masks, fused, options)
     lines = agreeing(lines, hull, volume, options.agreement_deg)
     inner = lines_through_cells(hull, volume, certainty, options.longest)
     points = np.concatenate([lines.points, inner.points])
