@@ -161,7 +161,7 @@ def _measure_pitch(views: Sequence[tuple[Float32Array, Float32Array]]) -> tuple[
     """Return the pitch in metres and its prominence, both 0 where no peak is found."""
     size, width = (round(edge * RESOLUTION) for edge in PITCH_PATCH)
     across = round(PROFILE_HALF_WIDTH * RESOLUTION)
-    shape = (2 * size, fft.next_fast_len(width + across, real=True))  # padded by the lags that are read
+    shape = (2 * size, fft.next_fast_len(width + across, real=True))  # padded by lags that are read
     power, window = np.zeros((2, shape[0], shape[1] // 2 + 1))
     count, filled = 0, 0
     for picture, hair in _patches(views, PITCH_PATCH, PITCH_STEP, PITCH_FILLED):
