@@ -11,6 +11,7 @@ What field and tracking plugins share: fusing views, priors, diffusion, and samp
 * `isosurface`: the smooth surface of a volume of cells
 * `parting`: how hair on the crown is combed from its parting
 * `sampling_kernels`: compiled look-ups in volumes
+* `smooth_volume`: Gaussian smoothing of volumes
 * `scalp_sight`: directions of the hair on the scalp, as all views see them
 * `symmetric_eigen`: eigenvectors of symmetric 3x3 tensors, in closed form
 * `ties`: where hair is tied, and the tube of the tail
