@@ -171,10 +171,10 @@ def _local_mean(values: Float32Array, core: BoolArray) -> Float32Array:
     weight = core.astype(np.float32)
     total = np.zeros(values.shape, np.float32)
     share = np.zeros_like(weight)
+    stack = np.dstack([values * weight[..., None], weight])
     for index, sigma in enumerate(_SIGMAS):
         step = int(sigma // _CELL_OF_SIGMA)
         size = (max(width // step, 1), max(height // step, 1))
-        stack = np.dstack([values * weight[..., None], weight])
         coarse = cv2.resize(stack, size, interpolation=cv2.INTER_AREA)
         blurred = cv2.resize(blur(np.asarray(coarse, np.float32), sigma / step), (width, height))
         total += _FADE**index * blurred[..., :3]

@@ -22,6 +22,7 @@ from hairkit.imaging.seeded_segmentation import (
     LabelSettings,
     Mixture,
     appearance,
+    fold_last,
     learn_mixture,
     polynomial_terms,
 )
@@ -139,10 +140,10 @@ def _weigh(
     evidence = np.full(prior.shape, -np.inf, np.float32)
     for index, mixture in mixtures.items():
         evidence[..., index] = mixture.scores(terms).reshape(prior.shape[:2])
-    relative = evidence - evidence.max(axis=-1, keepdims=True)
+    relative = evidence - fold_last(np.maximum, evidence)[..., None]
     relative = np.maximum(relative, np.float32(-settings.evidence_cap))
     odds = prior * np.exp(blur(relative, _SMOOTH_SIGMA))
-    result: Float32Array = odds / odds.sum(axis=-1, keepdims=True)
+    result: Float32Array = odds / fold_last(np.add, odds)[..., None]
     return result
 
 

@@ -9,6 +9,7 @@ connected instead of a graph cut, which trims thin hair away.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -233,7 +234,7 @@ def _weigh_colours(
     posterior: Float32Array = prior / prior.sum(axis=-1, keepdims=True)
     terms, order = polynomial_terms(flat), np.array(_ORDER, np.uint8)
     for _ in range(settings.rounds):
-        sure = posterior.max(axis=-1) > _SURE
+        sure = fold_last(np.maximum, posterior) > _SURE
         known = np.where(sure, order[posterior.argmax(axis=-1)], np.uint8(UNKNOWN))
         counts = [np.count_nonzero(known == label) for label in order]
         classes = [int(label) for label, n in zip(order, counts, strict=True) if n >= _FEWEST]
@@ -242,13 +243,19 @@ def _weigh_colours(
         evidence = class_evidence(flat, terms, known, classes, settings)
         relative = np.full(prior.shape, -settings.evidence_cap, np.float32)
         relative[..., np.isin(order, classes)] = np.maximum(
-            evidence - evidence.max(axis=-1, keepdims=True), -settings.evidence_cap
+            evidence - fold_last(np.maximum, evidence)[..., None], -settings.evidence_cap
         )
         for region in told:
             relative[region] = 0
         odds = prior * np.exp(blur(relative, _DENOISE_SIGMA))
-        posterior = odds / odds.sum(axis=-1, keepdims=True)
+        posterior = odds / fold_last(np.add, odds)[..., None]
     return posterior
+
+
+def fold_last(combine: np.ufunc, values: Float32Array) -> Float32Array:
+    """Return (...) the K values (..., K) combined: much faster than a reduction of a few."""
+    result: Float32Array = functools.reduce(combine, np.moveaxis(values, -1, 0))
+    return result
 
 
 def _standard_features(
