@@ -21,6 +21,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `photos`: photos, with their headers checked first
 * `ply_elements`: elements of PLY files, and strands from them
 * `polylines`: strands from loose edges
+* `spline_curves`: points on spline curves from control points
 * `strand_blocks`: large grooms written in blocks of little memory
 * `strokes`: strokes on photos, labelme's JSON
 * `textures`: texture maps of mesh files

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,15 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import FormatError
+from hairkit.io.spline_curves import cubic_map, nurbs_map
 
 from .archive import Archive, Object, Property, tag
 from .transforms import compose_transform
 
-_LINEAR, _NON_PERIODIC = 1, 0
+_CUBIC, _LINEAR, _NON_PERIODIC = 0, 1, 0
+_CUBIC_ORDER = 4
+_BASES = {1: "bezier", 2: "bspline", 3: "catmullRom"}
+"""Alembic's numbers of bases (`AbcGeom::BasisType`)."""
 _MOST_LEVELS = 100
 _IDENTITY = np.eye(4)
 
@@ -44,8 +48,8 @@ class CurveSet:
     """(S,)."""
     frames: int
     """Samples of the points in time."""
-    polyline: bool
-    """False where the points are control points of splines, or the curves are closed."""
+    plain: bool
+    """False where the points stay control points: of closed curves, or of rare bases."""
 
 
 def read_curve_sets(path: Path) -> list[CurveSet]:
@@ -90,6 +94,7 @@ def _curve_set(node: Object, world: Float64Array) -> CurveSet | None:
         return None
     counts = _counts(found, points, node)
     values = _Values(node, counts)
+    spline, plain = _spline(found, counts, node)
     attributes = found[".arbGeomParams"].properties() if ".arbGeomParams" in found else {}
     widths = values.per_point(attributes.get("groom_width"), 1)
     if widths is None:
@@ -100,15 +105,15 @@ def _curve_set(node: Object, world: Float64Array) -> CurveSet | None:
     group = values.per_strand(attributes.get("groom_group_id"), 1, "i")
     guide = values.per_strand(attributes.get("groom_guide"), 1, "i")
     return CurveSet(
-        points=_move(points, world),
+        points=_move(_on_curve(spline, points), world),
         counts=counts,
-        widths=None if widths is None else _scale(widths[:, 0], world),
+        widths=None if widths is None else _scale(_on_curve(spline, widths)[:, 0], world),
         root_uv=uv,
-        colour=values.per_point(attributes.get("groom_color"), 3),
+        colour=_on_curve(spline, values.per_point(attributes.get("groom_color"), 3)),
         group=None if group is None else group[:, 0],
         guide=None if guide is None else guide[:, 0],
         frames=found["P"].samples,
-        polyline=_polyline(found.get("curveBasisAndType")),
+        plain=plain,
     )
 
 
@@ -125,11 +130,39 @@ def _counts(found: dict[str, Property], points: Float32Array, node: Object) -> I
     return result
 
 
-def _polyline(kind: Property | None) -> bool:
-    numbers = None if kind is None else kind.integers()
-    if numbers is None or numbers.size < 2:
-        return True
-    return bool(numbers.ravel()[0] == _LINEAR and numbers.ravel()[1] == _NON_PERIODIC)
+def _spline(
+    found: Mapping[str, Property], counts: Int64Array, node: Object
+) -> tuple[Any | None, bool]:
+    """Return the map (P, P) from control points to points on the curves, and whether all is told.
+
+    None for polylines, and for Catmull-Rom curves, which run through their control points.
+    """
+    header = found.get("curveBasisAndType")
+    numbers = None if header is None else header.integers()
+    if numbers is None or numbers.size < 3:
+        return None, True
+    kind, wrap, basis = (int(number) for number in numbers.ravel()[:3])
+    if wrap != _NON_PERIODIC:
+        return None, False
+    knots = found[".knots"].floats() if ".knots" in found else None
+    if kind != _LINEAR and knots is not None and len(knots):
+        orders = found[".orders"].integers() if ".orders" in found else None
+        order = np.full(len(counts), _CUBIC_ORDER) if orders is None else orders.ravel()
+        weights = found["w"].floats() if "w" in found else None
+        if len(order) != len(counts) or (weights is not None and len(weights) != counts.sum()):
+            raise node.archive.file.error(f"{node.name} has orders or weights of other curves")
+        rational = None if weights is None else weights.ravel()
+        return nurbs_map(counts, order, knots.ravel(), rational, node.name), True
+    if kind == _LINEAR or _BASES.get(basis) == "catmullRom":
+        return None, True
+    if kind != _CUBIC or basis not in _BASES:
+        return None, False
+    return cubic_map(counts, _BASES[basis]), True
+
+
+def _on_curve(spline: Any | None, values: Float32Array | None) -> Any:
+    """Return values (P, C) of control points at the points on the curves."""
+    return values if spline is None or values is None else (spline @ values).astype(np.float32)
 
 
 def _move(points: Float32Array, world: Float64Array) -> Float32Array:

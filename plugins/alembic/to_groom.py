@@ -46,9 +46,9 @@ def _say_what_is_left_out(sets: list[CurveSet], path: Path) -> None:
     frames = max(part.frames for part in sets)
     if frames > 1:
         _log.warning("%s: animated, %d frames; the first is read", path, frames)
-    if not all(part.polyline for part in sets):
+    if not all(part.plain for part in sets):
         _log.warning(
-            "%s: splines or closed curves; their control points are taken as open polylines", path
+            "%s: closed or Hermite curves; their control points are taken as open polylines", path
         )
 
 

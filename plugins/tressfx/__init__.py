@@ -3,9 +3,9 @@
 Version 4 (TressFXFileFormat.h): a header of 160 bytes, then a position and inverse mass (4 f32) for
 every point, a texture coordinate and a thickness for every strand and a colour (4 f32) for every
 point. The first two points of a strand are fixed to the head. The .tfxbone binds each strand to
-the joints. The text files of version 1 and 2 are read.
+the joints. Binary files of version 3 and the text files of version 1 and 2 are read.
 
-* `binary`: .tfx of version 4
+* `binary`: .tfx of versions 4 and 3
 * `bones`: .tfxbone files
 * `text`: .tfx of versions 1 and 2
 * `writer`: blocks of a .tfx in order
@@ -88,7 +88,7 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
 
 @hookimpl
 def import_groom(path: Path, options: Options) -> Groom:
-    """Read a .tfx of version 4, or a text file of version 1 or 2; a head is put under it."""
+    """Read a .tfx of versions 1 to 4; a head is put under it."""
     data = read_bytes(path)
     hair, counts = read_text(data, path) if is_text(data) else read_binary(ByteReader(data, path))
     points = options.space.points_to_head(hair.points.reshape(-1, 3))

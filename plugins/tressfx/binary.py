@@ -1,4 +1,4 @@
-"""The binary .tfx of TressFX 4: a header with the place of each array."""
+"""The binary .tfx of TressFX 4 and 3: a header with the place of each array."""
 
 from __future__ import annotations
 
@@ -25,7 +25,26 @@ HEADER = np.dtype(
 )
 """160 bytes; `points` is of each strand, what follows it is where arrays begin, 0 for none."""
 
-VERSION = 4.0
+OLD_HEADER = np.dtype(
+    [
+        ("version", "<f4"),
+        ("strands", "<u4"),
+        ("points", "<u4"),
+        ("followers", "<u4"),
+        ("both_ends_fixed", "<u4"),
+        ("reserved", "<u4", 31),
+        ("position", "<u4"),
+        ("thickness", "<u4"),
+        ("strand_uv", "<u4"),
+        ("colour", "<u4"),
+        ("guides", "<u4"),
+        ("point_uv", "<u4"),
+        ("reserved_too", "<u4", 32),
+    ]
+)
+"""296 bytes of TressFX 3 (`TressFXFileObject`); positions are three numbers, not four."""
+
+VERSION, OLD_VERSION = 4.0, 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +67,17 @@ def read_binary(reader: ByteReader) -> tuple[TfxHair, Int64Array]:
     Raises
     ------
     FormatError
-        It is no .tfx of version 4, an array goes beyond its end, or a number is not finite.
+        It is no .tfx of version 3 or 4, an array goes beyond its end, or a number is not finite.
     """
-    header = reader.array(HEADER, 1, "the header")[0]
-    if header["version"] != VERSION:
-        raise reader.error(f"the version is {header['version']:g}, expected {VERSION:g}")
+    version = float(reader.array("<f4", 1, "the version")[0])
+    reader.seek(0, "the header")
+    if version not in (OLD_VERSION, VERSION):
+        raise reader.error(f"the version is {version:g}, expected {OLD_VERSION:g} or {VERSION:g}")
+    header = reader.array(HEADER if version == VERSION else OLD_HEADER, 1, "the header")[0]
     size = int(header["strands"]), int(header["points"])
     if min(size) < 1:
         raise reader.error(f"{size[0]} strands of {size[1]} points")
-    points = _array(reader, header, "position", (*size, 4))
+    points = _array(reader, header, "position", (*size, 4 if version == VERSION else 3))
     if points is None:
         raise reader.error("the positions are left out")
     colours = _array(reader, header, "colour", (*size, 4))

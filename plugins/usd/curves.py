@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array
-from hairkit.grooming.guide_weights import closest_guides
+from hairkit.grooming.guide_weights import closest_guides, guide_mask
 from hairkit.grooming.prepare_export import PreparedGroom, point_colours
 from hairkit.head_model.skinning import HEAD_JOINT
 from hairkit.io.coordinate_space import FileSpace
@@ -26,8 +26,13 @@ def add_hair(
     codes: list[float],
     *,
     attributes: bool = True,
+    mark_guides: bool = False,
 ) -> None:
-    """Add all strands as one linear BasisCurves, its points and extent at every time code too."""
+    """Add all strands as one linear BasisCurves, its points and extent at every time code too.
+
+    Where the strands are guides and nothing else they are not marked, as in Alembic files: Unreal
+    draws unmarked strands alone.
+    """
     from pxr import UsdGeom, UsdShade, Vt
 
     strands = ready.groom.strands
@@ -47,13 +52,14 @@ def add_hair(
         points.Set(place, *when)
         extent.Set(UsdGeom.Curves.ComputeExtent(place, widths), *when)
     if attributes:
-        _add_primvars(UsdGeom.PrimvarsAPI(hair.GetPrim()), ready.groom)
+        marked = mark_guides or not guide_mask(strands).all()
+        _add_primvars(UsdGeom.PrimvarsAPI(hair.GetPrim()), ready.groom, marked)
     UsdShade.MaterialBindingAPI.Apply(hair.GetPrim()).Bind(material)
     if ready.cache is None:
         _bind_to_head(hair.GetPrim(), skeleton)
 
 
-def _add_primvars(primvars: Any, groom: Groom) -> None:
+def _add_primvars(primvars: Any, groom: Groom, marked: bool) -> None:
     """Add the colours at every point and what is known of every strand."""
     from pxr import Sdf, UsdGeom, Vt
 
@@ -65,33 +71,33 @@ def _add_primvars(primvars: Any, groom: Groom) -> None:
     uv = Vt.Vec2fArray.FromNumpy(groom.strands.root_uv)
     for name, kind in (("st", types.TexCoord2fArray), ("groom_root_uv", types.Float2Array)):
         primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.uniform).Set(uv)
-    for name, values in _numbers(groom).items():
+    for name, values in _numbers(groom, marked).items():
         array, kind = Vt.IntArray.FromNumpy(values), types.IntArray
         primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.uniform).Set(array)
     density = Vt.FloatArray.FromNumpy(groom.root_density)
     primvars.CreatePrimvar(ROOT_DENSITY, types.FloatArray, UsdGeom.Tokens.uniform).Set(density)
-    for name, rows in _triples(groom).items():
+    for name, rows in _triples(groom, marked).items():
         array, kind = Vt.Vec3fArray.FromNumpy(rows), types.Float3Array
         primvars.CreatePrimvar(name, kind, UsdGeom.Tokens.uniform).Set(array)
 
 
-def _numbers(groom: Groom) -> dict[str, Int32Array]:
+def _numbers(groom: Groom, marked: bool) -> dict[str, Int32Array]:
     """Return the whole numbers (S,) of every strand."""
     strands = groom.strands
     assert strands.group is not None
     assert strands.guide is not None
-    return {
+    numbers = {
         "groom_id": np.arange(len(strands), dtype=np.int32),
         "groom_group_id": strands.group,
-        "groom_guide": strands.guide.astype(np.int32),
         "hairkit:root_triangle": groom.root_triangle,
     }
+    return numbers | ({"groom_guide": strands.guide.astype(np.int32)} if marked else {})
 
 
-def _triples(groom: Groom) -> dict[str, Float32Array]:
+def _triples(groom: Groom, marked: bool) -> dict[str, Float32Array]:
     """Return three numbers (S, 3) of every strand; ids of guides too, as Unreal reads no int3."""
     triples = {"hairkit:root_barycentric": groom.root_barycentric}
-    if groom.strands.guide is not None and groom.strands.guide.any():
+    if marked and guide_mask(groom.strands).any():
         mix = closest_guides(groom.strands)
         triples["groom_closest_guides"] = mix.guides.astype(np.float32)
         triples["groom_guide_weights"] = mix.weights

@@ -32,6 +32,11 @@ CURVE_PRIMVARS = (
     "hairkit:root_triangle",
     "hairkit:root_barycentric",
 )
+OWN_ARRAYS = (
+    *("curveVertexCounts", "faceVertexCounts", "faceVertexIndices", "widths"),
+    *("order", "knots", "pointWeights"),
+)
+"""Attributes of one number an element: of curves, of meshes, of NURBS."""
 _INSTEAD = {"st": "groom_root_uv", "displayColor": "groom_color"}
 """Attributes that are skipped if a better one was found."""
 _INTERPOLATIONS = ("constant", "uniform", "varying", "vertex", "faceVarying")
@@ -81,7 +86,7 @@ def extract_arrays(source: str) -> dict[str, npt.NDArray[Any]]:
     for number, prim in enumerate(prims):
         if number >= MAX_PRIMS:
             raise RefusedError(f"it has more than {MAX_PRIMS} prims")
-        if prim.IsA(UsdGeom.BasisCurves):
+        if prim.IsA(UsdGeom.BasisCurves) or prim.IsA(UsdGeom.NurbsCurves):
             taken.curves.append(taken.points(prim, "c", CURVE_PRIMVARS))
         elif prim.IsA(UsdGeom.Mesh) and prim.HasAttribute("primvars:hairkit:scalp"):
             taken.meshes.append(taken.points(prim, "m", ("st", "hairkit:scalp")))
@@ -116,7 +121,7 @@ class _Taken:
         attribute = prim.GetAttribute("points")
         time, frames = _time_of(attribute)
         self.put(name + "points", attribute.Get(time), 3)
-        for own in ("curveVertexCounts", "faceVertexCounts", "faceVertexIndices", "widths"):
+        for own in OWN_ARRAYS:
             if prim.HasAttribute(own):
                 when, _ = _time_of(prim.GetAttribute(own))
                 self.put(name + own, prim.GetAttribute(own).Get(when), 1)
@@ -138,6 +143,7 @@ class _Taken:
             "to_stage": [list(matrix.GetRow(row)) for row in range(4)],
             "interpolation": found,
             "shape": _shape(prim),
+            "wrap": _text_of(prim, "wrap"),
         }
 
     def put(self, name: str, value: Any, columns: int | None) -> None:
@@ -195,14 +201,17 @@ def _time_of(attribute: Any) -> tuple[Any, int]:
 
 
 def _shape(prim: Any) -> str:
-    """Return `linear`, or the basis of cubic curves."""
+    """Return `linear`, the basis of cubic curves, or `nurbs`."""
     from pxr import UsdGeom
 
-    curves = UsdGeom.BasisCurves(prim)
-    if not curves:
-        return ""
-    kind = str(curves.GetTypeAttr().Get())
-    return kind if kind == "linear" else str(curves.GetBasisAttr().Get())
+    if prim.IsA(UsdGeom.NurbsCurves):
+        return "nurbs"
+    kind = _text_of(prim, "type")
+    return kind if kind in ("", "linear") else _text_of(prim, "basis")
+
+
+def _text_of(prim: Any, name: str) -> str:
+    return str(prim.GetAttribute(name).Get()) if prim.HasAttribute(name) else ""
 
 
 def _curve_interpolation(prim: Any) -> str:

@@ -30,6 +30,8 @@ class StageOptions(Protocol):
     def bust(self) -> bool: ...
     @property
     def attributes(self) -> bool: ...
+    @property
+    def mark_guides(self) -> bool: ...
 
 
 def write_stage(ready: PreparedGroom, path: Path, options: StageOptions) -> None:
@@ -122,4 +124,5 @@ def _fill(
         materials.hair,
         time_codes(ready),
         attributes=options.attributes,
+        mark_guides=options.mark_guides,
     )

@@ -13,6 +13,7 @@ from hairkit.arrays import Float32Array, Int32Array, Int64Array
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands, rows_kept
 from hairkit.io.coordinate_space import FileSpace
+from hairkit.io.spline_curves import BASES, cubic_map, nurbs_map
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.strands import Strands
 
@@ -21,6 +22,9 @@ from .guarded import Contents, contents
 from .settings import material_from, physics_from, ties_from
 
 _log = logging.getLogger("hairkit")
+
+_THROUGH = ("catmullRom", True)
+"""Basis and pinning of curves that run through all their control points: these are the strand."""
 
 
 class ReadOptions(Protocol):
@@ -54,7 +58,7 @@ def read_groom(path: Path, options: Any) -> Groom:
         head = read_head(found, space, path)
     every = [curves for curves in every if len(curves.counts)]
     if not every:
-        raise FormatError(f"{path}: holds no BasisCurves with points")
+        raise FormatError(f"{path}: holds no BasisCurves or NurbsCurves with points")
     joined = _join(every)
     strands, kept = pack_strands(joined.points, joined.counts, path)
     strands = _complete(strands, joined, kept)
@@ -98,10 +102,12 @@ def _curves(found: Contents, description: dict[str, Any], space: FileSpace, path
     placed = space.points_to_head(points)
     if not np.isfinite(placed).all():
         raise FormatError(f"{where} has points too far away")
+    spline = _spline(found, description, counts, where)
+    placed = _on_curve(spline, placed)
     values = _Values(found, description, counts, where)
     growth = float(np.cbrt(abs(np.linalg.det(matrix[:3, :3])))) * space.metres
-    widths = values.of_points("widths")
-    colour = values.of_points("groom_color", 3)
+    widths = _on_curve(spline, values.of_points("widths"))
+    colour = _on_curve(spline, values.of_points("groom_color", 3))
     triangle = values.of_strands("hairkit:root_triangle")
     group = values.of_strands("groom_group_id")
     guide = values.of_strands("groom_guide")
@@ -113,21 +119,40 @@ def _curves(found: Contents, description: dict[str, Any], space: FileSpace, path
         values.of_strands("st", 2) if uv is None else uv,
         None if group is None else group.astype(np.int32),
         None if guide is None else guide.astype(np.int32),
-        values.of_points("displayColor", 3) if colour is None else colour,
+        _on_curve(spline, values.of_points("displayColor", 3)) if colour is None else colour,
         None if triangle is None else triangle.astype(np.int32),
         values.of_strands("hairkit:root_barycentric", 3),
     )
 
 
 def _say_what_changes(description: dict[str, Any], where: str) -> None:
-    if description["shape"] != "linear":
-        _log.warning(
-            "%s: cubic (%s) curves are read as lines between control points",
-            where,
-            description["shape"],
-        )
+    if description["wrap"] == "periodic":
+        _log.warning("%s: closed curves are read as open ones of their control points", where)
     if description["frames"] > 1:
         _log.warning("%s: animated, %d frames; only one is read", where, description["frames"])
+
+
+def _spline(
+    found: Contents, description: dict[str, Any], counts: Int64Array, where: str
+) -> Any | None:
+    """Return the map (P, P) from control points to points on the curves; None for polylines."""
+    name, shape = description["name"], description["shape"]
+    if shape == "nurbs":
+        orders = found.arrays.get(name + "order", np.zeros(0)).astype(np.int64)
+        knots = found.arrays.get(name + "knots", np.zeros(0)).astype(np.float64)
+        weights = found.arrays.get(name + "pointWeights")
+        if len(orders) != len(counts) or (weights is not None and len(weights) != counts.sum()):
+            raise FormatError(f"{where} has orders or weights that do not fit its curves")
+        return nurbs_map(counts, orders, knots, weights, where)
+    pinned = description["wrap"] == "pinned"
+    if shape not in BASES or description["wrap"] == "periodic" or (shape, pinned) == _THROUGH:
+        return None
+    return cubic_map(counts, shape, pinned=pinned)
+
+
+def _on_curve(spline: Any | None, values: Float32Array | None) -> Any:
+    """Return values of control points (P,) or (P, C) at the points on the curves."""
+    return values if spline is None or values is None else (spline @ values).astype(np.float32)
 
 
 class _Values:

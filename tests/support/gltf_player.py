@@ -50,8 +50,13 @@ class GltfPlayer:
         """(T,) the keys of the first animation, seconds."""
         return self.array(self.json["animations"][0]["samplers"][0]["input"])[:, 0]
 
-    def mesh(self, name: str, time: float, client: Client) -> npt.NDArray[Any]:
-        """Return (V, 3) where a client draws the vertices of the mesh of a node so named."""
+    def mesh(
+        self, name: str, time: float, client: Client, along: int | None = None
+    ) -> npt.NDArray[Any]:
+        """Return (V, 3) where a client draws the vertices of the mesh of a node so named.
+
+        `along` names an accessor of vectors: then it is where their ends are.
+        """
         number = next(n for n, node in enumerate(self.json["nodes"]) if node.get("name") == name)
         node, animated = self.json["nodes"][number], self._sampled(time)
         mesh = self.json["meshes"][node["mesh"]]
@@ -62,6 +67,7 @@ class GltfPlayer:
             weights = np.clip(weights, 0, 1)
         for weight, target in zip(weights, primitive.get("targets", []), strict=True):
             points = points + weight * self.array(target["POSITION"])
+        points = points if along is None else points + self.array(along)
         skins = client == "blender" or primitive.get("mode", _TRIANGLES) == _TRIANGLES
         if "skin" in node and skins:
             return self._skinned(points, primitive["attributes"], node["skin"], animated)
@@ -100,7 +106,10 @@ class GltfPlayer:
 
     def _sampled(self, time: float) -> dict[tuple[int, str], npt.NDArray[Any]]:
         """Return the animated properties of nodes at a time, between keys by the shorter arc."""
-        animation, found = self.json["animations"][0], {}
+        found: dict[tuple[int, str], npt.NDArray[Any]] = {}
+        if "animations" not in self.json:
+            return found
+        animation = self.json["animations"][0]
         for channel in animation["channels"]:
             sampler = animation["samplers"][channel["sampler"]]
             keys = self.array(sampler["input"])[:, 0].astype(float)

@@ -86,6 +86,24 @@ def test_strands_of_the_right_count_are_not_resampled(tmp_path: Path) -> None:
     assert np.array_equal(back.strands.points, uneven.points)
 
 
+def test_files_of_version_3_are_read(tmp_path: Path) -> None:
+    """`TressFXFileObject`: a header of 296 bytes, three numbers a point, where the header says."""
+    rng = np.random.default_rng(0)
+    points = np.cumsum(rng.normal(scale=0.01, size=(9, 4, 3)), axis=1).astype("<f4")
+    points[:, :, 0] += 0.1 * np.linspace(-1, 1, 9)[:, None]
+    width = np.full(9, 0.0001, "<f4")
+    header = struct.pack("<f4I31I6I32I", 3.0, 9, 4, 0, 1, *[0] * 31, 296, 296 + points.nbytes,
+                         0, 0, 0, 0, *[0] * 32)  # fmt: skip
+    path = tmp_path / "old.tfx"
+    path.write_bytes(header + points.tobytes() + width.tobytes())
+    groom = tressfx.import_groom(path, tressfx.Options())
+    np.testing.assert_array_equal(groom.strands.points, points.reshape(-1, 3))
+    np.testing.assert_array_equal(groom.strands.widths, np.repeat(width, 4))
+    path.write_bytes(struct.pack("<f", 5.0) + header[4:])
+    with pytest.raises(FormatError, match="at byte 0, the version is 5, expected 3 or 4"):
+        tressfx.import_groom(path, tressfx.Options())
+
+
 TEXT = """version 2.0
 scale 2.0
 rotation 0 0 0

@@ -85,12 +85,41 @@ def test_prims_are_joined_as_groups(read: Reader) -> None:
     np.testing.assert_allclose(groom.strands.roots[3], [0.02, 0, 0])
 
 
-def test_cubic_curves_are_read_as_lines(read: Reader, caplog: pytest.LogCaptureFixture) -> None:
-    """The control points are the strand, and a warning says so."""
-    with caplog.at_level(logging.WARNING, "hairkit"):
-        groom = read(HEADER + curves(kind="cubic"))
-    assert "cubic (bezier) curves are read as lines" in caplog.text
-    assert groom.strands.counts.tolist() == [3, 3, 3]
+BENT = """
+def {kind} "hair" {{
+    {more}
+    int[] curveVertexCounts = [4, 4]
+    point3f[] points = [(0, 0, 0), (0, 0.1, 0.1), (0, 0.2, 0.1), (0, 0.3, 0),
+        (0.1, 0, 0), (0.1, 0.1, 0.1), (0.1, 0.2, 0.1), (0.1, 0.3, 0)]
+    float[] widths = [0, 0.003, 0.006, 0.009, 0, 0.003, 0.006, 0.009] (
+        interpolation = "vertex"
+    )
+}}
+"""
+BEZIER = 'uniform token type = "cubic"\n uniform token basis = "bezier"'
+NURBS = "int[] order = [4, 4]\n double[] knots = [0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 1, 1, 1, 1]"
+
+
+@pytest.mark.parametrize(("kind", "more"), [("BasisCurves", BEZIER), ("NurbsCurves", NURBS)])
+def test_splines_are_read_as_points_on_the_curve(read: Reader, kind: str, more: str) -> None:
+    """A Bezier cubic, also as NURBS, runs at 3/4 of its control points' height, from end to end."""
+    groom = read(HEADER + BENT.format(kind=kind, more=more))
+    third = np.array([1, 2]) / 3
+    high = 0.3 * third * (1 - third)
+    wanted = [[0, 0, 0], [0, 0.1, high[0]], [0, 0.2, high[1]], [0, 0.3, 0]]
+    np.testing.assert_allclose(groom.strands.points[:4], wanted, atol=1e-7)
+    np.testing.assert_allclose(groom.strands.widths[:4], [0, 0.003, 0.006, 0.009], atol=1e-7)
+
+
+def test_damaged_nurbs_are_refused(read: Reader) -> None:
+    """Knots that are too few or descend are told in one line."""
+    for old, new in (
+        ("[4, 4]", "[4]"),
+        ("1, 1, 1, 1]", "1, 1, 1]"),
+        ("0, 0, 0, 0, 1", "5, 0, 0, 0, 1"),
+    ):
+        with pytest.raises(FormatError, match="hair"):
+            read(HEADER + BENT.format(kind="NurbsCurves", more=NURBS.replace(old, new, 1)))
 
 
 def test_the_first_frame_of_an_animation_is_read(
@@ -137,7 +166,7 @@ def test_other_files_are_never_opened(read: Reader, tmp_path: Path, text: str) -
     [
         ("", "not a readable USD file"),
         ("#usda 1.0\nx", "not a readable USD file"),
-        (HEADER, "no BasisCurves with points"),
+        (HEADER, "no BasisCurves or NurbsCurves"),
         (HEADER + curves().replace("[3, 3, 3]", "[3, 3, 4]"), "9 points, its curves 10"),
         (HEADER + curves().replace("[3, 3, 3]", "[3, 9, -3]"), "9 points, its curves 9"),
         (HEADER + curves().replace("(0, 0.2, 0)", "(0, nan, 0)"), "not finite"),

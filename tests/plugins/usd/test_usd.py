@@ -129,6 +129,19 @@ def test_equal_grooms_are_equal_files(manager: Manager, tmp_path: Path) -> None:
         assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
+def test_guides_alone_are_marked_only_when_asked(manager: Manager, tmp_path: Path) -> None:
+    """A file of guides alone marks none, as in Alembic: Unreal draws no marked strands."""
+    from pxr import UsdGeom
+
+    for asked in (False, True):
+        folder = tmp_path / str(asked)  # the library keeps a stage for each path
+        folder.mkdir()
+        stage = opened(exported(manager, bristle_groom(), folder, mark_guides=asked))
+        primvars = UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/Groom/Hair"))
+        assert bool(primvars.GetPrimvar("groom_guide")) == asked
+        assert bool(primvars.GetPrimvar("groom_closest_guides")) == asked
+
+
 def test_engines_find_what_they_read(manager: Manager, tmp_path: Path) -> None:
     """Unreal's attributes have the types its USD import takes; guides of guides are themselves."""
     from pxr import UsdGeom
