@@ -15,6 +15,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `models`: networks that plugins use
 * `new_plugin`: a plugin to start from
 * `plugins`: list of plugins and options
+* `reader_settings`: options of the verbs that read hair of any format
 * `reconstruct`: photos to groom
 * `render`: pictures of a groom
 * `rerun`: a recorded run once more

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from hairkit.cli.export import check_target
+from hairkit.cli.reader_settings import add_reader_arguments, reader_settings
 from hairkit.cli.settings import add_setting, split_settings
-from hairkit.errors import InputError, OptionError
+from hairkit.errors import InputError
 from hairkit.grooming.decimate import decimate
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.manager import Manager
@@ -26,8 +27,6 @@ Read a file of one format and write it in another; suffixes choose the formats. 
 (head, widths, root uv) gets default values, with a message. `hairkit plugins --formats` lists what
 each format carries."""
 
-UP = {"y": "y_up_metres", "z": "z_up_metres"}
-"""Axis option of the reader for each way up."""
 CURLS = 400
 """Strands at most whose curl is measured."""
 
@@ -55,16 +54,6 @@ def register(subparsers: Any) -> None:
     )
     add("--to", metavar="PLUGIN", help="export plugin (default: by suffix)")
     add_setting(add)
-
-
-def add_reader_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add options about the file to read."""
-    add = parser.add_argument
-    add("--scale", metavar="M", help="metres per unit of the input file")
-    add("--up", choices=tuple(UP), help="up axis of the input file")
-    add("--head", metavar="FILE", help="head to put under the strands")
-    add("--from", dest="reader", metavar="PLUGIN", help="import plugin (default: by suffix)")
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -100,23 +89,6 @@ def _with_curl(groom: Groom) -> Groom:
     count = min(len(groom.strands), CURLS)
     some = groom.strands.select(np.linspace(0, len(groom.strands) - 1, count).astype(np.int64))
     return replace(groom, material=measure_curl(some).written_to(groom.material))
-
-
-def reader_settings(manager: Manager, reader: str, args: argparse.Namespace) -> dict[str, object]:
-    """Return the reader's options for --scale, --up and --head."""
-    known = {option.name for option in manager.info(reader).options}
-    wanted = {
-        "scale": ("--scale", args.scale),
-        "axis": ("--up", None if args.up is None else UP[args.up]),
-        "head": ("--head", args.head),
-    }
-    given = {name: word for name, (word, value) in wanted.items() if value is not None}
-    missing = [word for name, word in given.items() if name not in known]
-    if missing:
-        raise OptionError(
-            f"{missing[0]}: files of plugin {reader!r} define it themselves; leave it out"
-        )
-    return {name: wanted[name][1] for name in given}
 
 
 def _summary(groom: Groom, target: Path, seconds: float) -> str:

@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import Float32Array
-from hairkit.cli.convert import add_reader_arguments, reader_settings
+from hairkit.cli.reader_settings import add_reader_arguments, reader_settings
 from hairkit.cli.settings import add_setting, split_settings
 from hairkit.errors import FormatError, InputError
-from hairkit.grooming.guide_weights import guide_mask
-from hairkit.manager import Manager
-from hairkit.pipeline.open_groom import load_groom, plugin_for
+from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache, is_cache_file
 
 _DESCRIPTION = """\
@@ -81,18 +79,17 @@ def _simulation(cache: PointCache) -> dict[str, Any]:
 
 
 def _groom(path: Path, args: argparse.Namespace) -> dict[str, Any]:
-    manager = Manager.loaded(args.plugin)
-    reader = args.reader or plugin_for(manager, "import_groom", path)
-    given = split_settings(manager, {"reader": reader}, args.set)["reader"]
-    settings = reader_settings(manager, reader, args) | given
-    groom = load_groom(manager, path, settings, reader)
+    chosen = (args.plugin, args.reader, args.set, args.scale, args.up, args.head)
+    own = path.suffix == ".npz" and not any(chosen)
+    groom = Groom.load(path) if own else _imported(path, args)
     strands = groom.strands
+    guides = len(strands) if strands.guide is None else int(np.count_nonzero(strands.guide))
     lengths, counts = strands.lengths(), strands.counts
     look = groom.material
     return {
         "kind": "groom",
         "strands": len(strands),
-        "guides": int(np.count_nonzero(guide_mask(strands))),
+        "guides": guides,
         "points": len(strands.points),
         "points_per_strand": _range(counts),
         "length_m": _range(lengths),
@@ -108,6 +105,18 @@ def _groom(path: Path, args: argparse.Namespace) -> dict[str, Any]:
         "tip_colour": [round(float(c), 4) for c in look.tip_colour],
         "head": _head(groom.head),
     }
+
+
+def _imported(path: Path, args: argparse.Namespace) -> Groom:
+    """Return the groom that a plugin reads; only then all plugins are loaded."""
+    from hairkit.manager import Manager
+    from hairkit.pipeline.open_groom import load_groom, plugin_for
+
+    manager = Manager.loaded(args.plugin)
+    reader = args.reader or plugin_for(manager, "import_groom", path)
+    given = split_settings(manager, {"reader": reader}, args.set)["reader"]
+    settings = reader_settings(manager, reader, args) | given
+    return load_groom(manager, path, settings, reader)
 
 
 def _scene(path: Path) -> dict[str, Any]:

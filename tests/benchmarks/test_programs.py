@@ -69,6 +69,7 @@ ELSEWHERE = {
     "face_landmarks",
     "fidelity",
     "simulation",
+    "stages",
     "studio_kills",
 }
 """Programs with tests of their own beside this one, or that need Blender."""

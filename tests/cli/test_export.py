@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +72,18 @@ def info(capsys: pytest.CaptureFixture[str], path: Path) -> dict[str, object]:
     facts = json.loads(capsys.readouterr().out)
     assert isinstance(facts, dict)
     return facts
+
+
+def test_info_on_our_own_file_loads_no_plugin(groom_file: Path) -> None:
+    """hairkit's own groom is read without plugins, compilers and SciPy: it takes a moment."""
+    heavy = ("numba", "cv2", "scipy", "hairkit_plugins")
+    code = (
+        f"import sys; from hairkit.cli import main; main(['info', {str(groom_file)!r}]);"
+        f"print('loaded', [m for m in {heavy} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("kind: groom")
+    assert done.stdout.splitlines()[-1] == "loaded []"
 
 
 def test_info_tells_what_a_groom_holds(
