@@ -39,6 +39,8 @@ FLOW_SMOOTHING = 2.0
 """Standard deviation in cells that makes the chamfer distance's gradient smooth."""
 LENGTH_PERCENTILE = 98
 """Percentile of the scalp distance that is taken as the hair's length."""
+OCTANTS = 8
+"""Orders in which the cells of a grid are swept."""
 MOST_SWEEPS = 12
 """Rounds of eight sweeps; paths round more corners than this are left too long."""
 LEAST_CHANGE = 1e-7
@@ -225,10 +227,10 @@ def _chamfer(occupied: BoolArray, spacing: np.float32, distance: Float32Array) -
     """Lower distances (X, Y, Z), infinite in unoccupied cells, until a round changes none."""
     cost = np.sqrt(np.arange(4)).astype(np.float32) * spacing
     unchanged = 0
-    for sweep in range(8 * MOST_SWEEPS):
-        changed = _sweep(occupied, cost, sweep % 8, distance)
+    for sweep in range(OCTANTS * MOST_SWEEPS):
+        changed = _sweep(occupied, cost, sweep % OCTANTS, distance)
         unchanged = 0 if changed else unchanged + 1
-        if unchanged == 8:
+        if unchanged == OCTANTS:
             break
 
 

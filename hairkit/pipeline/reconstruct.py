@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.cameras.similarity import move_head
+from hairkit.compilation import announce_compilation
 from hairkit.errors import InputError, RenderError
 from hairkit.field.find_parting import measure_parting
 from hairkit.field.growth_prior import measure_scalp_distance
@@ -139,7 +140,11 @@ def _run(
     """Run the stages in the work folder and write all files; the record comes last."""
     busy = f"{folder}: another run is working here; waiting for it to end"
     work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(busy))
-    with work, ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool:
+    with (
+        work,
+        announce_compilation(log.message),
+        ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool,
+    ):
         run = StageRunner(recipe, manager, work, log, pool)
         _sweep(folder, run)
         tell_missing(recipe, manager, log)

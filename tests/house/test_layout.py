@@ -21,7 +21,7 @@ TRAINING = sorted((PROJECT / "training").rglob("*.py"))
 PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins" / "__init__.py"})
 
 FLOORS = (
-    ("errors", "arrays", "colour", "options", "storage", "progress", "parallel"),
+    ("errors", "arrays", "colour", "options", "storage", "progress", "parallel", "compilation"),
     ("types",),
     ("cameras", "imaging", "helices", "head_model", "rendering"),
     ("field", "io", "nets"),
