@@ -11,7 +11,7 @@ import numpy.typing as npt
 from gltf_player import GltfPlayer
 
 Array = npt.NDArray[Any]
-SIZE, SPAN = 80, 0.3
+SIZE, SPAN = 64, 0.26
 """Pixels and metres of a picture's edge."""
 LIGHT = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
 """Towards the light, as the camera sees it: right, up, towards the camera."""
@@ -85,7 +85,8 @@ def draw(surface: Surface, view: str) -> Picture:
         _fill(pixel[face], place[face, 2], values[face], depth, seen)
     covered = np.isfinite(depth)
     normal = seen[..., 7:] / np.maximum(np.linalg.norm(seen[..., 7:], axis=2, keepdims=True), 1e-9)
-    half = (LIGHT + [0, 0, 1]) / np.linalg.norm(LIGHT + [0, 0, 1])
+    half = LIGHT + np.array([0, 0, 1])
+    half /= np.linalg.norm(half)
     diffuse = np.maximum(normal @ LIGHT, 0)
     shine = np.maximum(normal @ half, 0) ** GLOSS
     return Picture(

@@ -17,16 +17,16 @@ from hairkit.types.point_cache import PointCache
 from hairkit.types.strands import Strands
 
 WIDTH = 0.006
-POINTS = 10
+POINTS = 7
 ROOT, TIP = np.array([0.3, 0.15, 0.05]), np.array([0.8, 0.6, 0.3])
-ALLOWED = {"silhouette": 0.05, "lit": 0.02, "shine": 0.02, "colours": 0.02, "uv": 0.02}
+ALLOWED = {"silhouette": 0.05, "lit": 0.02, "shine": 0.02, "colours": 0.03, "uv": 0.02}
 """Differences of pictures at most; the strips' shades, 0.8 to 1, are told in the mean."""
 
 
 def parted_groom() -> Groom:
     """Return hair combed from a parting over a ball of 10 cm, shorter on the subject's right."""
     head, angle = ball_head(24), np.linspace(0.05, 1.0, POINTS)
-    across = np.linspace(-0.08, 0.08, 26)
+    across = np.linspace(-0.08, 0.08, 12)
     strands = [
         np.stack(
             [
@@ -42,7 +42,7 @@ def parted_groom() -> Groom:
     ]
     packed = Strands.from_list(strands)
     triangle, barycentric = bind(packed.roots, head)
-    uv = np.clip(0.5 + 4 * packed.roots[:, [2, 0]], 0, 1)
+    uv = np.clip([0.5, 0.2] + 4 * packed.roots[:, [2, 0]], 0, 1)
     return Groom(replace(packed, root_uv=uv), head, triangle, barycentric, HairMaterial(ROOT, TIP))
 
 
@@ -67,13 +67,8 @@ def wanted(groom: Groom, turn: Array) -> Surface:
     colours = 0.9 * (ROOT + share[:, None] * (TIP - ROOT))
     uv = np.stack(np.broadcast_arrays([0, 1.0], share[:, None]), axis=-1)
     root_uv = np.asarray(groom.strands.root_uv, float) * [1, -1] + [0, 1]
-    first = 2 * np.arange(POINTS - 1)
-    quads = np.concatenate(
-        [
-            np.stack(np.broadcast_arrays(first, first + 1, first + 2), 1),
-            np.stack([first + 1, first + 3, first + 2], 1),
-        ]
-    )
+    corners = np.array([[0, 2, 1], [1, 2, 3]])
+    quads = (2 * np.arange(POINTS - 1)[:, None, None] + corners).reshape(-1, 3)
     count = len(lines)
     return Surface(
         points.reshape(-1, 3) @ turn.T,
@@ -111,9 +106,11 @@ def true_pictures() -> dict[tuple[int, str], Picture]:
 
 
 def worst(surfaces: tuple[Surface, ...], true: dict[tuple[int, str], Picture]) -> dict[str, float]:
-    """Return the largest differences over all views and frames."""
+    """Return the largest differences over all views of as many frames as there are surfaces."""
     found = [
-        differences(draw(surfaces[frame], view), picture) for (frame, view), picture in true.items()
+        differences(draw(surfaces[frame], view), picture)
+        for (frame, view), picture in true.items()
+        if frame < len(surfaces)
     ]
     return {name: max(each.get(name, 1.0) for each in found) for name in ALLOWED}
 
@@ -147,7 +144,7 @@ def _backwards(values: Array) -> Array:
 def _across_the_parting(surface: Surface) -> Surface:
     points = surface.points.copy()
     x = points.reshape(-1, 2 * POINTS, 3)
-    x[::7, :, 0] *= -1
+    x[::5, :, 0] *= -1
     return replace(surface, points=points)
 
 
@@ -176,7 +173,7 @@ FAULTS: dict[str, Callable[[Surface], Surface]] = {
     "strips from tip to root": lambda s: replace(s, points=_backwards(s.points)),
     "texture from tip to root": lambda s: replace(s, uv=s.uv * [1, -1] + [0, 1]),
     "texture mirrored across": lambda s: replace(s, uv=s.uv * [-1, 1] + [1, 0]),
-    "roots of other strands": lambda s: replace(s, root_uv=np.roll(s.root_uv, 20 * POINTS, axis=0)),
+    "roots of other strands": lambda s: replace(s, root_uv=np.roll(s.root_uv, 8 * POINTS, axis=0)),
     "root texture upside down": lambda s: replace(s, root_uv=s.root_uv * [1, -1] + [0, 1]),
     "hair across the parting": _across_the_parting,
 }
@@ -187,8 +184,7 @@ def test_every_fault_of_appearance_is_seen(
     fault: str, written: tuple[Surface, ...], true_pictures: dict[tuple[int, str], Picture]
 ) -> None:
     """A file with one thing wrong looks wrong: some difference is beyond what is allowed."""
-    faulty = tuple(FAULTS[fault](surface) for surface in written)
-    found = worst(faulty, true_pictures)
+    found = worst((FAULTS[fault](written[0]),), true_pictures)
     assert any(found[name] > most for name, most in ALLOWED.items()), found
 
 
