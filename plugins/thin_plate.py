@@ -3,8 +3,9 @@
 Landmarks, intersected from the refined cameras, pull the landmarks of the head; points on the
 cranium, where there are no landmarks, are held softly. Then points that project outside a
 silhouette are pushed inside, those of the scalp a little deeper, since hair lies outside the head.
-Each correction is a smooth spline again, so the scalp stays smooth. Skin outlines are not fitted to
-the edges of the silhouettes: with estimated cameras that made faces worse (1.9 mm instead of 0.8).
+Where no hair covers the outline (bald crowns, shaved sides), the rim of the cranium is brought
+onto it; other outlines of skin do not bend the head: with estimated cameras that made faces worse
+(1.9 mm instead of 0.8). Each correction is a smooth spline again, so the scalp stays smooth.
 """
 
 from __future__ import annotations
@@ -14,9 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.similarity import triangulate
+from hairkit.head_model.cranium import LEAST_SHARE, RIM, Cranium
 from hairkit.head_model.spread_vertices import spread_vertices
 from hairkit.head_model.thin_plate_spline import ThinPlateSpline
 from hairkit.options import option
@@ -33,6 +35,13 @@ SLOPE_STEP = 0.002
 """Metres along a normal over which that slope is measured."""
 LARGEST_PUSH = 0.008
 """Metres: what sticks out farther is a wrong camera or mask rather than a big head."""
+SKULL = 0.09
+"""Radius of the cranium, metres: its rim stands out farther than points near the rim."""
+BROWS = slice(17, 27)
+"""Landmarks of the brows."""
+LARGEST_PULL, ON_OUTLINE = 0.03, 0.002
+"""Metres: a bare outline farther off is not that of the cranium; and how near to it counts as on
+it."""
 
 
 @dataclass(frozen=True)
@@ -62,8 +71,9 @@ def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: O
     if options.rounds and all(mask.person_known for mask in masks):
         outlines = Outlines.of(masks, count=OUTLINE_POINTS)
         controls = _spread(head, options.controls)
+        cranium = Cranium.of(head, masks, outlines.scale, controls)
         for _ in range(options.rounds):
-            head = _bend_to_outlines(head, scene.cameras, outlines, controls, options)
+            head = _bend_to_outlines(head, scene.cameras, outlines, controls, cranium, options)
     return replace(scene, head=head)
 
 
@@ -103,22 +113,54 @@ def _bend_to_outlines(
     cameras: tuple[Camera, ...],
     outlines: Outlines,
     controls: Int64Array,
+    cranium: Cranium,
     options: Options,
 ) -> Head:
-    """Push controls that stick out of a silhouette inwards, along their normals."""
+    """Push controls that stick out of a silhouette inwards, along their normals.
+
+    Those of the scalp on the rim, where the outline is bare, go onto it from either side.
+    """
     places = head.vertices[controls].astype(np.float64)
-    normals = head.normals()[controls]
-    margin = np.where(head.scalp[controls] > 0.5, options.margin, 0.0)
-    push = np.zeros(len(places))
-    smoothing = np.full(len(places), options.anchor_smoothing)
+    normals = head.normals()[controls].astype(np.float64)
+    scalp = head.scalp[controls] > 0.5
+    margin = np.where(scalp, options.margin, 0.0)
+    rims = _rims(cranium.moved(places, normals), cameras) * (scalp & _above_the_ears(head, places))
+    push, pull, total = np.zeros((3, len(places)))
     for view, camera in enumerate(cameras):
         inside, slope = _inside_by(outlines.fields[view], outlines.scale, camera, places, normals)
-        excess = margin - inside
-        known = (excess > 0) & (slope < -LEAST_SLOPE)
-        wanted = np.where(known, excess / np.maximum(-slope, LEAST_SLOPE), 0.0)
+        known = slope < -LEAST_SLOPE
+        steep = np.maximum(-slope, LEAST_SLOPE)
+        wanted = np.where(known, (margin - inside) / steep, 0.0)
         push = np.maximum(push, np.minimum(wanted, LARGEST_PUSH))
-    smoothing[push > 0] = options.smoothing
-    return _warp(head, places, -push[:, None] * normals, smoothing)
+        bulge = -(RIM**2) * SKULL * np.log(np.maximum(rims[view], LEAST_SHARE))
+        way = np.clip((inside - bulge) / steep, -LARGEST_PULL, LARGEST_PULL)
+        there = places + way[:, None] * normals
+        left, _ = _inside_by(outlines.fields[view], outlines.scale, camera, there, normals)
+        bare_there = cranium.bare(np.full(len(places), view), camera.project(there))
+        share = np.where(np.abs(left - bulge) < ON_OUTLINE, rims[view] * bare_there, 0.0)
+        pull, total = pull + share * way, total + share
+    bare = total > LEAST_SHARE
+    smoothing = np.where(bare | (push > 0), options.smoothing, options.anchor_smoothing)
+    move = np.where(bare, pull / np.maximum(total, LEAST_SHARE), -push)
+    return _warp(head, places, move[:, None] * normals, smoothing)
+
+
+def _above_the_ears(head: Head, places: Float64Array) -> BoolArray:
+    """Return which places (K, 3) lie above the brows, where no ear covers the cranium's rim."""
+    if head.landmark_vertices is None:
+        return np.zeros(len(places), np.bool_)
+    brows = head.vertices[head.landmark_vertices[BROWS], 1].max()
+    return np.asarray(places[:, 1] > brows, np.bool_)
+
+
+def _rims(cranium: Cranium, cameras: tuple[Camera, ...]) -> Float64Array:
+    """Return how much each point of a cranium is on the rim of each view (V, K), from 0 to 1."""
+    rotation = np.stack([camera.rotation for camera in cameras])
+    translation = np.stack([camera.translation for camera in cameras])
+    view, point, share = cranium.rims((rotation, translation))
+    result = np.zeros((len(cameras), len(cranium.points)))
+    result[view, point] = share
+    return result
 
 
 def _inside_by(

@@ -6,14 +6,13 @@ Unknown are the turn's shared place, tilt, magnification and perspective, and si
 * landmarks, marginalised over the unknown shape of the head (`.landmark_equations`), those that
   patches of skin carry to the neighbours (`.landmark_transfer`), the face's midline on the outline
   of views from the side, and the rim of the cranium on the outline where no hair covers it
-  (`.cranium`);
+  (`hairkit.head_model.cranium`);
 * silhouette coherence (`hairkit.cameras.silhouette_coherence`; Hernandez, Schmitt and Cipolla
   2007): the viewing ray of every contour point touches all other silhouettes;
 * a prior that keeps to the nominal turn.
 
 Perspective and orthographic cameras are both tried unless the capture or the options say which.
 
-* `cranium`: the cranium's rim and where outlines are bare
 * `landmark_equations`: landmark residuals, marginalised over the head's shape
 * `landmark_transfer`: landmarks matched in neighbouring views
 * `search`: Levenberg-Marquardt from coarse outlines to fine ones, and other starts
@@ -39,11 +38,11 @@ from hairkit.cameras.turntable import (
     Turn,
 )
 from hairkit.errors import InputError
+from hairkit.head_model.cranium import Cranium
 from hairkit.imaging.masked_filters import picture_scale
 from hairkit.options import option
 from hairkit.types.head import LANDMARKS
 
-from .cranium import Cranium
 from .landmark_equations import (
     CameraArrays,
     LandmarkFit,

@@ -13,11 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
+from hairkit.head_model.cranium import Cranium
 from hairkit.types.capture import Capture
 from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 from hairkit.types.mask import HAIR, Mask
-
-from .cranium import Cranium
 
 JAW_NOISE, COVERED_NOISE = 2.0, 3.0
 """Times the noise of given landmarks of the jaw, and of those under hair: detectors guess them."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.thin_plate import Options, fit_head
-from turntable import NAMES, Turntable, turntable
+from turntable import NAMES, Turntable, bald_masks, turntable
 
 from hairkit import Head, Scene
 
@@ -51,6 +51,20 @@ def test_a_head_too_big_is_pushed_into_the_silhouettes(bust: Turntable) -> None:
     fitted = fit_head(bust.capture, bust.masks, _scene(bust, wrong), Options()).head
     scalp = bust.head.scalp > 0.5
     assert _error(fitted, bust)[scalp].mean() < 0.8 * _error(without, bust)[scalp].mean()
+
+
+def test_a_small_cranium_comes_to_bare_outlines(bust: Turntable) -> None:
+    """A skull 15 % too low grows to that of a bald person to 1 mm, hardly to another's."""
+    vertices = bust.head.vertices.copy()
+    assert bust.head.landmark_vertices is not None
+    brows = vertices[bust.head.landmark_vertices[17:27], 1].max()
+    vertices[:, 1] -= 0.15 * np.maximum(vertices[:, 1] - brows, 0)
+    scene = _scene(bust, replace(bust.head, vertices=vertices))
+    hairy = fit_head(bust.capture, bust.masks, scene, Options()).head
+    bald = fit_head(bust.capture, bald_masks(bust.masks), scene, Options()).head
+    crown = bust.head.vertices[:, 1].max()
+    assert abs(bald.vertices[:, 1].max() - crown) < 0.001
+    assert crown - hairy.vertices[:, 1].max() > 0.005
 
 
 def test_joints_and_capsules_move_along(bust: Turntable) -> None:

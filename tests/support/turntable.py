@@ -11,6 +11,7 @@ from hairkit import Camera, Capture, Head, Mask, View
 from hairkit.arrays import Float64Array
 from hairkit.cameras.depth_raster import head_depth
 from hairkit.head_model.template import default_head
+from hairkit.types.mask import HAIR, PERSON
 
 WIDTH, HEIGHT = 300, 400
 NAMES = (
@@ -69,6 +70,16 @@ def _camera(azimuth: float, rng: np.random.Generator, stray: float, model: str) 
 
 def _grown(seen: Float64Array) -> Float64Array:
     return cv2.morphologyEx(seen.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3))) > 0
+
+
+def bald_masks(masks: tuple[Mask, ...]) -> tuple[Mask, ...]:
+    """Return masks with all hair but a pixel in a corner, since no mask is without."""
+    bald = []
+    for mask in masks:
+        labels = np.where(mask.labels == HAIR, PERSON, mask.labels).astype(np.uint8)
+        labels[-1, -1] = HAIR
+        bald.append(Mask(labels, True))
+    return tuple(bald)
 
 
 def azimuth_errors(found: tuple[Camera, ...], true: tuple[Camera, ...]) -> Float64Array:

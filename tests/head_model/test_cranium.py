@@ -4,29 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hairkit_plugins.silhouette.cranium import Cranium
-from turntable import Turntable, turntable
+from turntable import Turntable, bald_masks, turntable
 
-from hairkit import Mask
 from hairkit.arrays import Float64Array
 from hairkit.cameras.outlines import Outlines
-from hairkit.types.mask import HAIR, PERSON
+from hairkit.head_model.cranium import Cranium
 
 
 @pytest.fixture(scope="module")
 def bust() -> Turntable:
     """A head seen by cameras off the turn."""
     return turntable(np.random.default_rng(6))
-
-
-def _bald(masks: tuple[Mask, ...]) -> tuple[Mask, ...]:
-    """Return the masks with all hair but a pixel in a corner, since no mask is without."""
-    bald = []
-    for mask in masks:
-        labels = np.where(mask.labels == HAIR, PERSON, mask.labels).astype(np.uint8)
-        labels[-1, -1] = HAIR
-        bald.append(Mask(labels, True))
-    return tuple(bald)
 
 
 def _cameras(bust: Turntable) -> tuple[Float64Array, Float64Array]:
@@ -37,7 +25,7 @@ def _cameras(bust: Turntable) -> tuple[Float64Array, Float64Array]:
 def test_the_rim_lies_on_the_outline(bust: Turntable) -> None:
     """Seen by the true cameras, points on the rim above the ears lie on the outline to 1.5 px."""
     outlines = Outlines.of(bust.masks, 10)
-    cranium = Cranium.of(bust.head, _bald(bust.masks), outlines.scale)
+    cranium = Cranium.of(bust.head, bald_masks(bust.masks), outlines.scale)
     view, point, share = cranium.rims(_cameras(bust))
     for index, camera in enumerate(bust.cameras):
         rim = point[(view == index) & (share > 0.9)]
@@ -49,7 +37,9 @@ def test_the_rim_lies_on_the_outline(bust: Turntable) -> None:
 
 def test_outlines_are_bare_where_no_hair_is_near(bust: Turntable) -> None:
     """Every rim point of a bald head is bare, none within hair's reach, none off the picture."""
-    hairy, bald = (Cranium.of(bust.head, masks, 1.0) for masks in (bust.masks, _bald(bust.masks)))
+    hairy, bald = (
+        Cranium.of(bust.head, masks, 1.0) for masks in (bust.masks, bald_masks(bust.masks))
+    )
     view, point, _ = hairy.rims(_cameras(bust))
     cameras = [bust.cameras[index] for index in view]
     pixels = np.stack([c.project(p) for c, p in zip(cameras, hairy.points[point], strict=True)])
