@@ -32,7 +32,7 @@ from hairkit import (
 )
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.field.growth_prior import long_share
-from hairkit.field.sampling_kernels import gradient_at, make_unit, sample_at
+from hairkit.field.sampling_kernels import copy_point, gradient_at, make_unit, sample_at
 from hairkit.grooming.postprocess import FinishOptions, finish
 from hairkit.head_model.torso import Torso
 from hairkit.options import option
@@ -292,8 +292,8 @@ def _grow_strand(
 ) -> int:
     """Write one strand's points into path (M, 3); return their number, at least 2."""
     p, d, found = np.empty(3), np.zeros(3), np.empty(5)
-    p[:] = start
-    path[0] = p
+    copy_point(start, p)
+    copy_point(p, path[0])
     count, inside = 1, 1
     for i in range(1, limits[0] + 1):
         sample_at(volume.origin, volume.spacing, volume.values, p, found)
@@ -306,7 +306,7 @@ def _grow_strand(
             for axis in range(3):
                 d[axis] = rules.inertia * d[axis] + (1 - rules.inertia) * found[axis]
         elif known:
-            d[:] = found[:3]
+            copy_point(found, d)
         if not make_unit(d):
             break
         slides = rules.slide_sine > 0 and i < limits[1]
@@ -315,11 +315,11 @@ def _grow_strand(
             _slide(volume, rules, back, p, d)
         for axis in range(3):
             p[axis] += rules.step * d[axis]
-        path[count] = p
+        copy_point(p, path[count])
         count += 1
     count = min(count, inside + 1)
     if count == 1:  # nothing is known at the root: a step upwards, since every root has a strand
-        path[1] = path[0]
+        copy_point(path[0], path[1])
         path[1, 1] += rules.step
         count = 2
     return count

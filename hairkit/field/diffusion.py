@@ -164,11 +164,11 @@ def _conjugate_gradients(
     _begin(system, data, now, energy, size)
     for _ in range(max_iterations):
         parallel_for(_apply, CHUNKS, system, now.direction, now.image, products, min_chunk=least)
-        step = _ratio(energy, _column_sums(products))
+        step = _ratio(energy, products.sum(axis=0))
         parallel_for(_advance, CHUNKS, system, now, step, squares, products, min_chunk=least)
-        if (_column_sums(squares) <= tolerance * tolerance * size).all():
+        if (squares.sum(axis=0) <= tolerance * tolerance * size).all():
             break
-        before, energy = energy, _column_sums(products)
+        before, energy = energy, products.sum(axis=0)
         turn = _ratio(energy, before)
         parallel_for(_turn_direction, CHUNKS, system, now, turn, min_chunk=least)
     return now.solution
@@ -178,16 +178,6 @@ def _ratio(value: Float64Array, divisor: Float64Array) -> Float32Array:
     """Return (C,) the quotients, 0 where the divisor is not positive."""
     positive = np.where(divisor > 0, divisor, 1.0)
     return np.where(divisor > 0, value / positive, 0.0).astype(np.float32)
-
-
-@compiled
-def _column_sums(chunks: Float64Array) -> Float64Array:
-    """Return (C,) the sums of (CHUNKS, C), added in order."""
-    total = np.zeros(chunks.shape[1])
-    for chunk in range(len(chunks)):
-        for c in range(len(total)):
-            total[c] += chunks[chunk, c]
-    return total
 
 
 @compiled

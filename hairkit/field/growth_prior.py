@@ -216,16 +216,16 @@ def chamfer_distance(occupied: BoolArray, start: BoolArray, spacing: float) -> F
         box = tuple(slice(cells.min(), cells.max() + 1) for cells in np.nonzero(occupied))
         inside = np.pad(occupied[box], 1)  # no step of a sweep leaves the padded box
         distance = np.where(inside & np.pad(start[box], 1), 0, np.inf).astype(np.float32)
-        _chamfer(inside, np.float32(spacing), distance)
+        cost = np.sqrt(np.arange(4)).astype(np.float32) * np.float32(spacing)
+        _chamfer(inside, cost, distance)
         result[box] = distance[1:-1, 1:-1, 1:-1]
     result[start] = 0
     return result
 
 
 @compiled
-def _chamfer(occupied: BoolArray, spacing: np.float32, distance: Float32Array) -> None:
+def _chamfer(occupied: BoolArray, cost: Float32Array, distance: Float32Array) -> None:
     """Lower distances (X, Y, Z), infinite in unoccupied cells, until a round changes none."""
-    cost = np.sqrt(np.arange(4)).astype(np.float32) * spacing
     unchanged = 0
     for sweep in range(OCTANTS * MOST_SWEEPS):
         changed = _sweep(occupied, cost, sweep % OCTANTS, distance)

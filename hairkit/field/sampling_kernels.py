@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.parallel import compiled
@@ -52,6 +54,17 @@ def sample_at(
 
 
 @compiled
+def copy_point(point: npt.NDArray[np.floating[Any]], target: npt.NDArray[np.floating[Any]]) -> None:
+    """Write a point (3,) into another.
+
+    An assignment of one slice to another compiles Numba's checks of their shapes, and with them its
+    strings: five seconds of a first run.
+    """
+    for axis in range(3):
+        target[axis] = point[axis]
+
+
+@compiled
 def gradient_at(
     origin: Float64Array,
     spacing: float,
@@ -63,7 +76,7 @@ def gradient_at(
     at = np.empty(3)
     one = np.empty(1)
     for axis in range(3):
-        at[:] = p
+        copy_point(p, at)
         at[axis] = p[axis] + spacing
         sample_at(origin, spacing, values, at, one)
         high = one[0]

@@ -69,7 +69,10 @@ def _null_vector(t: Float64Array, value: float, result: Float64Array) -> None:
     rows[0, 0], rows[0, 1], rows[0, 2] = t[XX] - value, t[XY], t[XZ]
     rows[1, 0], rows[1, 1], rows[1, 2] = t[XY], t[YY] - value, t[YZ]
     rows[2, 0], rows[2, 1], rows[2, 2] = t[XZ], t[YZ], t[ZZ] - value
-    total = np.sum(rows * rows)
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += rows[i, j] ** 2
     result[0], result[1], result[2] = 1.0, 0.0, 0.0
     if not _largest_cross_product(rows, ROUND_OFF * total * total, result) and total > 0.0:
         _perpendicular(rows, total, result)

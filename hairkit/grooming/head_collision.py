@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
-from hairkit.field.sampling_kernels import gradient_at, sample_at
+from hairkit.field.sampling_kernels import copy_point, gradient_at, sample_at
 from hairkit.parallel import compiled, parallel_for
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
@@ -56,7 +56,7 @@ def _push_points(
     for i in range(first, last):
         if not free[i]:
             continue
-        p[:] = points[i]
+        copy_point(points[i], p)
         for _ in range(ROUNDS):
             sample_at(head.origin, head.spacing, head.values, p, level)
             lack = clearance - level[0]

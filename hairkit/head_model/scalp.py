@@ -253,10 +253,9 @@ def _candidates(
     return face[on_scalp].astype(np.int32), weight[on_scalp]
 
 
-@njit(cache=True)
 def take_free(
     points: Float64Array, apart: Float64Array, radius: float, taken: Int64Array, found: int
-) -> int:  # pragma: no cover - compiled
+) -> int:
     """Append to `taken` in turn the points (M, 3) that have no taken one within the radius.
 
     Parameters
@@ -270,28 +269,38 @@ def take_free(
     -------
     How many are taken now.
     """
-    low, shape = np.empty(3), np.empty(3, np.int64)
-    edge = radius
-    for k in range(3):
-        low[k] = points[:, k].min()
-        edge = max(edge, (points[:, k].max() - low[k]) / MOST_CELLS)
-    for k in range(3):
-        shape[k] = int((points[:, k].max() - low[k]) / edge) + 3
-    heads = np.full((shape[0], shape[1], shape[2]), -1, np.int32)
+    low, size = points.min(axis=0), np.ptp(points, axis=0)
+    edge = max(radius, float(size.max()) / MOST_CELLS)
+    cells = ((points - low) / edge).astype(np.int64) + 1
+    heads = np.full(tuple((size / edge).astype(np.int64) + 3), -1, np.int32)
     following = np.full(len(taken), -1, np.int32)
+    return int(_take_free(points, cells, apart, radius, heads, following, taken, found))
+
+
+@njit(cache=True)
+def _take_free(
+    points: Float64Array,
+    cells: Int64Array,
+    apart: Float64Array,
+    radius: float,
+    heads: Int32Array,
+    following: Int32Array,
+    taken: Int64Array,
+    found: int,
+) -> int:  # pragma: no cover - compiled
+    """Do the work of `take_free` with cells (M, 3) of the points and chains of taken ones."""
     for n in range(found):
-        _link(n, ((points[taken[n]] - low) / edge).astype(np.int64) + 1, heads, following)
+        _link(n, cells[taken[n]], heads, following)
     for i in range(len(points)):
         if apart[i] < radius:
             continue
         if found == len(taken):
             break
-        cell = ((points[i] - low) / edge).astype(np.int64) + 1
-        apart[i] = _distance_to_taken(points, i, cell, heads, following, taken)
+        apart[i] = _distance_to_taken(points, i, cells[i], heads, following, taken)
         if apart[i] >= radius:
             apart[i] = 0.0
             taken[found] = i
-            _link(found, cell, heads, following)
+            _link(found, cells[i], heads, following)
             found += 1
     return found
 

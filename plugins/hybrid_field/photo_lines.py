@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hairkit import Camera, Hull, Mask, Strands
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.cameras.projection_kernels import PackedCamera, pack_camera, perspective_divisor
-from hairkit.field.sampling_kernels import sample_at
+from hairkit.field.sampling_kernels import copy_point, sample_at
 from hairkit.field.view_fusion import DEPTH_SHRINK, FusedViews
 from hairkit.parallel import compiled, parallel_for
 from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
@@ -159,27 +159,28 @@ def _follow_photo(
         ahead = np.empty((half, 3), np.float32)
         before = _follow_line(photo, x, y, -1.0, back)
         after = _follow_line(photo, x, y, 1.0, ahead)
-        counts[s] = join(back[:before], ahead[:after], lines[s])
+        counts[s] = join(back, before, ahead, after, lines[s])
 
 
 @compiled
 def join(
     back: npt.NDArray[np.floating[Any]],
+    before: int,
     ahead: npt.NDArray[np.floating[Any]],
+    after: int,
     line: npt.NDArray[np.floating[Any]],
 ) -> int:
-    """Write back (A, 3) reversed, then ahead (B, 3), into line (M, 3); return the number of points.
+    """Write the first `before` points of back (A, 3) reversed, then the first `after` of ahead
+    (B, 3), into line (M, 3); return the number of points.
 
     Both begin at the seed, which is written once.
     """
-    total = 0
-    for k in range(len(back) - 1, 0, -1):
-        line[total] = back[k]
-        total += 1
-    for k in range(len(ahead)):
-        line[total] = ahead[k]
-        total += 1
-    return total
+    turn = max(before - 1, 0)
+    for k in range(turn):
+        copy_point(back[turn - k], line[k])
+    for k in range(after):
+        copy_point(ahead[k], line[turn + k])
+    return turn + after
 
 
 @compiled

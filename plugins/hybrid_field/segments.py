@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from hairkit import Camera, Hull, Mask, Strands
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
-from hairkit.field.sampling_kernels import make_unit, principal_direction, sample_at
+from hairkit.field.sampling_kernels import copy_point, make_unit, principal_direction, sample_at
 from hairkit.field.view_fusion import FusedViews
 from hairkit.parallel import compiled, parallel_for
 
@@ -124,9 +124,9 @@ def _follow_cells(
         if not principal_direction(tensor, FIRST_WAY, way):
             continue
         back, ahead = np.empty((half, 3)), np.empty((half, 3))
-        before = _follow_tensors(tensors, inside, seeds[s], -way, back)
-        after = _follow_tensors(tensors, inside, seeds[s], way, ahead)
-        counts[s] = join(back[:before], ahead[:after], lines[s])
+        before = _follow_tensors(tensors, inside, seeds[s], way, -1.0, back)
+        after = _follow_tensors(tensors, inside, seeds[s], way, 1.0, ahead)
+        counts[s] = join(back, before, ahead, after, lines[s])
 
 
 @compiled
@@ -135,16 +135,19 @@ def _follow_tensors(
     inside: Float32Array,
     seed: Float64Array,
     way: Float64Array,
+    sign: float,
     line: Float64Array,
 ) -> int:
-    """Write a line's points (M, 3) from seed (3,) along way (3,), and return their number."""
-    p, d = seed.copy(), way.copy()
+    """Write points (M, 3) from seed (3,) along sign times way (3,), and return their number."""
+    p, d = np.empty(3), np.empty(3)
+    for axis in range(3):
+        p[axis], d[axis] = seed[axis], sign * way[axis]
     tensor, share = np.empty(6), np.empty(1)
     for k in range(len(line)):
         sample_at(tensors.origin, tensors.spacing, inside, p, share)
         if share[0] < 0.5:
             return k
-        line[k] = p
+        copy_point(p, line[k])
         sample_at(tensors.origin, tensors.spacing, tensors.values, p, tensor)
         if not principal_direction(tensor, d, d) or not make_unit(d):
             return k + 1
