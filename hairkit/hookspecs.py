@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from hairkit.simulation.simulator import Simulator
     from hairkit.types.capture import Capture, View
     from hairkit.types.face import Face
+    from hairkit.types.finding import Finding
     from hairkit.types.groom import Groom
     from hairkit.types.head import Head, Roots
     from hairkit.types.mask import Mask, Masks
@@ -37,7 +38,7 @@ PROJECT = "hairkit"
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
 
-HOOKSPEC_VERSION = (1, 3)
+HOOKSPEC_VERSION = (1, 4)
 """Version of this contract. The second number grows when hooks or arguments are added, the first
 when one is removed or changes; a plugin may check it when it is imported."""
 
@@ -148,6 +149,11 @@ def export_groom(groom: Groom, path: Path, options: Any) -> bool | None:
 @hookspec(firstresult=True)
 def import_groom(path: Path, options: Any) -> Groom | None:
     """Read a file as a groom."""
+
+
+@hookspec
+def validate_groom(groom: Groom, path: Path, target: str) -> list[Finding] | None:
+    """Check a file that was read as a groom against rules of a target: those of all plugins."""
 
 
 @hookspec

@@ -3,7 +3,7 @@
 `register(subparsers)` adds the verb's parser, its description beginning with an example;
 `run(args)` does the work and returns the exit code. Only the verb that is asked for is imported.
 Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 2 one line says why,
-3 a simulation diverged, 130 ended by a second Ctrl-C.
+3 a simulation diverged, 4 a file that was validated breaks a rule, 130 ended by a second Ctrl-C.
 
 * `convert`: read hair of one format, write another
 * `doctor`: check this machine
@@ -27,6 +27,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `synth`: procedural captures
 * `study`: questionnaires
 * `texture`: textures made finer, filtered, or turned into bump and normal maps
+* `validate`: a hair file checked for an engine
 * `view`: the viewer
 """
 
@@ -59,6 +60,7 @@ VERBS = {
     "view": "show a groom in motion, in a window or by a script",
     "export": "write a groom in an engine's format",
     "convert": "read hair of one format, write another",
+    "validate": "check a hair file for an engine",
     "simulate": "simulate a groom, its head shaken and in wind",
     "info": "print what a file contains",
     "plugins": "list the plugins, or describe one",

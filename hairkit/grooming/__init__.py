@@ -13,6 +13,7 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `plait`: the course of strands in a tail or a braid
 * `postprocess`: smoothing, waves and head collision after tracking
 * `prepare_export`: choice of strands and defaults for exporters
+* `target_rules`: what engines demand of a hair file
 * `tie_strands`: strands led to their tie and down the tail
 * `wind_waves`: measured waves put onto strands
 """

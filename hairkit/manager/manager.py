@@ -17,7 +17,7 @@ from typing import Any
 import pluggy
 
 from hairkit import hookspecs
-from hairkit.errors import HairkitError, OptionError, PluginError
+from hairkit.errors import DataError, HairkitError, OptionError, PluginError
 from hairkit.manager.guard import describe_error, guard_hook, one_line, quiet_stdout, subject
 from hairkit.manager.loading import (
     DISABLE_AUTOLOAD,
@@ -28,6 +28,8 @@ from hairkit.manager.loading import (
 )
 from hairkit.manager.results import Call, check_result
 from hairkit.options import make_options, unknown_name
+from hairkit.types.finding import Finding
+from hairkit.types.groom import Groom
 
 _log = logging.getLogger("hairkit")
 
@@ -205,6 +207,23 @@ class Manager:
                     raise
                 except BaseException as error:  # whatever a listener does, the run goes on
                     _log.warning("%s failed in %r: %s", info, hook, describe_error(error))
+
+    def findings(self, groom: Groom, path: Path, target: str) -> list[Finding]:
+        """Return what the `validate_groom` of all plugins finds, in the order of their names.
+
+        Raises `PluginError` when one fails, or returns anything but findings.
+        """
+        hook, arguments = "validate_groom", {"groom": groom, "path": path, "target": target}
+        found: list[Finding] = []
+        for info in sorted(self._infos.values(), key=lambda info: info.name):
+            if hook not in info.notifications:
+                continue
+            with guard_hook(str(info), hook, arguments):
+                for answer in self._caller(hook, info.name)(**arguments):
+                    if not all(isinstance(finding, Finding) for finding in answer):
+                        raise DataError("returned no list of findings")
+                    found += answer
+        return found
 
     def guard(self, stage: str, plugin: str) -> AbstractContextManager[None]:
         """Return a context in which errors name the plugin: for what its simulator does later."""

@@ -8,6 +8,7 @@ the packages named after the subject.
 * `carried`: what a file held beyond a groom
 * `chosen`: what a user chooses instead of what is measured
 * `face`: landmarks and direction of a face
+* `finding`: what a check of a file found
 * `groom`: strands on a head with material and physics
 * `head`: the head mesh, roots, capsules
 * `mask`: labels: hair, person, background

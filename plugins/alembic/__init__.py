@@ -15,6 +15,7 @@ Sources: Alembic 1.8 AbcGeom and Ogawa; Epic's "Alembic for Grooms Specification
 * `options`: settings
 * `to_groom`: a groom from curves of a file
 * `transforms`: transforms of objects
+* `validation`: rules of Unreal's groom schema
 * `writer`: writing through the Alembic library
 """
 
@@ -26,6 +27,7 @@ from types import MappingProxyType
 from hairkit.grooming.prepare_export import prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.file_format import Feature, FileFormat
+from hairkit.types.finding import Finding
 from hairkit.types.groom import Groom
 
 from .options import Options
@@ -67,3 +69,13 @@ def import_groom(path: Path, options: Options) -> Groom:
     from .to_groom import read_groom
 
     return read_groom(path, options)
+
+
+@hookimpl
+def validate_groom(path: Path, target: str) -> list[Finding] | None:
+    """Check Unreal's groom schema in an .abc."""
+    from .validation import TARGETS, check_schema
+
+    if target not in TARGETS or path.suffix.lower() not in FORMAT.suffixes:
+        return None
+    return check_schema(path)

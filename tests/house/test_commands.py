@@ -26,7 +26,9 @@ PROJECT = Path(__file__).parents[2]
 PAGES = [PROJECT / "README.md", *sorted((PROJECT / "docs").rglob("*.md"))]
 PAGES += sorted((PROJECT / "examples").rglob("*.md"))
 NOT_RUN = {"reconstruct", "head", "rerun", "studio", "view", "evaluate", "doctor", "study"}
-"""They take long, or need a window, captures or a record: arguments and recipes are checked."""
+NOT_RUN |= {"validate"}
+"""They take long, or need a window, captures, a record or a file for an engine: arguments and
+recipes are checked."""
 ALONE = ("doctor", "plugins")
 """Verbs that are commands without arguments; a page may speak of the others by name."""
 LIGHTER = {
