@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy import ndimage
 
 from hairkit import (
     Head,
@@ -27,6 +26,7 @@ from hairkit import (
     hookimpl,
 )
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.field.cell_shells import erode_cells
 from hairkit.field.diffusion import solve_screened
 from hairkit.field.growth_prior import growth_potential
 from hairkit.field.view_fusion import Fading, front_depths, fuse_planes, plane_directions
@@ -92,7 +92,7 @@ def _weigh(found: OrientationMap, box: int) -> OrientationMap:
 
 def _outer_cells(hull: Hull) -> BoolArray:
     """Return which loose cells (N,) are hair with a face neighbour that is none."""
-    outer: BoolArray = (hull.dense & ~ndimage.binary_erosion(hull.dense))[hull.loose]
+    outer: BoolArray = (hull.dense & ~erode_cells(hull.dense))[hull.loose]
     return outer
 
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.field.cell_shells import dilate_cells
 from hairkit.field.parting import comb_from_parting, crown_share, root_lift
 from hairkit.field.smooth_volume import smooth_volume
 from hairkit.parallel import compiled
@@ -174,7 +174,7 @@ def measure_scalp_distance(head: Head, hull: Hull) -> ScalpDistance:
     start = np.zeros(hull.grid.shape, bool)
     cells = hull.grid.nearest_cell(head.vertices[head.scalp > 0.5])
     start[tuple(cells.T)] = True
-    start = ndimage.binary_dilation(start, iterations=2)
+    start = dilate_cells(start, 2)
     distance = chamfer_distance(hull.loose, start & hull.loose, hull.grid.spacing)
     distance = np.where(np.isfinite(distance), distance, 0).astype(np.float32)
     return ScalpDistance(distance, float(np.percentile(distance[hull.dense], LENGTH_PERCENTILE)))

@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from hairkit import Head, Hull, Parting, Strands
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.field.cell_shells import erode_cells
 from hairkit.field.diffusion import solve_screened
 from hairkit.field.growth_prior import combing_direction
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
@@ -109,7 +110,7 @@ def internal_distance(hull: Hull, segments: Strands, tolerance: float) -> Float3
         cells = hull.grid.nearest_cell(segments.points) // COARSE
         strand[tuple(cells.T)] = True
     if not strand.any():
-        strand = _pool(hull.dense & ~ndimage.binary_erosion(hull.dense), shape)
+        strand = _pool(hull.dense & ~erode_cells(hull.dense), shape)
     away = ndimage.distance_transform_edt(~strand) * (COARSE * hull.grid.spacing / UNIT)
     border = np.ones(shape, bool)
     border[1:-1, 1:-1, 1:-1] = False

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from hairkit import Camera, Hull, Mask, Strands
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
+from hairkit.field.cell_shells import erode_cells
 from hairkit.field.sampling_kernels import copy_point, make_unit, principal_direction, sample_at
 from hairkit.field.view_fusion import FusedViews
 from hairkit.parallel import compiled, parallel_for
@@ -83,7 +83,7 @@ def lines_through_cells(
     hull: Hull, volume: Float32Array, certainty: Float32Array, longest: float
 ) -> Strands:
     """Return lines through the tensors (X, Y, Z, 6) from every second confident outer cell."""
-    outer = hull.dense & ~ndimage.binary_erosion(hull.dense, iterations=OUTER_CELLS)
+    outer = hull.dense & ~erode_cells(hull.dense, OUTER_CELLS)
     sure = np.zeros(hull.grid.shape, np.float32)
     sure[hull.loose] = certainty
     best = float(np.percentile(sure[outer], BEST)) if outer.any() else 0.0

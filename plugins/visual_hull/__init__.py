@@ -27,6 +27,7 @@ from hairkit.arrays import BoolArray, Float32Array, UInt8Array
 from hairkit.cameras.depth_raster import SPLAT_CELLS, head_depth, mesh_depth, splat_depth
 from hairkit.cameras.projection_kernels import pack_camera
 from hairkit.errors import InputError
+from hairkit.field.cell_shells import dilate_cells, erode_cells
 from hairkit.head_model.signed_distance import signed_distance
 from hairkit.head_model.torso import Torso
 from hairkit.imaging.masked_filters import picture_scale
@@ -265,9 +266,9 @@ def _carve_both(
         rule = _rule(options, forgive=len(views.views))
         voted = carve(grid, outside, near, views.loose(), rule)
         if options.erosions:
-            voted = ndimage.binary_erosion(voted, iterations=options.erosions)
+            voted = erode_cells(voted, options.erosions)
         if options.dilations:
-            voted = ndimage.binary_dilation(voted, iterations=options.dilations) & outside
+            voted = dilate_cells(voted, options.dilations) & outside
         voted = _largest_part(voted)
         return voted, voted
     rule = _rule(options, views.forgive)
@@ -275,7 +276,7 @@ def _carve_both(
     loose = _largest_part(carve(grid, outside, near, body.loose(), rule))
     dense = carve(grid, loose, near, body.dense(), rule)
     dense = _largest_part(dense) if dense.any() else loose
-    reach = ndimage.binary_dilation(dense, iterations=options.loose_cells)
+    reach = dilate_cells(dense, options.loose_cells)
     return loose & reach, dense
 
 
@@ -299,7 +300,7 @@ def _with_person_hull(grid: VoxelGrid, views: _Views, options: Options) -> _View
         for view in views.views
     ]
     hull = carve(grid, everything, everything, persons, _rule(options, forgive=0))
-    points = grid.centres_of(hull & ~ndimage.binary_erosion(hull))
+    points = grid.centres_of(hull & ~erode_cells(hull))
     behind = options.body_margin + options.front_margin
     dressed = []
     for view in views.views:
@@ -327,4 +328,4 @@ def _scalp_shell(scene: Scene, grid: VoxelGrid, distance: Float32Array) -> BoolA
     near = np.zeros(grid.shape, bool)
     cells = grid.nearest_cell(scene.head.vertices[scene.head.scalp > 0.5])
     near[tuple(cells.T)] = True
-    return np.asarray(shell & ndimage.binary_dilation(near, iterations=SCALP_REACH_CELLS), bool)
+    return shell & dilate_cells(near, SCALP_REACH_CELLS)
