@@ -240,7 +240,7 @@ def _head(strands: Strands, options: ImportOptions, own: Head | None, source: ob
             1000 * place.distance,
         )
         return place_head(head, place.scale, place.shift)
-    head = _read(options.head)
+    head = _read(options.head, strands)
     if _away(strands.roots, head) <= FARTHEST:
         return head
     place = find_place(head, strands, scaled=False)  # a head file is read about its own middle
@@ -254,8 +254,10 @@ def _head(strands: Strands, options: ImportOptions, own: Head | None, source: ob
     return place_head(head, 1.0, place.shift)
 
 
-def _read(path: Path) -> Head:
-    return Groom.load(path).head if path.suffix == ".npz" else read_head(path)
+def _read(path: Path, strands: Strands) -> Head:
+    if path.suffix == ".npz":
+        return Groom.load(path).head
+    return read_head(path, roots=strands.roots)
 
 
 def _away(points: Float32Array, head: Head) -> float:

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, check_reach
 from hairkit.errors import FormatError, InputError
+from hairkit.head_model.reach import Reach
 from hairkit.head_model.template import default_head
 from hairkit.io.glb_mesh import read_glb
 from hairkit.io.mesh_text import FileMesh, obj_side_files, read_obj, read_ply
@@ -30,6 +32,8 @@ _NARROWEST, _BROADEST = 0.05, 0.6
 """Metres: scalps from a doll's to a statue's; others are in another unit than was given."""
 _OFF_CENTRE = 0.02
 """Metres from the origin to the middle of the cranium; heads farther off are moved."""
+_ROOT_GAP = 0.015
+"""Metres from a root to the nearest vertex, in the middle of all: half an edge of coarse heads."""
 _LANDMARK_GAP = 0.02
 """Metres from a landmark to the nearest vertex; farther off, units or axes differ."""
 _LEVEL_BREADTHS = 0.1
@@ -67,7 +71,11 @@ class HeadFile:
 
 
 def read_head(
-    path: str | os.PathLike[str], units: str = "m", scalp: str | None = None, up: str = "y"
+    path: str | os.PathLike[str],
+    units: str = "m",
+    scalp: str | None = None,
+    up: str = "y",
+    roots: npt.ArrayLike | None = None,
 ) -> Head:
     """Return the head in an OBJ, PLY or GLB file, in metres, +Y up, its middle at the origin.
 
@@ -88,6 +96,9 @@ def read_head(
         painted colours.
     up
         `y` or `z`.
+    roots
+        (S, 3) roots of a head of hair that belongs to it, metres: where the file marks no scalp
+        and they lie on the mesh, they show it, and the head stays where it is.
 
     Raises
     ------
@@ -98,14 +109,16 @@ def read_head(
     """
     file = Path(path)
     mesh = _file_mesh(file, units, up)
-    weight = _scalp_weight(mesh, file, scalp)
     vertices = _in_metres(mesh.vertices, units, up)
     check_reach(vertices, file, "vertices")
+    grown = None if scalp is not None or roots is None else _grown_weight(vertices, roots)
+    weight = _scalp_weight(mesh, file, scalp, grown)
     faces = _orient_outward(vertices, mesh.faces.astype(np.int32))
     used = np.unique(faces)
     breadth, middle = _breadth_and_middle(vertices[used], weight[used], file)
     landmarks = _landmarks(file, vertices, units, up)
-    moved = vertices if np.linalg.norm(middle) <= _OFF_CENTRE else vertices - middle
+    stays = weight is grown or np.linalg.norm(middle) <= _OFF_CENTRE
+    moved = vertices if stays else vertices - middle
     middle = middle if moved is vertices else np.zeros(3)
     uv = _azimuthal_uv(moved - middle) if mesh.uv is None else _in_unit_square(mesh.uv)
     joints, capsules = _skeleton(breadth / _DEFAULT_BREADTH, middle)
@@ -163,8 +176,18 @@ def _beside(file: Path, ending: str) -> Path:
     return file.with_name(f"{file.stem}.{ending}")
 
 
-def _scalp_weight(mesh: FileMesh, file: Path, scalp: str | None) -> Float64Array:
-    """(V,) from the first mark that the file or the user gives."""
+def _grown_weight(vertices: Float64Array, roots: npt.ArrayLike) -> Float64Array | None:
+    """(V,) 1 where roots of hair stand near each other; None where they are not on the mesh."""
+    places = np.asarray(roots, np.float64).reshape(-1, 3)
+    if np.median(cKDTree(vertices).query(places)[0]) > _ROOT_GAP:
+        return None
+    return Reach.of(places).covers(vertices).astype(np.float64)
+
+
+def _scalp_weight(
+    mesh: FileMesh, file: Path, scalp: str | None, grown: Float64Array | None
+) -> Float64Array:
+    """(V,) from the first mark that the file or the user gives, else from the roots of hair."""
     if scalp is not None and scalp.lower() in mesh.groups:
         weight = mesh.groups[scalp.lower()]
     elif scalp is not None and os.path.lexists(scalp):
@@ -178,6 +201,8 @@ def _scalp_weight(mesh: FileMesh, file: Path, scalp: str | None) -> Float64Array
         weight = _picture_weight(mesh, file, _beside(file, "scalp.png"))
     elif mesh.colours is not None:
         weight = _painted_weight(mesh.colours, file)
+    elif grown is not None and grown[mesh.faces].all(axis=1).any():
+        return grown
     else:
         raise InputError(f"{file}: the head has no scalp: {_HOW_TO_MARK}")
     in_use = np.bincount(mesh.faces.ravel(), minlength=len(weight)) > 0

@@ -19,7 +19,7 @@ from hairkit.grooming.adopt_strands import (
 )
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.head_model.placement import find_place, place_head
-from hairkit.head_model.scalp import evaluate, sample_roots
+from hairkit.head_model.scalp import evaluate, roots_at, sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.testing import bristle_groom
@@ -82,6 +82,27 @@ def test_the_named_head_is_taken(tmp_path: Path, caplog: pytest.LogCaptureFixtur
     shift = moved.head.vertices - groom.head.vertices
     assert np.abs(shift - [0, 1.7, 0]).max() < 0.03
     assert "is moved by" in caplog.text
+
+
+def test_roots_show_the_scalp_of_a_head_that_marks_none(tmp_path: Path) -> None:
+    """A plain mesh under its hair is taken where it is: hair grows on it where roots are."""
+    groom = bristle_groom()
+    lines = [f"v {x} {y + 1.6} {z}" for x, y, z in groom.head.vertices.tolist()]
+    lines += ["f " + " ".join(str(n + 1) for n in face) for face in groom.head.faces.tolist()]
+    (tmp_path / "plain.obj").write_text("\n".join(lines))
+    there = replace(groom.strands, points=groom.strands.points + np.float32([0, 1.6, 0]))
+    found = adopt(there, ImportOptions(head=tmp_path / "plain.obj"), "a.hair")
+    np.testing.assert_allclose(
+        found.head.vertices[:, 1] - 1.6, groom.head.vertices[:, 1], atol=1e-6
+    )
+    np.testing.assert_allclose(roots_at(found.head, found.root_triangle, found.root_barycentric)
+                               .positions, there.roots, atol=1e-5)  # fmt: skip
+    height = groom.head.vertices[:, 1]
+    assert (found.head.scalp[height < -0.05] == 0).all()
+    assert (found.head.scalp[(height > 0.02) & (height < 0.099)] == 1).all()
+    far = replace(there, points=there.points + np.float32([0.5, 0, 0]))
+    with pytest.raises(InputError, match="has no scalp"):
+        adopt(far, ImportOptions(head=tmp_path / "plain.obj"), "a.hair")
 
 
 def test_another_unit_is_asked_for() -> None:
