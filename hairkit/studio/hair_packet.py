@@ -1,4 +1,4 @@
-"""A groom for the page: head, hair and the guides that move it, as one block of bytes.
+"""A groom for the page: head, bust, hair and the guides that move it, as one block of bytes.
 
 Four bytes `HKS1`, the length of a JSON header (uint32, little-endian), the header padded to a
 multiple of four, then the arrays that it names with type, shape and place.
@@ -11,13 +11,17 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from hairkit.arrays import UInt8Array
 from hairkit.grooming.densify import densify
+from hairkit.rendering.head import Solid, bust_solid, head_solid
 from hairkit.storage import write_bytes
 from hairkit.types.groom import Groom
+from hairkit.types.head import Head
 
 MAGIC = b"HKS1"
 HAIRS, POINTS = 9000, 16
@@ -26,6 +30,8 @@ MOST_GUIDES = 700
 """Guides that are simulated in the page."""
 CARRIERS = 3
 """Guides that each hair follows."""
+SKIN_EDGE, SKIN_QUALITY = 1024, 85
+"""Longest edge in pixels, and JPEG quality, of the picture of the skin: about 100 kB."""
 LEAST_DISTANCE = 1e-3
 """Added to distances between roots, metres, before weights are taken as their inverse."""
 
@@ -44,11 +50,12 @@ def packet_of(groom: Groom) -> bytes:
     shape = (-1, POINTS, 3)
     carried, weights = _carriers(guides.points.reshape(shape), hair.points.reshape(shape))
     head = groom.head
+    bust = bust_solid(head, strands)
     arrays: dict[str, npt.NDArray[Any]] = {
-        "head_points": head.vertices.astype(np.float32),
-        "head_normals": head.normals().astype(np.float32),
-        "head_faces": head.faces.astype(np.uint32),
+        **_mesh("head", head_solid(head, groom.material)),
         "head_scalp": head.scalp.astype(np.float32),
+        "head_eyes": _on_eyes(head),
+        **({} if bust is None else _mesh("bust", bust)),
         "guides": guides.points.astype(np.float32).reshape(shape),
         "hair": hair.points.astype(np.float32).reshape(shape),
         "carriers": carried.astype(np.float32),
@@ -56,6 +63,7 @@ def packet_of(groom: Groom) -> bytes:
         "capsules": np.hstack(
             [head.capsules.first, head.capsules.second, head.capsules.radius]
         ).astype(np.float32),
+        **_skin(head),
     }
     facts = {
         "root_colour": groom.material.root_colour.tolist(),
@@ -71,12 +79,45 @@ def pack(arrays: dict[str, npt.NDArray[Any]], facts: dict[str, Any]) -> bytes:
     places, blocks, at = {}, [], 0
     for name, array in arrays.items():
         data = np.ascontiguousarray(array).tobytes()
+        data += bytes(-len(data) % 4)
         places[name] = {"type": array.dtype.name, "shape": array.shape, "at": at}
         blocks.append(data)
         at += len(data)
     header = json.dumps({"arrays": places, "facts": facts}).encode()
     header += b" " * (-len(header) % 4)
     return b"".join([MAGIC, struct.pack("<I", len(header)), header, *blocks])
+
+
+def _mesh(name: str, solid: Solid) -> dict[str, npt.NDArray[Any]]:
+    """Return points, normals, colours (V, 3), faces (F, 3) and texture coordinates (V, 2)."""
+    uv = np.zeros((len(solid.vertices), 2)) if solid.uv is None else solid.uv
+    return {
+        f"{name}_points": solid.vertices.astype(np.float32),
+        f"{name}_normals": solid.normals.astype(np.float32),
+        f"{name}_colours": solid.colours.astype(np.float32),
+        f"{name}_uv": uv.astype(np.float32),
+        f"{name}_faces": solid.faces.astype(np.uint32),
+    }
+
+
+def _on_eyes(head: Head) -> npt.NDArray[np.float32]:
+    """Return (V,) 1 on the eyeballs, 0 elsewhere."""
+    found = np.zeros(len(head.vertices), np.float32)
+    if head.eye_vertices is not None:
+        found[head.eye_vertices.ravel()] = 1
+    return found
+
+
+def _skin(head: Head) -> dict[str, UInt8Array]:
+    """Return the picture (N,) of the skin as a JPEG file, where the head has one."""
+    if head.maps is None or head.maps.albedo is None:
+        return {}
+    pixels = head.maps.albedo.pixels
+    scale = min(1.0, SKIN_EDGE / max(pixels.shape[:2]))
+    small = cv2.resize(pixels, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    options = [cv2.IMWRITE_JPEG_QUALITY, SKIN_QUALITY]
+    data = cv2.imencode(".jpg", small[..., ::-1], options)[1]
+    return {"head_skin": np.asarray(data, np.uint8).ravel()}
 
 
 def _carriers(

@@ -12,6 +12,7 @@ const LOCAL = 0.35; // pull to the captured direction from the segment before
 const DRAG = 22; // acceleration in m/s2 of a wind of 1 m/s, relative to the hair
 const CLEARANCE = 0.004; // metres between hair and head
 const MOST_MOVE = 0.05; // metres in a step
+const ROUNDS = 2; // of leaving the head and restoring the length; the length is restored last
 
 export class HairMotion {
   constructor(packet) {
@@ -77,13 +78,20 @@ export class HairMotion {
             now[i + k] += LOCAL * (goal - now[i + k]) * (1 - 0.7 * p / points);
           }
         }
-        const length = lengths[g * points + p];
-        const dx = now[i] - now[j], dy = now[i + 1] - now[j + 1], dz = now[i + 2] - now[j + 2];
-        const scale = length / Math.max(Math.hypot(dx, dy, dz), 1e-9);
-        now[i] = now[j] + dx * scale; now[i + 1] = now[j + 1] + dy * scale; now[i + 2] = now[j + 2] + dz * scale;
-        this.leaveHead(i);
+        for (let round = 0; round < ROUNDS; round += 1) {
+          this.leaveHead(i);
+          this.restoreLength(i, lengths[g * points + p]);
+        }
       }
     }
+  }
+
+  // Moves a point to its distance from the one before.
+  restoreLength(i, length) {
+    const { now } = this, j = i - 3;
+    const dx = now[i] - now[j], dy = now[i + 1] - now[j + 1], dz = now[i + 2] - now[j + 2];
+    const scale = length / Math.max(Math.hypot(dx, dy, dz), 1e-9);
+    now[i] = now[j] + dx * scale; now[i + 1] = now[j + 1] + dy * scale; now[i + 2] = now[j + 2] + dz * scale;
   }
 
   hold(g) {

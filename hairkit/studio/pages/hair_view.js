@@ -67,29 +67,39 @@ void main() {
 const HEAD_VERTEX = `#version 300 es
 precision highp float;
 uniform mat4 u_clip_from_head;
-in vec3 a_point, a_normal;
-in float a_scalp;
-out vec3 v_normal, v_place;
-out float v_scalp;
+in vec3 a_point, a_normal, a_colour;
+in vec2 a_uv;
+in float a_eye, a_scalp;
+out vec3 v_normal, v_place, v_colour;
+out vec2 v_uv;
+out float v_eye;
 void main() {
-  v_normal = a_normal; v_place = a_point; v_scalp = a_scalp;
-  gl_Position = u_clip_from_head * vec4(a_point - 0.0015 * a_normal, 1.0);
+  v_normal = a_normal; v_place = a_point; v_colour = a_colour; v_eye = a_eye;
+  v_uv = vec2(a_uv.x, 1.0 - a_uv.y);
+  gl_Position = u_clip_from_head * vec4(a_point - (0.0015 * a_scalp + 0.0010 * a_eye) * a_normal, 1.0);
 }`;
 
 const HEAD_FRAGMENT = `#version 300 es
 precision highp float;
-uniform vec3 u_eye, u_key, u_root;
-in vec3 v_normal, v_place;
-in float v_scalp;
+uniform sampler2D u_skin;      // sRGB, white where there is no picture
+uniform vec3 u_eye, u_key;
+uniform float u_textured, u_scatter;
+in vec3 v_normal, v_place, v_colour;
+in vec2 v_uv;
+in float v_eye;
 out vec4 out_colour;
 void main() {
   vec3 n = normalize(v_normal), eye = normalize(u_eye - v_place), key = normalize(u_key);
-  vec3 skin = mix(vec3(0.52, 0.36, 0.28), 0.6 * u_root + vec3(0.06, 0.045, 0.035), 0.75 * v_scalp);
-  float wrapped = max((dot(n, key) + 0.35) / 1.35, 0.0);
-  vec3 warm = mix(vec3(0.9, 0.42, 0.3), vec3(1.0), smoothstep(0.0, 0.5, wrapped));
-  float sheen = pow(max(dot(n, normalize(eye + key)), 0.0), 24.0);
-  vec3 colour = skin * (0.22 + 0.08 * n.y + wrapped * warm) + 0.05 * sheen;
-  colour += 0.12 * skin * pow(1.0 - max(dot(n, eye), 0.0), 3.0);
+  vec3 skin = v_colour * mix(vec3(1.0), texture(u_skin, v_uv).rgb, u_textured);
+  float soft = 0.35 * u_scatter;
+  float wrapped = max((dot(n, key) + soft) / (1.0 + soft), 0.0);
+  vec3 warm = mix(vec3(0.9, 0.42, 0.3), vec3(1.0), max(smoothstep(0.0, 0.5, wrapped), 1.0 - u_scatter));
+  float across = max(dot(n, normalize(eye + key)), 0.0);
+  float sheen = mix(0.05 * u_scatter * pow(across, 24.0), 1.2 * pow(across, 400.0), v_eye);
+  float lids = smoothstep(0.45, 0.95, n.z) * (1.0 - 0.55 * smoothstep(0.0, 0.42, n.y));
+  float open_sky = mix(1.0, 0.25 + 0.75 * lids, v_eye);  // eyeballs lie in the shade of their lids
+  vec3 colour = open_sky * (skin * (0.3 + 0.08 * n.y + 1.3 * wrapped * warm) + sheen);
+  colour += 0.12 * u_scatter * skin * pow(1.0 - max(dot(n, eye), 0.0), 3.0);
   out_colour = vec4(pow(colour / (1.0 + 0.35 * colour), vec3(1.0 / 2.2)), 1.0);
 }`;
 
@@ -111,6 +121,7 @@ void main() {
 }`;
 
 const COLUMNS = 128; // strands in a row of the texture: 16 points each make 2048 texels
+const SKIN = [172, 134, 115, 255]; // until the picture of the skin is decoded
 const SHOWN_WIDTH = 0.0007; // metres: few strands stand for a hundred thousand
 const NEAR = 0.05, FAR = 10, VIEW_ANGLE = 0.5; // metres, metres, radians
 
@@ -121,7 +132,7 @@ export function readPacket(buffer) {
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, size)));
   const arrays = {};
   for (const [name, { type, shape, at }] of Object.entries(header.arrays)) {
-    const kind = type === "uint32" ? Uint32Array : Float32Array;
+    const kind = { uint32: Uint32Array, uint8: Uint8Array }[type] ?? Float32Array;
     arrays[name] = { shape, data: new kind(buffer, 8 + size + at, shape.reduce((a, b) => a * b, 1)) };
   }
   return { arrays, facts: header.facts };
@@ -144,18 +155,41 @@ export class HairView {
     upload(gl, this.hair, this.points * COLUMNS, Math.ceil(this.hairs / COLUMNS), fourWide(arrays.hair.data, this.points * COLUMNS * Math.ceil(this.hairs / COLUMNS)));
     this.shift = new Float32Array(4 * this.points * arrays.guides.shape[0]);
     this.hairArray = vertexArray(gl, this.hairProgram, { a_carriers: [arrays.carriers.data, 3, 1], a_weights: [arrays.weights.data, 3, 1] });
-    this.headArray = vertexArray(gl, this.headProgram, {
-      a_point: [arrays.head_points.data, 3, 0], a_normal: [arrays.head_normals.data, 3, 0], a_scalp: [arrays.head_scalp.data, 1, 0],
-    });
-    gl.bindVertexArray(this.headArray);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, arrays.head_faces.data, gl.STATIC_DRAW);
-    this.corners = arrays.head_faces.data.length;
+    this.solids = ["head", "bust"].filter((name) => arrays[`${name}_points`]).map((name) => this.solid(name));
+    this.skin = texture(gl);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(SKIN));
+    this.skinShown = arrays.head_skin ? this.showSkin(arrays.head_skin.data) : Promise.resolve();
     this.middle = middleOf(arrays.head_points.data);
     this.target = middleOf(arrays.hair.data).map((value, k) => (value + this.middle[k]) / 2);
     this.azimuth = 0.5;
     this.elevation = 0.08;
     this.distance = 2.6 * reach(arrays.hair.data, arrays.head_points.data, this.target);
+  }
+
+  solid(name) {
+    const { gl, packet: { arrays } } = this;
+    const of = (part) => arrays[`${name}_${part}`].data;
+    const array = vertexArray(gl, this.headProgram, {
+      a_point: [of("points"), 3, 0], a_normal: [of("normals"), 3, 0], a_colour: [of("colours"), 3, 0], a_uv: [of("uv"), 2, 0],
+      ...(name === "head" ? { a_eye: [of("eyes"), 1, 0], a_scalp: [of("scalp"), 1, 0] } : {}),
+    });
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, of("faces"), gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    return { array, corners: of("faces").length, textured: name === "head" && arrays.head_skin ? 1 : 0, scatter: name === "head" ? 1 : 0 };
+  }
+
+  // The picture is decoded beside the first frames, which show plain skin.
+  async showSkin(bytes) {
+    const { gl } = this;
+    const picture = await createImageBitmap(new Blob([bytes], { type: "image/jpeg" }), { colorSpaceConversion: "none" });
+    gl.bindTexture(gl.TEXTURE_2D, this.skin);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, gl.RGBA, gl.UNSIGNED_BYTE, picture);
+    gl.generateMipmap(gl.TEXTURE_2D);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+    this.canvas.parentElement.dataset.skin = `${picture.width} x ${picture.height}`;
   }
 
   camera() {
@@ -199,9 +233,13 @@ export class HairView {
     gl.useProgram(this.wallProgram);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.enable(gl.DEPTH_TEST);
-    use(gl, this.headProgram, { u_clip_from_head: view.matrix, u_eye: view.eye, u_key: key, u_root: facts.root_colour });
-    gl.bindVertexArray(this.headArray);
-    gl.drawElements(gl.TRIANGLES, this.corners, gl.UNSIGNED_INT, 0);
+    gl.activeTexture(gl.TEXTURE0); gl.bindTexture(gl.TEXTURE_2D, this.skin);
+    for (const { array, corners, textured, scatter } of this.solids) {
+      use(gl, this.headProgram, { u_clip_from_head: view.matrix, u_eye: view.eye, u_key: key, u_textured: textured, u_scatter: scatter });
+      gl.uniform1i(gl.getUniformLocation(this.headProgram, "u_skin"), 0);
+      gl.bindVertexArray(array);
+      gl.drawElements(gl.TRIANGLES, corners, gl.UNSIGNED_INT, 0);
+    }
     use(gl, this.hairProgram, {
       u_clip_from_head: view.matrix, u_eye: view.eye, u_key: key, u_root: facts.root_colour,
       u_tip: facts.tip_colour, u_middle: this.middle, u_layout: [this.points, COLUMNS],
