@@ -27,8 +27,9 @@ LOOK_AT = (0.0, -0.02, 0.0)
 """Metres in the head frame in the middle of the picture."""
 HAIR_ABOVE = 0.045
 """Thickness of usual hair on the head, metres: its top is the line that hair should not pass."""
-TOLERANCE = 0.7
-"""Pixels by which an outline is simplified."""
+FINER, SMOOTH, TOLERANCE = 2, 3.0, 0.9
+"""How many times as many pixels an outline is taken from, the Gaussian that smooths it and the
+distance by which it is simplified, both in those pixels."""
 
 
 def guides_for(count: int, above: bool) -> list[dict[str, Any]]:
@@ -52,15 +53,21 @@ def hair_line(azimuth_deg: float) -> float:
 def _guide(name: str, azimuth_deg: float, elevation_deg: float) -> dict[str, Any]:
     camera = camera_at(azimuth_deg, elevation_deg)
     head = default_head()
-    inside = np.isfinite(head_depth(head, camera)).astype(np.uint8)
-    curves, _ = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    inside = np.isfinite(head_depth(head, camera.resized(FINER * WIDTH, FINER * HEIGHT)))
+    soft = cv2.GaussianBlur(inside.astype(np.float32), (0, 0), SMOOTH)
+    filled = (soft > 1 / 2).astype(np.uint8)
+    curves, _ = cv2.findContours(filled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     smooth = [cv2.approxPolyDP(curve, TOLERANCE, True)[:, 0] for curve in curves]
     hair = (head.vertices + HAIR_ABOVE * head.normals())[head.scalp > 0].astype(np.float64)
     return {
         "name": name,
         "azimuth": azimuth_deg,
         "elevation": elevation_deg,
-        "outline": [_shares([*curve, curve[0]]) for curve in smooth if len(curve) > 2]
+        "outline": [
+            _shares((np.array([*curve, curve[0]]) + 0.5) / FINER - 0.5)
+            for curve in smooth
+            if len(curve) > 2
+        ]
         + _face(camera),
         "top": float(camera.project(hair)[:, 1].min() / HEIGHT),
     }

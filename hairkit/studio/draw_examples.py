@@ -43,7 +43,7 @@ CLOTH = (0.045, 0.075, 0.16)
 """Linear RGB."""
 DIM, GLARE, BLUR = 0.14, 105.0, 7.0
 """Factor of too little light, levels that too much adds, and pixels of a blurred picture."""
-NEAR, FAR, ASIDE, HIGH, TURNED_DEG = 0.42, 2.8, 0.17, -0.06, -38.0
+NEAR, FAR, ASIDE, HIGH, TURNED_DEG = 0.3, 2.8, 0.17, -0.14, -38.0
 """Metres to the head, beside and above it, and degrees, in pictures of a wrong place."""
 
 

@@ -135,7 +135,7 @@ class Routes:
         incoming = await receive_file(request, self._studio.project.incoming, "photo")
         values = {"incoming": str(incoming), "azimuth": request.path_params["azimuth"] % 360}
         try:
-            return JSONResponse(await self._studio.editor.call("look", PHOTO_S, values))
+            return JSONResponse(await self._studio.drafter.call("look", PHOTO_S, values))
         finally:
             incoming.unlink(missing_ok=True)
 

@@ -43,6 +43,8 @@ class Studio:
         self.guides = guides
         self.events = Events()
         self.editor, self.builder, self.drafter = TaskProcess(), TaskProcess(), TaskProcess()
+        """For masks, for the hair, and for what must not wait for them: previews, and pictures of
+        a camera that somebody holds."""
         self.change = asyncio.Lock()
         self.facts: dict[int, dict[str, Any]] = {}
         """What is known of each photo: size, feedback, outline."""
@@ -137,9 +139,8 @@ class Studio:
         """Take an upload into the project, as a new photo or in the place of one."""
         pictures = {size: str(incoming) + f".{size}" for size in ("small", "large")}
         try:
-            done = await self.editor.call(
-                "accept", PHOTO_S, {"incoming": str(incoming), **pictures}
-            )
+            values = {"incoming": str(incoming), **pictures}
+            done = await self.drafter.call("accept", PHOTO_S, values)
             async with self.change:
                 if number is None:
                     shot = self.project.add(incoming, done["suffix"], view)

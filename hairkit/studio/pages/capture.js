@@ -5,14 +5,18 @@ const COUNTS = [8, 12, 16, 24];
 const READY_S = 0.7; // seconds for which all must be right before the shutter releases itself
 const AGAIN_S = 2.2; // seconds between two spoken prompts
 const CHECK_MS = 160;
+const BURST = 3, BURST_MS = 110; // pictures of which the sharpest is taken, and the time between two
 const LOOK_WIDTH = 300, LOOKED_MS = 3000; // small pictures for the server, and how long its word counts
 const SHOWN_MS = 1500; // the word after a shot stays this long, so that it can be read
-const directions = { front: "Look at the camera", left: "left side to the camera", back: "back to the camera", right: "right side to the camera" };
+const directions = {
+  front: "look at the camera", left: "left side to the camera", back: "back to the camera",
+  right: "right side to the camera", top: "from above the forehead",
+};
 
 export function show(main) {
   let stream = null, guides = [], at = 0, taken = new Map(), advice = {}, limits = {}, timer = 0;
   let goodFor = 0, shownUntil = 0, lastSpoken = 0, lastText = "", busy = false, before = null, automatic = true, aloud = true;
-  let looking = false, pressed = false, looked = { at: -1, time: 0, found: [] };
+  let looking = false, left = false, pressed = false, looked = { at: -1, time: 0, found: [] };
   let heading = null, headingAtFront = null, zeroOffset = 0;
 
   const video = make("video", { playsinline: true, muted: true, autoplay: true, "aria-label": "Picture of the camera" });
@@ -55,7 +59,8 @@ export function show(main) {
     } catch (error) { say(error.message); }
   }
 
-  function ready() {
+  // Shows the next view, and says which it is, after a word about the last.
+  function ready(word = "") {
     const view = guides[at];
     if (!view) return;
     goodFor = 0;
@@ -63,7 +68,8 @@ export function show(main) {
       ...view.outline.map((curve) => make("path", { d: pathOf([curve.map((v, i) => v * (i % 2 ? 4 : 3))], false) })),
       make("line", { x1: 0.3, x2: 2.7, y1: 4 * view.top, y2: 4 * view.top }));
     drawRing();
-    tell(`${view.name}: ${directions[view.name] ?? (view.name === "top" ? "from above the forehead" : "turn to the outline")}`);
+    const next = `${view.name}: ${directions[view.name] ?? "turn to the outline"}`;
+    tell(word + next[0].toUpperCase() + next.slice(1), undefined, true);
   }
 
   function drawRing() {
@@ -83,10 +89,12 @@ export function show(main) {
     finish.textContent = taken.size >= turn.length ? "Done: make the hair" : "Done";
   }
 
-  function tell(text, spoken = text) {
+  // What is said of the next view is not held back, and ends what is being said.
+  function tell(text, spoken = text, atOnce = false) {
     if (hint.textContent !== text) hint.textContent = text;
     const now = performance.now() / 1000;
-    if (aloud && window.speechSynthesis && spoken !== lastText && now - lastSpoken > AGAIN_S) {
+    if (aloud && spoken && window.speechSynthesis && (atOnce || (spoken !== lastText && now - lastSpoken > AGAIN_S))) {
+      if (atOnce) speechSynthesis.cancel();
       speechSynthesis.speak(new SpeechSynthesisUtterance(spoken));
       lastText = spoken;
       lastSpoken = now;
@@ -107,12 +115,13 @@ export function show(main) {
       video.srcObject = stream;
       await video.play();
       const found = (await navigator.mediaDevices.enumerateDevices()).filter((d) => d.kind === "videoinput");
+      if (left) { stopStream(); return; } // the page was left before the camera had started
       cameras.replaceChildren(...found.map((d, i) => make("option", { value: d.deviceId }, d.label || `Camera ${i + 1}`)));
       cameras.parentElement.hidden = found.length < 2;
       cameras.hidden = false;
       timer = setInterval(check, CHECK_MS);
-      ready();
     } catch (error) {
+      if (left) { stopStream(); return; }
       const reasons = {
         NotAllowedError: "The camera is blocked for this page. Allow it beside the address, or choose photos.",
         NotFoundError: "This machine has no camera. Use a phone, or choose photos.",
@@ -136,12 +145,12 @@ export function show(main) {
   }
 
   const small = make("canvas");
-  function measure() {
-    const [x, y, w, h] = crop();
+  // Light and sharpness of a picture, and its grey levels, at the width that the limits are for.
+  function measure(source, [x, y, w, h]) {
     small.width = limits.width;
     small.height = Math.round((limits.width * h) / w);
     const context = small.getContext("2d", { willReadFrequently: true });
-    context.drawImage(video, x, y, w, h, 0, 0, small.width, small.height);
+    context.drawImage(source, x, y, w, h, 0, 0, small.width, small.height);
     const { data } = context.getImageData(0, 0, small.width, small.height);
     const grey = new Float32Array(small.width * small.height);
     let sum = 0;
@@ -149,7 +158,7 @@ export function show(main) {
       grey[i] = 0.299 * data[4 * i] + 0.587 * data[4 * i + 1] + 0.114 * data[4 * i + 2];
       sum += grey[i];
     }
-    let edges = 0, squares = 0, count = 0, moved = 0;
+    let edges = 0, squares = 0, count = 0;
     for (let v = 1; v < small.height - 1; v += 1) {
       for (let u = 1; u < small.width - 1; u += 1) {
         const i = v * small.width + u;
@@ -157,16 +166,27 @@ export function show(main) {
         edges += edge; squares += edge * edge; count += 1;
       }
     }
-    if (before?.length === grey.length) {
-      for (let i = 0; i < grey.length; i += 1) moved += Math.abs(grey[i] - before[i]);
-      moved /= grey.length;
-    } else moved = Infinity;
-    before = grey;
-    return { mean: sum / grey.length, sharp: squares / count - (edges / count) ** 2, moved };
+    return { grey, mean: sum / grey.length, sharp: squares / count - (edges / count) ** 2 };
+  }
+
+  // The sharpest of a few pictures in a row.
+  async function sharpest() {
+    let best = null;
+    for (let k = 0; k < BURST; k += 1) {
+      if (k) await new Promise((done) => { setTimeout(done, BURST_MS); });
+      const [x, y, w, h] = crop();
+      const picture = make("canvas", { width: w, height: h });
+      picture.getContext("2d").drawImage(video, x, y, w, h, 0, 0, w, h);
+      const { sharp } = measure(picture, [0, 0, w, h]);
+      if (!best || sharp > best.sharp) best = { picture, sharp };
+    }
+    return new Promise((done) => { best.picture.toBlob(done, "image/jpeg", 0.95); });
   }
 
   function judge() {
-    const { mean, sharp, moved } = measure();
+    const { grey, mean, sharp } = measure(video, crop());
+    const moved = before?.length === grey.length ? grey.reduce((sum, value, i) => sum + Math.abs(value - before[i]), 0) / grey.length : Infinity;
+    before = grey;
     const found = [];
     if (mean < limits.dark) found.push("too_dark");
     if (mean > limits.bright) found.push("too_bright");
@@ -225,10 +245,8 @@ export function show(main) {
   async function take() {
     if (busy || !video.videoWidth) return;
     busy = true;
-    const [x, y, w, h] = crop();
-    const picture = make("canvas", { width: w, height: h });
-    picture.getContext("2d").drawImage(video, x, y, w, h, 0, 0, w, h);
-    const blob = await new Promise((done) => { picture.toBlob(done, "image/jpeg", 0.95); });
+    tell("Hold still…", "");
+    const blob = await sharpest();
     const view = guides[at], index = at;
     if (headingAtFront === null && heading !== null) { headingAtFront = heading; zeroOffset = view.azimuth; }
     try {
@@ -240,12 +258,9 @@ export function show(main) {
       const wrong = (found.feedback ?? [])[0];
       const next = guides.findIndex((_, i) => i !== index && !taken.has(i));
       at = next < 0 ? index : next;
-      lastText = "";
-      ready();
+      ready(wrong ? `Taken, but: ${advice[wrong][0]}. ` : next < 0 ? "All views taken. " : "Taken. ");
       shownUntil = performance.now() + SHOWN_MS;
       stage.dataset.shots = Number(stage.dataset.shots ?? 0) + 1;
-      if (wrong) tell(`Taken, but: ${advice[wrong][0]}`, advice[wrong][1]);
-      else tell(next < 0 ? "All views taken" : `Taken. Now ${guides[at].name}`);
     } catch (error) { say(error.message); }
     goodFor = -1;
     busy = false;
@@ -277,7 +292,7 @@ export function show(main) {
   addEventListener("keydown", key);
   send("PUT", "/api/hold", { held: true }).catch(() => {});
   cameras.parentElement.hidden = true;
-  load().then(() => start());
+  load().then(() => { if (!left) start(); });
   const stop = onChange(() => {});
 
   function stopStream() {
@@ -287,6 +302,7 @@ export function show(main) {
   }
 
   return () => {
+    left = true;
     stop();
     stopStream();
     removeEventListener("deviceorientation", turned);
