@@ -23,6 +23,8 @@ GUIDES = 600
 STROKES = 3
 """Strokes, one after the other, each on another photo; the figures are their means."""
 LONGEST_S = 1200.0
+ANSWERS = ("outline", "preview", "whole hair")
+"""To a stroke, in the order in which they come."""
 
 
 class Studio:
@@ -86,30 +88,31 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--photos", type=Path, default=sample_folder() / "photos")
     parser.add_argument("--strokes", type=int, default=STROKES)
+    parser.add_argument("--until", choices=ANSWERS, default=ANSWERS[-1], help="last answer")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         studio = Studio(Path(folder) / "head")
         try:
-            _measure(studio, sorted(arguments.photos.iterdir()), arguments.strokes)
+            last = 1 + ANSWERS.index(arguments.until)
+            _measure(studio, sorted(arguments.photos.iterdir()), arguments.strokes, last)
         finally:
             studio.close()
 
 
-def _measure(studio: Studio, photos: list[Path], strokes: int) -> None:
+def _measure(studio: Studio, photos: list[Path], strokes: int, answers: int) -> None:
     began = time.monotonic()
     for photo in photos:
         studio.ask("POST", "/api/photos", photo.read_bytes())
     last = time.monotonic()
     state = studio.wait(_is_done)
     first = (time.monotonic() - last, studio.busy_s())
-    rows = [_stroke(studio, state["photos"][k % len(photos)]) for k in range(strokes)]
+    photo = state["photos"]
+    rows = [_stroke(studio, photo[k % len(photos)], answers) for k in range(strokes)]
     print("| from | to | seconds | processor |")
     print("|---|---|---|---|")
     print(f"| first photo | last photo | {last - began:.1f} | |")
     print(f"| last photo | hair | {first[0]:.1f} | {first[1]:.1f} |")
-    for name, values in zip(
-        ("outline", "preview", "whole hair"), zip(*rows, strict=True), strict=True
-    ):
+    for name, values in zip(ANSWERS[:answers], zip(*rows, strict=True), strict=True):
         clock, busy = (sum(column) / len(rows) for column in zip(*values, strict=True))
         print(f"| stroke | {name} | {clock:.2f} | {busy:.2f} |")
 
@@ -118,8 +121,8 @@ def _is_done(state: dict[str, Any]) -> bool:
     return bool(state["build"]["state"] == "done")
 
 
-def _stroke(studio: Studio, photo: dict[str, Any]) -> list[tuple[float, float]]:
-    """Return seconds by clock and processor until outline, preview and whole hair."""
+def _stroke(studio: Studio, photo: dict[str, Any], answers: int) -> list[tuple[float, float]]:
+    """Return seconds by clock and processor until each of the first `answers`."""
     before = studio.ask("GET", "/api/project")
     width, height = photo["width"], photo["height"]
     middle = [[0.45 * width, 0.3 * height], [0.55 * width, 0.3 * height]]
@@ -135,11 +138,14 @@ def _stroke(studio: Studio, photo: dict[str, Any]) -> list[tuple[float, float]]:
 
     studio.ask("PUT", f"/api/photos/{photo['id']}/strokes", drawn)
     passed()
-    studio.wait(lambda state: state["draft"] not in ("", before["draft"]) or _made(state, before))
-    passed()
-    studio.wait(lambda state: _made(state, before))
-    passed()
+    for made in (_previewed, _made)[: answers - 1]:
+        studio.wait(lambda state, made=made: made(state, before))
+        passed()
     return found
+
+
+def _previewed(state: dict[str, Any], before: dict[str, Any]) -> bool:
+    return state["draft"] not in ("", before["draft"]) or _made(state, before)
 
 
 def _made(state: dict[str, Any], before: dict[str, Any]) -> bool:

@@ -52,7 +52,10 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "skin": ({"HEIGHT": 120}, ["CAPTURES"]),
     "skin_looks": ({"HEIGHT": 80}, ["-o", "CAPTURES/looks_of_skin.jpg"]),
     "strokes": ({"STROKES": 1}, ["CAPTURES", "--tool", "brush"]),
-    "studio": ({"GUIDES": 30}, ["--photos", "CAPTURES/short/photos", "--strokes", "1"]),
+    "studio": (
+        {"GUIDES": 30},
+        ["--photos", "CAPTURES/short/photos", "--strokes", "1", "--until", "preview"],
+    ),
     "super_helix": ({"GUIDES": 8, "ELEMENTS": 5, "FRAMES": 2}, []),
     "texture_gallery": ({"SIZE": 64}, ["-o", "CAPTURES/gallery"]),
     "threads": ({"REPETITIONS": 1}, ["--runs", "2"]),
