@@ -1,4 +1,7 @@
-"""The story of a user in a real browser: photos, masks, a stroke, moving hair, files."""
+"""The story of a user in a real browser: photos, masks, a stroke, moving hair, files.
+
+It is told by the keyboard alone; what pointers do, too, is checked beside it.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +13,47 @@ from typing import Any
 
 import pytest
 
+from hairkit.cli import main
 from hairkit.io.capture_reader import read_capture
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
-from hairkit.types.groom import Groom
 
 GUIDES = 80
 SLOW_S = 600
 """Seconds for what computes, on a busy machine."""
 SIZES = ((390, 844), (1440, 900))
-LISTEN = """window.spoken = [];
-speechSynthesis.speak = (said) => { window.spoken.push(said.text); };"""
-"""What is spoken is written down: browsers without a sound card say nothing."""
+LISTEN = """window.spoken = []; window.streams = [];
+speechSynthesis.speak = (said) => { window.spoken.push(said.text); };
+const ask = navigator.mediaDevices.getUserMedia.bind(navigator.mediaDevices);
+navigator.mediaDevices.getUserMedia = async (wanted) => {
+  const stream = await ask(wanted);
+  window.streams.push(stream);
+  return stream;
+};"""
+"""What is spoken is written down, since browsers without a sound card say nothing, and what the
+camera sends is kept."""
+LIVE = "() => window.streams.flatMap((s) => s.getTracks()).some((t) => t.readyState === 'live')"
 PAGES = ("photos", "capture", "annotate", "pose", "strands", "hair")
+NAMES = ("Photos", "Camera", "Mask", "Pose", "Strands", "Hair")
+"""Of the pages, in the bar of steps."""
+WRITTEN_ONLY, LEAST_FILE = (".html", ".fbx", ".ma"), 10_000
+"""Files that hairkit does not read, and bytes of the smallest file."""
+MOST_STOPS = 90
+"""Stops of the Tab key on a page, at most."""
+FOCUSED = """() => {
+  const e = document.activeElement, box = e.getBoundingClientRect(), style = getComputedStyle(e);
+  const middle = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+  return {
+    name: e.getAttribute("aria-label") || e.textContent.trim() || e.tagName,
+    drawn: style.outlineStyle !== "none" && parseFloat(style.outlineWidth) >= 2,
+    seen: box.width > 0 && box.right > 0 && box.bottom > 0 && box.x < innerWidth
+      && box.y < innerHeight,
+    covered: middle !== null && !e.contains(middle) && !middle.contains(e)
+      && !e.closest("label")?.contains(middle),
+    body: e === document.body,
+  };
+}"""
+"""What the keyboard is at: its name, whether that is marked, and whether one can see it."""
 
 
 @pytest.fixture
@@ -56,9 +87,26 @@ def page(browser: Any, project: Any) -> Iterator[Any]:
 
 
 def go(page: Any, project: Any, name: str) -> None:
-    """Go to a page of the studio."""
+    """Go to a page of the studio by its address."""
     page.goto(f"{project.origin}/#{name}")
     page.locator(f"nav a[aria-current][href='#{name.partition('/')[0]}']").wait_for()
+
+
+def step(page: Any, name: str) -> None:
+    """Go to a page by the bar of steps: Tab from the top, Enter."""
+    page.evaluate("document.activeElement.blur()")
+    tab_to(page, NAMES[PAGES.index(name)])
+    page.keyboard.press("Enter")
+    page.locator(f"nav a[aria-current][href='#{name}']").wait_for()
+
+
+def tab_to(page: Any, name: str) -> None:
+    """Press Tab until the control of that name has the keyboard."""
+    for _ in range(MOST_STOPS):
+        page.keyboard.press("Tab")
+        if page.evaluate(FOCUSED)["name"].startswith(name):
+            return
+    raise AssertionError(f"no Tab reaches {name!r}")
 
 
 def wait_ready(page: Any, project: Any) -> None:
@@ -82,10 +130,12 @@ def test_the_whole_story(
 ) -> None:
     """From photos to files, every step of the story holds, in this order."""
     check_photos_become_hair_by_themselves(page, project, photos)
+    check_a_parameter_is_kept(page, project)
     check_files_equal_those_of_the_command_line(page, project, photos, tmp_path)
     check_a_stroke_moves_the_outline(page, project)
+    check_landmarks_are_moved_by_keys(page, project)
     check_the_head_is_moved_by_keys(page, project)
-    check_a_parameter_is_that_of_the_command_line(page, project, tmp_path)
+    check_photos_change_places_by_keys(page, project)
     check_the_hair_moves(page, project)
     check_files_are_downloaded(page, project, browser, tmp_path)
     check_a_shot_of_the_camera_becomes_a_photo(page, project)
@@ -98,22 +148,45 @@ def test_the_whole_story(
 
 def check_photos_become_hair_by_themselves(page: Any, project: Any, photos: list[Path]) -> None:
     """Photos chosen in the page get masks and become hair without a further touch."""
-    page.set_input_files("#picker", [str(photo) for photo in photos])
+    with page.expect_file_chooser() as caught:
+        tab_to(page, "Choose photos")
+        page.keyboard.press("Enter")
+    caught.value.set_files([str(photo) for photo in photos])
     hair = page.locator(".card path.hair")
     hair.nth(len(photos) - 1).wait_for(state="attached", timeout=1000 * SLOW_S)
     wait_ready(page, project)
     assert not page.trouble
 
 
+def check_a_parameter_is_kept(page: Any, project: Any) -> None:
+    """A slider shows its strands, and its value is an option of the hair that is made next."""
+    step(page, "strands")
+    page.locator(".stage[data-drawn]").wait_for()
+    drawn = page.locator(".stage").get_attribute("data-drawn")
+    tab_to(page, "Narrowest window")
+    for _ in range(8):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_function(
+        "before => document.querySelector('.stage').dataset.drawn !== before", arg=drawn
+    )
+    page.get_by_text("Kept; the hair is made again.").wait_for()
+    settings = read_capture(project.folder).chosen.settings
+    assert len(settings) == 1
+    assert settings[0].startswith("structure_tensor.finest_window=")
+
+
 def check_files_equal_those_of_the_command_line(
     page: Any, project: Any, photos: list[Path], tmp_path: Path
 ) -> None:
-    """The original photos give the same bytes by `reconstruct`, in every file of the recipe."""
+    """The original photos give the same bytes by `reconstruct`, in every file of the recipe, with
+    the option as `--set` gives it."""
+    wait_ready(page, project)
     originals = tmp_path / "photos"
     originals.mkdir()
     for photo in photos:
         (originals / photo.name).write_bytes(photo.read_bytes())
-    reconstruct(originals, tmp_path / "out", guides=GUIDES, sheet=False)
+    recipe = load_recipe("default").with_set(read_capture(project.folder).chosen.settings)
+    reconstruct(originals, tmp_path / "out", recipe, guides=GUIDES, sheet=False)
     for name in ("groom.npz", "groom.apx", "groom.abc", "groom.glb"):
         there = project.folder / "result" / name
         assert there.read_bytes() == (tmp_path / "out" / name).read_bytes(), name
@@ -121,16 +194,14 @@ def check_files_equal_those_of_the_command_line(
 
 def check_a_stroke_moves_the_outline(page: Any, project: Any) -> None:
     """A stroke that is drawn changes the mask, is kept as labelme's JSON, and can be undone."""
-    go(page, project, "annotate/1")
+    step(page, "annotate")
     stage = page.locator(".stage")
     page.get_by_text("Found automatically").wait_for(timeout=1000 * SLOW_S)
+    tab_to(page, "Photo with the outline")
+    for key in ("Enter", "b", *["Shift+ArrowUp"] * 2, "Enter", *["ArrowRight"] * 8, "Enter"):
+        page.keyboard.press(key)
     box = page.locator(".stage canvas").bounding_box()
     middle, top = box["x"] + box["width"] / 2, box["y"] + 0.45 * box["height"]
-    page.keyboard.press("b")
-    page.mouse.move(middle - 20, top)
-    page.mouse.down()
-    page.mouse.move(middle + 20, top, steps=8)
-    page.mouse.up()
     page.locator(".stage[data-outline-ms]").wait_for(timeout=1000 * SLOW_S)
     assert int(stage.get_attribute("data-outline-ms")) > 0
     kept = json.loads((project.folder / "strokes" / "001.json").read_text())
@@ -156,13 +227,30 @@ def check_a_stroke_moves_the_outline(page: Any, project: Any) -> None:
     page.get_by_text("Found automatically").wait_for(timeout=1000 * SLOW_S)
 
 
+def check_landmarks_are_moved_by_keys(page: Any, project: Any) -> None:
+    """Arrow keys move a landmark, which is kept and can be given back."""
+    step(page, "pose")
+    page.get_by_text("Face found").wait_for()
+    tab_to(page, "Photo with the fitted head")
+    for key in ("n", "Shift+ArrowRight"):
+        page.keyboard.press(key)
+    tab_to(page, "Keep landmarks")
+    page.keyboard.press("Enter")
+    page.get_by_text("Kept; the hair is made again.").wait_for()
+    assert json.loads((project.folder / "landmarks.json").read_text())["views"]
+    tab_to(page, "Use automatic ones")
+    page.keyboard.press("Enter")
+    page.get_by_text("Automatic landmarks are used.").wait_for()
+
+
 def check_the_head_is_moved_by_keys(page: Any, project: Any) -> None:
     """Keys move the head in every photo, the residual follows, and the fit can be had again."""
     go(page, project, "pose/1")
     stage = page.locator(".stage")
     page.locator(".stage[data-residual]:not([data-residual=''])").wait_for()
     fitted = float(stage.get_attribute("data-residual"))
-    page.get_by_role("button", name="Move the head").click()
+    tab_to(page, "Move the head")
+    page.keyboard.press("Enter")
     page.keyboard.press("Shift+ArrowRight")
     page.keyboard.press("q")
     page.get_by_role("button", name="As it was fitted").and_(page.locator(":enabled")).wait_for()
@@ -171,32 +259,23 @@ def check_the_head_is_moved_by_keys(page: Any, project: Any) -> None:
         "before => Math.abs(document.querySelector('.stage').dataset.residual - before) > 1",
         arg=fitted,
     )
-    page.get_by_role("button", name="As it was fitted").click()
+    tab_to(page, "As it was fitted")
+    page.keyboard.press("Enter")
     page.get_by_role("button", name="As it was fitted").and_(page.locator(":disabled")).wait_for()
     assert stage.get_attribute("data-residual") == f"{fitted:.2f}"
 
 
-def check_a_parameter_is_that_of_the_command_line(page: Any, project: Any, tmp_path: Path) -> None:
-    """A slider shows its strands, and gives the bytes that `--set` gives."""
-    go(page, project, "strands/1")
-    page.locator(".stage[data-drawn]").wait_for()
-    drawn = page.locator(".stage").get_attribute("data-drawn")
-    slider = page.get_by_role("slider", name="Narrowest window")
-    slider.focus()
-    for _ in range(8):
-        page.keyboard.press("ArrowRight")
-    page.wait_for_function(
-        "before => document.querySelector('.stage').dataset.drawn !== before", arg=drawn
-    )
-    page.get_by_text("Kept; the hair is made again.").wait_for()
-    wait_ready(page, project)
-    settings = read_capture(project.folder).chosen.settings
-    assert len(settings) == 1
-    assert settings[0].startswith("structure_tensor.finest_window=")
-    recipe = load_recipe("default").with_set(settings)
-    reconstruct(tmp_path / "photos", tmp_path / "out", recipe, guides=GUIDES, sheet=False)
-    made = (project.folder / "result" / "groom.npz").read_bytes()
-    assert made == (tmp_path / "out" / "groom.npz").read_bytes()
+def check_photos_change_places_by_keys(page: Any, project: Any) -> None:
+    """A photo goes on in the turn and back again, and the keyboard goes with it."""
+    tab_to(page, "Photo 2 later")
+    page.keyboard.press("Enter")
+    moved = "(name) => document.activeElement.ariaLabel?.startsWith(name)"
+    page.wait_for_function(moved, arg="Photo 3 later")
+    kept = json.loads((project.folder / "studio.json").read_text())["photos"]
+    assert [photo["id"] for photo in kept[:3]] == [1, 3, 2]
+    page.keyboard.press("Shift+Tab")
+    page.keyboard.press("Enter")
+    page.wait_for_function(moved, arg="Photo 2 earlier")
 
 
 def check_the_hair_moves(page: Any, project: Any) -> None:
@@ -224,29 +303,47 @@ def check_the_hair_moves(page: Any, project: Any) -> None:
     }"""
     still, blown, stretched, settled = page.evaluate(measure)
     assert still < 1e-3
+    page.locator("#hair[data-skin]").wait_for()  # the skin of the photos
+    tab_to(page, "Hair on a head")
+    for key in ("p", "ArrowRight", "ArrowRight"):
+        page.keyboard.press(key)
+    held = "document.querySelector('#hair').hairMotion.held"
+    assert page.evaluate(f"{held}.at.length") == 3
+    page.keyboard.press("p")
+    assert page.evaluate(held) is None
     assert blown > 5e-3
-    assert stretched < 0.25
+    assert stretched < 1e-3
     assert settled < 2e-3
     assert not page.trouble
 
 
 def check_files_are_downloaded(page: Any, project: Any, browser: Any, tmp_path: Path) -> None:
-    """Any format comes from the page; `result.html` moves without a server."""
+    """Every format comes from the page and is read; `result.html` moves without a server."""
     go(page, project, "hair")
-    for name in ("groom.apx", "groom.npz", "groom.ply", "result.html"):
+    offered = page.locator("a[download]").all()
+    names = [link.get_attribute("download") for link in offered]
+    assert {"groom.apx", "groom.npz", "result.html"} < set(names)
+    for link, name in zip(offered, names, strict=True):
+        link.focus()
         with page.expect_download(timeout=1000 * SLOW_S) as caught:
-            page.locator(f"a[download='{name}']").click()
+            page.keyboard.press("Enter")
         caught.value.save_as(tmp_path / name)
-    assert len(Groom.load(tmp_path / "groom.npz").strands) > 0
+        assert (tmp_path / name).stat().st_size > LEAST_FILE
+        if Path(name).suffix not in WRITTEN_ONLY:
+            assert main(["info", str(tmp_path / name)]) == 0, name
     assert (tmp_path / "groom.apx").read_bytes() == (
         project.folder / "result" / "groom.apx"
     ).read_bytes()
     go(page, project, "photos")
     alone = browser.new_page()
+    asked: list[str] = []
+    alone.on("request", lambda request: asked.append(request.url))
     alone.on("pageerror", lambda error: page.trouble.append(str(error)))
     alone.goto((tmp_path / "result.html").as_uri(), timeout=1000 * SLOW_S)
     alone.locator("#hair[data-frames]").wait_for(timeout=1000 * SLOW_S)
     assert alone.evaluate("document.querySelector('#hair').hairMotion.count") > 0
+    alone.locator("#hair[data-skin]").wait_for()
+    assert asked == [(tmp_path / "result.html").as_uri()]
     alone.close()
 
 
@@ -293,16 +390,29 @@ def point_phone(page: Any, heading_deg: float) -> None:
 
 
 def check_pages_are_accessible(page: Any, project: Any, name: str, size: tuple[int, int]) -> None:
-    """axe-core finds nothing serious, nothing is wider than the screen, keys reach the page."""
+    """axe-core finds nothing serious, nothing is wider than the screen, Tab goes through all
+    controls, and where it stands is marked and seen."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright")
     page.set_viewport_size({"width": size[0], "height": size[1]})
     go(page, project, name)
     time.sleep(1)
+    if name != "capture":
+        page.wait_for_function(f"() => !({LIVE})()")  # no camera runs behind another page
     found = axe.Axe().run(page).response["violations"]
     serious = [(v["id"], [n["target"] for n in v["nodes"]]) for v in found
                if v["impact"] in ("serious", "critical")]  # fmt: skip
     assert not serious, (name, size)
     wide = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
     assert wide[0] <= wide[1], (name, size)
-    page.keyboard.press("Tab")
-    assert page.evaluate("document.activeElement !== document.body")
+    page.evaluate("document.activeElement.blur()")
+    stops = []
+    for _ in range(MOST_STOPS):
+        page.keyboard.press("Tab")
+        stop = page.evaluate(FOCUSED)
+        if stop["body"]:
+            break
+        stops.append(stop)
+    hidden = [s["name"] for s in stops if not s["drawn"] or not s["seen"] or s["covered"]]
+    assert not hidden, (name, size)
+    controls = page.locator(":is(a[href], button, input, select, canvas):visible:enabled")
+    assert len(stops) >= controls.count(), (name, size)

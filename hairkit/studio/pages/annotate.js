@@ -1,5 +1,5 @@
 // Masks corrected by a few strokes. Strokes are kept in labelme's shape; the mask follows from them.
-import { forget, get, make, onChange, outlineOf, pathOf, say, send, state } from "./api.js";
+import { forget, get, make, onChange, outlineOf, pathOf, refill, say, send, state } from "./api.js";
 
 const tools = {
   foreground: { name: "Hair", key: "f", label: "foreground", type: "linestrip", colour: "#ff5fa8" },
@@ -14,15 +14,16 @@ const tools = {
 };
 const NEAR_PX = 14; // a stroke is removed within this distance
 const LEAST_STEP_PX = 2.5; // between two points of a stroke
+const CROSS_PX = 22, PEN_PX = 3, FAST_PX = 18; // the cross for the keyboard: its arms, and steps of it
 const BRUSH = { least: 0.005, most: 0.12, usual: 0.03 }; // radius over the photo's height
 
 export function show(main, argument) {
   let photo = null, image = null, facts = null, shapes = [], undone = [], stroke = null;
   let tool = "foreground", zoom = 1, shift = [0, 0], bright = 1, contrast = 1, turn = 0, saving = null;
-  let pinch = null, brush = BRUSH.usual, bare = false;
+  let pinch = null, brush = BRUSH.usual, bare = false, pen = null;
   const pointers = new Map();
 
-  const canvas = make("canvas", { tabindex: "0", role: "img", "aria-label": "Photo with the outline of the hair. Draw with the pointer; keys choose tools." });
+  const canvas = make("canvas", { tabindex: "0", role: "img", "aria-label": "Photo with the outline of the hair. Draw with the pointer, or press Enter for a cross: arrow keys move it, Enter lowers and lifts the pen, Escape takes the cross away. Letters choose tools." });
   const status = make("p", { role: "status", class: "quiet" });
   const buttons = Object.entries(tools).map(([key, { name, key: letter }]) => make("button", {
     "aria-pressed": String(key === tool), "data-tool": key, title: `Key ${letter.toUpperCase()}`, onclick: () => choose(key),
@@ -38,7 +39,7 @@ export function show(main, argument) {
   main.append(make("div", { class: "split" }, stage, make("section", { class: "side", "aria-label": "Tools" },
     strip, make("div", { class: "tools" }, ...buttons), make("div", { class: "tools" }, undo, redo), status,
     size, brightness, contrasts,
-    make("p", { class: "quiet" }, "Correct only what is wrong: three strokes are usually enough. An edge brush paints up to the strongest edge under it. Scroll or pinch to zoom, hold Space to move, H to see the bare photo. Strands are followed in the photo with this brightness and contrast."))));
+    make("p", { class: "quiet" }, "Correct only what is wrong: three strokes are usually enough. An edge brush paints up to the strongest edge under it. Scroll or pinch to zoom, hold Space to move, H to see the bare photo. Without a pointer: Enter on the photo shows a cross, arrow keys move it, Enter lowers and lifts the pen. Strands are followed in the photo with this brightness and contrast."))));
 
   function slider(name, min, max, step, set, keep) {
     const input = make("input", { type: "range", min, max, step, value: "1", oninput: () => { set(Number(input.value)); draw(); }, onchange: () => keep?.() });
@@ -60,7 +61,7 @@ export function show(main, argument) {
     photo = next;
     history.replaceState(null, "", `#annotate/${photo.id}`);
     const order = ++turn;
-    zoom = 1; shift = [0, 0]; shapes = []; undone = []; facts = null; image = null;
+    zoom = 1; shift = [0, 0]; shapes = []; undone = []; facts = null; image = null; pen = stroke = null;
     [bright, contrast] = photo.tone ?? [1, 1];
     brightness.lastChild.value = bright;
     contrasts.lastChild.value = contrast;
@@ -87,7 +88,7 @@ export function show(main, argument) {
   }
 
   function thumbnails() {
-    strip.replaceChildren(...state.photos.map((p, i) => make("button", {
+    refill(strip, ...state.photos.map((p, i) => make("button", {
       "aria-label": `Photo ${i + 1}`, "aria-pressed": String(p.id === photo?.id), onclick: () => open(p),
     }, make("img", { src: `/api/photos/${p.id}/small?v=${p.version}`, alt: "" }))));
   }
@@ -121,6 +122,23 @@ export function show(main, argument) {
       context.stroke(path);
     }
     for (const shape of stroke ? [...shapes, stroke] : shapes) if (!bare) drawShape(context, shape, scale, ph);
+    if (pen) drawCross(context, scale);
+  }
+
+  function drawCross(context, scale) {
+    const [u, v] = pen, reach = CROSS_PX / scale;
+    for (const [colour, width] of [["#000", 5], [tools[tool].colour, 2]]) {
+      context.strokeStyle = colour;
+      context.lineWidth = width / scale;
+      context.beginPath();
+      for (const [x, y] of [[reach, 0], [0, reach]]) {
+        for (const side of [-1, 1]) {
+          context.moveTo(u + (side * x) / 4, v + (side * y) / 4);
+          context.lineTo(u + side * x, v + side * y);
+        }
+      }
+      context.stroke();
+    }
   }
 
   function drawShape(context, shape, scale, height) {
@@ -153,9 +171,59 @@ export function show(main, argument) {
   }
 
   function at(event) {
-    const { scale, x, y, pw, ph } = placed();
-    const limit = (value, most) => Math.round(10 * Math.max(0, Math.min(most, value))) / 10;
-    return [limit((event.offsetX - x) / scale, pw), limit((event.offsetY - y) / scale, ph)];
+    const { scale, x, y } = placed();
+    return inside([(event.offsetX - x) / scale, (event.offsetY - y) / scale]);
+  }
+
+  function inside(point) {
+    const { pw, ph } = placed();
+    return point.map((value, k) => Math.round(10 * Math.max(0, Math.min(k ? ph : pw, value))) / 10);
+  }
+
+  function begin(point) {
+    if (tool === "erase") { erase(point); return; }
+    const { label, type } = tools[tool];
+    stroke = { label, shape_type: type, points: type === "rectangle" ? [point, point] : [point], group_id: null, flags: {} };
+    if (tools[tool].brush) stroke.radius = Math.round(10 * brush * facts.height) / 10;
+  }
+
+  function lead(point) {
+    if (stroke.shape_type === "rectangle") stroke.points[1] = point;
+    else stroke.points.push(point);
+  }
+
+  function end(kept) {
+    if (!stroke) return;
+    const done = kept && finished(stroke);
+    stroke = null;
+    if (done) { shapes = [...shapes, done]; undone = []; save(); }
+    draw();
+  }
+
+  // The cross for the keyboard: Enter shows it, then lowers and lifts the pen there.
+  function press() {
+    if (!facts) return;
+    if (!pen) {
+      const { scale, x, y } = placed();
+      pen = inside([(canvas.clientWidth / 2 - x) / scale, (canvas.clientHeight / 2 - y) / scale]);
+      status.textContent = "Arrow keys move the cross, Shift faster; Enter lowers the pen, Escape leaves.";
+    } else if (stroke) end(true);
+    else {
+      begin([...pen]);
+      if (stroke) status.textContent = "Pen down: arrow keys draw, Enter lifts it.";
+    }
+    draw();
+  }
+
+  function movePen([dx, dy], fast) {
+    const step = (fast ? FAST_PX : PEN_PX) / placed().scale;
+    pen = inside([pen[0] + dx * step, pen[1] + dy * step]);
+    if (stroke) lead([...pen]);
+    const { scale, x, y } = placed();
+    const seen = [pen[0] * scale + x, pen[1] * scale + y];
+    const size = [canvas.clientWidth, canvas.clientHeight];
+    shift = shift.map((value, k) => value + Math.max(0, CROSS_PX - seen[k]) - Math.max(0, seen[k] - size[k] + CROSS_PX));
+    draw();
   }
 
   canvas.addEventListener("pointerdown", (event) => {
@@ -164,11 +232,8 @@ export function show(main, argument) {
     pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
     if (pointers.size === 2) { stroke = null; pinch = null; draw(); return; }
     if (event.button === 1 || moving || !facts) return;
-    if (tool === "erase") { erase(at(event)); return; }
-    const { label, type } = tools[tool];
-    const points = type === "rectangle" ? [at(event), at(event)] : [at(event)];
-    stroke = { label, shape_type: type, points, group_id: null, flags: {} };
-    if (tools[tool].brush) stroke.radius = Math.round(10 * brush * facts.height) / 10;
+    pen = null;
+    begin(at(event));
   });
   canvas.addEventListener("pointermove", (event) => {
     const before = pointers.get(event.pointerId);
@@ -183,10 +248,8 @@ export function show(main, argument) {
     } else if (!stroke) {
       if (tool !== "erase" || moving) shift = shift.map((value, k) => value + now[k] - before[k]);
       pointers.set(event.pointerId, now);
-    } else if (stroke.shape_type === "rectangle") {
-      stroke.points[1] = at(event);
-    } else if (Math.hypot(now[0] - before[0], now[1] - before[1]) >= LEAST_STEP_PX) {
-      stroke.points.push(at(event));
+    } else if (stroke.shape_type === "rectangle" || Math.hypot(now[0] - before[0], now[1] - before[1]) >= LEAST_STEP_PX) {
+      lead(at(event));
       pointers.set(event.pointerId, now);
     }
     draw();
@@ -195,11 +258,7 @@ export function show(main, argument) {
     canvas.addEventListener(kind, (event) => {
       pointers.delete(event.pointerId);
       pinch = null;
-      if (!stroke) return;
-      const done = finished(stroke);
-      stroke = null;
-      if (done && kind === "pointerup") { shapes = [...shapes, done]; undone = []; save(); }
-      draw();
+      end(kind === "pointerup");
     });
   }
 
@@ -265,6 +324,12 @@ export function show(main, argument) {
     draw();
   }, { passive: false });
 
+  // What zooming by keys is about: the cross, or the middle of the page's picture.
+  function middle() {
+    const { scale, x, y } = placed();
+    return pen ? [pen[0] * scale + x, pen[1] * scale + y] : [canvas.clientWidth / 2, canvas.clientHeight / 2];
+  }
+
   let moving = false;
   function key(event) {
     if (event.target instanceof HTMLInputElement && !event.ctrlKey && !event.metaKey) return;
@@ -279,7 +344,10 @@ export function show(main, argument) {
     }
     if (event.altKey) return;
     if (letter === "delete" || letter === "backspace") { event.preventDefault(); step(-1); }
-    if (letter === "escape" && stroke) { stroke = null; draw(); }
+    if (letter === "escape" && (stroke || pen)) { if (!stroke) pen = null; stroke = null; tell(); draw(); }
+    if (event.target === canvas && letter === "enter") { event.preventDefault(); press(); return; }
+    const way = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, -1], arrowdown: [0, 1] }[letter];
+    if (pen && way && event.target === canvas) { event.preventDefault(); movePen(way, event.shiftKey); return; }
     if (letter === "0") { zoom = 1; shift = [0, 0]; draw(); }
     const wider = { "[": 0.8, "]": 1.25 }[letter];
     if (wider) { brush = Math.max(BRUSH.least, Math.min(BRUSH.most, brush * wider)); size.lastChild.value = brush; }
@@ -288,8 +356,8 @@ export function show(main, argument) {
     const index = state.photos.findIndex((p) => p.id === photo?.id);
     const next = { arrowright: index + 1, arrowleft: index - 1, d: index + 1, a: index - 1 }[letter];
     if (next !== undefined && state.photos[next]) open(state.photos[next]);
-    if (letter === "+" || letter === "=") scaleAbout(1.25, [canvas.clientWidth / 2, canvas.clientHeight / 2]), draw();
-    if (letter === "-") scaleAbout(0.8, [canvas.clientWidth / 2, canvas.clientHeight / 2]), draw();
+    if (letter === "+" || letter === "=") scaleAbout(1.25, middle()), draw();
+    if (letter === "-") scaleAbout(0.8, middle()), draw();
   }
   addEventListener("keydown", key);
   addEventListener("keyup", key);

@@ -80,6 +80,21 @@ export function make(name, values = {}, ...children) {
   return element;
 }
 
+// Replaces the children of an element; the keyboard stays where it was, at the control with the
+// same data-key, or else at the one in the same place.
+export function refill(parent, ...children) {
+  const controls = () => [...parent.querySelectorAll("a, button, input, select, canvas")];
+  const place = controls().indexOf(document.activeElement);
+  const key = document.activeElement?.dataset?.key;
+  parent.replaceChildren(...children.filter((child) => child != null));
+  if (place < 0) return;
+  const now = controls();
+  const same = now.findIndex((control) => key && control.dataset.key === key);
+  const from = same < 0 ? Math.min(place, now.length - 1) : same;
+  const free = [...now.slice(from), ...now.slice(0, from).reverse()].find((control) => !control.disabled);
+  free?.focus({ preventScroll: true });
+}
+
 // Closed curves [[x, y, x, y, ...], ...] as the data of an SVG path.
 export function pathOf(curves, closed = true) {
   return curves.map((curve) => {

@@ -1,5 +1,5 @@
 // The hair that turns and moves, and its files.
-import { make, onChange, say, send, state } from "./api.js";
+import { make, onChange, refill, say, send, state } from "./api.js";
 import { showHair } from "./hair_controls.js";
 
 const engines = {
@@ -35,7 +35,7 @@ export function show(main) {
       const packet = await response.arrayBuffer();
       close();
       const stage = make("section", { class: "stage", id: "hair", "aria-label": "The hair in motion" });
-      main.replaceChildren(make("div", { class: "split" }, stage, side()));
+      refill(main, make("div", { class: "split" }, stage, side()));
       close = showHair(stage, packet);
     } catch (error) {
       say(error.message);

@@ -3,6 +3,7 @@ import { HairMotion } from "./hair_motion.js";
 import { HairView, readPacket } from "./hair_view.js";
 
 const GRAB_PX = 30; // a strand is taken within this distance
+const PULL_M = 0.012; // metres that a key pulls a strand
 const SHAKE_S = 2.4, SHAKE_TURNS = 3, SHAKE_RAD = 0.7;
 
 export function showHair(stage, buffer) {
@@ -13,7 +14,7 @@ export function showHair(stage, buffer) {
     return made;
   };
   const packet = readPacket(buffer);
-  const canvas = element("canvas", { tabindex: "0", role: "img", "aria-label": "Hair on a head. Arrow keys turn it, plus and minus zoom, W is wind, S shakes the head." });
+  const canvas = element("canvas", { tabindex: "0", role: "img", "aria-label": "Hair on a head. Arrow keys turn it, plus and minus zoom, W is wind, S shakes the head. P takes the strand in the middle: arrow keys pull it, P lets it go." });
   const comb = element("button", { type: "button", "aria-pressed": "false" }, "Pull strands");
   const shake = element("button", { type: "button" }, "Shake head");
   const label = element("label", {}, "Wind");
@@ -34,10 +35,10 @@ export function showHair(stage, buffer) {
   });
   shake.addEventListener("click", () => { shaken = 0; });
 
-  function grab(x, y) {
+  function grab(x, y, within = GRAB_PX) {
     const { matrix, right, up } = view.camera();
     const w = canvas.clientWidth, h = canvas.clientHeight;
-    let best = GRAB_PX, depth = Infinity, hit = null;
+    let best = within, depth = Infinity, hit = null;
     for (let g = 0; g < motion.count; g += 1) {
       for (let p = 3; p < motion.points; p += 1) {
         const i = (g * motion.points + p) * 3;
@@ -85,8 +86,20 @@ export function showHair(stage, buffer) {
     });
   }
   canvas.addEventListener("wheel", (event) => { event.preventDefault(); zoom(Math.exp(0.001 * event.deltaY)); }, { passive: false });
+  function take() {
+    grabbed = grabbed ? null : grab(canvas.clientWidth / 2, 0.6 * canvas.clientHeight, canvas.clientHeight);
+    motion.held = grabbed?.hit ?? null;
+  }
+
+  function pull(right, up) {
+    for (let k = 0; k < 3; k += 1) grabbed.hit.at[k] += PULL_M * (right * grabbed.right[k] + up * grabbed.up[k]);
+  }
+
   canvas.addEventListener("keydown", (event) => {
+    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    if (grabbed && !pointers.size && way) { event.preventDefault(); pull(...way); return; }
     const act = {
+      p: take, Escape: () => { grabbed = motion.held = null; },
       ArrowLeft: () => turn(-0.1, 0), ArrowRight: () => turn(0.1, 0), ArrowUp: () => turn(0, 0.1), ArrowDown: () => turn(0, -0.1),
       "+": () => zoom(0.9), "-": () => zoom(1.1), w: () => { wind.value = Number(wind.value) > 0 ? 0 : 1.5; }, s: () => { shaken = 0; },
     }[event.key];

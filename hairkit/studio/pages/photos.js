@@ -1,5 +1,5 @@
 // Photos by picker or drop, their masks, what is wrong with them.
-import { get, make, onChange, outlineOf, pathOf, refresh, say, send, state } from "./api.js";
+import { get, make, onChange, outlineOf, pathOf, refill, refresh, say, send, state } from "./api.js";
 
 const videos = /^video\//;
 let advice = {};
@@ -57,10 +57,10 @@ export function show(main) {
     drop.classList.toggle("small", state.photos.length > 0);
     drop.querySelector("h2").textContent =
       state.photos.length ? "Add more photos" : "Photos from all around a head";
-    list.replaceChildren(...state.photos.map((photo) => card(photo)));
+    refill(list, ...state.photos.map((photo) => card(photo)));
     const count = state.photos.length;
     const enough = count >= 3;
-    next.replaceChildren(
+    refill(next,
       make("p", { class: "quiet" }, count === 0 ? "" : enough
         ? `${count} photos. The hair is made by itself; correct a mask only where it is wrong.`
         : `${count} of at least 3 photos`),
@@ -95,7 +95,7 @@ function viewOf(name) {
 function card(photo) {
   const number = state.photos.indexOf(photo) + 1;
   const name = `Photo ${number}${photo.view ? `, ${photo.view}` : ""}`;
-  const frame = make("a", { class: "frame", href: `#annotate/${photo.id}`, "aria-label": `${name}: correct the mask` },
+  const frame = make("a", { class: "frame", "data-key": `mask ${photo.id}`, href: `#annotate/${photo.id}`, "aria-label": `${name}: correct the mask` },
     make("img", { src: `/api/photos/${photo.id}/small?v=${photo.version}`, alt: "", loading: "lazy" }));
   const problem = photo.problem ? "no hair found" : (photo.feedback ?? []).map((code) => advice[code]?.[0])[0];
   const note = problem ?? (photo.share ? (photo.drawn ? "corrected" : "hair found") : "looking for hair…");
@@ -105,7 +105,7 @@ function card(photo) {
   return make("li", { class: "card" }, frame, make("div", { class: "note" },
     make("span", { class: problem ? "bad" : photo.share ? "good" : "quiet" }, note),
     make("button", {
-      class: "plain remove", "aria-label": `Remove ${name}`,
+      class: "plain remove", "data-key": `remove ${photo.id}`, "aria-label": `Remove ${name}`,
       onclick: () => send("DELETE", `/api/photos/${photo.id}`).then(refresh).catch((error) => say(error.message)),
     }, "✕")));
 }

@@ -1,5 +1,5 @@
 // The fitted head over every photo, landmarks to drag, and the order of the photos.
-import { get, make, onChange, outlineOf, pathOf, say, send, state } from "./api.js";
+import { get, make, onChange, outlineOf, pathOf, refill, say, send, state } from "./api.js";
 
 const PARTS = [[0, 17], [17, 22], [22, 27], [27, 31], [31, 36], [36, 42], [42, 48], [48, 60], [60, 68]];
 const CLOSED = new Set([36, 42, 48, 60]);
@@ -114,15 +114,15 @@ export function show(main, argument) {
   }
 
   function order() {
-    list.replaceChildren(...state.photos.map((photo, index) => {
+    refill(list, ...state.photos.map((photo, index) => {
       const view = viewOf(photo);
       const item = make("li", { class: "card", draggable: "true" },
-        make("button", { class: "frame", "aria-label": `Photo ${index + 1}${view ? `, ${view.name}` : ""}`, "aria-pressed": String(photo.id === shown?.id), onclick: () => open(photo) },
+        make("button", { class: "frame", "data-key": `open ${photo.id}`, "aria-label": `Photo ${index + 1}${view ? `, ${view.name}` : ""}`, "aria-pressed": String(photo.id === shown?.id), onclick: () => open(photo) },
           make("img", { src: `/api/photos/${photo.id}/small?v=${photo.version}`, alt: "", draggable: "false" })),
         make("span", { class: "name" }, view ? `${view.name} ${Math.round(view.azimuth)}°` : `${index + 1}`),
         make("div", { class: "note" },
-          make("button", { class: "plain step", "aria-label": `Photo ${index + 1} earlier in the turn`, disabled: !index, onclick: () => reorder(photo.id, index - 1) }, "‹"),
-          make("button", { class: "plain step", "aria-label": `Photo ${index + 1} later in the turn`, disabled: index + 1 === state.photos.length, onclick: () => reorder(photo.id, index + 1) }, "›")));
+          make("button", { class: "plain step", "data-key": `earlier ${photo.id}`, "aria-label": `Photo ${index + 1} earlier in the turn`, disabled: !index, onclick: () => reorder(photo.id, index - 1) }, "‹"),
+          make("button", { class: "plain step", "data-key": `later ${photo.id}`, "aria-label": `Photo ${index + 1} later in the turn`, disabled: index + 1 === state.photos.length, onclick: () => reorder(photo.id, index + 1) }, "›")));
       item.addEventListener("dragstart", (event) => { event.dataTransfer.setData("text/plain", String(photo.id)); item.classList.add("dragged"); });
       item.addEventListener("dragend", () => item.classList.remove("dragged"));
       item.addEventListener("dragover", (event) => event.preventDefault());

@@ -1,5 +1,5 @@
 // Strands as they are followed in a photo, live with their parameters; colour, width and curl of the hair.
-import { get, make, onChange, say, send, state } from "./api.js";
+import { get, make, onChange, refill, say, send, state } from "./api.js";
 
 const SETTLED_MS = 120; // after the last move of a slider, before the picture is asked for
 const LOOKS = {
@@ -34,7 +34,7 @@ export function show(main, argument) {
   }
 
   function fill() {
-    sliders.replaceChildren(...choices.options.map((option) => {
+    refill(sliders, ...choices.options.map((option) => {
       const shown = make("output", {}, String(values[option.name]));
       // A wide range is set on a logarithmic scale.
       const log = option.low > 0 && option.high / option.low > 20;
@@ -55,9 +55,9 @@ export function show(main, argument) {
       });
       return make("label", { class: "valued", title: option.name }, option.doc.replace(/\.$/, ""), shown, input);
     }));
-    looks.replaceChildren(...Object.entries(LOOKS).map(([key, { name, ...kind }]) => {
+    refill(looks, ...Object.entries(LOOKS).map(([key, { name, ...kind }]) => {
       const own = hair[key] != null;
-      const input = make("input", { ...kind, value: hair[key] ?? choices.found?.[key] ?? "", onchange: () => { hair[key] = kind.type === "color" ? input.value : input.value === "" ? null : Number(input.value); keep(); fill(); } });
+      const input = make("input", { ...kind, "data-key": key, value: hair[key] ?? choices.found?.[key] ?? "", onchange: () => { hair[key] = kind.type === "color" ? input.value : input.value === "" ? null : Number(input.value); keep(); fill(); } });
       const measured = make("button", { class: "plain", disabled: !own, "aria-label": `${name}: as measured`, onclick: () => { hair[key] = null; keep(); fill(); } }, own ? "Measured" : "measured");
       return make("label", { class: "chosen" }, name, make("span", { class: "row" }, input, measured));
     }));
@@ -107,7 +107,7 @@ export function show(main, argument) {
   }
 
   function thumbnails() {
-    strip.replaceChildren(...state.photos.map((p, i) => make("button", {
+    refill(strip, ...state.photos.map((p, i) => make("button", {
       "aria-label": `Photo ${i + 1}`, "aria-pressed": String(p.id === photo?.id), onclick: () => open(p),
     }, make("img", { src: `/api/photos/${p.id}/small?v=${p.version}`, alt: "" }))));
   }
