@@ -72,14 +72,15 @@ class Studio:
         raise SystemExit(f"not ready after {LONGEST_S:g} s")
 
     def busy_s(self) -> float:
-        """Return the processor's seconds of the server and of the processes that it started."""
+        """Return the processor's seconds of the server and of the processes that it started, with
+        those that have ended."""
         tasks = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
         if not tasks.is_file():
             return float("nan")
         ticks = 0
         for pid in [str(self.process.pid), *tasks.read_text().split()]:
             fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-            ticks += int(fields[11]) + int(fields[12])
+            ticks += sum(int(field) for field in fields[11:15])
         return ticks / os.sysconf("SC_CLK_TCK")
 
 
