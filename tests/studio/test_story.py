@@ -135,11 +135,11 @@ def test_the_whole_story(
     check_a_stroke_moves_the_outline(page, project)
     check_landmarks_are_moved_by_keys(page, project)
     check_the_head_is_moved_by_keys(page, project)
-    check_photos_change_places_by_keys(page, project)
     check_the_hair_moves(page, project)
     check_files_are_downloaded(page, project, browser, tmp_path)
     check_a_shot_of_the_camera_becomes_a_photo(page, project)
     check_the_compass_is_a_hint(page)
+    check_photos_change_places_by_keys(page, project)
     for size in SIZES:
         for name in PAGES:
             check_pages_are_accessible(page, project, name, size)
@@ -267,6 +267,7 @@ def check_the_head_is_moved_by_keys(page: Any, project: Any) -> None:
 
 def check_photos_change_places_by_keys(page: Any, project: Any) -> None:
     """A photo goes on in the turn and back again, and the keyboard goes with it."""
+    step(page, "pose")
     tab_to(page, "Photo 2 later")
     page.keyboard.press("Enter")
     moved = "(name) => document.activeElement.ariaLabel?.startsWith(name)"
