@@ -41,9 +41,11 @@ MOTIONS = 7
 ZOOM = 6
 """The motion that scales the focal length."""
 LINE = 7
-"""Numbers of a ray's line in a view: at depth z it is at `((z a + b) / w, (z c + d) / w)` with
-`w = z e + f`, in pixels of the field (Hartley and Zisserman, "Multiple view geometry", 2004, 9.1);
-the last, over w^2, bounds by how many pixels the signed distance changes per metre of depth."""
+RIGHT, RIGHT_START, DOWN, DOWN_START, DEPTH, DEPTH_START, FASTEST = range(LINE)
+"""Numbers of a ray's line in a view: at depth z it is, in pixels of the field, at
+`(z right + right_start, z down + down_start) / w` with `w = z depth + depth_start` (Hartley and
+Zisserman, "Multiple view geometry", 2004, 9.1); the last, over w^2, bounds by how many pixels the
+signed distance changes per metre of depth."""
 
 
 def coherence(
@@ -123,32 +125,35 @@ def _search_rays(
     """Write value (N,) and slope (N, V, MOTIONS) of the contour points `first` to `last`."""
     count = len(views.focal)
     lines, distance = np.empty((count, LINE)), np.empty(count)
-    ray = np.ones(3)
+    work = np.empty((3, 3))
     for n in range(first, last):
         own = owners[n]
-        for axis in range(2):
-            ray[axis] = (points[n, axis] - views.centre[own, axis]) / views.focal[own]
-        _draw_ray(views, own, ray, lines)
+        right = (points[n, 0] - views.centre[own, 0]) / views.focal[own]
+        down = (points[n, 1] - views.centre[own, 1]) / views.focal[own]
+        _draw_ray(views, own, right, down, lines)
         value[n], z = _best_on_ray(views, own, lines, distance)
-        _add_slopes(views, own, lines, ray, z, distance, slope[n])
+        work[0, 0], work[0, 1], work[0, 2] = right * z, down * z, z
+        _add_slopes(views, own, lines, z, distance, work, slope[n])
 
 
 @compiled
-def _draw_ray(views: _Views, own: int, ray: Float64Array, lines: Float64Array) -> None:
-    """Write the lines (V, LINE) of a ray (3,), in camera axes of `own`, in all views."""
+def _draw_ray(views: _Views, own: int, right: float, down: float, lines: Float64Array) -> None:
+    """Write the lines (V, LINE) in all views of a ray that is at (right, down, 1) for `own`."""
+    scale = views.scale
     for view in range(len(lines)):
-        turn, line, scale = views.turns[own, view], lines[view], views.scale
-        line[4] = turn[2, 0] * ray[0] + turn[2, 1] * ray[1] + turn[2, 2]
-        line[5] = views.shifts[own, view, 2]
+        turn, focal = views.turns[own, view], views.focal[view] * scale
+        depth = turn[2, 0] * right + turn[2, 1] * down + turn[2, 2]
+        depth_start = views.shifts[own, view, 2]
         for axis in range(2):
-            along = turn[axis, 0] * ray[0] + turn[axis, 1] * ray[1] + turn[axis, 2]
-            focal = views.focal[view] * scale
+            along = turn[axis, 0] * right + turn[axis, 1] * down + turn[axis, 2]
             middle = views.centre[view, axis] * scale - 0.5
-            line[2 * axis] = focal * along + middle * line[4]
-            line[2 * axis + 1] = focal * views.shifts[own, view, axis] + middle * line[5]
-        right = line[0] * line[5] - line[1] * line[4]
-        down = line[2] * line[5] - line[3] * line[4]
-        line[6] = STEEPEST * np.hypot(right, down) / scale
+            start = focal * views.shifts[own, view, axis] + middle * depth_start
+            lines[view, 2 * axis] = focal * along + middle * depth
+            lines[view, 2 * axis + 1] = start
+        lines[view, DEPTH], lines[view, DEPTH_START] = depth, depth_start
+        across = lines[view, RIGHT] * depth_start - lines[view, RIGHT_START] * depth
+        below = lines[view, DOWN] * depth_start - lines[view, DOWN_START] * depth
+        lines[view, FASTEST] = STEEPEST * np.hypot(across, below) / scale
 
 
 @compiled
@@ -170,7 +175,7 @@ def _best_on_ray(
                 best, z = here, at
                 at += step
             else:
-                at += max(step, _hopeless(lines[nearest], at, best - here))
+                at += max(step, _hopeless(lines, nearest, at, best - here))
     best = _soft_distance(views, own, lines, z, distance)
     for _ in range(FINE):
         step *= 0.5
@@ -183,12 +188,14 @@ def _best_on_ray(
 
 
 @compiled
-def _hopeless(line: Float64Array, z: float, short: float) -> float:
+def _hopeless(lines: Float64Array, view: int, z: float, short: float) -> float:
     """Return how far behind depth z a view's distance stays too small by `short` pixels, metres."""
-    depth = z * line[4] + line[5]
-    rest = line[6] - short * depth * line[4]
-    if depth < NEAREST or rest <= 0:
-        return FOREVER if depth >= NEAREST else 0.0
+    depth = z * lines[view, DEPTH] + lines[view, DEPTH_START]
+    if depth < NEAREST:
+        return 0.0
+    rest = lines[view, FASTEST] - short * depth * lines[view, DEPTH]
+    if rest <= 0:
+        return FOREVER
     result: float = short * depth * depth / rest
     return result
 
@@ -248,11 +255,11 @@ def _sample(views: _Views, lines: Float64Array, view: int, z: float) -> tuple[fl
     Bilinear; CAP without slope where the distance is larger. Outside the picture, of which nothing
     is known, it grows from that at the edge by the distance from the edge.
     """
-    depth = z * lines[view, 4] + lines[view, 5]
+    depth = z * lines[view, DEPTH] + lines[view, DEPTH_START]
     if depth < NEAREST:
         return CAP, 0.0, 0.0
-    x = (z * lines[view, 0] + lines[view, 1]) / depth
-    y = (z * lines[view, 2] + lines[view, 3]) / depth
+    x = (z * lines[view, RIGHT] + lines[view, RIGHT_START]) / depth
+    y = (z * lines[view, DOWN] + lines[view, DOWN_START]) / depth
     field, scale = views.fields, views.scale
     right = min(max(x, 0.0), field.shape[2] - BORDER)
     down = min(max(y, 0.0), field.shape[1] - BORDER)
@@ -276,25 +283,28 @@ def _add_slopes(
     views: _Views,
     own: int,
     lines: Float64Array,
-    ray: Float64Array,
     z: float,
     distance: Float64Array,
+    work: Float64Array,
     slope: Float64Array,
 ) -> None:
     """Add to slope (V, MOTIONS) the derivative of the best value, at depth z of a ray.
 
     Every silhouette has the share that the soft minimum gives its distance (V,); at the best depth
-    the derivative by depth is 0, so that depth may be held.
+    the derivative by depth is 0, so that depth may be held. `work` (3, 3) begins with the point.
     """
-    least = distance.min()
+    least, total = CAP, 0.0
+    for view in range(len(distance)):
+        least = min(least, distance[view])
     if least >= CAP:
         return
-    share = np.exp((least - distance) / views.softness)
-    share[own] = 0.0
-    share /= share.sum()
-    for view in range(len(share)):
-        if share[view] > LEAST_SHARE:
-            _add_slope(views, own, lines, ray, z, view, share[view], slope)
+    for view in range(len(distance)):
+        share = 0.0 if view == own else np.exp((least - distance[view]) / views.softness)
+        distance[view] = share
+        total += share
+    for view in range(len(distance)):
+        if distance[view] > LEAST_SHARE * total:
+            _add_slope(views, own, lines, z, view, distance[view] / total, work, slope)
 
 
 @compiled
@@ -302,27 +312,28 @@ def _add_slope(
     views: _Views,
     own: int,
     lines: Float64Array,
-    ray: Float64Array,
     z: float,
     view: int,
     weight: float,
+    work: Float64Array,
     slope: Float64Array,
 ) -> None:
     """Add a silhouette's share: its own camera moves the point, the ray's camera the ray."""
     _, by_u, by_v = _sample(views, lines, view, z)
-    seen, turn, focal = z * ray, views.turns[own, view], views.focal[view]
-    local = views.shifts[own, view].copy()
+    turn, shift, focal = views.turns[own, view], views.shifts[own, view], views.focal[view]
+    x, y, depth = work[0]
     for i in range(3):
-        local[i] += turn[i, 0] * seen[0] + turn[i, 1] * seen[1] + turn[i, 2] * seen[2]
-    zoom = focal * (by_u * local[0] + by_v * local[1]) / local[2]
-    force = np.array([by_u * focal, by_v * focal, -zoom]) / local[2]
-    back = np.zeros(3)
+        work[1, i] = turn[i, 0] * x + turn[i, 1] * y + turn[i, 2] * depth + shift[i]
+    there = work[1, 2]
+    zoom = focal * (by_u * work[1, 0] + by_v * work[1, 1]) / there
+    work[2, 0], work[2, 1], work[2, 2] = by_u * focal / there, by_v * focal / there, -zoom / there
+    _add_moment(work[1], work[2], weight, slope[view])
+    right, down, behind = work[2]
     for i in range(3):
-        back[i] = turn[0, i] * force[0] + turn[1, i] * force[1] + turn[2, i] * force[2]
-    _add_moment(local, force, weight, slope[view])
-    _add_moment(seen, back, -weight, slope[own])
+        work[2, i] = turn[0, i] * right + turn[1, i] * down + turn[2, i] * behind
+    _add_moment(work[0], work[2], -weight, slope[own])
     slope[view, ZOOM] += weight * zoom
-    slope[own, ZOOM] -= weight * (seen[0] * back[0] + seen[1] * back[1])
+    slope[own, ZOOM] -= weight * (x * work[2, 0] + y * work[2, 1])
 
 
 @compiled
@@ -330,8 +341,7 @@ def _add_moment(
     place: Float64Array, force: Float64Array, weight: float, motion: Float64Array
 ) -> None:
     """Add weight times place x force to the turns of a motion (MOTIONS,), and force to shifts."""
-    turn, shift = motion[:3], motion[3:ZOOM]
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
-        turn[i] += weight * (place[j] * force[k] - place[k] * force[j])
-        shift[i] += weight * force[i]
+        motion[i] += weight * (place[j] * force[k] - place[k] * force[j])
+        motion[i + 3] += weight * force[i]

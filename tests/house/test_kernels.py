@@ -92,7 +92,8 @@ def test_loops_are_shared_in_one_way(project: Path) -> None:
 def test_numba_is_used_by_its_public_names(project: Path) -> None:
     """No module but that of the vector lanes imports the insides of Numba or llvmlite.
 
-    Numba documents `numba.core.event`, by which compilations are announced.
+    Numba documents `numba.core.event`, by which compilations are announced. Its cache has no public
+    name, and fails on an index of an older version (`tests/test_parallel.py`).
     """
     inside = []
     for folder in ("hairkit", "plugins"):
@@ -102,7 +103,11 @@ def test_numba_is_used_by_its_public_names(project: Path) -> None:
                 modules += [n.name for n in node.names] if isinstance(node, ast.Import) else []
                 if any(m.startswith(("numba.", "llvmlite")) for m in modules):
                     inside.append(file.relative_to(project).as_posix())
-    assert {*inside} <= {"plugins/pbd/simd.py", "hairkit/compilation.py"}
+    assert {*inside} <= {
+        "plugins/pbd/simd.py",
+        "hairkit/compilation.py",
+        "hairkit/parallel.py",
+    }
 
 
 def test_faults_of_kernels_are_found() -> None:
