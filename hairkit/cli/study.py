@@ -53,20 +53,20 @@ def run(args: argparse.Namespace) -> int:
 
 def _make(args: argparse.Namespace) -> int:
     from hairkit.manager import Manager
-    from hairkit.study import make_stock, make_study, read_subject, write_study
+    from hairkit.study import distinct_names, make_stock, make_study, read_subject, write_study
     from hairkit.study.questionnaire import CHOICES, every_question
     from hairkit.study.retrieval import answer
 
     manager = Manager.loaded()
-    subjects = []
-    for folder in args.folders:
-        subjects.append(read_subject(folder, manager))
+    subjects, names = [], distinct_names(args.folders)
+    for folder, name in zip(args.folders, names, strict=True):
+        subjects.append(read_subject(folder, manager, name=name))
         print(f"{folder}: {len(subjects[-1].shots)} photos", file=sys.stderr)
     study = make_study(subjects, make_stock(manager, seed=args.seed), args.questions, args.seed)
     if len(subjects) < CHOICES:
         print(f"no questions with photos to choose from: they take {CHOICES} OUT", file=sys.stderr)
     chosen = answer(study, study.questions)
-    page = write_study(args.output, study, chosen, _identity(args))
+    page = write_study(args.output, study, chosen, _identity(args, names))
     for kind, what in (("hair", "hair of a photo"), ("photo", "photo of a hair")):
         asked = [question for question in every_question(study) if question.kind == kind]
         if asked:
@@ -89,7 +89,7 @@ def _count(args: argparse.Namespace) -> int:
     return 0
 
 
-def _identity(args: argparse.Namespace) -> str:
+def _identity(args: argparse.Namespace, names: tuple[str, ...]) -> str:
     """Return a name for the study, the same when it is made again."""
-    parts = [str(args.questions), str(args.seed), *(folder.name for folder in args.folders)]
+    parts = [str(args.questions), str(args.seed), *names]
     return hashlib.blake2b("\0".join(parts).encode(), digest_size=_IDENTITY_BYTES).hexdigest()

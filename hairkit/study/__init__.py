@@ -14,12 +14,13 @@ from __future__ import annotations
 
 from hairkit.study.pages import write_results, write_study
 from hairkit.study.questionnaire import Question, Study, make_study
-from hairkit.study.subject import Subject, make_stock, read_subject
+from hairkit.study.subject import Subject, distinct_names, make_stock, read_subject
 
 __all__ = [
     "Question",
     "Study",
     "Subject",
+    "distinct_names",
     "make_stock",
     "make_study",
     "read_subject",

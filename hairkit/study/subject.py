@@ -97,10 +97,15 @@ class Subject:
 
 
 def read_subject(
-    folder: str | os.PathLike[str], manager: Manager, *, settling: float = SETTLING_S
+    folder: str | os.PathLike[str],
+    manager: Manager,
+    *,
+    name: str | None = None,
+    settling: float = SETTLING_S,
 ) -> Subject:
     """Read what `hairkit reconstruct` wrote, and the photos that its record names.
 
+    The subject has a name, or that of the folder.
     Raises `InputError` where the photos, the masks or the orientation maps are not there any more.
     """
     base = Path(folder)
@@ -113,7 +118,8 @@ def read_subject(
     shots = tuple(
         _shot(prediction, view, photos[name]) for view, name in enumerate(prediction.names)
     )
-    return replace(settle(base.resolve().name, prediction.groom, manager, settling), shots=shots)
+    name = name or base.resolve().name
+    return replace(settle(name, prediction.groom, manager, settling), shots=shots)
 
 
 def make_stock(
@@ -127,12 +133,23 @@ def make_stock(
     )
 
 
+def distinct_names(folders: Sequence[Path]) -> tuple[str, ...]:
+    """Return the last parts of the folders' paths, as many as tell the folders apart."""
+    paths = [folder.resolve().parts for folder in folders]
+    names: tuple[str, ...] = ()
+    for depth in range(1, max(len(parts) for parts in paths) + 1):
+        names = tuple("/".join(parts[-depth:]) for parts in paths)
+        if len({*names}) == len(names):
+            break
+    return names
+
+
 def check_names(subjects: Sequence[Subject]) -> None:
     """Raise `InputError` where two subjects have one name."""
     names = [subject.name for subject in subjects]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"two folders are called {name!r}; a study tells them by their names")
+            raise InputError(f"two subjects are called {name!r}; a study tells them by their names")
 
 
 def settle(name: str, groom: Groom, manager: Manager, seconds: float) -> Subject:

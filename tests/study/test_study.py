@@ -18,7 +18,7 @@ from hairkit.study import Study, Subject, make_study, write_results, write_study
 from hairkit.study.frame import HEIGHT, WIDTH, cut_out, frame_camera
 from hairkit.study.questionnaire import CHOICES, every_question
 from hairkit.study.retrieval import answer, look_distance
-from hairkit.study.subject import Shot, settle
+from hairkit.study.subject import Shot, distinct_names, settle
 from hairkit.synth import STYLES, grow
 from hairkit.types.camera import Camera
 
@@ -156,6 +156,14 @@ def test_the_command_refuses_what_it_cannot_ask(
         assert main(words) == 2
         assert len(capsys.readouterr().err.strip().splitlines()) == 1
     assert not (tmp_path / "s").exists()
+
+
+def test_folders_of_one_name_are_told_apart_by_those_above() -> None:
+    """Studio projects all keep their hair in a folder of one name."""
+    folders = [Path("/heads/anna/result"), Path("/heads/ben/result"), Path("/heads/carl")]
+    assert distinct_names(folders) == ("anna/result", "ben/result", "heads/carl")
+    assert distinct_names(folders[:1]) == ("result",)
+    assert distinct_names([folders[0]] * 2) == ("/".join(folders[0].parts),) * 2
 
 
 def test_read_subject_shows_the_photos_of_a_run(captures: Path, tmp_path: Path) -> None:
