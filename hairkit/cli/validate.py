@@ -60,12 +60,25 @@ def _findings(args: argparse.Namespace) -> list[Finding]:
     reader = args.reader or plugin_for(manager, "import_groom", args.file)
     given = split_settings(manager, {"reader": reader}, args.set)["reader"]
     settings = reader_settings(manager, reader, args) | given
-    if args.file.suffix.lower() == ".abc":
-        settings = dict(TARGETS[args.target].reading) | settings
+    as_target = dict(TARGETS[args.target].reading) if args.file.suffix.lower() == ".abc" else {}
     try:
-        groom = load_groom(manager, args.file, settings, reader)
+        groom = load_groom(manager, args.file, as_target | settings, reader)
     except (FormatError, InputError) as error:
+        if as_target and _reads(manager, args.file, settings, reader):
+            wanted = " ".join(f"--set {name}={value}" for name, value in as_target.items())
+            said = (
+                f"{args.target} reads other axes and units; `hairkit convert` writes it: {wanted}"
+            )
+            return [Finding("unit", "failed", said)]
         return [Finding("reads", "failed", " ".join(str(error).split()))]
     read = Finding("reads", "passed", f"{len(groom.strands)} strands")
     rules = check_groom(groom, args.file, args.target)
     return [read, *rules, *manager.findings(groom, args.file, args.target)]
+
+
+def _reads(manager: Manager, file: Path, settings: dict[str, Any], reader: str) -> bool:
+    try:
+        load_groom(manager, file, settings, reader)
+    except (FormatError, InputError):
+        return False
+    return True

@@ -84,10 +84,11 @@ def test_one_line_a_rule(folder: Path, capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_another_unit_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """An .abc in metres is refused for Unreal, which takes centimetres."""
+    """An .abc in metres is refused for Unreal, which takes centimetres, and the way out is told."""
     path = folder / "metres.abc"
     assert main(["export", str(folder / "groom.npz"), "-o", str(path)]) == 0
-    assert answers([str(path), "--for", "unreal"], capsys) == (BROKEN, {"reads": "failed"})
+    assert main(["validate", str(path), "--for", "unreal"]) == BROKEN
+    assert "--set axis=unreal" in capsys.readouterr().out
 
 
 def _with(groom: Groom, **changes: object) -> Groom:
