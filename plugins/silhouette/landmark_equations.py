@@ -20,6 +20,8 @@ from hairkit.types.mask import HAIR, Mask
 
 JAW_NOISE, COVERED_NOISE = 2.0, 3.0
 """Times the noise of given landmarks of the jaw, and of those under hair: detectors guess them."""
+FACES = 4
+"""Views that show the face in a turn of eight, at most."""
 MIDLINE = np.array([27, 28, 29, 30, 33, 51, 57, 8])
 """Nose, lips and chin: they lie on the outline of a view from the side."""
 AFFINE_SPREAD, SMOOTH_SPREAD, SMOOTH_LENGTH = 0.004, 0.004, 0.04
@@ -52,10 +54,13 @@ class Sights:
     def of(cls, capture: Capture, masks: tuple[Mask, ...], noise: Float64Array | float) -> Sights:
         """Return the landmarks of all views; `noise` (V,), or of all, where none is told, pixels.
 
-        Detectors tell the noise of each; a face's own landmarks are in `view.landmarks`.
+        Detectors tell the noise of each; a face's own landmarks are in `view.landmarks`. They err
+        alike on faces seen from near each other, so that more than `FACES` tell no more.
         """
         rows = []
+        shown = sum(view.landmarks is not None for view in capture.views)
         usual = np.broadcast_to(noise, len(masks))
+        crowded = np.sqrt(max(1.0, shown / FACES))
         for index, (view, mask) in enumerate(zip(capture.views, masks, strict=True)):
             if view.landmarks is None:
                 continue
@@ -66,7 +71,7 @@ class Sights:
                 inside = 0 <= x < view.width and 0 <= y < view.height
                 covered = inside and mask.labels[int(y), int(x)] == HAIR
                 trust = COVERED_NOISE if covered else 1.0
-                rows.append((index, point, x, y, own[point] * trust))
+                rows.append((index, point, x, y, own[point] * trust * crowded))
         return cls.of_rows(rows)
 
     @classmethod

@@ -108,7 +108,7 @@ def quiet(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     level = logger.level
     logger.setLevel(logging.CRITICAL)
     head = ball_head(4)
-    monkeypatch.setattr(adopt_strands, "_read", lambda _: head)
+    monkeypatch.setattr(adopt_strands, "_read", lambda *_: head)
     tracemalloc.start()
     yield
     tracemalloc.stop()
