@@ -20,6 +20,15 @@ hypothesis.settings.load_profile("hairkit")
 PROJECT = Path(__file__).parents[1]
 
 
+LONGEST = "test_the_whole_story"
+"""Seven minutes of one core; all others take about forty."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the longest test, so that no core ends with it alone."""
+    items.sort(key=lambda item: item.name != LONGEST)
+
+
 @pytest.fixture(scope="session")
 def captures() -> Path:
     """The folder of captures with truth, which does not ship with the project."""
