@@ -69,7 +69,7 @@ def test_photos_to_choose_from_are_only_those_of_subjects(study: Study) -> None:
     assert {question.kind for question in few.questions} == {"hair"}
     with pytest.raises(InputError, match="needed"):
         make_study(study.subjects[:2], study.stock, 2)
-    with pytest.raises(InputError, match="two folders"):
+    with pytest.raises(InputError, match="two subjects"):
         make_study([*study.subjects, study.subjects[0]], study.stock, 2)
 
 
