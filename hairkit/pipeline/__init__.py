@@ -6,6 +6,7 @@ plugins.
 * `contact_sheet`: one picture of all stages
 * `draft`: a quick groom after a change by hand
 * `find_skin`: the skin of the head, from the photos and after an example
+* `find_views`: faces, persons, and from where each photo was taken
 * `head_alone`: the head with its skin, without hair
 * `health`: figures that tell how good a run is
 * `masks_and_scene`: masks and cameras, each found by the other

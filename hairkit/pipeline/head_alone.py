@@ -18,10 +18,11 @@ from hairkit.io.head_reader import write_head_obj
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.find_skin import find_skin
+from hairkit.pipeline.find_views import find_views
 from hairkit.pipeline.masks_and_scene import fit_scene, label_views
 from hairkit.pipeline.own_head import mark_head
 from hairkit.pipeline.recipe import Recipe, load_recipe
-from hairkit.pipeline.reconstruct import find_views, tell_missing
+from hairkit.pipeline.reconstruct import tell_missing
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.stage_runner import Given, StageRunner
 from hairkit.pipeline.work_folder import WorkFolder

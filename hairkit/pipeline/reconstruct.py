@@ -27,6 +27,7 @@ from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.find_skin import find_skin
+from hairkit.pipeline.find_views import find_views
 from hairkit.pipeline.health import RED, Figure, assess
 from hairkit.pipeline.masks_and_scene import fit_scene, label_views
 from hairkit.pipeline.own_head import mark_head
@@ -38,13 +39,11 @@ from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
 from hairkit.types.capture import Capture
 from hairkit.types.chosen import ChosenHair
-from hairkit.types.face import Face
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
-from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
 from hairkit.types.tie import TiedHair
@@ -208,40 +207,6 @@ def export_paths(
     return tuple(
         (name, Path(out) / f"groom{suffix}") for name, suffix in zip(names, suffixes, strict=True)
     )
-
-
-def find_views(
-    run: StageRunner, capture: Capture, log: RunLog
-) -> tuple[Capture, Turnaround | None]:
-    """Find faces, persons and the turn; return the views upright, in its order, and the turn."""
-    plain = capture.plain()
-    views = [Given.of(view) for view in plain.views]
-    faces = run.every_view("landmarks", Face, views, absent=Face.absent)
-    persons = run.every_view("person", Person, views, absent=Person.absent)
-    seen = replace(
-        capture,
-        views=tuple(
-            view.with_findings(face.result().value, person.result().value)
-            for view, face, person in zip(capture.views, faces, persons, strict=True)
-        ),
-    )
-    if not run.has("turn"):
-        return seen, None
-    photos = Given.of(plain)
-    turn = run.once("turn", Turnaround, capture=photos, faces=faces, persons=persons).value
-    log.message(turn.summary)
-    return _with_upright_persons(run, seen.arranged(turn)), turn
-
-
-def _with_upright_persons(run: StageRunner, capture: Capture) -> Capture:
-    """Return the capture with persons found again in photos that lay on their side."""
-    turned = [i for i, view in enumerate(capture.views) if view.quarter_turns and view.person]
-    views = list(capture.views)
-    upright = [Given.of(replace(views[i], person=None)) for i in turned]
-    again = run.every_view("person", Person, upright, absent=Person.absent) if turned else []
-    for i, found in zip(turned, again, strict=True):
-        views[i] = replace(views[i], person=found.result().value)
-    return replace(capture, views=tuple(views))
 
 
 def _grow(
