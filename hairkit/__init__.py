@@ -26,7 +26,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `api`: the verbs of the front door
 * `arrays`: array types
 * `colour`: the sRGB curve
-* `compilation`: a word while kernels are compiled
+* `compilation`: the line that says that kernels are compiled
 * `errors`: errors that users can mend
 * `hookspecs`: the hooks that plugins implement
 * `manager`: plugins by name

@@ -1,4 +1,4 @@
-"""A word to the user while kernels are compiled: the first run on a machine takes a minute more."""
+"""The line that says that kernels are compiled: a first run on a machine takes a minute more."""
 
 from __future__ import annotations
 

@@ -37,6 +37,8 @@ LARGEST_PUSH = 0.008
 """Metres: what sticks out farther is a wrong camera or mask rather than a big head."""
 SKULL = 0.09
 """Radius of the cranium, metres: its rim stands out farther than points near the rim."""
+FAR = 100.0
+"""Metres: from there views are orthographic."""
 BROWS = slice(17, 27)
 """Landmarks of the brows."""
 LARGEST_PULL, ON_OUTLINE = 0.03, 0.002
@@ -71,7 +73,7 @@ def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: O
     if options.rounds and all(mask.person_known for mask in masks):
         outlines = Outlines.of(masks, count=OUTLINE_POINTS)
         controls = _spread(head, options.controls)
-        cranium = Cranium.of(head, masks, outlines.scale, controls)
+        cranium = Cranium.of(head, masks, outlines.scale)
         for _ in range(options.rounds):
             head = _bend_to_outlines(head, scene.cameras, outlines, controls, cranium, options)
     return replace(scene, head=head)
@@ -157,6 +159,8 @@ def _rims(cranium: Cranium, cameras: tuple[Camera, ...]) -> Float64Array:
     """Return how much each point of a cranium is on the rim of each view (V, K), from 0 to 1."""
     rotation = np.stack([camera.rotation for camera in cameras])
     translation = np.stack([camera.translation for camera in cameras])
+    flat = [camera.model == "orthographic" for camera in cameras]
+    translation[flat, 2] += FAR
     view, point, share = cranium.rims((rotation, translation))
     result = np.zeros((len(cameras), len(cranium.points)))
     result[view, point] = share

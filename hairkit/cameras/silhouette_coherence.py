@@ -175,7 +175,7 @@ def _best_on_ray(
                 best, z = here, at
                 at += step
             else:
-                at += max(step, _hopeless(lines, nearest, at, best - here))
+                at += max(step, _ruled_out(lines, nearest, at, best - here))
     best = _soft_distance(views, own, lines, z, distance)
     for _ in range(FINE):
         step *= 0.5
@@ -188,7 +188,7 @@ def _best_on_ray(
 
 
 @compiled
-def _hopeless(lines: Float64Array, view: int, z: float, short: float) -> float:
+def _ruled_out(lines: Float64Array, view: int, z: float, short: float) -> float:
     """Return how far behind depth z a view's distance stays too small by `short` pixels, metres."""
     depth = z * lines[view, DEPTH] + lines[view, DEPTH_START]
     if depth < NEAREST:

@@ -66,9 +66,7 @@ def _findings(args: argparse.Namespace) -> list[Finding]:
     except (FormatError, InputError) as error:
         if as_target and _reads(manager, args.file, settings, reader):
             wanted = " ".join(f"--set {name}={value}" for name, value in as_target.items())
-            said = (
-                f"{args.target} reads other axes and units; `hairkit convert` writes it: {wanted}"
-            )
+            said = f"not in the axes and the unit that {args.target} reads; export with {wanted}"
             return [Finding("unit", "failed", said)]
         return [Finding("reads", "failed", " ".join(str(error).split()))]
     read = Finding("reads", "passed", f"{len(groom.strands)} strands")

@@ -42,16 +42,9 @@ class Cranium:
     """Field pixels per pixel."""
 
     @classmethod
-    def of(
-        cls, head: Head, masks: tuple[Mask, ...], scale: float, vertices: Int64Array | None = None
-    ) -> Cranium:
-        """Return the cranium of a head, and what masks of whole persons show of it.
-
-        Its points are evenly spread ones, or the `vertices` (K,) of the head.
-        """
-        chosen = vertices
-        if chosen is None:
-            chosen = spread_vertices(head, np.nonzero(head.scalp > 0.5)[0], POINTS)
+    def of(cls, head: Head, masks: tuple[Mask, ...], scale: float) -> Cranium:
+        """Return the cranium of a head, and what masks of whole persons show of it."""
+        chosen = spread_vertices(head, np.nonzero(head.scalp > 0.5)[0], POINTS)
         shape = np.max([mask.labels.shape for mask in masks], axis=0)
         size = (max(1, round(shape[1] * scale)), max(1, round(shape[0] * scale)))
         fields = np.stack([_far_from_hair(mask, size) for mask in masks])
@@ -59,7 +52,7 @@ class Cranium:
         return cls(head.vertices[chosen].astype(np.float64), normals, fields, scale)
 
     def moved(self, points: Float64Array, normals: Float64Array) -> Cranium:
-        """Return the cranium with its points (K, 3) elsewhere."""
+        """Return the cranium with other points (K, 3) and their normals (K, 3)."""
         return replace(self, points=points, normals=normals)
 
     def select(self, points: Int64Array) -> Cranium:

@@ -11,6 +11,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float64Array
 from hairkit.types.groom import Groom
@@ -126,7 +127,7 @@ def _with_bones(
         near = np.arange(len(old))
         asset = replace(asset, faces=kept.faces, face_uvs=kept.face_uvs)
     else:
-        near = np.linalg.norm(roots[:, None] - old[None], axis=2).argmin(axis=1)
+        near = cKDTree(old).query(roots)[1]
     bound = bool(len(kept.bone_names))
     return replace(
         asset,
