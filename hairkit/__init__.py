@@ -25,6 +25,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `cli`: the command line
 * `api`: the verbs of the front door
 * `arrays`: array types
+* `child_process`: a program that may crash without harm
 * `colour`: the sRGB curve
 * `compilation`: the line that says that kernels are compiled
 * `errors`: errors that users can mend
@@ -35,6 +36,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `progress`: progress reporting
 * `storage`: safe files, frozen types as `.npz`
 * `testing`: a small head with hair for tests of plugins
+* `worker`: the other side of plugins in environments of their own
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 * `manager`: `Manager`, the plugins of this process, by name.
 * `loading`: installed plugins and plugin files, and what they must look like.
 * `results`: what each stage must return; the one table of checks.
+* `command_plugin`: a plugin in an environment of its own
 * `guard`: errors of plugins name the plugin; what plugins print does not reach stdout.
 """
 

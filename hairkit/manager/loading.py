@@ -20,6 +20,7 @@ import pluggy
 from hairkit import hookspecs
 from hairkit.errors import PluginError
 from hairkit.io.file_format import FileFormat
+from hairkit.manager.command_plugin import PluginCommand
 from hairkit.manager.results import STAGES
 from hairkit.nets.known_models import known_model
 from hairkit.options import OptionInfo, describe, make_options, unknown_name
@@ -56,6 +57,10 @@ class PluginInfo:
     """File format that it reads or writes, from the module's `FORMAT`."""
     models: tuple[str, ...] = ()
     """Networks that it uses when they are installed, from the module's `MODELS`."""
+    command: PluginCommand | None = None
+    """How it is started, for a plugin in an environment of its own."""
+    digest: str = ""
+    """Digest of code that is no module of this Python: that of a command."""
     broken: str | None = None
     """Why the plugin cannot be used, or None."""
 

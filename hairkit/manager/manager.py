@@ -11,6 +11,7 @@ import logging
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import pluggy
 
 from hairkit import hookspecs
 from hairkit.errors import DataError, HairkitError, OptionError, PluginError
+from hairkit.manager.command_plugin import CommandPlugin, PluginCommand
 from hairkit.manager.guard import describe_error, guard_hook, one_line, quiet_stdout, subject
 from hairkit.manager.loading import (
     DISABLE_AUTOLOAD,
@@ -94,6 +96,27 @@ class Manager:
                 self._pluggy.unregister(name=name)
             raise PluginError(_reason(error)) from error
         self._infos[name] = info
+
+    def add_command(self, command: PluginCommand) -> None:
+        """Start a plugin in an environment of its own and add it, unless it was added before.
+
+        Raises `PluginError` when it cannot be started or breaks the contract, or when another
+        plugin has its name.
+        """
+        name = command.name
+        info = self._infos.get(name)
+        if info is not None and info.command == command:
+            return
+        if info is not None and info.command is not None:
+            del self._infos[name]
+            old: Any = self._pluggy.unregister(name=name)
+            old.close()
+        try:
+            plugin = CommandPlugin(command)
+            self.register(plugin, name, command.line, plugin.version)
+        except PluginError as error:
+            raise PluginError(f"plugin {name!r}, {command.line}: {error}") from error
+        self._infos[name] = replace(self._infos[name], command=command, digest=plugin.digest)
 
     def plugins(self) -> tuple[PluginInfo, ...]:
         """Return all plugins by name, the broken ones too."""

@@ -8,6 +8,8 @@ scale = 0.5
 [orient]
 plugin = "gabor"
 angles = 64                          # options of the only plugin
+[plugins.matte]                      # a plugin that runs in an environment of its own
+command = ["/opt/nets/bin/python", "matte.py"]
 
 What a recipe does not say is as in the recipe `default`: a stage without a table, and the plugin of
 a table that only has options.
@@ -27,8 +29,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from hairkit.errors import HairkitError, InputError, OptionError
-from hairkit.manager import Manager
+from hairkit.errors import HairkitError, InputError, OptionError, PluginError
+from hairkit.manager import Manager, PluginInfo
+from hairkit.manager.command_plugin import PluginCommand, read_command
 from hairkit.nets.model_folder import missing_models
 from hairkit.options import split_setting, unknown_name
 from hairkit.pipeline.module_digest import module_digest
@@ -89,6 +92,8 @@ class Recipe:
     """Origin of the recipe, for error messages."""
     description: str
     stages: tuple[Stage, ...]
+    commands: tuple[PluginCommand, ...] = ()
+    """Plugins that run in environments of their own."""
 
     def stage(self, table: str) -> Stage | None:
         """Return the stage of a table, or None when the recipe leaves it out."""
@@ -113,7 +118,15 @@ class Recipe:
         return replace(recipe, source=f"{self.source} with --set") if assignments else self
 
     def check(self, manager: Manager) -> None:
-        """Check every plugin and option; raises `PluginError` or `OptionError` naming the place."""
+        """Start the plugins that are commands, check every plugin and option.
+
+        Raises `PluginError` or `OptionError` naming the place.
+        """
+        for command in self.commands:
+            try:
+                manager.add_command(command)
+            except PluginError as error:
+                raise PluginError(f"{self.source}: [plugins.{command.name}]: {error}") from error
         for stage in self.stages:
             for choice in stage.choices:
                 where = f"{self.source}: [{stage.table}]"
@@ -167,7 +180,7 @@ def load_recipe(name: str | os.PathLike[str]) -> Recipe:
     if path.suffix != ".toml" and not path.exists():
         reason = unknown_name("recipe", text, recipe_names())
         raise InputError(f"{reason}, or the path of a .toml file")
-    return parse_recipe(read_bytes(path), path.stem, text)
+    return parse_recipe(read_bytes(path), path.stem, text, path.absolute().parent)
 
 
 def recipe_names() -> tuple[str, ...]:
@@ -177,9 +190,13 @@ def recipe_names() -> tuple[str, ...]:
     return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
 
-def parse_recipe(data: bytes, name: str, source: str) -> Recipe:
-    """Read a recipe from TOML; plugins and options are checked later, by `Recipe.check`."""
+def parse_recipe(data: bytes, name: str, source: str, folder: Path | None = None) -> Recipe:
+    """Read a recipe from TOML; plugins and options are checked later, by `Recipe.check`.
+
+    Commands of plugins start in `folder`.
+    """
     document = _document(data, source)
+    commands = _commands(document.pop("plugins", {}), source, folder)
     description = document.pop("description", "")
     for key in document:
         if key not in HOOKS:
@@ -191,7 +208,20 @@ def parse_recipe(data: bytes, name: str, source: str) -> Recipe:
         elif isinstance(content, dict) and "plugin" not in content:
             tables[key] = {**_default_tables().get(key, {}), **content}
     stages = tuple(_stage(key, tables[key], source) for key in HOOKS if key in tables)
-    return Recipe(name, source, str(description), stages)
+    return Recipe(name, source, str(description), stages, commands)
+
+
+def _commands(content: object, source: str, folder: Path | None) -> tuple[PluginCommand, ...]:
+    """Return the plugins that run in environments of their own."""
+    commands = []
+    for name, values in content.items() if isinstance(content, dict) else [("", content)]:
+        if not isinstance(values, dict):
+            raise InputError(f"{source}: plugins.{name}: expected a table [plugins.NAME]")
+        try:
+            commands.append(read_command(name, values, None if folder is None else str(folder)))
+        except OptionError as error:
+            raise OptionError(f"{source}: [plugins.{name}]: {error}") from error
+    return tuple(commands)
 
 
 def _document(data: bytes, source: str) -> dict[str, Any]:
@@ -223,7 +253,7 @@ def stage_digest(manager: Manager, stage: Stage) -> str:
     for choice in stage.choices:
         options = manager.options(choice.plugin, choice.options)
         info = manager.info(choice.plugin)
-        code = module_digest(info.module)
+        code = plugin_code(info)
         digest.update(f"\n{choice.plugin} {info.origin} {code}".encode())
         digest.update(f"\nwithout {missing_models(info.models)}".encode())
         for field in dataclasses.fields(options) if options is not None else ():
@@ -233,6 +263,11 @@ def stage_digest(manager: Manager, stage: Stage) -> str:
                 digest.update(f"\n{file.name} ".encode())
                 digest.update(hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()
+
+
+def plugin_code(info: PluginInfo) -> str:
+    """Return a hex digest of a plugin's code: of its module, and of its command where it is one."""
+    return module_digest(info.module) + info.digest
 
 
 def _files_of(value: Any) -> list[Path]:

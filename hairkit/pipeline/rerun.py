@@ -54,6 +54,7 @@ def rerun(
     old = read_record(record)
     _check_inputs(old, Path(record), force)
     manager = Manager.loaded(old.plugin_files())
+    old.as_recipe().check(manager)
     if progress is not None:
         for line in changed_versions(old, manager):
             progress.message(line)

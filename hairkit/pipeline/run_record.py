@@ -18,9 +18,9 @@ import hairkit
 from hairkit.errors import FormatError
 from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
+from hairkit.manager.command_plugin import PluginCommand
 from hairkit.pipeline.health import Figure
-from hairkit.pipeline.module_digest import module_digest
-from hairkit.pipeline.recipe import HOOKS, Choice, Recipe, Stage
+from hairkit.pipeline.recipe import HOOKS, Choice, Recipe, Stage, plugin_code
 from hairkit.pipeline.run_log import StageTime
 from hairkit.storage import read_bytes, read_text, write_text
 from hairkit.types.capture import Capture
@@ -84,6 +84,8 @@ class RunRecord:
     stages: tuple[StageTime, ...] = ()
     health: tuple[Figure, ...] = ()
     outputs: tuple[FileRecord, ...] = ()
+    commands: tuple[PluginCommand, ...] = ()
+    """Plugins that ran in environments of their own."""
 
     def write(self, path: Path) -> None:
         """Write the record as JSON."""
@@ -98,15 +100,14 @@ class RunRecord:
             choices = tuple(Choice(p.plugin, MappingProxyType(dict(p.options))) for p in own)
             if choices:
                 stages.append(Stage(table, choices))
-        return Recipe(self.recipe, f"{RECORD} of {self.recipe_source}", "", tuple(stages))
+        source = f"{RECORD} of {self.recipe_source}"
+        return Recipe(self.recipe, source, "", tuple(stages), self.commands)
 
     def plugin_files(self) -> list[Path]:
         """Return the files of plugins that belong to no installed distribution."""
-        return [
-            Path(name)
-            for name in dict.fromkeys(record.distribution for record in self.plugins)
-            if name.endswith(".py")
-        ]
+        commands = {command.name for command in self.commands}
+        own = [record.distribution for record in self.plugins if record.plugin not in commands]
+        return [Path(name) for name in dict.fromkeys(own) if name.endswith(".py")]
 
 
 def describe_run(
@@ -147,6 +148,7 @@ def describe_run(
         recipe_source=recipe.source,
         plugins=plugins,
         inputs=tuple(hash_file(path.resolve()) for path in files),
+        commands=recipe.commands,
     )
 
 
@@ -181,6 +183,7 @@ def read_record(path: str | os.PathLike[str]) -> RunRecord:
                 "stages": tuple(StageTime(**each) for each in document["stages"]),
                 "health": tuple(Figure(**each) for each in document["health"]),
                 "outputs": tuple(FileRecord(**each) for each in document["outputs"]),
+                "commands": tuple(_command(each) for each in document.get("commands", ())),
             }
         )
     except FormatError:
@@ -218,13 +221,17 @@ def _plugins(recipe: Recipe, manager: Manager) -> tuple[PluginRecord, ...]:
             options = manager.options(choice.plugin, choice.options)
             values = {} if options is None else dataclasses.asdict(options)
             info = manager.info(choice.plugin)
-            code = module_digest(info.module)
+            code = plugin_code(info)
             file = Path(info.distribution)
             origin = str(file.resolve()) if file.is_file() else info.distribution
             records.append(
                 PluginRecord(stage.table, choice.plugin, origin, info.version, code, values)
             )
     return tuple(records)
+
+
+def _command(values: dict[str, Any]) -> PluginCommand:
+    return PluginCommand(**values | {"command": tuple(values["command"])})
 
 
 def _named(plugins: Sequence[PluginRecord]) -> list[Path]:

@@ -28,6 +28,7 @@ KNOWN_TURN = SimpleNamespace(
 SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "analogies": ({"SMALL": 16, "LARGE": 24, "SEEDS": 1, "ROWS": 1}, []),
     "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
+    "command_plugins": ({"CALLS": 2, "SIZE": (40, 30)}, []),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "head_fit": ({}, ["CAPTURES"]),
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "as_they_are"]),

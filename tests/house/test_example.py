@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from hairkit.pipeline.recipe import recipe_names
+from hairkit.pipeline.recipe import load_recipe, recipe_names
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "hairkit-sobel"
 
@@ -99,3 +99,16 @@ def test_its_own_test_passes(installed: dict[str, str], tmp_path: Path) -> None:
     shutil.copy(EXAMPLE / "test_hairkit_sobel.py", tmp_path)
     output = run(["-m", "pytest", "-q", "-W", "error", "."], installed, tmp_path)
     assert "4 passed" in output
+
+
+def test_the_command_example_passes_its_own_test(tmp_path: Path) -> None:
+    """The plugin that runs in an environment of its own is a plugin, and its recipe names it."""
+    example = EXAMPLE.with_name("hairkit-matte")
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+    shutil.copytree(example, tmp_path / "example")
+    output = run(["-m", "pytest", "-q", "-W", "error", "."], environment, tmp_path / "example")
+    assert "1 passed" in output
+    (command,) = load_recipe(example / "matte.toml").commands
+    assert command.command[-1] == "hairkit_matte"
+    for path in example.glob("*.py"):
+        compile(path.read_text(), str(path), "exec")

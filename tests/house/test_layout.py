@@ -21,7 +21,18 @@ TRAINING = sorted((PROJECT / "training").rglob("*.py"))
 PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins" / "__init__.py"})
 
 FLOORS = (
-    ("errors", "arrays", "colour", "options", "storage", "progress", "parallel", "compilation"),
+    (
+        "errors",
+        "arrays",
+        "colour",
+        "options",
+        "storage",
+        "progress",
+        "parallel",
+        "compilation",
+        "child_process",
+        "worker",
+    ),
     ("types",),
     ("cameras", "imaging", "helices", "head_model", "rendering"),
     ("field", "io", "nets"),

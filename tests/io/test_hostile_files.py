@@ -37,6 +37,8 @@ SECONDS = 20
 """A reader that takes longer waits for something that never comes."""
 OWN_FILES = {
     "hairkit/storage.py": "opens every file",
+    "hairkit/child_process.py": "what the system says of a process",
+    "hairkit/worker.py": "runs without the rest of hairkit; its own files",
     "hairkit/head_model/template_skin.py": "its own picture",
     "hairkit/pipeline/module_digest.py": "sources",
     "hairkit/pipeline/recipe.py": "shipped recipes",
