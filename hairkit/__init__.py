@@ -55,6 +55,7 @@ if TYPE_CHECKING:
         render,
         sample_capture,
         simulate,
+        wrap,
         write_groom,
     )
     from hairkit.errors import HairkitError
@@ -128,6 +129,7 @@ __all__ = [
     "render",
     "sample_capture",
     "simulate",
+    "wrap",
     "write_groom",
 ]
 
@@ -139,6 +141,7 @@ _HOMES = {
         "render",
         "sample_capture",
         "simulate",
+        "wrap",
         "write_groom",
     ),
     "errors": ("HairkitError",),

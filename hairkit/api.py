@@ -30,6 +30,7 @@ if TYPE_CHECKING:  # these load OpenGL and Numba, so each verb imports its own
     from hairkit.evaluation import Evaluation, Prediction, Truth
     from hairkit.progress import Progress
     from hairkit.simulation import HeadMotion
+    from hairkit.types.head import Head
 
 StrPath = str | os.PathLike[str]
 
@@ -88,6 +89,37 @@ def export(
         checked = plugins.options(name, values)
         opened = _open(groom, plugins)
         plugins.call("export_groom", name, checked, groom=opened, path=Path(path))
+
+
+def wrap(
+    groom: Groom | StrPath,
+    head: Head | StrPath,
+    *,
+    units: str = "m",
+    up: str = "y",
+    scalp: str | None = None,
+    keep_root_uv: bool = False,
+    manager: Manager | None = None,
+) -> Groom:
+    """Return a groom on another head of any mesh: `wrap(groom, "other.glb")`.
+
+    Parameters
+    ----------
+    groom
+        A groom, or what `read_groom` reads.
+    head
+        The other head, or its .obj, .ply or .glb file; the face along +Z (-Y where `up` is z).
+    units, up, scalp
+        How to read the file, as of `read_head`; without a marked scalp the groom's is carried over.
+    keep_root_uv
+        Keep the roots' old texture coordinates instead of taking those of the other head.
+    """
+    from hairkit.grooming.wrap import wrap_groom
+    from hairkit.io.head_reader import BareHead, read_bare_head
+    from hairkit.types.head import Head
+
+    other = BareHead.of(head) if isinstance(head, Head) else read_bare_head(head, units, scalp, up)
+    return wrap_groom(_open(groom, manager), other, keep_root_uv=keep_root_uv)
 
 
 def simulate(

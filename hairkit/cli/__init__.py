@@ -29,6 +29,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `texture`: textures made finer, filtered, or turned into bump and normal maps
 * `validate`: a hair file checked for an engine
 * `view`: the viewer
+* `wrap`: a groom carried to another head
 """
 
 from __future__ import annotations
@@ -60,6 +61,7 @@ VERBS = {
     "view": "show a groom in motion, in a window or by a script",
     "export": "write a groom in an engine's format",
     "convert": "read hair of one format, write another",
+    "wrap": "carry a groom to another head",
     "validate": "check a hair file for an engine",
     "simulate": "simulate a groom, its head shaken and in wind",
     "info": "print what a file contains",

@@ -16,4 +16,5 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `target_rules`: what engines demand of a hair file
 * `tie_strands`: strands led to their tie and down the tail
 * `wind_waves`: measured waves put onto strands
+* `wrap`: a groom carried to another head
 """

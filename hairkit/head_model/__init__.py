@@ -15,6 +15,7 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `photo_skin`: the skin of a head taken from the photos
 * `placement`: a head placed under given strands
 * `reach`: how far hair grows from its guides
+* `register_head`: a head brought onto another of any mesh
 * `scalp`: roots: sampling, binding to faces, growth mesh
 * `signed_distance`: signed distance to a head, on a grid or at points
 * `skinning`: skin weights of the three joints

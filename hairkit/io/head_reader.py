@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float32Array, Float64Array, Int32Array, check_reach
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array, check_reach
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.reach import Reach
 from hairkit.head_model.template import default_head
@@ -21,7 +21,7 @@ from hairkit.io.photos import read_drawing
 from hairkit.io.textures import as_maps, write_mtl
 from hairkit.storage import read_text, write_text
 from hairkit.types.head import Capsules, Head
-from hairkit.types.skin import Blendshape
+from hairkit.types.skin import Blendshape, SkinMaps
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres in one unit of a head file."""
@@ -47,6 +47,39 @@ _HOW_TO_MARK = (
     "mark it by a group, material or vertex property named 'scalp', by vertices painted red (or "
     "white on black), or by a mask picture NAME.scalp.png over its texture coordinates"
 )
+
+
+@dataclass(frozen=True, eq=False)
+class BareHead:
+    """A head where its file has it, in metres, +Y up, the face along +Z."""
+
+    vertices: Float64Array
+    """(V, 3) metres."""
+    faces: Int32Array
+    """(F, 3) counter-clockwise from outside."""
+    uv: Float64Array | None = None
+    """(V, 2) texture coordinates in [0, 1]."""
+    scalp: Float64Array | None = None
+    """(V,) 1 where hair grows; None where nothing marks it."""
+    landmark_vertices: Int32Array | None = None
+    """(68,) vertices of the iBUG landmarks."""
+    maps: SkinMaps | None = None
+    blendshapes: tuple[Blendshape, ...] = ()
+    grown: bool = False
+    """Whether roots of hair, and no mark of the file, show the scalp."""
+
+    @classmethod
+    def of(cls, head: Head) -> BareHead:
+        """Return a head with a scalp as one that was read."""
+        return cls(
+            head.vertices.astype(np.float64),
+            head.faces,
+            head.uv.astype(np.float64),
+            head.scalp.astype(np.float64),
+            head.landmark_vertices,
+            head.maps,
+            head.blendshapes,
+        )
 
 
 @dataclass(frozen=True)
@@ -108,33 +141,62 @@ def read_head(
         The file is damaged or of another format.
     """
     file = Path(path)
-    mesh = _file_mesh(file, units, up)
-    vertices = _in_metres(mesh.vertices, units, up)
-    check_reach(vertices, file, "vertices")
-    grown = None if scalp is not None or roots is None else _grown_weight(vertices, roots)
-    weight = _scalp_weight(mesh, file, scalp, grown)
-    faces = _orient_outward(vertices, mesh.faces.astype(np.int32))
-    used = np.unique(faces)
-    breadth, middle = _breadth_and_middle(vertices[used], weight[used], file)
-    landmarks = _landmarks(file, vertices, units, up)
-    stays = weight is grown or np.linalg.norm(middle) <= _OFF_CENTRE
-    moved = vertices if stays else vertices - middle
-    middle = middle if moved is vertices else np.zeros(3)
-    uv = _azimuthal_uv(moved - middle) if mesh.uv is None else _in_unit_square(mesh.uv)
+    bare = _read_bare(file, units, scalp, up, roots)
+    if bare.scalp is None:
+        raise InputError(f"{file}: the head has no scalp: {_HOW_TO_MARK}")
+    used = np.unique(bare.faces)
+    breadth, middle = _breadth_and_middle(bare.vertices[used], bare.scalp[used], file)
+    stays = bare.grown or np.linalg.norm(middle) <= _OFF_CENTRE
+    moved = bare.vertices if stays else bare.vertices - middle
+    middle = middle if stays else np.zeros(3)
+    uv = _azimuthal_uv(moved - middle) if bare.uv is None else bare.uv
     joints, capsules = _skeleton(breadth / _DEFAULT_BREADTH, middle)
     return Head(
         moved.astype(np.float32),
-        faces,
+        bare.faces,
         uv.astype(np.float32),
-        weight.astype(np.float32),
-        landmarks,
+        bare.scalp.astype(np.float32),
+        bare.landmark_vertices,
         joints,
         capsules,
-        maps=as_maps(mesh.maps),
-        blendshapes=tuple(
+        maps=bare.maps,
+        blendshapes=bare.blendshapes,
+    )
+
+
+def read_bare_head(
+    path: str | os.PathLike[str], units: str = "m", scalp: str | None = None, up: str = "y"
+) -> BareHead:
+    """Return the head in a file where it is, whether or not its scalp is marked.
+
+    Parameters and errors are those of `read_head`.
+    """
+    return _read_bare(Path(path), units, scalp, up, None)
+
+
+def _read_bare(
+    file: Path, units: str, scalp: str | None, up: str, roots: npt.ArrayLike | None
+) -> BareHead:
+    mesh = _file_mesh(file, units, up)
+    vertices = _in_metres(mesh.vertices, units, up)
+    check_reach(vertices, file, "vertices")
+    weight = _marked_weight(mesh, file, scalp)
+    grown = None
+    if weight is None and roots is not None:
+        grown = weight = _grown_weight(vertices, mesh.faces, roots)
+    shapes = mesh.shapes.items()
+    return BareHead(
+        vertices,
+        _orient_outward(vertices, mesh.faces.astype(np.int32)),
+        None if mesh.uv is None else _in_unit_square(mesh.uv),
+        weight,
+        _landmarks(file, vertices, units, up),
+        as_maps(mesh.maps),
+        tuple(
             Blendshape(name, _in_metres(offsets, units, up).astype(np.float32))
-            for name, offsets in mesh.shapes.items()
+            for name, offsets in shapes
         ),
+        grown=grown is not None,
     )
 
 
@@ -176,18 +238,19 @@ def _beside(file: Path, ending: str) -> Path:
     return file.with_name(f"{file.stem}.{ending}")
 
 
-def _grown_weight(vertices: Float64Array, roots: npt.ArrayLike) -> Float64Array | None:
+def _grown_weight(
+    vertices: Float64Array, faces: Int64Array, roots: npt.ArrayLike
+) -> Float64Array | None:
     """(V,) 1 where roots of hair stand near each other; None where they are not on the mesh."""
     places = np.asarray(roots, np.float64).reshape(-1, 3)
     if np.median(cKDTree(vertices).query(places)[0]) > _ROOT_GAP:
         return None
-    return Reach.of(places).covers(vertices).astype(np.float64)
+    grown = Reach.of(places).covers(vertices).astype(np.float64)
+    return grown if grown[faces].all(axis=1).any() else None
 
 
-def _scalp_weight(
-    mesh: FileMesh, file: Path, scalp: str | None, grown: Float64Array | None
-) -> Float64Array:
-    """(V,) from the first mark that the file or the user gives, else from the roots of hair."""
+def _marked_weight(mesh: FileMesh, file: Path, scalp: str | None) -> Float64Array | None:
+    """(V,) from the first mark that the file or the user gives; None where there is none."""
     if scalp is not None and scalp.lower() in mesh.groups:
         weight = mesh.groups[scalp.lower()]
     elif scalp is not None and os.path.lexists(scalp):
@@ -199,12 +262,10 @@ def _scalp_weight(
         weight = mesh.groups["scalp"]
     elif os.path.lexists(_beside(file, "scalp.png")):
         weight = _picture_weight(mesh, file, _beside(file, "scalp.png"))
-    elif mesh.colours is not None:
-        weight = _painted_weight(mesh.colours, file)
-    elif grown is not None and grown[mesh.faces].all(axis=1).any():
-        return grown
+    elif mesh.colours is not None and (painted := _painted_weight(mesh.colours)) is not None:
+        weight = painted
     else:
-        raise InputError(f"{file}: the head has no scalp: {_HOW_TO_MARK}")
+        return None
     in_use = np.bincount(mesh.faces.ravel(), minlength=len(weight)) > 0
     weight = np.clip(weight, 0, 1) * in_use
     if not (weight[mesh.faces].mean(axis=1) > 0.5).any():
@@ -225,14 +286,14 @@ def _picture_weight(mesh: FileMesh, file: Path, picture: Path) -> Float64Array:
     return np.asarray(mask[row, column] / brightest, np.float64)
 
 
-def _painted_weight(colours: Float64Array, file: Path) -> Float64Array:
-    """Red paint if there is any, else white on black; skin colours are neither."""
+def _painted_weight(colours: Float64Array) -> Float64Array | None:
+    """Red paint if there is any, else white on black; skin colours are neither, so None."""
     redness = colours[:, 0] - colours[:, 1:].max(axis=1)
     if redness.max() > 0.5:
         return np.asarray(redness / redness.max(), np.float64)
     brightness: Float64Array = colours.mean(axis=1)
     if brightness.min() > 0.25 or brightness.max() < _WHITE or np.ptp(colours, axis=1).max() > 0.25:
-        raise InputError(f"{file}: its colours mark no scalp: {_HOW_TO_MARK}")
+        return None
     return brightness
 
 

@@ -13,6 +13,7 @@ import pytest
 from hairkit_plugins import landmarks
 
 from hairkit.cli import main as hairkit
+from hairkit.synth.foreign_heads import make_coarse_head
 
 PROJECT = Path(__file__).parents[2]
 SHARED = {"captures_argument", "example_textures", "plain_analogies", "xpbd_peer"}
@@ -64,6 +65,10 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "viewer": (
         {"WARM": 1, "SETTLING": 2, "ROWS": ((False, 0), (True, 3), (None, None))},
         ["--guides", "20", "--hairs", "60", "--size", "64x48", "--pictures", "1"],
+    ),
+    "wrap": (
+        {"STYLES": ("wavy",), "FOREIGN_HEADS": {"coarse": make_coarse_head}},
+        ["--strands", "40", "-o", "CAPTURES/wrap.jpg"],
     ),
 }
 """Constants and arguments that make a program quick. CAPTURES is a folder with one capture."""

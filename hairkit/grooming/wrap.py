@@ -1,0 +1,238 @@
+"""A groom carried to another head: roots on its surface, strands around it, lengths kept.
+
+The heads' map takes every root to the other surface and every strand to its side. Each strand is
+then laid anew from its root, piece by piece in the mapped directions and with the lengths of its
+pieces, and slides along the head where it would enter it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
+from hairkit.errors import InputError
+from hairkit.field.sampling_kernels import copy_point, gradient_at, sample_at
+from hairkit.head_model.bvh import build_tree, nearest_on_surface
+from hairkit.head_model.register_head import HeadMap, Surface, register_head
+from hairkit.head_model.scalp import evaluate, roots_at
+from hairkit.head_model.signed_distance import signed_distance
+from hairkit.io.head_reader import BareHead
+from hairkit.parallel import compiled, parallel_for
+from hairkit.types.groom import Groom
+from hairkit.types.head import Capsules, Head
+from hairkit.types.strands import Strands
+from hairkit.types.tie import Tie
+from hairkit.types.volume import VoxelGrid
+
+CLEARANCE = 0.0003
+"""Metres that strands keep from the head: above the error of the sampled distance."""
+LIFTED_OVER = 0.004
+"""Metres from the root over which a strand may rise to that clearance."""
+SLIDES = 8
+"""Rounds that take a point out of the head and back to its distance from the one before."""
+CELL, MOST_CELLS = 0.002, 12e6
+"""Metres of a cell of the sampled distance, and how many cells there may be."""
+MAP_CELL = 0.008
+"""Metres between the points at which the map is evaluated; it is smooth."""
+MAP_MARGIN = 0.02
+"""Metres around the strands that these points reach."""
+TIE_STEP = 0.01
+"""Metres along a tie's axis over which its direction is mapped."""
+MIN_STRANDS = 64
+"""Least number of strands that are worth another thread."""
+SCALP_GAP = 0.012
+"""Metres between the mapped head and the other up to which its scalp is carried over: heads of
+other topology, such as those with a mouth and eye sockets inside, have surface far from it."""
+
+
+def wrap_groom(groom: Groom, head: BareHead, *, keep_root_uv: bool = False) -> Groom:
+    """Return the groom on another head, in the frame of that head.
+
+    Strands keep their lengths, numbers and points. Scalp, texture coordinates, joints and capsules
+    that the other head lacks are carried over from the groom's, and so are ties; what the groom's
+    file held beyond the groom belonged to the old head and is left out.
+
+    Parameters
+    ----------
+    groom
+        Its head and the other must be whole down to the neck; bodies may follow.
+    head
+        The other head, of any mesh, `hairkit.io.head_reader.read_bare_head`.
+    keep_root_uv
+        Keep the roots' old texture coordinates, for pictures that were painted on the old head.
+
+    Raises
+    ------
+    InputError
+        The other head has another size or direction than a head in metres that faces +Z.
+    """
+    marks = None if head.landmark_vertices is None else head.vertices[head.landmark_vertices]
+    heads = register_head(groom.head, Surface(head.vertices, head.faces, marks))
+    tree = build_tree(head.vertices, head.faces)
+    old = evaluate(groom.head, groom.root_triangle, groom.root_barycentric)
+    triangle, weights, _ = nearest_on_surface(tree, heads(old))
+    fitted = _fitted_head(groom, head, heads, triangle)
+    strands = _lay(groom.strands, fitted, heads, evaluate(fitted, triangle, weights))
+    if not (keep_root_uv and groom.strands.root_uv is not None):
+        strands = replace(strands, root_uv=roots_at(fitted, triangle, weights).uv)
+    return replace(
+        groom,
+        strands=strands,
+        head=fitted,
+        root_triangle=triangle,
+        root_barycentric=weights.astype(np.float32),
+        ties=tuple(_carried_tie(tie, heads) for tie in groom.ties),
+        carried=None,
+    )
+
+
+def _fitted_head(groom: Groom, head: BareHead, heads: HeadMap, triangle: Int32Array) -> Head:
+    """Return the other head as a `Head`, with what its file lacks carried from the groom's."""
+    vertices, old = head.vertices, groom.head
+    mapped = heads(old.vertices)
+    face, weights, apart = nearest_on_surface(build_tree(mapped, old.faces), vertices)
+
+    def carried(values: Float32Array) -> Float64Array:
+        """Return the old head's values (V', K) at the vertices (V, K)."""
+        at_corners = values.reshape(len(values), -1)[old.faces[face]]
+        mixed: Float64Array = np.einsum("nk,nkd->nd", weights, at_corners)
+        return mixed
+
+    scalp = head.scalp
+    if scalp is None:
+        scalp = np.where(apart < SCALP_GAP, carried(old.scalp)[:, 0], 0.0)
+        scalp[head.faces[triangle]] = 1.0  # hair grows where its roots are
+    density = None if old.density is None else np.clip(carried(old.density)[:, 0], 0, 1)
+    uv = carried(old.uv) if head.uv is None else head.uv
+    capsules = old.capsules
+    scale = np.float32(heads.similarity.scale)
+    return Head(
+        vertices.astype(np.float32),
+        head.faces,
+        uv.astype(np.float32),
+        scalp.astype(np.float32),
+        head.landmark_vertices,
+        heads(old.joints).astype(np.float32),
+        Capsules(
+            heads(capsules.first).astype(np.float32),
+            heads(capsules.second).astype(np.float32),
+            scale * capsules.radius,
+        ),
+        None if density is None else density.astype(np.float32),
+        head.maps,
+        head.blendshapes,
+    )
+
+
+def _carried_tie(tie: Tie, heads: HeadMap) -> Tie:
+    ends = heads(np.stack([tie.centre, tie.centre + TIE_STEP * tie.axis]))
+    axis = ends[1] - ends[0]
+    return replace(
+        tie,
+        centre=ends[0].astype(np.float32),
+        axis=(axis / np.linalg.norm(axis)).astype(np.float32),
+    )
+
+
+class _Laying(NamedTuple):
+    """What strands are laid in."""
+
+    origin: Float64Array
+    """(3,) corner of the grid, metres."""
+    spacing: float
+    """Edge of a cell, metres."""
+    distance: Float32Array
+    """(X, Y, Z, 1) signed distance to the head, metres, negative inside."""
+    offsets: Int64Array
+    """(S + 1,) first points of the strands."""
+    arc: Float64Array
+    """(P,) metres from each point to its root along the strand."""
+
+
+def _lay(strands: Strands, head: Head, heads: HeadMap, roots: Float64Array) -> Strands:
+    """Return the strands on the other head, from roots (S, 3)."""
+    points = _mapped(strands.points, heads)
+    owner = strands.strand_of_point
+    points += (roots - points[strands.offsets[:-1]])[owner]
+    grid = _grid_around(points, head)
+    distance = signed_distance(head, grid)[..., None]
+    laying = _Laying(
+        grid.origin, float(grid.spacing), distance, strands.offsets, strands.arc_lengths()
+    )
+    laid = points.copy()
+    parallel_for(_lay_strands, len(strands), laying, points, laid, min_chunk=MIN_STRANDS)
+    return replace(strands, points=laid.astype(np.float32))
+
+
+def _mapped(points: Float32Array, heads: HeadMap) -> Float64Array:
+    """Return points (P, 3) under the map, which is sampled on a grid where they are many."""
+    moved = heads.similarity.apply(points)
+    if heads.bend is None:
+        return moved
+    low, high = moved.min(axis=0) - MAP_MARGIN, moved.max(axis=0) + MAP_MARGIN
+    grid = VoxelGrid.around(low, high, MAP_CELL)
+    if np.prod(grid.shape) > len(moved):
+        return moved + heads.bend(moved)
+    values = heads.bend(grid.centres().reshape(-1, 3)).astype(np.float32)
+    return moved + grid.sample(values.reshape(*grid.shape, 3), moved)
+
+
+def _grid_around(points: Float64Array, head: Head) -> VoxelGrid:
+    """Return the grid of the distance: where both strands and the head are."""
+    margin = 10 * CELL
+    low = np.maximum(points.min(axis=0), head.vertices.min(axis=0)) - margin
+    high = np.minimum(points.max(axis=0), head.vertices.max(axis=0)) + margin
+    if (high <= low).any():
+        raise InputError("the strands lie beside the head; is it in the same unit and upright?")
+    spacing = max(CELL, float(np.cbrt(np.prod(high - low) / MOST_CELLS)))
+    return VoxelGrid.around(low, high, spacing)
+
+
+@compiled
+def _lay_strands(
+    first: int, last: int, laying: _Laying, mapped: Float64Array, laid: Float64Array
+) -> None:
+    """Lay strands in the directions of the mapped points (P, 3), around the head."""
+    p, before, aim = np.empty(3), np.empty(3), np.empty(3)
+    for strand in range(first, last):
+        begin = laying.offsets[strand]
+        copy_point(mapped[begin], before)
+        copy_point(mapped[begin], laid[begin])
+        for i in range(begin + 1, laying.offsets[strand + 1]):
+            length = laying.arc[i] - laying.arc[i - 1]
+            for axis in range(3):
+                aim[axis] = mapped[i, axis] - mapped[i - 1, axis]
+            _step(before, aim, length, p)
+            lifted = min(laying.arc[i] / LIFTED_OVER, 1.0)
+            _slide(laying, before, length, CLEARANCE * lifted, p)
+            copy_point(p, laid[i])
+            copy_point(p, before)
+
+
+@compiled
+def _step(start: Float64Array, aim: Float64Array, length: float, p: Float64Array) -> None:
+    """Write the point (3,) at a length from the start in the direction of the aim."""
+    size = np.sqrt(aim[0] ** 2 + aim[1] ** 2 + aim[2] ** 2)
+    share = length / size if size > 0 else 0.0
+    for axis in range(3):
+        p[axis] = start[axis] + share * aim[axis]
+
+
+@compiled
+def _slide(
+    laying: _Laying, before: Float64Array, length: float, clearance: float, p: Float64Array
+) -> None:
+    """Move a point out of the head, at a length from the one before it."""
+    level, normal, away = np.empty(1), np.empty(3), np.empty(3)
+    for _ in range(SLIDES):
+        sample_at(laying.origin, laying.spacing, laying.distance, p, level)
+        lack = clearance - level[0]
+        if lack <= 0:
+            return
+        gradient_at(laying.origin, laying.spacing, laying.distance, p, normal)
+        for axis in range(3):
+            away[axis] = p[axis] + lack * normal[axis] - before[axis]
+        _step(before, away, length, p)
