@@ -54,8 +54,11 @@ from .landmark_equations import (
 from .landmark_transfer import PatchSettings, transfer_landmarks
 from .search import Fit, Round, Search, precision_cost
 
-USUAL_DISTANCE = 0.7
-"""Distance of head portraits, metres."""
+USUAL_DISTANCE, FAR_DISTANCE = 0.7, 2.0
+"""Distance of head portraits, and where the search begins again if it fits badly, metres."""
+POOR_COST = 40.0
+"""Cost of a view from which a solution fits badly: the eight rendered captures have 13 to 27 with
+photos alone, photographs of a bald man 72, and 44 from `FAR_DISTANCE`."""
 SHARED_SPREAD = (0.05, 0.01, 0.01, 0.1, 0.2, 0.1, 0.5, 0.5)
 """Prior of what views share: tilt of the head in the turn (radians), the turn's centre (metres),
 log of the magnification, 1 / distance."""
@@ -146,6 +149,9 @@ def _from_nothing(problem: _Problem, search: Search, capture: Capture, options: 
         wanted = options.model
     faceless = [i for i, view in enumerate(capture.views) if view.landmarks is None]
     best = search.find(problem.start(wanted == "orthographic"), faceless)
+    if best.cost > POOR_COST * len(capture.views) and not best.flat and problem.focal is None:
+        far = search.find(problem.start(False, FAR_DISTANCE), faceless)
+        best = min(best, far, key=lambda fit: fit.cost)
     if options.model == "auto" and not capture.orthographic:
         flat = search.settle(search.descend(problem.start(True), FLAT_NOISE, options.iterations), 1)
         best = min(best, flat, key=lambda fit: fit.cost)
@@ -215,10 +221,10 @@ class _Problem:
         """Return the search for the cameras."""
         return Search(self.linearised, self.prior_spread, iterations)
 
-    def start(self, flat: bool) -> Fit:
+    def start(self, flat: bool, distance: float = USUAL_DISTANCE) -> Fit:
         """Return the nominal turn, its place and magnification as landmarks or masks suggest."""
         vector = np.zeros(self.turn.size)
-        vector[PERSPECTIVE] = 1 / USUAL_DISTANCE
+        vector[PERSPECTIVE] = 1 / distance
         magnification, place = (
             self._place_by_landmarks(self.landmarks, flat)
             if self.landmarks is not None

@@ -84,3 +84,26 @@ def test_hair_apart_from_the_scalp_on_bare_skin_is_dropped() -> None:
     kept = head_prior._without_islands(labels, bare)
     assert (kept[5:10, 10:50] == HAIR).all()
     assert (kept[20:] == PERSON).all()
+
+
+def test_hair_that_no_other_view_confirms_is_dropped() -> None:
+    """A spot off the scalp goes where other views show none there, a lock of hair in 3D remains."""
+    _, masks, scene = set_up()
+    labels = [mask.labels.copy() for mask in masks]
+    chin = np.array([0.0, -0.11, 0.12])  # a beard: only the view from the left takes it for hair
+    lock = np.array([0.0, -0.1, -0.12])  # hangs behind the neck; views from the sides and the back
+    spots: dict[tuple[int, str], tuple[slice, slice]] = {}
+    for view, name, place in (
+        (1, "chin", chin),
+        (1, "lock", lock),
+        (2, "lock", lock),
+        (3, "lock", lock),
+    ):
+        u, v = scene.cameras[view].project(place).astype(int)
+        spots[view, name] = (slice(v - 4, v + 5), slice(u - 4, u + 5))
+        labels[view][v - 7 : v + 8, u - 7 : u + 8] = PERSON
+        labels[view][spots[view, name]] = HAIR
+    kept = head_prior._without_strangers(labels, scene)
+    assert (kept[1][spots[1, "chin"]] == PERSON).all()
+    for view in (1, 2, 3):
+        assert (kept[view][spots[view, "lock"]] == HAIR).all()

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.silhouette import Options, _Problem, estimate_scene
+from hairkit_plugins.silhouette.search import Fit, Search
 from turntable import Turntable, azimuth_errors, turntable
 
 from hairkit import Camera, Capture, Face, Mask, Scene, View
-from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, SHARED
+from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, PERSPECTIVE, SHARED
 
 FAST = Options(contour_points=40)
 """Fewer rays along outlines than the default, for half of its time."""
@@ -87,6 +88,25 @@ def test_orthographic_cameras_start_at_their_scale() -> None:
     exact = np.exp(problem.start(flat=True).vector[LOG_MAGNIFICATION])
     assert exact == pytest.approx(800, rel=0.001)
     assert np.exp(problem.start(flat=False).vector[LOG_MAGNIFICATION]) < 0.97 * exact
+
+
+@pytest.mark.parametrize(("cost", "starts"), [(100.0, [0.7]), (400.0, [0.7, 2.0])])
+def test_a_poor_fit_is_searched_again_from_farther(
+    bust: Turntable, monkeypatch: pytest.MonkeyPatch, cost: float, starts: list[float]
+) -> None:
+    """Cameras that cost more than 40 a view are sought from 2 m too, and the cheaper ones kept."""
+    tried: list[float] = []
+
+    def find(self: Search, start: Fit, restarted: object) -> Fit:
+        tried.append(round(1 / float(start.vector[PERSPECTIVE]), 3))
+        return replace(start, cost=cost / len(tried))
+
+    monkeypatch.setattr(Search, "find", find)
+    options = replace(FAST, model="perspective", carries=0)
+    scene = estimate_scene(bust.capture, bust.masks, bust.head, None, options)
+    assert tried == starts
+    distance = np.linalg.norm(scene.cameras[0].position)
+    assert distance == pytest.approx(starts[-1], rel=0.15)
 
 
 def test_options_say_how_sure_landmarks_of_files_are(bust: Turntable) -> None:
