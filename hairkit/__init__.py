@@ -16,6 +16,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `nets`: networks of others, run in a process of their own
 * `simulation`: contract of simulators, motion, wind
 * `grooming`: methods on strands and grooms
+* `batches`: many captures
 * `studio`: from a camera to moving hair, in a browser
 * `study`: questionnaires about reconstructions
 * `synth`: procedural hair
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
         wrap,
         write_groom,
     )
+    from hairkit.batches.batch import batch
     from hairkit.errors import HairkitError
     from hairkit.hookspecs import hookimpl, hookspec
     from hairkit.io.capture_reader import read_capture
@@ -116,6 +118,7 @@ __all__ = [
     "View",
     "VoxelGrid",
     "Waves",
+    "batch",
     "evaluate",
     "export",
     "hookimpl",
@@ -144,6 +147,7 @@ _HOMES = {
         "wrap",
         "write_groom",
     ),
+    "batches.batch": ("batch",),
     "errors": ("HairkitError",),
     "hookspecs": ("hookimpl", "hookspec"),
     "io.capture_reader": ("read_capture",),

@@ -81,6 +81,7 @@ class ChildProcess:
         self._turn = threading.Lock()
         self._numbers = itertools.count(1)
         self._running: _Running | None = None
+        self._stopped = False
 
     def ask(
         self,
@@ -90,6 +91,8 @@ class ChildProcess:
     ) -> dict[str, Any]:
         """Return the answer; `tell` gets what comes before it. Raises `ChildError`."""
         with self._turn:
+            if self._stopped:
+                raise ChildError("was stopped", limit=True)
             number = next(self._numbers)
             line = json.dumps({"id": number, **question}).encode() + b"\n"
             if len(line) > LONGEST_QUESTION:
@@ -98,8 +101,10 @@ class ChildProcess:
             try:
                 running.send(line)
                 return running.answer(number, limits, tell)
-            except BaseException:  # Ctrl-C, too: its answer would be taken for the next one's
+            except BaseException as error:  # Ctrl-C, too: its answer would come to the next
                 self._end()
+                if self._stopped:
+                    raise ChildError("was stopped", limit=True) from error
                 raise
 
     @property
@@ -117,8 +122,9 @@ class ChildProcess:
         with self._turn:
             self._end()
 
-    def interrupt(self) -> None:
-        """End the process while a thread waits for its answer."""
+    def stop(self) -> None:
+        """End the process while a thread waits for its answer, and start no other one."""
+        self._stopped = True
         running = self._running
         if running is not None:
             running.kill()

@@ -5,6 +5,8 @@
 Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 2 one line says why,
 3 a simulation diverged, 4 a file that was validated breaks a rule, 130 ended by a second Ctrl-C.
 
+* `batch`: many captures
+* `batch_table`: its table on a terminal
 * `convert`: read hair of one format, write another
 * `doctor`: check this machine
 * `evaluate`: scores against the truth
@@ -52,6 +54,7 @@ VERBS = {
     "reconstruct": "turn photos of a head, or a video, into a groom",
     "head": "turn photos into a head with the person's skin, without hair",
     "studio": "from a camera to moving hair, in a browser",
+    "batch": "turn many captures into grooms, a process for each",
     "rerun": "run a reconstruction again from its record",
     "evaluate": "score a groom against the truth",
     "synth": "make a procedural groom and photos of it, with their truth",

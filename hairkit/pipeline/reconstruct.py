@@ -25,7 +25,7 @@ from hairkit.imaging.waves import measure_waves
 from hairkit.io.capture_reader import read_capture
 from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
-from hairkit.parallel import one_blas_thread
+from hairkit.parallel import one_blas_thread, thread_count
 from hairkit.pipeline.find_skin import find_skin
 from hairkit.pipeline.find_views import find_views
 from hairkit.pipeline.health import RED, Figure, assess
@@ -142,7 +142,7 @@ def _run(
     with (
         work,
         announce_compilation(log.message),
-        ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool,
+        ThreadPoolExecutor(thread_count(), thread_name_prefix="hairkit") as pool,
     ):
         run = StageRunner(recipe, manager, work, log, pool)
         _sweep(folder, run)

@@ -28,6 +28,7 @@ KNOWN_TURN = SimpleNamespace(
 """In the place of `silhouette`, whose search takes longer than all else."""
 SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "analogies": ({"SMALL": 16, "LARGE": 24, "SEEDS": 1, "ROWS": 1}, []),
+    "batch": ({"JOBS": 4, "WARM": 2}, []),
     "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
     "command_plugins": ({"CALLS": 2, "SIZE": (40, 30)}, []),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),

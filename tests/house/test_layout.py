@@ -39,7 +39,7 @@ FLOORS = (
     ("simulation", "grooming", "synth", "hookspecs"),
     ("manager", "testing"),
     ("pipeline", "evaluation"),
-    ("viewer", "studio", "study", "api"),
+    ("viewer", "studio", "study", "batches", "api"),
     ("cli", "__main__"),
 )
 """Rooms of hairkit, lowest floor first. A room may use its own floor and those below."""

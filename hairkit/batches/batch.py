@@ -1,0 +1,120 @@
+"""Reconstruct many captures and yield what becomes of each, as it comes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from hairkit.batches.jobs import Job, Result, Settings, find_jobs, finished, job_digest, part_of
+from hairkit.batches.pool import LocalPool, Watcher
+from hairkit.batches.run_job import JobLimits
+from hairkit.errors import InputError
+from hairkit.manager import Manager
+
+GIB = 2**30
+"""Bytes of a GiB."""
+
+
+def batch(
+    captures: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    recipe: str | os.PathLike[str] = "default",
+    *,
+    settings: Mapping[str, Any] | Settings | None = None,
+    only: Sequence[str] = (),
+    part: str | None = None,
+    workers: int | None = None,
+    threads: int | None = None,
+    memory_gib: float | None = None,
+    capture_memory_gib: float | None = None,
+    seconds: float = 3600.0,
+    retries: int = 2,
+    client: Any = None,
+    watcher: Watcher | None = None,
+) -> Iterator[Result]:
+    """Reconstruct every capture in a folder: `for result in hairkit.batch("captures/", "out/")`.
+
+    What an earlier batch made of the same photos with the same settings and plugins is kept.
+
+    Parameters
+    ----------
+    captures
+        Folder with one folder of photos, or one video, for each capture.
+    out
+        Folder for the results, one folder a capture, as `reconstruct` writes them.
+    recipe
+        A shipped recipe's name, or a `.toml` file.
+    settings
+        More of `hairkit.batches.jobs.Settings`: `{"guides": 8000, "settings": ["head=none"]}`.
+    only, part
+        Names of the captures to do; every N-th from the K-th on, "K/N", for job arrays of farms.
+    workers, threads
+        Captures done at the same time (default: a worker a core), and threads of each (default:
+        the cores that each worker has).
+    memory_gib
+        What all workers together may take; by default most of the memory that is free.
+    capture_memory_gib, seconds, retries
+        Limits of one capture; how often it is tried again after a crash.
+    client
+        A `distributed.Client`, whose workers do the captures in the place of this machine's.
+    watcher
+        Hears what happens.
+
+    Raises
+    ------
+    HairkitError
+        No capture can be done at all: recipe, plugins or folders are at fault. What goes wrong with
+        one capture is its result's `error`.
+    """
+    given = settings if isinstance(settings, Settings) else Settings(**settings or {})
+    shared = replace(given, recipe=os.fspath(recipe)) if recipe != "default" else given
+    cores = _core_count()
+    count = workers or cores
+    for name, value in (("workers", count), ("threads", threads or 1), ("seconds", seconds)):
+        if not value > 0:
+            raise InputError(f"{name} is {value}, expected more than 0")
+    jobs = find_jobs(captures, out, only)
+    jobs = part_of(jobs, part) if part is not None else jobs
+    digest = shared.digest(Manager.loaded(shared.plugin_files))
+    limits = JobLimits(seconds, _bytes(capture_memory_gib), retries)
+    budget = _bytes(memory_gib)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    if client is not None:
+        from hairkit.batches.dask_pool import DaskPool
+
+        pool: Any = DaskPool(client, limits, threads=threads or 1)
+    else:
+        each = threads or max(1, cores // count)
+        pool = LocalPool(count, limits, threads=each, budget_bytes=budget)
+    return _results(jobs, shared, digest, pool, watcher)
+
+
+def _results(
+    jobs: Sequence[Job], settings: Settings, digest: str, pool: Any, watcher: Watcher | None
+) -> Iterator[Result]:
+    """Yield what is there already, then what the pool makes."""
+    missing = []
+    for job in jobs:
+        own = job_digest(job, digest)
+        kept = finished(job, own)
+        if kept is not None:
+            yield kept
+        else:
+            missing.append((job, own))
+    if missing:
+        yield from pool.run(missing, settings, watcher)
+
+
+def _core_count() -> int:
+    """Return the number of cores that this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity is not None else os.cpu_count() or 1
+
+
+def _bytes(gib: float | None) -> int | None:
+    if gib is not None and not gib > 0:
+        raise InputError(f"{gib} GiB of memory, expected more than 0")
+    return None if gib is None else int(gib * GIB)

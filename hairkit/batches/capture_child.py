@@ -1,0 +1,177 @@
+"""The process that reconstructs one capture after the other, asked by `run_job`.
+
+It answers `{"do": "capture", "job": {...}, "settings": {...}, "digest": "..."}` by the result, and
+tells each stage that begins. It ends when its stdin does, so that nothing is left of a batch that
+was killed.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import resource
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hairkit import worker
+from hairkit.errors import HairkitError
+
+if TYPE_CHECKING:
+    from hairkit.batches.jobs import Job, Settings
+    from hairkit.manager import Manager
+
+THUMBNAIL = "thumbnail.jpg"
+THUMBNAIL_EDGE, THUMBNAIL_QUALITY = 320, 80
+"""Long edge in pixels and JPEG quality of the picture in the report: about 15 KB."""
+_RSS_UNIT = 1 if sys.platform == "darwin" else 1024
+"""Bytes in which the system counts the peak memory of a process."""
+
+
+def main() -> None:
+    """Answer until stdin ends; nothing heavy is loaded before the first question."""
+    worker.answer_questions({"capture": capture})
+
+
+def capture(question: dict[str, Any], tell: Callable[[Any], None]) -> dict[str, Any]:
+    """Return the result of one capture as JSON, a failure's, too."""
+    from hairkit.batches.jobs import FAILED, Job, Result, Settings
+
+    job, settings = Job(**question["job"]), Settings(**question["settings"])
+    began, used = time.perf_counter(), time.process_time()
+    try:
+        made = _reconstruct(job, settings, tell)
+        result = Result(job.name, **made, **_taken(began, used), digest=question["digest"])
+        result.write()
+    except (HairkitError, OSError, MemoryError) as error:
+        line = explain(error)
+        result = Result(job.name, FAILED, job.out, error=line, **_taken(began, used))
+    return asdict(result)
+
+
+def explain(error: BaseException) -> str:
+    """Return one line about an error that the user can mend."""
+    if isinstance(error, MemoryError):
+        return "out of memory; give the batch fewer workers or smaller pictures"
+    if isinstance(error, OSError) and not isinstance(error, HairkitError):
+        named = f"{error.filename}: " if error.filename is not None else ""
+        cure = "; free some space and run the batch again" if error.errno == errno.ENOSPC else ""
+        return f"{named}{error.strerror or error}{cure}"
+    return " ".join(str(error).split())
+
+
+def _reconstruct(job: Job, settings: Settings, tell: Callable[[Any], None]) -> dict[str, Any]:
+    from hairkit.batches.jobs import DONE
+    from hairkit.io.capture_reader import WORKING_EDGE, read_capture
+    from hairkit.pipeline.recipe import load_recipe
+    from hairkit.pipeline.reconstruct import reconstruct
+    from hairkit.pipeline.run_record import RECORD, read_record
+
+    _use_few_threads()
+    given = read_capture(job.photos, settings.max_edge or WORKING_EDGE)
+    recipe = load_recipe(settings.recipe).with_set([*given.chosen.settings, *settings.settings])
+    groom = reconstruct(
+        given,
+        job.out,
+        recipe,
+        _manager(settings.plugin_files),
+        guides=settings.guides,
+        seed=settings.seed,
+        progress=_Told(tell),
+        sheet=settings.sheet,
+    )
+    record = read_record(Path(job.out) / RECORD)
+    return {
+        "state": DONE,
+        "out": job.out,
+        "strands": len(groom.strands),
+        "thumbnail": _draw_thumbnail(job, given.views[0].image),
+        "stages": {stage.stage: stage.seconds for stage in record.stages if not stage.reused},
+        "health": tuple(asdict(figure) for figure in record.health),
+        "scores": _scores(job) if settings.scores else {},
+    }
+
+
+def _taken(began: float, used: float) -> dict[str, Any]:
+    return {
+        "seconds": round(time.perf_counter() - began, 3),
+        "processor_seconds": round(time.process_time() - used, 3),
+        "peak_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _RSS_UNIT,
+    }
+
+
+@cache
+def _manager(plugin_files: tuple[str, ...]) -> Manager:
+    from hairkit.manager import Manager
+
+    return Manager.loaded(plugin_files)
+
+
+def _use_few_threads() -> None:
+    """Let OpenCV use as many threads as Numba, which reads its number from the environment."""
+    import cv2
+
+    from hairkit.parallel import thread_count
+
+    cv2.setNumThreads(thread_count())
+
+
+def _draw_thumbnail(job: Job, photo: Any) -> str:
+    """Write a small picture: of the contact sheet, else of the first photo; return its name."""
+    import cv2
+
+    from hairkit.pipeline.reconstruct import SHEET
+    from hairkit.storage import read_bytes, write_bytes
+
+    sheet = Path(job.out) / SHEET
+    picture = photo[..., ::-1]
+    if sheet.is_file():
+        import numpy as np
+
+        data = np.frombuffer(read_bytes(sheet), np.uint8)
+        picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    scale = THUMBNAIL_EDGE / max(picture.shape[:2])
+    small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    quality = [cv2.IMWRITE_JPEG_QUALITY, THUMBNAIL_QUALITY]
+    write_bytes(Path(job.out) / THUMBNAIL, cv2.imencode(".jpg", small, quality)[1].tobytes())
+    return THUMBNAIL
+
+
+def _scores(job: Job) -> Mapping[str, float]:
+    """Return F of all strands at each threshold, where the truth is known."""
+    truth = Path(job.photos) / "truth"
+    if not truth.is_dir():
+        return {}
+    from hairkit.evaluation import evaluate, read_prediction, read_truth
+
+    found = evaluate(read_prediction(job.out), read_truth(truth))
+    values = {f"F {s.distance_mm:g} mm/{s.angle_deg:g} deg": s.f for s in found.scores.all}
+    return {name: round(float(value), 4) for name, value in values.items()}
+
+
+class _Told:
+    """Progress that tells the other side which stage has begun."""
+
+    def __init__(self, tell: Callable[[Any], None]) -> None:
+        self._tell = tell
+
+    def started(self, stage: str, steps: int) -> None:
+        self._tell(stage)
+
+    def stepped(self, stage: str) -> None:
+        pass
+
+    def finished(self, stage: str, seconds: float, reused: bool) -> None:
+        pass
+
+    def message(self, text: str) -> None:
+        pass
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
+    main()

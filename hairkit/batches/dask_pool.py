@@ -1,0 +1,151 @@
+"""Jobs on the workers of Dask: one process on this machine's cores, or a cluster's.
+
+A Dask worker gives each job to a process of hairkit's own, with its limits, so that no capture can
+harm the worker. A worker that is lost has its jobs given to others by Dask's scheduler.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import queue
+import threading
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from hairkit.batches.jobs import FAILED, Job, Result, Settings
+from hairkit.batches.pool import Silence, Watcher
+from hairkit.batches.run_job import COMMAND, JobLimits, run_job, start_child
+from hairkit.child_process import ChildProcess
+from hairkit.errors import HairkitError, MissingExtraError
+
+POLL_S = 0.5
+"""Seconds between two looks at whether the scheduler is there."""
+CONNECTING_S = 30.0
+"""Seconds in which a scheduler must answer."""
+LOST_WORKERS = 10
+"""Workers that may be lost with a job before Dask gives it up: its own 3 are meant for jobs that
+kill their workers, which these cannot."""
+_own = threading.local()
+
+
+class SchedulerLostError(HairkitError):
+    """The connection to the scheduler is gone; what is done is on disk."""
+
+
+class DaskPool:
+    """The workers that a Dask client knows."""
+
+    def __init__(
+        self,
+        client: Any,
+        limits: JobLimits,
+        *,
+        threads: int = 1,
+        command: Sequence[str] = COMMAND,
+    ) -> None:
+        self._client = client
+        self._limits = limits
+        self._threads = threads
+        self._command = tuple(command)
+        self._futures: list[Any] = []
+
+    def run(
+        self,
+        jobs: Sequence[tuple[Job, str]],
+        settings: Settings,
+        watcher: Watcher | None = None,
+    ) -> Iterator[Result]:
+        """Yield results as they come; raises `SchedulerLostError` when the scheduler is gone."""
+        watcher = watcher or Silence()
+        jobs_of, ended = {}, queue.SimpleQueue[Any]()
+        try:
+            for job, digest in jobs:
+                future = self._client.submit(
+                    _do, job, settings, digest, self._limits, self._threads, self._command,
+                    key=f"{job.name}-{digest}", pure=False,
+                )  # fmt: skip
+                jobs_of[future.key] = job
+                watcher.started(job.name)
+                future.add_done_callback(ended.put)
+                self._futures.append(future)
+            for _ in jobs:
+                future = self._next(ended)
+                yield self._result(future, jobs_of[future.key])
+        finally:
+            with contextlib.suppress(Exception):  # a scheduler that is gone cannot cancel either
+                self._client.cancel(self._futures, force=True)
+            self._futures.clear()
+
+    def _next(self, ended: queue.SimpleQueue[Any]) -> Any:
+        """Return the next future that has ended; raises when the scheduler does not answer."""
+        while True:
+            with contextlib.suppress(queue.Empty):
+                future = ended.get(timeout=POLL_S)
+                if future.status in ("finished", "error"):
+                    return future
+            if self._client.status != "running":
+                raise SchedulerLostError(
+                    "the Dask scheduler is gone; run the batch again, it does what is missing"
+                )
+
+    def _result(self, future: Any, job: Job) -> Result:
+        """Return what a future holds; a job whose workers were all lost has failed."""
+        error = future.exception()
+        if error is None:
+            result: Result = future.result()
+            return result
+        if isinstance(error, _distributed().KilledWorker):
+            reason = f"the workers that had it were lost {LOST_WORKERS} times"
+            return Result(job.name, FAILED, job.out, error=reason)
+        line = " ".join(f"{type(error).__name__}: {error}".split())
+        return Result(job.name, FAILED, job.out, error=line)
+
+
+def local_client(workers: int) -> Any:
+    """Return a client of a new cluster on this machine, each worker a process with one job."""
+    distributed = _distributed()
+    cluster = distributed.LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        processes=True,
+        memory_limit=0,  # jobs are limited themselves
+        dashboard_address="127.0.0.1:0",
+    )
+    return distributed.Client(cluster)
+
+
+def connect(address: str) -> Any:
+    """Return a client of a scheduler: `tcp://10.0.0.1:8786`."""
+    distributed = _distributed()
+    try:
+        return distributed.Client(address, timeout=CONNECTING_S)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise HairkitError(f"{address}: no Dask scheduler answers ({error})") from error
+
+
+def _distributed() -> Any:
+    """Return the module `distributed`, its scheduler told how many workers may be lost."""
+    try:
+        dask = importlib.import_module("dask")
+        distributed = importlib.import_module("distributed")
+    except ImportError as error:
+        raise MissingExtraError("Dask is not installed; pip install 'hairkit[batch]'") from error
+    dask.config.set({"distributed.scheduler.allowed-failures": LOST_WORKERS})
+    return distributed
+
+
+def _do(
+    job: Job,
+    settings: Settings,
+    digest: str,
+    limits: JobLimits,
+    threads: int,
+    command: tuple[str, ...],
+) -> Result:
+    """Run a job on a worker of Dask, in the process that its thread keeps."""
+    child: ChildProcess | None = getattr(_own, "child", None)
+    if child is None or _own.kind != (threads, command):
+        _own.child = child = start_child(threads, command)
+        _own.kind = (threads, command)
+    return run_job(child, job, settings, digest, limits)
