@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import asdict
 from typing import Any
 
 from hairkit.cli.format_table import format_table
+from hairkit.errors import InputError
 from hairkit.manager import STAGES, Manager, PluginInfo
 from hairkit.options import OptionInfo
 
@@ -14,8 +16,9 @@ _DESCRIPTION = """\
 Example: hairkit plugins gabor
 
 List the installed plugins by stage, or describe one: its distribution, what it does, and its
-options with their defaults and bounds. --formats prints what each file format carries, as a
-Markdown table."""
+options with their defaults and bounds. --check tries it on a made-up head: contract, options,
+texts, time, memory, and whether two calls give the same; exit code 2 where something fails.
+--formats prints what each file format carries, as a Markdown table."""
 
 
 def register(subparsers: Any) -> None:
@@ -25,6 +28,7 @@ def register(subparsers: Any) -> None:
     parser.add_argument(
         "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
     )
+    parser.add_argument("--check", action="store_true", help="try the plugin on a made-up head")
     parser.add_argument("--formats", action="store_true", help="print the table of file formats")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -35,13 +39,30 @@ def run(args: argparse.Namespace) -> int:
     if args.formats:
         print(format_table(manager))
         return 0
+    if args.check and (args.name is None or args.name in STAGES):
+        raise InputError("--check tries one plugin; name it: hairkit plugins gabor --check")
     if args.name is None or args.name in STAGES:
         wanted = [i for i in manager.plugins() if args.name is None or args.name in i.stages]
         print(_as_json(wanted) if args.json else _listing(wanted))
         return 0
+    if args.check:
+        return _check(manager, args.name, as_json=args.json)
     info = manager.info(args.name)
     print(_as_json([info]) if args.json else _details(info))
     return 2 if info.broken else 0
+
+
+def _check(manager: Manager, name: str, *, as_json: bool) -> int:
+    """Print what is found about a plugin."""
+    from hairkit.manager.plugin_check import check_plugin
+
+    checks = list(check_plugin(manager, name))
+    if as_json:
+        print(json.dumps([asdict(check) for check in checks], indent=1))
+    else:
+        rows = [(("ok" if c.passed else "FAILS"), c.name, c.said) for c in checks]
+        print("\n".join(f"{state:<6} {name:<22} {said}" for state, name, said in rows))
+    return 0 if all(check.passed for check in checks) else 2
 
 
 def _listing(infos: list[PluginInfo]) -> str:

@@ -4,6 +4,8 @@
 * `loading`: installed plugins and plugin files, and what they must look like.
 * `results`: what each stage must return; the one table of checks.
 * `command_plugin`: a plugin in an environment of its own
+* `manifest`: plugins on shared drives, described by files that are read without running them
+* `plugin_check`: a plugin tried on the made-up head
 * `guard`: errors of plugins name the plugin; what plugins print does not reach stdout.
 """
 

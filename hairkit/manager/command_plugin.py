@@ -134,7 +134,7 @@ class CommandPlugin:
         self.digest = str(told["digest"])
         """Digest of its sources and of the files that it names."""
         if told["options"]:
-            self.Options = _options_of(told["options"])
+            self.Options = options_of(told["options"])
         possible = [hook for hook in RESULTS if hook not in IN_PROCESS_ONLY]
         for hook, parameters in told["hooks"].items():
             if hook not in possible:
@@ -257,7 +257,7 @@ def _flat(tree: Any, place: str) -> dict[str, Any]:
     return {name: value for part in parts for name, value in part.items()}
 
 
-def _options_of(described: Mapping[str, Mapping[str, Any]]) -> type:
+def options_of(described: Mapping[str, Mapping[str, Any]]) -> type:
     """Return the `Options` of a plugin from the descriptions of its worker."""
     fields: list[tuple[str, Any, Any]] = []
     for name, given in described.items():

@@ -21,6 +21,7 @@ from hairkit import hookspecs
 from hairkit.errors import PluginError
 from hairkit.io.file_format import FileFormat
 from hairkit.manager.command_plugin import PluginCommand
+from hairkit.manager.manifest import check_hookspec
 from hairkit.manager.results import STAGES
 from hairkit.nets.known_models import known_model
 from hairkit.options import OptionInfo, describe, make_options, unknown_name
@@ -111,6 +112,8 @@ def inspect_plugin(plugin: object, name: str, distribution: str, version: str) -
     """Return what is known about a plugin; raises `PluginError` when it breaks the contract."""
     if not name.replace("-", "_").isidentifier() or name == NO_PLUGIN:
         raise PluginError(f"its name is {name!r}, expected letters, digits, - and _; rename it")
+    if hasattr(plugin, "HOOKSPEC"):
+        check_hookspec(plugin.HOOKSPEC)
     hash(plugin)  # pluggy keeps plugins in sets
     form = getattr(plugin, "FORMAT", None)
     if form is not None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib.metadata
 import logging
 import os
+import threading
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -28,6 +29,7 @@ from hairkit.manager.loading import (
     import_file,
     inspect_plugin,
 )
+from hairkit.manager.manifest import Manifest, find_manifests
 from hairkit.manager.results import Call, check_result
 from hairkit.options import make_options, unknown_name
 from hairkit.types.finding import Finding
@@ -44,6 +46,8 @@ class Manager:
         self._pluggy.add_hookspecs(hookspecs)
         self._infos: dict[str, PluginInfo] = {}
         self._clashes: list[PluginInfo] = []
+        self._asleep: dict[str, Manifest] = {}
+        self._waking = threading.RLock()
 
     @classmethod
     def loaded(
@@ -57,7 +61,7 @@ class Manager:
     def load(
         self, plugin_files: Sequence[str | os.PathLike[str]] = (), *, autoload: bool = True
     ) -> None:
-        """Load installed plugins, then plugin files.
+        """Load installed plugins, note those of `HAIRKIT_PLUGIN_PATH`, load plugin files.
 
         Parameters
         ----------
@@ -76,6 +80,8 @@ class Manager:
         for distribution, version, entry in entry_points():
             if distribution == hookspecs.PROJECT or not own_only:
                 self._load_entry_point(entry, distribution, version)
+        for manifest in () if own_only else find_manifests():
+            self._add_manifest(manifest)
         for file in plugin_files:
             self._load_file(Path(file))
 
@@ -135,6 +141,7 @@ class Manager:
 
     def implementer(self, stage: str, name: str) -> PluginInfo:
         """Return the working plugin `name` that implements `stage`, or raise `PluginError`."""
+        self._wake(name)
         info = self._infos.get(name)
         if info is not None and info.broken:
             raise PluginError(f"{info} is broken: {info.broken}")
@@ -150,6 +157,7 @@ class Manager:
 
         Raises `OptionError`, its text starting with `where` (the plugin's name by default).
         """
+        self._wake(name)
         kind, place = getattr(self._pluggy.get_plugin(name), "Options", None), where or name
         if kind is None and values:
             raise OptionError(f"{place}: no option {next(iter(values))!r}; it has none")
@@ -282,6 +290,45 @@ class Manager:
                 self._clashes.append(broken)
             else:
                 self._infos[entry.name] = broken
+
+    def _add_manifest(self, manifest: Manifest) -> None:
+        """Note a plugin that is described by a file; its code is loaded when it is first used."""
+        info = PluginInfo(
+            manifest.name, str(manifest.path), manifest.version, manifest.summary,
+            manifest.stages, options=manifest.options, broken=manifest.broken,
+        )  # fmt: skip
+        if manifest.name in self._infos:
+            taken = self._infos[manifest.name].origin
+            reason = f"a plugin named {manifest.name!r} is already loaded from {taken}; rename one"
+            self._clashes.append(replace(info, broken=manifest.broken or reason))
+            return
+        self._infos[manifest.name] = info
+        if manifest.broken is None:
+            self._asleep[manifest.name] = manifest
+
+    def _wake(self, name: str) -> None:
+        """Load a plugin that was only described so far; one that is not as described is broken."""
+        with self._waking:
+            manifest = self._asleep.pop(name, None)
+            if manifest is None:
+                return
+            described = self._infos.pop(name)
+            try:
+                with quiet_stdout():
+                    if manifest.command is not None:
+                        self.add_command(manifest.command)
+                    elif manifest.module is not None:
+                        module = import_file(manifest.module)
+                        self.register(module, name, described.distribution, manifest.version)
+                missing = set(described.stages) - set(self._infos[name].stages)
+                if missing:
+                    self._infos.pop(name)
+                    self._pluggy.unregister(name=name)
+                    raise PluginError(f"its code has no {', '.join(sorted(missing))}")
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # a plugin may do anything while it is imported
+                self._infos[name] = replace(described, broken=_reason(error))
 
     def _load_file(self, path: Path) -> None:
         if not path.is_file():
