@@ -47,7 +47,7 @@ void apply_friction(int k) {
         vec3 relative = speed[j] - drift(k, place[j]);
         vec3 brake = friction_part(j, relative - dot(relative, normal[j]) * normal[j]);
         speed[j] -= brake;
-        place[j] -= u_seconds * brake;
+        place[j] -= 0.5 * u_seconds * brake;
     }
 }
 
@@ -55,7 +55,8 @@ void apply_friction(int k) {
 // node may have moved by its distance at the last lookup.
 vec3 contact_normal(int k, int j) {
     vec3 p = place[j], relative = speed[j] - drift(k, p), way = vec3(0.0);
-    float clear = rates(j).z, left = slack[j] - FURTHER * u_seconds * length(relative);
+    float clear = rates(j).z, left = slack[j];
+    left -= FURTHER * u_seconds * length(relative - 0.5 * u_seconds * gain[j]);  // its mean velocity
     if (left <= 0.0) {
         left = obstacle_distance(p, clear, way) - clear;
         float across = dot(relative, way), inward = max(-across, 0.0);
@@ -65,7 +66,7 @@ vec3 contact_normal(int k, int j) {
             grip[j] = u_friction * inward;
             vec3 brake = friction_part(j, relative - across * way);
             speed[j] += inward * way - brake;
-            place[j] += depth * way - u_seconds * brake;
+            place[j] += depth * way - 0.5 * u_seconds * brake;
         } else {
             way = vec3(0.0);
         }

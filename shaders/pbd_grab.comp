@@ -17,7 +17,7 @@ uniform int u_step;
 uniform float u_seconds;   // of a substep
 uniform float u_speed;     // m/s, of the fastest pull
 uniform vec4 u_back[3];    // rows of the motion from the world to the head axes after the substep
-uniform float u_softest, u_learnt, u_kept, u_most, u_strongest, u_taut;
+uniform float u_softest, u_learnt, u_kept, u_most, u_strongest, u_taut, u_ahead;
 const int MANY = 64;
 const float LEAST_SIZE = 1e-30;
 
@@ -95,8 +95,10 @@ vec3 pull(int i, mat3 stiff, float free) {
     int node = grabs[i].node;
     vec4 target = vec4(grabs[i].target[0], grabs[i].target[1], grabs[i].target[2], 1.0);
     target.xyz = rows(u_back[0], u_back[1], u_back[2], target);
-    vec3 wanted = reachable(target.xyz, grabs[i].rod, node) - expected[node];
-    wanted = clamp_length(wanted, u_speed * u_seconds);
+    vec3 away = reachable(target.xyz, grabs[i].rod, node) - carried_place;
+    // at the target a substep later: a change of place goes on as one of velocity
+    vec3 wanted = clamp_length(away, 2.0 * u_speed * u_seconds) - 2.0 * (expected[node] - carried_place);
+    wanted /= u_ahead;
     Learnt before = known[i];
     vec3 missed = before.hoped.w * (before.hoped.xyz - carried_place);
     vec3 standing = u_kept * before.standing.xyz + u_learnt / free * clamp_length(missed, u_most);

@@ -2,7 +2,8 @@
 // follow below. NODES is a #define of the host program.
 // Software renderers read textures many times faster than buffers.
 const int SEGMENTS = NODES - 1;
-const int STATE_ROWS = 2 * NODES + SEGMENTS;  // place and slack, velocity of nodes; frames (x, y, z, w)
+// Place and slack, velocity of nodes; frames (x, y, z, w); acceleration of nodes.
+const int GAIN_ROW = 2 * NODES + SEGMENTS, STATE_ROWS = GAIN_ROW + NODES;
 layout(local_size_x = 64) in;
 
 // Global index of this invocation; work groups beyond the limit of x continue along y.

@@ -8,7 +8,9 @@
 #include "pbd_substep_schedule.glsl"
 
 const float SHARPEST = 0.3, LARGEST_SPIN = 0.3, SOFTEST = 1e-3, SINGULAR = 1e-6;
-const float FASTEST_TURN = 1.0, TINY = 1e-20;
+const float FASTEST_TURN = 1.0, TINY = 1e-20, FASTEST_CHANGE = 500.0;
+// Weights of the new acceleration in the velocity, and of the old one in velocity and place.
+const float IMPLICIT = 2.0 / 3.0, PASSED = 1.0 - IMPLICIT, DRIFT = 0.5 - IMPLICIT * IMPLICIT;
 
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
 uniform sampler2D u_wind;      // of each node, world, m/s
@@ -26,8 +28,9 @@ uniform int u_rounds;             // friction iterations under the strands' tens
 uniform float u_fastest;       // m/s
 
 int rod;
-vec3 place[NODE_ROOM], speed[NODE_ROOM], force[NODE_ROOM], solved[NODE_ROOM];
+vec3 place[NODE_ROOM], speed[NODE_ROOM], gain[NODE_ROOM], force[NODE_ROOM], solved[NODE_ROOM];
 vec3 free[NODE_ROOM];          // the solution without lengths
+vec3 held_back;                // force of the root's acceleration on the next node
 float slack[NODE_ROOM];
 vec4 frame[SEGMENT_ROOM];
 vec3 edge[SEGMENT_ROOM], direction[SEGMENT_ROOM];
@@ -52,17 +55,30 @@ vec3 drift(int k, vec3 p) {
 // Transform a node to the new axes, extrapolate it, and sum the forces on it.
 void predict(int k, int j) {
     vec4 rest = rest_and_mass(j), rate = rates(j);
-    vec3 p = to_new_axes(k, vec4(place[j], 1.0));
-    vec3 u = j == 0 ? (rest.xyz - p) / u_seconds : to_new_axes(k, vec4(speed[j], 0.0));
-    p += u_seconds * u;
+    vec3 p = to_new_axes(k, vec4(place[j], 1.0)), u = to_new_axes(k, vec4(speed[j], 0.0));
+    vec3 a = to_new_axes(k, vec4(gain[j], 0.0));
+    if (j == 0) {  // the root goes with the head
+        speed[0] = (rest.xyz - p) / u_seconds;
+        gain[0] = (speed[0] - u) / u_seconds;
+        // the inertia between it and the next node, a sixth of the segment's mass, is a third of its own
+        held_back = rest.w / (3.0 * IMPLICIT) * (gain[0] - PASSED * a);
+        place[0] = rest.xyz;
+        force[0] = vec3(0.0);
+        return;
+    }
+    p += u_seconds * (u + DRIFT * u_seconds * a);
+    a *= PASSED;
+    u += u_seconds * a;
     vec4 wind = vec4(u_gusts ? texelFetch(u_wind, texel(rod, j, NODES), 0).xyz : u_air, 0.0);
     vec3 drawn = rows(steps[k].air[0], steps[k].air[1], steps[k].air[2], wind) - u;
     vec3 gravity = vec3(steps[k].air[0].w, steps[k].air[1].w, steps[k].air[2].w);
     force[j] = rest.w * (gravity + rate.x * drawn + u_damping * (drift(k, p) - u)
                          + rate.y * (rest.xyz - p));
     if (u_forced) force[j] += texelFetch(u_force, texel(rod, j, NODES), 0).xyz;
+    if (j == 1) force[1] -= held_back;
     place[j] = p;
     speed[j] = u;
+    gain[j] = a;
 }
 
 // Solve the tridiagonal system that `pivot`, `beside` (j - 1 and j) and `value` hold.
@@ -184,10 +200,12 @@ void go_on() {
             before = after;
         }
     }
-    for (int j = 0; j < EACH_NODE; j++) {  // both are 0 at the root
-        vec3 change = free[j] - solved[j];
+    for (int j = 1; j < EACH_NODE; j++) {
+        vec3 change = free[j] - solved[j], added = change / (IMPLICIT * u_seconds);
         place[j] += change;
-        speed[j] += change / u_seconds;
+        speed[j] += added;
+        gain[j] += added / u_seconds;
+        gain[j] *= min(FASTEST_CHANGE / sqrt(dot(gain[j], gain[j]) + TINY), 1.0);
     }
 }
 
@@ -214,6 +232,7 @@ void main() {
         place[j] = at.xyz;
         slack[j] = at.w;
         speed[j] = node_speed(rod, j).xyz;
+        gain[j] = state(rod, GAIN_ROW + j).xyz;
     }
     for (int j = 0; j < EACH_SEGMENT; j++) frame[j] = segment_frame(rod, j);
     for (int k = u_first; k < u_first + u_substeps; k++) {
@@ -232,6 +251,7 @@ void main() {
     for (int j = 0; j < EACH_NODE; j++) {
         imageStore(u_new_state, texel(rod, 2 * j, STATE_ROWS), vec4(place[j], slack[j]));
         imageStore(u_new_state, texel(rod, 2 * j + 1, STATE_ROWS), vec4(speed[j], 0.0));
+        imageStore(u_new_state, texel(rod, GAIN_ROW + j, STATE_ROWS), vec4(gain[j], 0.0));
     }
     for (int j = 0; j < EACH_SEGMENT; j++)
         imageStore(u_new_state, texel(rod, 2 * NODES + j, STATE_ROWS), frame[j]);

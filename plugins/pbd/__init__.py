@@ -1,13 +1,14 @@
 """Implicit Cosserat rods with direct length constraints: inextensible guides with contact.
 
 Each guide is a discrete Cosserat rod with orientations (Kugelstadt and Schoemer 2016). A substep is
-implicit Euler: one banded system for bending, drag and the pull to the captured shape, and one
-direct solve for all segment lengths of a strand (after Han and Harada 2013, here with the metric of
-the implicit system). Stiffness depends neither on iterations nor on the frame rate. The natural
-shape comes from inverse statics, so that captured hair stays in place under gravity. Despite the
-plugin's name this is not position-based dynamics.
+implicit and of second order: one banded system for bending, drag and the pull to the captured
+shape, and one direct solve for all segment lengths of a strand (after Han and Harada 2013, here
+with the metric of the implicit system). Stiffness depends neither on iterations nor on the frame
+rate. The natural shape comes from inverse statics, so that captured hair stays in place under
+gravity. Despite the plugin's name this is not position-based dynamics.
 
 * `backend`: what all backends provide
+* `drawn_points`: the guides' own points on the rods
 * `energies`: stretch and elastic energy
 * `factor_layout`: the factorised matrix in the order of the float32 backends
 * `gl_backend`: substeps in compute shaders

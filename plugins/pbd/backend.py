@@ -9,9 +9,10 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 
+from .drawn_points import draw_points
 from .hair_grid import HairGrid
 from .linear_system import System
-from .reference import Contact, Load, State, draw_points, rest_state, substep, transform_points
+from .reference import Contact, Load, State, rest_state, substep, transform_points
 from .resampling import Embedding
 from .rods import Rods
 

@@ -58,15 +58,17 @@ class ComputeEngine:
         """The present state, read back; setting it moves the rods and releases grabbed points."""
         with renderer():
             rows = self._store.rods("u_state")
-        ends = 2 * self._nodes
-        return State(rows[:, 0:ends:2, :3], rows[:, 1:ends:2, :3], _quaternions(rows[:, ends:]))
+        ends, gain = 2 * self._nodes, 3 * self._nodes - 1
+        frames = _quaternions(rows[:, ends:gain])
+        return State(rows[:, 0:ends:2, :3], rows[:, 1:ends:2, :3], frames, rows[:, gain:, :3])
 
     @state.setter
     def state(self, value: State) -> None:
-        ends = 2 * self._nodes
-        rows = np.zeros((self._count, 3 * self._nodes - 1, 4), np.float32)
+        ends, gain = 2 * self._nodes, 3 * self._nodes - 1
+        rows = np.zeros((self._count, gain + self._nodes, 4), np.float32)
         rows[:, 0:ends:2, :3], rows[:, 1:ends:2, :3] = value.position, value.velocity
-        rows[:, ends:] = np.roll(value.frames, -1, axis=-1)
+        rows[:, ends:gain] = np.roll(value.frames, -1, axis=-1)
+        rows[:, gain:, :3] = value.acceleration
         with renderer():
             self._store.put_rods("u_state", rows)
         self._held.clear()
@@ -131,7 +133,7 @@ class ComputeEngine:
 
     def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
         """Return places and velocities (n, 3) of one rod, head axes."""
-        ends, rows = 2 * self._nodes, 3 * self._nodes - 1
+        ends, rows = 2 * self._nodes, 4 * self._nodes - 1
         with renderer():
             self._store.make_words("one", 4 * rows)
             self._store.read_by("one")

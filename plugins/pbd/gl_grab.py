@@ -11,7 +11,7 @@ from hairkit.arrays import Float64Array, Int64Array
 from hairkit.simulation import Grab
 
 from .gl_buffers import Store
-from .grab import KEPT, LEARNT, MOST, SOFTEST, STRONGEST, TAUT
+from .grab import AHEAD, KEPT, LEARNT, MOST, SOFTEST, STRONGEST, TAUT
 from .resampling import Embedding
 
 
@@ -64,6 +64,7 @@ class GpuGrabs:
             "u_seconds": seconds,
             "u_speed": self._speed,
             "u_back": [tuple(row) for row in self._back[:3]],
+            "u_ahead": AHEAD,
             "u_softest": SOFTEST,
             "u_learnt": LEARNT,
             "u_kept": KEPT,

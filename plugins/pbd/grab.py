@@ -1,4 +1,4 @@
-"""Forces on grabbed points that bring their nodes to the targets within one substep."""
+"""Forces on grabbed points that bring their nodes to the targets within two substeps."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from .rods import Rods
 
 SOFTEST = 0.3
 """Compliance added, as a share of a free node's: limits the force along a taut strand."""
-LEARNT, KEPT = 0.3, 0.99
+LEARNT, KEPT = 0.15, 0.99
 """Gain of the integral term on the remaining error, and its decay in a substep."""
 MOST = 0.005
 """Largest error that the integral term sees in a substep, metres: anti-windup."""
 STRONGEST = 1.5
 """Largest force over the one that accelerates a free node to full speed in a substep."""
+AHEAD = 2.0
+"""Divides what is missing two substeps ahead: a free node needs `1 + 1 / IMPLICIT`; from 1.3 on
+down a held tip jitters."""
 TAUT = 0.999
 """Largest distance of a target from the root, as a share of the strand's length."""
 
@@ -55,13 +58,16 @@ class GrabForces:
             node = max(int(embedding.segment[grab.point] + (embedding.share[grab.point] >= 0.5)), 1)
             place, velocity = engine.rod(rod)
             carried = transform_points(load.head_step, place)
-            expected = carried + system.step * velocity @ load.head_step[:3, :3].T
+            way = system.step * velocity @ load.head_step[:3, :3].T
+            expected = carried + way
             target = _reachable(
                 transform_points(back, np.asarray(grab.target, np.float64)), rods, rod, node
             )
-            wanted = target - expected[node]
-            far = float(np.linalg.norm(wanted))
-            wanted *= min(1.0, speed * system.step / max(far, 1e-12))
+            far = float(np.linalg.norm(target - carried[node]))
+            share = min(1.0, 2 * speed * system.step / max(far, 1e-12))
+            # at the target a substep later: a change of place goes on as one of velocity
+            ahead = share * (target - carried[node]) - 2 * way[node]
+            wanted = ahead / AHEAD
             stiff = np.linalg.inv(_compliance(system, expected, rod, node))
             standing, hoped = self._held.get(grab.point, (np.zeros(3), carried[node]))
             short = hoped - carried[node]

@@ -18,13 +18,13 @@ from .simd_math import (
     trilinear,
 )
 
-PLACE, SPEED, SLACK = 0, 3, 6
+PLACE, SPEED, SLACK, GAIN = 0, 3, 6, 7
 LENGTH, CLEAR, EASE = 0, 6, 7
 START, END = 0, 3
 GRIP, PRESS, PRESS_NEXT, LINES = 5, 6, 7, 8
 """Rows of `line`, and their number: the largest change of a node's velocity by friction, and how
 far a segment's pull presses the nodes at its ends into the obstacle."""
-ONE, ZERO, SOFTEST = np.float32(1), np.float32(0), np.float32(1e-3)
+ONE, HALF, ZERO, SOFTEST = np.float32(1), np.float32(0.5), np.float32(0), np.float32(1e-3)
 FURTHER, ROOM = np.float32(1.05), np.float32(1.001)
 
 
@@ -38,7 +38,8 @@ def resolve_contacts(x, node, constants, grid, settings, corners, normals, grips
     shift, h, touching = constants[1], settings[0], False
     for j in range(1, x.shape[0]):
         place, speed = load_three(x, j, PLACE), load_three(x, j, SPEED)
-        way = plus(times(h, speed), transform_rows(shift, place))
+        mean = minus(speed, times(HALF * h, load_three(x, j, GAIN)))
+        way = plus(times(h, mean), transform_rows(shift, place))
         slack = load(x, (j, SLACK)) - FURTHER * lane_root(dot(way, way))
         store(x, (j, SLACK), slack)
         store_three(normals, j, 0, (ZERO, ZERO, ZERO))
@@ -137,7 +138,7 @@ def _brake(x, j, speed, place, shift, normal, h, grips) -> None:  # type: ignore
     store(grips, j, grip - slowed * size)
     brake = times(slowed, along)
     store_three(x, j, SPEED, minus(speed, brake))
-    store_three(x, j, PLACE, minus(load_three(x, j, PLACE), times(h, brake)))
+    store_three(x, j, PLACE, minus(load_three(x, j, PLACE), times(HALF * h, brake)))
 
 
 @row

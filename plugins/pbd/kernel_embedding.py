@@ -20,7 +20,7 @@ def embed_points(  # type: ignore[no-untyped-def]
     """Write the embedded points of rods `first` to before `last`, world.
 
     Each follows the rod's curve at its own distance from the point before, out of the obstacles
-    (see `reference.draw_points`).
+    (see `drawn_points.draw_points`).
 
     Parameters
     ----------

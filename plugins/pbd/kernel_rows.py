@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from . import linear_system as system
+from . import reference
 from .simd import lane_root, load, pick
 from .simd_math import (
     cross,
@@ -25,13 +27,16 @@ from .simd_math import (
     twist_angle,
 )
 
-PLACE, SPEED = 0, 3
+PLACE, SPEED, GAIN = 0, 3, 7
 REST, MASS, DRAG, SHAPE = 0, 3, 4, 5
 OVER, BEND, TWIST, CURVE, NATURAL = 1, 2, 3, 4, 7
 EDGE, DIRECTION = 0, 3
 """Rows of a segment: its vector and its direction."""
 ONE, HALF, QUARTER, ZERO = np.float32(1), np.float32(0.5), np.float32(0.25), np.float32(0)
 TWO, THIRD, FIFTH = np.float32(2), np.float32(1 / 3), np.float32(0.2)
+IMPLICIT, PASSED = np.float32(system.IMPLICIT), np.float32(1 - system.IMPLICIT)
+DRIFT, TINY = np.float32(reference.DRIFT), np.float32(reference.TINY)
+FASTEST_CHANGE = np.float32(reference.FASTEST_CHANGE)
 SHARPEST, LARGEST_SPIN = np.float32(0.3), np.float32(0.3)
 
 
@@ -53,20 +58,39 @@ def constants_of(head_step, turn, gravity, settings):  # type: ignore[no-untyped
 
 
 @row
+def lead_root(x, node, constants):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Move the root with the head; return the force by which it holds the next node back.
+
+    The inertia between them, a sixth of the segment's mass, is a third of the root's.
+    """
+    head_step, over = constants[0], constants[5][2]
+    rest, place = load_three(node, 0, REST), transform_rows(head_step, load_three(x, 0, PLACE))
+    speed = times(over, minus(rest, place))
+    gain = times(over, minus(speed, rotate_rows(head_step, load_three(x, 0, SPEED))))
+    jerk = minus(gain, times(PASSED, rotate_rows(head_step, load_three(x, 0, GAIN))))
+    store_three(x, 0, PLACE, rest)
+    store_three(x, 0, SPEED, speed)
+    store_three(x, 0, GAIN, gain)
+    return times(THIRD / IMPLICIT * load(node, (0, MASS)), jerk)
+
+
+@row
 def predict_node(x, node, air, constants, force, j) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Transform a node to the new head axes, extrapolate it, and write the force on it."""
     head_step, shift, _, world, gravity, step = constants
     h, damping, over = step
     rest = load_three(node, j, REST)
-    place, speed = (
+    place, speed, gain = (
         transform_rows(head_step, load_three(x, j, PLACE)),
         rotate_rows(head_step, load_three(x, j, SPEED)),
+        rotate_rows(head_step, load_three(x, j, GAIN)),
     )
-    if j == 0:
-        speed = times(over, minus(rest, place))
-    place = plus(place, times(h, speed))
+    place = plus(place, times(h, plus(speed, times(DRIFT * h, gain))))
+    gain = times(PASSED, gain)
+    speed = plus(speed, times(h, gain))
     store_three(x, j, PLACE, place)
     store_three(x, j, SPEED, speed)
+    store_three(x, j, GAIN, gain)
     blown = minus(rotate_rows(world, load_three(air, min(j, air.shape[0] - 1), 0)), speed)
     # velocity of a point that rides on the head, against that of the node
     head_velocity = plus(times(over, transform_rows(shift, place)), speed)
@@ -74,6 +98,18 @@ def predict_node(x, node, air, constants, force, j) -> None:  # type: ignore[no-
     mass, drag, shape = load(node, (j, MASS)), load(node, (j, DRAG)), load(node, (j, SHAPE))
     pull = plus(plus(times(drag, blown), times(shape, apart)), gravity)
     store_three(force, j, 0, times(mass, minus(pull, times(damping, head_velocity))))
+
+
+@row
+def move_node(x, move, constants, j) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Move a node by the solution, which adds to its velocity and acceleration."""
+    over = constants[5][2]
+    added = times(over / IMPLICIT, move)
+    store_three(x, j, PLACE, plus(load_three(x, j, PLACE), move))
+    store_three(x, j, SPEED, plus(load_three(x, j, SPEED), added))
+    gain = plus(load_three(x, j, GAIN), times(over, added))
+    share = FASTEST_CHANGE / lane_root(dot(gain, gain) + TINY)
+    store_three(x, j, GAIN, times(pick(share, ONE, share, ONE), gain))
 
 
 @row

@@ -19,6 +19,8 @@ from .kernel_contact import GRIP, LINES, apply_friction, resolve_contacts, resto
 from .kernel_rows import (
     bending_force,
     constants_of,
+    lead_root,
+    move_node,
     predict_node,
     spin_frame,
     transport_frame,
@@ -35,9 +37,10 @@ ELEMENT = 11
 REST, MASS, DRAG, SHAPE, CLEAR, EASE = 0, 3, 4, 5, 6, 7
 """Rows of a node's constants: rest place (3), mass, rates, clearance, 1/mass (root 0)."""
 NODE = 8
-PLACE, SPEED, SLACK = 0, 3, 6
-"""Rows of a node's state: position (3), velocity (3), and how far it may move before a lookup."""
-STATE = 7
+PLACE, SPEED, SLACK, GAIN = 0, 3, 6, 7
+"""Rows of a node's state: position (3), velocity (3), how far it may move before a lookup, and the
+acceleration of the last substep before contact (3)."""
+STATE = 10
 EDGE, DIRECTION = 0, 3
 
 ONE, ZERO = np.float32(1), np.float32(0)
@@ -106,8 +109,10 @@ def _substep(  # type: ignore[no-untyped-def]
     """Do one substep of a block, in the reference's order."""
     n = x.shape[0]
     force, free, change, normals = vector[0], vector[1], vector[2], vector[3]
-    for j in range(n):
+    coupled = lead_root(x, node, constants)
+    for j in range(1, n):
         predict_node(x, node, air, constants, force, j)
+    store_three(force, 1, 0, minus(load_three(force, 1, 0), coupled))
     if extra.shape[0] == n:
         for j in range(n):
             store_three(force, j, 0, plus(load_three(force, j, 0), load_three(extra, j, 0)))
@@ -124,11 +129,8 @@ def _substep(  # type: ignore[no-untyped-def]
         solve_banded(element, force, change)
         if iteration + 1 < iterations:
             _redirect(segment, free, change)
-    over = constants[5][2]
     for j in range(1, n):
-        move = minus(load_three(free, j, 0), load_three(change, j, 0))
-        store_three(x, j, PLACE, plus(load_three(x, j, PLACE), move))
-        store_three(x, j, SPEED, plus(load_three(x, j, SPEED), times(over, move)))
+        move_node(x, minus(load_three(free, j, 0), load_three(change, j, 0)), constants, j)
     if settings[5] > ZERO:
         touching = resolve_contacts(
             x, node, constants, grid, settings, corners, normals, line[GRIP]

@@ -1,8 +1,8 @@
 """The linear system of a substep, constant for a constant time step.
 
-Implicit Euler for nodes with mass, drag, bending and shape springs solves `A delta = force`, with
+An implicit step for nodes with mass, drag, bending and shape springs solves `A delta = force`, with
 
-    A = M / h^2 + C / h + K_bend + K_shape,
+    A = M / t^2 + C / t + K_bend + K_shape,  t = 2 h / 3,
 
 one banded matrix for all three coordinates, since the bending energy is quadratic. Lengths are
 constraints with multipliers along the directions d; their Schur complement is the elementwise
@@ -19,6 +19,9 @@ from hairkit.arrays import Float64Array
 
 from .rods import Rods
 
+IMPLICIT = 2 / 3
+"""Weight of the new acceleration in the velocity, that of the old one being the rest: backward
+differences of second order (Curtiss and Hirschfelder 1952). Stiff motion halves in a step."""
 COMPLIANCE = 1e-6
 """Relative increase of the diagonal of the length system, which keeps it definite in float32."""
 
@@ -40,7 +43,9 @@ class System:
     """Matrices of a substep for each rod."""
 
     step: float
-    """Seconds."""
+    """Seconds h."""
+    coupling: Float64Array
+    """(S, 1, 1) inertia between the root and node 1, kg."""
     banded: Float64Array
     """(S, n - 1, 3) diagonal and two lower bands of A, kg/s^2, for the free nodes 1 to n - 1."""
     inverse: Float64Array
@@ -56,16 +61,15 @@ def assemble(rods: Rods, rates: Rates, step: float) -> System:
     difference = np.eye(count) - np.eye(count, k=-1)
     turns = (np.eye(count) - np.eye(count, k=-1))[None] / rods.length[:, None, :]
     bending = turns @ difference
-    mass = rods.mass[:, 1:]
-    diagonal = mass * (
-        1 / step**2 + (rates.drag[:, 1:] + rates.damping) / step + rates.shape[:, 1:]
-    )
+    inner, inertia = IMPLICIT * step, rods.inertia()
+    diagonal = rods.mass[:, 1:] * ((rates.drag[:, 1:] + rates.damping) / inner + rates.shape[:, 1:])
     matrix = np.einsum("sij,si,sik->sjk", bending, rods.bend, bending)
+    matrix += inertia[:, 1:, 1:] / inner**2
     matrix[:, np.arange(count), np.arange(count)] += diagonal
     inverse = np.linalg.inv(matrix)
     metric = difference @ inverse @ difference.T
     metric[:, np.arange(count), np.arange(count)] *= 1 + COMPLIANCE
-    return System(step, _bands(matrix), inverse, metric, rates)
+    return System(step, inertia[:, 1:2, :1], _bands(matrix), inverse, metric, rates)
 
 
 def _bands(matrix: Float64Array) -> Float64Array:

@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hairkit.arrays import Float64Array, Int64Array
+from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
 from hairkit.simulation.obstacles import Obstacles
 
-from .linear_system import System
-from .resampling import Embedding
+from .linear_system import IMPLICIT, System
 from .rods import Rods, half_binormal, midpoint_frame, next_element, split_torque, twist_between
 
 SOFTEST = 1e-3
@@ -26,8 +25,10 @@ LARGEST_SPIN = 0.3
 FASTEST_TURN = 1.0
 """Largest rotation of a segment in a substep, radians: more than hair does, less than what linear
 solves cannot follow."""
-CHASE = 0.3
-"""Share of the way back to the curve that a drawn point takes."""
+DRIFT = 0.5 - IMPLICIT**2
+"""Weight of the old acceleration in the place; that of the new one is `IMPLICIT` squared."""
+FASTEST_CHANGE = 500.0
+"""Largest acceleration that a substep passes on to the next, m/s^2: more is a blow."""
 TINY = 1e-20
 """Added to squares before a division."""
 
@@ -42,6 +43,8 @@ class State:
     """(S, n, 3) m/s in the world."""
     frames: Float64Array
     """(S, n - 1, 4) of the segments."""
+    acceleration: Float64Array
+    """(S, n, 3) of the last substep before contact, m/s^2 in the world; 0 in equilibrium."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,8 @@ class Load:
 
 def rest_state(rods: Rods) -> State:
     """Return the captured state with zero velocity."""
-    return State(rods.points.copy(), np.zeros_like(rods.points), rods.frames.copy())
+    still = np.zeros_like(rods.points)
+    return State(rods.points.copy(), still, rods.frames.copy(), still.copy())
 
 
 def substep(
@@ -110,8 +114,12 @@ def solve_substep(
     The tension (S, n - 1) of the segments is what kept their lengths in this substep.
     """
     h, rates = system.step, system.rates
-    old = to_new_head_axes(state, load.head_step, rods, h)
-    predicted = old.position + h * old.velocity
+    old, root = to_new_head_axes(state, load.head_step, rods, h)
+    # what the old acceleration contributes to the new velocity and place
+    passed = (1 - IMPLICIT) * old.acceleration
+    predicted = old.position + h * old.velocity + DRIFT * h**2 * old.acceleration
+    velocity = old.velocity + h * passed
+    predicted[:, 0], velocity[:, 0] = rods.points[:, 0], old.velocity[:, 0]
     edge = np.diff(predicted, axis=1)
     direction = quaternion.normalize(edge)
     frames = transport_frames(old.frames, direction)
@@ -121,12 +129,13 @@ def solve_substep(
     head_velocity = (predicted - transform_points(load.head_step, predicted)) / h
     force += rods.mass[..., None] * (
         load.turn @ load.gravity
-        + rates.drag[..., None] * (load.air @ load.turn.T - old.velocity)
-        + rates.damping * (head_velocity - old.velocity)
+        + rates.drag[..., None] * (load.air @ load.turn.T - velocity)
+        + rates.damping * (head_velocity - velocity)
         + rates.shape[..., None] * (rods.points - predicted)
     )
     if load.force is not None:
         force += load.force
+    force[:, 1:2] -= system.coupling / IMPLICIT * (root - passed[:, :1])
     free = system.inverse @ force[:, 1:]
     change = free
     pull = np.zeros_like(rods.length)
@@ -134,10 +143,19 @@ def solve_substep(
         pull = solve_tension(system, edge + _edges(free), direction, rods.length)
         change = free - system.inverse @ _apply_edges_transposed(pull[..., None] * direction)
         direction = quaternion.normalize(edge + _edges(change))
-    position, velocity = predicted.copy(), old.velocity.copy()
+    position, acceleration = predicted.copy(), passed
     position[:, 1:] += change
-    velocity[:, 1:] += change / h
-    return State(position, velocity, frames), pull
+    velocity[:, 1:] += change / (IMPLICIT * h)
+    acceleration[:, :1] = root
+    acceleration[:, 1:] += change / (IMPLICIT * h**2)
+    return State(position, velocity, frames, _bound(acceleration)), pull
+
+
+def _bound(acceleration: Float64Array) -> Float64Array:
+    """Return accelerations of no more than `FASTEST_CHANGE`."""
+    size = np.sqrt((acceleration * acceleration).sum(axis=-1, keepdims=True) + TINY)
+    result: Float64Array = np.minimum(FASTEST_CHANGE / size, 1.0) * acceleration
+    return result
 
 
 def transform_points(motion: Float64Array, points: Float64Array) -> Float64Array:
@@ -146,13 +164,21 @@ def transform_points(motion: Float64Array, points: Float64Array) -> Float64Array
     return result
 
 
-def to_new_head_axes(state: State, head_step: Float64Array, rods: Rods, step: float) -> State:
-    """Return the state in the head axes at the end of the substep; roots follow the head."""
+def to_new_head_axes(
+    state: State, head_step: Float64Array, rods: Rods, step: float
+) -> tuple[State, Float64Array]:
+    """Return the state in the head axes at the end of the substep; roots follow the head.
+
+    Beside it, (S, 1, 3) the roots' acceleration in it.
+    """
     position = transform_points(head_step, state.position)
     velocity = state.velocity @ head_step[:3, :3].T
     frames = quaternion.product(quaternion.from_matrix(head_step[:3, :3]), state.frames)
-    velocity[:, 0] = (rods.points[:, 0] - position[:, 0]) / step
-    return State(position, velocity, frames)
+    acceleration = state.acceleration @ head_step[:3, :3].T
+    led = (rods.points[:, :1] - position[:, :1]) / step
+    root = (led - velocity[:, :1]) / step
+    velocity[:, :1] = led
+    return State(position, velocity, frames, acceleration), root
 
 
 def transport_frames(frames: Float64Array, direction: Float64Array) -> Float64Array:
@@ -245,7 +271,8 @@ def resolve_contacts(
     grip, taut = contact.friction * inward, np.zeros_like(rods.length)
     for _ in range(1 + contact.rounds):
         brake = friction_change(velocity - head_velocity, normal, grip)
-        position, velocity = position + step * brake, velocity + brake
+        # a change over the substep moves a node by half of it, as that of its other forces
+        position, velocity = position + 0.5 * step * brake, velocity + brake
         fixed, pull, pressed = restore_lengths(rods, position, normal)
         velocity, position = velocity + (fixed - position) / step, fixed
         taut += pull / step**2
@@ -284,46 +311,6 @@ def keep_lengths(rods: Rods, state: State, step: float) -> State:
         share = np.minimum(FASTEST_TURN * rods.length[:, j, None] / (step * speed), 1.0)
         velocity[:, j + 1] = velocity[:, j] + share * apart
     return replace(state, position=position, velocity=velocity)
-
-
-def draw_points(embedding: Embedding, curve: Float64Array, contact: Contact | None) -> Float64Array:
-    """Return the guides' points (P, 3), head axes, from the places that their rods carry them to.
-
-    Each follows the curve at its own distance from the point before: it goes along the curve and a
-    share `CHASE` of the way back to it. A point that lies deeper in an obstacle than it may is
-    pushed out, twice, since its distance then moves it again.
-    """
-    place, starts = curve.copy(), embedding.starts[:-1]
-    count, limited = np.diff(embedding.starts), contact is not None and not embedding.identity
-    for k in range(1, int(count.max(initial=0))):
-        i = starts[count > k] + k
-        start, length = place[i - 1], embedding.length[i, None]
-        place[i] = _along(start, curve[i] - curve[i - 1] + CHASE * (curve[i - 1] - start), length)
-        for _ in range(2 if limited else 0):
-            out = _way_out(place[i], contact, i)
-            place[i] = np.where(
-                out.any(axis=1, keepdims=True),
-                _along(start, place[i] + out - start, length),
-                place[i],
-            )
-    return place
-
-
-def _along(start: Float64Array, way: Float64Array, length: Float64Array) -> Float64Array:
-    """Return places at a distance from `start` along `way`."""
-    size = np.sqrt((way * way).sum(axis=1, keepdims=True) + TINY)
-    result: Float64Array = start + length / size * way
-    return result
-
-
-def _way_out(points: Float64Array, contact: Contact | None, which: Int64Array) -> Float64Array:
-    """Return the way (N, 3) out of the obstacles of some points, 0 where they are outside."""
-    if contact is None or contact.deepest is None:
-        return np.zeros_like(points)
-    distance, normal = contact.obstacles.at(points)
-    depth = np.maximum(contact.deepest[which] - distance, 0.0)
-    result: Float64Array = depth[:, None] * normal
-    return result
 
 
 def restore_lengths(

@@ -96,7 +96,7 @@ class Embedding:
         """Return the places (P, 3) that rods at `position` (S, n, 3) carry the points to.
 
         They are farther apart or closer than the points where a rod bends; see
-        `reference.draw_points`.
+        `drawn_points.draw_points`.
         """
         if self.identity:
             return position.reshape(-1, 3)

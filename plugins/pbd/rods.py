@@ -25,6 +25,8 @@ from hairkit.simulation import quaternion
 
 SHARPEST = 0.3
 """Lower bound of 1 + cosine of a turn, which limits the twist coupling beyond 134 degrees."""
+TINY = 1e-30
+"""Added to what divides."""
 _ROUNDS = 20
 
 
@@ -36,6 +38,9 @@ class Rods:
     """(S, n, 3) nodes at rest."""
     mass: Float64Array
     """(S, n) mass of the nodes."""
+    bars: Float64Array
+    """(S, n - 1) mass of the segments, which are rigid bars; 0 where the mass is beads at the
+    nodes."""
     length: Float64Array
     """(S, n - 1) length of the segments."""
     bend: Float64Array
@@ -58,6 +63,16 @@ class Rods:
     def nodes(self) -> int:
         """Nodes of every rod."""
         return int(self.points.shape[1])
+
+    def inertia(self) -> Float64Array:
+        """Return (S, n, n) the mass matrix: a rigid bar has thirds and sixths of its mass."""
+        at = np.arange(self.nodes)
+        matrix = np.zeros((len(self.mass), self.nodes, self.nodes))
+        matrix[:, at, at] = self.mass
+        for ends in ((at[:-1], at[1:]), (at[1:], at[:-1])):
+            matrix[:, ends[0], ends[0]] -= self.bars / 6
+            matrix[:, ends[0], ends[1]] += self.bars / 6
+        return matrix
 
     def before(self, frames: Float64Array) -> Float64Array:
         """Return (S, n - 1, 4) the frame before each element: the root's, then the segments'."""
@@ -111,7 +126,7 @@ def make_rods(
         np.broadcast_to(quaternion.normalize(held), direction[:, 0].shape), direction
     )
     rods = Rods(
-        nodes, mass, length, ei / span, gj / span, frames[:, 0], frames[:, 1:],
+        nodes, mass, segments, length, ei / span, gj / span, frames[:, 0], frames[:, 1:],
         np.zeros_like(nodes[:, 1:]), np.zeros_like(length),
     )  # fmt: skip
     return rods if straight else _with_moments(rods, np.zeros_like(direction), 0 * length)
@@ -127,6 +142,22 @@ def parallel_frames(held: Float64Array, direction: Float64Array) -> Float64Array
         frames.append(quaternion.normalize(quaternion.product(turn, frames[-1])))
         before = direction[:, j]
     return np.stack(frames, axis=1)
+
+
+def clamp_roots(rods: Rods, force: Float64Array) -> Rods:
+    """Return rods whose first elements are as stiff as a clamp is under the load (S, n, 3).
+
+    A clamped beam of bending stiffness B under a tension T leaves the clamp's direction over the
+    length sqrt(B / T), which is not longer than a segment of hair. Its small turns beyond elements
+    of B / l fall as r^j with r + 1 / r - 2 = T l^2 / B; they sum up to that length where the first
+    element has (1 + 1 / sqrt(r)) B / l, which is 2 B / l without tension.
+    """
+    pull = (force[:, 1:].sum(axis=1) * quaternion.third_axis(rods.frames[:, 0])).sum(axis=-1)
+    soft = np.maximum(0.5 * rods.bend[:, 0] * rods.length[:, 0], TINY)
+    ratio = np.sqrt(np.maximum(pull, 0.0) / soft) * rods.length[:, 0]
+    bend = rods.bend.copy()
+    bend[:, 0] *= 0.5 * (1 + np.exp(np.arcsinh(0.5 * ratio)))
+    return replace(rods, bend=bend)
 
 
 def balance_load(rods: Rods, force: npt.ArrayLike) -> Rods:

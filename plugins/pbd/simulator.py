@@ -28,7 +28,7 @@ from .head_interpolation import finer_steps, interpolate_motion, inverse_motion,
 from .linear_system import Rates, System, assemble
 from .reference import Contact, Load, rest_state, transform_points
 from .resampling import embed_points, max_stiffness, node_points
-from .rods import Rods, balance_load, make_rods
+from .rods import Rods, balance_load, clamp_roots, make_rods
 
 if TYPE_CHECKING:
     from . import Options
@@ -221,7 +221,8 @@ class PbdSimulator:
         bending = density * np.minimum(SINGLE_HAIR * options.firmness(), most)
         rods = make_rods(self._nodes, density, bending, bending * options.twist)
         down = np.array([0.0, -self._groom.physics.gravity, 0.0])
-        self._rods = balance_load(rods, rods.mass[..., None] * down)
+        weight = rods.mass[..., None] * down
+        self._rods = balance_load(clamp_roots(rods, weight), weight)
 
     def _rates_of(self, options: Options) -> Rates:
         """Convert options to rates; drag goes as area over mass, which is 1 / width."""

@@ -16,7 +16,7 @@ from hairkit.cli import main as hairkit
 from hairkit.synth.foreign_heads import make_coarse_head
 
 PROJECT = Path(__file__).parents[2]
-SHARED = {"captures_argument", "example_textures", "plain_analogies", "xpbd_peer"}
+SHARED = {"captures_argument", "example_textures", "plain_analogies", "random_hair", "xpbd_peer"}
 """Modules that programs import."""
 PROGRAMS = sorted({path.stem for path in (PROJECT / "benchmarks").glob("*.py")} - SHARED)
 KNOWN_TURN = SimpleNamespace(
@@ -50,6 +50,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
         },
         [],
     ),
+    "robustness": ({}, ["--grooms", "2"]),
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
     "skin": ({"HEIGHT": 120}, ["CAPTURES"]),

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from hairkit_plugins.pbd.linear_system import Rates, System, assemble
+from hairkit_plugins.pbd.linear_system import IMPLICIT, Rates, System, assemble
 from hairkit_plugins.pbd.reference import (
     Load,
     State,
     relax_twist,
     rest_state,
+    solve_substep,
     substep,
     transport_frames,
 )
@@ -81,7 +82,17 @@ def displaced(rods: Rods, shift: Float64Array) -> State:
     """Return rods at rest with their nodes shifted a little."""
     position = rods.points + shift
     frames = transport_frames(rods.frames, quaternion.normalize(np.diff(position, axis=1)))
-    return State(position, np.zeros_like(position), frames)
+    return State(position, 0 * position, frames, 0 * position)
+
+
+def let_go(rods: Rods, system: System, state: State, gravity: Float64Array = NOTHING) -> State:
+    """Return a state off equilibrium with the acceleration that it starts with.
+
+    A substep from none gains `IMPLICIT` of it.
+    """
+    later, _ = solve_substep(rods, system, state, load_of(gravity))
+    gained = (later.velocity - state.velocity) / system.step
+    return replace(state, acceleration=gained / IMPLICIT)
 
 
 def tangled(rng: np.random.Generator) -> tuple[Rods, State]:
@@ -94,7 +105,7 @@ def tangled(rng: np.random.Generator) -> tuple[Rods, State]:
     moved = points[:, :1] + np.cumsum(way * rods.length[..., None], axis=1)
     position = np.concatenate([points[:, :1], moved], axis=1)
     frames = balanced(rods, transport_frames(rods.frames, way))
-    return rods, State(position, np.zeros_like(position), frames)
+    return rods, State(position, 0 * position, frames, 0 * position)
 
 
 def balanced(rods: Rods, frames: Float64Array) -> Float64Array:
@@ -129,7 +140,8 @@ def naturally_bent(rods: Rods, angle: Float64Array) -> Rods:
 def chain(beads: int) -> Rods:
     """Return a chain without stiffness that hangs: beads alike, the first node is the hook."""
     rods = make_rods(straight(1, beads + 1, (0, -1, 0)), DENSITY, 1e-18, straight=True)
-    return replace(rods, mass=np.full_like(rods.mass, DENSITY * LENGTH / beads))
+    mass = np.full_like(rods.mass, DENSITY * LENGTH / beads)
+    return replace(rods, mass=mass, bars=np.zeros_like(rods.bars))
 
 
 def mode_of_chain(beads: int, number: int = 0) -> Float64Array:

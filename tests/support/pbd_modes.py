@@ -39,9 +39,9 @@ class Small:
         """Return the least stiffness, N/m; below 0 the equilibrium is unstable."""
         return float(np.linalg.eigvalsh(self.stiffness)[0])
 
-    def squares(self, mass: Float64Array) -> Float64Array:
-        """Return the squared angular frequencies, rising, of nodes of these masses (n,)."""
-        heavy = self.basis.T @ (np.repeat(mass, 3)[:, None] * self.basis)
+    def squares(self, inertia: Float64Array) -> Float64Array:
+        """Return the squared angular frequencies, rising, of a mass matrix (n, n) of nodes."""
+        heavy = self.basis.T @ np.kron(inertia, np.eye(3)) @ self.basis
         result: Float64Array = eigh(self.stiffness, heavy, eigvals_only=True)
         return result
 

@@ -204,7 +204,9 @@ def test_a_curved_strand_leaves_its_plane_where_its_linear_theory_says() -> None
     frames = transport_frames(state.frames, quaternion.normalize(np.diff(state.position, axis=1)))
     stiffness = np.empty(6)
     for k in range(6):
-        one = State(*(array[k : k + 1] for array in (state.position, state.velocity, frames)))
+        one = State(
+            *(a[k : k + 1] for a in (state.position, state.velocity, frames, state.acceleration))
+        )
         weight = rods.mass[k][:, None] * DOWN
         stiffness[k] = linearised(one_of(rods, k), one, weight).lowest()
     for three in stiffness.reshape(2, 3):

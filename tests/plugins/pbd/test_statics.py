@@ -98,7 +98,7 @@ def test_the_error_falls_with_the_square_of_the_spacing() -> None:
     errors = []
     for nodes in (9, 17, 33):
         rods = cantilevers(np.array([5.0]), nodes)
-        tip = settled(rods, DOWN, step=1 / 50, drag=5.0, steps=130).position[0, -1] / LENGTH
+        tip = settled(rods, DOWN, step=1 / 50, drag=5.0, steps=260).position[0, -1] / LENGTH
         errors.append(np.hypot(tip[0] - x, tip[1] + drop))
     order = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (order > 1.7).all()
@@ -130,11 +130,11 @@ def test_a_cable_hangs_as_a_catenary() -> None:
 
 
 def test_a_hanging_strand_carries_the_weight_below() -> None:
-    """Tension w (L - s) at the middles of the segments, to 2e-4 of the weight."""
+    """Tension w (L - s) at the middles of the segments, to 3e-4 of the weight."""
     rods = make_rods(straight(1, 16, (0, -1, 0)), DENSITY, 1e-10, straight=True)
     _, tension = solve_substep(rods, system_of(rods, 1 / 240), rest_state(rods), load_of(DOWN))
     below = LENGTH - (np.arange(15) + 0.5) * LENGTH / 15
-    np.testing.assert_allclose(tension[0], WEIGHT * below, atol=2e-4 * WEIGHT * LENGTH)
+    np.testing.assert_allclose(tension[0], WEIGHT * below, atol=3e-4 * WEIGHT * LENGTH)
 
 
 def arcs(angle: Float64Array) -> Float64Array:
@@ -230,7 +230,7 @@ def test_natural_curls_come_back() -> None:
     flat = quaternion.normalize(0.3 * edge + 0.7 * edge[:, :1]) * rods.length[..., None]
     position = np.concatenate([helix[:, :1], helix[:, :1] + np.cumsum(flat, axis=1)], axis=1)
     frames = transport_frames(rods.frames, quaternion.normalize(flat))
-    start = State(position, np.zeros_like(position), frames)
+    start = State(position, 0 * position, frames, 0 * position)
     state = settled(rods, NOTHING, start=start, drag=5.0, steps=300)
     np.testing.assert_allclose(state.position, helix, atol=1e-4)
 

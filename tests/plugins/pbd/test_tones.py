@@ -19,7 +19,7 @@ NODES = 41
 def tones(rods: Rods, force: Float64Array | None, free: Float64Array | None = None) -> Float64Array:
     """Return the lowest three angular frequencies; each stands for two planes."""
     small = linearised(rods, rest_state(rods), force, free)
-    return np.sqrt(small.squares(rods.mass[0])[:6:2])
+    return np.sqrt(small.squares(rods.inertia()[0])[:6:2])
 
 
 def test_a_beam_has_three_tones() -> None:
