@@ -71,7 +71,7 @@ def batch(
     """
     given = settings if isinstance(settings, Settings) else Settings(**settings or {})
     shared = replace(given, recipe=os.fspath(recipe)) if recipe != "default" else given
-    cores = _core_count()
+    cores = core_count()
     count = workers or cores
     for name, value in (("workers", count), ("threads", threads or 1), ("seconds", seconds)):
         if not value > 0:
@@ -108,7 +108,7 @@ def _results(
         yield from pool.run(missing, settings, watcher)
 
 
-def _core_count() -> int:
+def core_count() -> int:
     """Return the number of cores that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return len(affinity(0)) if affinity is not None else os.cpu_count() or 1

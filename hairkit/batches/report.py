@@ -86,11 +86,12 @@ def _row(result: Result) -> str:
     else:
         found = f"{result.state}<small>{result.strands} guides</small>"
     found += f"<small>{result.tries} tries</small>" if result.tries > 1 else ""
+    memory = f"{result.peak_bytes / 2**30:.2f} GiB" if result.peak_bytes else ""
     scores = "".join(f"<small>{html.escape(k)}: {v:.2f}</small>" for k, v in result.scores.items())
     return (
         f"<tr><td>{name}{picture}</td><td>{found}</td><td>{_health(result)}</td>"
         f'<td class="wide">{scores}</td><td class="number">{result.seconds:.1f}</td>'
-        f'<td class="number wide">{result.peak_bytes / 2**30:.2f} GiB</td></tr>'
+        f'<td class="number wide">{memory}</td></tr>'
     )
 
 

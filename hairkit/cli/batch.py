@@ -107,6 +107,7 @@ def settings_of(args: argparse.Namespace) -> Settings:
 
 def _made(args: argparse.Namespace) -> list[Result]:
     """Return the results of a batch; a lost scheduler of our own is replaced."""
+    from hairkit.batches.batch import core_count
     from hairkit.batches.dask_pool import SchedulerLostError, connect, local_client
 
     if not (args.dask or args.scheduler):
@@ -115,7 +116,7 @@ def _made(args: argparse.Namespace) -> list[Result]:
         with closing(connect(args.scheduler)) as client:
             return _run(args, client)
     for rebuild in range(REBUILDS):
-        client = local_client(args.workers or 2)
+        client = local_client(args.workers or core_count())
         try:
             print(f"hairkit: Dask's dashboard: {client.dashboard_link}", file=sys.stderr)
             return _run(args, client)

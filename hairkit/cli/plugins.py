@@ -18,6 +18,7 @@ Example: hairkit plugins gabor
 List the installed plugins by stage, or describe one: its distribution, what it does, and its
 options with their defaults and bounds. --check tries it on a made-up head: contract, options,
 texts, time, memory, and whether two calls give the same; exit code 2 where something fails.
+--lock prints the versions of a recipe's plugins, to be put at its end: it then runs with no others.
 --formats prints what each file format carries, as a Markdown table."""
 
 
@@ -29,6 +30,7 @@ def register(subparsers: Any) -> None:
         "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
     )
     parser.add_argument("--check", action="store_true", help="try the plugin on a made-up head")
+    parser.add_argument("--lock", metavar="RECIPE", help="print the recipe's table [lock]")
     parser.add_argument("--formats", action="store_true", help="print the table of file formats")
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -38,6 +40,12 @@ def run(args: argparse.Namespace) -> int:
     manager = Manager.loaded(args.plugin)
     if args.formats:
         print(format_table(manager))
+        return 0
+    if args.lock is not None:
+        from hairkit.pipeline.plugin_lock import lock_of
+        from hairkit.pipeline.recipe import load_recipe
+
+        print(lock_of(load_recipe(args.lock), manager))
         return 0
     if args.check and (args.name is None or args.name in STAGES):
         raise InputError("--check tries one plugin; name it: hairkit plugins gabor --check")

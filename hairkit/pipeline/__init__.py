@@ -13,6 +13,7 @@ plugins.
 * `module_digest`: digests of the code that made a cached result
 * `open_groom`: grooms by any name that a user may give
 * `own_head`: landmarks for a head that has none
+* `plugin_lock`: versions of plugins that a recipe is run with
 * `recipe`: which plugin does each stage, with which options
 * `reconstruct`: a whole run
 * `rerun`: a run once more, from its record

@@ -35,6 +35,7 @@ from hairkit.manager.command_plugin import PluginCommand, read_command
 from hairkit.nets.model_folder import missing_models
 from hairkit.options import split_setting, unknown_name
 from hairkit.pipeline.module_digest import module_digest
+from hairkit.pipeline.plugin_lock import check_lock, read_lock
 from hairkit.storage import read_bytes
 
 HOOKS = {
@@ -94,6 +95,8 @@ class Recipe:
     stages: tuple[Stage, ...]
     commands: tuple[PluginCommand, ...] = ()
     """Plugins that run in environments of their own."""
+    lock: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    """Versions of plugins with which it may be run; others are not checked."""
 
     def stage(self, table: str) -> Stage | None:
         """Return the stage of a table, or None when the recipe leaves it out."""
@@ -120,7 +123,7 @@ class Recipe:
     def check(self, manager: Manager) -> None:
         """Start the plugins that are commands, check every plugin and option.
 
-        Raises `PluginError` or `OptionError` naming the place.
+        Compares versions with the lock. Raises `PluginError` or `OptionError` naming the place.
         """
         for command in self.commands:
             try:
@@ -135,6 +138,7 @@ class Recipe:
                 except HairkitError as error:
                     raise type(error)(f"{where}: {error}") from error
                 manager.options(choice.plugin, choice.options, f"{where} {choice.plugin}")
+        check_lock(self.lock, manager, self.source)
 
     def _with_option(self, plugin: str, name: str, value: str, text: str) -> Recipe:
         used = [choice.plugin for stage in self.stages for choice in stage.choices]
@@ -197,6 +201,7 @@ def parse_recipe(data: bytes, name: str, source: str, folder: Path | None = None
     """
     document = _document(data, source)
     commands = _commands(document.pop("plugins", {}), source, folder)
+    lock = read_lock(document.pop("lock", {}), source)
     description = document.pop("description", "")
     for key in document:
         if key not in HOOKS:
@@ -208,7 +213,7 @@ def parse_recipe(data: bytes, name: str, source: str, folder: Path | None = None
         elif isinstance(content, dict) and "plugin" not in content:
             tables[key] = {**_default_tables().get(key, {}), **content}
     stages = tuple(_stage(key, tables[key], source) for key in HOOKS if key in tables)
-    return Recipe(name, source, str(description), stages, commands)
+    return Recipe(name, source, str(description), stages, commands, lock)
 
 
 def _commands(content: object, source: str, folder: Path | None) -> tuple[PluginCommand, ...]:

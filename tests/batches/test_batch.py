@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,8 @@ import pytest
 from ball import PLUGIN_FILE, RECIPE, write_capture
 
 import hairkit
-from hairkit.batches.jobs import DONE, FAILED, KEPT, Result, Settings, read_result
+from hairkit.batches import capture_child
+from hairkit.batches.jobs import DONE, FAILED, KEPT, Job, Result, Settings, finished, read_result
 from hairkit.batches.report import DATA, PAGE, write_report
 from hairkit.cli import main
 from hairkit.cli.batch_table import Hush, LiveTable, ResultLines, table_for
@@ -161,3 +164,26 @@ def test_dask_that_is_not_installed_is_named(
     monkeypatch.setattr(dask_pool.importlib, "import_module", absent)
     with pytest.raises(MissingExtraError, match=r"pip install 'hairkit\[batch\]'"):
         dask_pool.connect("tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize("where", ["run", "result"])
+def test_a_full_disk_is_said_and_the_capture_is_done_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    """Without room a capture fails with what to do, and leaves nothing that says it is done."""
+    full = OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "groom.npz"))
+
+    def fail(*_: Any, **__: Any) -> Any:
+        raise full
+
+    job = Job("anna", str(tmp_path), str(tmp_path / "out"))
+    made = {"state": DONE, "out": job.out}
+    run = fail if where == "run" else lambda *_: made
+    monkeypatch.setattr(capture_child, "_reconstruct", run)
+    if where == "result":
+        monkeypatch.setattr(Result, "write", fail)
+    question = {"job": asdict(job), "settings": asdict(Settings()), "digest": "x"}
+    found = capture_child.capture(question, lambda _: None)
+    assert found["state"] == FAILED
+    assert found["error"].endswith("on device; free some space and run the batch again")
+    assert finished(job, "x") is None
