@@ -21,9 +21,9 @@ from hairkit.batches.jobs import Job, Result, Settings
 from hairkit.batches.run_job import COMMAND, JobLimits, run_job, start_child
 from hairkit.child_process import ChildProcess
 
-FIRST_GUESS = 2**30
+FIRST_GUESS = 5 * 2**28
 """Bytes that a capture is expected to take before one has been measured: the sample's eight photos
-of one megapixel take 0.9 GiB with the default recipe."""
+of one megapixel take 0.9 to 1.1 GiB with the default recipe."""
 BUDGET_SHARE = 0.8
 """Share of the memory that is free at the start which a batch takes."""
 KIBIBYTE = 2**10

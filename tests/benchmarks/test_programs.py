@@ -28,9 +28,10 @@ KNOWN_TURN = SimpleNamespace(
 """In the place of `silhouette`, whose search takes longer than all else."""
 SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "analogies": ({"SMALL": 16, "LARGE": 24, "SEEDS": 1, "ROWS": 1}, []),
-    "batch": ({"JOBS": 4, "WARM": 2}, []),
+    "batch": ({"JOBS": 4, "WARM": 2, "WAITING": 2, "WAIT_S": 0.0}, []),
     "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
     "command_plugins": ({"CALLS": 2, "SIZE": (40, 30)}, []),
+    "farm_costs": ({"TASKS": (20, 60)}, ["--seconds", "5"]),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "head_fit": ({}, ["CAPTURES"]),
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "as_they_are"]),

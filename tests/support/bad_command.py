@@ -1,6 +1,7 @@
 """A plugin in a process of its own that misbehaves in the way that its first argument names.
 
 What speaks before or beside the protocol is done by hand; the rest goes through `hairkit.worker`.
+With `as_told` it goes by the name of the view, so that one process serves many tests.
 """
 
 from __future__ import annotations
@@ -77,8 +78,8 @@ def main() -> None:
 
 
 def segment(view: Any) -> Any:
-    """Misbehave."""
-    return globals()[HOW](view)
+    """Misbehave as the view's name says, else as the program's argument does."""
+    return globals()[view.name if HOW == "as_told" else HOW](view)
 
 
 def raises(view: Any) -> Any:
@@ -276,6 +277,7 @@ def _written(change: Any) -> Any:
 
     def spoil(tree: Any, text_path: Path, arrays_path: Path) -> None:
         write(tree, text_path, arrays_path)
+        worker.write_tree = write  # the next answer is left as it is
         change(text_path.parent)
 
     worker.write_tree = spoil
