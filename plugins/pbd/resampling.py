@@ -65,6 +65,21 @@ def max_stiffness(points: Float64Array, step: float) -> Float64Array:
     return result
 
 
+def overhang(points: Float64Array) -> Float64Array:
+    """Return the largest product along rods (S, n, 3) of lever and length squared (S,), m^3.
+
+    At each node, what lies beyond it has a length, and its middle is off to the side, by the lever.
+    """
+    edge = np.diff(points, axis=1)
+    length = np.linalg.norm(edge, axis=-1)
+    level = 0.5 * (points[:, 1:] + points[:, :-1])[..., [0, 2]]
+    beyond = np.cumsum(length[:, ::-1], axis=1)[:, ::-1]
+    moment = np.cumsum((length[..., None] * level)[:, ::-1], axis=1)[:, ::-1]
+    moment = moment - beyond[..., None] * points[:, :-1, [0, 2]]
+    result: Float64Array = (np.linalg.norm(moment, axis=-1) * beyond).max(axis=1)
+    return result
+
+
 def _largest_turn(points: Float64Array) -> Float64Array:
     """Return the largest turn (S,) at a node, radians."""
     direction = quaternion.normalize(np.diff(points, axis=1))

@@ -27,7 +27,7 @@ from .hair_grid import HairGrid, make_hair_grid
 from .head_interpolation import finer_steps, interpolate_motion, inverse_motion, motion_steps
 from .linear_system import Rates, System, assemble
 from .reference import Contact, Load, rest_state, transform_points
-from .resampling import embed_points, max_stiffness, node_points
+from .resampling import embed_points, max_stiffness, node_points, overhang
 from .rods import Rods, balance_load, clamp_roots, make_rods
 
 if TYPE_CHECKING:
@@ -51,6 +51,10 @@ STANDING = 2.5
 """Squared frequency, in g / L, of the pull that bears hair which stands or lies out, since other
 hair is beneath it: a column that carries its own weight buckles by pi^2 / 4 of it at most. Hair
 that hangs needs none."""
+UPRIGHT = 6.4
+"""Moment by its own weight times length over sqrt(EI GJ) at which a level strand turns aside (it
+buckles at w L^3 = 12.85 sqrt(EI GJ)). A guide stands for the hair around it, which together bears
+what lies out: it is at least so stiff that it stays."""
 SMALLEST = 2e-5
 """Metres between points of which float32 has digits enough for a stretch of 1 %."""
 _KEPT_SYSTEMS = 4
@@ -218,7 +222,10 @@ class PbdSimulator:
         most = max_stiffness(self._nodes, FRAME / options.substeps)[:, None]
         length = np.linalg.norm(np.diff(self._nodes, axis=1), axis=-1).min(axis=1, keepdims=True)
         most = np.minimum(most, FIRMEST * length**4 / (FRAME / options.substeps) ** 2)
-        bending = density * np.minimum(SINGLE_HAIR * options.firmness(), most)
+        weight = abs(self._groom.physics.gravity) * overhang(self._nodes)[:, None]
+        borne = weight / (UPRIGHT * np.sqrt(options.twist))
+        firm = np.maximum(SINGLE_HAIR * options.firmness(), borne)
+        bending = density * np.minimum(firm, most)
         rods = make_rods(self._nodes, density, bending, bending * options.twist)
         down = np.array([0.0, -self._groom.physics.gravity, 0.0])
         weight = rods.mass[..., None] * down
