@@ -10,6 +10,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `coordinate_space`: axes and unit of a file
 * `exif`: orientation and focal length from EXIF
 * `file_format`: what a format carries, as its plugin declares it
+* `glb_document`: glTF documents under construction
 * `glb_file`: glTF documents
 * `glb_mesh`: the triangle mesh of a glTF file
 * `glb_motion`: the motion of a head in a glTF file
@@ -22,6 +23,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `ply_elements`: elements of PLY files, and strands from them
 * `polylines`: strands from loose edges
 * `spline_curves`: points on spline curves from control points
+* `streamed`: arrays made while they are written
 * `strand_blocks`: large grooms written in blocks of little memory
 * `strokes`: strokes on photos, labelme's JSON
 * `textures`: texture maps of mesh files

@@ -2,6 +2,7 @@
 
 The viewer shares its OpenGL context, cameras and lights.
 
+* `cards`: textured cards, as engines draw them
 * `context`: OpenGL contexts: EGL, else OSMesa
 * `framebuffer`: frame buffers, supersampling, read-back
 * `framing`: cameras that show a whole groom

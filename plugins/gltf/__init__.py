@@ -5,7 +5,6 @@ strands stand in the file twice, as one LINES primitive with custom attributes, 
 and as triangles for viewers, which is not.
 
 * `baking`: a point cache as morph targets
-* `document`: JSON objects and buffer under construction
 * `extras`: `extras.hairkit`
 * `joining`: line segments joined to strands
 * `meshes`: head, lines and strips as meshes
@@ -13,7 +12,6 @@ and as triangles for viewers, which is not.
 * `ribbons`: hair as ribbons or cards
 * `scene`: the document of a groom
 * `skin`: the head's material
-* `streamed`: arrays made while they are written
 * `strips`: ribbons and cards at several levels of detail
 * `texture`: strand and relief pictures for strips
 """

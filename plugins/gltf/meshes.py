@@ -13,14 +13,14 @@ from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.head_model.bust import CLOTH, Bust
+from hairkit.io.glb_document import INDICES, Document, index_type
 from hairkit.io.strand_blocks import shares
+from hairkit.io.streamed import Streamed, at_points, repeat_row, segments
 from hairkit.types.groom import Groom
 from hairkit.types.skin import SkinMaps
 from hairkit.types.strands import Strands
 
-from .document import INDICES, Document, index_type
 from .skin import SKIN_COLOUR, skin_material
-from .streamed import Streamed, at_points, repeat_row, segments
 from .strips import HairMesh
 
 JOINTS = ("root", "neck", "head")

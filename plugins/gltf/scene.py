@@ -12,10 +12,10 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.head_model.bust import bust_under
+from hairkit.io.glb_document import Document
 from hairkit.types.groom import Groom
 
 from .baking import Baked, bake
-from .document import Document
 from .extras import groom_extras
 from .meshes import HEAD_JOINT, JOINTS, ROUGHNESS, Meshes, brightest
 from .strips import StripOptions, hair_meshes

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from hairkit.io.glb_document import Document
 from hairkit.io.glb_skin import ROUGHNESS_CHANNEL
 from hairkit.io.textures import grey
 from hairkit.types.skin import SkinMaps, Texture
 from hairkit.types.skin_look import SkinLook
 
-from .document import Document
 from .texture import white_picture
 
 SKIN_COLOUR = np.array([0.58, 0.4, 0.32])

@@ -32,6 +32,10 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
     "command_plugins": ({"CALLS": 2, "SIZE": (40, 30)}, []),
     "farm_costs": ({"TASKS": (20, 60)}, ["--seconds", "5"]),
+    "cards": (
+        {"STYLES": ("straight",), "SIZE": (48, 64), "WARM_UP": 20},
+        ["--strands", "300", "--points", "8", "--cards", "20", "--atlas", "256"],
+    ),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "head_fit": ({}, ["CAPTURES"]),
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "as_they_are"]),
