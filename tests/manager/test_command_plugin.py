@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -235,11 +236,16 @@ def test_calls_run_side_by_side_in_as_many_processes_as_allowed(tmp_path: Path) 
 
 
 def test_nothing_is_left_of_a_command_that_was_ended() -> None:
-    """The processes that it started are ended with it."""
-    code = "import subprocess; p = subprocess.Popen(['sleep', '60']); print(p.pid); input()"
-    child = ChildProcess((sys.executable, "-u", "-c", f"{code}; input()"))
-    with pytest.raises(ChildError, match="no answer: "):
+    """The processes that it started are ended with it; one that was stopped is not replaced."""
+    code = "import subprocess as s; print('started', s.Popen(['sleep', '60']).pid)"
+    child = ChildProcess((sys.executable, "-u", "-c", f"{code}; input(); input()"))
+    with pytest.raises(ChildError, match="no answer: started") as caught:
         child.ask({}, Limits(20))
+    grandchild = Path(f"/proc/{str(caught.value).split()[-1]}/cmdline")
+    deadline = time.monotonic() + 10
+    while grandchild.exists() and grandchild.read_bytes() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert time.monotonic() < deadline
     child = ChildProcess((sys.executable, "-c", "import time; time.sleep(60)"))
     threading.Timer(0.3, child.stop).start()
     with pytest.raises(ChildError, match="was stopped"):
