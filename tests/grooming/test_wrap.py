@@ -14,7 +14,7 @@ from hairkit.errors import HairkitError, InputError
 from hairkit.grooming.wrap import wrap_groom
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.head_model.identity import blend_head
-from hairkit.head_model.scalp import evaluate
+from hairkit.head_model.scalp import evaluate, roots_at
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.head_model.template import default_head
 from hairkit.io.head_reader import BareHead, read_bare_head
@@ -59,6 +59,21 @@ def test_roots_are_on_the_head_and_strands_outside_at_their_lengths(name: str) -
     np.testing.assert_allclose(after.strands.lengths(), groom().strands.lengths(), rtol=1e-4)
     bound = evaluate(after.head, after.root_triangle, after.root_barycentric)
     np.testing.assert_allclose(bound, after.strands.roots, atol=BINDING)
+
+
+def test_slick_hair_stays_outside() -> None:
+    """Strands that lie on the skin from root to tip slide along the other head."""
+    loose, head = groom().strands, default_head()
+    above = np.flatnonzero(loose.points[loose.offsets[1:] - 1, 2] < 0)[:60]
+    some = loose.select(above).resampled(40)
+    tree = build_tree(head.vertices, head.faces)
+    face, weights, _ = nearest_on_surface(tree, some.points)
+    skin = roots_at(head, face, weights)
+    slick = replace(some, points=skin.positions + np.float32(3e-4) * skin.normals)
+    bound = groom().root_triangle[above], groom().root_barycentric[above]
+    flat = Groom(slick, head, *bound)
+    other = FOREIGN_HEADS["coarse"]()
+    _check(other, flat, wrap_groom(flat, other))
 
 
 @pytest.mark.parametrize("name", FOREIGN_HEADS)
