@@ -12,7 +12,7 @@ EXAMPLE := examples/hairkit-sobel
 LIBRARIES := libegl1 libgl1 libgl1-mesa-dri libosmesa6
 DISPLAYS := xvfb chromium
 
-.PHONY: test test-clients demo lint docs matrix bench clean
+.PHONY: test test-clients demo lint docs matrix wheel bench clean
 
 # A worker has one core: threads of matrix products would wait for each other.
 test test-clients: export OPENBLAS_NUM_THREADS := 1
@@ -43,6 +43,10 @@ docs: $(VENV)/.docs
 
 matrix: $(VENV)/.hairkit
 	$(BIN)/python .ci/matrix.py $(MATRIX)
+
+# A wheel for this Python on x86-64 Linux, with compiled kernels: its first run compiles nothing.
+wheel: $(VENV)/.tests $(VENV)/.models $(VENV)/.lint
+	$(BIN)/python .ci/wheel.py dist
 
 bench: $(VENV)/.tests
 	@for program in benchmarks/*.py; do echo "== $$program"; $(BIN)/python $$program || exit 1; done

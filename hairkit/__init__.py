@@ -31,6 +31,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `compilation`: the line that says that kernels are compiled
 * `errors`: errors that users can mend
 * `hookspecs`: the hooks that plugins implement
+* `kernel_cache`: compiled functions of the machine, and those that a wheel brings along
 * `manager`: plugins by name
 * `options`: options of plugins
 * `parallel`: compiled loops on threads

@@ -17,7 +17,8 @@ from itertools import pairwise
 from typing import Any, TypeVar, cast
 
 from numba import config, njit
-from numba.core.caching import FunctionCache
+
+from hairkit.kernel_cache import KernelCache
 
 TASKS_PER_THREAD = 3
 """Ranges for each thread: what one that is held up leaves is taken by the others."""
@@ -27,24 +28,18 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 def compiled(function: _Function) -> _Function:
     """Compile a function that releases Python's lock and divides as NumPy does."""
-    made: Any = njit(nogil=True, error_model="numpy")(function)
-    made._cache = _Cache(function)  # type: ignore[no-untyped-call]
-    return cast(_Function, made)
+    return compiled_with()(function)
 
 
-class _Cache(FunctionCache):
-    """Numba's cache of a function, empty where its index names types that are no more.
+def compiled_with(**options: Any) -> Callable[[_Function], _Function]:
+    """Return the same decorator with more of Numba's options: `fastmath=True`."""
 
-    Numba reads the types of all that is in the index before it looks whether the source is older,
-    so that after an update with a type renamed every call would fail.
-    """
+    def decorate(function: _Function) -> _Function:
+        made: Any = njit(nogil=True, error_model="numpy", **options)(function)
+        made._cache = KernelCache(function)
+        return cast(_Function, made)
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        try:
-            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        except (AttributeError, ImportError):
-            self.flush()  # type: ignore[no-untyped-call]
-            return None
+    return decorate
 
 
 def thread_count() -> int:

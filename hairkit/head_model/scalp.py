@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
@@ -14,6 +13,7 @@ from hairkit.errors import InputError
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.head_model.reach import Reach
 from hairkit.head_model.template import default_head
+from hairkit.parallel import compiled
 from hairkit.types.head import Head, Roots
 
 MAX_ROOTS = 200_000
@@ -277,7 +277,7 @@ def take_free(
     return int(_take_free(points, cells, apart, radius, heads, following, taken, found))
 
 
-@njit(cache=True)
+@compiled
 def _take_free(
     points: Float64Array,
     cells: Int64Array,
@@ -305,7 +305,7 @@ def _take_free(
     return found
 
 
-@njit(cache=True)
+@compiled
 def _link(
     n: int, cell: Int64Array, heads: Int32Array, following: Int32Array
 ) -> None:  # pragma: no cover - compiled
@@ -314,7 +314,7 @@ def _link(
     heads[cell[0], cell[1], cell[2]] = n
 
 
-@njit(cache=True)
+@compiled
 def _distance_to_taken(
     points: Float64Array,
     i: int,

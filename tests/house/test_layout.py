@@ -29,6 +29,7 @@ FLOORS = (
         "storage",
         "progress",
         "parallel",
+        "kernel_cache",
         "compilation",
         "child_process",
         "worker",

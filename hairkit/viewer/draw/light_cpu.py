@@ -17,7 +17,7 @@ from hairkit.rendering.light import Lights
 from hairkit.types.strands import Strands
 from hairkit.viewer.draw.interface import HairDrawer
 from hairkit.viewer.draw.light_gpu import LightVolume, solid_depth
-from hairkit.viewer.draw.place_kernels import row, shared
+from hairkit.viewer.draw.place_kernels import shared
 
 STEPS, GROWTH = 9, 1.35
 SKY_STEPS, SKY_GROWTH = 5, 1.7
@@ -178,7 +178,7 @@ def light_cells(  # type: ignore[no-untyped-def]
                 transmittance[z, y, x, 2] = sky / np.float32(6)
 
 
-@row
+@shared
 def _reaching(extinction, z, y, x, way, depth):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     deep, high, wide = extinction.shape
     total = np.float32(0)

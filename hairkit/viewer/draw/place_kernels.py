@@ -12,13 +12,12 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-_HOW: dict[str, Any] = {
-    "cache": True, "fastmath": True, "error_model": "numpy", "_nrt": False,
-}  # fmt: skip
-row: Callable[[Any], Any] = njit(**_HOW)
+from hairkit.parallel import compiled_with
+
+shared: Callable[[Any], Any] = compiled_with(fastmath=True, _nrt=False)
 """Compiles a function that allocates nothing, so that array views are not reference-counted."""
-shared: Callable[[Any], Any] = njit(nogil=True, **_HOW)
-"""The same for what threads do at once (see `hairkit.parallel`)."""
+allocating: Callable[[Any], Any] = compiled_with(fastmath=True)
+"""The same for a function that makes arrays."""
 inlined: Callable[[Any], Any] = njit(fastmath=True, error_model="numpy", inline="always")
 """Inlines a function, so that the compiler can vectorise loops around it."""
 SLICES, TILE = 32, 8
@@ -31,7 +30,7 @@ _MIDDLE, _BESIDE = np.float32(0.4 / 4096), np.float32(0.15 / 4096)
 _NEAREST, _PER_TILE, _FAR = np.float32(0.01), np.float32(1 / TILE), np.float32(1e9)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
+@allocating
 def guide_turns(rest, now):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     """Return the rotations (G, m, 4), x, y, z, w, of guides (G, m, 3) since rest."""
     count, points = now.shape[:2]
@@ -111,7 +110,7 @@ def place_hair(  # type: ignore[no-untyped-def]
         )  # fmt: skip
 
 
-@row
+@shared
 def _place_chunk(  # type: ignore[no-untyped-def]
     guides, turns, followed, weights, offsets, widths, camera, slices, wider, first, last, places,
     seen, filled, frame,
@@ -157,7 +156,7 @@ def _place(  # type: ignore[no-untyped-def]
     )
 
 
-@row
+@shared
 def _fill(filled, seen, s, k, slices, width) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Splat the segment from point k - 1 to k into the cells at its quarters."""
     ax, ay = seen[s, k - 1, 0], seen[s, k - 1, 1]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.viewer.draw.place_kernels import inlined, pixels_per_metre, row, shared
+from hairkit.viewer.draw.place_kernels import inlined, pixels_per_metre, shared
 from hairkit.viewer.draw.shade_kernels import HIDDEN
 
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
@@ -39,7 +39,7 @@ def draw_hair(  # type: ignore[no-untyped-def]
         )  # fmt: skip
 
 
-@row
+@shared
 def _draw_chunk(  # type: ignore[no-untyped-def]
     seen, looks, widths, solid, camera, wider, smooth, first, last, frame, sums
 ) -> None:  # pragma: no cover - compiled
@@ -50,7 +50,7 @@ def _draw_chunk(  # type: ignore[no-untyped-def]
                 _stroke(seen, looks, s, k, width, smooth, solid, frame, sums)
 
 
-@row
+@shared
 def _stroke(  # type: ignore[no-untyped-def]
     seen, looks, s, k, width, smooth, solid, frame, sums
 ) -> None:  # pragma: no cover - compiled

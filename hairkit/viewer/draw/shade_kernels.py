@@ -7,14 +7,14 @@ cones, and the diffuse term of Kajiya and Kay (1989) for multiple scattering. Al
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from hairkit.arrays import Float32Array
 from hairkit.colour import srgb_from_linear
+from hairkit.parallel import compiled_with
 from hairkit.rendering.light import Lights
 from hairkit.types.camera import Camera
 from hairkit.types.volume import VoxelGrid
-from hairkit.viewer.draw.place_kernels import TILE, inlined, row
+from hairkit.viewer.draw.place_kernels import TILE, inlined, shared
 
 LANES, FIELDS = 64, 14
 """Points shaded together, and values of each."""
@@ -71,7 +71,7 @@ def fibre_colours(
     return np.asarray(colours * bright[:, None, None], np.float32)
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@compiled_with(fastmath=True)
 def shade_hair(  # type: ignore[no-untyped-def]
     first, last, seen, places, colours, random, opacity, slices, shading, light, tones, looks,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
@@ -89,7 +89,7 @@ def shade_hair(  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@row
+@shared
 def _shade_chunk(  # type: ignore[no-untyped-def]
     seen, places, colours, random, opacity, slices, shading, light, tones, first, last, looks,
     points, lit, which,
@@ -113,7 +113,7 @@ def _shade_chunk(  # type: ignore[no-untyped-def]
     _flush(points, shading, tones, lit, which, waiting, looks)
 
 
-@row
+@shared
 def _gather(  # type: ignore[no-untyped-def]
     places, colours, s, k, random, other, shading, light, points, at
 ) -> None:  # pragma: no cover - compiled
@@ -129,7 +129,7 @@ def _gather(  # type: ignore[no-untyped-def]
     points[11 * LANES + at], points[12 * LANES + at], points[13 * LANES + at] = key, rim, sky
 
 
-@row
+@shared
 def _flush(points, shading, tones, lit, which, count, looks) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     if shading[EXPOSURE + 2] > _HALF:
         _show_direction(points, lit)
@@ -144,7 +144,7 @@ def _flush(points, shading, tones, lit, which, count, looks) -> None:  # type: i
             looks[s, k, c] = value
 
 
-@row
+@shared
 def _show_direction(points, lit) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     """Colour by direction: red for x, green for z, blue for y."""
     low, high = np.float32(0.2), np.float32(0.8)
@@ -157,7 +157,7 @@ def _show_direction(points, lit) -> None:  # type: ignore[no-untyped-def] # prag
         lit[2 * LANES + n] = (low + over * abs(y)) * bright
 
 
-@row
+@shared
 def _light_lanes(points, shading, lit) -> None:  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     """Compute the radiance of each lane's point towards the camera, as an index of the tones."""
     ex, ey, ez = shading[EYE], shading[EYE + 1], shading[EYE + 2]
