@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
+from hairkit.compilation import announce_compilation
 from hairkit.errors import DataError, DivergedError, InputError
 from hairkit.parallel import one_blas_thread
 from hairkit.progress import Progress, Silent
@@ -82,18 +83,19 @@ def run(
     times = np.arange(before + frames) / frames_per_second
     heads = np.empty((frames, 4, 4))
     points, stretched = _allocate_frames(frames, len(simulator.strands.points)), 0
-    for frame, time in enumerate(times):
-        head = motion(float(time))
-        if not frame:
-            simulator.reset(head)
-        else:
-            around = Surroundings(head, air.wind, air.turbulence, air.gravity)
-            simulator.advance(1.0 / frames_per_second, around)
-        if frame >= before:
-            _check_points(simulator.points, points.shape[1:], float(time))
-            stretched = _check_stretch(simulator, stretched, frames_per_second, float(time))
-            points[frame - before], heads[frame - before] = simulator.points, head
-        told.stepped(STAGE)
+    with announce_compilation(told.message):
+        for frame, time in enumerate(times):
+            head = motion(float(time))
+            if not frame:
+                simulator.reset(head)
+            else:
+                around = Surroundings(head, air.wind, air.turbulence, air.gravity)
+                simulator.advance(1.0 / frames_per_second, around)
+            if frame >= before:
+                _check_points(simulator.points, points.shape[1:], float(time))
+                stretched = _check_stretch(simulator, stretched, frames_per_second, float(time))
+                points[frame - before], heads[frame - before] = simulator.points, head
+            told.stepped(STAGE)
     told.finished(STAGE, perf_counter() - began, False)
     return PointCache(points, times[:frames], heads)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from hairkit.parallel import compiled_with
 
 from .simd import LANES, load_number
 from .simd_math import dot, minus, plus, rotate, row, rows_of, times, transform_rows, trilinear
@@ -13,7 +14,7 @@ SLACK = 6
 CHASE, TINY = np.float32(0.3), np.float32(1e-20)
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+@compiled_with(fastmath=True)
 def embed_points(  # type: ignore[no-untyped-def]
     first, last, x, q, clear, starts, segment, weight, offset, length, deepest, head, grid, out
 ) -> None:  # pragma: no cover - compiled

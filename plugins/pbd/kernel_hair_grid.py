@@ -6,7 +6,8 @@ A cell holds four numbers: mass and momentum during the splat, then crowding and
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from hairkit.parallel import compiled_with
 
 from .simd import LANES, load, load_quad, part_of, pick, quad_of, store, store_quad
 from .simd_math import load_three, minus, plus, row, rows_of, store_three, times, transform_rows
@@ -16,7 +17,7 @@ CELL = np.float32(1 / 0.02)
 PLACE, SPEED = 0, 3
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+@compiled_with(fastmath=True)
 def spread_nodes(  # type: ignore[no-untyped-def]
     first, last, x, mass, shift, origin, shape, seconds, cells
 ) -> None:  # pragma: no cover - compiled
@@ -41,7 +42,7 @@ def spread_nodes(  # type: ignore[no-untyped-def]
         _spread(x[start:end], mass[start:end], shift, origin, shape, seconds, cells[grid])
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+@compiled_with(fastmath=True)
 def settle_cells(first, last, cells, uncrowded_mass) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Convert masses to crowding and momenta to velocities, in the first grid.
 
@@ -58,7 +59,7 @@ def settle_cells(first, last, cells, uncrowded_mass) -> None:  # type: ignore[no
             cells[0, k, 0] = min(max((filled - uncrowded_mass[k]) / uncrowded_mass[k], ZERO), FOUR)
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+@compiled_with(fastmath=True)
 def draw_nodes(first, last, x, shift, origin, shape, rates, cells) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Relax velocities towards the mean around, and push nodes out of crowded cells, in place.
 
@@ -71,7 +72,7 @@ def draw_nodes(first, last, x, shift, origin, shape, rates, cells) -> None:  # t
             _draw(x[block], j, shift, origin, shape, rates, cells, work)
 
 
-@njit(fastmath=True, error_model="numpy", cache=True)
+@compiled_with(fastmath=True)
 def _spread(x, mass, shift, origin, shape, seconds, cells) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Splat the masses and momenta of some blocks."""
     cells[:] = ZERO

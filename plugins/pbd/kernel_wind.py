@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from hairkit.parallel import compiled_with
 
 from .simd import pick, whole
 from .simd_math import ZERO, dot, load_three, minus, plus, row, store_three, times
@@ -19,7 +20,7 @@ _C = [np.float32((-1) ** k * (2 * np.pi) ** (2 * k) / math.factorial(2 * k)) for
 _C1, _C2, _C3, _C4, _C5, _C6 = _C[1:]
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+@compiled_with(fastmath=True)
 def sample_gusts(first, last, x, waves, amplitudes, wind, out) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write the velocity of the air at the nodes of some blocks, world.
 

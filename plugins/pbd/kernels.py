@@ -7,13 +7,10 @@ cache. Masses are relative to the strand's mean node mass, so that stiffness is 
 
 from __future__ import annotations
 
-import logging
-from pathlib import Path
-
 import numpy as np
-from numba import njit
 
 from hairkit.arrays import Float32Array
+from hairkit.parallel import compiled_with
 
 from .kernel_contact import GRIP, LINES, apply_friction, resolve_contacts, restore_lengths
 from .kernel_rows import (
@@ -46,7 +43,7 @@ EDGE, DIRECTION = 0, 3
 ONE, ZERO = np.float32(1), np.float32(0)
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+@compiled_with(fastmath=True)
 def run_substeps(  # type: ignore[no-untyped-def]
     first,
     last,
@@ -225,16 +222,6 @@ def _redirect(segment, free, change) -> None:  # type: ignore[no-untyped-def] # 
         edge = plus(load_three(segment, j, EDGE), minus(end, start))
         size = ONE / lane_root(dot(edge, edge))
         store_three(segment, j, DIRECTION, times(size, edge))
-
-
-def warn_of_compilation() -> None:
-    """Warn if no compiled kernels are cached: the first step then takes half a minute."""
-    if run_substeps.signatures:
-        return
-    if not any(Path(run_substeps.stats.cache_path or ".").glob("kernels.run_substeps-*.nbi")):
-        logging.getLogger("hairkit").warning(
-            "compiling the simulator, once per machine (half a minute)"
-        )
 
 
 def pack_lanes(values: Float32Array, lanes: int = LANES) -> Float32Array:

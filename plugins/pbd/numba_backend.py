@@ -37,7 +37,6 @@ class FastEngine:
     """Rods in blocks of lanes."""
 
     def __init__(self, rods: Rods, contact: Contact | None) -> None:
-        kernels.warn_of_compilation()
         self._rods = rods
         self._count = len(rods.points)
         self._unit = rods.mass.mean(axis=1)
