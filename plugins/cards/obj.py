@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hairkit.storage import write_text
+from hairkit.storage import write_bytes
 
 from .build import CardSet, Level
 
@@ -25,8 +25,13 @@ def write_objs(path: Path, stem: str, cards: CardSet) -> None:
     """Write the finest level to `path`, the others to STEM_LOD1.cards.obj and so on, in metres."""
     for number, level in enumerate(cards.levels):
         name = path if number == 0 else path.with_name(f"{stem}_LOD{number}.cards.obj")
-        write_text(name, _text(level, number, stem))
-    write_text(path.with_name(f"{stem}.mtl"), MATERIAL.format(stem=stem))
+        write_bytes(name, _encoded(_text(level, number, stem)))
+    write_bytes(path.with_name(f"{stem}.mtl"), _encoded(MATERIAL.format(stem=stem)))
+
+
+def _encoded(text: str) -> bytes:
+    """Return UTF-8, and names of files that are not as the system has them."""
+    return text.encode(errors="surrogateescape")
 
 
 def _text(level: Level, number: int, stem: str) -> str:

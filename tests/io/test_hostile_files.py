@@ -39,6 +39,7 @@ OWN_FILES = {
     "hairkit/storage.py": "opens every file",
     "hairkit/child_process.py": "what the system says of a process",
     "hairkit/batches/pool.py": "what the system says of memory",
+    "hairkit/kernel_cache.py": "sources of kernels",
     "hairkit/worker.py": "runs without the rest of hairkit; its own files",
     "hairkit/head_model/template_skin.py": "its own picture",
     "hairkit/pipeline/module_digest.py": "sources",
