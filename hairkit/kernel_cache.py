@@ -19,6 +19,8 @@ from typing import Any, NamedTuple
 from llvmlite import binding
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+from hairkit import __version__
+
 SHIPPED = Path(__file__).with_name("shipped_kernels")
 """Folder of compiled functions, one folder a module; wheels alone have it."""
 PORTABLE_PROCESSOR, PORTABLE_FEATURES = "x86-64-v3", ""
@@ -56,11 +58,15 @@ class KernelCache(FunctionCache):
             found = None
         return found or self._load_shipped(sig, target_context)
 
+    def _index_key(self, sig: Any, codegen: Any) -> tuple[Any, ...]:
+        """Return Numba's key and hairkit's version: kernels hold code of others' files, too."""
+        return (*super()._index_key(sig, codegen), __version__)  # type: ignore[no-untyped-call]
+
     def _load_shipped(self, sig: Any, target_context: Any) -> Any:
         if not runs_portable_code():
             return None
         processor = _Processor(target_context.codegen().magic_tuple()[0])
-        key = self._index_key(sig, processor)  # type: ignore[no-untyped-call]
+        key = self._index_key(sig, processor)
         data = self._shipped.load(key)  # type: ignore[no-untyped-call]
         return None if data is None else self._impl.rebuild(target_context, data)
 

@@ -36,6 +36,9 @@ if what == "ship":
 if what == "old processor":
     kernel_cache.PORTABLE_INSTRUCTIONS += ("an-instruction-that-no-processor-has",)
 
+if what == "next version":
+    kernel_cache.__version__ = "999"
+
 class Count(event.Listener):
     compiled = 0
 
@@ -68,7 +71,7 @@ def run(place: Path, what: str, **settings: str) -> tuple[float, int]:
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="wheels hold kernels for x86-64 alone")
 def test_what_a_wheel_brings_is_not_compiled(tmp_path: Path) -> None:
-    """The first run finds the shipped functions; an old processor or a new source compiles anew."""
+    """The first run finds the shipped functions; others, and updates, compile anew."""
     (tmp_path / "shipped_example.py").write_text(KERNELS)
     portable = {"NUMBA_CPU_NAME": PORTABLE_PROCESSOR, "NUMBA_CPU_FEATURES": PORTABLE_FEATURES}
     value, compiled = run(tmp_path, "ship", **portable)
@@ -76,5 +79,6 @@ def test_what_a_wheel_brings_is_not_compiled(tmp_path: Path) -> None:
     assert compiled > 0
     assert run(tmp_path, "first run") == (5.0, 0)
     assert run(tmp_path, "old processor") == (5.0, compiled)
+    assert run(tmp_path, "next version") == (5.0, compiled)
     (tmp_path / "shipped_example.py").write_text(KERNELS + "\n# a newer version\n")
     assert run(tmp_path, "updated") == (5.0, compiled)
