@@ -18,19 +18,16 @@ for style in ("short", "straight"):
     if not folder.exists():
         photograph(grow(style, default_head(), strands=1000, seed=1), folder, size=(300, 400))
 
-# The manager loads the plugins once for all runs. Coarse cells keep this example quick.
-manager = hairkit.Manager.loaded()
-recipe = hairkit.load_recipe("default").with_set(["visual_hull.voxel_size=0.006"])
+# Every capture has a process of its own, and one that fails does so alone. A second run keeps what
+# the first has done. Coarse cells keep this example quick.
+settings = {"guides": 300, "settings": ["visual_hull.voxel_size=0.006"]}
 
 print("| capture | strands | F 4 mm/40 deg | mean length / true |")
 print("|---|---|---|---|")
-for photos in sorted((out / "captures").iterdir()):
-    result = out / photos.name
-    try:
-        hairkit.reconstruct(photos, result, recipe, manager, guides=300, sheet=False)
-    except hairkit.HairkitError as error:  # one line; go on with the next capture
-        print(f"| {photos.name} | {error} | | |")
+for result in hairkit.batch(out / "captures", out / "results", settings=settings):
+    if result.error:
+        print(f"| {result.name} | {result.error} | | |")
         continue
-    scores = hairkit.evaluate(result, photos / "truth")
+    scores = hairkit.evaluate(result.out, out / "captures" / result.name / "truth")
     f, length = 100 * scores.scores.all[-1].f, scores.lengths.mean_ratio
-    print(f"| {photos.name} | {scores.strands} | {f:.1f} | {length:.2f} |")
+    print(f"| {result.name} | {scores.strands} | {f:.1f} | {length:.2f} |")
