@@ -3,6 +3,7 @@
 const float FURTHER = 1.05;       // safety factor on the distance that a node has moved
 
 vec3 normal[NODE_ROOM];           // contact normal, 0 for free nodes
+vec3 surface[NODE_ROOM];          // velocity of the obstacle where it is touched, m/s
 float grip[NODE_ROOM];            // largest change of velocity by friction, m/s
 
 // Restore the lengths; a node in contact moves only perpendicular to its normal, and its pressure adds
@@ -42,23 +43,27 @@ vec3 friction_part(int j, vec3 slide) {
     return slide * (brake / max(size, 1e-12));
 }
 
-void apply_friction(int k) {
+void apply_friction() {
     for (int j = 1; j < EACH_NODE; j++) {
-        vec3 relative = speed[j] - drift(k, place[j]);
+        vec3 relative = speed[j] - surface[j];
         vec3 brake = friction_part(j, relative - dot(relative, normal[j]) * normal[j]);
         speed[j] -= brake;
         place[j] -= 0.5 * u_seconds * brake;
     }
 }
 
-// Push a node out of the obstacles; return the contact normal, else 0. The grid is read only after the
+// Push a node out of the obstacles; return the contact normal, else 0. The grids are read only after the
 // node may have moved by its distance at the last lookup.
 vec3 contact_normal(int k, int j) {
-    vec3 p = place[j], relative = speed[j] - drift(k, p), way = vec3(0.0);
+    vec3 p = place[j], mean = speed[j] - 0.5 * u_seconds * gain[j], way = vec3(0.0);
+    vec3 head = drift(k, p), torso = torso_drift(k, p);
     float clear = rates(j).z, left = slack[j];
-    left -= FURTHER * u_seconds * length(relative - 0.5 * u_seconds * gain[j]);  // its mean velocity
+    left -= FURTHER * u_seconds * max(distance(mean, head), distance(mean, torso));
     if (left <= 0.0) {
-        left = obstacle_distance(p, clear, way) - clear;
+        bool on_torso;
+        left = obstacle_distance(p, steps[k].torso, clear, way, on_torso) - clear;
+        surface[j] = on_torso ? torso : head;
+        vec3 relative = speed[j] - surface[j];
         float across = dot(relative, way), inward = max(-across, 0.0);
         // depth of this substep is removed at once, older depth at a limited speed
         float depth = min(-left, (inward + u_fastest) * u_seconds);
@@ -78,10 +83,11 @@ vec3 contact_normal(int k, int j) {
 void resolve_contacts(int k) {
     for (int j = 0; j < EACH_NODE; j++) {
         grip[j] = 0.0;
+        surface[j] = vec3(0.0);
         normal[j] = j > 0 ? contact_normal(k, j) : vec3(0.0);
     }
     for (int round = 0; round <= u_rounds; round++) {
-        if (round > 0) apply_friction(k);
+        if (round > 0) apply_friction();
         restore_lengths();
     }
 }

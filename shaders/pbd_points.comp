@@ -1,6 +1,6 @@
 #version 430
 // The guides' points, head axes and world: each follows the curve of its rod at its own distance from the
-// point before, out of the obstacles (see draw_points of plugins/pbd/reference.py). One invocation a rod.
+// point before, out of the obstacles (see hairkit.simulation.obstacle_kernels.draw_points). One invocation a rod.
 #include "pbd_layout.glsl"
 #include "pbd_quaternion.glsl"
 #include "pbd_distance.glsl"
@@ -10,6 +10,7 @@ layout(std430, binding = 2) readonly buffer Starts { int starts[]; };
 layout(std430, binding = 3) writeonly buffer Local { float local[]; };    // x, y, z, head axes
 layout(std430, binding = 4) writeonly buffer Points { float points[]; };  // x, y, z, world
 uniform vec4 u_head[3];  // rows of the motion from the head's axes to the world
+uniform vec4 u_torso_from_head[3];
 const float CHASE = 0.3, TINY = 1e-20;
 
 vec3 node(int rod, int j) { return node_place(rod, j).xyz; }
@@ -36,14 +37,16 @@ void main() {
     int rod = invocation();
     if (rod >= u_rods) return;
     vec3 before = vec3(0.0), place = vec3(0.0), normal;
+    bool on_torso;
     for (int i = starts[rod]; i < starts[rod + 1]; i++) {
         int j = int(kinds[i].x);
         float t = offsets[i].w, least = kinds[i].y, size = kinds[i].z;
         vec3 curve = on_rod(rod, j, t) + rotate(frame_at(rod, j, t), offsets[i].xyz), start = place;
         place = i == starts[rod] ? curve : along(start, curve - before + CHASE * (before - start), size);
         before = curve;
-        for (int turn = 0; turn < 2; turn++) {
-            float depth = u_obstacles ? least - obstacle_distance(place, least, normal) : 0.0;
+        for (int turn = 0; turn < 3; turn++) {
+            float depth = 0.0;
+            if (u_obstacles) depth = least - obstacle_distance(place, u_torso_from_head, least, normal, on_torso);
             if (depth > 0.0 && size > 0.0) place = along(start, place + depth * normal - start, size);
         }
         for (int c = 0; c < 3; c++) local[3 * i + c] = place[c];

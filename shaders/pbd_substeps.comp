@@ -52,6 +52,10 @@ vec3 drift(int k, vec3 p) {
     return rows(steps[k].drift[0], steps[k].drift[1], steps[k].drift[2], vec4(p, 1.0));
 }
 
+vec3 torso_drift(int k, vec3 p) {
+    return rows(steps[k].torso_drift[0], steps[k].torso_drift[1], steps[k].torso_drift[2], vec4(p, 1.0));
+}
+
 // Transform a node to the new axes, extrapolate it, and sum the forces on it.
 void predict(int k, int j) {
     vec4 rest = rest_and_mass(j), rate = rates(j);

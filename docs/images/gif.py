@@ -1,9 +1,15 @@
-"""Make the animated pictures of the README; needs Pillow beside hairkit.
+"""Draw the recordings of simulated hair: those of the README, and both simulators side by side.
 
-python docs/images/gif.py [pbd] [super_helix] [--every 3] [--colours 160] [--still 6]
+python docs/images/gif.py [shake.gif ...] [--hairs 8000]
 
-grows straight and wavy hair, plays shake.toml and wind.toml headless with each simulator, packs
-every third picture: shake.gif and wind.gif for pbd, shake_super_helix.gif and so on for others.
+| file | what |
+|---|---|
+| shake.gif, wind.gif | straight hair on a shaken head, wavy hair in wind, by pbd |
+| shake_super_helix.gif, wind_super_helix.gif | the same by super_helix |
+| hair_shake.gif, hair_jump.gif | straight, wavy, curly, short; above by pbd, below by super_helix |
+| hair_nod.gif, hair_wind.gif | the same |
+
+Needs Pillow beside hairkit. Without names all are drawn.
 """
 
 from __future__ import annotations
@@ -11,87 +17,181 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
-from hairkit.cli import main as hairkit
 from hairkit.head_model.template import default_head
+from hairkit.manager import Manager
+from hairkit.rendering.context import Renderer, renderer
 from hairkit.synth import StyleName, grow
+from hairkit.viewer.actions.actions import perform
+from hairkit.viewer.head_motion import HeadMotion
+from hairkit.viewer.preview import Preview
+from hairkit.viewer.session import Session
 
+Picture = npt.NDArray[np.uint8]
 HERE = Path(__file__).parent
-MILLISECONDS = 35
-"""Between two pictures of the viewer's script."""
+GUIDES = 400
+STYLES: tuple[StyleName, ...] = ("straight", "wavy", "curly", "short")
+SIMULATORS = ("pbd", "super_helix")
+FRAME, EVERY = 1 / 30, 3
+"""Seconds of a picture of the viewer, and of how many one is kept."""
+SECONDS = 3.0
+LARGE, SMALL = (480, 360), (216, 216)
+"""Pixels of a picture alone and of one beside others."""
+HOP_M, HOP_S = 0.12, 0.5
+"""Height and time of a jump, metres and seconds."""
+COLOURS, STILL = 160, 6
+"""Of the palette; largest change of a channel, of 255, that is not written again."""
+
+
+@dataclass
+class Jumping(HeadMotion):
+    """A head that also jumps twice."""
+
+    age: float = 0.0
+
+    def advance(self, seconds: float) -> None:
+        """Advance by `seconds`."""
+        super().advance(seconds)
+        self.age += seconds
+
+    def matrix(self) -> npt.NDArray[np.float64]:
+        """Return head_from_rest (4, 4)."""
+        result = super().matrix()
+        if 0 < self.age < 2 * HOP_S:
+            result[1, 3] += HOP_M * np.sin(np.pi * self.age / HOP_S) ** 2
+        return result
+
+
+def shake(session: Session, frame: int) -> None:
+    """Shake the head for 1.6 seconds."""
+    if frame == 0:
+        perform(session, "shake", {"degrees": 28.0, "hertz": 1.2, "seconds": 1.6})
+
+
+def nod(session: Session, frame: int) -> None:
+    """Nod for 1.6 seconds."""
+    if frame == 0:
+        perform(session, "shake", {"axis": "pitch", "degrees": 20.0, "hertz": 1.2, "seconds": 1.6})
+
+
+def jump(session: Session, frame: int) -> None:
+    """Jump twice."""
+    if frame == 0:
+        session.motion = Jumping(session.motion.pivot)
+
+
+def wind(session: Session, frame: int) -> None:
+    """Let wind blow for 1.8 seconds."""
+    if frame == 0:
+        values = {"on": True, "speed": 5.0, "azimuth": -70.0, "turbulence": 0.6}
+        perform(session, "wind", values)
+    if frame == round(1.8 / FRAME):
+        perform(session, "wind", {"on": False})
+
+
+Motion = Callable[[Session, int], None]
+ALONE: dict[str, tuple[StyleName, str, Motion]] = {
+    "shake.gif": ("straight", "pbd", shake),
+    "wind.gif": ("wavy", "pbd", wind),
+    "shake_super_helix.gif": ("straight", "super_helix", shake),
+    "wind_super_helix.gif": ("wavy", "super_helix", wind),
+}
+TOGETHER = {f"hair_{motion.__name__}.gif": motion for motion in (shake, jump, nod, wind)}
 
 
 def main() -> int:
-    """Write the pictures of the simulators that are named, or of pbd, beside this program."""
-    args = _arguments()
-    shown: dict[str, StyleName] = {"shake": "straight", "wind": "wavy"}
-    with tempfile.TemporaryDirectory() as folder:
-        for name, style in shown.items():
-            groom = Path(folder) / f"{style}.npz"
-            grow(style, default_head(), 600).save(groom)
-            for simulator in args.simulators or ["pbd"]:
-                words = ["view", str(groom), "--headless", "--simulator", simulator]
-                words += ["--script", str(HERE / f"{name}.toml")]
-                out = Path(folder) / simulator
-                if hairkit([*words, "--out", str(out)]):
-                    return 1
-                ending = "" if simulator == "pbd" else f"_{simulator}"
-                frames = sorted((out / name).glob("*.png"))[:: args.every]
-                target = HERE / f"{name}{ending}.gif"
-                pack(frames, target, args.colours, args.still, MILLISECONDS * args.every)
-    return 0
-
-
-def _arguments() -> argparse.Namespace:
+    """Draw what is named, or all."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    add = parser.add_argument
-    add("simulators", nargs="*", metavar="SIMULATOR", help="pbd by default")
-    add("--every", type=int, default=3, metavar="N", help="take one picture of N (default 3)")
-    add("--colours", type=int, default=160, metavar="N", help="of the palette (default 160)")
-    add("--still", type=int, default=6, metavar="D", help="change that is not shown (default 6)")
-    return parser.parse_args()
+    every = [*ALONE, *TOGETHER]
+    parser.add_argument("names", nargs="*", metavar="FILE", help=", ".join(every))
+    parser.add_argument("--hairs", type=int, default=8000, help="strands drawn (default 8000)")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder, renderer() as gl:
+        for name in args.names or every:
+            frames = (
+                recorded(gl, Path(folder), *ALONE[name], LARGE, args.hairs)
+                if name in ALONE
+                else side_by_side(gl, Path(folder), TOGETHER[name], args.hairs)
+            )
+            pack(frames, HERE / name)
+            print(HERE / name, flush=True)
+    return 0
 
 
-def pack(frames: list[Path], target: Path, colours: int, still: int, milliseconds: int) -> None:
-    """Write frames as a GIF with one palette; what hardly changes is not written again.
+def side_by_side(gl: Renderer, folder: Path, motion: Motion, hairs: int) -> list[Picture]:
+    """Return pictures of all hair, a row for each simulator."""
+    rows = []
+    for simulator in SIMULATORS:
+        row = [recorded(gl, folder, style, simulator, motion, SMALL, hairs) for style in STYLES]
+        rows.append(np.concatenate(row, axis=2))
+    return list(np.concatenate(rows, axis=1))
 
-    A pixel stays as it was shown until a channel is more than `still` of 255 away from that. GIF
-    keeps such pixels from frame to frame at hardly any cost.
+
+def recorded(
+    gl: Renderer,
+    folder: Path,
+    style: StyleName,
+    simulator: str,
+    motion: Motion,
+    size: tuple[int, int],
+    hairs: int,
+) -> list[Picture]:
+    """Return every `EVERY`th picture (H, W, 3) of hair in motion."""
+    groom = folder / f"{style}.npz"
+    if not groom.exists():
+        grow(style, default_head(), GUIDES).save(groom)
+    session = Session(Manager.loaded(), groom, size=size, simulator=simulator, hairs=hairs)
+    preview, frames = Preview(gl, session), []
+    perform(session, "layer", {"name": "torso"})
+    perform(session, "orbit", {"right": 15.0})
+    for frame in range(round(SECONDS / FRAME)):
+        motion(session, frame)
+        preview.frame(FRAME, still=True)
+        if frame % EVERY == 0:
+            frames.append(preview.picture().copy())
+    preview.release()
+    return frames
+
+
+def pack(pictures: list[Picture], target: Path) -> None:
+    """Write pictures as a GIF with one palette; what hardly changes is not written again.
+
+    A pixel stays as it was shown until a channel is more than `STILL` away from that. GIF keeps
+    such pixels from frame to frame at hardly any cost.
     """
     from PIL import Image
 
-    pictures = [np.asarray(Image.open(path).convert("RGB")) for path in frames]
     middle = Image.fromarray(pictures[len(pictures) // 3])
-    palette = middle.quantize(colours, Image.Quantize.MEDIANCUT)
+    palette = middle.quantize(COLOURS, Image.Quantize.MEDIANCUT)
     # no dithering: it would flicker, and not compress
     packed = [
         Image.fromarray(shown).quantize(palette=palette, dither=Image.Dither.NONE)
-        for shown in _steadied(pictures, still)
+        for shown in _steadied(pictures)
     ]
     packed[0].save(
         target,
         save_all=True,
         append_images=packed[1:],
-        duration=milliseconds,
+        duration=round(1000 * FRAME * EVERY),
         loop=0,
         optimize=True,
     )
 
 
-def _steadied(
-    pictures: list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]], still: int
-) -> Iterator[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
-    """Yield pictures (H, W, 3) whose pixels change only where they change by more than `still`."""
+def _steadied(pictures: list[Picture]) -> Iterator[Picture]:
+    """Yield pictures (H, W, 3) whose pixels change only where they change by more than `STILL`."""
     shown = pictures[0]
     for picture in pictures:
         change = np.abs(picture.astype(np.int16) - shown).max(axis=2, keepdims=True)
-        shown = np.where(change > still, picture, shown)
+        shown = np.where(change > STILL, picture, shown)
         yield shown
 
 

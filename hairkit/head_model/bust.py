@@ -2,7 +2,8 @@
 
 The torso of `hairkit.head_model.torso`, from a collar that lies on the head's own neck down to a
 rounded end, as of a sculpture. Where strands run inside of it, it gives way: the person's shoulders
-are not known, and no hair may be hidden. Reconstruction and simulation do not use it.
+are not known, and no hair may be hidden. In simulations it keeps hair out; reconstruction does not
+use it.
 """
 
 from __future__ import annotations

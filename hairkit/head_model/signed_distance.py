@@ -11,7 +11,7 @@ On the default head a grid of 25,000 cells takes 0.04 s of processor time, one o
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +43,20 @@ _SAME_PLACE = 1e-12
 """Metres along a line at which two feet are at one place."""
 
 
+class Surface(Protocol):
+    """A mesh: a head, a bust."""
+
+    @property
+    def vertices(self) -> Float32Array:
+        """(V, 3) metres."""
+        ...
+
+    @property
+    def faces(self) -> Int32Array:
+        """(F, 3) vertices of the triangles."""
+        ...
+
+
 class Cells(NamedTuple):
     """The centres of a grid's cells."""
 
@@ -65,7 +79,7 @@ class Feet(NamedTuple):
     """(X, Y, Z) the foot of each cell at the surface, -1 elsewhere."""
 
 
-def signed_distance(head: Head, grid: VoxelGrid, band: float | None = None) -> Float32Array:
+def signed_distance(head: Surface, grid: VoxelGrid, band: float | None = None) -> Float32Array:
     """Return the signed distance to the head at the cell centres, (X, Y, Z), metres, inside < 0.
 
     Each cell at the surface gets the nearest point on its nearest triangle (its foot); every other
@@ -97,13 +111,16 @@ def signed_distance(head: Head, grid: VoxelGrid, band: float | None = None) -> F
 
 def distance_to(head: Head, points: npt.ArrayLike) -> Float64Array:
     """Return the exact signed distance (N,) of points (N, 3) to the head, metres, inside < 0."""
-    tree = _closed_tree(head)
+    return _distances(_closed_tree(head), points)
+
+
+def _distances(tree: TriangleTree, points: npt.ArrayLike) -> Float64Array:
     distance = nearest_on_surface(tree, points)[2]
     np.negative(distance, out=distance, where=inside_surface(tree, points))
     return distance
 
 
-def closed_surface(head: Head) -> tuple[Float64Array, Int32Array]:
+def closed_surface(head: Surface) -> tuple[Float64Array, Int32Array]:
     """Return the head's vertices (V', 3) and faces (F', 3) with every hole closed by a fan.
 
     Vertices that texture seams repeat are merged first. Each connected run of boundary edges then
@@ -140,9 +157,10 @@ def _closed_tree(head: Head) -> TriangleTree:
     return build_tree(*closed_surface(head))
 
 
-def _far_from_surface(head: Head, grid: VoxelGrid) -> Float32Array:
+def _far_from_surface(head: Surface, grid: VoxelGrid) -> Float32Array:
     """Return the distances of a grid without cells at the surface: wholly inside or outside."""
-    return distance_to(head, grid.centres().reshape(-1, 3)).reshape(grid.shape).astype(np.float32)
+    tree, centres = build_tree(*closed_surface(head)), grid.centres().reshape(-1, 3)
+    return _distances(tree, centres).reshape(grid.shape).astype(np.float32)
 
 
 @compiled

@@ -4,9 +4,11 @@ The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)`
 `Simulator`.
 
 * `motion`: motion of the head: keyframes and shakes
-* `obstacles`: head and capsules as a signed distance on a grid
+* `obstacle_kernels`: distances to obstacles, and drawn points out of them, compiled
+* `obstacles`: head and torso as signed distances on grids
 * `posing`: a groom at one frame of a simulation
 * `quaternion`: arrays of unit quaternions
+* `rigid_motion`: the head's motion within a step, and how the torso follows
 * `running`: runs a simulator without a window
 * `simulator`: the protocol of all simulators
 * `ties`: which part of every strand its tie holds to the head

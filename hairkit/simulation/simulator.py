@@ -56,6 +56,8 @@ class Measures:
     """Joules, all guides."""
     potential_energy: float
     """Gravitational and elastic energy, joules, relative to the rest state."""
+    depth: float = 0.0
+    """Metres that a drawn point lies deeper in the head or the torso than at rest, at most."""
 
 
 @runtime_checkable

@@ -12,6 +12,7 @@ import numpy as np
 from hairkit.arrays import UInt8Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.head import Solid, bust_solid, head_solid
+from hairkit.simulation.rigid_motion import follow_head
 from hairkit.viewer.draw.colouring import point_values, ramp
 from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
 from hairkit.viewer.draw.frame_budget import LEVELS, Budget
@@ -129,6 +130,9 @@ class Preview:
                 billboards=billboards,
                 billboard_opacity=session.shown.opacity,
                 solids=solids,
+                world_from_torso=follow_head(
+                    np.eye(4), session.world_from_head, session.motion.pivot
+                ),
             )
         )
         self._hairs = 0 if look is None else look.hairs

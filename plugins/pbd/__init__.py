@@ -19,7 +19,7 @@ gravity. Despite the plugin's name this is not position-based dynamics.
 * `gl_uniforms`: a substep's inputs packed for the shaders
 * `grab`: forces on held points
 * `hair_grid`: hair-hair contact: density and velocity on a grid
-* `head_interpolation`: head motion between two poses
+* `head_steps`: how finely a frame is divided for a fast head
 * `kernel_contact`: contact and friction, compiled
 * `kernel_embedding`: the guides' own points, compiled
 * `kernel_hair_grid`: hair-hair contact, compiled

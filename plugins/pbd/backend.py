@@ -9,7 +9,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 
-from .drawn_points import draw_points
+from .drawn_points import draw_curve
 from .hair_grid import HairGrid
 from .linear_system import System
 from .reference import Contact, Load, State, rest_state, substep, transform_points
@@ -22,6 +22,8 @@ class Engine(Protocol):
 
     state: State
     """The present state; setting it moves the rods."""
+    torso_from_head: Float64Array
+    """(4, 4) from the head axes to the torso's, for the points."""
 
     def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
         """Do one substep for each load."""
@@ -48,6 +50,7 @@ class ReferenceEngine:
     def __init__(self, rods: Rods, contact: Contact | None) -> None:
         self._rods, self._contact = rods, contact
         self.state = rest_state(rods)
+        self.torso_from_head = np.eye(4)
 
     def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
         """Do one substep for each load."""
@@ -67,5 +70,5 @@ class ReferenceEngine:
     def points(self, embedding: Embedding, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
         curve = embedding.curve(self.state.position, self.state.frames)
-        local = draw_points(embedding, curve, self._contact)
+        local = draw_curve(embedding, curve, self._contact, self.torso_from_head)
         return transform_points(head, local).astype(np.float32)

@@ -25,7 +25,7 @@ from .gl_obstacles import contact_uniforms, faces
 from .gl_uniforms import MOST_STEPS, AirWaves, Units, air_uniforms, step_words, steps_at_once
 from .hair_grid import HairGrid
 from .linear_system import System
-from .reference import Contact, Load, State, rest_state
+from .reference import Contact, Load, State, obstacles_of, rest_state
 from .resampling import Embedding
 from .rods import Rods
 
@@ -46,11 +46,13 @@ class ComputeEngine:
         self._gusty = False
         with renderer() as gl:
             self._store = Store(gl, self._count, self._nodes)
-            self._store.put_grid("u_distances", faces(contact))
+            for name, body in zip(("head", "torso"), obstacles_of(contact), strict=True):
+                self._store.put_grid(f"u_{name}_distances", faces(body))
             for name in ("u_wind", "u_force"):
                 self._store.put_rods(name, np.zeros((self._count, 1, 3)))
         self._held = GpuGrabs(self._store, self._nodes)
         self.state = rest_state(rods)
+        self.torso_from_head = np.eye(4)
         weakref.finalize(self, self._store.release).atexit = False
 
     @property
@@ -171,6 +173,7 @@ class ComputeEngine:
             uniforms = self._upload_embedding(embedding)
             self._store.read_by("offsets", "kinds", "starts", "local", "points")
             uniforms["u_head"] = [tuple(row) for row in head[:3]]
+            uniforms["u_torso_from_head"] = [tuple(row) for row in self.torso_from_head[:3]]
             self._store.dispatch("pbd_points", self._count, uniforms)
             return self._store["points"]
 
@@ -242,7 +245,7 @@ class ComputeEngine:
             for name in ("local", "points"):
                 self._store.make_words(name, 3 * len(embedding.rod))
             self._embedding = embedding
-        if deepest is None or embedding.identity:
+        if deepest is None:
             return {"u_obstacles": False}
         return contact_uniforms(self._contact)
 

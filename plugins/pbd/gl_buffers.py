@@ -164,6 +164,6 @@ class Store:
 
 
 _SAMPLERS = (
-    "u_state", "u_constants", "u_wind", "u_force", "u_distances", "u_masses",
-    "u_uncrowded_mass", "u_means",
+    "u_state", "u_constants", "u_wind", "u_force", "u_masses",
+    "u_uncrowded_mass", "u_means", "u_head_distances", "u_torso_distances",
 )  # fmt: skip

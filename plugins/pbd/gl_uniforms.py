@@ -14,7 +14,7 @@ from hairkit.rendering.context import on_graphics_card
 from hairkit.simulation import quaternion
 
 from .hair_grid import SPACING, HairGrid
-from .reference import Load
+from .reference import Load, TorsoStep
 
 UNITS = 2.0**30
 """Units of the mass of all hair, and of the largest momentum of a cell."""
@@ -32,14 +32,17 @@ AirWaves: TypeAlias = tuple[Float64Array, Float64Array, Float64Array]
 
 
 def step_words(loads: Sequence[Load], step: float) -> Float32Array:
-    """Return (MOST_STEPS, 10, 4) words of substeps: see `Step` in the shader."""
-    words = np.zeros((MOST_STEPS, 10, 4))
+    """Return (MOST_STEPS, 16, 4) words of substeps: see `Step` in the shader."""
+    words = np.zeros((MOST_STEPS, 16, 4))
     for k, load in enumerate(loads):
         words[k, :3] = load.head_step[:3]
         words[k, 3:6] = drift_rows(load.head_step, step)
         words[k, 6:9, :3] = load.turn
         words[k, 6:9, 3] = load.turn @ load.gravity
         words[k, 9] = np.roll(quaternion.from_matrix(load.head_step[:3, :3]), -1)
+        torso = load.torso or TorsoStep(np.eye(4), load.head_step)
+        words[k, 10:13] = torso.from_head[:3]
+        words[k, 13:16] = drift_rows(torso.step, step)
     return words.astype(np.float32)
 
 

@@ -29,23 +29,30 @@ FURTHER, ROOM = np.float32(1.05), np.float32(1.001)
 
 
 @row
-def resolve_contacts(x, node, constants, grid, settings, corners, normals, grips):  # type: ignore[no-untyped-def] # pragma: no cover
+def resolve_contacts(  # type: ignore[no-untyped-def]
+    x, node, constants, grids, settings, corners, normals, drifts, grips
+):  # pragma: no cover - compiled
     """Push nodes out of the obstacles; write contact normals, else 0; return if there is any.
 
-    `grips` are the largest changes of velocity by friction. The grid is read for a node only after
-    it may have moved by its distance at the last lookup.
+    `drifts` are how far an obstacle's surface has moved back in the substep, `grips` the largest
+    changes of velocity by friction. The grids are read for a node only after it may have moved by
+    its distance at the last lookup.
     """
-    shift, h, touching = constants[1], settings[0], False
+    h, touching = settings[0], False
     for j in range(1, x.shape[0]):
         place, speed = load_three(x, j, PLACE), load_three(x, j, SPEED)
-        mean = minus(speed, times(HALF * h, load_three(x, j, GAIN)))
-        way = plus(times(h, mean), transform_rows(shift, place))
-        slack = load(x, (j, SLACK)) - FURTHER * lane_root(dot(way, way))
+        way = times(h, minus(speed, times(HALF * h, load_three(x, j, GAIN))))
+        drift, beside = transform_rows(constants[1], place), transform_rows(constants[7], place)
+        slack = load(x, (j, SLACK)) - FURTHER * _farther(plus(way, drift), plus(way, beside))
         store(x, (j, SLACK), slack)
         store_three(normals, j, 0, (ZERO, ZERO, ZERO))
         store(grips, j, ZERO)
         if any_below(slack, ZERO):
-            distance, normal = _distances(grid, place, slack, corners)
+            distance, normal = _distances(grids[0], place, slack, corners)
+            if grids[1][0].shape[0] > 0:
+                distance, normal, drift = _nearer(
+                    grids[1], constants[6], place, slack, corners, distance, normal, drift, beside
+                )
             clear = load(node, (j, CLEAR))
             store(x, (j, SLACK), pick(slack, ZERO, distance - clear, slack))
             depth = pick(slack, ZERO, clear - distance, ZERO)
@@ -54,8 +61,44 @@ def resolve_contacts(x, node, constants, grid, settings, corners, normals, grips
                 inside = pick(ZERO, depth, ONE + ZERO * depth, ZERO)
                 normal = times(inside, normal)
                 store_three(normals, j, 0, normal)
-                _out(x, j, shift, inside * depth, normal, settings, grips)
+                store_three(drifts, j, 0, drift)
+                _out(x, j, drift, inside * depth, normal, settings, grips)
     return touching
+
+
+@row
+def _farther(a, b):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the length of the longer one of two vectors."""
+    one, other = dot(a, a), dot(b, b)
+    return lane_root(pick(one, other, other, one))
+
+
+@row
+def _nearer(  # type: ignore[no-untyped-def]
+    grid, pose, place, slack, corners, distance, normal, drift, beside
+):  # pragma: no cover - compiled
+    """Return distance, direction and drift of the torso in lanes where it is nearer."""
+    other, away = _distances(grid, transform_rows(pose, place), slack, corners)
+    away = (
+        pose[0][0] * away[0] + pose[1][0] * away[1] + pose[2][0] * away[2],
+        pose[0][1] * away[0] + pose[1][1] * away[1] + pose[2][1] * away[2],
+        pose[0][2] * away[0] + pose[1][2] * away[1] + pose[2][2] * away[2],
+    )
+    return (
+        pick(other, distance, other, distance),
+        _pick_three(other, distance, away, normal),
+        _pick_three(other, distance, beside, drift),
+    )
+
+
+@row
+def _pick_three(a, b, below, otherwise):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Pick vectors as `pick` picks numbers."""
+    return (
+        pick(a, b, below[0], otherwise[0]),
+        pick(a, b, below[1], otherwise[1]),
+        pick(a, b, below[2], otherwise[2]),
+    )
 
 
 @row
@@ -112,24 +155,24 @@ def _take_up(values, corners, lane) -> None:  # type: ignore[no-untyped-def] # p
 
 
 @row
-def _out(x, j, shift, depth, normal, settings, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def _out(x, j, drift, depth, normal, settings, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Move nodes out by up to their depth, with friction; nothing happens where normals are 0."""
     h, friction, fastest = settings[0], settings[2], settings[3]
     place, speed = load_three(x, j, PLACE), load_three(x, j, SPEED)
-    across = dot(plus(speed, times(ONE / h, transform_rows(shift, place))), normal)
+    across = dot(plus(speed, times(ONE / h, drift)), normal)
     inward = pick(across, ZERO, ZERO - across, ZERO)
     most = h * (inward + fastest)
     out = pick(depth, most, depth, most)
     store(grips, j, friction * inward)
     store_three(x, j, SPEED, plus(speed, times(inward, normal)))
     store_three(x, j, PLACE, minus(place, times(ZERO - out, normal)))
-    _brake(x, j, load_three(x, j, SPEED), place, shift, normal, h, grips)
+    _brake(x, j, load_three(x, j, SPEED), drift, normal, h, grips)
 
 
 @row
-def _brake(x, j, speed, place, shift, normal, h, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Slow a node along the obstacle by no more than its grip; `place` says how the head goes."""
-    relative = plus(speed, times(ONE / h, transform_rows(shift, place)))
+def _brake(x, j, speed, drift, normal, h, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Slow a node along the obstacle by no more than its grip."""
+    relative = plus(speed, times(ONE / h, drift))
     along = minus(relative, times(dot(relative, normal), normal))
     size = lane_root(dot(along, along)) + np.float32(1e-12)
     grip = load(grips, j)
@@ -142,14 +185,14 @@ def _brake(x, j, speed, place, shift, normal, h, grips) -> None:  # type: ignore
 
 
 @row
-def apply_friction(x, constants, settings, normals, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def apply_friction(x, settings, normals, drifts, grips) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Let nodes that touch rub once more, by what the strands' own tension adds to their grip."""
     for j in range(1, x.shape[0]):
         normal = load_three(normals, j, 0)
         if any_below(ZERO - dot(normal, normal), ZERO):
-            speed, place = load_three(x, j, SPEED), load_three(x, j, PLACE)
             # where nothing is touched the whole velocity is along, and grip is 0
-            _brake(x, j, speed, place, constants[1], normal, settings[0], grips)
+            drift = load_three(drifts, j, 0)
+            _brake(x, j, load_three(x, j, SPEED), drift, normal, settings[0], grips)
 
 
 @row

@@ -42,7 +42,8 @@ SHARPEST, LARGEST_SPIN = np.float32(0.3), np.float32(0.3)
 
 @row
 def constants_of(head_step, turn, gravity, settings):  # type: ignore[no-untyped-def] # pragma: no cover
-    """Return the substep's scalars: motion, displacement, rotation, world to head, gravity, step.
+    """Return the substep's scalars: motion, displacement, rotation, world to head, gravity, step,
+    head to torso, displacement of the torso.
 
     See `kernels.run_substeps` for the arguments.
     """
@@ -54,6 +55,8 @@ def constants_of(head_step, turn, gravity, settings):  # type: ignore[no-untyped
         world,
         rotate_rows(world, (gravity[0], gravity[1], gravity[2])),
         (settings[0], settings[1], ONE / settings[0]),
+        rows_of(head_step, 12),
+        rows_of(head_step, 16),
     )
 
 
@@ -77,7 +80,7 @@ def lead_root(x, node, constants):  # type: ignore[no-untyped-def] # pragma: no 
 @row
 def predict_node(x, node, air, constants, force, j) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Transform a node to the new head axes, extrapolate it, and write the force on it."""
-    head_step, shift, _, world, gravity, step = constants
+    head_step, shift, _, world, gravity, step, _, _ = constants
     h, damping, over = step
     rest = load_three(node, j, REST)
     place, speed, gain = (

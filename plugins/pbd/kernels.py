@@ -58,7 +58,7 @@ def run_substeps(  # type: ignore[no-untyped-def]
     gravity,
     air,
     force,
-    grid,
+    grids,
     settings,
 ) -> None:  # pragma: no cover - compiled
     """Advance blocks `first` to before `last` by as many substeps as there are rides, in place.
@@ -71,21 +71,22 @@ def run_substeps(  # type: ignore[no-untyped-def]
         (B, 1, 7, W) frame and direction, (B, n, NODE, W), (B, n - 1, ELEMENT, W) and
         (B, n (n - 1) / 2, W) constants.
     rides, turns
-        (K, 3, 12): the head axes' motion, the same less the identity, and the turn's quaternion in
-        the first row; (K, 3, 4) from the world to the head axes after each substep.
+        (K, 3, 20): the head axes' motion, the same less the identity, the turn's quaternion in the
+        first row, the torso's place and its motion less the identity (see `TorsoStep`);
+        (K, 3, 4) from the world to the head axes after each substep.
     gravity, air, force
         (3,) world; (B, n, 3, W) world, or (1, 1, 3, W) for all; (B, n, 3, W) per mass, or
         (1, 1, 3, W) for none.
-    grid
-        Obstacles: values (X, Y, Z), and where they are (5,): origin, 1/spacing, and how far at
-        least everything is outside.
+    grids
+        Of head and torso: values (X, Y, Z), empty for none, and where they are (5,): origin,
+        1/spacing, and how far at least everything is outside.
     settings
         (7,) step, damping, friction, depenetration speed, iterations, contacts, rounds of friction.
     """
     n = x.shape[1]
-    # work: segments (6), sums along the rod, forces, solutions and normals (3 each), factor, cells
+    # work: segments (6), sums along the rod, vectors of nodes, factor, cells
     segment, line = np.empty((n - 1, 6, LANES), np.float32), np.empty((LINES, n, LANES), np.float32)
-    vector = np.empty((4, n, 3, LANES), np.float32)
+    vector = np.empty((5, n, 3, LANES), np.float32)
     factor = np.empty((metric.shape[1], LANES), np.float32)
     corners = np.zeros((12, LANES), np.float32)
     for block in range(first, last):
@@ -93,19 +94,19 @@ def run_substeps(  # type: ignore[no-untyped-def]
         for k in range(head_steps.shape[0]):
             _substep(
                 x[block], q[block], root[block], node[block], element[block], metric[block],
-                constants_of(head_steps[k], turns[k], gravity, settings), wind, extra, grid,
+                constants_of(head_steps[k], turns[k], gravity, settings), wind, extra, grids,
                 settings, segment, vector, line, factor, corners,
             )  # fmt: skip
 
 
 @row
 def _substep(  # type: ignore[no-untyped-def]
-    x, q, root, node, element, metric, constants, air, extra, grid, settings,
+    x, q, root, node, element, metric, constants, air, extra, grids, settings,
     segment, vector, line, factor, corners,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Do one substep of a block, in the reference's order."""
     n = x.shape[0]
-    force, free, change, normals = vector[0], vector[1], vector[2], vector[3]
+    force, free, change, normals, drifts = vector[0], vector[1], vector[2], vector[3], vector[4]
     coupled = lead_root(x, node, constants)
     for j in range(1, n):
         predict_node(x, node, air, constants, force, j)
@@ -130,12 +131,12 @@ def _substep(  # type: ignore[no-untyped-def]
         move_node(x, minus(load_three(free, j, 0), load_three(change, j, 0)), constants, j)
     if settings[5] > ZERO:
         touching = resolve_contacts(
-            x, node, constants, grid, settings, corners, normals, line[GRIP]
+            x, node, constants, grids, settings, corners, normals, drifts, line[GRIP]
         )
         restore_lengths(x, node, element, segment, normals, line, settings)
         # without contact, one more iteration is enough
         for _ in range(int(settings[6] if touching else min(settings[6], ONE))):
-            apply_friction(x, constants, settings, normals, line[GRIP])
+            apply_friction(x, settings, normals, drifts, line[GRIP])
             restore_lengths(x, node, element, segment, normals, line, settings)
     keep_lengths(x, element, constants[5][0])
 

@@ -11,22 +11,23 @@ import numpy.typing as npt
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.parallel import parallel_for
 from hairkit.simulation import quaternion
+from hairkit.simulation.obstacles import Obstacles
 
 from . import kernels
+from .drawn_points import drawing
 from .factor_layout import banded_factor
 from .hair_grid import HairGrid
 from .kernel_embedding import embed_points
 from .kernel_hair_grid import draw_nodes, settle_cells, spread_nodes
 from .kernel_wind import sample_gusts
 from .linear_system import System
-from .reference import Contact, Load, State, rest_state
+from .reference import Contact, Load, State, TorsoStep, obstacles_of, rest_state
 from .resampling import Embedding
 from .rods import Rods
 from .simd import LANES
 
 Array = npt.NDArray[Any]
 AirWaves = tuple[Float64Array, Float64Array, Float64Array]
-NOWHERE = np.zeros(0, np.float32)
 WORTH = 64 // LANES
 """Blocks that are worth another thread's while."""
 FEW, GRIDS = 2000, 4
@@ -44,11 +45,9 @@ class FastEngine:
         held = quaternion.third_axis(rods.root_frame)
         self._root = kernels.pack_lanes(np.concatenate([rods.root_frame, held], axis=1)[:, None])
         self._packed: tuple[System, Float32Array, Float32Array, Float32Array] | None = None
-        self._grid = _grid(contact)
-        deepest = None if contact is None else contact.deepest
-        self._deepest = NOWHERE if deepest is None else deepest.astype(np.float32)
-        clear = np.zeros(rods.mass.shape) if contact is None else contact.clearance
-        self._clear = kernels.pack_lanes(clear.astype(np.float32))
+        head, torso = obstacles_of(contact)
+        self._grids = _grid(head), _grid(torso)
+        self.torso_from_head = np.eye(4)
         self._mass = kernels.pack_lanes(rods.mass.astype(np.float32))
         self._mass[-1, :, (self._count - 1) % LANES + 1 :] = 0.0
         self._cells = np.zeros((1, 0, 4), np.float32)
@@ -95,7 +94,7 @@ class FastEngine:
             loads[0].gravity.astype(np.float32),
             self._air(loads[0].air),
             self._force(loads[0].force),
-            self._grid,
+            self._grids,
             settings,
             min_chunk=WORTH,
         )
@@ -175,17 +174,15 @@ class FastEngine:
                 _pack_embedding(embedding, self._x.shape[1]),
             )
         out = np.empty((len(embedding.rod), 3), np.float32)
-        deepest = NOWHERE if embedding.identity else self._deepest
         parallel_for(
             embed_points,
             self._count,
             self._x,
             self._q,
-            self._clear,
             *self._packed_embedding[1],
-            deepest,
+            *drawing(embedding, self._contact),
+            self.torso_from_head,
             head[:3].astype(np.float32),
-            self._grid,
             out,
             min_chunk=256,
         )
@@ -235,19 +232,22 @@ def _constants(
 
 def _pack_motions(loads: Sequence[Load]) -> tuple[Float32Array, Float32Array]:
     """Pack rides and turns as `kernels.run_substeps` takes them."""
-    head_steps, turns = np.zeros((len(loads), 3, 12)), np.zeros((len(loads), 3, 4))
+    head_steps, turns = np.zeros((len(loads), 3, 20)), np.zeros((len(loads), 3, 4))
     for k, load in enumerate(loads):
         head_steps[k, :, :4] = load.head_step[:3]
         head_steps[k, :, 4:8] = load.head_step[:3] - np.eye(
             3, 4
         )  # in float64: small motions keep their digits
-        head_steps[k, 0, 8:] = quaternion.from_matrix(load.head_step[:3, :3])
+        head_steps[k, 0, 8:12] = quaternion.from_matrix(load.head_step[:3, :3])
+        torso = load.torso or TorsoStep(np.eye(4), load.head_step)
+        head_steps[k, :, 12:16] = torso.from_head[:3]
+        head_steps[k, :, 16:] = torso.step[:3] - np.eye(3, 4)
         turns[k, :, :3] = load.turn
     return head_steps.astype(np.float32), turns.astype(np.float32)
 
 
 def _pack_embedding(embedding: Embedding, nodes: int) -> tuple[Array, ...]:
-    """Return starts, segment, weights (P, 6) of four nodes and two frames, offset and length."""
+    """Return segment, weights (P, 6) of four nodes and two frames, and offset."""
     t, last = embedding.share, nodes - 2
     one, two = t * t * (3 - 2 * t), t * (1 - t)
     start, end = two * (1 - t), -two * t  # of the slopes, per segment
@@ -263,18 +263,18 @@ def _pack_embedding(embedding: Embedding, nodes: int) -> tuple[Array, ...]:
         ],
         axis=1,
     )
-    parts = (weight, embedding.offset, embedding.length)
     return (
-        embedding.starts, embedding.segment.astype(np.int32),
-        *(part.astype(np.float32) for part in parts),
-    )  # fmt: skip
+        embedding.segment.astype(np.int32),
+        weight.astype(np.float32),
+        embedding.offset.astype(np.float32),
+    )
 
 
-def _grid(contact: Contact | None) -> tuple[Float32Array, Float32Array]:
-    if contact is None:
-        return np.zeros((2, 2, 2), np.float32), np.ones(5, np.float32)
-    grid = contact.obstacles.grid
+def _grid(body: Obstacles | None) -> tuple[Float32Array, Float32Array]:
+    if body is None:
+        return np.zeros((0, 0, 0), np.float32), np.ones(5, np.float32)
+    grid = body.grid
     first = grid.origin + 0.5 * grid.spacing
     # least distance outside the grid, metres
     place = np.array([*first, 1.0 / grid.spacing, 0.02], np.float32)
-    return contact.obstacles.distance.copy(), place
+    return body.distance.copy(), place

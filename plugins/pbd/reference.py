@@ -8,12 +8,13 @@ head is. The faster backends do the same steps; tests compare them with this one
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
-from hairkit.simulation.obstacles import Obstacles
+from hairkit.simulation.obstacles import Bodies, Obstacles
 
 from .linear_system import IMPLICIT, System
 from .rods import Rods, half_binormal, midpoint_frame, next_element, split_torque, twist_between
@@ -51,7 +52,7 @@ class State:
 class Contact:
     """Parameters of contact between nodes and obstacles."""
 
-    obstacles: Obstacles
+    bodies: Bodies
     clearance: Float64Array
     """(S, n) least distance of the nodes, metres; less where the captured hair is nearer."""
     friction: float
@@ -63,6 +64,16 @@ class Contact:
     rounds: int = 0
     """Friction iterations under the tension that restores the lengths. With 0 taut strands have too
     little friction around bends; with 4 the Euler-Eytelwein equation holds."""
+
+
+class TorsoStep(NamedTuple):
+    """The torso in one substep."""
+
+    from_head: Float64Array
+    """(4, 4) from the head axes after it to the torso's axes."""
+    step: Float64Array
+    """(4, 4) the torso's motion in it as `Load.head_step`: where its points were, head axes after
+    it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +90,13 @@ class Load:
     """(S, n, 3) or (3,) velocity of the air, m/s, world."""
     force: Float64Array | None = None
     """(S, n, 3) further force, newtons, head axes after the substep."""
+    torso: TorsoStep | None = None
+    """Where the torso is; None: it goes with the head, as at rest."""
+
+
+def obstacles_of(contact: Contact | None) -> tuple[Obstacles | None, Obstacles | None]:
+    """Return head and torso, None where there is none."""
+    return (None, None) if contact is None else (contact.bodies.head, contact.bodies.torso)
 
 
 def rest_state(rods: Rods) -> State:
@@ -102,7 +120,7 @@ def substep(
     """
     new, _ = solve_substep(rods, system, state, load, iterations)
     if contact is not None:
-        new, _ = resolve_contacts(rods, new, contact, load.head_step, system.step)
+        new, _ = resolve_contacts(rods, new, contact, load, system.step)
     return keep_lengths(rods, new, system.step)
 
 
@@ -250,27 +268,30 @@ def solve_tension(
 
 
 def resolve_contacts(
-    rods: Rods, state: State, contact: Contact, head_step: Float64Array, step: float
+    rods: Rods, state: State, contact: Contact, load: Load, step: float
 ) -> tuple[State, Float64Array]:
     """Return the state with penetrations resolved, with Coulomb friction, and a tension.
 
     The tension (S, n - 1), newtons, restores the lengths, in addition to that of the substep
     before: both press a taut strand onto an obstacle.
     """
-    shape = state.position.shape
-    distance, normal = contact.obstacles.at(state.position.reshape(-1, 3))
-    depth = contact.clearance - distance.reshape(shape[:2])
+    pose = None if load.torso is None else load.torso.from_head
+    distance, normal, on_torso = contact.bodies.at(state.position, pose)
+    depth = contact.clearance - distance
     depth[:, 0] = 0.0
-    normal = (depth > 0)[..., None] * normal.reshape(shape)
-    head_velocity = (state.position - transform_points(head_step, state.position)) / step
-    inward = np.maximum(-((state.velocity - head_velocity) * normal).sum(axis=-1), 0.0)
+    normal = (depth > 0)[..., None] * normal
+    surface = (state.position - transform_points(load.head_step, state.position)) / step
+    if load.torso is not None:
+        beside = (state.position - transform_points(load.torso.step, state.position)) / step
+        surface = np.where(on_torso[..., None], beside, surface)
+    inward = np.maximum(-((state.velocity - surface) * normal).sum(axis=-1), 0.0)
     # Depth of this substep is removed at once, older depth at a limited speed.
     out = np.clip(depth, 0.0, (inward + contact.fastest) * step)
     velocity = state.velocity + inward[..., None] * normal
     position = state.position + out[..., None] * normal
     grip, taut = contact.friction * inward, np.zeros_like(rods.length)
     for _ in range(1 + contact.rounds):
-        brake = friction_change(velocity - head_velocity, normal, grip)
+        brake = friction_change(velocity - surface, normal, grip)
         # a change over the substep moves a node by half of it, as that of its other forces
         position, velocity = position + 0.5 * step * brake, velocity + brake
         fixed, pull, pressed = restore_lengths(rods, position, normal)

@@ -14,7 +14,13 @@ from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.rendering.context import on_graphics_card
 from hairkit.simulation import Measures, Surroundings
-from hairkit.simulation.obstacles import Obstacles, head_obstacles
+from hairkit.simulation.obstacles import Bodies, groom_bodies
+from hairkit.simulation.rigid_motion import (
+    follow_head,
+    interpolate_motion,
+    inverse_motion,
+    motion_steps,
+)
 from hairkit.simulation.ties import held_lengths
 from hairkit.simulation.wind import air_velocity, gust_waves
 from hairkit.types.groom import Groom
@@ -24,9 +30,9 @@ from .backend import Engine, ReferenceEngine
 from .energies import elastic_energy, largest_stretch
 from .grab import GrabForces
 from .hair_grid import HairGrid, make_hair_grid
-from .head_interpolation import finer_steps, interpolate_motion, inverse_motion, motion_steps
+from .head_steps import finer_steps
 from .linear_system import Rates, System, assemble
-from .reference import Contact, Load, rest_state, transform_points
+from .reference import Contact, Load, TorsoStep, rest_state, transform_points
 from .resampling import embed_points, max_stiffness, node_points, overhang
 from .rods import Rods, balance_load, clamp_roots, make_rods
 
@@ -66,9 +72,10 @@ class PbdSimulator:
     def __init__(self, groom: Groom, options: Options) -> None:
         guides = select_strands(groom, guide_mask(groom.strands))
         self._groom = guides
-        self._obstacles: Obstacles = head_obstacles(guides.head)
+        self._bodies: Bodies = groom_bodies(groom)
         self._points: Float32Array | None = None
         self._head: Float64Array = np.eye(4)
+        self._torso: Float64Array = np.eye(4)
         self._grab_forces = GrabForces()
         self._rest_energy: float | None = None
         self._tune(options)
@@ -141,6 +148,7 @@ class PbdSimulator:
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
         """Reset the guides to rest on a head at `head_from_rest` (4, 4), with zero velocity."""
         self._head = np.eye(4) if head_from_rest is None else np.asarray(head_from_rest, np.float64)
+        self._torso, self._engine.torso_from_head = self._head, np.eye(4)
         self._engine.state = rest_state(self._rods)
         self._grab_forces = GrabForces()
         self._time = 0.0
@@ -171,11 +179,13 @@ class PbdSimulator:
             found = largest_stretch(rods, state), kinetic, weight, elastic
         stretch, kinetic, weight, elastic = found
         energy = weight + elastic - self._rest_energy
-        return Measures(max(stretch, self._drawn_stretch()), kinetic, energy)
-
-    def _drawn_stretch(self) -> float:
-        """Return the largest stretch between points, in head axes: far away float32 is coarse."""
+        # in head axes, since float32 is coarse far away
         points = self._engine.points(self._embedding, np.eye(4)).astype(np.float64)
+        depth = self._bodies.deepest(points, self._engine.torso_from_head, self._deepest)
+        return Measures(max(stretch, self._drawn_stretch(points)), kinetic, energy, depth)
+
+    def _drawn_stretch(self, points: Float64Array) -> float:
+        """Return the largest stretch between points."""
         now = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1)
         long = self._embedding.length > SMALLEST
         return float(np.abs(now[long] / self._embedding.length[long] - 1).max(initial=0.0))
@@ -198,8 +208,9 @@ class PbdSimulator:
         self._rates = self._rates_of(resolved)
         self._systems: dict[float, System] = {}
         self._rest_energy = None
-        self._contact = _contact(resolved, self._obstacles, self._near, self._deepest)
+        self._contact = _contact(resolved, self._bodies, self._near, self._deepest)
         self._engine = _engine(resolved.backend, self._rods, self._contact)
+        self._engine.torso_from_head = inverse_motion(self._torso) @ self._head
 
     def _place_nodes(self, nodes: int) -> None:
         """Place nodes along the guides; measure the captured distance to the obstacles."""
@@ -209,12 +220,12 @@ class PbdSimulator:
         if width is not None:
             mean = np.add.reduceat(width, strands.offsets[:-1]) / strands.counts
             self._width = np.maximum(mean, 1e-6)
-        near = self._obstacles.at(self._nodes.reshape(-1, 3))[0]
-        self._near: Float64Array = near.reshape(self._nodes.shape[:2])
+        near = self._bodies.at(self._nodes)[0]
+        self._near: Float64Array = near
         length = np.maximum(strands.lengths(), 1e-9)
         self._held: Float64Array = held_lengths(self._groom) / length
         # embedded points between nodes outside the head may still cut through it
-        self._deepest = np.minimum(self._obstacles.at(strands.points)[0], 0.001) - 1e-5
+        self._deepest = np.minimum(self._bodies.at(strands.points)[0], 0.001) - 1e-5
 
     def _stiffen(self, options: Options) -> None:
         """Make the rods, whose natural shape balances gravity at the captured shape."""
@@ -260,7 +271,9 @@ class PbdSimulator:
         segment = float(np.median(self._rods.length))
         finer = finer_steps(start, end, self._rods.points[:, 0], segment)
         if finer == 0:
-            start, finer = end, 1  # hair goes with a head that is elsewhere at once
+            start, finer = end, 1  # hair and torso go with a head that is elsewhere at once
+            self._move_torso(end, end, 1)
+            self._engine.state = self._engine.state  # known distances to the torso are void
         count = max(1, math.ceil(self._options.substeps * seconds / FRAME - 1e-6)) * finer
         step = seconds / count
         system = self._system(step)
@@ -270,8 +283,9 @@ class PbdSimulator:
             self._engine.apply_hair_grid(self._hair_grid, inverse_motion(end) @ start, rates)
         held = self._grabs_on_engine(around, start)
         loads = []
-        for after, head_step in motion_steps(start, end, count):
-            load = Load(head_step, after[:3, :3].T, gravity, air)
+        torsos = self._move_torso(start, end, count)
+        for (after, head_step), torso in zip(motion_steps(start, end, count), torsos, strict=True):
+            load = Load(head_step, after[:3, :3].T, gravity, air, None, torso)
             if around.grabs and not held:  # a pull depends on the node's position
                 force = self._grab_forces.compute(
                     around.grabs, self._engine, self._rods, self._embedding, system, load,
@@ -283,6 +297,21 @@ class PbdSimulator:
         if loads:
             self._engine.run(system, loads, self._options.iterations)
         self._time += seconds
+
+    def _move_torso(
+        self, start: Float64Array, end: Float64Array, count: int
+    ) -> list[TorsoStep | None]:
+        """Let the torso follow the head, which goes from `start` to `end`; return its substeps."""
+        if self._bodies.torso is None:
+            return [None] * count
+        before, self._torso = self._torso, follow_head(self._torso, end, self._bodies.joint)
+        heads, torsos = motion_steps(start, end, count), motion_steps(before, self._torso, count)
+        steps: list[TorsoStep | None] = []
+        for (head, _), (torso, change) in zip(heads, torsos, strict=True):
+            from_head = inverse_motion(torso) @ head
+            steps.append(TorsoStep(from_head, inverse_motion(from_head) @ change @ from_head))
+        self._engine.torso_from_head = inverse_motion(self._torso) @ end
+        return steps
 
     def _grabs_on_engine(self, around: Surroundings, head: Float64Array) -> bool:
         """Pass the grabs to the engine; return False if it cannot pull points itself."""
@@ -338,9 +367,9 @@ def _engine(name: str, rods: Rods, contact: Contact) -> Engine:
 
 
 def _contact(
-    options: Options, obstacles: Obstacles, near: Float64Array, deepest: Float64Array
+    options: Options, bodies: Bodies, near: Float64Array, deepest: Float64Array
 ) -> Contact:
     """Return the contact parameters; hair captured nearer (S, n) keeps its own distance."""
     clearance = np.minimum(options.clearance, near)
     apply_hair_grid, fastest = options.friction_coefficient(), options.depenetration
-    return Contact(obstacles, clearance, apply_hair_grid, fastest, deepest, options.rounds)
+    return Contact(bodies, clearance, apply_hair_grid, fastest, deepest, options.rounds)

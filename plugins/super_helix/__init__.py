@@ -25,8 +25,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from hairkit.grooming.guide_weights import guide_mask
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.hookspecs import hookimpl
 from hairkit.options import option
 from hairkit.types.groom import Groom
@@ -86,4 +84,4 @@ def make_simulator(groom: Groom, options: Options) -> SuperHelices:
     """Return a simulator of the guides as super-helices."""
     from .simulator import SuperHelices
 
-    return SuperHelices(select_strands(groom, guide_mask(groom.strands)), options)
+    return SuperHelices(groom, options)

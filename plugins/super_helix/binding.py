@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,7 +14,7 @@ from hairkit.helices.helix_strands import travelling
 from hairkit.parallel import compiled
 from hairkit.types.strands import Strands
 
-from .element_kernels import advance_frame, node, place_clamped_end, times, turns
+from .element_kernels import advance_frame, node, times, turns
 from .rods import Rods
 
 SHAPE, FEWEST, MOST = 0.0015, 8, 32
@@ -90,33 +89,31 @@ def _without_points(strands: Strands) -> Strands:
 
 def _offsets(rods: Rods, binding: Binding, wanted: Float64Array) -> Float64Array:
     bare, frames = np.empty_like(wanted), np.empty((len(wanted), 3, 3))
-    draw(0, len(rods.roots), rods, rods.captured, np.eye(4), binding, bare, frames, False)
+    carry_points(0, len(rods.roots), rods, rods.captured, binding, bare, frames)
     return np.ascontiguousarray(np.einsum("pji,pj->pi", frames, wanted - bare))
 
 
 @compiled
-def draw(
+def carry_points(
     begin: int,
     stop: int,
     rods: Rods,
     q: Float64Array,
-    head: Float64Array,
     binding: Binding,
     points: Float64Array,
     frames: Float64Array,
-    keep: bool,
 ) -> None:
-    """Write the points (P, 3) and frames (P, 3, 3) of strands `begin` to `stop`, world.
+    """Write the points (P, 3) and frames (P, 3, 3) of strands `begin` to `stop`, head axes.
 
-    Points off the rod's line come apart or together where it bends; they are then set at their
-    rest distances along the strand, in the directions found.
+    Those off the rod's line come apart or together where it bends: see
+    `hairkit.simulation.obstacle_kernels.draw_points`.
     """
     local, slope, arm = np.empty(3), np.empty((3, 3)), np.empty(3)
     turn, mean = np.empty((3, 3)), np.empty((3, 3))
     frame, root = np.empty((3, 3)), np.empty(3)
     next_frame, next_root = np.empty((3, 3)), np.empty(3)
     for strand in range(begin, stop):
-        place_clamped_end(head, rods.roots[strand], rods.frames[strand], root, frame)
+        root[:], frame[:] = rods.roots[strand], rods.frames[strand]
         e = rods.offsets[strand]
         for p in range(binding.bounds[strand], binding.bounds[strand + 1]):
             while e < binding.element[p]:
@@ -137,21 +134,3 @@ def draw(
                         + frame[i, 1] * turn[1, j]
                         + frame[i, 2] * turn[2, j]
                     )
-        if keep:
-            _keep_lengths(points, binding.step, binding.bounds[strand], binding.bounds[strand + 1])
-
-
-@compiled
-def _keep_lengths(points: Float64Array, step: Float64Array, first: int, last: int) -> None:
-    """Set points `first` to `last` of a strand at the distances `step`, root to tip."""
-    shift, before = np.zeros(3), points[first].copy()
-    for p in range(first + 1, last):
-        size = 0.0
-        for i in range(3):
-            size += (points[p, i] - before[i]) ** 2
-        factor = step[p] / max(math.sqrt(size), 1e-12)
-        for i in range(3):
-            along = points[p, i] - before[i]
-            before[i] = points[p, i]
-            shift[i] += (factor - 1.0) * along
-            points[p, i] += shift[i]

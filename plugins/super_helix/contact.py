@@ -1,4 +1,4 @@
-"""Contact of Gauss points with the head: a stiff spring outward, and Coulomb friction.
+"""Contact of Gauss points with head and torso: a stiff spring outward, and Coulomb friction.
 
 Both enter the implicit step as 3 x 3 weights of their points, so that a deep overlap or a fast head
 cannot make it unstable; friction takes the normal force and the sliding speed of the last iterate.
@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled
+from hairkit.simulation.obstacle_kernels import distance_at
 
-from .state import Step
+from .state import Body, Step
 
 _SLOW = 1e-3
 """Sliding speeds below this, metres per second, are held by friction without slipping."""
@@ -23,6 +21,7 @@ _SLOW = 1e-3
 @compiled
 def touch(
     step: Step,
+    body: Body,
     mass: float,
     h: float,
     gap: float,
@@ -32,12 +31,12 @@ def touch(
     pull: Float64Array,
     scratch: Float64Array,
 ) -> bool:
-    """Add to a point's weight and gradient what the obstacles do to it; return whether they do.
+    """Add to a point's weight and gradient what a body does to it; return whether it does.
 
     Parameters
     ----------
-    step
-        The `Step`.
+    step, body
+        The `Step`, one of its bodies.
     mass, h
         The point's mass, kilograms; the step's effective seconds.
     gap
@@ -47,24 +46,26 @@ def touch(
     weight, pull
         (3, 3) and (3,) changed in place.
     scratch
-        (4, 3) anything.
+        (3, 3) anything.
     """
-    local, normal, n, slide = scratch[0], scratch[1], scratch[2], scratch[3]
+    local, n, slide = scratch[0], scratch[1], scratch[2]
+    pose, before_pose = body.pose, body.pose_before
     for i in range(3):
         local[i] = 0.0
         for j in range(3):
-            local[i] += step.head[j, i] * (point[j] - step.head[j, 3])
-    depth = gap - distance_at(step.origin, step.spacing, step.distance, local, normal)
+            local[i] += pose[j, i] * (point[j] - pose[j, 3])
+    distance, a, b, c = distance_at(body.field, local[0], local[1], local[2], gap)
+    depth = gap - distance
     if depth <= 0:
         return False
     speed = 0.0
     for i in range(3):
-        n[i] = surface = 0.0
+        n[i] = pose[i, 0] * a + pose[i, 1] * b + pose[i, 2] * c
+        surface = 0.0
         for j in range(3):
-            n[i] += step.head[i, j] * normal[j]
-            surface += step.head_before[i, j] * local[j]
+            surface += before_pose[i, j] * local[j]
         # the surface's own motion over the whole step, as a velocity
-        moved = point[i] - surface - step.head_before[i, 3]
+        moved = point[i] - surface - before_pose[i, 3]
         slide[i] = (point[i] - before[i]) - h * moved / step.seconds
     along = slide[0] * n[0] + slide[1] * n[1] + slide[2] * n[2]
     for i in range(3):
@@ -79,43 +80,3 @@ def touch(
         for j in range(3):
             weight[i, j] += (stiff - grip) * n[i] * n[j]
     return True
-
-
-@compiled
-def distance_at(
-    origin: Float64Array,
-    spacing: float,
-    values: npt.NDArray[np.float32],
-    point: Float64Array,
-    normal: Float64Array,
-) -> float:
-    """Return the trilinear distance at a point and write its unit gradient; 1 off the grid."""
-    x = (point[0] - origin[0]) / spacing - 0.5
-    y = (point[1] - origin[1]) / spacing - 0.5
-    z = (point[2] - origin[2]) / spacing - 0.5
-    if not (
-        0 <= x <= values.shape[0] - 1
-        and 0 <= y <= values.shape[1] - 1
-        and 0 <= z <= values.shape[2] - 1
-    ):
-        normal[:] = 0.0
-        return 1.0
-    i = min(int(x), values.shape[0] - 2)
-    j = min(int(y), values.shape[1] - 2)
-    k = min(int(z), values.shape[2] - 2)
-    u, v, w = x - i, y - j, z - k
-    value, a, b, c = 0.0, 0.0, 0.0, 0.0
-    for di in range(2):
-        p, dp = (u, 1.0) if di else (1 - u, -1.0)
-        for dj in range(2):
-            q, dq = (v, 1.0) if dj else (1 - v, -1.0)
-            for dk in range(2):
-                r, dr = (w, 1.0) if dk else (1 - w, -1.0)
-                found = float(values[i + di, j + dj, k + dk])
-                value += found * p * q * r
-                a += found * dp * q * r
-                b += found * p * dq * r
-                c += found * p * q * dr
-    size = max(math.sqrt(a * a + b * b + c * c), 1e-12)
-    normal[0], normal[1], normal[2] = a / size, b / size, c / size
-    return value

@@ -23,7 +23,7 @@ from .elimination import TWIST, eliminate
 from .rods import NODES, SHARES, WEIGHTS, Rods
 from .state import CLOSE, FAR, Loads, Motion, Step
 
-POINTS, ARMS, TOUCH, SCRATCH = 3, 4, 5, 7
+POINTS, ARMS, TOUCH, SCRATCH = 3, 4, 5, 6
 """Rows of the scratch space that hold points, levers and what contact needs, and their number."""
 
 
@@ -175,18 +175,10 @@ def _element(
             for k in range(3):
                 weight[i, k] = total if i == k else 0.0
         touched = False
-        if len(step.distance):
-            touched = touch(
-                step,
-                mass,
-                h,
-                loads.gap[e, g],
-                point,
-                before,
-                weight,
-                pull,
-                scratch[TOUCH:].reshape(-1, 3),
-            )
+        for body in step.bodies:
+            if len(body.field.distance):
+                gap, room = loads.gap[e, g], scratch[TOUCH]
+                touched |= touch(step, body, mass, h, gap, point, before, weight, pull, room)
         if touched:
             _add_point(form, gradient, arm, by_change, weight, pull)
         else:

@@ -154,10 +154,11 @@ def _point_loads(
     pull = mass * (points - back - h * rate - h * h * step.gravity)
     pull += drag * (points - back - h * loads.air) + spring * (points - loads.anchor)
     weight = (mass + drag + spring)[..., None] * np.eye(3)
-    if len(step.distance):
-        for e, g in np.ndindex(len(points), NODES):
+    for body in step.bodies:
+        for e, g in np.ndindex(len(points), NODES if len(body.field.distance) else 0):
             touch(
                 step,
+                body,
                 float(mass[e, g, 0]),
                 h,
                 float(loads.gap[e, g]),
@@ -165,6 +166,6 @@ def _point_loads(
                 back[e, g],
                 weight[e, g],
                 pull[e, g],
-                np.empty((4, 3)),
+                np.empty((3, 3)),
             )
     return weight, pull

@@ -10,20 +10,24 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
+from hairkit.grooming.guide_weights import guide_mask
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.parallel import parallel_for
-from hairkit.simulation import Measures, Surroundings, quaternion
-from hairkit.simulation.obstacles import Obstacles, head_obstacles
+from hairkit.simulation import Measures, Surroundings
+from hairkit.simulation.obstacle_kernels import NO_FIELDS, Drawn, draw_points
+from hairkit.simulation.obstacles import Bodies, groom_bodies
+from hairkit.simulation.rigid_motion import follow_head, interpolate_motion, inverse_motion
 from hairkit.simulation.ties import held_lengths
 from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
-from .binding import bind_rods, draw
+from .binding import bind_rods, carry_points
 from .hair_contact import Neighbours
 from .linear_time_step import place_points, step_strands
 from .reference import step_densely
 from .rods import NODES, Rods
-from .state import Loads, Motion, Step
+from .state import Body, Loads, Motion, Step
 from .statics import rest_as_captured
 
 if TYPE_CHECKING:
@@ -31,6 +35,9 @@ if TYPE_CHECKING:
 
 FRAME = 1 / 60
 """Seconds that the option `substeps` divides: one frame."""
+DRAWN, ROUNDING = 0.001, 1e-5
+"""Metres off the head that drawn points keep, where they were not nearer at rest, and by which
+that is less than what grids say."""
 SKIN = 0.0015
 """Hair is kept this far off the head, metres, where it was not nearer at rest."""
 PUSH_RATE, GRAB_RATE = 600.0, 150.0
@@ -48,15 +55,18 @@ MIDDLE = 0.6
 class SuperHelices:
     """Guides whose elements keep their length: two curvatures and a twist each."""
 
-    def __init__(self, groom: Groom, options: Options, obstacles: Obstacles | None = None) -> None:
-        self._groom = groom
+    def __init__(self, groom: Groom, options: Options) -> None:
+        self._bodies: Bodies | None = None
+        if options.contact and len(groom.strands):
+            self._bodies = groom_bodies(groom)
+        self._fields = NO_FIELDS if self._bodies is None else self._bodies.fields
+        self._groom = groom = select_strands(groom, guide_mask(groom.strands))
         self._shape, self._binding = bind_rods(groom.strands, options.elements)
         self._rest_gravity = np.array([0.0, -groom.physics.gravity, 0.0])
-        if obstacles is None and options.contact and len(groom.strands):
-            obstacles = head_obstacles(groom.head)
-        self._obstacles = obstacles
-        empty = np.zeros((0, 0, 0), np.float32)
-        self._distance = empty if obstacles is None else np.array(obstacles.distance)
+        self._deepest = np.zeros(0)
+        if self._bodies is not None:
+            away = self._bodies.at(groom.strands.points)[0]
+            self._deepest = np.minimum(away, DRAWN) - ROUNDING
         self.retune(options)
         self.reset()
 
@@ -93,7 +103,8 @@ class SuperHelices:
         head = np.eye(4) if head_from_rest is None else np.array(head_from_rest, np.float64)
         if head.shape != (4, 4):
             raise InputError(f"head_from_rest has shape {head.shape}, expected (4, 4)")
-        self._head, self._time, self._before = head, 0.0, 0.0
+        self._head = self._torso = head
+        self._time = self._before = 0.0
         shape = (len(self._rods.lengths), NODES)
         rest = np.empty((*shape, 3))
         parallel_for(
@@ -103,9 +114,8 @@ class SuperHelices:
         self._motion = Motion(q.copy(), q.copy(), rest, rest.copy(), still, still.copy())
         own = (rest - head[:3, 3]) @ head[:3, :3]
         self._gap = np.full(shape, SKIN)
-        if self._obstacles is not None:
-            away = self._obstacles.at(own.reshape(-1, 3))[0].reshape(shape)
-            self._gap = np.minimum(self._gap, away)
+        if self._bodies is not None:
+            self._gap = np.minimum(self._gap, self._bodies.at(own)[0])
         self._neighbours = Neighbours(own, self._rods.masses)
         self._rest_energy = self._potential(own, q, self._rest_gravity)
 
@@ -115,14 +125,9 @@ class SuperHelices:
             raise InputError(f"cannot advance by {seconds} s, expected seconds above 0")
         count = max(1, int(np.ceil(seconds / FRAME * self._options.substeps - 1e-6)))
         start, end = self._head, surroundings.head_from_rest
-        turns = quaternion.from_matrix(np.stack([start[:3, :3], end[:3, :3]]))
         air = self._air(surroundings)
         for substep in range(1, count + 1):
-            share = substep / count
-            head = end.copy()
-            if substep < count:
-                head[:3, :3] = quaternion.to_matrix(quaternion.slerp(turns[0], turns[1], share))
-                head[:3, 3] = (1 - share) * start[:3, 3] + share * end[:3, 3]
+            head = interpolate_motion(start, end, substep / count)
             self._substep(seconds / count, head, surroundings, air)
 
     def measure(self) -> Measures:
@@ -134,7 +139,16 @@ class SuperHelices:
             self._stretch(),
             float(0.5 * (self._rods.masses * speed).sum()),
             self._potential(own, self._motion.q, gravity) - self._rest_energy,
+            self._depth(),
         )
+
+    def _depth(self) -> float:
+        """Return by how much a drawn point is deeper in head or torso than at rest."""
+        if self._bodies is None:
+            return 0.0
+        own = (self._drawn() - self._head[:3, 3]) @ self._head[:3, :3]
+        torso = inverse_motion(self._torso) @ self._head
+        return self._bodies.deepest(own, torso, self._deepest)
 
     def _substep(
         self, seconds: float, head: Float64Array, around: Surroundings, air: Float64Array
@@ -142,7 +156,9 @@ class SuperHelices:
         options = self._options
         gravity = self._rest_gravity if around.gravity is None else around.gravity
         two_step = options.second_order and abs(self._before - seconds) < 1e-9
-        grid = self._obstacles
+        torso = self._torso
+        if self._bodies is not None:
+            torso = follow_head(torso, head, self._bodies.joint)
         step = Step(
             seconds,
             two_step,
@@ -150,19 +166,19 @@ class SuperHelices:
             options.iterations,
             np.array(gravity, np.float64),
             np.array(head, np.float64),
-            np.array(self._head, np.float64),
             PUSH_RATE**2,
             float(options.friction or 0.0),
-            np.zeros(3) if grid is None else np.array(grid.grid.origin, np.float64),
-            1.0 if grid is None else float(grid.grid.spacing),
-            self._distance,
+            (
+                Body(np.array(head), np.array(self._head), self._fields.head),
+                Body(np.array(torso), np.array(self._torso), self._fields.torso),
+            ),
         )
         loads = self._loads(around, air)
         if options.solver == "recursion":
             parallel_for(step_strands, len(self._rods.roots), self._rods, self._motion, loads, step)
         else:
             step_densely(self._rods, self._motion, loads, step)
-        self._head, self._before = step.head, seconds
+        self._head, self._torso, self._before = step.head, torso, seconds
         self._time += seconds
 
     def _air(self, around: Surroundings) -> Float64Array:
@@ -222,17 +238,19 @@ class SuperHelices:
         total = len(self._binding.arc)
         points, frames = np.empty((total, 3)), np.empty((total, 3, 3))
         parallel_for(
-            draw,
+            carry_points,
             len(self._rods.roots),
             self._rods,
             self._motion.q,
-            self._head,
             self._binding,
             points,
             frames,
-            True,
         )
-        return points
+        drawn = Drawn(self._binding.bounds, self._binding.step, self._deepest)
+        torso = inverse_motion(self._torso) @ self._head
+        parallel_for(draw_points, len(self._rods.roots), drawn, self._fields, torso, points)
+        world: Float64Array = points @ self._head[:3, :3].T + self._head[:3, 3]
+        return world
 
     def _potential(self, points: Float64Array, q: Float64Array, gravity: Float64Array) -> float:
         rods = self._rods

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
 from hairkit.arrays import Float64Array
+from hairkit.simulation.obstacle_kernels import Field
 
 CLOSE = 0.03
 """Largest rotation of an element in an iteration, radians, at which a step has converged."""
@@ -47,6 +45,17 @@ class Loads(NamedTuple):
     """(E, NODES) distance from obstacles below which a point is pushed out, metres."""
 
 
+class Body(NamedTuple):
+    """An obstacle during a step."""
+
+    pose: Float64Array
+    """(4, 4) its motion since rest at the step's end."""
+    pose_before: Float64Array
+    """(4, 4) at its start."""
+    field: Field
+    """Its distances, rest axes; empty for none."""
+
+
 class Step(NamedTuple):
     """One step, the same for all strands."""
 
@@ -62,15 +71,9 @@ class Step(NamedTuple):
     """(3,) metres per second squared."""
     head: Float64Array
     """(4, 4) head_from_rest at the step's end."""
-    head_before: Float64Array
-    """(4, 4) at its start."""
     contact: float
     """Square of the rate at which obstacles push points out, per square second."""
     coulomb: float
     """Coefficient of friction on obstacles."""
-    origin: Float64Array
-    """(3,) of the obstacles' grid."""
-    spacing: float
-    """Of the obstacles' grid, metres."""
-    distance: npt.NDArray[np.float32]
-    """(X, Y, Z) of the obstacles, metres; empty for none."""
+    bodies: tuple[Body, Body]
+    """Head and torso."""

@@ -30,6 +30,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "analogies": ({"SMALL": 16, "LARGE": 24, "SEEDS": 1, "ROWS": 1}, []),
     "batch": ({"JOBS": 4, "WARM": 2, "WAITING": 2, "WAIT_S": 0.0}, []),
     "cameras": ({}, ["CAPTURES", "--plugin", "landmarks"]),
+    "contact": ({}, ["--guides", "20", "--frames", "2", "--hair", "short"]),
     "command_plugins": ({"CALLS": 2, "SIZE": (40, 30)}, []),
     "farm_costs": ({"TASKS": (20, 60)}, ["--seconds", "5"]),
     "cards": (

@@ -7,8 +7,10 @@ import numpy.typing as npt
 from hairkit_plugins.super_helix.kinematics import place
 from hairkit_plugins.super_helix.linear_time_step import step_strands
 from hairkit_plugins.super_helix.rods import NODES, Rods
-from hairkit_plugins.super_helix.state import Loads, Motion, Step
+from hairkit_plugins.super_helix.state import Body, Loads, Motion, Step
 from hairkit_plugins.super_helix.statics import gravity_forces
+
+from hairkit.simulation.obstacle_kernels import NO_FIELDS
 
 Array = npt.NDArray[np.float64]
 DOWN = np.array([0.0, -9.81, 0.0])
@@ -90,6 +92,7 @@ def step_of(
     iterations: int = 1,
 ) -> Step:
     """Return a step without head motion and obstacles."""
+    nowhere = Body(np.eye(4), np.eye(4), NO_FIELDS.head)
     return Step(
         seconds,
         two_step,
@@ -97,12 +100,9 @@ def step_of(
         iterations,
         np.array(gravity, np.float64),
         np.eye(4),
-        np.eye(4),
         600.0**2,
         0.3,
-        np.zeros(3),
-        1.0,
-        np.zeros((0, 0, 0), np.float32),
+        (nowhere, nowhere),
     )
 
 

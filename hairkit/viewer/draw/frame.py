@@ -14,6 +14,7 @@ from hairkit.rendering.gl_camera import DepthRange, set_uniforms
 from hairkit.rendering.head import Solid
 from hairkit.rendering.light import Lights
 from hairkit.rendering.picture import BACKDROP_BOTTOM, BACKDROP_TOP, HEAD_PUSH
+from hairkit.simulation.rigid_motion import inverse_motion
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw.hair_cpu import SoftHairPass
 from hairkit.viewer.draw.hair_data import HairBody
@@ -61,6 +62,8 @@ class FrameInputs:
     billboard_opacity: float = 1.0
     solids: tuple[str, ...] = ()
     """Names of the other meshes to draw."""
+    world_from_torso: Float64Array = field(default_factory=lambda: np.eye(4))
+    """(4, 4) motion since rest of meshes that do not move with the head."""
 
 
 @dataclass
@@ -194,7 +197,8 @@ class FrameRenderer:
             self._head.draw(own, depth, HEAD_PUSH, lighting)
         for name in inputs.solids:
             if name in FIXED_SOLIDS:
-                self._solids[name].place(np.asarray(np.linalg.inv(inputs.world_from_head), float))
+                head_from_world = inverse_motion(inputs.world_from_head)
+                self._solids[name].place(head_from_world @ inputs.world_from_torso)
             self._solids[name].draw(own, depth, 0.0, lighting)
         self.gl.context.cull_face = "back"
 

@@ -20,7 +20,7 @@ from pbd_bench import DENSITY, LENGTH, G, load_of, straight, system_of
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
-from hairkit.simulation.obstacles import Obstacles
+from hairkit.simulation.obstacles import Bodies, Obstacles
 from hairkit.types.volume import VoxelGrid
 
 RADIUS, LEAD = 0.02, 0.04
@@ -36,7 +36,9 @@ def test_hair_on_a_slope_slides_when_the_slope_beats_friction(rounds: int) -> No
     plane = Obstacles(grid, grid.centres()[..., 1])
     rods = make_rods(straight(1, 12), DENSITY, 1e-16, straight=True)
     for share in (1.1, 0.9):
-        contact = Contact(plane, np.zeros_like(rods.mass), share * np.tan(alpha), 0.5, None, rounds)
+        contact = Contact(
+            Bodies(plane), np.zeros_like(rods.mass), share * np.tan(alpha), 0.5, None, rounds
+        )
         system, state = system_of(rods, 1 / 240), rest_state(rods)
         for _ in range(48):
             state = substep(rods, system, state, load_of(gravity), contact)
@@ -71,7 +73,7 @@ def test_compiled_ropes_slip_as_those_of_the_reference(rounds: int) -> None:
     rods = make_rods(points, DENSITY, 1e-12, straight=True)
     force = np.zeros_like(points)
     force[:, -1] = 1e-5 * np.stack([np.cos(wrap), -np.sin(wrap), 0.3 + 0 * wrap], axis=1)
-    contact = Contact(bollard(), np.zeros_like(rods.mass), 0.3, 0.5, None, rounds)
+    contact = Contact(Bodies(bollard()), np.zeros_like(rods.mass), 0.3, 0.5, None, rounds)
     system, load = system_of(rods, 1 / 240), load_of(force=force)
     places = []
     for engine in (ReferenceEngine(rods, contact), FastEngine(rods, contact)):
@@ -95,11 +97,11 @@ def slipping(wrap: Float64Array, speed: Float64Array, friction: float, rounds: i
     force = np.zeros_like(points)
     force[:, -1] = pull * np.stack([np.cos(wrap), -np.sin(wrap), 0 * wrap], axis=1)
     system, load, found = system_of(rods, step), load_of(force=force), []
-    contact = Contact(bollard(), np.zeros_like(rods.mass), friction, 0.5, None, rounds)
+    contact = Contact(Bodies(bollard()), np.zeros_like(rods.mass), friction, 0.5, None, rounds)
     for _ in range(100):
         points[:, 0, 0] -= speed * step
         state, before = solve_substep(replace(rods, points=points), system, state, load)
-        state, after = resolve_contacts(rods, state, contact, load.head_step, step)
+        state, after = resolve_contacts(rods, state, contact, load, step)
         found.append((before + after)[:, 0] / pull)
     return np.mean(found[25:], axis=0)
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hairkit_plugins.pbd import Options
 from hairkit_plugins.pbd.gl_backend import ComputeEngine
-from hairkit_plugins.pbd.head_interpolation import interpolate_motion, inverse_motion, motion_steps
 from hairkit_plugins.pbd.reference import rest_state
 from hairkit_plugins.pbd.simulator import PbdSimulator
 
@@ -305,20 +304,3 @@ def test_compiled_hair_among_hair_is_that_of_the_reference(groom: Groom, copies:
     wanted = hair_grid.mix_velocities(state, rods.mass, head_step, (5.0, 4.0, 1 / 60)).velocity
     assert np.abs(wanted - state.velocity).max() > 0.05
     np.testing.assert_allclose(engine.state.velocity, wanted, atol=1e-5)
-
-
-@pytest.mark.parametrize("count", [1, 4])
-def test_a_course_goes_evenly_from_start_to_end(groom: Groom, count: int) -> None:
-    """Steps end at the interpolated motion; transforms map the axes before to those after."""
-    motion = add_shakes(["yaw:40:1", "pitch:20:2"], groom.head)
-    start, end = motion(0.1), motion(0.15)
-    before = start
-    for k, (after, head_step) in enumerate(motion_steps(start, end, count)):
-        np.testing.assert_allclose(
-            after, interpolate_motion(start, end, (k + 1) / count), atol=1e-12
-        )
-        np.testing.assert_allclose(after @ head_step, before, atol=1e-12)
-        np.testing.assert_allclose(inverse_motion(after) @ before, head_step, atol=1e-12)
-        before = after
-    assert (before == end).all()
-    assert all((head_step == np.eye(4)).all() for _, head_step in motion_steps(end, end, 3))

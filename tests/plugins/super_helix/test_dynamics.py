@@ -8,12 +8,13 @@ from hairkit_plugins.super_helix import element_kernels, reference
 from hairkit_plugins.super_helix.kinematics import move_slopes, moves, place
 from hairkit_plugins.super_helix.linear_time_step import newton, step_strands
 from hairkit_plugins.super_helix.rods import NODES, Rods
-from hairkit_plugins.super_helix.state import Loads, Motion, Step
+from hairkit_plugins.super_helix.state import Body, Loads, Motion, Step
 from hairkit_plugins.super_helix.statics import gravity_forces, rest_as_captured
 from rod_bench import DOWN, energy, free, random_rods, rest, rod, run, step_of
 from scipy.integrate import solve_ivp
 
 from hairkit.helices.helix import mean_rotation, rotation
+from hairkit.simulation.obstacle_kernels import Field
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-7, 1.0, 60.0])
@@ -117,14 +118,13 @@ def busy(rng: np.random.Generator, rods: Rods) -> tuple[Motion, Loads, Step]:
     away = np.linalg.norm(np.stack(np.meshgrid(line, line, line, indexing="ij")), axis=0)
     head = np.eye(4)
     head[:3, :3], head[:3, 3] = rotation(np.array([0.002, 0.001, 0.003])), [1e-4, 2e-4, 0]
+    field = Field(np.full(3, -0.6), 0.03, (away - 0.15).astype(np.float32))
     return (
         motion,
         loads,
         step_of(1 / 120, friction=0.02)._replace(
             head=head,
-            origin=np.full(3, -0.615),
-            spacing=0.03,
-            distance=(away - 0.15).astype(np.float32),
+            bodies=(Body(head, np.eye(4), field), Body(np.eye(4), np.eye(4), field)),
         ),
     )
 

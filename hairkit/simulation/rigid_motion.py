@@ -1,0 +1,116 @@
+"""Rigid motions (4, 4) of the head within a step, and how the torso follows them.
+
+Between two poses the head goes along a screw: it turns evenly about a fixed axis and slides along
+it. A head that is turned about the neck thus keeps its pivot.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hairkit.arrays import Float64Array
+from hairkit.simulation import quaternion
+
+NECK_REACH = math.radians(80)
+"""Largest turn of the head against the torso, radians: an adult's to either side (American Academy
+of Orthopaedic Surgeons, "Joint Motion", 1965). A head that turns farther takes the torso along."""
+_IDENTITY = np.eye(4)
+
+
+def interpolate_motion(start: Float64Array, end: Float64Array, share: float) -> Float64Array:
+    """Return the rigid motion at fraction `share` between `start` and `end`."""
+    if share <= 0.0 or (start == end).all():
+        return start
+    return end if share >= 1.0 else _along_screw(start, end, np.array([share]))[0]
+
+
+def motion_steps(
+    start: Float64Array, end: Float64Array, count: int
+) -> list[tuple[Float64Array, Float64Array]]:
+    """Return the motion (4, 4) after each of `count` equal steps, and the change of axes of each.
+
+    The latter transforms points from the axes before the step to those after it.
+    """
+    if (start == end).all():
+        return [(end, _IDENTITY)] * count
+    poses = _along_screw(start, end, np.arange(count + 1) / count)
+    poses[0], poses[-1] = start, end
+    back = poses[1:, :3, :3].swapaxes(1, 2)
+    changes = np.tile(_IDENTITY, (count, 1, 1))
+    changes[:, :3, :3] = back @ poses[:-1, :3, :3]
+    changes[:, :3, 3:] = back @ (poses[:-1] - poses[1:])[:, :3, 3:]
+    return list(zip(poses[1:], changes, strict=True))
+
+
+def inverse_motion(motion: Float64Array) -> Float64Array:
+    """Return the inverse of a rigid motion (4, 4)."""
+    result = np.eye(4)
+    result[:3, :3] = motion[:3, :3].T
+    result[:3, 3] = -motion[:3, :3].T @ motion[:3, 3]
+    return result
+
+
+def follow_head(torso: Float64Array, head: Float64Array, joint: Float64Array) -> Float64Array:
+    """Return where the torso is once the head is at `head`: both (4, 4) motions since rest.
+
+    The torso stays on the head's neck `joint` (3,), rest coordinates, and keeps its orientation
+    until the head has turned against it by more than `NECK_REACH`.
+    """
+    old, new = (quaternion.from_matrix(motion[:3, :3]) for motion in (torso, head))
+    turn = quaternion.product(new, quaternion.inverse(old))
+    angle = 2 * math.atan2(float(np.linalg.norm(turn[1:])), abs(float(turn[0])))
+    result = torso.copy()
+    if angle > NECK_REACH:
+        result[:3, :3] = quaternion.to_matrix(quaternion.slerp(old, new, 1 - NECK_REACH / angle))
+    result[:3, 3] = head[:3, :3] @ joint + head[:3, 3] - result[:3, :3] @ joint
+    return torso if np.allclose(result, torso, rtol=0.0, atol=1e-12) else result
+
+
+def _along_screw(start: Float64Array, end: Float64Array, share: Float64Array) -> Float64Array:
+    """Return the motions (N, 4, 4) at fractions `share` (N,) of the way."""
+    cross, angle = _axis_and_angle(end[:3, :3] @ start[:3, :3].T)
+    share = share[:, None, None]
+    turn = _rotation(cross, share * angle)
+    result = np.tile(_IDENTITY, (len(share), 1, 1))
+    result[:, :3, :3] = start[:3, :3] + turn @ start[:3, :3]
+    # the origin's velocity less that of the turn is constant in the axes that turn
+    way = end[:3, 3] - start[:3, 3]
+    if angle == 0:
+        result[:, :3, 3] = start[:3, 3] + share[:, 0] * way
+        return result
+    whole = np.ones((1, 1, 1))
+    way = way - _rotation(cross, angle * whole)[0] @ start[:3, 3]
+    velocity = np.linalg.solve(_integral(cross, angle, whole)[0], way)
+    result[:, :3, 3] += (
+        start[:3, 3] + turn @ start[:3, 3] + _integral(cross, angle, share) @ velocity
+    )
+    return result
+
+
+def _rotation(cross: Float64Array, angle: Float64Array) -> Float64Array:
+    """Return rotations (N, 3, 3) less the identity (Rodrigues), for angles (N, 1, 1)."""
+    result: Float64Array = np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+    return result
+
+
+def _integral(cross: Float64Array, angle: float, share: Float64Array) -> Float64Array:
+    """Return (N, 3, 3) the integral of the rotation over the fractions `share` (N, 1, 1)."""
+    part = share * angle
+    result: Float64Array = (
+        share * np.eye(3)
+        + (1 - np.cos(part)) / angle * cross
+        + (part - np.sin(part)) / angle * (cross @ cross)
+    )
+    return result
+
+
+def _axis_and_angle(turn: Float64Array) -> tuple[Float64Array, float]:
+    """Return the cross-product matrix (3, 3) of a rotation's axis, and the angle."""
+    w, x, y, z = quaternion.from_matrix(turn).tolist()
+    sine = math.sqrt(x * x + y * y + z * z)
+    if sine < 1e-12:
+        return np.zeros((3, 3)), 0.0
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) / sine
+    return cross, 2 * math.atan2(sine, w)
