@@ -18,7 +18,9 @@ from .simd_math import (
     trilinear,
 )
 
-PLACE, SPEED, SLACK, GAIN = 0, 3, 6, 7
+PLACE, SPEED, SLACK, GAIN, BESIDE = 0, 3, 6, 7, 10
+SHIFT, TORSO, TORSO_SHIFT = 1, 6, 7
+"""Of a substep's constants (`kernel_rows.constants_of`)."""
 LENGTH, CLEAR, EASE = 0, 6, 7
 START, END = 0, 3
 GRIP, PRESS, PRESS_NEXT, LINES = 5, 6, 7, 8
@@ -39,55 +41,58 @@ def resolve_contacts(  # type: ignore[no-untyped-def]
     its distance at the last lookup.
     """
     h, touching = settings[0], False
+    with_torso = grids[1][0].shape[0] > 0
     for j in range(1, x.shape[0]):
         place, speed = load_three(x, j, PLACE), load_three(x, j, SPEED)
         way = times(h, minus(speed, times(HALF * h, load_three(x, j, GAIN))))
-        drift, beside = transform_rows(constants[1], place), transform_rows(constants[7], place)
-        slack = load(x, (j, SLACK)) - FURTHER * _farther(plus(way, drift), plus(way, beside))
-        store(x, (j, SLACK), slack)
-        store_three(normals, j, 0, (ZERO, ZERO, ZERO))
-        store(grips, j, ZERO)
+        drift, clear = transform_rows(constants[SHIFT], place), load(node, (j, CLEAR))
+        normal = times(ZERO, place)
+        slack = load(x, (j, SLACK)) - FURTHER * lane_root(_square(plus(way, drift)))
         if any_below(slack, ZERO):
             distance, normal = _distances(grids[0], place, slack, corners)
-            if grids[1][0].shape[0] > 0:
-                distance, normal, drift = _nearer(
-                    grids[1], constants[6], place, slack, corners, distance, normal, drift, beside
+            slack = pick(slack, ZERO, distance - clear, slack)
+        store(x, (j, SLACK), slack)
+        store_three(normals, j, 0, normal)
+        if with_torso:
+            beside = transform_rows(constants[TORSO_SHIFT], place)
+            slack = load(x, (j, BESIDE)) - FURTHER * lane_root(_square(plus(way, beside)))
+            if any_below(slack, ZERO):
+                distance, away = _torso(grids[1], constants[TORSO], place, slack, corners)
+                slack = pick(slack, ZERO, distance - clear, slack)
+                head = load(x, (j, SLACK))
+                store_three(
+                    normals, j, 0, _pick_three(slack, head, away, load_three(normals, j, 0))
                 )
-            clear = load(node, (j, CLEAR))
-            store(x, (j, SLACK), pick(slack, ZERO, distance - clear, slack))
-            depth = pick(slack, ZERO, clear - distance, ZERO)
-            if any_below(ZERO - depth, ZERO):
-                touching = True
-                inside = pick(ZERO, depth, ONE + ZERO * depth, ZERO)
-                normal = times(inside, normal)
-                store_three(normals, j, 0, normal)
-                store_three(drifts, j, 0, drift)
-                _out(x, j, drift, inside * depth, normal, settings, grips)
+                drift = _pick_three(slack, head, beside, drift)
+            store(x, (j, BESIDE), slack)
+            slack = pick(slack, load(x, (j, SLACK)), slack, load(x, (j, SLACK)))
+        store(grips, j, ZERO)
+        if any_below(slack, ZERO):
+            touching = True
+            inside = pick(slack, ZERO, ONE + ZERO * slack, ZERO)
+            normal = times(inside, load_three(normals, j, 0))
+            store_three(normals, j, 0, normal)
+            store_three(drifts, j, 0, drift)
+            _out(x, j, drift, inside * (ZERO - slack), normal, settings, grips)
+        else:
+            store_three(normals, j, 0, (ZERO, ZERO, ZERO))
     return touching
 
 
 @row
-def _farther(a, b):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the length of the longer one of two vectors."""
-    one, other = dot(a, a), dot(b, b)
-    return lane_root(pick(one, other, other, one))
+def _square(a):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return the square of a vector's length."""
+    return dot(a, a)
 
 
 @row
-def _nearer(  # type: ignore[no-untyped-def]
-    grid, pose, place, slack, corners, distance, normal, drift, beside
-):  # pragma: no cover - compiled
-    """Return distance, direction and drift of the torso in lanes where it is nearer."""
-    other, away = _distances(grid, transform_rows(pose, place), slack, corners)
-    away = (
+def _torso(grid, pose, place, slack, corners):  # type: ignore[no-untyped-def] # pragma: no cover
+    """Return distances to the torso and their directions, head axes, as `_distances`."""
+    distance, away = _distances(grid, transform_rows(pose, place), slack, corners)
+    return distance, (
         pose[0][0] * away[0] + pose[1][0] * away[1] + pose[2][0] * away[2],
         pose[0][1] * away[0] + pose[1][1] * away[1] + pose[2][1] * away[2],
         pose[0][2] * away[0] + pose[1][2] * away[1] + pose[2][2] * away[2],
-    )
-    return (
-        pick(other, distance, other, distance),
-        _pick_three(other, distance, away, normal),
-        _pick_three(other, distance, beside, drift),
     )
 
 

@@ -35,9 +35,9 @@ REST, MASS, DRAG, SHAPE, CLEAR, EASE = 0, 3, 4, 5, 6, 7
 """Rows of a node's constants: rest place (3), mass, rates, clearance, 1/mass (root 0)."""
 NODE = 8
 PLACE, SPEED, SLACK, GAIN = 0, 3, 6, 7
-"""Rows of a node's state: position (3), velocity (3), how far it may move before a lookup, and the
-acceleration of the last substep before contact (3)."""
-STATE = 10
+"""Rows of a node's state: position (3), velocity (3), how far it may move before a lookup of the
+head, the acceleration of the last substep before contact (3), and the same for the torso."""
+STATE = 11
 EDGE, DIRECTION = 0, 3
 
 ONE, ZERO = np.float32(1), np.float32(0)

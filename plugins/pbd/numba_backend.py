@@ -62,12 +62,13 @@ class FastEngine:
         """The present state as float64; setting it moves the rods."""
         nodes = self._unpack_lanes(self._x)
         frames = quaternion.normalize(self._unpack_lanes(self._q))
-        return State(nodes[..., :3], nodes[..., 3:6], frames, nodes[..., 7:])
+        return State(nodes[..., :3], nodes[..., 3:6], frames, nodes[..., 7:10])
 
     @state.setter
     def state(self, value: State) -> None:
         slack = np.zeros_like(value.position[..., :1])
-        nodes = np.concatenate([value.position, value.velocity, slack, value.acceleration], axis=-1)
+        parts = (value.position, value.velocity, slack, value.acceleration, slack)
+        nodes = np.concatenate(parts, axis=-1)
         self._x = kernels.pack_lanes(nodes.astype(np.float32))
         self._q = kernels.pack_lanes(value.frames.astype(np.float32))
 
