@@ -19,6 +19,7 @@ plugins.
 * `rerun`: a run once more, from its record
 * `run_log`: `hairkit.log`: versions, options and times
 * `run_record`: `run.json`: inputs, recipe, outputs and health
+* `single_photo`: what a photo shows before the whole turn is there
 * `stage_runner`: one stage, once or once for each view
 * `work_folder`: cached results of stages
 """

@@ -1,16 +1,16 @@
 """A quick groom after a change by hand: what the last run found is kept but for what was touched.
 
 A stroke changes one mask. A whole run then solves the cameras again, because they follow from all
-masks; a draft keeps cameras, fitted head, waves, parting and hairline, and follows strands again in
-the photos that were drawn on alone. Hull, field and strands are made anew, on a coarser grid where
-the recipe says so and from smaller pictures where the capture was read so. What a process has once
-read of a run it keeps, so that only the first of its drafts waits for the disk. What a draft shows
-is replaced by the run that follows it.
+masks; a draft keeps cameras, fitted head, waves, parting and hairline, and looks again at photos
+that were drawn on alone, where `see_photo` has not done so already. Hull, field and strands are
+made anew, on a coarser grid where the recipe says so and from smaller pictures where the capture
+was read so. What a process has once read of a run it keeps, so that only the first of its drafts
+waits for the disk. What a draft shows is replaced by the run that follows it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -28,19 +28,17 @@ from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.hairline import Hairline
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
-from hairkit.io.capture_reader import WORKING_EDGE
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.recipe import Recipe
+from hairkit.pipeline.single_photo import see_photo
 from hairkit.pipeline.work_folder import read_latest, stage_file
 from hairkit.storage import Stored
-from hairkit.types.capture import Capture, View
-from hairkit.types.face import Face
+from hairkit.types.capture import Capture
 from hairkit.types.groom import Groom
 from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
-from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.skin import SkinMaps
 from hairkit.types.turnaround import Turnaround
@@ -55,7 +53,7 @@ MOST_KEPT = 64
 def draft(
     capture: Capture,
     work: Path,
-    touched: Collection[str],
+    touched: Mapping[str, Path],
     recipe: Recipe,
     manager: Manager,
     guides: int,
@@ -70,7 +68,8 @@ def draft(
     work
         The work folder.
     touched
-        File names of photos whose strokes changed since.
+        File names of photos whose strokes changed since, each with the work folder in which
+        `see_photo` keeps what it finds in that photo.
     recipe
         That of the run; a coarser hull makes the draft quicker.
     manager
@@ -85,7 +84,7 @@ def draft(
     InputError
         The last run found other views, or was not ended.
     """
-    capture = _arranged(capture, work, touched, recipe)
+    capture = _arranged(capture, work, recipe)
     masks, orientations = _seen(capture, work, touched, recipe, manager)
     scene = _read(Scene, work, "head" if recipe.stage("head") else "scene")
     if capture.chosen.head is not None:
@@ -118,35 +117,15 @@ def draft(
     )
 
 
-def _arranged(capture: Capture, work: Path, touched: Collection[str], recipe: Recipe) -> Capture:
-    """Return the views in the order of the turn; those that were touched with what is in them."""
-    has = {table: recipe.stage(table) is not None for table in ("landmarks", "person", "turn")}
-    turn = _read(Turnaround, work, "turn") if has["turn"] else None
-    if turn is not None and len(turn.order) != len(capture.views):
+def _arranged(capture: Capture, work: Path, recipe: Recipe) -> Capture:
+    """Return the views in the order of the turn."""
+    if recipe.stage("turn") is None:
+        return capture
+    turn = _read(Turnaround, work, "turn")
+    if len(turn.order) != len(capture.views):
         count = len(capture.views)
         raise InputError(f"{work}: the last run had {len(turn.order)} photos, now {count}")
-    views = list(capture.views)
-    for index, view in enumerate(views):
-        if view.photo_path is not None and view.photo_path.name in touched:
-            face, person = Face.absent(), Person.absent()
-            if has["person"]:
-                person = _read(Person, work, "person", view.name)
-            if has["landmarks"]:
-                face = _read(Face, work, "landmarks", view.name)
-            views[index] = _with_findings(view, face, person)
-    found = replace(capture, views=tuple(views))
-    return found if turn is None else found.arranged(turn)
-
-
-def _with_findings(view: View, face: Face, person: Person) -> View:
-    """Return a view with what was found in its photo at the size of the last run."""
-    factor = max(view.image.shape) / min(max(view.photo_size), WORKING_EDGE)
-    face = replace(face, landmarks=factor * face.landmarks, noise_px=factor * face.noise_px)
-    if person.alpha.size:
-        size = (view.width, view.height)
-        small = cv2.resize(person.alpha, size, interpolation=cv2.INTER_AREA)
-        person = Person(np.asarray(small, np.uint8))
-    return view.with_findings(face, person)
+    return capture.arranged(turn)
 
 
 def _reduced(scene: Scene, capture: Capture) -> Scene:
@@ -158,16 +137,17 @@ def _reduced(scene: Scene, capture: Capture) -> Scene:
 
 
 def _seen(
-    capture: Capture, work: Path, touched: Collection[str], recipe: Recipe, manager: Manager
+    capture: Capture, work: Path, touched: Mapping[str, Path], recipe: Recipe, manager: Manager
 ) -> tuple[tuple[Mask, ...], tuple[OrientationMap, ...]]:
     """Return masks and orientations of all views, made again where a photo was touched."""
     is_refined = (work / "refine.npz").is_file()
     masks, orientations = [], []
     for index, view in enumerate(capture.views):
         size = (view.width, view.height)
-        if view.photo_path is not None and view.photo_path.name in touched:
-            mask = _call(manager, recipe, "segment", view=view.plain())
-            orientation = _call(manager, recipe, "orient", view=view.toned(), mask=mask)
+        folder = None if view.photo_path is None else touched.get(view.photo_path.name)
+        if folder is not None:
+            seen = see_photo(view, folder, recipe, manager)
+            mask, orientation = seen.mask, cast(OrientationMap, seen.orientation)
         else:
             if is_refined and view.mask_path is None:
                 mask = _small_refined(_time(work, "refine"), work, index, size)

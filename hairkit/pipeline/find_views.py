@@ -1,5 +1,6 @@
 """Faces, persons and the turn: where each photo was taken from, and which side of it is up.
 
+None of them depends on what was drawn on a photo, so that a stroke does not find them again.
 Networks see photos that lie on their side less well. Where the turn finds such photos, they are
 turned upright, and faces, persons and the turn are found again, so that how a camera was held does
 not change the result.
@@ -10,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hairkit.pipeline.run_log import RunLog
+from hairkit.pipeline.single_photo import given_bare_photo
 from hairkit.pipeline.stage_runner import Given, StageRunner
 from hairkit.types.capture import Capture
 from hairkit.types.face import Face
@@ -52,7 +54,7 @@ def _find_turn(
 ) -> tuple[Capture, Given[Turnaround] | None]:
     """Return the capture with what is in its views, and its turn; `kind` begins results' names."""
     plain = capture.plain()
-    views = [Given.of(replace(view, name=kind + view.name)) for view in plain.views]
+    views = [given_bare_photo(view, kind + view.name) for view in plain.views]
     faces = run.every_view("landmarks", Face, views, absent=Face.absent)
     persons = run.every_view("person", Person, views, absent=Person.absent)
     found = zip(capture.views, faces, persons, strict=True)
@@ -62,6 +64,7 @@ def _find_turn(
     )
     if not run.has("turn"):
         return seen, None
-    photos = Given.of(plain)
+    bare = (replace(view, mask_path=None, strokes_path=None) for view in plain.views)
+    photos = Given.of(replace(plain, views=tuple(bare)))
     turn = run.once("turn", Turnaround, f"{kind}turn", capture=photos, faces=faces, persons=persons)
     return seen, turn

@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import Future
 
+from hairkit.pipeline.single_photo import given_photo
 from hairkit.pipeline.stage_runner import Given, StageRunner, completed
+from hairkit.pipeline.work_folder import digest_of
 from hairkit.types.capture import Capture
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask, Masks
@@ -24,7 +26,7 @@ def label_views(
     Then the scene by which they were mended, if they were.
     """
     views = photos.value.views
-    masks = run.every_view("segment", Mask, [Given.of(view) for view in views])
+    masks = run.every_view("segment", Mask, [given_photo(view) for view in views])
     if run.has("refine") and not all(view.mask_path for view in views):
         return _refine(run, photos, masks, Given.of(head))
     return masks, None
@@ -63,7 +65,13 @@ def _refine(
     )
     refined = run.once("refine", Masks, capture=photos, masks=masks, scene=scene)
     mended = [
-        mask if view.mask_path else completed(Given.of(new))
+        mask if view.mask_path else _mended(mask, new)
         for view, mask, new in zip(photos.value.views, masks, refined.value.views, strict=True)
     ]
     return mended, scene
+
+
+def _mended(mask: Future[Given[Mask]], new: Mask) -> Future[Given[Mask]]:
+    """Return a view's mask as it came where mending left it alone: what was made of it holds."""
+    same = digest_of(mask.result().value) == digest_of(new)
+    return mask if same else completed(Given.of(new))

@@ -34,6 +34,7 @@ from hairkit.pipeline.own_head import mark_head
 from hairkit.pipeline.recipe import Recipe, load_recipe, missing_networks
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.run_record import RECORD, RunRecord, describe_run, finish_record
+from hairkit.pipeline.single_photo import given_photo
 from hairkit.pipeline.stage_runner import Given, StageRunner
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
@@ -221,7 +222,7 @@ def _grow(
     plain = capture.plain()
     photos = Given.of(plain)
     masks, first = label_views(run, photos, head)
-    toned = [Given.of(view.toned()) for view in capture.views]
+    toned = [given_photo(view.toned()) for view in capture.views]
     orientations = run.every_view("orient", OrientationMap, toned, mask=masks)
     scene = fit_scene(run, photos, masks, head, first)
     if capture.chosen.head is not None:

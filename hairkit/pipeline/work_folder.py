@@ -1,11 +1,13 @@
 """The work folder: the result of every stage, stored with a digest of its inputs.
 
 A stage file is `STAGE.npz` or `STAGE-VIEW.npz`. It is reused only if its digest matches, so an
-interrupted run continues where it stopped, with the same result.
+interrupted run continues where it stopped, with the same result. What was made before the run of
+single photos lies in folders below `ahead/`, and is taken from there.
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 import os
@@ -24,6 +26,8 @@ from hairkit.errors import HairkitError, InputError
 from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
 
 _Result = TypeVar("_Result", bound=Stored)
+AHEAD = "ahead"
+"""Folder in the work folder, of folders of single photos (`single_photo`)."""
 _DIGEST = "work_digest"
 _DIGEST_BYTES = 20
 """Length of a digest, as SHA-1's and git's: no two inputs share one by chance."""
@@ -93,6 +97,7 @@ class WorkFolder:
         self._writer = ThreadPoolExecutor(1, thread_name_prefix="hairkit-work")
         self._writes: list[Future[None]] = []
         self._guard = threading.Lock()
+        self._ahead: dict[str, Path] = {}
 
     def __enter__(self) -> Self:
         try:
@@ -102,6 +107,8 @@ class WorkFolder:
         self._lock = _lock(self.path / ".lock", self._waiting)
         for leftover in self.path.glob(".*.part"):  # left by a killed run
             leftover.unlink(missing_ok=True)
+        ahead = (self.path / AHEAD).glob("*/*.npz")
+        self._ahead = {digest: file for file in ahead if (digest := _stored_digest(file))}
         return self
 
     def __exit__(
@@ -119,7 +126,9 @@ class WorkFolder:
     def get(self, kind: type[_Result], digest: str, stage: str, view: str = "") -> _Result | None:
         """Return the stored result with this digest; None if there is none or it is damaged."""
         path = self._file(stage, view)
-        if not self._reuse or _stored_digest(path) != digest:
+        if not self._reuse:
+            return None
+        if _stored_digest(path) != digest and not self._take(digest, path):
             return None
         try:
             arrays = read_npz(path)
@@ -127,6 +136,13 @@ class WorkFolder:
             return from_arrays(kind, arrays, str(path))
         except HairkitError:
             return None
+
+    def _take(self, digest: str, path: Path) -> bool:
+        """Put a result that was made ahead of this run in its place; False if there is none."""
+        with contextlib.suppress(KeyError, FileNotFoundError):
+            self._ahead.pop(digest).replace(path)
+            return True
+        return False
 
     def put(self, value: Stored, digest: str, stage: str, view: str = "") -> None:
         """Store a stage's result; it is written in the background, `flush` waits for it."""

@@ -12,6 +12,8 @@ processes of its own, and all state is in the project's folder.
 * `guard`: who may ask for what
 * `hair_packet`: a groom as the page reads it
 * `lan`: addresses, certificate and code for a phone
+* `photo_files`: which files are photos, and when one changed
+* `photo_tasks`: those of these tasks that see one photo
 * `pose`: the head in every photo
 * `project`: the files of a project
 * `result_page`: the hair in one file that needs no server

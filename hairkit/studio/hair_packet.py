@@ -21,7 +21,7 @@ from hairkit.grooming.densify import densify
 from hairkit.rendering.head import Solid, bust_solid, head_solid
 from hairkit.storage import write_bytes
 from hairkit.types.groom import Groom
-from hairkit.types.head import Head
+from hairkit.types.head import Head, Roots
 
 MAGIC = b"HKS1"
 HAIRS, POINTS = 9000, 16
@@ -36,17 +36,17 @@ LEAST_DISTANCE = 1e-3
 """Added to distances between roots, metres, before weights are taken as their inverse."""
 
 
-def write_packet(groom: Groom, path: Path) -> None:
+def write_packet(groom: Groom, path: Path, roots: Roots | None = None) -> None:
     """Write the packet of a groom."""
-    write_bytes(path, packet_of(groom))
+    write_bytes(path, packet_of(groom, roots))
 
 
-def packet_of(groom: Groom) -> bytes:
-    """Return the packet of a groom."""
+def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
+    """Return the packet of a groom; `roots` are those of the hair between its guides, if known."""
     strands = groom.strands
     step = max(1, -(-len(strands) // MOST_GUIDES))
     guides = strands.select(np.arange(len(strands)) % step == 0).resampled(POINTS)
-    hair = densify(groom, HAIRS).resampled(POINTS)
+    hair = densify(groom, HAIRS, roots=roots).resampled(POINTS)
     shape = (-1, POINTS, 3)
     carried, weights = _carriers(guides.points.reshape(shape), hair.points.reshape(shape))
     head = groom.head

@@ -35,12 +35,12 @@ from hairkit.io.capture_toml import (
 )
 from hairkit.io.strokes import read_strokes
 from hairkit.storage import read_text, write_bytes, write_text
+from hairkit.studio.photo_files import facts_of, is_photo, natural
 from hairkit.types.chosen import Chosen, ChosenHair
 
 STATE = "studio.json"
 RESULT = "result"
 _BUILT = "studio.json"
-_SUFFIXES = (".jpg", ".jpeg", ".png", ".heic", ".heif")
 _LARGEST_STATE = 2**20
 """Bytes of studio.json; a photo takes about a hundred."""
 _LANDMARKS = 68
@@ -69,7 +69,7 @@ class Project:
         self.folder = Path(folder)
         if self.folder.exists() and not self.folder.is_dir():
             raise InputError(f"{self.folder}: not a folder; name one for the project")
-        bare = self.folder.is_dir() and any(map(_is_photo, self.folder.iterdir()))
+        bare = self.folder.is_dir() and any(map(is_photo, self.folder.iterdir()))
         self.photo_folder = self.folder if bare else self.folder / "photos"
         for made in (self.photo_folder, self.folder / "strokes", self.incoming, self.pictures):
             made.mkdir(parents=True, exist_ok=True)
@@ -128,6 +128,10 @@ class Project:
     def picture(self, shot: Shot, size: str) -> Path:
         """Return the path of the picture of a photo that pages show: `small` or `large`."""
         return self.pictures / f"{Path(shot.file).stem}-{size}.jpg"
+
+    def seen(self, shot: Shot) -> Path:
+        """Return the folder of what previews need of a photo."""
+        return self.pictures / f"{Path(shot.file).stem}-seen"
 
     def next_file(self, suffix: str) -> tuple[int, str]:
         """Return the number and the file name of a new photo; `InputError` when it is full."""
@@ -271,13 +275,16 @@ class Project:
         files += sorted((self.folder / "strokes").glob("*.json"))
         files += sorted((self.folder / "masks").glob("*.png"))
         files += [self.folder / "landmarks.json", self.folder / "capture.toml"]
-        facts = [(f.name, f.stat().st_size, f.stat().st_mtime_ns) for f in files if f.is_file()]
-        return json.dumps(facts)
+        return json.dumps([facts_of(file) for file in files if file.is_file()])
 
     @property
     def built(self) -> str:
         """What `inputs` was when the result was made; empty where there is none."""
         return str(self._built().get("inputs", ""))
+
+    def has_built(self, shot: Shot) -> bool:
+        """Return whether the result was made from this photo, among others."""
+        return facts_of(self.photo(shot)) in json.loads(self.built or "[]")
 
     @property
     def made(self) -> dict[str, Any]:
@@ -315,7 +322,7 @@ class Project:
 
     def _read_shots(self) -> list[Shot]:
         """Return the photos that are there, in the order that was kept; new ones come last."""
-        files = sorted(filter(_is_photo, self.photo_folder.iterdir()), key=_natural)
+        files = sorted(filter(is_photo, self.photo_folder.iterdir()), key=natural)
         there = {path.name for path in files}
         shots = [shot for shot in self._kept() if shot.file in there]
         known = {shot.file for shot in shots}
@@ -358,7 +365,7 @@ class Project:
         if named:
             shots = sorted(shots, key=lambda shot: NAMES.index(shot.view or ""))
         order = [shot.file for shot in shots]
-        in_order = order == sorted(order, key=lambda name: _natural(Path(name)))
+        in_order = order == sorted(order, key=lambda name: natural(Path(name)))
         toned = any((shot.brightness, shot.contrast) != (1, 1) for shot in shots)
         if not (named or toned) and in_order and not set(order) & set(self._said):
             return []
@@ -384,13 +391,4 @@ class Project:
         for size in ("small", "large"):
             self.picture(shot, size).unlink(missing_ok=True)
         self._outline_file(shot).unlink(missing_ok=True)
-
-
-def _is_photo(path: Path) -> bool:
-    return path.suffix.lower() in _SUFFIXES and not path.name.startswith(".") and path.is_file()
-
-
-def _natural(path: Path) -> list[Any]:
-    """Return a key by which `2.jpg` is before `10.jpg`."""
-    pieces = re.split(r"(\d+)", path.name.lower())
-    return [int(piece) if piece.isdigit() else piece for piece in pieces]
+        shutil.rmtree(self.seen(shot), ignore_errors=True)

@@ -265,7 +265,7 @@ class Routes:
         tone = make_options(Tone, await receive_json(request), "photo")
         async with self._studio.change:
             self._studio.project.tone(shot.id, tone.brightness, tone.contrast)
-        self._studio.changed()
+        self._studio.changed(touched=[shot.file])
         return JSONResponse({})
 
     async def _strands(self, request: Request) -> Response:

@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Collection
+from collections.abc import Awaitable, Callable, Collection
 from pathlib import Path
 from typing import Any
 
 import hairkit
 from hairkit.errors import HairkitError
 from hairkit.nets.model_folder import model_folder
+from hairkit.pipeline.work_folder import AHEAD
 from hairkit.studio.events import Events
 from hairkit.studio.project import Project, Shot
 from hairkit.studio.task_process import TaskError, TaskProcess
 
 QUIET_S = 0.6
-"""Seconds without a change before the hair is made again."""
+"""Seconds without a change before the hair is made again; the strands of a photo that was drawn on
+are found meanwhile."""
 DRAFT_GUIDES = 300
 """Roots of the quick groom that is shown until the whole one is made."""
 MEANWHILE = 6
@@ -176,11 +178,17 @@ class Studio:
 
     def drawn(self, shot: Shot) -> dict[str, Any]:
         """Return the files of a photo as tasks take them."""
-        strokes, mask = self.project.strokes(shot), self.project.mask(shot)
+        project, stem = self.project, Path(shot.file).stem
+        strokes, mask = project.strokes(shot), project.mask(shot)
         return {
-            "photo": str(self.project.photo(shot)),
+            "photo": str(project.photo(shot)),
             "strokes": str(strokes) if strokes.is_file() else None,
             "mask": None if mask is None else str(mask),
+            "landmarks": project.landmarks().get(stem),
+            "tone": [shot.brightness, shot.contrast],
+            "project": str(project.folder),
+            "seen": str(project.seen(shot)),
+            "ahead": str(project.result / "work" / AHEAD / stem),
         }
 
     async def stop_build(self) -> None:
@@ -193,18 +201,49 @@ class Studio:
             with contextlib.suppress(TaskError):
                 if not self.formats:
                     self.formats = (await self.editor.call("formats", PHOTO_S))["formats"]
-            for shot in self.project.shots:
-                facts = self.facts.setdefault(shot.id, {})
-                large = self.project.picture(shot, "large")
-                with contextlib.suppress(HairkitError, OSError, KeyError):  # it may go
-                    if not large.is_file():
-                        await self.draw_pictures(shot)
-                    if "outline_of" not in facts:
-                        await self.outline(shot)
-                        self.events.send("project", **self.summary())
-                        break
+            for step in (self._look_at, self._follow, self._prepare):
+                if await self._on_first(step):
+                    break
             else:
-                await asyncio.sleep(QUIET_S / 3)
+                await asyncio.sleep(QUIET_S / 6)
+
+    async def _on_first(self, step: Callable[[Shot], Awaitable[bool]]) -> bool:
+        """Do something with the first photo that needs it; return whether one does."""
+        for shot in list(self.project.shots):
+            with contextlib.suppress(HairkitError, OSError, KeyError):  # it may go
+                if await step(shot):
+                    return True
+        return False
+
+    async def _look_at(self, shot: Shot) -> bool:
+        """Draw the pictures of a photo and find its mask."""
+        if not self.project.picture(shot, "large").is_file():
+            await self.draw_pictures(shot)
+        if "outline_of" in self.facts.setdefault(shot.id, {}):
+            return False
+        await self.outline(shot)
+        self.events.send("project", **self.summary())
+        return True
+
+    async def _follow(self, shot: Shot) -> bool:
+        """Find the strands of a photo as soon as its mask stands, for previews."""
+        facts, settings = self.facts[shot.id], self.project.folder / "capture.toml"
+        key = f"{facts['outline_of']}/{_version(settings)}"
+        if facts.get("strands_of") == key or "problem" in facts:
+            return False
+        facts["strands_of"] = key
+        await self.editor.call("follow", PHOTO_S, self.drawn(shot))
+        return True
+
+    async def _prepare(self, shot: Shot) -> bool:
+        """Do what a whole run will do with a photo alone, while the turn is still being taken."""
+        facts, project = self.facts[shot.id], self.project
+        early = self.held or len(project.shots) < MEANWHILE
+        if not early or facts.get("prepared") == facts["outline_of"] or project.has_built(shot):
+            return False
+        facts["prepared"] = facts["outline_of"]
+        await self.builder.call("prepare", PHOTO_S, self.drawn(shot))
+        return True
 
     async def draw_pictures(self, shot: Shot) -> None:
         """Draw the pictures of a photo that pages show."""
@@ -266,7 +305,11 @@ class Studio:
         values = {
             "folder": str(self.project.folder),
             "packet": str(packet),
-            "touched": touched,
+            "touched": {
+                shot.file: str(self.project.seen(shot))
+                for shot in self.project.shots
+                if shot.file in touched
+            },
             "guides": min(DRAFT_GUIDES, self.guides),
         }
         await self.drafter.call("draft", BUILD_S, values)
@@ -328,7 +371,7 @@ class Studio:
         self.events.send("build", **values)
 
 
-_LARGE = ("outline", "landmarks", "outline_of")
+_LARGE = ("outline", "landmarks", "outline_of", "strands_of", "prepared")
 
 
 def _models() -> list[str]:

@@ -104,6 +104,10 @@ class View:
         """Return the view as all other stages see it."""
         return replace(self, brightness=1.0, contrast=1.0)
 
+    def alone(self) -> Self:
+        """Return the view without its place in the turn, as stages of single photos see it."""
+        return replace(self, azimuth_deg=0.0, elevation_deg=0.0, named=False)
+
     def turned(self, quarter_turns: int) -> Self:
         """Return the view after clockwise quarter turns of its photo."""
         turns = quarter_turns % 4

@@ -143,17 +143,20 @@ def test_a_draft_follows_a_change_without_the_cameras(tmp_path: Path) -> None:
     manager = Manager()
     manager.register(ball_plugin, "ball_plugin")
     recipe = parse_recipe(RECIPE.encode(), "ball", "test")
-    views = [replace(v, photo_path=Path(f"{k}.jpg")) for k, v in enumerate(turn_capture().views)]
+    views = [replace(v, photo_path=Path(f"{v.name}.jpg")) for v in turn_capture().views]
     capture = replace(turn_capture(), views=tuple(views))
     ball_plugin.CALLS.clear()
-    quick = draft(capture, tmp_path / "work", {"3.jpg"}, recipe, manager, 30)
-    steps = [f"{stage} {views[3].name}" for stage in ("segment", "orient")]
+    drawn = {"back-left.jpg": tmp_path / "seen"}
+    quick = draft(capture, tmp_path / "work", drawn, recipe, manager, 30)
     calls = list(ball_plugin.CALLS)
-    assert calls == [*steps, "hull", "field", "track"]
+    assert calls == ["segment back-left", "orient back-left", "hull", "field", "track"]
+    ball_plugin.CALLS.clear()
+    draft(capture, tmp_path / "work", drawn, recipe, manager, 30)
+    assert ball_plugin.CALLS == ["hull", "field", "track"]  # its strands were found before
     assert len(quick.strands) == 30
     assert quick.head.vertices.shape == whole.head.vertices.shape
     with pytest.raises(InputError, match="run all stages first"):
-        draft(capture, tmp_path / "nothing", set(), recipe, manager, 30)
+        draft(capture, tmp_path / "nothing", {}, recipe, manager, 30)
 
 
 def test_a_draft_may_see_smaller_pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -175,7 +178,7 @@ def test_a_draft_may_see_smaller_pictures(tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr("hairkit.pipeline.draft.measure_ties", look)
     capture = replace(turn_capture(), views=tuple(views))
-    assert len(draft(capture, tmp_path / "work", set(), recipe, manager, 30).strands) == 30
+    assert len(draft(capture, tmp_path / "work", {}, recipe, manager, 30).strands) == 30
     size = views[0].image.shape[:2]
     assert {mask.labels.shape for mask in seen["masks"]} == {size}
     assert {found.angle.shape for found in seen["orientations"]} == {size}

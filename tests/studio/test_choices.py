@@ -161,11 +161,11 @@ def test_outlines_survive_a_restart(tmp_path: Path, start_studio: Any, photos: l
     kept = folder / ".studio" / "pictures" / "001-outline.json"
     document = json.loads(kept.read_text())
     assert document["found"]["outline"] == found["outline"]
-    document["found"]["plugin"] = "kept"
+    document["found"]["share"] = 0.25
     kept.write_text(json.dumps(document))
     second = start_studio(folder).enter()
     try:
-        assert second.ask("GET", f"/api/photos/{number}/outline").json["plugin"] == "kept"
+        assert second.ask("GET", f"/api/photos/{number}/outline").json["share"] == 0.25
     finally:
         second.kill()
 

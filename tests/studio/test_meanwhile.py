@@ -23,11 +23,15 @@ class Process:
 
     def __init__(self, calls: list[tuple[str, Any]], groom: Path) -> None:
         self.calls, self.groom, self.pause_s = calls, groom, 0.0
+        self.looks: list[tuple[str, str]] = []
+        """Tasks on single photos, with the photo's file."""
 
     async def call(self, do: str, limit_s: float, values: Any = None, tell: Any = None) -> Any:
         """Answer as an empty task would."""
         if do == "build" or (do == "draft" and values["touched"]):  # not the first, unseen one
-            self.calls.append((do, (values or {}).get("touched")))
+            self.calls.append((do, list(values["touched"]) if do == "draft" else None))
+        if do in ("outline", "follow", "prepare"):
+            self.looks.append((do, Path(values["photo"]).name))
         if do == "build":
             try:
                 await asyncio.sleep(self.pause_s)
@@ -95,6 +99,63 @@ def test_a_stroke_is_previewed_before_the_whole_hair_is_made(studio: Studio) -> 
         await studio.close()
 
     run(story)
+
+
+def test_a_photos_strands_are_found_as_soon_as_its_mask_stands(studio: Studio) -> None:
+    """Before any hair is made; a stroke or a tone restarts the photo that it is on, and no other,
+    and that before the preview which needs it begins."""
+    looks, calls = studio.editor.looks, studio.builder.calls  # type: ignore[attr-defined]
+    files = [shot.file for shot in studio.project.shots]
+    studio.held = True
+
+    async def story() -> None:
+        await studio.start()
+        await until(lambda: len(looks) == 2 * len(files))
+        assert sorted(looks) == sorted((do, f) for do in ("outline", "follow") for f in files)
+        assert looks[: len(files)] == [("outline", file) for file in files]  # what is shown first
+        assert calls == []
+        studio.changed(ask=True)
+        await until(lambda: studio.build["state"] == "done")
+        looks.clear()
+        stroke(studio, 3, 20)
+        await studio.outline(studio.project.shot(3))
+        await until(lambda: ("draft", [files[2]]) in calls)
+        assert looks == [("outline", files[2]), ("follow", files[2])]
+        await until(lambda: studio.build["state"] == "done")
+        await studio.close()
+
+    run(story)
+
+
+def test_photos_are_prepared_while_the_turn_is_taken(studio: Studio) -> None:
+    """While no hair may be made the builder does each new photo's own part of it, once."""
+    looks = studio.builder.looks  # type: ignore[attr-defined]
+    files = [shot.file for shot in studio.project.shots]
+    studio.held = True
+
+    async def story() -> None:
+        await studio.start()
+        await until(lambda: len(looks) == len(files))
+        assert looks == [("prepare", file) for file in files]
+        studio.changed(ask=True)
+        await until(lambda: studio.build["state"] == "done")
+        studio.held = True  # somebody takes a photo again
+        looks.clear()
+        new = studio.project.retake(2, copied(studio, files[4]), ".jpg")
+        studio.facts[new.id] = {}
+        await until(lambda: len(looks) == 1)
+        await asyncio.sleep(0.5)
+        assert looks == [("prepare", new.file)]
+        await studio.close()
+
+    run(story)
+
+
+def copied(studio: Studio, file: str) -> Path:
+    """An upload with the picture of a photo."""
+    path = studio.project.incoming / "upload.bin"
+    shutil.copyfile(studio.project.photo_folder / file, path)
+    return path
 
 
 def test_a_change_ends_a_build_that_it_makes_useless(studio: Studio) -> None:

@@ -107,7 +107,7 @@ export function pathOf(curves, closed = true) {
 const outlines = new Map();
 export async function outlineOf(photo) {
   const kept = outlines.get(photo.id);
-  const version = `${photo.version}/${photo.share}/${photo.plugin}`;
+  const version = `${photo.version}/${photo.share}`;
   if (kept && kept.version === version) return kept.facts;
   const facts = await get(`/api/photos/${photo.id}/outline`);
   outlines.set(photo.id, { version, facts });
