@@ -65,14 +65,15 @@ def _make(args: argparse.Namespace) -> int:
     study = make_study(subjects, make_stock(manager, seed=args.seed), args.questions, args.seed)
     if len(subjects) < CHOICES:
         print(f"no questions with photos to choose from: they take {CHOICES} OUT", file=sys.stderr)
-    chosen = answer(study, study.questions)
-    page = write_study(args.output, study, chosen, _identity(args, names))
+    every = every_question(study)
+    chosen = answer(study, [*study.questions, *every])  # what one sees, others need not look for
+    count = len(study.questions)
+    page = write_study(args.output, study, chosen[:count], _identity(args, names))
     for kind, what in (("hair", "hair of a photo"), ("photo", "photo of a hair")):
-        asked = [question for question in every_question(study) if question.kind == kind]
-        if asked:
-            pairs = zip(answer(study, asked), asked, strict=True)
-            right = sum(choice == question.right for choice, question in pairs)
-            print(f"the program finds the {what}: {right} of {len(asked)}", file=sys.stderr)
+        pairs = zip(chosen[count:], every, strict=True)
+        right = [choice == question.right for choice, question in pairs if question.kind == kind]
+        if right:
+            print(f"the program finds the {what}: {sum(right)} of {len(right)}", file=sys.stderr)
     print(page)
     return 0
 

@@ -20,6 +20,7 @@ from hairkit.arrays import Int64Array, UInt8Array
 from hairkit.errors import FormatError, InputError
 from hairkit.storage import read_text, write_bytes, write_text
 from hairkit.study.questionnaire import CHOICES, Question, Study, nearest_view
+from hairkit.study.subject import Shot, Subject
 
 STUDY, PAGE, RESULTS, GALLERY = "study.json", "index.html", "results.html", "gallery.jpg"
 """Names in the folder of a study."""
@@ -27,6 +28,10 @@ VERSION = 1
 """Of `study.json` and of answers."""
 GALLERY_VIEWS = 2
 """Photos of each subject in the gallery, each with the hair beside it."""
+_From = tuple[str, str]
+"""A subject, and the name of a photo of it, by whose camera something is seen."""
+_Drawn = dict[tuple[str, str, str], UInt8Array]
+"""Pictures of grooms by their names, each with from where it is seen."""
 _MOST_BYTES = 2**22
 _JPEG_QUALITY = 88
 _ASK = {"hair": "Which hair is that of the photo?", "photo": "Which photo is that of the hair?"}
@@ -84,10 +89,11 @@ def write_study(
     """
     base = Path(folder)
     base.mkdir(parents=True, exist_ok=True)
+    drawn = _draw(study)
     for number, question in enumerate(study.questions):
-        for name, picture in zip(_names(number), _pictures(study, question), strict=True):
+        for name, picture in zip(_names(number), _pictures(study, question, drawn), strict=True):
             write_bytes(base / name, _jpeg(picture))
-    write_bytes(base / GALLERY, _jpeg(_gallery(study)))
+    write_bytes(base / GALLERY, _jpeg(_gallery(study, drawn)))
     write_text(base / PAGE, _page([question.kind for question in study.questions], identity))
     asked = [
         dataclasses.asdict(question) | {"program": int(choice)}
@@ -181,27 +187,59 @@ def _read(path: Path, kind: str) -> dict[str, Any]:
     return document
 
 
-def _pictures(study: Study, question: Question) -> Iterator[UInt8Array]:
-    """Yield what is asked about, then the choices."""
-    subject = study.named(question.subject)
-    shot = next(shot for shot in subject.shots if shot.name == question.view)
-    if question.kind == "hair":
-        yield shot.picture
-        yield from (study.named(name).draw(shot.camera) for name in question.choices)
-        return
-    yield subject.draw(shot.camera)
-    for each in (study.named(name) for name in question.choices):
-        yield each.shots[nearest_view(each, subject, question.view)].picture
-
-
-def _gallery(study: Study) -> UInt8Array:
-    """Return photos and hair side by side, one row a subject."""
-    count = min(GALLERY_VIEWS, *(len(subject.shots) for subject in study.subjects))
-    rows = []
+def _wanted(study: Study) -> dict[str, list[_From]]:
+    """Return for each groom from where it is shown, each place once."""
+    found: dict[str, dict[_From, None]] = {}
+    for question in study.questions:
+        shown = question.choices if question.kind == "hair" else (question.subject,)
+        for name in shown:
+            found.setdefault(name, {})[question.subject, question.view] = None
     for subject in study.subjects:
-        shots = [subject.shots[i * len(subject.shots) // count] for i in range(count)]
-        rows.append(np.hstack([p for s in shots for p in (s.picture, subject.draw(s.camera))]))
+        for shot in _gallery_shots(study, subject):
+            found.setdefault(subject.name, {})[subject.name, shot.name] = None
+    return {name: list(places) for name, places in found.items()}
+
+
+def _draw(study: Study) -> _Drawn:
+    """Return all pictures of grooms; each groom is uploaded once for all of its own."""
+    drawn: _Drawn = {}
+    for name, places in _wanted(study).items():
+        cameras = [study.named(subject).shot(view).camera for subject, view in places]
+        for place, picture in zip(places, study.named(name).draw(cameras), strict=True):
+            drawn[(name, *place)] = picture
+    return drawn
+
+
+def _pictures(study: Study, question: Question, drawn: _Drawn) -> Iterator[UInt8Array]:
+    """Yield what is asked about, then the choices."""
+    subject, view = study.named(question.subject), question.view
+    if question.kind == "hair":
+        yield subject.shot(view).picture
+        yield from (drawn[name, subject.name, view] for name in question.choices)
+        return
+    yield drawn[subject.name, subject.name, view]
+    for each in (study.named(name) for name in question.choices):
+        yield each.shots[nearest_view(each, subject, view)].picture
+
+
+def _gallery(study: Study, drawn: _Drawn) -> UInt8Array:
+    """Return photos and hair side by side, one row a subject."""
+    rows = [
+        np.hstack(
+            [
+                picture
+                for shot in _gallery_shots(study, subject)
+                for picture in (shot.picture, drawn[subject.name, subject.name, shot.name])
+            ]
+        )
+        for subject in study.subjects
+    ]
     return np.vstack(rows)
+
+
+def _gallery_shots(study: Study, subject: Subject) -> list[Shot]:
+    count = min(GALLERY_VIEWS, *(len(each.shots) for each in study.subjects))
+    return [subject.shots[i * len(subject.shots) // count] for i in range(count)]
 
 
 def _names(number: int) -> list[str]:

@@ -87,7 +87,7 @@ def every_question(study: Study, seed: int = 0) -> tuple[Question, ...]:
 
 def nearest_view(subject: Subject, like: Subject, view: str) -> int:
     """Return the index of the subject's photo that was taken from most nearly the same side."""
-    wanted = next(shot.camera for shot in like.shots if shot.name == view).rotation[2]
+    wanted = like.shot(view).camera.rotation[2]
     return int(np.argmax([shot.camera.rotation[2] @ wanted for shot in subject.shots]))
 
 

@@ -49,8 +49,7 @@ def _looks(study: Study) -> _Looks:
 
     @cache
     def look(groom: str, subject: str, view: str) -> Look:
-        camera = next(s.camera for s in study.named(subject).shots if s.name == view)
-        return study.named(groom).look(camera)
+        return study.named(groom).look(study.named(subject).shot(view).camera)
 
     return look
 
@@ -58,7 +57,7 @@ def _looks(study: Study) -> _Looks:
 def _distances(study: Study, question: Question, looks: _Looks) -> list[float]:
     subject = study.named(question.subject)
     if question.kind == "hair":
-        shown = next(shot.look for shot in subject.shots if shot.name == question.view)
+        shown = subject.shot(question.view).look
         drawn = (looks(name, subject.name, question.view) for name in question.choices)
         return [look_distance(shown, each) for each in drawn]
     hair = looks(subject.name, subject.name, question.view)

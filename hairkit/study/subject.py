@@ -24,7 +24,7 @@ from hairkit.rendering.measurement import draw_measurements
 from hairkit.simulation import run, static_motion
 from hairkit.simulation.posing import pose_groom
 from hairkit.storage import from_arrays, read_npz
-from hairkit.study.frame import BACKDROP, cut_out, frame_camera
+from hairkit.study.frame import BACKDROP, HEIGHT, WIDTH, cut_out, frame_camera
 from hairkit.synth import STYLES, grow
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
@@ -38,6 +38,8 @@ HAIRS, POINTS = 20_000, 48
 COARSE_HAIRS, COARSE_POINTS, COARSE_WIDTH = 4_000, 24, 2.5e-3
 """Strands, points a strand and width in metres of the hair that a program looks at: a pixel of the
 frame is a millimetre wide."""
+COLOUR_SIDES_DEG, COLOUR_SCALE = (0.0, 90.0, 180.0, 270.0), 1 / 3
+"""Sides from which the colour of a groom is looked at, and the scale of the pictures for it."""
 SIMULATOR = "pbd"
 SETTLING_S = 2.0
 """Seconds of simulation before a groom is drawn: it hangs as a game would show it."""
@@ -75,25 +77,51 @@ class Subject:
 
     name: str
     groom: Groom
-    hair: Strands
     shots: tuple[Shot, ...] = ()
 
-    def draw(self, camera: Camera) -> UInt8Array:
-        """Return the groom on its head in the frame (H, W, 3) RGB, from where `camera` stands."""
-        framed = frame_camera(camera)
-        return draw_views(self.hair, self.groom.head, [framed], material=self.groom.material)[0]
+    def shot(self, name: str) -> Shot:
+        """Return the photo of a name."""
+        return next(shot for shot in self.shots if shot.name == name)
+
+    def draw(self, cameras: Sequence[Camera]) -> list[UInt8Array]:
+        """Return the groom on its head in frames (H, W, 3) RGB, from where cameras stand."""
+        framed = [frame_camera(camera) for camera in cameras]
+        return draw_views(self._hair, self.groom.head, framed, material=self.groom.material)
 
     def look(self, camera: Camera) -> Look:
-        """Return what a program sees of `draw(camera)`."""
-        framed, hair, head = frame_camera(camera), self._coarse, self.groom.head
-        [picture] = draw_views(hair, head, [framed], material=self.groom.material, supersample=1)
-        measured = draw_measurements(hair, head, framed, width=COARSE_WIDTH)
+        """Return what a program sees of the groom from where `camera` stands.
+
+        Its colour is that from all sides: it hardly depends on the side, since the light comes
+        from the camera.
+        """
+        framed, head = frame_camera(camera), self.groom.head
+        measured = draw_measurements(self._coarse, head, framed, width=COARSE_WIDTH)
         seen = measured.seen.astype(np.float32)
-        return Look(seen, double_angle(measured.angle, seen), _mean_colour(picture, seen))
+        return Look(seen, double_angle(measured.angle, seen), self._colour)
+
+    @cached_property
+    def _hair(self) -> Strands:
+        """Full hair; made where the groom is shown."""
+        count = max(HAIRS, len(self.groom.strands))
+        return densify(self.groom, count).resampled(POINTS)
 
     @cached_property
     def _coarse(self) -> Strands:
         return densify(self.groom, COARSE_HAIRS).resampled(COARSE_POINTS)
+
+    @cached_property
+    def _colour(self) -> Float32Array:
+        """The mean sRGB (3,) of the hair, seen from `COLOUR_SIDES_DEG`."""
+        hair, head, material = self._coarse, self.groom.head, self.groom.material
+        size = (round(COLOUR_SCALE * WIDTH), round(COLOUR_SCALE * HEIGHT))
+        turn = [
+            Camera.on_turn(deg, focal=HEIGHT, width=WIDTH, height=HEIGHT)
+            for deg in COLOUR_SIDES_DEG
+        ]
+        cameras = [frame_camera(camera).resized(*size) for camera in turn]
+        pictures = draw_views(hair, head, cameras, material=material, supersample=1)
+        seen = [draw_measurements(hair, head, each, width=COARSE_WIDTH).seen for each in cameras]
+        return _mean_colour(np.concatenate(pictures), np.concatenate(seen).astype(np.float32))
 
 
 def read_subject(
@@ -153,7 +181,7 @@ def check_names(subjects: Sequence[Subject]) -> None:
 
 
 def settle(name: str, groom: Groom, manager: Manager, seconds: float) -> Subject:
-    """Return the groom as it hangs after `seconds`, its guides interpolated to full hair."""
+    """Return the groom as it hangs after `seconds`."""
     if not len(groom.strands):
         raise InputError(f"{name}: its groom holds no strands")
     if seconds > 0:
@@ -161,7 +189,7 @@ def settle(name: str, groom: Groom, manager: Manager, seconds: float) -> Subject
         with manager.guard("make_simulator", SIMULATOR):
             cache = run(simulator, static_motion(), 1, _RATE, warm_up=seconds)
         groom = pose_groom(groom, cache, 0)
-    return Subject(name, groom, densify(groom, max(HAIRS, len(groom.strands))).resampled(POINTS))
+    return Subject(name, groom)
 
 
 def _read_photos(folder: Path) -> Capture:

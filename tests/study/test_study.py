@@ -40,9 +40,12 @@ def study(manager: Manager) -> Iterator[Study]:
                 for seed in (1, 2)
             )
             shots = tuple(
-                Shot(name, camera(at), photographed.draw(camera(at)), photographed.look(camera(at)))
+                Shot(
+                    name, camera(at), photographed.draw([camera(at)])[0],
+                    photographed.look(camera(at)),
+                )
                 for name, at in (("front", 0.0), ("back-left", 135.0))
-            )
+            )  # fmt: skip
             subjects.append(replace(drawn, shots=shots))
         stock = [settle("stock parted", grow("parted", default_head(), 400, 3), manager, 0.0)]
         yield make_study(subjects, stock, 4, seed=5)

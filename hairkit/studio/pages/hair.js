@@ -5,7 +5,7 @@ import { showHair } from "./hair_controls.js";
 const engines = {
   hairworks: "HairWorks", alembic: "Blender, Unreal, Maya", gltf: "Web, Unity", usd: "Houdini, Omniverse",
   fbx: "Unity, Maya", maya: "Maya, XGen", native: "hairkit", obj: "any tool", ply: "any tool",
-  tressfx: "TressFX", cyhair: "CyHair", usc_data: "research",
+  tressfx: "TressFX", cyhair: "CyHair", usc_data: "research", cards: "Hair cards",
 };
 
 export function show(main) {
