@@ -84,9 +84,9 @@ class Subject:
         return next(shot for shot in self.shots if shot.name == name)
 
     def draw(self, cameras: Sequence[Camera]) -> list[UInt8Array]:
-        """Return the groom on its head in frames (H, W, 3) RGB, from where cameras stand."""
-        framed = [frame_camera(camera) for camera in cameras]
-        return draw_views(self._hair, self.groom.head, framed, material=self.groom.material)
+        """Return the groom on head and bust in frames (H, W, 3) RGB, from where cameras stand."""
+        framed, groom = [frame_camera(camera) for camera in cameras], self.groom
+        return draw_views(self._hair, groom.head, framed, material=groom.material, bust=True)
 
     def look(self, camera: Camera) -> Look:
         """Return what a program sees of the groom from where `camera` stands.
