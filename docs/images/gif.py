@@ -43,7 +43,7 @@ FRAME, EVERY = 1 / 30, 3
 SECONDS = 3.0
 LARGE, SMALL = (480, 360), (216, 216)
 """Pixels of a picture alone and of one beside others."""
-HOP_M, HOP_S = 0.12, 0.5
+HOP_M, HOP_S = 0.05, 0.5
 """Height and time of a jump, metres and seconds."""
 COLOURS, STILL = 160, 6
 """Of the palette; largest change of a channel, of 255, that is not written again."""
