@@ -35,6 +35,9 @@ def register(subparsers: Any) -> None:
     parser.add_argument(
         "--head-units", default="m", metavar="U", help="units of a head file (default m)"
     )
+    parser.add_argument(
+        "--head-scalp", metavar="NAME", help="its scalp: a group, a mask picture, or transfer"
+    )
     add_reader_arguments(parser)
     add_setting(parser.add_argument)
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -61,7 +64,7 @@ def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
     try:
         return _groom(path, args)
     except FormatError:  # no strands in it, so it is a head
-        return _head_file(path, args.head_units)
+        return _head_file(path, args.head_units, args.head_scalp)
 
 
 def _simulation(cache: PointCache) -> dict[str, Any]:
@@ -157,10 +160,10 @@ def _capture(path: Path) -> dict[str, Any]:
     return {"kind": "capture", "cameras": cameras, "views": views}
 
 
-def _head_file(path: Path, units: str) -> dict[str, Any]:
+def _head_file(path: Path, units: str, scalp: str | None) -> dict[str, Any]:
     from hairkit.io.head_reader import read_head
 
-    return {"kind": "head", **_head(read_head(path, units=units))}
+    return {"kind": "head", **_head(read_head(path, units, scalp))}
 
 
 def _head(head: Any) -> dict[str, Any]:

@@ -47,7 +47,11 @@ def register(subparsers: Any) -> None:
     add_setting(add, STAGE_HELP)
     add("--head", metavar="FILE", help="your head: OBJ, PLY or GLB with a scalp")
     add("--head-units", default="m", metavar="U", help="units of the head file (default m)")
-    add("--head-scalp", metavar="NAME", help="the scalp: a group of it, or a mask picture")
+    add(
+        "--head-scalp",
+        metavar="NAME",
+        help="the scalp: a group of it, a mask picture, or transfer: the default head's",
+    )
     add("--head-up", default="y", metavar="AXIS", help="axis that points up in it (default y)")
     words = get_args(PartingWord)
     add("--parting", choices=words, help="where the parting is (default: as the photos show it)")

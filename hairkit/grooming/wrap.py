@@ -16,6 +16,7 @@ from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.field.sampling_kernels import copy_point, gradient_at, sample_at
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
+from hairkit.head_model.carry_scalp import Carrier
 from hairkit.head_model.register_head import HeadMap, Surface, register_head
 from hairkit.head_model.scalp import evaluate, roots_at
 from hairkit.head_model.signed_distance import signed_distance
@@ -43,9 +44,6 @@ TIE_STEP = 0.01
 """Metres along a tie's axis over which its direction is mapped."""
 MIN_STRANDS = 64
 """Least number of strands that are worth another thread."""
-SCALP_GAP = 0.012
-"""Metres between the mapped head and the other up to which its scalp is carried over: heads of
-other topology, such as those with a mouth and eye sockets inside, have surface far from it."""
 
 
 def wrap_groom(groom: Groom, head: BareHead, *, keep_root_uv: bool = False) -> Groom:
@@ -92,21 +90,13 @@ def wrap_groom(groom: Groom, head: BareHead, *, keep_root_uv: bool = False) -> G
 def _fitted_head(groom: Groom, head: BareHead, heads: HeadMap, triangle: Int32Array) -> Head:
     """Return the other head as a `Head`, with what its file lacks carried from the groom's."""
     vertices, old = head.vertices, groom.head
-    mapped = heads(old.vertices)
-    face, weights, apart = nearest_on_surface(build_tree(mapped, old.faces), vertices)
-
-    def carried(values: Float32Array) -> Float64Array:
-        """Return the old head's values (V', K) at the vertices (V, K)."""
-        at_corners = values.reshape(len(values), -1)[old.faces[face]]
-        mixed: Float64Array = np.einsum("nk,nkd->nd", weights, at_corners)
-        return mixed
-
+    carrier = Carrier.of(old, heads, vertices)
     scalp = head.scalp
     if scalp is None:
-        scalp = np.where(apart < SCALP_GAP, carried(old.scalp)[:, 0], 0.0)
+        scalp = carrier.scalp(old)
         scalp[head.faces[triangle]] = 1.0  # hair grows where its roots are
-    density = None if old.density is None else np.clip(carried(old.density)[:, 0], 0, 1)
-    uv = carried(old.uv) if head.uv is None else head.uv
+    density = None if old.density is None else np.clip(carrier.carry(old.density)[:, 0], 0, 1)
+    uv = carrier.carry(old.uv) if head.uv is None else head.uv
     capsules = old.capsules
     scale = np.float32(heads.similarity.scale)
     return Head(

@@ -5,6 +5,7 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `bare_head`: where a photo shows face, ears and neck
 * `bust`: a clothed bust under a head, for pictures and exports
 * `bvh`: nearest points and ray crossings on triangle meshes
+* `carry_scalp`: a scalp carried to a head of another mesh
 * `cranium`: the cranium's rim and where outlines are bare
 * `delighting`: the light of photos taken out of colours
 * `eye_colours`: the colours of a person's eyes, from photos

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array, check_reach
 from hairkit.errors import FormatError, InputError
+from hairkit.head_model.carry_scalp import transfer_scalp
 from hairkit.head_model.reach import Reach
 from hairkit.head_model.template import default_head
 from hairkit.io.glb_mesh import read_glb
@@ -45,8 +46,11 @@ _TOP_OVER_BREADTH = 0.452
 """Height of the crown over the head's centre, in head breadths."""
 _HOW_TO_MARK = (
     "mark it by a group, material or vertex property named 'scalp', by vertices painted red (or "
-    "white on black), or by a mask picture NAME.scalp.png over its texture coordinates"
+    "white on black), or by a mask picture NAME.scalp.png over its texture coordinates; or "
+    "take the default head's scalp, laid on it by shape: --head-scalp transfer"
 )
+TRANSFER = "transfer"
+"""Name of the scalp that is the default head's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +130,8 @@ def read_head(
     scalp
         Name of the group, material or vertex property that is the scalp, or the path of a mask
         picture (PNG, white is scalp). `None`: a group named scalp, else NAME.scalp.png, else
-        painted colours.
+        painted colours. `transfer`: where no group has that name, the default head's scalp and,
+        where none are given, its landmarks, found by the head's shape.
     up
         `y` or `z`.
     roots
@@ -142,6 +147,8 @@ def read_head(
     """
     file = Path(path)
     bare = _read_bare(file, units, scalp, up, roots)
+    if bare.scalp is None and scalp == TRANSFER:
+        bare = _with_default_scalp(bare, file)
     if bare.scalp is None:
         raise InputError(f"{file}: the head has no scalp: {_HOW_TO_MARK}")
     used = np.unique(bare.faces)
@@ -162,6 +169,14 @@ def read_head(
         maps=bare.maps,
         blendshapes=bare.blendshapes,
     )
+
+
+def _with_default_scalp(bare: BareHead, file: Path) -> BareHead:
+    try:
+        scalp, marks = transfer_scalp(bare.vertices, bare.faces, bare.landmark_vertices)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+    return replace(bare, scalp=scalp, landmark_vertices=marks)
 
 
 def read_bare_head(
@@ -255,6 +270,8 @@ def _marked_weight(mesh: FileMesh, file: Path, scalp: str | None) -> Float64Arra
         weight = mesh.groups[scalp.lower()]
     elif scalp is not None and os.path.lexists(scalp):
         weight = _picture_weight(mesh, file, Path(scalp))
+    elif scalp == TRANSFER:
+        return None
     elif scalp is not None:
         known = ", ".join(sorted(mesh.groups)) or "none"
         raise InputError(f"{file}: no group or picture {scalp!r} for the scalp; groups: {known}")
