@@ -38,7 +38,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
         ["--strands", "300", "--points", "8", "--cards", "20", "--atlas", "256"],
     ),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
-    "head_fit": ({}, ["CAPTURES"]),
+    "head_fit": ({"MIXINGS": 1, "ROUNDS": 2}, ["CAPTURES"]),
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "as_they_are"]),
     "held_out": ({"GUIDES": 60, "MEASURED": 5}, ["CAPTURES"]),
     "helices": ({"COUNT": 10}, []),
