@@ -8,7 +8,8 @@ vertices are drawn to their nearest points of the scan, with a stiffness that fa
 (Sumner and Popovic 2004). Vertices without scan near them, over holes and under hair, follow their
 neighbours. Faces, texture coordinates and the scalp stay those of the head.
 
-The photos' cameras are those of the head that is bent, so the scan is scaled to that head.
+The photos' cameras are those of the head that is bent, so the scan is scaled to that head. Without
+a scan the points that the plugin `sfm` found on the person's skin take its place.
 """
 
 from __future__ import annotations
@@ -54,6 +55,8 @@ SMALLEST, LARGEST = 0.08, 2.5
 """Metres across: scans from a face's to a person's; others are in another unit."""
 FEWEST_POINTS = 500
 """Points of a scan at least."""
+FEWEST_SPARSE = 100
+"""Points of a scene on the head at least, where there is no scan."""
 ROUNDS, KEPT = 40, 0.7
 """Rounds of the rigid alignment, and the share of the nearest points that it uses."""
 SAMPLE = 4000
@@ -73,7 +76,9 @@ _FACES = re.compile(rb"^element face 0*[1-9]", re.MULTILINE)
 class Options:
     """Settings of the registration."""
 
-    scan: Path | None = option(None, doc="The scan: .ply (mesh or points), .obj or .glb.")
+    scan: Path | None = option(
+        None, doc="The scan: .ply (mesh or points), .obj or .glb; none: the points of sfm."
+    )
     units: str = option("m", choices=tuple(UNITS), doc="Unit of the scan.")
     method: str = option("amberg", choices=("amberg", "sumner"), doc="What is kept smooth.")
     stiffness: float = option(
@@ -96,9 +101,21 @@ class Scan(NamedTuple):
 def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: Options) -> Scene:
     """Return the scene with its head bent onto the scan."""
     if options.scan is None:
-        raise InputError("nonrigid_icp needs a scan: --set nonrigid_icp.scan=FILE")
+        return replace(scene, head=bend(scene.head, _sparse(scene), options))
     scan = read_scan(options.scan, options.units)
     return replace(scene, head=bend(scene.head, place(scan, scene.head, options.scan), options))
+
+
+def _sparse(scene: Scene) -> Scan:
+    """Return the points that the scene's cameras found on the head, which lie on it already."""
+    points = np.zeros((0, 3)) if scene.points is None else scene.points.astype(np.float64)
+    near = points[cKDTree(scene.head.vertices).query(points)[0] < NEAR]
+    if len(near) < FEWEST_SPARSE:
+        raise InputError(
+            "nonrigid_icp needs a scan, --set nonrigid_icp.scan=FILE, or the points of a scene by"
+            f" sfm, {FEWEST_SPARSE} or more on the head; there are {len(near)}"
+        )
+    return Scan(near, np.empty((0, 3), np.int64), None)
 
 
 def read_scan(path: Path, units: str = "m") -> Scan:

@@ -65,7 +65,9 @@ class Similarity:
 def move_head(scene: Scene, matrix: Float64Array) -> Scene:
     """Return the scene whose head was moved by a similarity (4, 4), in the frame of that head."""
     back = Similarity.of(matrix).inverse()
-    return replace(scene, cameras=tuple(back.moved_camera(camera) for camera in scene.cameras))
+    cameras = tuple(back.moved_camera(camera) for camera in scene.cameras)
+    points = None if scene.points is None else back.apply(scene.points).astype(np.float32)
+    return replace(scene, cameras=cameras, points=points)
 
 
 def fit_similarity(

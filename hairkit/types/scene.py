@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-from hairkit.arrays import UInt8Array
+import numpy as np
+
+from hairkit.arrays import Float32Array, UInt8Array, frozen_array
 from hairkit.errors import DataError, FormatError
 from hairkit.storage import Stored, read_text, write_text
 from hairkit.types.camera import Camera
@@ -25,12 +27,17 @@ class Scene(Previewed, Stored):
     head: Head
     residual_px: float | None = None
     """Root mean square misfit of the cameras in working pixels; None when never measured."""
+    points: Float32Array | None = None
+    """(P, 3) points of the person's skin that photos show, metres; None when none were found."""
 
     def __post_init__(self) -> None:
         if len(self.names) != len(self.cameras) or not self.cameras:
             raise DataError(
                 f"scene has {len(self.cameras)} cameras for {len(self.names)} view names"
             )
+        if self.points is not None:
+            points = frozen_array(self.points, np.float32, (None, 3), "scene points")
+            object.__setattr__(self, "points", points)
 
     def __repr__(self) -> str:
         misfit = "" if self.residual_px is None else f", residual {self.residual_px:.2f} px"

@@ -1,0 +1,130 @@
+"""What COLMAP found, as cameras and points; it runs in a process of its own.
+
+pycolmap and OpenCV in one process crash each other: both bring libraries that read pictures.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from hairkit import Camera, Mask, View
+from hairkit.arrays import Float64Array, Int64Array
+from hairkit.errors import InputError, MissingExtraError
+from hairkit.storage import read_npz
+from hairkit.types.mask import BACKGROUND
+
+MISSING = "sfm needs pycolmap, which is not installed: pip install 'hairkit[sfm]'"
+USUAL_FOCAL = 1.2
+"""Focal length over the longer edge where the photos tell none, as COLMAP has it."""
+_PROGRAM = Path(__file__).with_name("colmap_child.py")
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """Cameras and points in a frame and a size of their own."""
+
+    cameras: tuple[Camera | None, ...]
+    """One a photo, None for those that were not joined."""
+    points: Float64Array
+    """(P, 3)."""
+    sights: Float64Array
+    """(S, 4) point, photo, and where it is seen, x and y as shares of the photo's sides."""
+    residual_px: float
+    """Mean distance between seen and projected points."""
+
+    def reordered(self, order: Int64Array) -> Model:
+        """Return the model whose photo k was photo `order[k]`."""
+        cameras: list[Camera | None] = [None] * len(order)
+        for index, camera in zip(order, self.cameras, strict=True):
+            cameras[index] = camera
+        sights = self.sights.copy()
+        sights[:, 1] = order[sights[:, 1].astype(np.int64)]
+        return Model(tuple(cameras), self.points, sights, self.residual_px)
+
+
+def solve(
+    views: Sequence[View],
+    masks: Sequence[Mask],
+    settings: tuple[int, float, int],
+    seconds: float,
+) -> Model:
+    """Return the model of photos in the order of the turn.
+
+    `settings` are features, contrast and neighbours of the plugin's options.
+
+    Raises
+    ------
+    MissingExtraError
+        pycolmap is not installed.
+    InputError
+        COLMAP joins no photos, ends or takes too long.
+    """
+    if importlib.util.find_spec("pycolmap") is None:
+        raise MissingExtraError(MISSING)
+    with tempfile.TemporaryDirectory(prefix="hairkit-sfm-") as folder:
+        _write_photos(Path(folder), views, masks)
+        task: dict[str, object] = dict(
+            zip(("features", "contrast", "neighbours"), settings, strict=True)
+        )
+        focals = [view.focal_px or USUAL_FOCAL * max(view.width, view.height) for view in views]
+        known = all(view.focal_px for view in views)
+        alike = len({(view.width, view.height) for view in views}) == 1
+        task |= {"focals": focals, "known": known, "shared": alike and len(set(focals)) == 1}
+        (Path(folder) / "task.json").write_text(json.dumps(task))
+        _run(folder, seconds)
+        found = read_npz(Path(folder) / "model.npz")
+    return _model(found, views)
+
+
+def _write_photos(folder: Path, views: Sequence[View], masks: Sequence[Mask]) -> None:
+    for name in ("photos", "masks"):
+        (folder / name).mkdir()
+    for i, (view, mask) in enumerate(zip(views, masks, strict=True)):
+        person = np.where(mask.labels == BACKGROUND, 0, 255).astype(np.uint8)
+        size = (view.width, view.height)
+        small = cv2.resize(person, size, interpolation=cv2.INTER_NEAREST)
+        cv2.imwrite(str(folder / "photos" / f"{i:04}.png"), view.image[..., ::-1])
+        cv2.imwrite(str(folder / "masks" / f"{i:04}.png.png"), small)
+
+
+def _run(folder: str, seconds: float) -> None:
+    command = [sys.executable, "-P", str(_PROGRAM), folder]
+    try:
+        done = subprocess.run(
+            command, capture_output=True, stdin=subprocess.DEVNULL, timeout=seconds, check=False
+        )
+    except subprocess.TimeoutExpired as error:
+        raise InputError(f"sfm: not done within {seconds:.0f} s; raise sfm.seconds") from error
+    if done.returncode:
+        last = [*done.stderr.decode("utf-8", "replace").strip().split("\n")][-1]
+        raise InputError(f"sfm: COLMAP ended with code {done.returncode} ({last.strip()[:160]})")
+
+
+def _model(found: Mapping[str, npt.NDArray[Any]], views: Sequence[View]) -> Model:
+    cameras: list[Camera | None] = []
+    for i, view in enumerate(views):
+        if not found["joined"][i]:
+            cameras.append(None)
+            continue
+        matrix = np.eye(4)
+        u, _, vt = np.linalg.svd(found["poses"][i][:, :3])
+        matrix[:3, :3], matrix[:3, 3] = u @ vt, found["poses"][i][:, 3]
+        centre = np.array([view.width, view.height]) / 2.0
+        cameras.append(Camera(matrix, float(found["focals"][i]), centre, view.width, view.height))
+    sights = found["sights"].astype(np.float64)
+    sizes = np.array([(view.width, view.height) for view in views], np.float64)
+    sights[:, 2:] /= sizes[sights[:, 1].astype(np.int64)]
+    points = found["points"].astype(np.float64)
+    return Model(tuple(cameras), points, sights, float(found["residual_px"]))
