@@ -16,17 +16,16 @@ from pathlib import Path
 
 import numpy as np
 from captures_argument import NO_CAPTURES, add_captures
-from hairkit_plugins import mask_files, silhouette, structure_tensor, thin_plate
+from hairkit_plugins import mask_files, silhouette, thin_plate
 
 from hairkit import Mask
 from hairkit.arrays import Float64Array
 from hairkit.evaluation import Truth, read_truth
 from hairkit.evaluation.align import align
-from hairkit.field.find_parting import measure_parting
+from hairkit.field.find_parting import parting_from_skin
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import read_capture
 from hairkit.types.parting import Parting
-from hairkit.types.tie import TiedHair
 
 CROWN = 0.045
 """Height of the crown below the top of the head, metres."""
@@ -88,11 +87,7 @@ def _found(folder: Path, truth: Truth) -> list[str]:
     level = [k for k, name in enumerate(scene.names) if name in truth.names]
     cameras = [scene.cameras[k] for k in level]
     similarity = align(cameras, truth.cameras, head.vertices)
-    maps = [
-        structure_tensor.orient(view, mask, structure_tensor.Options())
-        for view, mask in zip(capture.views, masks, strict=True)
-    ]
-    parting = measure_parting(capture, masks, maps, scene.cameras, bent, TiedHair())
+    parting = parting_from_skin(masks, scene.cameras, bent)
     if not parting.seen:
         return ["none", "-"]
     return [f"{1000 * _place(parting, similarity.apply):.1f}", f"{1000 * parting.spread:.0f}"]

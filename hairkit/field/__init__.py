@@ -5,7 +5,6 @@ What field and tracking plugins share: fusing views, priors, diffusion, and samp
 * `braids`: the angle at which the hair of a tail crosses its spine
 * `cell_shells`: cells grown or shrunk over their faces
 * `diffusion`: screened diffusion on masked cells, by conjugate gradients
-* `crown_family`: whether the hair on the crown is parted, combed back or forward, or a whorl
 * `find_parting`: where the parting is, as the user says or the views show
 * `growth_prior`: geodesic distances from scalp and tips, and a direction prior
 * `hanging_hair`: the field of tight curls
@@ -13,6 +12,7 @@ What field and tracking plugins share: fusing views, priors, diffusion, and samp
 * `parting`: how hair on the crown is combed from its parting
 * `sampling_kernels`: compiled look-ups in volumes
 * `smooth_volume`: Gaussian smoothing of volumes
+* `scalp_comb`: which way the hair on the crown is combed, as all views see it
 * `scalp_sight`: directions of the hair on the scalp, as all views see them
 * `symmetric_eigen`: eigenvectors of symmetric 3x3 tensors, in closed form
 * `ties`: where hair is tied, and the tube of the tail

@@ -1,10 +1,10 @@
 """Find how the crown is combed: as the user says, as skin shows a parting, or as directions tell.
 
 Level views see the crown at a grazing angle, so that the 2D orientation of the strands there tells
-little. Skin that shows inside the hair does: its median is the parting; where there is a photo from
-above, it alone is asked. What the user says counts first: `parting` in capture.toml or on the
-command line, then a stroke labelled `parting`. Where no skin shows, and of a fringe,
-the directions of all views tell (`hairkit.field.crown_family`).
+little of where a parting is. Skin that shows inside the hair does: its median is the parting; where
+there is a photo from above, it alone is asked. What the user says counts first: `parting` in
+capture.toml or on the command line, then a stroke labelled `parting`. Where no skin shows, and of a
+fringe, the directions of all views tell (`hairkit.field.scalp_comb`).
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float64Array
-from hairkit.field.crown_family import choose_family
+from hairkit.field.growth_prior import TIP_SHARE, growth_potential
+from hairkit.field.scalp_comb import comb_scalp
 from hairkit.field.scalp_sight import look_at, see_scalp
 from hairkit.io.strokes import read_view_strokes
 from hairkit.types.camera import Camera
@@ -25,6 +26,7 @@ from hairkit.types.mask import PERSON, Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
 from hairkit.types.tie import TiedHair
+from hairkit.types.volume import Hull, ScalpDistance
 
 CROWN_DEPTH = 0.045
 """Height of the crown below the top of the head, metres."""
@@ -53,6 +55,8 @@ def measure_parting(
     cameras: Sequence[Camera],
     head: Head,
     tied: TiedHair,
+    hull: Hull,
+    scalp_distance: ScalpDistance,
 ) -> Parting:
     """Return the parting that the user gives, or how the views show the crown to be combed.
 
@@ -66,15 +70,21 @@ def measure_parting(
         line = _drawn_line(view, camera, head)
         if line is not None:
             return Parting(line, source="stroke")
-    views = [pair for pair in zip(masks, cameras, strict=True) if pair[0].person_known]
-    above = [(mask, camera) for mask, camera in views if _elevation(camera) > FROM_ABOVE]
-    if len(views) < len(masks):
+    if not all(mask.person_known for mask in masks):
         return Parting()
-    skin = _measure_skin(above or views, head, LEAST_SKIN_ABOVE if above else LEAST_SKIN)
+    skin = parting_from_skin(masks, cameras, head)
     if tied.tails:
         return skin
     sight = see_scalp(masks, orientations, cameras, head)
-    return choose_family(skin, sight, masks, cameras, head)
+    growth = growth_potential(hull, scalp_distance, TIP_SHARE)
+    return comb_scalp(skin, sight, masks, cameras, head, hull, growth)
+
+
+def parting_from_skin(masks: Sequence[Mask], cameras: Sequence[Camera], head: Head) -> Parting:
+    """Return the parting that skin shows on the crown, in photos from above if there are any."""
+    views = list(zip(masks, cameras, strict=True))
+    above = [(mask, camera) for mask, camera in views if _elevation(camera) > FROM_ABOVE]
+    return _measure_skin(above or views, head, LEAST_SKIN_ABOVE if above else LEAST_SKIN)
 
 
 def _measure_skin(views: Sequence[tuple[Mask, Camera]], head: Head, least: float) -> Parting:

@@ -33,6 +33,8 @@ and 0.058 in a bob of 15 cm, whose strands end too soon where the second is 0.1 
 the true one, not 0.86)."""
 PARTED_HAIR = 0.05
 """Longest way through the hair, in metres, from which hair is combed from a parting."""
+TIP_SHARE = 0.6
+"""Cells this far along the longest way from the scalp count as tips."""
 TIP_SLOPE = 0.2
 """Slope of the growth potential among the tips; 1 before them."""
 FLOW_SMOOTHING = 2.0

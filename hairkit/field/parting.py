@@ -1,8 +1,8 @@
 """How hair on the crown is combed (`hairkit.field.find_parting` finds which way).
 
 From a parting it is combed away to both sides, down and back; behind the line's end the nearest
-point of the line is its end, which makes a whorl. Other hair is combed from a whorl, or all back. A
-fringe is combed forward.
+point of the line is its end, which makes a whorl. Other hair is combed as the views see it
+(`hairkit.field.scalp_comb`), or all back. A fringe is combed forward.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float64Array
 from hairkit.types.head import Head
@@ -28,6 +29,9 @@ DROP = np.array([0.0, -0.25, 0.0])
 """Part of the direction down of hair that is combed back or forward over the head, against 1."""
 FRONT_DEPTH, FRONT_WIDTH, FRONT_FADE = 0.035, 0.05, 0.01
 """The fringe's depth behind the foremost scalp and half its width; metres over which it fades."""
+NEAREST, BETWEEN, LEAST_WEIGHT = 8, 0.012, 1e-9
+"""Places of a comb that count at a point, standard deviation in metres of their weight, and weight
+of places far away."""
 THINNEST, THICKEST = 0.004, 0.03
 """Bounds of the hair's thickness over which the lift at the roots fades, metres."""
 THICKNESS_BLUR, LEAST_HELD = 2.0, 0.05
@@ -78,20 +82,19 @@ def comb_from_parting(
 
 
 def _comb_behind_front(parting: Parting, at: Float64Array, outward: Float64Array) -> Float64Array:
-    """Return the comb without a fringe: from the line, from the whorl, or back."""
-    flat, away = at[:, [0, 2]], np.zeros_like(at)
-    if parting.line is not None:
-        away[:, [0, 2]] = flat - _nearest_on(parting.line, flat)
-    elif parting.whorl is not None:
-        away[:, [0, 2]] = flat - parting.whorl
-    else:
+    """Return the comb without a fringe: from the line, as the views see it, or back."""
+    if parting.places is not None and parting.directions is not None:
+        gap, near = cKDTree(parting.places).query(at, k=min(NEAREST, len(parting.places)))
+        weight = np.exp(-0.5 * (gap / BETWEEN) ** 2) + LEAST_WEIGHT
+        seen = np.einsum("nk,nki->ni", weight, parting.directions[near])
+        return _unit(_tangent(seen, outward))
+    if parting.line is None:
         return _over_head(outward, 1.0)
-    away = _unit(_tangent(away, outward))
-    pull = DOWN * np.broadcast_to([0.0, -1.0, 0.0], at.shape)
-    if parting.line is not None:
-        back = np.clip(SWEEP + SWEEP_SLOPE * (SWEEP_AT - at[:, 2]), -MOST_SWEEP, MOST_SWEEP)
-        pull = pull + back[:, None] * np.array([0.0, 0.0, -1.0])
-    return _unit(away + _tangent(pull, outward))
+    flat, away = at[:, [0, 2]], np.zeros_like(at)
+    away[:, [0, 2]] = flat - _nearest_on(parting.line, flat)
+    back = np.clip(SWEEP + SWEEP_SLOPE * (SWEEP_AT - at[:, 2]), -MOST_SWEEP, MOST_SWEEP)
+    pull = DOWN * np.array([0.0, -1.0, 0.0]) + back[:, None] * np.array([0.0, 0.0, -1.0])
+    return _unit(_unit(_tangent(away, outward)) + _tangent(pull, outward))
 
 
 def _over_head(outward: Float64Array, back: float) -> Float64Array:

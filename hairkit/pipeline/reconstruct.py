@@ -273,7 +273,7 @@ def _measure(
     )  # fmt: skip
     parting = run.derive(
         "parting", Parting, measure_parting, capture=photos, orientations=orientations, head=head,
-        tied=tied, **views,
+        tied=tied, hull=hull, scalp_distance=distance, **views,
     )  # fmt: skip
     return {
         "scene": scene, "masks": masks, "orientations": orientations, "hull": hull,

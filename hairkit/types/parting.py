@@ -22,8 +22,8 @@ SIDE = 0.03
 
 @dataclass(frozen=True, eq=False)
 class Parting(Stored):
-    """How hair on the crown is combed: to both sides of a line, back, from a whorl, or as the hull
-    suggests; and in front over the forehead, or not.
+    """How hair on the crown is combed: to both sides of a line, back, as the views see it, or as
+    the hull suggests; and in front over the forehead, or not.
     """
 
     line: Float64Array | None = None
@@ -33,8 +33,11 @@ class Parting(Stored):
     """True when all hair on the crown is combed back."""
     fringe: bool = False
     """True when the hair in front is combed forward over the forehead."""
-    whorl: Float64Array | None = None
-    """(2,) x and z of the place from which hair runs to all sides; None where none is found."""
+    places: Float64Array | None = None
+    """(M, 3) places of the hair on the crown, metres, at which the views see its directions; None
+    where a line or the user tells more, or the views do not agree."""
+    directions: Float64Array | None = None
+    """(M, 3) unit tangents of the hair there, root to tip."""
     sureness: float = 1.0
     """How well the views' directions agree with this, 0 to 1; 1 where skin or the user says it."""
     skin_share: float = 0.0
@@ -50,9 +53,14 @@ class Parting(Stored):
             if len(line) < 2:
                 raise DataError(f"a parting of {len(line)} points, expected at least 2")
             object.__setattr__(self, "line", line)
-        if self.whorl is not None:
-            whorl = frozen_array(self.whorl, np.float64, (2,), "whorl")
-            object.__setattr__(self, "whorl", whorl)
+        if (self.places is None) != (self.directions is None):
+            raise DataError("a comb has places and directions, or neither")
+        if self.places is not None and self.directions is not None:
+            places = frozen_array(self.places, np.float64, (None, 3), "places of the comb")
+            count = (len(places), 3)
+            directions = frozen_array(self.directions, np.float64, count, "directions of the comb")
+            object.__setattr__(self, "places", places)
+            object.__setattr__(self, "directions", directions)
 
     @classmethod
     def at(cls, x: float, skin_share: float = 0.0, spread: float = 0.0) -> Self:
@@ -83,7 +91,7 @@ class Parting(Stored):
     @property
     def known(self) -> bool:
         """True when it is known how the crown is combed."""
-        return self.seen or self.swept_back or self.fringe or self.whorl is not None
+        return self.seen or self.swept_back or self.fringe or self.places is not None
 
     @property
     def summary(self) -> str:
@@ -98,8 +106,8 @@ class Parting(Stored):
         if self.line is not None:
             side = "left" if self.x > 0 else "right"
             how = f"parting {1000 * abs(self.x):.0f} mm {side} of the middle"
-        elif self.whorl is not None:
-            how = f"whorl {-1000 * self.whorl[1]:.0f} mm behind the middle"
+        elif self.places is not None:
+            how = "no parting, crown combed as the views see it"
         width = f", the skin there {1000 * self.spread:.0f} mm wide" if self.spread else ""
         sure = f", sureness {self.sureness:.2f}" if self.sureness < 1 else ""
         return f"{how}{width}{', fringe' if self.fringe else ''}{sure} ({self.source})"

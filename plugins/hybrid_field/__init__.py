@@ -39,7 +39,12 @@ from hairkit import (
     Waves,
     hookimpl,
 )
-from hairkit.field.growth_prior import ScalpPrior, add_scalp_prior, growth_potential
+from hairkit.field.growth_prior import (
+    TIP_SHARE,
+    ScalpPrior,
+    add_scalp_prior,
+    growth_potential,
+)
 from hairkit.field.hanging_hair import hang_curls
 from hairkit.field.view_fusion import FusionOptions, fuse_views
 from hairkit.options import option
@@ -103,7 +108,7 @@ class Options(FusionOptions):
     outward: float = option(0.2, low=0, high=10, doc="Largest weight of grad(I), at the scalp.")
     signed: float = option(0.1, low=0, high=10, doc="Weight of O.")
     tip_share: float = option(
-        0.6,
+        TIP_SHARE,
         low=0.05,
         high=1,
         doc="Cells this far along the longest way from the scalp count as tips.",

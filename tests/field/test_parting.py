@@ -13,6 +13,7 @@ import pytest
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
 from hairkit.field.find_parting import measure_parting
+from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.field.parting import comb_from_parting, crown_share, root_lift
 from hairkit.testing import ball_head, shell_hull, turn_capture, turn_scene
 from hairkit.types.camera import Camera
@@ -57,7 +58,9 @@ def large_cameras() -> list[Camera]:
 def measure(capture: Capture, masks: Sequence[Mask], cameras: Sequence[Camera]) -> Parting:
     """Measure the parting in views that show no directions, of hair that is not tied."""
     blank = [OrientationMap(0 * mask.labels, 0.0 * mask.labels) for mask in masks]
-    return measure_parting(capture, masks, blank, cameras, HEAD, TiedHair())
+    hull = shell_hull(0.005)
+    distance = measure_scalp_distance(HEAD, hull)
+    return measure_parting(capture, masks, blank, cameras, HEAD, TiedHair(), hull, distance)
 
 
 @pytest.mark.parametrize("x", [-0.03, 0.0, 0.02])
