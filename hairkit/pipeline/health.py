@@ -305,7 +305,7 @@ def assess_parting(parting: Parting | None) -> tuple[Figure, ...]:
     if parting.sureness < 1:
         light = CROWN.light(parting.sureness)
         figures.append(Figure("parting", "sureness", parting.sureness, "", light, note, 2))
-    if parting.spread:
+    if parting.spread and parting.places is None:  # directions tell more than such skin
         width = 1000 * parting.spread
         light = PARTING_MM.light(width)
         figures.append(Figure("parting", "width of the skin", width, "mm", light, note, 0))

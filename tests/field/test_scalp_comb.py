@@ -18,7 +18,7 @@ BARE, COVERED = 0.0, -0.05
 """Heights below which the ball is skin, metres: its scalp's edge, and the chin of a fringe."""
 
 UNSEEN = 0.094
-"""Height on the ball above which its level views see the surface at too grazing an angle, metres."""
+"""Height on the ball above which level views see it at too grazing an angle, metres."""
 WHORL = np.array([0.0, 0.0866, -0.05])
 """A place on the ball behind its top, metres."""
 
