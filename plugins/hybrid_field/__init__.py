@@ -59,7 +59,7 @@ from .four_fields import (
 )
 from .given_segments import read_segments, segments_in_hair
 from .ribbons import ribbons
-from .segments import find_segments, orient_segments
+from .segments import Way, find_segments, orient_segments
 
 __all__ = ["Options", "blend", "find_segments", "internal_distance", "ribbons"]
 
@@ -132,12 +132,13 @@ def solve_field(
     if waves.curly:
         return hang_curls(scene.head, hull, growth)
     length = scalp_distance.hair_length
+    way = Way(growth, scene.head, parting, length)
     fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options)
     if options.segments is None:
-        segments = find_segments(scene.cameras, masks, fused, hull, growth, options)
+        segments = find_segments(scene.cameras, masks, fused, hull, way, options)
     else:
         given = segments_in_hair(read_segments(options.segments), hull, options.segments)
-        segments = orient_segments(given, hull, growth)
+        segments = orient_segments(given, hull, way)
     prior = ScalpPrior(
         options.scalp_weight, options.scalp_reach, options.scalp_lift, crown=options.parting_weight
     )

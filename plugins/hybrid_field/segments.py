@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hairkit import Camera, Hull, Mask, Strands
+from hairkit import Camera, Head, Hull, Mask, Parting, Strands
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.field.cell_shells import erode_cells
+from hairkit.field.growth_prior import combing_direction, long_share, parts
+from hairkit.field.parting import crown_share
 from hairkit.field.sampling_kernels import copy_point, make_unit, principal_direction, sample_at
 from hairkit.field.view_fusion import FusedViews
 from hairkit.parallel import compiled, parallel_for
@@ -42,6 +44,18 @@ FIRST_WAY = np.array([0.3, 0.9, 0.3])
 it. The growth decides later which end is the root."""
 
 
+class Way(NamedTuple):
+    """What tells a segment's root from its tip."""
+
+    growth: Float32Array
+    """(X, Y, Z) potential that rises from root to tip."""
+    head: Head
+    parting: Parting
+    """How the crown is combed."""
+    hair_length: float
+    """Longest way through the hair from the nearest scalp, metres."""
+
+
 class SegmentOptions(LineOptions, Protocol):
     """Options of the segments."""
 
@@ -54,7 +68,7 @@ def find_segments(
     masks: Sequence[Mask],
     fused: FusedViews,
     hull: Hull,
-    growth: Float32Array,
+    way: Way,
     options: SegmentOptions,
 ) -> Strands:
     """Return segments root to tip, points `STEP` apart, in the head frame.
@@ -63,8 +77,8 @@ def find_segments(
     ----------
     fused
         The maps of all views, and their fusion in the loose cells.
-    growth
-        (X, Y, Z) potential that rises from root to tip: the first guess of a segment's sign.
+    way
+        From root to tip: the first guess of a segment's sign.
     """
     certainty = fused.certainty
     volume = np.zeros((*hull.grid.shape, 6), np.float32)
@@ -76,7 +90,7 @@ def find_segments(
     offsets = np.concatenate([lines.offsets, inner.offsets[1:] + lines.offsets[-1]])
     if len(offsets) == 1:
         return Strands(points, offsets)
-    return orient_segments(Strands(points, offsets), hull, growth)
+    return orient_segments(Strands(points, offsets), hull, way)
 
 
 def lines_through_cells(
@@ -156,20 +170,27 @@ def _follow_tensors(
     return len(line)
 
 
-def orient_segments(segments: Strands, hull: Hull, growth: Float32Array) -> Strands:
+def orient_segments(segments: Strands, hull: Hull, way: Way) -> Strands:
     """Return the segments root to tip, those that ran tip to root reversed.
 
-    Each starts with the sign of the growth along it. In each round it then takes the sign of a
-    vote: the growth, and the signs of its nearest segments weighted by the cosine between them.
+    Each starts with the sign of the way to the tips along it: that of the growth potential, of the
+    comb in short hair, whose ends lie everywhere, and on a crown that is known. In each round it
+    then takes the sign of a vote: that way, and the signs of its nearest segments weighted by the
+    cosine between them.
     """
     count = len(segments)
-    level = hull.grid.sample(growth, np.concatenate([segments.roots, segments.tips]))
+    level = hull.grid.sample(way.growth, np.concatenate([segments.roots, segments.tips]))
     chord = (segments.tips - segments.roots).astype(np.float64)
     length = np.maximum(np.linalg.norm(chord, axis=1), 1e-6)
-    wish = np.clip((level[count:] - level[:count]) / length, -1, 1)
     middle = 0.5 * (segments.tips + segments.roots)
-    near = cKDTree(middle).query(middle, k=min(NEIGHBOURS + 1, count))[1].reshape(count, -1)[:, 1:]
     unit = chord / length[:, None]
+    comb = combing_direction(way.head, hull, way.growth, middle, 0.0, way.parting, way.hair_length)
+    combed = np.full(count, 1 - long_share(way.hair_length))
+    if parts(way.parting, way.hair_length):
+        combed = np.maximum(combed, crown_share(way.parting, way.head, middle))
+    rise = np.clip((level[count:] - level[:count]) / length, -1, 1)
+    wish = (1 - combed) * rise + combed * (unit * comb).sum(axis=1)
+    near = cKDTree(middle).query(middle, k=min(NEIGHBOURS + 1, count))[1].reshape(count, -1)[:, 1:]
     parallel = np.einsum("nkc,nc->nk", unit[near], unit)
     sign = np.where(wish < 0, -1.0, 1.0)
     for _ in range(ROUNDS):

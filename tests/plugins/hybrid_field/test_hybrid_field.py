@@ -20,7 +20,7 @@ from hairkit_plugins.hybrid_field.photo_lines import (
     lift_lines,
 )
 from hairkit_plugins.hybrid_field.ribbons import SURFACE, Band, ribbons
-from hairkit_plugins.hybrid_field.segments import find_segments, orient_segments
+from hairkit_plugins.hybrid_field.segments import Way, find_segments, orient_segments
 from scipy import ndimage
 
 from hairkit.field.growth_prior import growth_potential, measure_scalp_distance
@@ -36,6 +36,8 @@ from hairkit.types.volume import Hull, VoxelGrid, cell_slopes, outer_products
 from hairkit.types.waves import Waves
 
 SPACING = 0.006
+LONG, SHORT = 0.2, 0.01
+"""Longest ways through hair, metres."""
 PLAIN = Options(scalp_weight=0.0, pool=0.0, unslant=False, outward=0.0)
 
 
@@ -54,7 +56,8 @@ def segments(options: Options = PLAIN) -> tuple[Strands, Hull]:
     hull = hair()
     growth = growth_potential(hull, measure_scalp_distance(ball_head(), hull), 0.6)
     fused = fuse_views(views, masks, maps, hull, Waves(), options)
-    return find_segments(views, masks, fused, hull, growth, options), hull
+    way = Way(growth, ball_head(), Parting(), LONG)
+    return find_segments(views, masks, fused, hull, way, options), hull
 
 
 def test_segments_run_along_the_hair_they_were_seen_on() -> None:
@@ -116,9 +119,23 @@ def test_segments_agree_on_which_end_is_the_root() -> None:
     growth = hull.grid.centres()[..., 1]
     growth = growth + 0.004 * rng.standard_normal(growth.shape).astype(np.float32)
     mixed = Strands(points.reshape(-1, 3).astype(np.float32), np.arange(61) * 8)
-    result = orient_segments(mixed, hull, growth.astype(np.float32))
+    way = Way(growth.astype(np.float32), ball_head(), Parting(), LONG)
+    result = orient_segments(mixed, hull, way)
     assert ((result.tips - result.roots)[:, 1] > 0).all()
     np.testing.assert_array_equal(np.sort(result.points[:, 1]), np.sort(mixed.points[:, 1]))
+
+
+def test_segments_of_short_hair_run_as_it_is_combed() -> None:
+    """Its ends lie everywhere, so a potential that rises against the comb counts in long hair
+    alone; on a crown that is known the comb counts there too."""
+    hull = hair()
+    at = CENTRE + np.array([[0.0, 0.0, 0.06], [0.01, 0.0, 0.06]])
+    points = at[:, None] + np.linspace(0, 0.02, 8)[:, None] * np.array([0.0, -1.0, 0.0])
+    downward = Strands(points.reshape(-1, 3).astype(np.float32), np.arange(3) * 8)
+    rising = hull.grid.centres()[..., 1].astype(np.float32)
+    for length, sign in ((SHORT, -1), (LONG, 1)):
+        result = orient_segments(downward, hull, Way(rising, ball_head(), Parting(), length))
+        assert (sign * (result.tips - result.roots)[:, 1] > 0).all()
 
 
 def test_ribbons_widen_segments_along_the_surface() -> None:
