@@ -146,18 +146,19 @@ def assess(
     turn
         How the photos were arranged; None when their names were believed.
     parting
-        How the crown is combed, which counts for nothing in short hair; None when nothing was
-        measured.
+        How the crown is combed, which counts for nothing in short hair and in hair that is combed
+        to a tie; None when nothing was measured.
     tied
         The ties that were found; None of loose hair.
     """
+    short, tails = hair_length < PARTED_HAIR, tied is not None and len(tied.tails)
     return (
         *assess_turn(turn),
         *assess_landmarks(capture, scene),
         *assess_cameras(scene),
         *assess_masks(masks, scene),
         *assess_hull(hull, masks, scene),
-        *(assess_parting(parting) if hair_length >= PARTED_HAIR else ()),
+        *(() if short or tails else assess_parting(parting)),
         *assess_ties(tied, scene.head),
         *assess_strands(groom, roots, hair_length),
     )

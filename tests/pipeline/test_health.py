@@ -22,6 +22,7 @@ from hairkit.types.groom import Groom
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
+from hairkit.types.tie import Tail, Tie, TiedHair
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull
 
@@ -57,6 +58,7 @@ class Run:
         self.roots = len(self.groom.strands)
         self.hair_length = HAIR_LENGTH
         self.parting = Parting.at(0.0, skin_share=0.02, spread=0.012)
+        self.tied = TiedHair()
 
     def _mask(self, camera: Camera) -> Mask:
         head = self.scene.head
@@ -79,7 +81,7 @@ class Run:
         """Return the figures by stage and name."""
         every = assess(
             self.capture, self.masks, self.scene, self.hull, self.groom, self.roots,
-            self.hair_length, self.turn, self.parting,
+            self.hair_length, self.turn, self.parting, self.tied,
         )  # fmt: skip
         return {f"{figure.stage}: {figure.name}": figure for figure in every}
 
@@ -219,3 +221,13 @@ def test_limits_may_rise_or_fall() -> None:
     lights = [Limits(0.9, 0.8).light(value) for value in (1.0, 0.9, 0.85, 0.8, 0.1)]
     assert lights == ["green", "green", "amber", "red", "red"]
     assert [Limits(1, 3).light(value) for value in (0, 2, 3)] == ["green", "amber", "red"]
+
+
+def test_the_crown_of_tied_hair_is_no_parting(run: Run) -> None:
+    """Its skin shows along the hairline, and the hair is combed to the tie whatever that says."""
+    bare_hairline(run)
+    tie = Tie(np.array([0.0, 0.05, -0.1]), np.array([0.0, 0.0, -1.0]), 0.015, "tail")
+    spine = np.array([[0.0, 0.05, -0.1], [0.0, 0.0, -0.12]])
+    spokes = 0.01 * np.broadcast_to(np.eye(3)[:2], (2, 2, 3))
+    run.tied = TiedHair((Tail(tie, 0.9, spine, spokes, np.ones(2)),))
+    assert not [name for name in run.figures() if name.startswith("parting")]
