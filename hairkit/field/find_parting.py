@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float64Array
 from hairkit.field.growth_prior import TIP_SHARE, growth_potential
-from hairkit.field.scalp_comb import comb_scalp
+from hairkit.field.scalp_comb import comb_beside_parting, comb_scalp, see_front
 from hairkit.field.scalp_sight import look_at, see_scalp
 from hairkit.io.strokes import read_view_strokes
 from hairkit.types.camera import Camera
@@ -76,8 +76,11 @@ def measure_parting(
     if tied.tails:
         return skin
     sight = see_scalp(masks, orientations, cameras, head)
+    front = see_front(sight, masks, cameras, head)
+    if skin.seen:
+        return comb_beside_parting(skin, front)
     growth = growth_potential(hull, scalp_distance, TIP_SHARE)
-    return comb_scalp(skin, sight, masks, cameras, head, hull, growth)
+    return comb_scalp(skin, front, sight, head, hull, growth)
 
 
 def parting_from_skin(masks: Sequence[Mask], cameras: Sequence[Camera], head: Head) -> Parting:

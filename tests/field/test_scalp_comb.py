@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.field.parting import comb_from_parting, crown_share, front_share
-from hairkit.field.scalp_comb import comb_scalp
+from hairkit.field.scalp_comb import Front, comb_beside_parting, comb_scalp, see_front
 from hairkit.field.scalp_sight import see_scalp
 from hairkit.types.parting import Parting
 from tests.support import tied_ball as ball
@@ -57,8 +58,11 @@ def find(
     masks, maps = zip(*(ball.drawn(camera, comb, bare) for camera in cameras), strict=True)
     sight = see_scalp(masks, maps, cameras, ball.HEAD)
     potential = rising(np.array([0.0, -1.0, 0.0])) if growth is None else growth
+    front = see_front(sight, masks, cameras, ball.HEAD)
+    if skin is not None and skin.seen:
+        return comb_beside_parting(skin, front)
     hull = ball.tied_hull(curtain=True)
-    return comb_scalp(skin or Parting(), sight, masks, cameras, ball.HEAD, hull, potential)
+    return comb_scalp(skin or Parting(), front, sight, ball.HEAD, hull, potential)
 
 
 def combed(parting: Parting) -> Callable[[Float64Array], Float64Array]:
@@ -97,7 +101,7 @@ def test_hair_that_runs_from_a_whorl_is_found() -> None:
     assert np.mean(agreement > np.cos(np.radians(25))) > 0.9
 
 
-def test_neighbours_outvote_a_wrong_potential() -> None:
+def test_a_small_fault_of_the_potential_does_not_count() -> None:
     """In a patch 4 cm wide the potential points the other way; the comb does not."""
     centres = ball.GRID.centres()
     patch = np.linalg.norm(centres - np.array([0.0, 0.1, 0.0]), axis=-1) < 0.02
@@ -106,6 +110,32 @@ def test_neighbours_outvote_a_wrong_potential() -> None:
     points = crown(0.02)
     seen = comb_from_parting(find(across, growth=growth), ball.HEAD, points, outward(points))
     assert ((seen * across(points)).sum(axis=1) > 0).all()
+
+
+def test_places_that_no_view_sees_follow_the_potential() -> None:
+    """Directions are seen on the left half alone; the rest is combed along the potential."""
+    cameras, points = ball.cameras(), crown(0.06)
+    masks, maps = zip(*(ball.drawn(camera, across, BARE) for camera in cameras), strict=True)
+    sight = see_scalp(masks, maps, cameras, ball.HEAD)
+    half = sight.at(sight.places[:, 0] > 0.06)
+    hull, back = ball.tied_hull(curtain=True), rising(np.array([0.0, 0.0, -1.0]))
+    found = comb_scalp(Parting(), Front(0.0, 0.0), half, ball.HEAD, hull, back)
+    right = points[points[:, 0] < -0.03]
+    seen = comb_from_parting(found, ball.HEAD, right, outward(right))
+    assert (seen[:, 2] < -0.5).mean() > 0.9
+
+
+def test_a_head_without_scalp_on_its_crown_says_nothing() -> None:
+    """There is no place to comb."""
+    height = ball.HEAD.vertices[:, 1]
+    low = ((height < 0) & (height > -0.03)).astype(np.float32)
+    bald = replace(ball.HEAD, scalp=low)
+    cameras = ball.cameras()
+    masks, maps = zip(*(ball.drawn(camera, across, BARE) for camera in cameras), strict=True)
+    sight = see_scalp(masks, maps, cameras, ball.HEAD)
+    hull, growth = ball.tied_hull(curtain=True), rising(np.array([0.0, -1.0, 0.0]))
+    skin = Parting()
+    assert comb_scalp(skin, Front(0.0, 0.0), sight, bald, hull, growth) is skin
 
 
 def test_directions_that_do_not_agree_leave_the_crown_as_it_was() -> None:

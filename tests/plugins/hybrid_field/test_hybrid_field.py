@@ -127,7 +127,7 @@ def test_segments_agree_on_which_end_is_the_root() -> None:
 
 def test_segments_of_short_hair_run_as_it_is_combed() -> None:
     """Its ends lie everywhere, so a potential that rises against the comb counts in long hair
-    alone; on a crown that is known the comb counts there too."""
+    alone."""
     hull = hair()
     at = CENTRE + np.array([[0.0, 0.0, 0.06], [0.01, 0.0, 0.06]])
     points = at[:, None] + np.linspace(0, 0.02, 8)[:, None] * np.array([0.0, -1.0, 0.0])
