@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.field.parting import comb_from_parting, crown_share, front_share
@@ -110,6 +111,16 @@ def test_a_small_fault_of_the_potential_does_not_count() -> None:
     points = crown(0.02)
     seen = comb_from_parting(find(across, growth=growth), ball.HEAD, points, outward(points))
     assert ((seen * across(points)).sum(axis=1) > 0).all()
+
+
+def test_neighbours_outvote_a_noisy_potential() -> None:
+    """The potential alone turns more than 6 % of the directions round; after the vote none is."""
+    noise = ndimage.gaussian_filter(np.random.default_rng(2).normal(size=ball.GRID.shape), 4)
+    slope = rising(np.array([-1.0, 0.0, 0.0]))
+    found = find(across, growth=slope + (0.02 / noise.std() * noise).astype(np.float32))
+    assert found.places is not None
+    assert found.directions is not None
+    assert ((found.directions * across(found.places)).sum(axis=1) > 0).all()
 
 
 def test_places_that_no_view_sees_follow_the_potential() -> None:
