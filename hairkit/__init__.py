@@ -36,6 +36,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `options`: options of plugins
 * `parallel`: compiled loops on threads
 * `progress`: progress reporting
+* `remote`: files and folders at URLs
 * `storage`: safe files, frozen types as `.npz`
 * `testing`: a small head with hair for tests of plugins
 * `worker`: the other side of plugins in environments of their own

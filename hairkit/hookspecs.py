@@ -38,9 +38,17 @@ PROJECT = "hairkit"
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
 
-HOOKSPEC_VERSION = (1, 4)
+HOOKSPEC_VERSION = (1, 5)
 """Version of this contract. The second number grows when hooks or arguments are added, the first
 when one is removed or changes; a plugin may check it when it is imported."""
+
+
+@hookspec(firstresult=True)
+def capture(source: str, max_edge: int, options: Any) -> Capture | None:
+    """Return the photos of a path, or of another name that the plugin knows; None for others'.
+
+    Photos whose long edge has more pixels are scaled down to `max_edge`.
+    """
 
 
 @hookspec(firstresult=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array
@@ -66,10 +67,13 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
     stage
         Name of the hook: `orient`.
     folder
-        An empty folder for the file of `export_groom` or `import_groom`.
+        An empty folder for the photos of `capture`, or the file of `export_groom` or
+        `import_groom`.
     """
     capture, scene = turn_capture(), turn_scene()
     masks = tuple(ball_mask(camera) for camera in scene.cameras)
+    if stage == "capture":
+        return {"source": _write_photos(folder, capture), "max_edge": _HEIGHT}
     if stage in ("make_simulator", "export_groom", "import_groom"):
         return _groom_arguments(stage, folder)
     if stage == "enhance_texture":
@@ -252,6 +256,15 @@ def _texture_arguments() -> dict[str, Any]:
         for angle in (_TEXTURE_STRIPES, _EXAMPLE_STRIPES)
     )
     return {"texture": texture, "example": TextureExample(filtered)}
+
+
+def _write_photos(folder: Path | None, capture: Capture) -> str:
+    """Write the photos as `front.png`, ... and return their folder."""
+    if folder is None:
+        raise ValueError("stage_arguments('capture') needs a folder to put the photos in")
+    for view in capture.views:
+        cv2.imwrite(str(folder / f"{view.name}.png"), view.image[..., ::-1])
+    return str(folder)
 
 
 def _groom_arguments(stage: str, folder: Path | None) -> dict[str, Any]:

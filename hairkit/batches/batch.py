@@ -13,6 +13,7 @@ from hairkit.batches.pool import LocalPool, Watcher
 from hairkit.batches.run_job import JobLimits
 from hairkit.errors import InputError
 from hairkit.manager import Manager
+from hairkit.remote import is_url
 
 GIB = 2**30
 """Bytes of a GiB."""
@@ -42,9 +43,10 @@ def batch(
     Parameters
     ----------
     captures
-        Folder with one folder of photos, or one video, for each capture.
+        Folder with one folder of photos, or one video, for each capture, at a path or a URL; or a
+        `.txt` file that names one a line, as the recipe's stage `capture` knows it.
     out
-        Folder for the results, one folder a capture, as `reconstruct` writes them.
+        Folder for the results, one folder a capture, as `reconstruct` writes them; or a URL.
     recipe
         A shipped recipe's name, or a `.toml` file.
     settings
@@ -71,25 +73,35 @@ def batch(
     """
     given = settings if isinstance(settings, Settings) else Settings(**settings or {})
     shared = replace(given, recipe=os.fspath(recipe)) if recipe != "default" else given
-    cores = core_count()
-    count = workers or cores
-    for name, value in (("workers", count), ("threads", threads or 1), ("seconds", seconds)):
-        if not value > 0:
-            raise InputError(f"{name} is {value}, expected more than 0")
+    limits = JobLimits(seconds, _bytes(capture_memory_gib), retries)
+    pool = _pool(client, workers, threads, memory_gib, limits)
     jobs = find_jobs(captures, out, only)
     jobs = part_of(jobs, part) if part is not None else jobs
     digest = shared.digest(Manager.loaded(shared.plugin_files))
-    limits = JobLimits(seconds, _bytes(capture_memory_gib), retries)
-    budget = _bytes(memory_gib)
-    Path(out).mkdir(parents=True, exist_ok=True)
+    if not is_url(out):
+        Path(out).mkdir(parents=True, exist_ok=True)
+    return _results(jobs, shared, digest, pool, watcher)
+
+
+def _pool(
+    client: Any,
+    workers: int | None,
+    threads: int | None,
+    memory_gib: float | None,
+    limits: JobLimits,
+) -> Any:
+    """Return Dask's workers, or this machine's."""
+    cores = core_count()
+    count = cores if workers is None else workers
+    for name, value in (("workers", count), ("threads", threads), ("seconds", limits.seconds)):
+        if value is not None and not value > 0:
+            raise InputError(f"{name} is {value}, expected more than 0")
     if client is not None:
         from hairkit.batches.dask_pool import DaskPool
 
-        pool: Any = DaskPool(client, limits, threads=threads or 1)
-    else:
-        each = threads or max(1, cores // count)
-        pool = LocalPool(count, limits, threads=each, budget_bytes=budget)
-    return _results(jobs, shared, digest, pool, watcher)
+        return DaskPool(client, limits, threads=threads or 1)
+    each = threads or max(1, cores // count)
+    return LocalPool(count, limits, threads=each, budget_bytes=_bytes(memory_gib))
 
 
 def _results(

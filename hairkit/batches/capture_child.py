@@ -8,8 +8,10 @@ was killed.
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import resource
+import shutil
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -24,6 +26,9 @@ from hairkit.errors import HairkitError
 if TYPE_CHECKING:
     from hairkit.batches.jobs import Job, Settings
     from hairkit.manager import Manager
+    from hairkit.pipeline.recipe import Recipe
+    from hairkit.progress import Progress
+    from hairkit.types.capture import Capture
 
 THUMBNAIL = "thumbnail.jpg"
 THUMBNAIL_EDGE, THUMBNAIL_QUALITY = 320, 80
@@ -65,34 +70,72 @@ def explain(error: BaseException) -> str:
 
 
 def _reconstruct(job: Job, settings: Settings, tell: Callable[[Any], None]) -> dict[str, Any]:
-    from hairkit.batches.jobs import DONE
-    from hairkit.io.capture_reader import WORKING_EDGE, read_capture
+    from hairkit.io.capture_reader import WORKING_EDGE
     from hairkit.pipeline.recipe import load_recipe
-    from hairkit.pipeline.reconstruct import reconstruct
-    from hairkit.pipeline.run_record import RECORD, read_record
+    from hairkit.pipeline.take_capture import take_capture
+    from hairkit.pipeline.work_folder import WORK
+    from hairkit.remote import forget, is_url, send
 
     _use_few_threads()
-    given = read_capture(job.photos, settings.max_edge or WORKING_EDGE)
-    recipe = load_recipe(settings.recipe).with_set([*given.chosen.settings, *settings.settings])
+    manager, recipe = _manager(settings.plugin_files), load_recipe(settings.recipe)
+    asked = recipe.with_set(settings.settings)
+    asked.check(manager)
+    given = take_capture(job.photos, asked, manager, settings.max_edge or WORKING_EDGE)
+    recipe = recipe.with_set([*given.chosen.settings, *settings.settings])
+    folder = _near(job)
+    made = _results(folder, given, recipe, manager, settings, _Told(tell))
+    if is_url(job.out):
+        send(folder, job.out, without=WORK)
+        shutil.rmtree(folder)
+    if is_url(job.photos) and given.source is not None:
+        forget(given.source)
+    return made | {"out": job.out}
+
+
+def _near(job: Job) -> Path:
+    """Return the folder for a job's results on this machine; a second try finds the same one."""
+    from hairkit.remote import copies, is_url
+
+    if not is_url(job.out):
+        return Path(job.out)
+    return copies() / f"results-{hashlib.sha256(job.out.encode()).hexdigest()}"
+
+
+def _results(
+    folder: Path,
+    given: Capture,
+    recipe: Recipe,
+    manager: Manager,
+    settings: Settings,
+    progress: Progress,
+) -> dict[str, Any]:
+    """Reconstruct, and return what is said of it."""
+    from hairkit.batches.jobs import DONE
+    from hairkit.pipeline.reconstruct import reconstruct
+    from hairkit.pipeline.run_record import RECORD, read_record
+    from hairkit.pipeline.work_folder import drop_work
+
     groom = reconstruct(
         given,
-        job.out,
+        folder,
         recipe,
-        _manager(settings.plugin_files),
+        manager,
         guides=settings.guides,
         seed=settings.seed,
-        progress=_Told(tell),
+        progress=progress,
         sheet=settings.sheet,
     )
-    record = read_record(Path(job.out) / RECORD)
+    record = read_record(folder / RECORD)
+    scores = _scores(folder, given.source) if settings.scores else {}
+    if settings.drop_work:
+        drop_work(folder)
     return {
         "state": DONE,
-        "out": job.out,
         "strands": len(groom.strands),
-        "thumbnail": _draw_thumbnail(job, given.views[0].image),
+        "thumbnail": _draw_thumbnail(folder, given.views[0].image),
         "stages": {stage.stage: stage.seconds for stage in record.stages if not stage.reused},
         "health": tuple(asdict(figure) for figure in record.health),
-        "scores": _scores(job) if settings.scores else {},
+        "scores": scores,
     }
 
 
@@ -120,14 +163,14 @@ def _use_few_threads() -> None:
     cv2.setNumThreads(thread_count())
 
 
-def _draw_thumbnail(job: Job, photo: Any) -> str:
+def _draw_thumbnail(folder: Path, photo: Any) -> str:
     """Write a small picture: of the contact sheet, else of the first photo; return its name."""
     import cv2
 
     from hairkit.pipeline.reconstruct import SHEET
     from hairkit.storage import read_bytes, write_bytes
 
-    sheet = Path(job.out) / SHEET
+    sheet = folder / SHEET
     picture = photo[..., ::-1]
     if sheet.is_file():
         import numpy as np
@@ -137,18 +180,17 @@ def _draw_thumbnail(job: Job, photo: Any) -> str:
     scale = THUMBNAIL_EDGE / max(picture.shape[:2])
     small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     quality = [cv2.IMWRITE_JPEG_QUALITY, THUMBNAIL_QUALITY]
-    write_bytes(Path(job.out) / THUMBNAIL, cv2.imencode(".jpg", small, quality)[1].tobytes())
+    write_bytes(folder / THUMBNAIL, cv2.imencode(".jpg", small, quality)[1].tobytes())
     return THUMBNAIL
 
 
-def _scores(job: Job) -> Mapping[str, float]:
+def _scores(folder: Path, photos: Path | None) -> Mapping[str, float]:
     """Return F of all strands at each threshold, where the truth is known."""
-    truth = Path(job.photos) / "truth"
-    if not truth.is_dir():
+    if photos is None or not (photos / "truth").is_dir():
         return {}
     from hairkit.evaluation import evaluate, read_prediction, read_truth
 
-    found = evaluate(read_prediction(job.out), read_truth(truth))
+    found = evaluate(read_prediction(folder), read_truth(photos / "truth"))
     values = {f"F {s.distance_mm:g} mm/{s.angle_deg:g} deg": s.f for s in found.scores.all}
     return {name: round(float(value), 4) for name, value in values.items()}
 

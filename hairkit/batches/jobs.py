@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import json
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from hairkit.errors import HairkitError, InputError
 from hairkit.options import unknown_name
-from hairkit.storage import read_text, write_text
+from hairkit.remote import children, describe, exists, is_url, join, read_bytes, write_text
+from hairkit.storage import read_text
 
 if TYPE_CHECKING:  # a worker of Dask knows jobs, and starts without the libraries that do them
     from hairkit.manager import Manager
@@ -33,7 +35,9 @@ class Job:
     name: str
     """Name of its folder or video, and of its folder in the output."""
     photos: str
+    """What the stage `capture` is asked for: a path, a URL, or a name that its plugin knows."""
     out: str
+    """Path or URL of its folder in the output."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +56,13 @@ class Settings:
     """Draw the contact sheet of each capture."""
     scores: bool = False
     """Evaluate captures that have a folder `truth`."""
+    drop_work: bool = False
+    """Empty the folder `work` of each capture once it is done."""
 
     def __post_init__(self) -> None:
-        recipe = Path(self.recipe)
-        if recipe.suffix == ".toml":  # a worker may start in another folder
-            object.__setattr__(self, "recipe", str(recipe.absolute()))
+        # a worker may start in another folder
+        if self.recipe.endswith(".toml") and not is_url(self.recipe):
+            object.__setattr__(self, "recipe", str(Path(self.recipe).absolute()))
         files = tuple(str(Path(file).absolute()) for file in self.plugin_files)
         object.__setattr__(self, "plugin_files", files)
         object.__setattr__(self, "settings", tuple(self.settings))
@@ -106,7 +112,7 @@ class Result:
     def write(self) -> None:
         """Write the result into its folder."""
         text = json.dumps(dataclasses.asdict(self), indent=1)
-        write_text(Path(self.out) / RESULT, text + "\n")
+        write_text(join(self.out, RESULT), text + "\n")
 
     @property
     def lights(self) -> dict[str, int]:
@@ -118,30 +124,51 @@ class Result:
 def find_jobs(
     captures: str | os.PathLike[str], out: str | os.PathLike[str], only: Sequence[str] = ()
 ) -> tuple[Job, ...]:
-    """Return a job for each folder and video in a folder of captures, sorted by name.
+    """Return a job for each capture, sorted by name.
 
-    Raises `InputError` where there is none, for a name in `only` that is not there, and for an
-    output folder in which captures lie.
+    Captures are the folders and videos in a folder, at a path or a URL, or the lines of a `.txt`
+    file. Raises `InputError` where there is none, for a name in `only` that is not there, and for
+    an output folder in which captures lie.
     """
-    from hairkit.io.video import is_video
-
-    folder, results = Path(captures).absolute(), Path(out).absolute()
-    if not folder.is_dir():
-        raise InputError(f"{captures}: no such folder")
-    if results == folder or folder in results.parents:
+    given = str(captures) if is_url(captures) else str(Path(captures).absolute())
+    results = str(out) if is_url(out) else str(Path(out).absolute())
+    listed = not is_url(given) and given.endswith(".txt")
+    found = _listed(Path(given)) if listed else _lying(given)
+    if not listed and f"{results.rstrip('/')}/".startswith(f"{given.rstrip('/')}/"):
         raise InputError(f"{out}: lies in the folder of the captures; choose one beside it")
-    found = sorted(p for p in folder.iterdir() if p.name[0] != "." and (p.is_dir() or is_video(p)))
     if not found:
         raise InputError(f"{captures}: holds no capture: a folder of photos or a video for each")
-    names = [path.name for path in found]
     for name in only:
-        if name not in names:
-            raise InputError(f"{captures}: {unknown_name('capture', name, names)}")
-    return tuple(
-        Job(path.name, str(path), str(results / path.name))
-        for path in found
-        if not only or path.name in only
-    )
+        if name not in found:
+            raise InputError(f"{captures}: {unknown_name('capture', name, [*found])}")
+    chosen = {name: source for name, source in found.items() if not only or name in only}
+    return tuple(Job(name, source, join(results, name)) for name, source in chosen.items())
+
+
+def _lying(folder: str) -> dict[str, str]:
+    """Return the captures in a folder by their names."""
+    if not is_url(folder) and not Path(folder).is_dir():
+        raise InputError(f"{folder}: no such folder")
+    from hairkit.io.video import SUFFIXES
+
+    return {
+        name: join(folder, name)
+        for name, is_folder in children(folder)
+        if name[0] != "." and (is_folder or Path(name).suffix.lower() in SUFFIXES)
+    }
+
+
+def _listed(path: Path) -> dict[str, str]:
+    """Return the captures that a file names, one a line: what the stage `capture` is asked for."""
+    lines = [line.strip() for line in read_text(path, LONGEST_RESULT).splitlines()]
+    sources = [line for line in lines if line and not line.startswith("#")]
+    found: dict[str, str] = {}
+    for source in sources:
+        name = re.sub(r"[^\w.-]+", "_", source).strip("_.")
+        if name in found:
+            raise InputError(f"{path}: {source!r} and {found[name]!r} would have one folder {name}")
+        found[name] = str(Path(source).absolute()) if Path(source).exists() else source
+    return dict(sorted(found.items()))
 
 
 def part_of(jobs: Sequence[Job], text: str) -> tuple[Job, ...]:
@@ -158,32 +185,38 @@ def part_of(jobs: Sequence[Job], text: str) -> tuple[Job, ...]:
 
 
 def job_digest(job: Job, settings_digest: str) -> str:
-    """Return a hex digest of a job: of its settings and of names, sizes and times of its files."""
+    """Return a hex digest of a job: of its settings and of names, sizes and times of its files.
+
+    Of a source that is neither path nor URL only the name is known.
+    """
     state = hashlib.sha256(settings_digest.encode())
-    photos = Path(job.photos)
-    for path in _files(photos):
-        found = path.stat()
-        name = path.relative_to(photos.parent)
-        state.update(f"\n{name} {found.st_size} {found.st_mtime_ns}".encode())
+    if is_url(job.photos):
+        files = describe(job.photos)
+    else:
+        photos = Path(job.photos)
+        found = {path.relative_to(photos.parent): path.stat() for path in _files(photos)}
+        files = {str(name): f"{at.st_size} {at.st_mtime_ns}" for name, at in found.items()}
+        files = files if photos.exists() else {job.photos: ""}
+    for name, stamp in files.items():
+        state.update(f"\n{name} {stamp}".encode())
     return state.hexdigest()
 
 
 def finished(job: Job, digest: str) -> Result | None:
     """Return the result of an earlier batch with this digest, None where there is none."""
     try:
-        result = read_result(Path(job.out) / RESULT)
+        result = read_result(join(job.out, RESULT))
     except HairkitError:
         return None
-    if result.digest != digest or not (Path(job.out) / "groom.npz").is_file():
+    if result.digest != digest or not exists(join(job.out, "groom.npz")):
         return None
     return dataclasses.replace(result, name=job.name, out=job.out, state=KEPT)
 
 
-def read_result(path: Path) -> Result:
+def read_result(path: str | os.PathLike[str]) -> Result:
     """Return a result that was written; raises `InputError` for anything else."""
     try:
-        document = json.loads(read_text(path, LONGEST_RESULT))
-        return result_from(document)
+        return result_from(json.loads(read_bytes(path, LONGEST_RESULT)))
     except (ValueError, TypeError, LookupError, RecursionError, AttributeError) as error:
         raise InputError(f"{path}: no result of a batch ({error})") from error
 

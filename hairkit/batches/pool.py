@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Protocol
 
 from hairkit.batches.jobs import Job, Result, Settings
 from hairkit.batches.run_job import COMMAND, JobLimits, run_job, start_child
@@ -31,24 +30,14 @@ KIBIBYTE = 2**10
 CGROUP = Path("/sys/fs/cgroup")
 
 
-class Watcher(Protocol):
-    """Hears what happens to jobs; calls come from any thread."""
+class Watcher:
+    """Hears what happens to jobs, from any thread, and does nothing about it."""
 
     def started(self, name: str) -> None:
         """A capture has been given to a worker."""
 
     def stage(self, name: str, stage: str) -> None:
         """A stage of it has begun."""
-
-
-class Silence:
-    """A watcher that does nothing."""
-
-    def started(self, name: str) -> None:
-        """Do nothing."""
-
-    def stage(self, name: str, stage: str) -> None:
-        """Do nothing."""
 
 
 class LocalPool:
@@ -90,7 +79,7 @@ class LocalPool:
 
         def work(child: ChildProcess) -> None:
             try:
-                self._work(child, waiting, settings, watcher or Silence(), results.put)
+                self._work(child, waiting, settings, watcher or Watcher(), results.put)
             except BaseException as error:  # a fault of hairkit must not make the batch wait
                 results.put(error)
 

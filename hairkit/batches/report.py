@@ -7,12 +7,11 @@ import html
 import json
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from urllib.parse import quote
 
 from hairkit.batches.jobs import FAILED, Result
 from hairkit.pipeline.health import GREEN, Figure
-from hairkit.storage import write_text
+from hairkit.remote import join, write_text
 
 PAGE, DATA = "report.html", "report.json"
 """Names of the two files."""
@@ -38,8 +37,8 @@ def write_report(out: str | os.PathLike[str], results: Sequence[Result], seconds
         "counts": count_states(results),
         "captures": [dataclasses.asdict(result) for result in ordered],
     }
-    write_text(Path(out) / DATA, json.dumps(document, indent=1) + "\n")
-    write_text(Path(out) / PAGE, _page(ordered, seconds))
+    write_text(join(out, DATA), json.dumps(document, indent=1) + "\n")
+    write_text(join(out, PAGE), _page(ordered, seconds))
 
 
 def count_states(results: Sequence[Result]) -> dict[str, int]:

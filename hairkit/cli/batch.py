@@ -21,10 +21,11 @@ if TYPE_CHECKING:
 _DESCRIPTION = """\
 Example: hairkit batch captures/ -o results/
 
-Reconstruct every capture in a folder: a folder of photos, or a video, for each. OUT gets a folder
-for each, as `hairkit reconstruct` writes it, and report.html and report.json about all. Captures
-run in processes of their own, as many at once as there are cores and memory for. One that fails,
-hangs or crashes fails alone. Run it again: it does what is missing. Exit code 2 where one failed.
+Reconstruct every capture in a folder: a folder of photos, or a video, for each. CAPTURES may be a
+URL (s3://bucket/captures), or a .txt file with a capture on each line. OUT gets a folder for each,
+as `hairkit reconstruct` writes it, and report.html and report.json about all. Captures run in
+processes of their own, as many at once as there are cores and memory for. One that fails, hangs or
+crashes fails alone. Run it again: it does what is missing. Exit code 2 where one failed.
 """
 GUIDES = 600
 """Roots by default, as of `hairkit.reconstruct`."""
@@ -40,8 +41,8 @@ def register(subparsers: Any) -> None:
         "batch", help="reconstruct many captures", description=_DESCRIPTION
     )
     add = parser.add_argument
-    add("captures", metavar="CAPTURES", help="folder with a folder or video for each capture")
-    add("-o", "--out", required=True, metavar="OUT", help="output folder")
+    add("captures", metavar="CAPTURES", help="folder of folders or videos, or its URL, or a .txt")
+    add("-o", "--out", required=True, metavar="OUT", help="output folder, or its URL")
     add("--recipe", default="default", metavar="R", help="a shipped recipe or a .toml file")
     add_setting(add, STAGE_HELP)
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
@@ -50,6 +51,7 @@ def register(subparsers: Any) -> None:
     add("--max-edge", type=int, metavar="PX", help="scale larger photos to this edge (1440)")
     add("--sheet", action="store_true", help="draw the contact sheets")
     add("--scores", action="store_true", help="score captures that have a folder truth/")
+    add("--drop-work", action="store_true", help="empty work/ of captures that are done")
     add("--only", action="append", default=[], metavar="NAME", help="do this capture")
     add("--part", metavar="K/N", help="do every N-th capture from the K-th on")
     add("--workers", type=int, metavar="N", help="captures at once (default: one a core)")
@@ -70,6 +72,7 @@ def register(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Do the batch, and print what became of it."""
     from hairkit.batches.report import DATA, PAGE, summary, write_report
+    from hairkit.remote import join
 
     if args.write_job:
         print(_write_job(args))
@@ -84,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         lines = [summary(results, seconds)]
         lines += [f"failed {r.name}: {r.error}" for r in results if r.error]
-        lines += [] if args.no_report else [str(Path(args.out) / name) for name in (PAGE, DATA)]
+        lines += [] if args.no_report else [join(args.out, name) for name in (PAGE, DATA)]
         print("\n".join(lines))
     return 2 if any(result.error for result in results) else 0
 
@@ -102,6 +105,7 @@ def settings_of(args: argparse.Namespace) -> Settings:
         args.max_edge,
         args.sheet,
         args.scores,
+        args.drop_work,
     )
 
 
@@ -161,11 +165,12 @@ def _run(args: argparse.Namespace, client: Any) -> list[Result]:
 def _found(args: argparse.Namespace) -> list[Result]:
     """Return what is known of every capture, without doing any."""
     from hairkit.batches.jobs import FAILED, RESULT, Result, find_jobs, read_result
+    from hairkit.remote import join
 
     results = []
     for job in find_jobs(args.captures, args.out, args.only):
         try:
-            results.append(read_result(Path(job.out) / RESULT))
+            results.append(read_result(join(job.out, RESULT)))
         except InputError:
             reason = "not done; run the batch again to see why"
             results.append(Result(job.name, FAILED, job.out, error=reason))
@@ -177,7 +182,11 @@ def _write_job(args: argparse.Namespace) -> str:
     from hairkit.batches.farm_files import OPENJD, write_job
     from hairkit.batches.jobs import find_jobs
     from hairkit.manager import Manager
+    from hairkit.remote import is_url
 
+    for place in (args.captures, args.out):
+        if is_url(place) or place.endswith(".txt"):
+            raise InputError(f"{place}: a job file takes folders, which all machines of a farm see")
     settings = settings_of(args)
     settings.digest(Manager.loaded(settings.plugin_files))
     jobs = find_jobs(args.captures, args.out, args.only)
@@ -186,7 +195,8 @@ def _write_job(args: argparse.Namespace) -> str:
     words += [word for file in settings.plugin_files for word in ("--plugin", file)]
     words += [word for name in args.only for word in ("--only", name)]
     words += ["--max-edge", str(args.max_edge)] if args.max_edge is not None else []
-    words += [flag for flag in ("--sheet", "--scores") if getattr(args, flag[2:])]
+    flags = {"--sheet": args.sheet, "--scores": args.scores, "--drop-work": args.drop_work}
+    words += [flag for flag, given in flags.items() if given]
     program = (sys.executable, "-m", "hairkit")
     path = write_job(args.write_job, args.captures, args.out, len(jobs), words, program)
     words = ["sh", str(path)]

@@ -6,63 +6,41 @@ import sys
 import threading
 import time
 from collections import Counter
-from types import TracebackType
-from typing import Any, Protocol, Self, TextIO
+from typing import Any, Self, TextIO
 
 from hairkit.batches.jobs import FAILED, Result
+from hairkit.batches.pool import Watcher
+from hairkit.progress import Lines
 
 REDRAWS_HZ = 4
 """Pictures of the table in a second."""
 
 
-class BatchTable(Protocol):
-    """Hears what happens to captures; calls come from any thread."""
-
-    def started(self, name: str) -> None:
-        """A capture has been given to a worker."""
-
-    def stage(self, name: str, stage: str) -> None:
-        """A stage of it has begun."""
+class BatchTable(Watcher):
+    """Shows nothing; used as a context manager, as all tables are."""
 
     def ended(self, result: Result) -> None:
         """A capture is done, or has failed."""
 
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: Any) -> None: ...
-
-
-class Hush:
-    """Shows nothing."""
-
-    def started(self, name: str) -> None:
-        """Do nothing."""
-
-    def stage(self, name: str, stage: str) -> None:
-        """Do nothing."""
-
-    def ended(self, result: Result) -> None:
-        """Do nothing."""
-
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: Any) -> None:
+    def __exit__(self, *_: object) -> None:
         return None
 
 
-class ResultLines(Hush):
+class ResultLines(BatchTable):
     """Writes one line for each capture that has ended, for logs and pipes."""
 
     def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
+        self._lines = Lines(stream)
 
     def ended(self, result: Result) -> None:
         """Write the line."""
-        print(line_of(result), file=self._stream, flush=True)
+        self._lines.message(line_of(result))
 
 
-class LiveTable:
+class LiveTable(BatchTable):
     """Draws captures that are at work, and counts the others; used as a context manager."""
 
     def __init__(self, stream: TextIO, count: int) -> None:
@@ -86,12 +64,7 @@ class LiveTable:
         self._live.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._live.stop()
 
     def started(self, name: str) -> None:
@@ -140,5 +113,5 @@ def table_for(stream: TextIO | None, count: int, *, quiet: bool) -> BatchTable:
     """Return a table for a terminal, lines for anything else, nothing when `quiet`."""
     stream = stream or sys.stderr
     if quiet:
-        return Hush()
+        return BatchTable()
     return LiveTable(stream, count) if stream.isatty() else ResultLines(stream)

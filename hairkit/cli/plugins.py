@@ -30,6 +30,7 @@ def register(subparsers: Any) -> None:
         "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
     )
     parser.add_argument("--check", action="store_true", help="try the plugin on a made-up head")
+    parser.add_argument("--source", metavar="S", help="with --check, what to ask `capture` for")
     parser.add_argument("--lock", metavar="RECIPE", help="print the recipe's table [lock]")
     parser.add_argument("--formats", action="store_true", help="print the table of file formats")
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -54,17 +55,17 @@ def run(args: argparse.Namespace) -> int:
         print(_as_json(wanted) if args.json else _listing(wanted))
         return 0
     if args.check:
-        return _check(manager, args.name, as_json=args.json)
+        return _check(manager, args.name, args.source, as_json=args.json)
     info = manager.info(args.name)
     print(_as_json([info]) if args.json else _details(info))
     return 2 if info.broken else 0
 
 
-def _check(manager: Manager, name: str, *, as_json: bool) -> int:
+def _check(manager: Manager, name: str, source: str | None, *, as_json: bool) -> int:
     """Print what is found about a plugin."""
     from hairkit.manager.plugin_check import check_plugin
 
-    checks = list(check_plugin(manager, name))
+    checks = list(check_plugin(manager, name, source))
     if as_json:
         print(json.dumps([asdict(check) for check in checks], indent=1))
     else:

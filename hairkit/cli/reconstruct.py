@@ -39,7 +39,7 @@ def register(subparsers: Any) -> None:
         description=_DESCRIPTION,
     )
     add = parser.add_argument
-    add("photos", nargs="?", metavar="PHOTOS", help="folder of the photos, or a video")
+    add("photos", nargs="?", metavar="PHOTOS", help="folder of the photos, a video, or a name")
     add("-o", "--out", required=True, metavar="OUT", help="output folder")
     add("--sample", action="store_true", help="use the capture that ships with hairkit")
     recipes = f"{', '.join(recipe_names())} or a .toml file"
@@ -61,6 +61,7 @@ def register(subparsers: Any) -> None:
     add("--max-edge", type=int, metavar="PX", help="scale larger photos to this edge (1440)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--no-cache", action="store_true", help="run every stage again")
+    add("--drop-work", action="store_true", help="empty OUT/work/ at the end: most of the bytes")
     add("--no-sheet", action="store_true", help="draw no contact sheet")
     add("--quiet", action="store_true", help="print only errors on stderr")
     add("--json", action="store_true", help="print a summary as JSON")
@@ -68,12 +69,13 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Reconstruct, and print a summary."""
-    from hairkit.io.capture_reader import WORKING_EDGE, read_capture
+    from hairkit.io.capture_reader import WORKING_EDGE
     from hairkit.manager import Manager
     from hairkit.pipeline.health import summarise
     from hairkit.pipeline.recipe import load_recipe
     from hairkit.pipeline.reconstruct import SHEET, export_paths, reconstruct
     from hairkit.pipeline.run_record import RECORD, read_record
+    from hairkit.pipeline.take_capture import take_capture
     from hairkit.progress import Recorder, progress_for
     from hairkit.types.parting import Parting
 
@@ -81,8 +83,9 @@ def run(args: argparse.Namespace) -> int:
     manager = Manager.loaded(args.plugin)
     head = _head(args)
     recipe = load_recipe(args.recipe)
-    recipe.with_set(args.set).check(manager)  # before minutes of reading photos or a video
-    capture = read_capture(_photos(args), _max_edge(args, WORKING_EDGE))
+    asked = recipe.with_set(args.set)
+    asked.check(manager)  # before minutes of reading photos or a video
+    capture = take_capture(_photos(args), asked, manager, _max_edge(args, WORKING_EDGE))
     recipe = recipe.with_set([*capture.chosen.settings, *args.set])
     recipe.check(manager)
     if args.parting is not None:
@@ -100,6 +103,7 @@ def run(args: argparse.Namespace) -> int:
             progress=record,
             reuse=not args.no_cache,
             sheet=not args.no_sheet,
+            keep_work=not args.drop_work,
         )
     sheet = Path(args.out) / SHEET
     health = read_record(Path(args.out) / RECORD).health
@@ -123,12 +127,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _photos(args: argparse.Namespace) -> Path:
+def _photos(args: argparse.Namespace) -> str:
     from hairkit.io.capture_reader import sample_folder
 
     if args.sample == (args.photos is not None):
         raise InputError("give either a folder of photos or --sample")
-    return sample_folder() if args.sample else Path(args.photos)
+    return str(sample_folder()) if args.sample else str(args.photos)
 
 
 def _max_edge(args: argparse.Namespace, default: int) -> int:

@@ -24,6 +24,19 @@ ALWAYS = ("from hairkit.hookspecs import hookimpl", "from hairkit.options import
 _NUMPY = "import numpy as np"
 
 SKETCHES = {
+    "capture": Sketch(
+        "Captures of an archive, by the names of their folders.",
+        (
+            "from pathlib import Path",
+            "from hairkit.io.capture_reader import read_folder",
+            "from hairkit.types.capture import Capture",
+        ),
+        'archive: str = option("", doc="Folder of the archive.")',
+        "source: str, max_edge: int, options: Options) -> Capture | None",
+        """
+folder = Path(options.archive) / source
+return read_folder(folder, max_edge) if folder.is_dir() else None""",
+    ),
     "detect_landmarks": Sketch(
         "A face in the middle of the photo, seen from in front.",
         (

@@ -94,9 +94,14 @@ def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> 
         There are fewer than 3 or more than 36 photos, one cannot be read, or masks, strokes or
         landmarks do not belong to the photos.
     """
+    if is_video(Path(path)):
+        return read_video(Path(path), max_edge)
+    return read_folder(path, max_edge)
+
+
+def read_folder(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> Capture:
+    """Return the capture in a folder, as `read_capture`."""
     folder = Path(path)
-    if is_video(folder):
-        return read_video(folder, max_edge)
     if not folder.is_dir():
         reason = "not a folder" if folder.exists() else "no such folder"
         raise InputError(f"{folder}: {reason}, expected a folder of photos")

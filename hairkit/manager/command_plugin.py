@@ -32,8 +32,8 @@ from hairkit.manager.results import RESULTS
 from hairkit.options import option, unknown_name
 from hairkit.storage import Stored, from_arrays, open_file, parsing, read_text
 
-IN_PROCESS_ONLY = ("make_simulator",)
-"""Hooks that return a live object, which no file can hold."""
+IN_PROCESS_ONLY = ("capture", "make_simulator")
+"""Hooks that return what no npz can hold: paths of photos, a live object."""
 KINDS: dict[str, type] = {"bool": bool, "int": int, "float": float, "str": str, "path": Path}
 """Types of options by the names that `hairkit.worker.option` gives them."""
 CLEARED = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "__PYVENV_LAUNCHER__")

@@ -5,7 +5,7 @@
 name = "studio_matte"
 version = "1.2"
 summary = "Hair by the studio's network."
-hookspec = "1.4"                       # version of the hooks that it was written for
+hookspec = "1.5"                       # version of the hooks that it was written for
 hooks = ["segment"]
 module = "studio_matte.py"             # or command = ["/opt/nets/bin/python", "matte.py"]
 [options.level]                        # as `hairkit.worker.option` describes it
@@ -83,7 +83,7 @@ def read_manifest(path: Path) -> Manifest:
 
 
 def check_hookspec(version: object) -> None:
-    """Raise `PluginError` unless a plugin for these hooks, "1.4" or (1, 4), works with ours.
+    """Raise `PluginError` unless a plugin for these hooks, "1.5" or (1, 5), works with ours.
 
     Hooks of our major version only gained arguments and companions, so what was written for an
     older minor version works; one for a newer minor version may ask for what is not there.

@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 
 from hairkit.errors import HairkitError, PluginError
+from hairkit.io.capture_reader import WORKING_EDGE
 from hairkit.manager.loading import PluginInfo
 from hairkit.manager.manager import Manager
 from hairkit.storage import Stored, read_bytes, to_arrays
 from hairkit.testing import stage_arguments
+from hairkit.types.capture import Capture
 
 MEBIBYTE = 2**20
 """Bytes."""
@@ -34,8 +36,11 @@ class Check:
     """What was found, one line."""
 
 
-def check_plugin(manager: Manager, name: str) -> Iterator[Check]:
-    """Yield what is found about a plugin; raises `PluginError` when there is none of that name."""
+def check_plugin(manager: Manager, name: str, source: str | None = None) -> Iterator[Check]:
+    """Yield what is found about a plugin; raises `PluginError` when there is none of that name.
+
+    `source` is what `capture` is asked for; a folder with photos of the made-up head when None.
+    """
     manager.info(name)
     with contextlib.suppress(PluginError):
         manager.implementer("", name)  # loads one that was only described so far
@@ -47,7 +52,7 @@ def check_plugin(manager: Manager, name: str) -> Iterator[Check]:
     yield Check("summary", bool(info.summary), info.summary or "its docstring is empty")
     yield _options(manager, info)
     for stage in info.stages:
-        yield from _stage(manager, name, stage)
+        yield from _stage(manager, name, stage, source)
 
 
 def _options(manager: Manager, info: PluginInfo) -> Check:
@@ -67,16 +72,18 @@ def _options(manager: Manager, info: PluginInfo) -> Check:
     return Check("options", True, f"{len(info.options)}, each explained")
 
 
-def _stage(manager: Manager, name: str, stage: str) -> Iterator[Check]:
+def _stage(manager: Manager, name: str, stage: str, source: str | None) -> Iterator[Check]:
     """Call a stage twice and compare; the second call is measured."""
     try:
-        first, _, _ = _called(manager, name, stage)
-        second, seconds, most = _called(manager, name, stage)
+        first, _, _ = _called(manager, name, stage, source)
+        second, seconds, most = _called(manager, name, stage, source)
     except HairkitError as error:
         yield Check(stage, False, str(error))
         return
     if first is None:
-        yield Check(stage, True, "has no answer on the made-up head; nothing was checked")
+        what = "the made-up head" if stage != "capture" or source is None else repr(source)
+        passed = stage != "capture" or source is None
+        yield Check(stage, passed, f"has no answer on {what}; nothing was checked")
         return
     size = f"{most / MEBIBYTE:.1f} MiB" if manager.info(name).command is None else "not measured"
     yield Check(stage, True, f"keeps the contract; {seconds:.3f} s, memory {size}")
@@ -84,10 +91,14 @@ def _stage(manager: Manager, name: str, stage: str) -> Iterator[Check]:
     yield Check(f"{stage} twice", same, "equal results" if same else "two calls, two results")
 
 
-def _called(manager: Manager, name: str, stage: str) -> tuple[str | None, float, int]:
+def _called(
+    manager: Manager, name: str, stage: str, source: str | None
+) -> tuple[str | None, float, int]:
     """Return a digest of the result, None without one, the seconds and the most bytes taken."""
     with tempfile.TemporaryDirectory(prefix="hairkit-check-") as folder:
         arguments = stage_arguments(stage, Path(folder))
+        if stage == "capture" and source is not None:
+            arguments |= {"source": source, "max_edge": WORKING_EDGE}
         info = manager.info(name)
         if stage == "export_groom" and info.suffixes:
             arguments["path"] = arguments["path"].with_suffix(info.suffixes[0])
@@ -106,6 +117,8 @@ def _digest(result: Any, arguments: dict[str, Any]) -> str:
     state = hashlib.sha256(type(result).__name__.encode())
     if isinstance(result, Stored):
         values = {key: np.asarray(value) for key, value in to_arrays(result).items()}
+    elif isinstance(result, Capture):
+        values = {view.name: view.image for view in result.views}
     elif hasattr(result, "points"):
         values = {"points": np.asarray(result.points)}
     else:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from hairkit.errors import DataError
+from hairkit.types.capture import Capture
 from hairkit.types.face import Face
 from hairkit.types.groom import Groom
 from hairkit.types.mask import Mask, Masks
@@ -57,6 +58,23 @@ def check_result(hook: str, result: object, call: Call) -> None:
         raise DataError(f"returned {type(result).__name__}, expected {kind.__name__}")
     for check in checks:
         check(result, call)
+
+
+def _photos_are_scaled(capture: Capture, call: Call) -> None:
+    most = call.arguments["max_edge"]
+    for view in capture.views:
+        if max(view.width, view.height) > most:
+            raise DataError(
+                f"photo {view.name!r} has {view.width} x {view.height} pixels, expected a long"
+                f" edge of at most {most}"
+            )
+
+
+def _views_have_names_of_their_own(capture: Capture, call: Call) -> None:
+    names = [view.name for view in capture.views]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise DataError(f"two views have the name {twice!r}, expected each its own")
 
 
 def _mask_has_photo_size(mask: Mask, call: Call) -> None:
@@ -206,6 +224,7 @@ def _file_state(path: Path) -> tuple[int, int, int] | None:
 Check = Callable[[Any, Call], None]
 
 RESULTS: dict[str, tuple[type, tuple[Check, ...]]] = {
+    "capture": (Capture, (_photos_are_scaled, _views_have_names_of_their_own)),
     "detect_landmarks": (Face, ()),
     "segment_person": (Person, (_person_has_photo_size,)),
     "find_turn": (Turnaround, (_turn_has_each_photo,)),

@@ -21,5 +21,6 @@ plugins.
 * `run_record`: `run.json`: inputs, recipe, outputs and health
 * `single_photo`: what a photo shows before the whole turn is there
 * `stage_runner`: one stage, once or once for each view
+* `take_capture`: the stage that reads the photos
 * `work_folder`: cached results of stages
 """

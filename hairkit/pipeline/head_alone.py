@@ -13,7 +13,6 @@ import numpy as np
 from hairkit.errors import InputError
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
-from hairkit.io.capture_reader import read_capture
 from hairkit.io.head_reader import write_head_obj
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
@@ -25,6 +24,7 @@ from hairkit.pipeline.recipe import Recipe, load_recipe
 from hairkit.pipeline.reconstruct import tell_missing
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.stage_runner import Given, StageRunner
+from hairkit.pipeline.take_capture import take_capture
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
 from hairkit.types.capture import Capture
@@ -74,7 +74,7 @@ def photograph_head(
     manager = manager or Manager.loaded()
     recipe = recipe if isinstance(recipe, Recipe) else load_recipe(recipe)
     recipe.check(manager)
-    given = photos if isinstance(photos, Capture) else read_capture(photos)
+    given = photos if isinstance(photos, Capture) else take_capture(photos, recipe, manager)
     log = RunLog(progress or Silent())
     with (
         tempfile.TemporaryDirectory(prefix="hairkit-head-") as folder,

@@ -36,9 +36,10 @@ from hairkit.nets.model_folder import missing_models
 from hairkit.options import split_setting, unknown_name
 from hairkit.pipeline.module_digest import module_digest
 from hairkit.pipeline.plugin_lock import check_lock, read_lock
-from hairkit.storage import read_bytes
+from hairkit.remote import is_url, read_bytes
 
 HOOKS = {
+    "capture": "capture",
     "landmarks": "detect_landmarks",
     "person": "segment_person",
     "turn": "find_turn",
@@ -55,7 +56,7 @@ HOOKS = {
 }
 """Table of the recipe -> stage hook, in the order in which they run."""
 
-SEVERAL = ("landmarks", "person", "segment", "export")
+SEVERAL = ("capture", "landmarks", "person", "segment", "export")
 """Tables that may name several plugins."""
 
 NEEDED = ("segment", "scene", "orient", "hull", "field", "track")
@@ -181,6 +182,8 @@ def load_recipe(name: str | os.PathLike[str]) -> Recipe:
     if text in recipe_names():
         return parse_recipe(_read_shipped(text), text, f"recipe {text}")
     path = Path(text)
+    if is_url(text):
+        return parse_recipe(read_bytes(text), path.stem, text)
     if path.suffix != ".toml" and not path.exists():
         reason = unknown_name("recipe", text, recipe_names())
         raise InputError(f"{reason}, or the path of a .toml file")

@@ -22,7 +22,6 @@ from hairkit.head_model.hairline import Hairline, measure_hairline
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.imaging.waves import measure_waves
-from hairkit.io.capture_reader import read_capture
 from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread, thread_count
@@ -36,7 +35,8 @@ from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.run_record import RECORD, RunRecord, describe_run, finish_record
 from hairkit.pipeline.single_photo import given_photo
 from hairkit.pipeline.stage_runner import Given, StageRunner
-from hairkit.pipeline.work_folder import WorkFolder
+from hairkit.pipeline.take_capture import take_capture
+from hairkit.pipeline.work_folder import WORK, WorkFolder, drop_work
 from hairkit.progress import Progress, Silent
 from hairkit.types.capture import Capture
 from hairkit.types.chosen import ChosenHair
@@ -71,13 +71,15 @@ def reconstruct(
     progress: Progress | None = None,
     reuse: bool = True,
     sheet: bool = True,
+    keep_work: bool = True,
 ) -> Groom:
     """Run a recipe on photos and return the groom: `reconstruct("photos/", "out/")`.
 
     Parameters
     ----------
     photos
-        The folder of a capture, or a capture that was read before.
+        The folder of a capture, or what else the recipe's stage `capture` takes; or a capture that
+        was read before.
     out
         Folder for `groom.npz`, `scene.json`, the recipe's exports, `contact_sheet.png`,
         `run.json` and `hairkit.log`; its `work/` keeps the results of stages, so that unchanged
@@ -100,6 +102,9 @@ def reconstruct(
         False runs every stage again.
     sheet
         Draw the contact sheet; where there is no OpenGL one line of progress says so.
+    keep_work
+        False empties `work/` at the end. Groom, exports and `run.json` do not need it; the viewer's
+        layers, scores of masks and a faster second run do.
 
     Raises
     ------
@@ -111,14 +116,18 @@ def reconstruct(
     manager = manager or Manager.loaded()
     if not 1 <= guides <= MAX_GUIDES:
         raise InputError(f"{guides} guides, expected 1 to {MAX_GUIDES}")
-    given = photos if isinstance(photos, Capture) else read_capture(photos)
+    chosen = recipe if isinstance(recipe, Recipe) else load_recipe(recipe)
+    chosen.check(manager)
+    given = photos if isinstance(photos, Capture) else take_capture(photos, chosen, manager)
     if not isinstance(recipe, Recipe):
-        recipe = load_recipe(recipe).with_set(given.chosen.settings)
-    recipe.check(manager)
+        chosen = chosen.with_set(given.chosen.settings)
+        chosen.check(manager)
     head = HeadFile(os.fspath(head)) if isinstance(head, (str, os.PathLike)) else head
-    record = describe_run(given, head, recipe, manager, guides, seed)
+    record = describe_run(given, head, chosen, manager, guides, seed)
     log = RunLog(progress or Silent())
-    groom, health = _run(record, given, Path(out), head, recipe, manager, log, reuse, sheet)
+    groom, health = _run(record, given, Path(out), head, chosen, manager, log, reuse, sheet)
+    if not keep_work:
+        drop_work(out)
     if progress is None:
         for figure in health:
             if figure.light == RED:
@@ -139,7 +148,7 @@ def _run(
 ) -> tuple[Groom, tuple[Figure, ...]]:
     """Run the stages in the work folder and write all files; the record comes last."""
     busy = f"{folder}: another run is working here; waiting for it to end"
-    work = WorkFolder(folder / "work", reuse=reuse, waiting=lambda: log.message(busy))
+    work = WorkFolder(folder / WORK, reuse=reuse, waiting=lambda: log.message(busy))
     with (
         work,
         announce_compilation(log.message),

@@ -7,11 +7,13 @@ import os
 from pathlib import Path
 
 from hairkit.errors import InputError
-from hairkit.io.capture_reader import WORKING_EDGE, read_capture
+from hairkit.io.capture_reader import WORKING_EDGE
 from hairkit.manager import Manager
 from hairkit.pipeline.reconstruct import SHEET, reconstruct
 from hairkit.pipeline.run_record import RECORD, RunRecord, hash_file, library_versions, read_record
+from hairkit.pipeline.take_capture import take_capture
 from hairkit.progress import Progress
+from hairkit.remote import exists
 from hairkit.types.groom import Groom
 
 
@@ -58,11 +60,12 @@ def rerun(
     if progress is not None:
         for line in changed_versions(old, manager):
             progress.message(line)
-    capture = read_capture(str(old.photos), old.max_edge or WORKING_EDGE)
+    recipe = old.as_recipe()
+    capture = take_capture(str(old.photos), recipe, manager, old.max_edge or WORKING_EDGE)
     groom = reconstruct(
         capture,
         out,
-        old.as_recipe(),
+        recipe,
         manager,
         head=old.head,
         guides=old.guides,
@@ -109,9 +112,9 @@ def _check_inputs(record: RunRecord, path: Path, force: bool) -> None:
         what = "photos" if record.photos is None else "head"
         raise InputError(f"{path}: the {what} of this run were given as objects, not as files")
     for file in record.inputs:
-        if not Path(file.path).is_file():
+        if not exists(file.path):
             raise InputError(f"{file.path}: no such file; {path} names it as an input")
-        if not force and hash_file(Path(file.path)).sha256 != file.sha256:
+        if not force and hash_file(file.path).sha256 != file.sha256:
             raise InputError(
                 f"{file.path}: changed since {path} was written; --force runs with it as it is now"
             )

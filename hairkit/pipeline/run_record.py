@@ -20,9 +20,10 @@ from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.manager.command_plugin import PluginCommand
 from hairkit.pipeline.health import Figure
-from hairkit.pipeline.recipe import HOOKS, Choice, Recipe, Stage, plugin_code
+from hairkit.pipeline.recipe import HOOKS, Choice, Recipe, Stage, load_recipe, plugin_code
 from hairkit.pipeline.run_log import StageTime
-from hairkit.storage import read_bytes, read_text, write_text
+from hairkit.remote import is_url, join, read_bytes
+from hairkit.storage import read_text, write_text
 from hairkit.types.capture import Capture
 
 RECORD = "run.json"
@@ -39,7 +40,7 @@ class FileRecord:
     """A file and its content."""
 
     path: str
-    """Inputs have absolute paths, outputs are named within the folder of the record."""
+    """Inputs have absolute paths or URLs, outputs are named within the folder of the record."""
     sha256: str
 
 
@@ -68,7 +69,8 @@ class RunRecord:
     libraries: Mapping[str, str]
     """Version of Python and of each library by name."""
     photos: str | None
-    """Folder or video of the capture; None when the photos were not read from a path."""
+    """What the stage `capture` was asked for: a folder, a video, or a name that its plugin knows;
+    None when the photos were not read from anywhere."""
     max_edge: int | None
     """Long edge that photos were scaled down to, pixels."""
     head: HeadFile | None
@@ -100,6 +102,8 @@ class RunRecord:
             choices = tuple(Choice(p.plugin, MappingProxyType(dict(p.options))) for p in own)
             if choices:
                 stages.append(Stage(table, choices))
+        if not stages or stages[0].table != "capture":  # a record from before that stage
+            stages[:0] = load_recipe("default").stages[:1]
         source = f"{RECORD} of {self.recipe_source}"
         return Recipe(self.recipe, source, "", tuple(stages), self.commands)
 
@@ -138,7 +142,7 @@ def describe_run(
         hairkit=hairkit.__version__,
         platform=platform.platform(),
         libraries=library_versions(),
-        photos=None if capture.source is None else str(capture.source.resolve()),
+        photos=_photos(capture),
         max_edge=capture.max_edge,
         head=head_file,
         head_given=head is not None and head_file is None,
@@ -147,9 +151,15 @@ def describe_run(
         recipe=recipe.name,
         recipe_source=recipe.source,
         plugins=plugins,
-        inputs=tuple(hash_file(path.resolve()) for path in files),
+        inputs=tuple(hash_file(path.resolve(), _at_url(path, capture)) for path in files),
         commands=recipe.commands,
     )
+
+
+def _photos(capture: Capture) -> str | None:
+    """Return what the stage `capture` can be asked for again."""
+    source = None if capture.source is None else str(capture.source.resolve())
+    return capture.asked or source
 
 
 def finish_record(
@@ -203,8 +213,16 @@ def input_files(capture: Capture) -> list[Path]:
     return [path for path in dict.fromkeys(named) if path is not None and path.is_file()]
 
 
-def hash_file(path: Path, name: str | None = None) -> FileRecord:
-    """Return a file's SHA-256 under its path, or under another name."""
+def _at_url(path: Path, capture: Capture) -> str | None:
+    """Return where a file was fetched from; None for one that lies where it is."""
+    asked, source = capture.asked, capture.source
+    if asked is None or not is_url(asked) or source is None or not path.is_relative_to(source):
+        return None
+    return join(asked, *path.relative_to(source).parts)
+
+
+def hash_file(path: str | os.PathLike[str], name: str | None = None) -> FileRecord:
+    """Return the SHA-256 of a file at a path or a URL, under that or under another name."""
     return FileRecord(name or str(path), hashlib.sha256(read_bytes(path)).hexdigest())
 
 

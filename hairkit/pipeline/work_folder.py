@@ -11,6 +11,7 @@ import contextlib
 import dataclasses
 import hashlib
 import os
+import shutil
 import threading
 import time
 import zipfile
@@ -28,6 +29,9 @@ from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
 _Result = TypeVar("_Result", bound=Stored)
 AHEAD = "ahead"
 """Folder in the work folder, of folders of single photos (`single_photo`)."""
+WORK = "work"
+"""Name of the folder in that of the results."""
+_LOCK = ".lock"
 _DIGEST = "work_digest"
 _DIGEST_BYTES = 20
 """Length of a digest, as SHA-1's and git's: no two inputs share one by chance."""
@@ -104,7 +108,7 @@ class WorkFolder:
             self.path.mkdir(parents=True, exist_ok=True)
         except (FileExistsError, NotADirectoryError) as error:
             raise InputError(f"{self.path}: not a folder; choose another for the output") from error
-        self._lock = _lock(self.path / ".lock", self._waiting)
+        self._lock = _lock(self.path / _LOCK, self._waiting)
         for leftover in self.path.glob(".*.part"):  # left by a killed run
             leftover.unlink(missing_ok=True)
         ahead = (self.path / AHEAD).glob("*/*.npz")
@@ -157,8 +161,23 @@ class WorkFolder:
         for write in writes:
             write.result()
 
+    def clear(self) -> None:
+        """Remove all results; the lock stays, for runs that wait for it."""
+        self.flush()
+        for path in self.path.iterdir():
+            if path.is_dir():
+                shutil.rmtree(path)
+            elif path.name != _LOCK:
+                path.unlink()
+
     def _file(self, stage: str, view: str) -> Path:
         return stage_file(self.path, stage, view)
+
+
+def drop_work(out: str | os.PathLike[str]) -> None:
+    """Remove what the stages of a run kept: groom, exports and record stay, and can be rerun."""
+    with WorkFolder(Path(out) / WORK) as work:
+        work.clear()
 
 
 def read_latest(kind: type[_Result], work: Path, stage: str, view: str = "") -> _Result:

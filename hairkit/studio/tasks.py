@@ -18,7 +18,6 @@ from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
 from hairkit.errors import HairkitError, InputError
 from hairkit.grooming.densify import roots_between
 from hairkit.head_model.scalp import roots_at
-from hairkit.io.capture_reader import read_capture
 from hairkit.io.capture_toml import head_entry, head_pose, read_capture_file
 from hairkit.io.photos import MAX_BYTES, read_header, read_photo
 from hairkit.io.video import read_video
@@ -26,6 +25,7 @@ from hairkit.options import make_options
 from hairkit.pipeline.draft import draft
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.run_record import RECORD, read_record
+from hairkit.pipeline.take_capture import take_capture
 from hairkit.pipeline.work_folder import digest_of
 from hairkit.storage import read_bytes, write_bytes
 from hairkit.studio.clean_photo import clean_photo
@@ -105,7 +105,7 @@ def pick_frames(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]
 def build_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
     """Reconstruct the project in `folder` into its `result`, as `hairkit reconstruct` does."""
     out = Path(request["result"])
-    capture = read_capture(request["folder"])
+    capture = take_capture(request["folder"], recipe(), manager())
     groom = reconstruct(
         capture,
         out,
@@ -134,7 +134,7 @@ def draft_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]
         if stopped():
             raise StoppedError("stopped; another change came")
 
-    capture = read_capture(request["folder"], OUTLINE_EDGE)
+    capture = take_capture(request["folder"], recipe(), manager(), OUTLINE_EDGE)
     coarse = recipe().with_set([*capture.chosen.settings, *DRAFT_SETTINGS])
     work = Path(request["folder"]) / "result" / "work"
     drawn = {name: Path(folder) for name, folder in request["touched"].items()}

@@ -16,9 +16,10 @@ from hairkit.evaluation.prediction import WORK, Prediction, read_prediction
 from hairkit.grooming.densify import densify
 from hairkit.head_model.template import default_head
 from hairkit.imaging.masked_filters import double_angle
-from hairkit.io.capture_reader import WORKING_EDGE, read_capture
+from hairkit.io.capture_reader import WORKING_EDGE
 from hairkit.manager import Manager
 from hairkit.pipeline.run_record import RECORD, read_record
+from hairkit.pipeline.take_capture import take_capture
 from hairkit.rendering import draw_views
 from hairkit.rendering.measurement import draw_measurements
 from hairkit.simulation import run, static_motion
@@ -137,7 +138,7 @@ def read_subject(
     Raises `InputError` where the photos, the masks or the orientation maps are not there any more.
     """
     base = Path(folder)
-    prediction, capture = read_prediction(base), _read_photos(base)
+    prediction, capture = read_prediction(base), _read_photos(base, manager)
     if prediction.masks is None or prediction.orientations is None:
         raise InputError(f"{base / WORK}: masks and orientation maps are gone; reconstruct again")
     photos = {view.name: view.image for view in capture.views}
@@ -192,12 +193,13 @@ def settle(name: str, groom: Groom, manager: Manager, seconds: float) -> Subject
     return Subject(name, groom)
 
 
-def _read_photos(folder: Path) -> Capture:
+def _read_photos(folder: Path, manager: Manager) -> Capture:
     """Return the capture of a run, arranged as the run found the turn."""
     record = read_record(folder / RECORD)
     if record.photos is None:
         raise InputError(f"{folder}: its photos were given as objects, not as files")
-    capture = read_capture(str(record.photos), record.max_edge or WORKING_EDGE)
+    edge = record.max_edge or WORKING_EDGE
+    capture = take_capture(record.photos, record.as_recipe(), manager, edge)
     path = folder / WORK / "turn.npz"
     if not path.is_file():
         return capture

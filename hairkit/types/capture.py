@@ -146,6 +146,9 @@ class Capture(Previewed):
     """How the crown is combed, where the user says it; None leaves it to the photos."""
     chosen: Chosen = field(default_factory=Chosen)
     """What the user chooses instead of what is measured and fitted."""
+    asked: str | None = None
+    """What the stage `capture` was asked for: an absolute path, or a name that its plugin knows;
+    None when no stage was."""
 
     def __post_init__(self) -> None:
         if not self.views:
@@ -160,7 +163,8 @@ class Capture(Previewed):
 
     def plain(self) -> Self:
         """Return the capture without choices, as stages see it: none of them reads any."""
-        return replace(self, views=tuple(view.plain() for view in self.views), chosen=Chosen())
+        views = tuple(view.plain() for view in self.views)
+        return replace(self, views=views, chosen=Chosen(), asked=None)
 
     def arranged(self, turn: Turnaround) -> Self:
         """Return the views upright, in the order, with the names and from where the turn says."""

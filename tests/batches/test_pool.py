@@ -16,7 +16,7 @@ import quick_captures
 from quick_captures import COMMAND, write_captures
 
 from hairkit.batches.jobs import Job, Result, Settings, find_jobs, finished, job_digest, part_of
-from hairkit.batches.pool import LocalPool, free_bytes
+from hairkit.batches.pool import LocalPool, Watcher, free_bytes
 from hairkit.batches.run_job import JobLimits
 from hairkit.errors import InputError
 
@@ -153,14 +153,11 @@ def test_memory_decides_how_many_run_at_once(tmp_path: Path) -> None:
     captures = write_captures(tmp_path / "captures", *GOOD)
     seen, running, guard = [], [0], threading.Lock()
 
-    class Watcher:
+    class Counting(Watcher):
         def started(self, name: str) -> None:
             with guard:
                 running[0] += 1
                 seen.append(running[0])
-
-        def stage(self, name: str, stage: str) -> None:
-            pass
 
     for budget in (GIB, 4 * GIB):
         seen.clear()
@@ -168,7 +165,7 @@ def test_memory_decides_how_many_run_at_once(tmp_path: Path) -> None:
         pool = LocalPool(4, JobLimits(60), budget_bytes=budget, command=COMMAND)
         out = tmp_path / f"out-{budget}"
         jobs = [(job, "x") for job in find_jobs(captures, out)]
-        for _ in pool.run(jobs, Settings(seed=100), Watcher()):
+        for _ in pool.run(jobs, Settings(seed=100), Counting()):
             with guard:
                 running[0] -= 1
         assert (max(seen) <= 2) == (budget == GIB)  # one may start before the other is counted off

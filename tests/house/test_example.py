@@ -68,7 +68,9 @@ def command(*words: str) -> list[str]:
 
 def test_it_is_thirty_lines() -> None:
     """A third-party plugin is no more than that, options and docstrings included."""
-    assert len((EXAMPLE / "hairkit_sobel.py").read_text().splitlines()) <= 30
+    for name in ("sobel", "assets"):
+        path = EXAMPLE.with_name(f"hairkit-{name}") / f"hairkit_{name}.py"
+        assert len(path.read_text().splitlines()) <= 30
 
 
 def test_it_is_found_and_listed_with_its_options(installed: dict[str, str], tmp_path: Path) -> None:
@@ -99,6 +101,14 @@ def test_its_own_test_passes(installed: dict[str, str], tmp_path: Path) -> None:
     shutil.copy(EXAMPLE / "test_hairkit_sobel.py", tmp_path)
     output = run(["-m", "pytest", "-q", "-W", "error", "."], installed, tmp_path)
     assert "4 passed" in output
+
+
+def test_the_example_of_captures_passes_its_own_test(tmp_path: Path) -> None:
+    """The plugin that finds captures in a database is a plugin as it stands."""
+    shutil.copytree(EXAMPLE.with_name("hairkit-assets"), tmp_path / "example")
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+    output = run(["-m", "pytest", "-q", "-W", "error", "."], environment, tmp_path / "example")
+    assert "1 passed" in output
 
 
 def test_the_command_example_passes_its_own_test(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ FLOORS = (
         "options",
         "storage",
         "progress",
+        "remote",
         "parallel",
         "kernel_cache",
         "compilation",

@@ -99,7 +99,7 @@ def test_a_plugin_cannot_change_what_it_is_given(hook: str, tmp_path: Path) -> N
     """Every array of every argument is read-only, and the error names who tried to write."""
     arguments = stage_arguments(hook, tmp_path)
     arrays = [array for value in arguments.values() for array in arrays_in(value)]
-    assert arrays or hook == "import_groom"
+    assert arrays or hook in ("capture", "import_groom")
     for array in arrays:
 
         def write(_: dict[str, Any], array: np.ndarray = array) -> None:

@@ -23,6 +23,7 @@ from hairkit.errors import InputError, PluginError, ResultError
 from hairkit.manager import RESULTS, STAGES
 from hairkit.testing import stage_arguments
 from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture, View
 from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.person import Person
@@ -150,6 +151,15 @@ def turn(**change: Any) -> Callable[[Arguments], Any]:
 
 
 WRONG: dict[str, dict[str, Callable[[Arguments], Any]]] = {
+    "capture": {
+        "photo 'front' has 97 x 129 pixels, expected a long edge of at most 128": lambda _: Capture(
+            (View("front", 0.0, np.zeros((129, 97, 3), np.uint8)),)
+        ),
+        "two views have the name 'front', expected each its own": lambda given: Capture(
+            (right("capture", given).views[0],) * 2
+        ),
+        "a capture needs at least one view": lambda _: Capture(()),
+    },
     "detect_landmarks": {
         "face presence is 2": lambda given: replace(right("detect_landmarks", given), presence=2),
         "face landmarks has shape": lambda given: replace(

@@ -10,7 +10,7 @@ import numpy as np
 from hairkit.testing import VIEW_NAMES, ball_mask, bristle_groom, turn_capture, turn_scene
 
 PLUGIN_FILE = Path(__file__).with_name("ball_plugin.py")
-TABLES = ("segment", "scene", "head", "orient", "hull", "field", "track", "export")
+TABLES = ("capture", "segment", "scene", "head", "orient", "hull", "field", "track", "export")
 LEFT_OUT = ("landmarks", "person", "turn", "refine")
 RECIPE = "".join(f"{table} = false\n" for table in LEFT_OUT) + "".join(
     f'[{table}]\nplugin = "ball_plugin"\n' for table in TABLES

@@ -21,6 +21,7 @@ from hairkit import (
     View,
     hookimpl,
 )
+from hairkit.io.capture_reader import read_folder
 from hairkit.io.file_format import FileFormat
 from hairkit.options import option
 from hairkit.storage import write_bytes
@@ -54,6 +55,11 @@ class Options:
 def _begin(stage: str, options: Options, view: str = "") -> None:
     CALLS.append(f"{stage} {view}".strip())
     time.sleep(options.delay)
+
+
+@hookimpl
+def capture(source: str, max_edge: int) -> Capture:
+    return read_folder(source, max_edge)
 
 
 @hookimpl
