@@ -68,7 +68,7 @@ class Options:
 
     mode: str = option("labels", choices=("labels", "votes"), doc="How views decide on a cell.")
     voxel_size: float = option(0.003, low=FINEST, high=0.02, doc="Edge length of a cell.", unit="m")
-    min_views: int = option(2, low=1, high=64, doc="Views that must see hair in a cell.")
+    min_views: int = option(2, low=1, high=64, doc="Views that must have hair at a cell.")
     forgive: int = option(
         -1,
         low=-1,
@@ -281,7 +281,9 @@ def _carve_both(
 
 
 def _rule(options: Options, forgive: int) -> Rule:
-    return Rule(options.min_views, forgive, float(options.front_margin))
+    margin = float(options.front_margin)
+    hides = options.mode == "labels" and options.cut_head
+    return Rule(options.min_views, forgive, margin, margin if hides else np.inf)
 
 
 def _forgiven_votes(scene: Scene, options: Options) -> int:

@@ -1,4 +1,8 @@
-"""Votes of views on cells: hair, empty or none; the hull keeps cells by a rule on their numbers."""
+"""Votes of views on cells: hair, empty or none; the hull keeps cells by a rule on their numbers.
+
+Where the head hides a cell from a view, hair in the picture lies before the head and says little
+about the cell: silhouettes alone leave a thin layer on skin that every nearer view sees bare.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +17,9 @@ from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.cameras.projection_kernels import PackedCamera, project
 from hairkit.parallel import compiled, parallel_for
 
-EMPTY, PERSON, HAIR = 0, 1, 2
-"""Labels of pixels; as votes, PERSON means none."""
+EMPTY, PERSON, HAIR, HIDDEN = 0, 1, 2, 3
+"""Labels of pixels; as votes, PERSON means none, and HIDDEN hair of a view from which the head
+hides the cell."""
 
 
 class LabelledView(NamedTuple):
@@ -49,11 +54,24 @@ class Rule(NamedTuple):
     """When a cell is kept."""
 
     min_views: int
-    """Views that must see hair in it."""
+    """Views that must have hair at its pixel, at least one of them before the head."""
     forgive: int
     """Views that may call it empty."""
     front_margin: float
     """Depth in front of the person's surface beyond which a cell is empty, metres."""
+    hidden_depth: float
+    """Depth behind the head's surface beyond which a cell is hidden, metres."""
+
+
+class Votes(NamedTuple):
+    """What the views say of each cell; all (X, Y, Z)."""
+
+    hair: npt.NDArray[np.int16]
+    """Views with hair at its pixel."""
+    empty: npt.NDArray[np.int16]
+    """Views that call it empty."""
+    seen: BoolArray
+    """A view has hair at its pixel, and the cell is not hidden behind the head."""
 
 
 def carve(
@@ -69,22 +87,17 @@ def carve(
     """
     cells = Cells(grid.origin, float(grid.spacing), candidates, near)
     hair, empty = (np.zeros(grid.shape, np.int16) for _ in range(2))
+    votes = Votes(hair, empty, np.zeros(grid.shape, bool))
     for view in views:
-        parallel_for(add_votes, grid.shape[0], view, cells, rule, hair, empty)
-    return candidates & (empty <= rule.forgive) & (hair >= rule.min_views)
+        parallel_for(add_votes, grid.shape[0], view, cells, rule, votes)
+    return candidates & votes.seen & (empty <= rule.forgive) & (hair >= rule.min_views)
 
 
 @compiled
 def add_votes(
-    first: int,
-    last: int,
-    view: LabelledView,
-    cells: Cells,
-    rule: Rule,
-    hair: npt.NDArray[np.int16],
-    empty: npt.NDArray[np.int16],
+    first: int, last: int, view: LabelledView, cells: Cells, rule: Rule, votes: Votes
 ) -> None:
-    """Add a view's votes to hair and empty (X, Y, Z), for the layers `first` to `last` along x.
+    """Add a view's votes for the layers `first` to `last` along x.
 
     Cells that already have too many empty votes are left out: they are lost.
     """
@@ -94,22 +107,24 @@ def add_votes(
         for iy in range(size_y):
             y = cells.origin[1] + (iy + 0.5) * cells.spacing
             for iz in range(size_z):
-                if not cells.candidates[ix, iy, iz] or empty[ix, iy, iz] > rule.forgive:
+                if not cells.candidates[ix, iy, iz] or votes.empty[ix, iy, iz] > rule.forgive:
                     continue
                 z = cells.origin[2] + (iz + 0.5) * cells.spacing
                 u, v, depth = project(view.camera, x, y, z)
-                vote = _vote(view, u, v, depth, rule.front_margin, cells.near[ix, iy, iz])
-                if vote == HAIR:
-                    hair[ix, iy, iz] += 1
-                elif vote == EMPTY:
-                    empty[ix, iy, iz] += 1
+                vote = _vote(view, u, v, depth, rule, cells.near[ix, iy, iz])
+                if vote == EMPTY:
+                    votes.empty[ix, iy, iz] += 1
+                elif vote != PERSON:
+                    votes.hair[ix, iy, iz] += 1
+                    if vote == HAIR:
+                        votes.seen[ix, iy, iz] = True
 
 
 @compiled
-def _vote(view: LabelledView, u: float, v: float, depth: float, margin: float, near: bool) -> int:
-    """Return a view's vote on a cell at pixel u, v: EMPTY, HAIR, or PERSON for no vote.
+def _vote(view: LabelledView, u: float, v: float, depth: float, rule: Rule, near: bool) -> int:
+    """Return a view's vote on a cell at pixel u, v: EMPTY, HAIR, HIDDEN, or PERSON for no vote.
 
-    Where the view sees the person, a cell farther than `margin` in front of the surface is empty.
+    Where it sees the person, a cell farther than `front_margin` in front of the surface is empty.
     """
     height, width = view.labels.shape
     left, top, right, bottom = u < 0, v < 0, u >= width, v >= height
@@ -123,6 +138,8 @@ def _vote(view: LabelledView, u: float, v: float, depth: float, margin: float, n
         return PERSON if unknown else EMPTY
     label = view.labels[int(v), int(u)]
     surface = view.surface[int(v), int(u)]
-    if label == PERSON and np.isfinite(surface) and depth < surface - margin:
+    if label == PERSON and np.isfinite(surface) and depth < surface - rule.front_margin:
         return EMPTY
+    if label == HAIR and depth > surface + rule.hidden_depth:
+        return HIDDEN
     return int(label)

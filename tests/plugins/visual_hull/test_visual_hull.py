@@ -262,6 +262,15 @@ def test_what_a_view_sees_in_front_of_the_face_is_not_hair() -> None:
     assert not held(labels, labels.loose, window).any()
 
 
+def test_skin_that_nearer_views_see_bare_bears_no_layer_of_hair() -> None:
+    """Views from behind have hair there, but before the head, which is too small here."""
+    scene, masks = views_of(cap)
+    head = replace(scene.head, vertices=0.95 * scene.head.vertices)
+    fine = replace(COARSE, voxel_size=0.004, front_margin=0.012)
+    hull = build_hull(replace(scene, head=head), masks, fine)
+    assert hull.grid.centres_of(hull.dense)[:, 2].max() < 0.08
+
+
 def test_forgiving_a_view_keeps_more() -> None:
     """One view may err: no cell is lost by it, and a view with a wrong mask does no harm."""
     scene, masks = views_of(cap)
