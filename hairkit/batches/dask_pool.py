@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import itertools
 import queue
 import threading
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 from hairkit.batches.jobs import FAILED, Job, Result, Settings
-from hairkit.batches.pool import Silence, Watcher
+from hairkit.batches.pool import Watcher
 from hairkit.batches.run_job import COMMAND, JobLimits, run_job, start_child
 from hairkit.child_process import ChildProcess
 from hairkit.errors import HairkitError, MissingExtraError
@@ -26,6 +27,12 @@ CONNECTING_S = 30.0
 LOST_WORKERS = 10
 """Workers that may be lost with a job before Dask gives it up: its own 3 are meant for jobs that
 kill their workers, which these cannot."""
+WINDOW = 10_000
+"""Captures that the scheduler knows at once: its memory, some 5 kB a capture, stays below 0.1 GB,
+and adaptive clusters see hours of work (benchmarks/farm_scheduler.py)."""
+TASK = "hairkit-capture"
+"""First part of the keys, by which Dask takes all captures for one group and queues them: keys that
+begin otherwise each would be groups of their own, and given to workers at once."""
 _own = threading.local()
 
 
@@ -48,7 +55,7 @@ class DaskPool:
         self._limits = limits
         self._threads = threads
         self._command = tuple(command)
-        self._futures: list[Any] = []
+        self._futures: dict[Any, tuple[Any, Job]] = {}
 
     def run(
         self,
@@ -57,24 +64,30 @@ class DaskPool:
         watcher: Watcher | None = None,
     ) -> Iterator[Result]:
         """Yield results as they come; raises `SchedulerLostError` when the scheduler is gone."""
-        watcher = watcher or Silence()
-        jobs_of, ended = {}, queue.SimpleQueue[Any]()
-        try:
-            for job, digest in jobs:
+        watcher, waiting = watcher or Watcher(), iter(jobs)
+        ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+        def submit(count: int) -> None:
+            for job, digest in itertools.islice(waiting, count):
                 future = self._client.submit(
                     _do, job, settings, digest, self._limits, self._threads, self._command,
-                    key=f"{job.name}-{digest}", pure=False,
+                    key=(TASK, f"{job.name}-{digest}"), pure=False,
                 )  # fmt: skip
-                jobs_of[future.key] = job
+                self._futures[future.key] = future, job
                 watcher.started(job.name)
                 future.add_done_callback(ended.put)
-                self._futures.append(future)
-            for _ in jobs:
+
+        try:
+            submit(WINDOW)
+            while self._futures:
                 future = self._next(ended)
-                yield self._result(future, jobs_of[future.key])
+                _, job = self._futures.pop(future.key)
+                submit(1)
+                yield self._result(future, job)
         finally:
+            left = [future for future, _ in self._futures.values()]
             with contextlib.suppress(Exception):  # a scheduler that is gone cannot cancel either
-                self._client.cancel(self._futures, force=True)
+                self._client.cancel(left, force=True)
             self._futures.clear()
 
     def _next(self, ended: queue.SimpleQueue[Any]) -> Any:
@@ -82,7 +95,7 @@ class DaskPool:
         while True:
             with contextlib.suppress(queue.Empty):
                 future = ended.get(timeout=POLL_S)
-                if future.status in ("finished", "error"):
+                if future.status in ("finished", "error") and future.key in self._futures:
                     return future
             if self._client.status != "running":
                 raise SchedulerLostError(
@@ -125,13 +138,15 @@ def connect(address: str) -> Any:
 
 
 def _distributed() -> Any:
-    """Return the module `distributed`, its scheduler told how many workers may be lost."""
+    """Return the module `distributed`, schedulers of this process told how to treat captures."""
     try:
         dask = importlib.import_module("dask")
         distributed = importlib.import_module("distributed")
     except ImportError as error:
         raise MissingExtraError("Dask is not installed; pip install 'hairkit[batch]'") from error
-    dask.config.set({"distributed.scheduler.allowed-failures": LOST_WORKERS})
+    # a capture waits at the scheduler, not at a worker that is busy while another has nothing to do
+    settings = {"allowed-failures": LOST_WORKERS, "worker-saturation": 1.0}
+    dask.config.set({f"distributed.scheduler.{key}": value for key, value in settings.items()})
     return distributed
 
 

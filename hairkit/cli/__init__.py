@@ -31,6 +31,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `texture`: textures made finer, filtered, or turned into bump and normal maps
 * `validate`: a hair file checked for an engine
 * `view`: the viewer
+* `written`: what verbs that write files print
 * `wrap`: a groom carried to another head
 """
 

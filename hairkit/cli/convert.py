@@ -13,6 +13,7 @@ import numpy as np
 from hairkit.cli.export import check_target
 from hairkit.cli.reader_settings import add_reader_arguments, reader_settings
 from hairkit.cli.settings import add_setting, split_settings
+from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 from hairkit.grooming.decimate import decimate
 from hairkit.grooming.guide_weights import guide_mask
@@ -54,6 +55,7 @@ def register(subparsers: Any) -> None:
     )
     add("--to", metavar="PLUGIN", help="export plugin (default: by suffix)")
     add_setting(add)
+    add_json(add)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -78,7 +80,8 @@ def run(args: argparse.Namespace) -> int:
     if args.measure_curl:
         groom = _with_curl(groom)
     manager.call("export_groom", writer, options, groom=groom, path=target)
-    print(_summary(groom, target, time.perf_counter() - start))
+    said = _summary(groom, target, time.perf_counter() - start)
+    print_written(args, target, lines=[said], strands=len(groom.strands))
     return 0
 
 

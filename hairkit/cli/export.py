@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.cli.settings import add_setting, importer_of, split_settings
+from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
@@ -29,6 +30,7 @@ def register(subparsers: Any) -> None:
     add_setting(add)
     add("--using", metavar="NAME", help="export plugin (default: by suffix)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+    add_json(add)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -43,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     check_target(target)
     groom = load_groom(manager, source, settings["reader"])
     manager.call("export_groom", exporter, options, groom=groom, path=target)
-    print(target)
+    print_written(args, target)
     return 0
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.cli.settings import STAGE_HELP, add_setting
+from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 
 _DESCRIPTION = """\
@@ -28,6 +29,7 @@ def register(subparsers: Any) -> None:
     add_setting(add, STAGE_HELP)
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--quiet", action="store_true", help="print only errors on stderr")
+    add_json(add)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -41,8 +43,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f"{args.output}: a head is written as {', '.join(ENDINGS)}")
     manager = Manager.loaded(args.plugin)
     recipe = load_recipe(args.recipe).with_set(args.set)
-    with progress_for(sys.stderr, quiet=args.quiet) as shown:
+    with progress_for(sys.stderr, quiet=args.quiet or args.json) as shown:
         scene = photograph_head(args.photos, recipe, manager, progress=shown)
     write_head(args.output, scene.head, manager)
-    print(args.output)
+    print_written(args, args.output)
     return 0

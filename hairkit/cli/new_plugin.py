@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from hairkit.cli.scaffold import new_plugin
+from hairkit.cli.written import add_json, print_written
 from hairkit.manager import STAGES
 from hairkit.pipeline.recipe import HOOKS
 
@@ -26,12 +27,12 @@ def register(subparsers: Any) -> None:
     parser.add_argument("stage", metavar="STAGE", help=stages)
     parser.add_argument("name", metavar="NAME", help="the plugin's name: lower_case_words")
     parser.add_argument("-o", "--output", metavar="FOLDER", help="default: hairkit-NAME")
+    add_json(parser.add_argument)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the package and print how to install and test it."""
     folder = new_plugin(args.stage, args.name, args.output)
-    print(f"wrote {folder}")
-    print(f"install it: pip install -e {folder}")
-    print(f"test it:    python -m pytest {folder}")
+    lines = [f"wrote {folder}", f"install it: pip install -e {folder}"]
+    print_written(args, folder, lines=[*lines, f"test it:    python -m pytest {folder}"])
     return 0

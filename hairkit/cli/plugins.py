@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
+import tomllib
 from dataclasses import asdict
 from typing import Any
 
 from hairkit.cli.format_table import format_table
 from hairkit.errors import InputError
+from hairkit.io.file_format import Feature
 from hairkit.manager import STAGES, Manager, PluginInfo
 from hairkit.options import OptionInfo
 
@@ -40,13 +42,16 @@ def run(args: argparse.Namespace) -> int:
     """Print the list, or one plugin; a broken plugin asked for by name gives exit code 2."""
     manager = Manager.loaded(args.plugin)
     if args.formats:
-        print(format_table(manager))
+        forms = [plugin.format for plugin in manager.plugins() if plugin.format is not None]
+        cells = {form.title: {part.value: form.state(part) for part in Feature} for form in forms}
+        print(json.dumps(cells, indent=1) if args.json else format_table(manager))
         return 0
     if args.lock is not None:
         from hairkit.pipeline.plugin_lock import lock_of
         from hairkit.pipeline.recipe import load_recipe
 
-        print(lock_of(load_recipe(args.lock), manager))
+        lock = lock_of(load_recipe(args.lock), manager)
+        print(json.dumps(tomllib.loads(lock)) if args.json else lock)
         return 0
     if args.check and (args.name is None or args.name in STAGES):
         raise InputError("--check tries one plugin; name it: hairkit plugins gabor --check")

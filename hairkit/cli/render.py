@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hairkit.cli.settings import add_setting, importer_of, split_settings
+from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.io.capture_reader import TURN
@@ -69,6 +70,7 @@ def register(subparsers: Any) -> None:
     parser.add_argument(
         "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
     )
+    add_json(parser.add_argument)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -91,8 +93,8 @@ def run(args: argparse.Namespace) -> int:
             skin=SkinLook(args.lobe),
         )
         write_picture(path, picture)
-        print(path)
         print(f"{path.name}: {len(hair)} strands, {camera.width}x{camera.height}", file=sys.stderr)
+    print_written(args, *paths, strands=len(hair))
     return 0
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.cli.settings import add_setting, importer_of, split_settings
+from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 
 _DESCRIPTION = """\
@@ -57,6 +58,7 @@ def register(subparsers: Any) -> None:
     add("--using", metavar="NAME", help=f"simulator plugin ({SIMULATOR}, or the preset's)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--quiet", action="store_true", help="no progress")
+    add_json(add)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -113,7 +115,9 @@ def _run(args: argparse.Namespace) -> int:
         f" stretch {100 * stretch:.2f} % at the end",
         file=sys.stderr,
     )
-    print(args.out)
+    print_written(
+        args, args.out, frames=len(cache), guides=len(simulator.strands), stretch=float(stretch)
+    )
     return 0
 
 

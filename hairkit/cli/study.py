@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 
 _DESCRIPTION = """\
@@ -36,6 +37,7 @@ def register(subparsers: Any) -> None:
     add("--questions", type=int, default=QUESTIONS, metavar="N", help=f"each way ({QUESTIONS})")
     add("--seed", type=int, default=0, help="of choices and views (0)")
     add("--answers", nargs="+", type=Path, metavar="FILE", help="answers to count")
+    add_json(add)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -74,7 +76,7 @@ def _make(args: argparse.Namespace) -> int:
         right = [choice == question.right for choice, question in pairs if question.kind == kind]
         if right:
             print(f"the program finds the {what}: {sum(right)} of {len(right)}", file=sys.stderr)
-    print(page)
+    print_written(args, page)
     return 0
 
 
@@ -86,7 +88,7 @@ def _count(args: argparse.Namespace) -> int:
     page, counts = write_results(args.folders[0], args.answers)
     for number, row in enumerate(counts.tolist()):
         print(f"question {number + 1}: {' '.join(str(count) for count in row)}", file=sys.stderr)
-    print(page)
+    print_written(args, page)
     return 0
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.cli.render import parse_size
+from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 from hairkit.head_model.template import default_head
 from hairkit.synth import STYLES, grow, photograph
@@ -38,6 +39,7 @@ def register(subparsers: Any) -> None:
         "--jitter", type=float, default=1.0, help="how far cameras leave the nominal turn (1)"
     )
     parser.add_argument("--orthographic", action="store_true", help="parallel rays")
+    add_json(parser.add_argument)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -59,5 +61,5 @@ def run(args: argparse.Namespace) -> int:
         orthographic=args.orthographic,
     )
     groom.save(args.output / "groom.npz")
-    print(args.output)
+    print_written(args, args.output, strands=len(groom.strands))
     return 0

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hairkit.cli.settings import SET_HELP, add_setting, split_settings
+from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ def register(subparsers: Any) -> None:
     add("--difference", type=Path, metavar="FILE", help="write what changed, in false colours")
     add_setting(add, SET_HELP)
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+    add_json(add)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -73,8 +75,7 @@ def run(args: argparse.Namespace) -> int:
     if args.difference is not None:
         drawn = Texture.encode(draw_difference(given.pixels, made.pixels))
         write_bytes(args.difference, drawn.data.tobytes())
-    for path in outputs:
-        print(path)
+    print_written(args, *outputs)
     return 0
 
 

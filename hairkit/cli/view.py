@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 from hairkit.cli.render import parse_size
 from hairkit.cli.settings import add_setting
+from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 
 MOST_HAIRS = 200_000
@@ -40,6 +41,7 @@ def register(subparsers: Any) -> None:
     add("--out", type=Path, metavar="FOLDER", help="where a script's pictures go (.)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--actions", action=_ListActions, nargs=0, help="list the actions of scripts, and exit")
+    add_json(add)
 
 
 class _ListActions(argparse.Action):
@@ -114,8 +116,7 @@ def _headless(args: argparse.Namespace) -> int:
         preview = Preview(gl, _session(args, manager, size, script.setup.seed))
         play(preview, script, args.out or Path())
         preview.release()
-    for path in preview.written:
-        print(path)
+    print_written(args, *preview.written)
     return 0
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from hairkit.cli.export import check_target
 from hairkit.cli.settings import add_setting, importer_of, split_settings
+from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 from hairkit.io.head_reader import UNITS, BareHead, read_bare_head
 from hairkit.manager import Manager
@@ -48,6 +49,7 @@ def register(subparsers: Any) -> None:
     add_setting(add)
     add("--using", metavar="NAME", help="export plugin (default: by suffix)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+    add_json(add)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -71,7 +73,9 @@ def run(args: argparse.Namespace) -> int:
     manager.call("export_groom", exporter, options, groom=wrapped, path=args.out)
     if args.source_head is not None:
         write_head(args.source_head, groom.head, manager)
-    print(f"{args.out}: {_summary(groom, wrapped)}, in {time.perf_counter() - start:.1f} s")
+    said = f"{args.out}: {_summary(groom, wrapped)}, in {time.perf_counter() - start:.1f} s"
+    heads = [] if args.source_head is None else [args.source_head]
+    print_written(args, args.out, *heads, lines=[said], strands=len(wrapped.strands))
     return 0
 
 

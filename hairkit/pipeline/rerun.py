@@ -15,6 +15,7 @@ from hairkit.pipeline.take_capture import take_capture
 from hairkit.progress import Progress
 from hairkit.remote import exists
 from hairkit.types.groom import Groom
+from hairkit.types.parting import Parting
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -62,6 +63,8 @@ def rerun(
             progress.message(line)
     recipe = old.as_recipe()
     capture = take_capture(str(old.photos), recipe, manager, old.max_edge or WORKING_EDGE)
+    if old.parting is not None:
+        capture = dataclasses.replace(capture, parting=Parting.named(old.parting))
     groom = reconstruct(
         capture,
         out,

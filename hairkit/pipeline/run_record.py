@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, get_args
+
+import numpy as np
 
 import hairkit
 from hairkit.errors import FormatError
@@ -25,6 +27,7 @@ from hairkit.pipeline.run_log import StageTime
 from hairkit.remote import is_url, join, read_bytes
 from hairkit.storage import read_text, write_text
 from hairkit.types.capture import Capture
+from hairkit.types.parting import Parting, PartingWord
 
 RECORD = "run.json"
 """Name of the record beside the groom."""
@@ -88,6 +91,8 @@ class RunRecord:
     outputs: tuple[FileRecord, ...] = ()
     commands: tuple[PluginCommand, ...] = ()
     """Plugins that ran in environments of their own."""
+    parting: str | None = None
+    """What `--parting` said; None where photos or `capture.toml` did."""
 
     def write(self, path: Path) -> None:
         """Write the record as JSON."""
@@ -153,7 +158,21 @@ def describe_run(
         plugins=plugins,
         inputs=tuple(hash_file(path.resolve(), _at_url(path, capture)) for path in files),
         commands=recipe.commands,
+        parting=_said_parting(capture.parting),
     )
+
+
+def _said_parting(given: Parting | None) -> str | None:
+    """Return the word of a parting that came with the command, not with the photos."""
+    if given is None or given.source != "option":
+        return None
+    words = {word: Parting.named(word) for word in get_args(PartingWord)}
+    alike = (
+        word
+        for word, parting in words.items()
+        if given.swept_back == parting.swept_back and np.array_equal(given.line, parting.line)
+    )
+    return next(alike, None)
 
 
 def _photos(capture: Capture) -> str | None:

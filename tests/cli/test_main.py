@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import importlib
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 
 from hairkit import cli
 from hairkit.errors import InputError
+from hairkit.testing import bristle_groom
 
 
 def let_plugins_raise(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
@@ -120,6 +122,32 @@ def test_help_begins_with_an_example(verb: str, capsys: pytest.CaptureFixture[st
     text = capsys.readouterr().out
     assert f"hairkit {verb}" in text.splitlines()[0]
     assert text.index(f"hairkit {verb}") < text.index("usage:")
+
+
+@pytest.mark.parametrize("verb", [verb for verb in cli.VERBS if verb != "studio"])
+def test_every_verb_speaks_to_programs(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """All but the server of pages print JSON when they are asked to."""
+    assert outcome([verb, "--help"]) == 0
+    assert "--json" in capsys.readouterr().out
+
+
+def test_what_was_written_is_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One document with the names of the files, which exist, and figures beside them."""
+    groom = tmp_path / "groom.npz"
+    bristle_groom().save(groom)
+    for words, key in (
+        (["export", str(groom), "-o", str(tmp_path / "a.obj")], "files"),
+        (["convert", str(groom), str(tmp_path / "b.hair")], "strands"),
+        (["new-plugin", "orient", "mine", "-o", str(tmp_path / "mine")], "files"),
+        (["simulate", str(groom), "-o", str(tmp_path / "c.npz"), "--frames", "2"], "stretch"),
+    ):
+        assert outcome([*words, "--json"]) == 0, words
+        document = json.loads(capsys.readouterr().out)
+        assert key in document
+        assert all(Path(file).exists() for file in document["files"])
+    for words in (["plugins", "--formats"], ["plugins", "--lock", "default"]):
+        assert outcome([*words, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)
 
 
 def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:

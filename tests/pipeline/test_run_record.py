@@ -23,6 +23,9 @@ from hairkit.storage import write_text
 from hairkit.testing import ball_head, turn_capture
 
 
+PARTING = ["--parting", "left"]
+
+
 def run_in(folder: Path) -> Path:
     """The results of the small capture, with masks, strokes, a head's file and an option."""
     capture = write_capture(folder / "capture", masks=True)
@@ -31,7 +34,7 @@ def run_in(folder: Path) -> Path:
     words = ["reconstruct", str(capture), "-o", str(folder / "out"), "--guides", "20"]
     words += ["--recipe", str(folder / "ball.toml"), "--plugin", str(PLUGIN_FILE), "--quiet"]
     words += ["--head", str(folder / "head.obj"), "--set", "ball_plugin.length=0.05"]
-    assert main([*words, "--no-sheet", "--seed", "3", "--max-edge", "128"]) == 0
+    assert main([*words, "--no-sheet", "--seed", "3", "--max-edge", "128", *PARTING]) == 0
     return folder / "out"
 
 
@@ -53,6 +56,7 @@ def test_the_record_names_all_that_the_result_depends_on(out: Path) -> None:
     for file in record.outputs:
         assert file.sha256 == hashlib.sha256((out / file.path).read_bytes()).hexdigest()
     assert (record.guides, record.seed, record.max_edge) == (20, 3, 128)
+    assert record.parting == "left"
     assert record.hairkit == hairkit.__version__
     assert {"python", "numpy", "cv2"} <= set(record.libraries)
     assert {plugin.plugin for plugin in record.plugins} == {"ball_plugin"}
@@ -71,7 +75,7 @@ def test_a_rerun_gives_the_same_bytes(
     for name in ("groom.npz", "scene.json", "groom.ball"):
         assert (out / name).read_bytes() == (again / name).read_bytes()
     first, second = read_record(out / RECORD), read_record(again / RECORD)
-    for field in ("inputs", "outputs", "plugins", "health", "photos", "head"):
+    for field in ("inputs", "outputs", "plugins", "health", "photos", "head", "parting"):
         assert getattr(first, field) == getattr(second, field), field
 
 

@@ -1,0 +1,28 @@
+"""What verbs that write files print: the files' names, or with `--json` one JSON document."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+
+def add_json(add: Callable[..., Any]) -> None:
+    """Add `--json` to a verb's parser, given its `add_argument`."""
+    add("--json", action="store_true", help="print what was written as JSON")
+
+
+def print_written(
+    args: argparse.Namespace, *files: str | os.PathLike[str], lines: Sequence[str] = (), **more: Any
+) -> None:
+    """Print the names of files, one a line; with `--json` as `files`, beside further figures.
+
+    `lines` are printed in the place of the names, where the verb says more about its files.
+    """
+    names = [os.fspath(file) for file in files]
+    if args.json:
+        print(json.dumps({"files": names, **more}, indent=1))
+    else:
+        print("\n".join(lines or names))
