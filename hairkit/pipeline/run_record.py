@@ -14,8 +14,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, get_args
 
-import numpy as np
-
 import hairkit
 from hairkit.errors import FormatError
 from hairkit.io.head_reader import HeadFile
@@ -166,13 +164,12 @@ def _said_parting(given: Parting | None) -> str | None:
     """Return the word of a parting that came with the command, not with the photos."""
     if given is None or given.source != "option":
         return None
-    words = {word: Parting.named(word) for word in get_args(PartingWord)}
-    alike = (
-        word
-        for word, parting in words.items()
-        if given.swept_back == parting.swept_back and np.array_equal(given.line, parting.line)
-    )
-    return next(alike, None)
+    for word in get_args(PartingWord):
+        parting = Parting.named(word)
+        lines = [[] if each.line is None else each.line.tolist() for each in (given, parting)]
+        if given.swept_back == parting.swept_back and lines[0] == lines[1]:
+            return str(word)
+    return None
 
 
 def _photos(capture: Capture) -> str | None:

@@ -22,7 +22,6 @@ from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.storage import write_text
 from hairkit.testing import ball_head, turn_capture
 
-
 PARTING = ["--parting", "left"]
 
 
