@@ -1,6 +1,6 @@
 # `make test` and `make demo` need Python 3.11 or newer and make; what else they need they fetch:
 # into .venv by pip and, as root on Debian or Ubuntu, the OpenGL libraries by apt.
-# `make test-clients` adds what Blender 4.5 makes of the files; it needs Python 3.11 for that.
+# `make test-clients` adds what Blender 4.5 and 5.0 make of the files; both need Python 3.11.
 
 PYTHON ?= python3
 VENV := .venv
@@ -79,7 +79,8 @@ $(VENV)/.tests: $(VENV)/.hairkit $(wildcard $(EXAMPLE)/*.*)
 
 $(CLIENTS)/.blender: .ci/blender
 	@mkdir -p $(CLIENTS)
-	@sh .ci/blender $(CLIENTS)/bpy $(BPY_PYTHON) python3.11 $(PYTHON)
+	@sh .ci/blender $(CLIENTS)/bpy 4.5 $(BPY_PYTHON) python3.11 $(PYTHON)
+	@sh .ci/blender $(CLIENTS)/bpy5 5.0 $(BPY_PYTHON) python3.11 $(PYTHON)
 	@touch $@
 
 $(VENV)/.docs: $(VENV)/.hairkit

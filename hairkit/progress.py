@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 from types import TracebackType
 from typing import Any, Protocol, Self, TextIO
 
@@ -61,6 +62,27 @@ class Lines(Silent):
         print(text, file=self._stream, flush=True)
 
 
+class Steps(Lines):
+    """Writes one line for each step too, `simulate 3/120`, for programs that show progress."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        """Write to `stream`, stderr by default."""
+        super().__init__(stream)
+        self._done: dict[str, tuple[int, int]] = {}
+        self._lock = threading.Lock()
+
+    def started(self, stage: str, steps: int) -> None:
+        """Remember how many steps the stage has."""
+        self._done[stage] = (0, steps)
+
+    def stepped(self, stage: str) -> None:
+        """Write which step is done."""
+        with self._lock:
+            done, steps = self._done[stage]
+            self._done[stage] = (done + 1, steps)
+            self.message(f"{stage} {done + 1}/{steps}")
+
+
 class Bars:
     """Draws one bar per stage on a terminal; used as a context manager."""
 
@@ -110,8 +132,13 @@ class Bars:
         self._rich.console.print(text, markup=False, highlight=False)
 
 
-def progress_for(stream: TextIO, *, quiet: bool) -> Silent | Lines | Bars:
-    """Return bars for a terminal, lines for anything else, nothing when `quiet`."""
+def progress_for(stream: TextIO, *, quiet: bool, steps: bool = False) -> Silent | Lines | Bars:
+    """Return bars for a terminal, lines for anything else, nothing when `quiet`.
+
+    With `steps` there is a line for each step, whatever the stream is.
+    """
+    if steps:
+        return Steps(stream)
     if quiet:
         return Silent()
     return Bars(stream) if stream.isatty() else Lines(stream)

@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from hairkit.progress import Bars, Lines, Progress, Recorder, Silent, progress_for
+from hairkit.progress import Bars, Lines, Progress, Recorder, Silent, Steps, progress_for
 
 
 class Terminal(io.StringIO):
@@ -33,6 +33,21 @@ def test_the_stream_decides_between_bars_and_lines() -> None:
     assert isinstance(progress_for(Terminal(), quiet=False), Bars)
     assert isinstance(progress_for(io.StringIO(), quiet=False), Lines)
     assert isinstance(progress_for(Terminal(), quiet=True), Silent)
+    assert isinstance(progress_for(Terminal(), quiet=True, steps=True), Steps)
+
+
+def test_steps_are_lines_too() -> None:
+    """One line a step, with how many there are, and one for the end of the stage."""
+    stream = io.StringIO()
+    with Steps(stream) as progress:
+        tell(progress)
+    assert stream.getvalue().splitlines() == [
+        "segment 1/2",
+        "[by the way]",
+        "scene    kept",
+        "segment 2/2",
+        "segment  1.23 s",
+    ]
 
 
 def test_lines_name_every_stage_with_its_time() -> None:

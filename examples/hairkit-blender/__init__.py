@@ -1,5 +1,5 @@
 # ruff: noqa: N999 (the folder is named as a distribution is, Blender goes by the manifest)
-"""hairkit in Blender: reconstruct hair from photos, import grooms with their head.
+"""hairkit in Blender: hair from photos and files, on its head, simulated and filled in.
 
 hairkit itself runs in a Python of its own, as a child process, so that no package of hairkit meets
 Blender's NumPy; what crosses over is a groom file (.npz).
@@ -9,6 +9,7 @@ import bpy
 
 from .operators import ImportGroom, Reconstruct
 from .preferences import Preferences
+from .simulate import Simulate
 
 
 class HairkitMenu(bpy.types.Menu):
@@ -18,12 +19,13 @@ class HairkitMenu(bpy.types.Menu):
     bl_label = "hairkit"
 
     def draw(self, context):
-        """Show both commands."""
+        """Show the commands."""
         self.layout.operator(Reconstruct.bl_idname)
         self.layout.operator(ImportGroom.bl_idname)
+        self.layout.operator(Simulate.bl_idname)
 
 
-_CLASSES = (Preferences, Reconstruct, ImportGroom, HairkitMenu)
+_CLASSES = (Preferences, Reconstruct, ImportGroom, Simulate, HairkitMenu)
 
 
 def register():

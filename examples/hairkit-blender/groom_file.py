@@ -62,6 +62,11 @@ def z_up(points):
     return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1).astype(np.float32)
 
 
+def y_up(points):
+    """Return points (N, 3) of Blender's axes in the head frame."""
+    return np.stack([points[:, 0], points[:, 2], -points[:, 1]], axis=1).astype(np.float32)
+
+
 def _arranged(stored):
     points, faces, uv = stored["points"], stored["head.faces"], stored["head.uv"]
     widths = stored.get("widths")

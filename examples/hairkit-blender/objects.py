@@ -5,17 +5,25 @@ import itertools
 import bpy
 import numpy as np
 
+from . import interpolation
 from .attachment import face_cells, places
 from .materials import hair_material, head_material
 
 UV, ATTACHMENT = "UVMap", "hairkit attachment"
 SCALP = "scalp"
+FOLLOW = "Follow the head"
+"""Name of the modifier that deforms hair with the surface of the head."""
 
 
-def add_groom(context, groom, name):
-    """Add a groom to the scene and return the objects (head, hair), the hair selected."""
+def add_groom(context, groom, name, fill=0):
+    """Add a groom to the scene and return the objects (head, hair), the hair selected.
+
+    Guides get Blender's nodes that draw about `fill` hairs between them.
+    """
     head = add_head(context, groom, f"{name} head")
     hair = add_hair(context, groom, name, head)
+    if interpolation.wanted(groom, fill):
+        interpolation.interpolate(hair, head, groom, fill, SCALP, ATTACHMENT)
     for thing in context.selected_objects:
         thing.select_set(False)
     hair.select_set(True)
@@ -63,7 +71,7 @@ def add_hair(context, groom, name, head):
     curves.surface_uv_map = ATTACHMENT
     hair = bpy.data.objects.new(name, curves)
     hair.parent = head
-    hair.modifiers.new("Follow the head", "NODES").node_group = _follow_nodes()
+    hair.modifiers.new(FOLLOW, "NODES").node_group = _follow_nodes()
     context.collection.objects.link(hair)
     return hair
 

@@ -1,30 +1,44 @@
-"""The commands of the menu."""
+"""The commands of the menu that add hair: from files, and from photos."""
 
 import json
 import os
-import tempfile
+import shutil
 from pathlib import Path
 from typing import ClassVar
 
 import bpy
+import numpy as np
 from bpy_extras.io_utils import ImportHelper
 
-from . import child
-from .groom_file import GroomError, read_groom
+from . import child, playback
+from .animated_file import PlaybackError, frames_of
+from .background import ERRORS, Background
+from .groom_file import read_groom
 from .objects import add_groom
 from .preferences import chosen_python
 
+FILL = 20_000
+"""Hairs that are drawn between guides: a full head at a distance of a metre."""
+_FILL = bpy.props.IntProperty(
+    name="Fill",
+    description="Hairs that Blender's nodes draw between guides; 0: the guides alone",
+    default=FILL,
+    min=0,
+    max=500_000,
+)
+
 
 class ImportGroom(bpy.types.Operator, ImportHelper):
-    """Import a groom with its head; what is no .npz is read by hairkit."""
+    """Import a groom with its head and its animation; what is no .npz is read by hairkit."""
 
     bl_idname = "hairkit.import_groom"
     bl_label = "Import groom"
     bl_options: ClassVar = {"REGISTER", "UNDO"}
 
+    fill: _FILL
     hairs: bpy.props.IntProperty(
         name="Hairs",
-        description="Strands in all, interpolated between the guides; 0: those of the file",
+        description="Strands in all, made by hairkit between the guides; 0: those of the file",
         default=0,
         min=0,
         max=2_000_000,
@@ -41,34 +55,75 @@ class ImportGroom(bpy.types.Operator, ImportHelper):
         min=0.0,
         precision=5,
     )
+    animation: bpy.props.BoolProperty(
+        name="Animation", description="Play the animation of the file", default=True
+    )
+    simulation: bpy.props.StringProperty(
+        name="Simulation",
+        description="A cache that hairkit simulate wrote for this groom",
+        subtype="FILE_PATH",
+    )
     filter_glob: bpy.props.StringProperty(
-        default="*.npz;*.apx;*.abc;*.usd;*.usda;*.usdc;*.glb;*.hair;*.tfx;*.data;*.ply;*.obj",
+        default="*.npz;*.apx;*.abc;*.usd;*.usda;*.usdc;*.glb;*.hair;*.tfx;*.data;*.ply;*.obj;*.ma"
+        ";*.npy",
         options={"HIDDEN"},
     )
 
     def execute(self, context):
-        """Add head and hair to the scene."""
+        """Add head and hair to the scene, and let them move as the file says."""
         source = Path(bpy.path.abspath(self.filepath))
         try:
-            groom = self._read(source)
-        except (child.ChildError, GroomError) as error:
+            stored = self._stored(source)
+            groom = read_groom(stored)
+            frames = self._frames(context, source, groom)
+            head, hair = add_groom(context, groom, source.stem, self.fill)
+            hair[playback.GROOM] = str(stored)
+            if frames is not None:
+                self._play(context, head, hair, frames)
+        except ERRORS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        add_groom(context, groom, source.stem)
-        self.report({"INFO"}, f"{len(groom.offsets) - 1} strands")
+        moving = "" if frames is None else f", {len(frames.times)} frames"
+        self.report({"INFO"}, f"{len(groom.offsets) - 1} strands{moving}")
         return {"FINISHED"}
 
-    def _read(self, source):
-        """Return the groom in a file; hairkit's own file needs no hairkit."""
+    def _stored(self, source):
+        """Return the groom of a file as hairkit's own file; that one needs no hairkit."""
         words = self._words()
         if source.suffix.lower() == ".npz" and not words:
-            return read_groom(source)
-        with tempfile.TemporaryDirectory() as folder:
-            target = str(Path(folder) / "groom.npz")
-            command = [*child.hairkit(chosen_python()), "convert", str(source), target, *words]
-            for warning in child.run(command).warnings:
-                self.report({"WARNING"}, warning)
-            return read_groom(target)
+            return source
+        words = [*child.hairkit(chosen_python()), "convert", str(source)], words
+        target = playback.free_name(playback.folder(source.stem), "groom", ".npz")
+        try:
+            answer = child.run([*words[0], str(target), *words[1]])
+        except child.ChildError:
+            if not any(target.parent.iterdir()):
+                shutil.rmtree(target.parent)
+            raise
+        for warning in answer.warnings:
+            self.report({"WARNING"}, warning)
+        return target
+
+    def _frames(self, context, source, groom):
+        if self.simulation:
+            return playback.read_frames(bpy.path.abspath(self.simulation))
+        if not self.animation or self.hairs:
+            return None
+        try:
+            return frames_of(context, source, groom.points, np.diff(groom.offsets))
+        except PlaybackError as reason:
+            self.report({"WARNING"}, str(reason))
+            return None
+
+    def _play(self, context, head, hair, frames):
+        words, scene = child.hairkit(chosen_python()), context.scene
+        place = playback.folder(hair.name)
+        stored = bpy.path.abspath(hair[playback.GROOM])
+        playback.play(hair, playback.write_playable(words, stored, frames, place), 0)
+        if playback.moves(frames.head_from_rest):
+            playback.set_keys(head, frames.head_from_rest, 0)
+        scene.frame_start, scene.frame_end = 0, len(frames.times) - 1
+        scene.frame_set(0)
 
     def _words(self):
         words = ["--up", self.up] if self.up != "FILE" else []
@@ -76,7 +131,7 @@ class ImportGroom(bpy.types.Operator, ImportHelper):
         return words + (["--set", f"writer.hairs={self.hairs}"] if self.hairs else [])
 
 
-class Reconstruct(bpy.types.Operator):
+class Reconstruct(bpy.types.Operator, Background):
     """Make hair from a folder with eight photos around a head."""
 
     bl_idname = "hairkit.reconstruct"
@@ -90,67 +145,27 @@ class Reconstruct(bpy.types.Operator):
         subtype="DIR_PATH",
     )
     guides: bpy.props.IntProperty(name="Guides", default=600, min=10, max=20_000)
+    fill: _FILL
     settings: bpy.props.StringProperty(
         name="Settings", description="As of the command line: gabor.angles=64"
     )
-
-    _run = None
-    _timer = None
-    _area = None
 
     def invoke(self, context, event):
         """Ask for the folder."""
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
-        """Start hairkit; with a window Blender goes on meanwhile, without one it waits."""
-        try:
-            self._run = child.Child(self._command())
-        except child.ChildError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        if bpy.app.background or context.window is None:
-            return self._finish(context)
-        manager = context.window_manager
-        self._timer = manager.event_timer_add(0.2, window=context.window)
-        manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
-
-    def modal(self, context, event):
-        """Show how far it is, stop it at Escape, take its groom at the end."""
-        if event.type == "ESC":
-            self._run.stop()
-            self._leave(context)
-            self.report({"WARNING"}, "hairkit was stopped; run it again to go on from there")
-            return {"CANCELLED"}
-        if event.type != "TIMER" or not self._run.over():
-            context.workspace.status_text_set(f"hairkit: {self._run.last_line()}   [Esc] stops")
-            return {"PASS_THROUGH"}
-        self._leave(context)
-        return self._finish(context)
-
-    def _command(self):
+    def work(self, context):
+        """Yield the command that reconstructs; then add its groom."""
         photos = Path(bpy.path.abspath(self.directory))
         out = Path(bpy.path.abspath(self.out)) if self.out else _beside(photos)
         words = ["reconstruct", str(photos), "-o", str(out), "--guides", str(self.guides)]
         words += [word for text in self.settings.split() for word in ("--set", text)]
-        return [*child.hairkit(chosen_python()), *words, "--json"]
-
-    def _finish(self, context):
-        try:
-            made = json.loads(self._run.result().output)
-            groom = read_groom(made["groom"])
-        except (child.ChildError, GroomError, ValueError, KeyError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        add_groom(context, groom, Path(made["groom"]).parent.name)
+        answer = yield [*child.hairkit(chosen_python()), *words, "--json", "--steps"]
+        made = json.loads(answer.output)
+        _, hair = add_groom(context, read_groom(made["groom"]), out.name, self.fill)
+        hair[playback.GROOM] = str(Path(made["groom"]).resolve())
         self.report({"INFO"}, f"{made['strands']} guides in {made['seconds']:.0f} s")
-        return {"FINISHED"}
-
-    def _leave(self, context):
-        context.window_manager.event_timer_remove(self._timer)
-        context.workspace.status_text_set(None)
 
 
 def _beside(photos):

@@ -64,6 +64,7 @@ def register(subparsers: Any) -> None:
     add("--drop-work", action="store_true", help="empty OUT/work/ at the end: most of the bytes")
     add("--no-sheet", action="store_true", help="draw no contact sheet")
     add("--quiet", action="store_true", help="print only errors on stderr")
+    add("--steps", action="store_true", help="a line for each step, for programs that show them")
     add("--json", action="store_true", help="print a summary as JSON")
 
 
@@ -90,7 +91,8 @@ def run(args: argparse.Namespace) -> int:
     recipe.check(manager)
     if args.parting is not None:
         capture = replace(capture, parting=Parting.named(args.parting))
-    with progress_for(sys.stderr, quiet=args.quiet or args.json) as shown:
+    quiet = args.quiet or args.json
+    with progress_for(sys.stderr, quiet=quiet, steps=args.steps) as shown:
         record = Recorder(shown)
         groom = reconstruct(
             capture,

@@ -59,6 +59,7 @@ def register(subparsers: Any) -> None:
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--quiet", action="store_true", help="no progress")
     add_json(add)
+    add("--steps", action="store_true", help="a line for each step, for programs that show them")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -98,7 +99,7 @@ def _run(args: argparse.Namespace) -> int:
     motion = add_shakes(args.shake, groom.head, motion)
     simulator = manager.call("make_simulator", using, options, groom=groom)
     with (
-        progress_for(sys.stderr, quiet=args.quiet) as progress,
+        progress_for(sys.stderr, quiet=args.quiet, steps=args.steps) as progress,
         manager.guard("make_simulator", using),
     ):
         cache = simulated(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
-from blender_session import VARIABLE, BlenderSession, blender_python, z_up
+from blender_session import PROJECT, VARIABLE, BlenderSession, blender_pythons, z_up
 from client_groom import wandering
 from rich_groom import rich_groom
 
@@ -16,15 +17,40 @@ from hairkit.grooming.guide_weights import follow
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache
 
+PYTHONS = {python.parents[1].name: python for python in blender_pythons()}
+"""By the name of the folder: `bpy` has Blender 4.5, `bpy5` has 5.0."""
+
+ADDON = PROJECT / "examples" / "hairkit-blender"
+FIND_TOOL = "import bpy; print(bpy.utils.resource_path('LOCAL'))"
+TOOL = "scripts/addons_core/bl_pkg/cli/blender_ext.py"
+OPERATORS = ["import_groom", "reconstruct", "simulate"]
+
+
+@pytest.fixture(scope="session", params=PYTHONS or [""])
+def blender(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[BlenderSession]:
+    """Each Blender, started once for all checks."""
+    if not PYTHONS:
+        pytest.skip(f"no Blender: run `make test-clients`, or name its Python in {VARIABLE}")
+    folder = tmp_path_factory.mktemp("blender")
+    with BlenderSession(PYTHONS[request.param], folder) as session:
+        yield session
+
 
 @pytest.fixture(scope="session")
-def blender(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BlenderSession]:
-    """Blender, started once for all checks."""
-    python = blender_python()
-    if python is None:
-        pytest.skip(f"no Blender: run `make test-clients`, or name its Python in {VARIABLE}")
-    with BlenderSession(python, tmp_path_factory.mktemp("blender")) as session:
-        yield session
+def addon(blender: BlenderSession, tmp_path_factory: pytest.TempPathFactory) -> BlenderSession:
+    """Blender with the add-on: built and validated by Blender's own tool, installed, enabled."""
+    python = str(blender.python)
+    found = subprocess.run([python, "-c", FIND_TOOL], capture_output=True, text=True, check=True)
+    tool = Path(found.stdout.strip().splitlines()[-1]) / TOOL
+    package = tmp_path_factory.mktemp("addon") / "hairkit.zip"
+    words = ["build", "--source-dir", str(ADDON), "--output-filepath", str(package)]
+    subprocess.run([python, str(tool), *words], capture_output=True, check=True)
+    subprocess.run([python, str(tool), "validate", str(package)], capture_output=True, check=True)
+    state = blender.call("addon.installed", package=package)
+    assert state == {"enabled": True, "operators": OPERATORS, "menu": True}
+    return blender
 
 
 @pytest.fixture(scope="session")

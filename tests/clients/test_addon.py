@@ -2,37 +2,17 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from blender_session import BlenderSession, blender_python, only, z_up
+from blender_session import BlenderSession, only, z_up
 from client_groom import read_back, written
 
 from hairkit.io.capture_reader import sample_folder
 from hairkit.manager import Manager
 from hairkit.types.groom import Groom
-
-ADDON = Path(__file__).parents[2] / "examples" / "hairkit-blender"
-FIND_TOOL = "import bpy; print(bpy.utils.resource_path('LOCAL'))"
-TOOL = "scripts/addons_core/bl_pkg/cli/blender_ext.py"
-
-
-@pytest.fixture(scope="module")
-def addon(blender: BlenderSession, tmp_path_factory: pytest.TempPathFactory) -> BlenderSession:
-    """Blender with the add-on: built and validated by Blender's own tool, installed, enabled."""
-    python = str(blender_python())
-    found = subprocess.run([python, "-c", FIND_TOOL], capture_output=True, text=True, check=True)
-    tool = Path(found.stdout.strip().splitlines()[-1]) / TOOL
-    package = tmp_path_factory.mktemp("addon") / "hairkit.zip"
-    words = ["build", "--source-dir", str(ADDON), "--output-filepath", str(package)]
-    subprocess.run([python, str(tool), *words], capture_output=True, check=True)
-    subprocess.run([python, str(tool), "validate", str(package)], capture_output=True, check=True)
-    state = blender.call("addon.installed", package=package)
-    assert state == {"enabled": True, "operators": ["import_groom", "reconstruct"], "menu": True}
-    return blender
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +74,7 @@ def test_without_hairkit_one_line_says_what_to_do(
     addon: BlenderSession, tmp_path: Path, python: str, says: str
 ) -> None:
     """A Python that is not set, not there or without hairkit is one line with the cure."""
-    chosen = str(blender_python()) if python == "BLENDER" else python
+    chosen = str(addon.python) if python == "BLENDER" else python
     for words in (
         {"operator": "import_groom", "filepath": tmp_path / "x.apx"},
         {"operator": "reconstruct", "directory": tmp_path},

@@ -20,7 +20,7 @@ import numpy.typing as npt
 PROJECT = Path(__file__).parents[2]
 INSIDE = Path(__file__).parents[1] / "clients" / "inside"
 VARIABLE = "HAIRKIT_BPY_PYTHON"
-"""Names a Python that can `import bpy`, in place of the one that `make test-clients` makes."""
+"""Names Pythons that can `import bpy`, in place of those that `make test-clients` makes."""
 LIMIT = 300.0
 """Seconds that one call may take."""
 
@@ -29,19 +29,21 @@ class BlenderError(Exception):
     """Blender raised an error, or it is gone; the text is what it said."""
 
 
-def blender_python() -> Path | None:
-    """Return the Python that has Blender as a module, or None where there is none."""
+def blender_pythons() -> list[Path]:
+    """Return the Pythons that have Blender as a module, one for each version of Blender."""
     named = os.environ.get(VARIABLE)
-    made = PROJECT / ".clients" / "bpy"
-    places = [Path(named)] if named else [made / "bin" / "python", made / "Scripts" / "python.exe"]
-    return next((place for place in places if place.exists()), None)
+    if named:
+        return [Path(name) for name in named.split(os.pathsep)]
+    made = sorted((PROJECT / ".clients").glob("bpy*"))
+    places = [folder / end for folder in made for end in ("bin/python", "Scripts/python.exe")]
+    return [place for place in places if place.exists()]
 
 
 class BlenderSession:
     """One Blender that answers calls; it is started again when a call has killed it."""
 
     def __init__(self, python: Path, folder: Path) -> None:
-        self._python = python
+        self.python = python
         self._folder = folder
         """Blender's own files, so that nothing of the user's is read or changed."""
         self._child: subprocess.Popen[str] | None = None
@@ -83,7 +85,7 @@ class BlenderSession:
     def _started(self) -> subprocess.Popen[str]:
         resources = {"BLENDER_USER_RESOURCES": str(self._folder), "PYTHONDONTWRITEBYTECODE": "1"}
         return subprocess.Popen(
-            [str(self._python), str(INSIDE / "serve.py"), str(self._folder)],
+            [str(self.python), str(INSIDE / "serve.py"), str(self._folder)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._said,

@@ -1,5 +1,6 @@
 """The add-on, installed in Blender as a user installs it."""
 
+import importlib
 from typing import Any
 
 import bpy
@@ -7,6 +8,7 @@ import numpy as np
 from contents import objects
 
 _MODULE = "bl_ext.user_default.hairkit"
+_KINDS = ("objects", "hair_curves", "meshes", "armatures", "actions", "materials", "collections")
 
 
 def installed(package: str) -> dict:
@@ -39,6 +41,59 @@ def reconstructed(folder: str, out: str, python: str, **settings: Any) -> list:
     return _with_looks(objects())
 
 
+def grown(path: str, **settings: Any) -> np.ndarray:
+    """Return the points (S, P, 3) of the hair that is drawn for a file of guides of P points."""
+    imported(path, **settings)
+    return _drawn_hair(_hair())
+
+
+def shaped(path: str, shift: list, **settings: Any) -> dict:
+    """Return the drawn hair before and after every vertex of the head is moved."""
+    imported(path, **settings)
+    before = _drawn_hair(_hair())
+    _shift(_hair().data.surface, shift)
+    return {"before": before, "after": _drawn_hair(_hair())}
+
+
+def moving(path: str, python: str, frames: list, **settings: Any) -> dict:
+    """Return hair and head in the world at frames, as an animated file is imported."""
+    _emptied_with(python)
+    known = {kind: len(getattr(bpy.data, kind)) for kind in _KINDS}
+    bpy.ops.hairkit.import_groom(filepath=path, **settings)
+    added = {kind: len(getattr(bpy.data, kind)) - known[kind] for kind in _KINDS}
+    return _at(frames) | {"added": added}
+
+
+def simulated(path: str, python: str, keys: list, frames: list, edit: float, **words: Any) -> dict:
+    """Import a groom, give its head keys (frame, x, degrees about Z), simulate, return `_at`.
+
+    `edit` metres are added to the height of all points but roots before that, as by combing.
+    """
+    imported(path, python, fill=words.pop("fill", 0))
+    scene, hair = bpy.context.scene, _hair()
+    scene.frame_start, scene.frame_end, scene.render.fps = frames[0], frames[-1], 24
+    for frame, x, degrees in keys:
+        hair.parent.location.x = x
+        hair.parent.rotation_euler.z = np.radians(degrees)
+        hair.parent.keyframe_insert("location", frame=frame)
+        hair.parent.keyframe_insert("rotation_euler", frame=frame)
+    if edit:
+        places = _of(hair.data)
+        starts = np.empty(len(hair.data.curves) + 1, np.int32)
+        hair.data.curve_offset_data.foreach_get("value", starts)
+        free = np.setdiff1d(np.arange(len(places)), starts[:-1])
+        places[free, 2] += edit
+        hair.data.position_data.foreach_set("vector", places.ravel())
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.hairkit.simulate(**words)
+    return _at(frames)
+
+
+def progress(lines: list) -> list:
+    """Return the share of a stage that each line of hairkit's progress tells."""
+    return [importlib.import_module(f"{_MODULE}.background").share(line) for line in lines]
+
+
 def refusal(operator: str, python: str = "", **arguments: Any) -> str:
     """Return the text of the error that a command of the add-on reports."""
     _emptied_with(python)
@@ -52,15 +107,9 @@ def refusal(operator: str, python: str = "", **arguments: Any) -> str:
 def followed(path: str, shift: list) -> dict:
     """Return the hair's points before and after every vertex of the head is moved."""
     imported(path)
-    hair = next(thing for thing in bpy.data.objects if thing.type == "CURVES")
-    head = hair.data.surface
+    hair = _hair()
     before = _shown(hair)
-    places = np.empty(3 * len(head.data.vertices), np.float32)
-    head.data.vertices.foreach_get("co", places)
-    head.shape_key_add(name="rest")
-    moved = head.shape_key_add(name="moved")
-    moved.data.foreach_set("co", (places.reshape(-1, 3) + np.array(shift)).ravel())
-    moved.value = 1.0
+    _shift(hair.data.surface, shift)
     return {"before": before, "after": _shown(hair)}
 
 
@@ -77,12 +126,15 @@ def _emptied_with(python: str) -> None:
     """Empty the scene by hand: factory settings would disable the add-on."""
     for thing in list(bpy.data.objects):
         bpy.data.objects.remove(thing)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 250
     bpy.context.preferences.addons[_MODULE].preferences.python = python
 
 
 def _names() -> dict:
     return {
-        "operators": [name for name in ("import_groom", "reconstruct") if _is_there(name)],
+        "operators": [
+            name for name in ("import_groom", "reconstruct", "simulate") if _is_there(name)
+        ],
         "menu": hasattr(bpy.types, "VIEW3D_MT_hairkit"),
     }
 
@@ -95,11 +147,46 @@ def _is_there(name: str) -> bool:
     return True
 
 
+def _hair() -> Any:
+    return next(thing for thing in bpy.data.objects if thing.type == "CURVES")
+
+
+def _shift(head: Any, shift: list) -> None:
+    """Move every vertex of a head by a shape key."""
+    places = np.empty(3 * len(head.data.vertices), np.float32)
+    head.data.vertices.foreach_get("co", places)
+    head.shape_key_add(name="rest")
+    moved = head.shape_key_add(name="moved")
+    moved.data.foreach_set("co", (places.reshape(-1, 3) + np.array(shift)).ravel())
+    moved.value = 1.0
+
+
+def _at(frames: list) -> dict:
+    """Return hair (T, P, 3), head (T, V, 3) in the world and the scene's range."""
+    scene = bpy.context.scene
+    hair, head = _hair(), _hair().parent
+    found: dict = {"range": [scene.frame_start, scene.frame_end], "hair": [], "head": []}
+    for frame in frames:
+        scene.frame_set(frame)
+        for name, thing in (("hair", hair), ("head", head)):
+            whole = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            matrix = np.array(whole.matrix_world)
+            found[name].append(_of(whole.data) @ matrix[:3, :3].T + matrix[:3, 3])
+    return found | {name: np.array(found[name]) for name in ("hair", "head")}
+
+
 def _shown(hair: Any) -> np.ndarray:
     bpy.context.view_layer.update()
-    curves = hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    places = np.empty(3 * len(curves.points), np.float32)
-    curves.attributes["position"].data.foreach_get("vector", places)
+    return _of(hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data)
+
+
+def _drawn_hair(hair: Any) -> np.ndarray:
+    return _shown(hair).reshape(-1, len(hair.data.points) // len(hair.data.curves), 3)
+
+
+def _of(data: Any) -> np.ndarray:
+    places = np.empty(3 * len(data.attributes["position"].data), np.float32)
+    data.attributes["position"].data.foreach_get("vector", places)
     return places.reshape(-1, 3)
 
 
