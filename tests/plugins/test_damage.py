@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import tracemalloc
 from collections.abc import Iterator
@@ -31,7 +32,17 @@ READERS = [
 _POINTS = np.zeros((4, 7), "<f4")
 _POINTS[:, 1] = 0.1, 0.12, 0.1, 0.13
 _POINTS[2:, 0] = 0.05
+_PLACES = _POINTS[:, :3].reshape(2, 2, 3).astype("<f4")
 _POINTS = _POINTS.view("<i4").reshape(-1)
+
+
+def _array_file(array: Any) -> str:
+    """Return a .npy file's bytes, one character each."""
+    stream = io.BytesIO()
+    np.save(stream, array)
+    return stream.getvalue().decode("latin-1")
+
+
 OTHER_FILES_TEXT = {
     ("tressfx", "text.tfx"): """version 2.0
 scale 0.01
@@ -85,6 +96,32 @@ l 4/1 5/2
     .astype("<i4")
     .tobytes()
     .decode("latin-1"),
+    ("numpy_arrays", "hair.npy"): _array_file(_PLACES),
+    ("numpy_arrays", "map.convdata"): _array_file(
+        np.pad(_PLACES, ((0, 2), (0, 0), (0, 1))).transpose(1, 2, 0).reshape(8, 2, 2)
+    ),
+    ("maya", "foreign.ma"): """//Maya ASCII 2022 scene
+currentUnit -l meter -a degree -t film;
+createNode transform -n "hair";
+	setAttr ".t" -type "double3" 0 0.05 0 ;
+	setAttr ".ry" 30;
+	setAttr ".rp" -type "double3" 0.1 0 0 ;
+createNode nurbsCurve -n "hairShape" -p "hair";
+	setAttr ".cc" -type "nurbsCurve"
+		3 1 0 no 3
+		6 0 0 0 1 1 1
+		4
+		0 0.1 0
+		0 0.12 0
+		0 0.13 0.01
+		0 0.14 0.01
+		;
+createNode transform -n "b" -p "hair";
+createNode nurbsCurve -n "bShape" -p "|hair|b";
+	setAttr ".cc" -type "nurbsCurve" 1 1 0 no 3 2 0 1 2 0.1 0 0 0.13 0 0 ;
+createNode script -n "s";
+	setAttr ".b" -type "string" "// print; \\"no\\";";
+""",
 }
 """Small files of two strands."""
 OTHER_FILES = list(OTHER_FILES_TEXT)

@@ -1,16 +1,20 @@
 """Maya ASCII .ma: every strand as a NURBS curve of degree 1, which XGen takes as guides.
 
 The scene needs no plugin: transforms `guides` and `hair` (one for each group of the groom, where it
-has several) below `groom`, with one curve a strand. Written only; widths, root uv, colour and the
-head go by Alembic, USD or FBX.
+has several) below `groom`, with one curve a strand. Widths, root uv, colour and the
+head go by Alembic, USD or FBX. Read are the open NURBS curves of any scene, where transforms put
+them, as points on the curves.
 Source: Autodesk's description of Maya ASCII files and of `setAttr -type nurbsCurve`.
+
+* `reader`: the curves of a scene
 """
 
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -18,6 +22,7 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Int64Array
 from hairkit.errors import InputError
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.coordinate_space import SPACES, FileSpace, SpaceOptions
@@ -25,19 +30,22 @@ from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.number_text import format_rows
 from hairkit.io.strand_blocks import blocks
 from hairkit.options import option
-from hairkit.storage import write_pieces
+from hairkit.storage import read_text, write_pieces
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 FORMAT = FileFormat(
     title="Maya ASCII",
     suffixes=(".ma",),
-    written=frozenset({Feature.POINTS, Feature.COUNTS, Feature.GUIDE, Feature.GROUP}),
+    exact=frozenset({Feature.POINTS, Feature.COUNTS, Feature.GUIDE, Feature.GROUP}),
 )
 
 UNITS = {0.001: "millimeter", 0.01: "centimeter", 1.0: "meter", 0.0254: "inch", 0.3048: "foot"}
 """Maya's names of units, by their metres."""
 _TOP = "groom"
+_NAME = re.compile(r"(guide|hair)_(\d{1,18})")
+_GROUP = re.compile(r"(?:guides|hair)(?:_(minus)?(\d{1,9}))?")
+"""Names of hairkit's own scenes."""
 _HEADER = """//Maya ASCII 2018 scene
 //hairkit: strands as curves of degree 1
 requires maya "2018";
@@ -47,8 +55,8 @@ createNode transform -n "{top}";
 
 
 @dataclass(frozen=True)
-class Options(SpaceOptions, ExportOptions):
-    """Settings of the Maya exporter."""
+class Options(SpaceOptions, ExportOptions, ImportOptions):
+    """Settings of .ma files. Scenes say their unit; reading takes `scale` only to overrule it."""
 
     axis: str = option(
         "y_up_centimetres",
@@ -68,6 +76,33 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     return True
 
 
+@hookimpl
+def import_groom(path: Path, options: Options) -> Groom:
+    """Read all NURBS curves as strands; a head is put under them."""
+    from .reader import read_curves
+
+    curves = read_curves(read_text(path), path)
+    space = options.space if options.scale else replace(options.space, metres=curves.metres)
+    points = space.points_to_head(curves.points)
+    strands, _ = pack_strands(points, curves.counts, path)
+    return adopt(_as_named(strands, curves.names), options, path)
+
+
+def _as_named(strands: Strands, names: list[tuple[str, str]]) -> Strands:
+    """Return strands in the order, groups and kinds that the names of hairkit's scenes tell.
+
+    Strands of other scenes stay as they are.
+    """
+    found = [(_NAME.fullmatch(name), _GROUP.fullmatch(group)) for name, group in names]
+    numbers = [int(name[2]) for name, _ in found if name]
+    if not all(name and group for name, group in found) or len({*numbers}) < len(names):
+        return strands
+    groups = [-int(g[2]) if g[1] else int(g[2] or 0) for _, g in found if g]
+    guide = np.array([name[1] == "guide" for name, _ in found if name])
+    named = replace(strands, group=np.array(groups), guide=guide)
+    return named.select(np.argsort(numbers))
+
+
 def _unit(space: FileSpace) -> str:
     """Return Maya's name of the file's unit."""
     for metres, name in UNITS.items():
@@ -85,7 +120,7 @@ def _scene(strands: Strands, space: FileSpace) -> Iterator[bytes]:
         assert strands.group is not None
         groups = np.unique(strands.group[chosen])
         for group in groups.tolist():
-            name = kind.group if len(groups) == 1 else _number_name(kind.group, group)
+            name = kind.group if groups.tolist() == [0] else _number_name(kind.group, group)
             yield f'createNode transform -n "{name}" -p "|{_TOP}";\n'.encode("ascii")
             index = np.flatnonzero(chosen & (strands.group == group))
             yield from _curves(strands, space, index, name.encode(), kind.curve.encode())
