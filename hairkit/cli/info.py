@@ -21,9 +21,10 @@ Example: hairkit info out/groom.npz
 
 Print what a file contains: a groom (.npz or what an import plugin reads; --scale, --up and --set
 give what bare strands do not define), a simulation (.npz), a scene.json, a head (.obj, .ply, .glb),
-or a capture's folder. Lengths are in metres."""
+hair cards (.glb, .vrm, .obj), or a capture's folder. Lengths are in metres."""
 
 _HEADS = (".obj", ".ply", ".glb")
+_CARDS = (".glb", ".gltf", ".vrm", ".obj")
 
 
 def register(subparsers: Any) -> None:
@@ -59,12 +60,24 @@ def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
         return _scene(path)
     if is_cache_file(path):
         return _simulation(PointCache.load(path))
+    if path.name.lower().endswith(_CARDS) and (cards := _cards(path)) is not None:
+        return cards
     if path.suffix.lower() not in _HEADS:
         return _groom(path, args)
     try:
         return _groom(path, args)
     except FormatError:  # no strands in it, so it is a head
         return _head_file(path, args.head_units, args.head_scalp)
+
+
+def _cards(path: Path) -> dict[str, Any] | None:
+    from hairkit.io.card_file import read_card_file
+
+    found = read_card_file(path)
+    if found is None:
+        return None
+    triangles = {name: {"triangles": count} for name, count in found.triangles.items()}
+    return {"kind": "cards", "levels": triangles, "bones": found.bones, "springs": found.springs}
 
 
 def _simulation(cache: PointCache) -> dict[str, Any]:

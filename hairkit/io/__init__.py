@@ -7,6 +7,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `byte_writer`: arrays as bytes of binary files
 * `capture_reader`: a folder of photos with masks, strokes and landmarks
 * `capture_toml`: `capture.toml`
+* `card_file`: what files of hair cards hold
 * `coordinate_space`: axes and unit of a file
 * `exif`: orientation and focal length from EXIF
 * `file_format`: what a format carries, as its plugin declares it

@@ -27,10 +27,8 @@ from hairkit.types.skin import Blendshape, SkinMaps
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres in one unit of a head file."""
 _READERS = {".obj": read_obj, ".ply": read_ply, ".glb": read_glb}
-_DEFAULT_BREADTH = 0.155
-"""Breadth of the default head, metres."""
-_NARROWEST, _BROADEST = 0.05, 0.6
-"""Metres: scalps from a doll's to a statue's; others are in another unit than was given."""
+_DEFAULT_BREADTH, _NARROWEST, _BROADEST = 0.155, 0.05, 0.6
+"""Breadths in metres: the default head's, a doll's, a statue's; others are in another unit."""
 _OFF_CENTRE = 0.02
 """Metres from the origin to the middle of the cranium; heads farther off are moved."""
 _ROOT_GAP = 0.015
@@ -151,18 +149,21 @@ def read_head(
         bare = _with_default_scalp(bare, file)
     if bare.scalp is None:
         raise InputError(f"{file}: the head has no scalp: {_HOW_TO_MARK}")
+    return _placed(bare, bare.scalp, file)
+
+
+def _placed(bare: BareHead, scalp: Float64Array, file: Path) -> Head:
     used = np.unique(bare.faces)
-    breadth, middle = _breadth_and_middle(bare.vertices[used], bare.scalp[used], file)
-    stays = bare.grown or np.linalg.norm(middle) <= _OFF_CENTRE
-    moved = bare.vertices if stays else bare.vertices - middle
-    middle = middle if stays else np.zeros(3)
+    breadth, middle = _breadth_and_middle(bare.vertices[used], scalp[used], file)
+    offset = np.zeros(3) if bare.grown or np.linalg.norm(middle) <= _OFF_CENTRE else middle
+    moved, middle = bare.vertices - offset, middle - offset
     uv = _azimuthal_uv(moved - middle) if bare.uv is None else bare.uv
     joints, capsules = _skeleton(breadth / _DEFAULT_BREADTH, middle)
     return Head(
         moved.astype(np.float32),
         bare.faces,
         uv.astype(np.float32),
-        bare.scalp.astype(np.float32),
+        scalp.astype(np.float32),
         bare.landmark_vertices,
         joints,
         capsules,
@@ -199,7 +200,6 @@ def _read_bare(
     grown = None
     if weight is None and roots is not None:
         grown = weight = _grown_weight(vertices, mesh.faces, roots)
-    shapes = mesh.shapes.items()
     return BareHead(
         vertices,
         _orient_outward(vertices, mesh.faces.astype(np.int32)),
@@ -209,7 +209,7 @@ def _read_bare(
         as_maps(mesh.maps),
         tuple(
             Blendshape(name, _in_metres(offsets, units, up).astype(np.float32))
-            for name, offsets in shapes
+            for name, offsets in mesh.shapes.items()
         ),
         grown=grown is not None,
     )
@@ -234,9 +234,8 @@ def write_head_obj(path: str | os.PathLike[str], head: Head) -> None:
         lines += ["f {0}/{0} {1}/{1} {2}/{2}".format(*row) for row in (faces + 1).tolist()]
     write_text(path, "\n".join(lines) + "\n")
     if head.landmark_vertices is not None:
-        write_text(
-            _beside(Path(path), "landmarks.json"), json.dumps(head.landmark_vertices.tolist())
-        )
+        marks = json.dumps(head.landmark_vertices.tolist())
+        write_text(_beside(Path(path), "landmarks.json"), marks)
 
 
 def _file_mesh(file: Path, units: str, up: str) -> FileMesh:

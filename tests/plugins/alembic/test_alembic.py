@@ -16,7 +16,7 @@ from hairkit_plugins.alembic import curves, writer
 
 from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import closest_guides
-from hairkit.grooming.prepare_export import complete_groom, select_strands
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.point_cache import PointCache
@@ -391,19 +391,3 @@ def test_the_room_made_is_enough(tmp_path: Path, caplog: pytest.LogCaptureFixtur
         size = writer._size(curves.groom_curves(ready, alembic.Options(**options)))
         have = written(groom, tmp_path, **options).stat().st_size
         assert have <= size < 2 * have + 50_000
-
-
-def test_attributes_can_be_left_out(tmp_path: Path) -> None:
-    """Points, widths and uv stay; what only grooms have is not in the file, which is smaller."""
-    groom = hair_groom()
-    whole = written(groom, tmp_path)
-    size = whole.stat().st_size
-    whole.rename(tmp_path / "whole.abc")
-    bare = written(groom, tmp_path, attributes=False)
-    assert bare.stat().st_size < 0.8 * size
-    assert b"groom_id" in (tmp_path / "whole.abc").read_bytes()
-    assert b"groom_id" not in bare.read_bytes()
-    back = alembic.import_groom(bare, alembic.Options()).strands
-    np.testing.assert_array_equal(back.points, groom.strands.points)
-    np.testing.assert_array_equal(back.widths, complete_groom(groom).strands.widths)
-    assert back.guide is None
