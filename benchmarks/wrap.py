@@ -1,15 +1,17 @@
 """How well grooms lie on other heads: a child's, a man's of few triangles, a woman's remeshed.
 
-    python benchmarks/wrap.py [-o PICTURE] [--strands N]
+    python benchmarks/wrap.py [-o PICTURE] [--strands N] [--heads FILE ...]
 
 Prints for each style of hair and each head how far roots are off the surface, how deep points lie
 in the head, how much lengths change, and the processor time. -o draws the wavy groom on all heads.
+--heads takes files of heads or bodies instead, in metres, +Y up, the face along +Z.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ from hairkit.grooming.wrap import wrap_groom
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.head_model.template import default_head
+from hairkit.io.head_reader import read_bare_head
 from hairkit.rendering.framing import framing_cameras
 from hairkit.rendering.picture import draw_views
 from hairkit.rendering.picture_file import write_picture
@@ -37,14 +40,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, help="picture")
     parser.add_argument("--strands", type=int, default=1000)
+    parser.add_argument("--heads", type=Path, nargs="*", default=(), metavar="FILE")
     args = parser.parse_args()
+    makers = {path.stem: partial(read_bare_head, path) for path in args.heads} or FOREIGN_HEADS
     print("| hair | head | roots off, mm | deepest point, mm | lengths changed | seconds |")
     print("|---|---|---|---|---|---|")
     shown = []
     for style in STYLES:
         groom = grow(style, default_head(), args.strands, 0)
         shown += [groom] if style == "wavy" else []
-        for name, make in FOREIGN_HEADS.items():
+        for name, make in makers.items():
             head = make()
             start = time.process_time()
             wrapped = wrap_groom(groom, head)

@@ -9,6 +9,7 @@ registration") with closest points for matches. Neither asks anything of the mes
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -53,6 +54,8 @@ SPREAD = 6_000
 """Points spread over the other head's faces."""
 MARGIN = 0.02
 """Metres around the head within which the other's points are matched to it."""
+BODY = 0.1
+"""Metres around the head from which on a mesh is another part of the body."""
 FACING = 0.3
 """Least cosine between the normals of a pair."""
 CROWN = 0.12
@@ -140,7 +143,19 @@ def place_on(head: Head, surface: Surface, rounds: int = ROUNDS) -> HeadMap:
         starts = [fit.start(scale) for scale in SCALES]
     trials = [fit.improve(start, TRIALS) for start in starts]
     best = min(trials, key=lambda found: found.distance)
+    part = _without_body(head, surface, best.similarity)
+    fit = fit if part is surface else _Closest(head, part)
     return fit.improve(best.similarity, rounds)
+
+
+def _without_body(head: Head, surface: Surface, found: Similarity) -> Surface:
+    """Return what of a surface is around the head, so that points spread over it are not lost."""
+    local = found.inverse().apply(surface.vertices)
+    low, high = head.vertices.min(axis=0) - BODY, head.vertices.max(axis=0) + BODY
+    inside = ((local > low) & (local < high)).all(axis=1)[surface.faces].all(axis=1)
+    if inside.all() or np.count_nonzero(inside) < FEWEST:
+        return surface
+    return replace(surface, faces=surface.faces[inside])
 
 
 def _check_size(surface: Surface) -> None:
@@ -161,9 +176,10 @@ def _check_direction(head: Head, surface: Surface, placed: HeadMap) -> None:
     found = {}
     for fault, rotation in TURNS.items():
         turned = replace(surface, vertices=surface.vertices @ np.array(rotation, np.float64).T)
-        found[fault] = place_on(head, turned, TRIALS).distance
-    best = min(found, key=lambda fault: found[fault])
-    if found[best] < CLEARLY * placed.distance:
+        with contextlib.suppress(InputError):  # nothing lies where a head would
+            found[fault] = place_on(head, turned, TRIALS).distance
+    best = min(found, key=lambda fault: found[fault], default="")
+    if best and found[best] < CLEARLY * placed.distance:
         raise InputError(f"the head {best}; it must look along +Z with +Y up")
 
 

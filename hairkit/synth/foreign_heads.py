@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import trimesh
 
 from hairkit.field.isosurface import volume_surface
 from hairkit.head_model.identity import blend_head
@@ -24,6 +25,14 @@ _LOW, _HIGH = (-0.22, -0.42, -0.15), (0.22, 0.17, 0.15)
 """Corners of the volume of these cells, metres."""
 _SHOULDERS_AT, _SHOULDERS = (0.0, -0.36, -0.02), (0.2, 0.12, 0.1)
 """Middle and half axes of the shoulders' ellipsoid, metres."""
+_BODY = (
+    ((0.0, -0.65, -0.02), (0.2, 0.4, 0.13)),
+    ((0.45, -0.4, -0.02), (0.4, 0.05, 0.06)),
+    ((-0.45, -0.4, -0.02), (0.4, 0.05, 0.06)),
+    ((0.1, -1.3, -0.02), (0.09, 0.45, 0.1)),
+    ((-0.1, -1.3, -0.02), (0.09, 0.45, 0.1)),
+)
+"""Middles and half axes of trunk, arms and legs, ellipsoids, metres."""
 
 
 def make_child_head() -> BareHead:
@@ -56,9 +65,25 @@ def make_remeshed_head() -> BareHead:
     return BareHead(vertices + np.array(_WOMAN_AT), faces)
 
 
+def make_whole_body() -> BareHead:
+    """Return a woman's head on a body with spread arms, of which the head is a small part."""
+    head = blend_head(_WOMAN)
+    parts = [(head.vertices.astype(np.float64), head.skin_faces())]
+    ball = trimesh.creation.icosphere(subdivisions=4)
+    for middle, half_axes in _BODY:
+        parts.append((ball.vertices * half_axes + np.array(middle), ball.faces))
+    sizes = np.cumsum([0] + [len(vertices) for vertices, _ in parts[:-1]])
+    faces = [part + size for (_, part), size in zip(parts, sizes, strict=True)]
+    return BareHead(
+        np.concatenate([vertices for vertices, _ in parts]),
+        np.concatenate(faces).astype(np.int32),
+    )
+
+
 FOREIGN_HEADS = {
     "child": make_child_head,
     "coarse": make_coarse_head,
     "remeshed": make_remeshed_head,
+    "body": make_whole_body,
 }
 """Makers by name."""

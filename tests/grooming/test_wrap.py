@@ -14,6 +14,7 @@ from hairkit.errors import HairkitError, InputError
 from hairkit.grooming.wrap import wrap_groom
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.head_model.identity import blend_head
+from hairkit.head_model.register_head import SURE, Surface, place_on
 from hairkit.head_model.scalp import evaluate, roots_at
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.head_model.template import default_head
@@ -111,6 +112,14 @@ def test_the_skeleton_and_the_ties_come_along() -> None:
     assert np.abs(after.ties[0].centre - [0, 1.1, -0.07]).max() < 0.025
     assert after.ties[0].axis[2] < -0.95
     assert after.head.capsules.radius[0, 0] < groom().head.capsules.radius[0, 0]
+
+
+def test_a_body_does_not_count() -> None:
+    """A head on a whole body is found as near as heads alone are, and at its size."""
+    body = FOREIGN_HEADS["body"]()
+    found = place_on(default_head(), Surface(body.vertices, body.faces))
+    assert found.distance < SURE
+    assert 0.9 < found.similarity.scale < 1.1
 
 
 def test_root_uv_are_those_of_the_other_head() -> None:
