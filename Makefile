@@ -24,7 +24,8 @@ test: $(VENV)/.tests $(VENV)/.models
 
 test-clients: $(VENV)/.tests $(CLIENTS)/.blender
 	@sh .ci/validator $(CLIENTS)
-	$(BIN)/python -m pytest -n auto --dist worksteal tests/clients tests/plugins
+	@sh .ci/three $(CLIENTS)
+	$(BIN)/python -m pytest -n auto --dist worksteal tests/clients
 
 demo: $(VENV)/.hairkit $(VENV)/.models
 	$(BIN)/hairkit reconstruct hairkit/sample -o $(DEMO)

@@ -9,14 +9,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from blender_session import BlenderSession, only, z_up
-from client_groom import moved, nodding, swinging, written
+from client_groom import moved, nodding, off_strands, swinging, written
 
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES
 from hairkit.manager import Manager
 from hairkit.types.groom import Groom
-from hairkit.types.strands import Strands
 
 STRIPS, POINTS = 30, 12
 RIBBONS = {"lines": "none", "strips": STRIPS, "strip_points": POINTS}
@@ -27,15 +26,6 @@ def seen(blender: BlenderSession, path: Path, frames: Any = ()) -> list[dict[str
     """Return what Blender imports, without the shape that it makes to show bones."""
     things = blender.call("contents.imported", path=path, operator=IMPORT, frames=frames)
     return [thing for thing in things if thing["name"] != "Icosphere"]
-
-
-def off_strands(points: npt.NDArray[Any], strands: npt.NDArray[Any], layout: Strands) -> float:
-    """Return the largest distance of points (N, 3) from the polylines of points (P, 3)."""
-    first = layout.segments()[1]
-    start, way = strands[first].astype(float), (strands[first + 1] - strands[first]).astype(float)
-    share = np.einsum("nsc,sc->ns", points[:, None] - start, way) / (way**2).sum(axis=1)
-    foot = start + share.clip(0, 1)[..., None] * way
-    return float(np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1).max())
 
 
 def test_ribbons_lie_on_strands(

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.grooming.guide_weights import guide_mask
@@ -12,6 +14,7 @@ from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import plugin_for
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache
+from hairkit.types.strands import Strands
 
 
 def written(manager: Manager, groom: Groom, path: Path, **options: object) -> Path:
@@ -72,3 +75,12 @@ def moved(motion: Float64Array, points: Float32Array) -> Float32Array:
     """Return points (P, 3) under each of the rigid motions (T, 4, 4): (T, P, 3)."""
     turned = np.einsum("tij,pj->tpi", motion[:, :3, :3], points) + motion[:, None, :3, 3]
     return np.asarray(turned, np.float32)
+
+
+def off_strands(points: npt.NDArray[Any], strands: npt.NDArray[Any], layout: Strands) -> float:
+    """Return the largest distance of points (N, 3) from the polylines of points (P, 3)."""
+    first = layout.segments()[1]
+    start, way = strands[first].astype(float), (strands[first + 1] - strands[first]).astype(float)
+    share = np.einsum("nsc,sc->ns", points[:, None] - start, way) / (way**2).sum(axis=1)
+    foot = start + share.clip(0, 1)[..., None] * way
+    return float(np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1).max())
