@@ -3,8 +3,8 @@
 Seconds, memory and bytes of a capture are measured by a run of a few small ones, or given. What
 Dask's own scheduler takes is measured in this process, client and worker included: tasks that do
 nothing, on a worker that is a thread. From these the table says how long a number of captures takes
-on a number of cores, and which of four runs out first: cores, the scheduler's time, its memory, or
-the shared drive.
+on a number of cores, and which of three runs out first: cores, the scheduler's time, or the shared
+drive. `farm_scheduler.py` plays such numbers through the scheduler.
 """
 
 from __future__ import annotations
@@ -30,8 +30,6 @@ COUNTS = (10_000, 10_000_000)
 CORES = (16, 256, 4096, 65_536)
 DRIVE_BYTES_S = 2e9
 """Bytes in a second of a shared drive: 16 Gbit/s, a common file server. `--drive` says another."""
-SCHEDULER_BYTES = 64 * 2**30
-"""Memory of the scheduler's machine."""
 HOUR = 3600.0
 
 
@@ -95,8 +93,6 @@ def row(count: int, cores: int, capture: Capture, scheduler: Scheduler, drive: f
     first = max(parts, key=lambda part: parts[part])
     second = sorted(parts.values())[-2]
     word = f"{second / parts[first]:.0%} of that"
-    if count * scheduler.memory_bytes > SCHEDULER_BYTES:
-        word += f"; in {-(-count * scheduler.memory_bytes // SCHEDULER_BYTES):.0f} batches"
     return (
         f"| {count:,} | {cores:,} | {cores * capture.memory_bytes / 2**30:,.0f} GiB |"
         f" {parts[first] / HOUR:,.1f} | {count * capture.bytes_kept / 1e12:,.1f} TB |"

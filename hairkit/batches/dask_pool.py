@@ -109,7 +109,7 @@ class DaskPool:
             result: Result = future.result()
             return result
         if isinstance(error, _distributed().KilledWorker):
-            reason = f"the workers that had it were lost {LOST_WORKERS} times"
+            reason = f"the workers that had it were lost {error.allowed_failures + 1} times"
             return Result(job.name, FAILED, job.out, error=reason)
         line = " ".join(f"{type(error).__name__}: {error}".split())
         return Result(job.name, FAILED, job.out, error=line)

@@ -33,6 +33,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "contact": ({}, ["--guides", "20", "--frames", "2", "--hair", "short"]),
     "command_plugins": ({"CALLS": 2, "SIZE": (40, 30)}, []),
     "farm_costs": ({"TASKS": (20, 60)}, ["--seconds", "5"]),
+    "farm_scheduler": ({}, ["--counts", "60", "--workers", "4", "--window", "0", "20"]),
     "cards": (
         {"STYLES": ("straight",), "SIZE": (48, 64), "WARM_UP": 20},
         ["--strands", "300", "--points", "8", "--cards", "20", "--atlas", "256"],
@@ -81,6 +82,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
 }
 """Constants and arguments that make a program quick. CAPTURES is a folder with one capture."""
 ELSEWHERE = {
+    "batch_chaos",
     "blender_picture",
     "export",
     "face_landmarks",
