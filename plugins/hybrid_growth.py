@@ -7,8 +7,9 @@ field without signs the tensors are followed in the direction in which the growt
 Added to the patent, and off in the recipe `patent`: a strand that leaves the hair goes on for a
 while (`patience`, the uncertain steps of the thesis) and is cut where it left; a strand that slides
 is turned back to the surface (`pull`) and ends farther outside (`bound`), because its tip hangs
-below what all views agree on; and a strand that meets the shoulders turns along them (`turn_sine`).
-Inertia, too, is an addition.
+below what all views agree on; a strand that meets the shoulders turns along them (`turn_sine`); and
+hair that photos show and no strand reaches gets strands of its own (`cover`,
+`hairkit.grooming.cover_hair`). Inertia, too, is an addition.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from scipy import ndimage
 
 from hairkit import (
     Hull,
+    Mask,
     OrientationField,
     Roots,
     ScalpDistance,
@@ -33,6 +35,7 @@ from hairkit import (
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.field.growth_prior import long_share
 from hairkit.field.sampling_kernels import copy_point, gradient_at, make_unit, sample_at
+from hairkit.grooming.cover_hair import find_bare_cells, lead_to_roots
 from hairkit.grooming.postprocess import FinishOptions, finish
 from hairkit.head_model.torso import Torso
 from hairkit.options import option
@@ -104,6 +107,13 @@ class Options(FinishOptions):
     inertia: float = option(
         0.9, low=0, high=0.99, doc="Share of the previous direction in the next step's."
     )
+    cover: float = option(
+        2.0,
+        low=0,
+        high=10,
+        doc="Density, against the mean, of strands led through hair that photos show and no strand"
+        " reaches; 0: none.",
+    )
     wave_share: float = option(
         0.18,
         low=0,
@@ -115,6 +125,7 @@ class Options(FinishOptions):
 @hookimpl
 def track(
     scene: Scene,
+    masks: tuple[Mask, ...],
     hull: Hull,
     field: OrientationField,
     roots: Roots,
@@ -129,16 +140,27 @@ def track(
     if memory > options.step:
         inertia = max(options.inertia, 1 - options.step / memory)
         options = replace(options, inertia=inertia)
-    strands = grow(
-        field,
-        _sign_directions(field),
-        _distance(field, hull),
-        roots.positions,
-        way,
-        options,
-        float(Torso.under(scene.head).joint[1]),
-    )
+    direction, distance = _sign_directions(field), _distance(field, hull)
+    shoulders = float(Torso.under(scene.head).joint[1])
+    strands = grow(field, direction, distance, roots.positions, way, options, shoulders)
+    if options.cover > 0 and not tied.tails:
+        bare = find_bare_cells(strands, hull, masks, scene.cameras, scene.head)
+        seeds = _spread_seeds(bare, hull, options.cover * len(strands))
+        if len(seeds):
+            back = grow(field, -direction, distance, seeds, way, options, shoulders)
+            ahead = grow(field, direction, distance, seeds, way, options, shoulders)
+            ways = (s.points.reshape(len(seeds), -1, 3) for s in (back, ahead))
+            strands = lead_to_roots(strands, roots.positions, *ways)
     return finish(replace(strands, root_uv=roots.uv), waves, tied, hull, field, options)
+
+
+def _spread_seeds(bare: Float64Array, hull: Hull, strands: float) -> Float32Array:
+    """Return starts (K, 3) in bare cells (N, 3): `strands` times their share of the hair."""
+    wanted = int(np.ceil(strands * len(bare) / max(int(hull.dense.sum()), 1)))
+    chosen = np.arange(wanted) * len(bare) // max(wanted, 1)
+    jitter = np.random.RandomState(0).uniform(-0.5, 0.5, (wanted, 3))  # its stream never changes
+    seeds: Float32Array = (bare[chosen] + hull.grid.spacing * jitter).astype(np.float32)
+    return seeds
 
 
 def grow(

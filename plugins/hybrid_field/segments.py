@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from hairkit import Camera, Head, Hull, Mask, Parting, Strands
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.field.cell_shells import erode_cells
-from hairkit.field.growth_prior import combing_direction, long_share, parts
+from hairkit.field.growth_prior import combing_direction, gradient, long_share, parts
 from hairkit.field.parting import crown_share
 from hairkit.field.sampling_kernels import copy_point, make_unit, principal_direction, sample_at
 from hairkit.field.view_fusion import FusedViews
@@ -33,6 +33,9 @@ NEIGHBOURS, ROUNDS = 8, 10
 """Nearest segments that a segment compares its sign with, and the rounds of it."""
 NEIGHBOUR_WEIGHT = 0.5
 """Weight of a parallel neighbour's sign against a growth of one metre per metre."""
+HANGING_WEIGHT, HANGS_OFF = 0.5, 0.02
+"""Weight of hanging down against a growth of one metre per metre, and the metres off the head from
+which hair hangs: where a tuft stands out, the potential leads hair below it upwards."""
 OUTER_CELLS = 2
 """Depth in cells of the hull's outer shell, which photos see."""
 BEST = 95
@@ -173,10 +176,10 @@ def _follow_tensors(
 def orient_segments(segments: Strands, hull: Hull, way: Way) -> Strands:
     """Return the segments root to tip, those that ran tip to root reversed.
 
-    Each starts with the sign of the way to the tips along it: that of the growth potential, of the
-    comb in short hair, whose ends lie everywhere, and on a crown that is known. In each round it
-    then takes the sign of a vote: that way, and the signs of its nearest segments weighted by the
-    cosine between them.
+    Each starts with the sign of the way to the tips along it: that of the growth potential, and of
+    gravity beside the head; that of the comb in short hair, whose ends lie everywhere, and on a
+    crown that is known. In each round it then takes the sign of a vote: that way, and the signs of
+    its nearest segments weighted by the cosine between them.
     """
     count = len(segments)
     level = hull.grid.sample(way.growth, np.concatenate([segments.roots, segments.tips]))
@@ -189,7 +192,10 @@ def orient_segments(segments: Strands, hull: Hull, way: Way) -> Strands:
     if parts(way.parting, way.hair_length):
         combed = np.maximum(combed, crown_share(way.parting, way.head, middle))
     rise = np.clip((level[count:] - level[:count]) / length, -1, 1)
-    wish = (1 - combed) * rise + combed * (unit * comb).sum(axis=1)
+    off = np.clip(hull.grid.sample(hull.head_distance, middle) / HANGS_OFF, 0, 1)
+    beside = 1 - np.maximum(gradient(hull.grid, hull.head_distance, middle)[:, 1], 0)
+    hangs = -HANGING_WEIGHT * off * beside * unit[:, 1]
+    wish = (1 - combed) * (rise + hangs) + combed * (unit * comb).sum(axis=1)
     near = cKDTree(middle).query(middle, k=min(NEIGHBOURS + 1, count))[1].reshape(count, -1)[:, 1:]
     parallel = np.einsum("nkc,nc->nk", unit[near], unit)
     sign = np.where(wish < 0, -1.0, 1.0)

@@ -44,11 +44,11 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
     ("changed", "again"),
     [
         ("hairkit/types/camera.py", "scene head hull field track"),
-        ("hairkit/types/mask.py", "segment scene head orient hull field"),
+        ("hairkit/types/mask.py", "segment scene head orient hull field track"),
         ("hairkit/storage.py", "segment scene head orient hull field track"),
         ("hairkit/cameras/silhouette_coherence.py", "scene"),
         ("hairkit/cameras/outlines.py", "scene head"),
-        ("hairkit/cameras/projection_kernels.py", "hull field"),
+        ("hairkit/cameras/projection_kernels.py", "hull field track"),
         ("hairkit/imaging/seeded_segmentation.py", "segment"),
         ("hairkit/imaging/geodesic.py", "segment"),
         ("hairkit/head_model/signed_distance.py", "hull"),

@@ -12,6 +12,7 @@ from hairkit.arrays import Float32Array
 from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.testing import (
     ball_head,
+    ball_mask,
     combed_field,
     scalp_roots,
     shell_hull,
@@ -24,11 +25,15 @@ from hairkit.types.tie import TiedHair
 from hairkit.types.volume import OrientationField, VoxelGrid
 from hairkit.types.waves import Waves
 
-FREE = Options(slide_sine=0.0, waves=False, clearance=0.0)
+FREE = Options(slide_sine=0.0, waves=False, clearance=0.0, cover=0.0)
 DISTANCE = measure_scalp_distance(ball_head(), shell_hull())
 LOOSE = TiedHair()
 CAMERA = Camera.on_turn(0.0, distance=1.0, focal=100.0, width=80, height=60)
 SCENE = Scene(("front",), (CAMERA,), ball_head())
+MASKS = (ball_mask(CAMERA),)
+SHARP_CAMERA = Camera.on_turn(0.0, distance=1.2, focal=600.0, width=240, height=240)
+SHARP = Scene(("front",), (SHARP_CAMERA,), ball_head())
+SHARP_MASKS = (ball_mask(SHARP_CAMERA),)
 GRID = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.01)
 
 
@@ -136,7 +141,7 @@ def test_a_root_where_nothing_is_known_keeps_its_place() -> None:
 def follow_ball(options: Options, roots: Roots) -> Strands:
     hull = shell_hull()
     field = combed_field(hull.grid)
-    return track(SCENE, hull, field, roots, Waves(), DISTANCE, LOOSE, options)
+    return track(SCENE, MASKS, hull, field, roots, Waves(), DISTANCE, LOOSE, options)
 
 
 def test_a_field_without_signs_is_followed_along_its_growth() -> None:
@@ -236,7 +241,15 @@ def test_strands_can_be_smoothed_by_helix_arcs() -> None:
     options = replace(FREE, inertia=0.0, reach=2.0)
     rough, calm = (
         track(
-            SCENE, hull, noisy, roots, Waves(), DISTANCE, LOOSE, replace(options, helix_tolerance=t)
+            SCENE,
+            MASKS,
+            hull,
+            noisy,
+            roots,
+            Waves(),
+            DISTANCE,
+            LOOSE,
+            replace(options, helix_tolerance=t),
         )
         for t in (0.0, 0.0005)
     )
@@ -265,13 +278,14 @@ def test_a_strand_does_not_depend_on_how_many_others_are_grown() -> None:
     among, alone = (
         track(
             SCENE,
+            MASKS,
             hull,
             combed_field(hull.grid),
             r,
             Waves(0.006, 0.04, 0.0),
             DISTANCE,
             TiedHair(),
-            Options(),
+            Options(cover=0.0),
         )
         for r in (roots, few)
     )
@@ -302,3 +316,22 @@ def test_sliding_strands_are_pulled_back_to_the_surface() -> None:
         for p in (0.0, 1.0)
     )
     assert abs(pulled.tips[0, 1]) < 0.5 * free.tips[0, 1]
+
+
+def test_hair_that_photos_show_and_no_strand_reaches_gets_strands() -> None:
+    """Hair is combed down from a crown without roots: strands are led to it from around."""
+    everywhere = scalp_roots(ball_head())
+    around = np.hypot(*everywhere.positions.T[[0, 2]]) > 0.035
+    columns = ("positions", "normals", "uv", "triangle", "barycentric")
+    roots = Roots(*(getattr(everywhere, name)[around] for name in columns))
+    hull = shell_hull()
+    field = combed_field(hull.grid)
+    on_crown = []
+    for cover in (0.0, 2.0):
+        options = replace(FREE, reach=1.0, cover=cover)
+        found = track(SHARP, SHARP_MASKS, hull, field, roots, Waves(), DISTANCE, LOOSE, options)
+        near = np.hypot(*found.points.T[[0, 2]]) < 0.025
+        on_crown.append(int((near & (found.points[:, 1] > 0)).sum()))
+        np.testing.assert_array_equal(found.roots, roots.positions)
+    assert on_crown[0] == 0
+    assert on_crown[1] > 100

@@ -138,6 +138,20 @@ def test_segments_of_short_hair_run_as_it_is_combed() -> None:
         assert (sign * (result.tips - result.roots)[:, 1] > 0).all()
 
 
+def test_hair_beside_the_head_hangs() -> None:
+    """A tuft that stands out lets the potential rise upwards below it: weakly, so hair hangs. On
+    the skin and above the head the potential decides."""
+    hull = hair()
+    course = np.linspace(0, 0.02, 8)[:, None] * np.array([0.0, 1.0, 0.0])
+    rising = (0.3 * hull.grid.centres()[..., 1]).astype(np.float32)
+    beside = 0.03 + hull.grid.centres()[..., 0]
+    for distance, sign in ((beside, -1), (beside - 0.03, 1), (hull.head_distance, 1)):
+        hanging = replace(hull, head_distance=distance.astype(np.float32))
+        upward = Strands((CENTRE + course).astype(np.float32), [0, 8])
+        result = orient_segments(upward, hanging, Way(rising, ball_head(), Parting(), LONG))
+        assert (sign * (result.tips - result.roots)[:, 1] > 0).all()
+
+
 def test_ribbons_widen_segments_along_the_surface() -> None:
     """A wider ribbon covers more cells, all directions unit where one segment runs alone."""
     hull = hair()
