@@ -41,6 +41,7 @@ SCHEDULER = {
     "DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION": "1.0",
 }
 """Settings of a scheduler as docs/tutorials/batch.md advises, and as `--dask local` has them."""
+QUIET = ("--workers", str(WORKERS), "--time-limit", "3600")
 ROUNDS = 8
 """Most batches that are run until all captures are done."""
 GROWN_MB = 4000
@@ -140,7 +141,7 @@ def main() -> int:
         (folder / "poison.py").write_text(POISON)
         good = sorted(path.name for path in captures.iterdir() if path.name not in BAD)
         only = [word for name in good for word in ("--only", name)]
-        quiet = run_batch(args, folder, "quiet", [*only, "--workers", str(WORKERS)])
+        quiet = run_batch(args, folder, "quiet", [*only, *QUIET])
         print(f"quiet: {quiet['done']} of {len(good)} captures done", flush=True)
         with small_disk(folder / "chaos", args.disk) as grow:
             farm = Farm(folder, free_port())
@@ -185,10 +186,10 @@ def run_batch(
     """Run `hairkit batch` and return the number of captures by state, and of full disks."""
     changes = ["capture=poison,photo_folder", *(args.set or SIMPLE)]
     words = [sys.executable, "-m", "hairkit", "batch", "captures", "-o", out, "--quiet", "--json"]
-    words += ["--recipe", args.recipe, "--guides", GUIDES, "--threads", "1", "--no-report", *more]
+    words += ["--recipe", args.recipe, "--guides", GUIDES, "--threads", "1", "--no-report"]
     words += [word for text in changes for word in ("--set", text)]
     words += [word for file in ["poison.py", *args.plugin] for word in ("--plugin", file)]
-    words += ["--time-limit", str(args.time_limit), "--capture-memory", str(args.memory)]
+    words += ["--time-limit", str(args.time_limit), "--capture-memory", str(args.memory), *more]
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
     try:
         results = json.loads(done.stdout)

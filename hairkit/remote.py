@@ -111,7 +111,7 @@ def fetch(url: str) -> Path:
     with tempfile.TemporaryDirectory(dir=copies(), prefix=".part-") as folder, _files(url) as at:
         files, path = at
         files.get(path.rstrip("/"), f"{folder}/{copy.name}", recursive=True)
-        with contextlib.suppress(FileExistsError, OSError):  # another process was faster
+        with contextlib.suppress(OSError):  # another process was faster
             os.rename(folder, copy.parent)
             os.mkdir(folder)
     return copy

@@ -12,9 +12,10 @@ import itertools
 import queue
 import threading
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
-from hairkit.batches.jobs import FAILED, Job, Result, Settings
+from hairkit.batches.jobs import DONE, FAILED, Job, Result, Settings, finished
 from hairkit.batches.pool import Watcher
 from hairkit.batches.run_job import COMMAND, JobLimits, run_job, start_child
 from hairkit.child_process import ChildProcess
@@ -81,9 +82,10 @@ class DaskPool:
             submit(WINDOW)
             while self._futures:
                 future = self._next(ended)
-                _, job = self._futures.pop(future.key)
+                result = self._result(future, self._futures.pop(future.key)[1])
+                del future  # its worker may be lost now without the capture being done again
                 submit(1)
-                yield self._result(future, job)
+                yield result
         finally:
             left = [future for future, _ in self._futures.values()]
             with contextlib.suppress(Exception):  # a scheduler that is gone cannot cancel either
@@ -158,7 +160,13 @@ def _do(
     threads: int,
     command: tuple[str, ...],
 ) -> Result:
-    """Run a job on a worker of Dask, in the process that its thread keeps."""
+    """Run a job on a worker of Dask, in the process that its thread keeps.
+
+    What another worker has done that was lost before it could say so is not done again.
+    """
+    kept = finished(job, digest)
+    if kept is not None:
+        return replace(kept, state=DONE)
     child: ChildProcess | None = getattr(_own, "child", None)
     if child is None or _own.kind != (threads, command):
         _own.child = child = start_child(threads, command)

@@ -177,7 +177,7 @@ class Recipe:
 
 
 def load_recipe(name: str | os.PathLike[str]) -> Recipe:
-    """Read a shipped recipe by name, or a `.toml` file by path; `InputError` says what is wrong."""
+    """Read a recipe that ships, by name, or a `.toml` file by path or URL; raises `InputError`."""
     text = os.fspath(name)
     if text in recipe_names():
         return parse_recipe(_read_shipped(text), text, f"recipe {text}")

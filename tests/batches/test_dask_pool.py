@@ -113,3 +113,20 @@ def test_a_lost_scheduler_is_one_line_and_the_rest_is_done_again(tmp_path: Path)
     done = [path.parent.name for path in (tmp_path / "out").glob("*/batch.json")]
     assert 1 <= len(done) < len(names)
     assert len(find_jobs(tmp_path / "captures", tmp_path / "out")) == len(names)
+
+
+def test_what_a_lost_worker_has_done_is_not_done_again(tmp_path: Path) -> None:
+    """A task that Dask gives to a second worker finds the capture done, and starts no process."""
+    from hairkit.batches.dask_pool import _do
+    from hairkit.batches.jobs import DONE, Result, Settings
+    from hairkit.batches.run_job import JobLimits
+
+    write_captures(tmp_path / "captures", "good-0")
+    (job,) = find_jobs(tmp_path / "captures", tmp_path / "out")
+    Path(job.out).mkdir(parents=True)
+    (Path(job.out) / "groom.npz").write_bytes(b"hair")
+    Result(job.name, DONE, job.out, 2.5, digest="same").write()
+    found = _do(job, Settings(), "same", JobLimits(60.0), 1, ("/nobody/here",))
+    assert (found.state, found.seconds, found.error) == (DONE, 2.5, "")
+    lost = _do(job, Settings(), "other", JobLimits(60.0), 1, ("/nobody/here",))
+    assert "cannot be started" in lost.error
