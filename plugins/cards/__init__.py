@@ -53,7 +53,7 @@ class Options(ExportOptions):
 
     cards: int = option(2000, low=8, high=20_000, doc="Cards of the finest level.")
     levels: int = option(
-        4, low=1, high=6, doc="Levels of detail, each with 0.4 of the cards before."
+        4, low=1, high=6, doc="Levels of detail, each with 0.55 of the cards before."
     )
     stations: int = option(10, low=3, high=64, doc="Pairs of vertices along each card.")
     atlas: int = option(2048, low=256, high=16_384, doc="Edge of the atlas.", unit="px")

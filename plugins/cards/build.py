@@ -16,7 +16,7 @@ from .packing import Places, pack
 from .painting import blank_atlas, paint
 from .strips import Cards, make_cards
 
-FEWER = 0.4
+FEWER = 0.55
 """Cards of a level, of those of the level before."""
 FEWEST = 8
 """Cards of a level at least."""
