@@ -27,7 +27,7 @@ from hairkit.types.tie import TiedHair
 from hairkit.types.waves import Waves
 
 TRACKERS: dict[str, dict[str, object]] = {
-    "hybrid_growth": {"waves": False},
+    "hybrid_growth": {"waves": False, "cover": 0.0},
     "certainty_tracker": {},
 }
 """Trackers with the options that let them do the same work."""

@@ -17,8 +17,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from hairkit import storage
 from hairkit.errors import HairkitError, InputError, MissingExtraError
+from hairkit.storage import MAX_FILE_BYTES
+from hairkit.storage import read_bytes as read_local
+from hairkit.storage import write_text as write_local
 
 STAMPS = ("ETag", "etag", "mtime", "LastModified", "last_modified", "updated", "created")
 """What services call that which changes with a file's content."""
@@ -43,10 +45,10 @@ def join(place: str | os.PathLike[str], *names: str) -> str:
     return "/".join([text.rstrip("/"), *names]) if is_url(text) else str(Path(text, *names))
 
 
-def read_bytes(place: str | os.PathLike[str], limit: int = storage.MAX_FILE_BYTES) -> bytes:
+def read_bytes(place: str | os.PathLike[str], limit: int = MAX_FILE_BYTES) -> bytes:
     """Return a file's bytes; `InputError` where there is none, or above `limit` bytes."""
     if not is_url(place):
-        return storage.read_bytes(place, limit)
+        return read_local(place, limit)
     with _files(place) as (files, path):
         size = int(files.size(path) or 0)
         if size > limit:
@@ -57,7 +59,7 @@ def read_bytes(place: str | os.PathLike[str], limit: int = storage.MAX_FILE_BYTE
 def write_text(place: str | os.PathLike[str], text: str) -> None:
     """Write a file whole."""
     if not is_url(place):
-        storage.write_text(place, text)
+        write_local(place, text)
         return
     with _files(place) as (files, path):
         files.makedirs(files._parent(path), exist_ok=True)
