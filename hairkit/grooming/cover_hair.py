@@ -10,6 +10,7 @@ place of the strand of the nearest root.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -106,24 +107,19 @@ def lead_to_roots(
     """
     tree = cKDTree(roots)
     nearest = tree.query(back.reshape(-1, 3))[0].reshape(len(back), -1)
-    count = len(strands.points) // len(strands)
-    points = strands.points.reshape(len(strands), count, 3).copy()
     free = np.ones(len(roots), bool)
+    chosen, lines = [], []
     for way, on, end in zip(back, ahead, nearest.argmin(axis=1), strict=True):
         near = np.array(tree.query_ball_point(way[end], ROOT_REACH), np.int64)
         near = near[free[near]]
         if len(near):
             root = near[np.argmin(np.linalg.norm(roots[near] - way[end], axis=1))]
             free[root] = False
-            line = np.concatenate([roots[root, None], way[end::-1], on[1:]])
-            points[root] = _even(line, count)
-    return Strands(
-        points.reshape(-1, 3), strands.offsets, strands.widths, strands.root_uv, strands.group
-    )
-
-
-def _even(line: Float32Array, count: int) -> Float64Array:
-    """Return `count` points at equal shares of a line (M, 3)."""
-    arc = np.append(0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-    at = np.linspace(0, arc[-1], count)
-    return np.stack([np.interp(at, arc, column) for column in line.T], axis=1)
+            chosen.append(root)
+            lines.append(np.concatenate([roots[root, None], way[end::-1], on[1:]]))
+    if not chosen:
+        return strands
+    points = strands.points.reshape(len(strands), -1, 3).copy()
+    even = Strands.from_list(lines).resampled(points.shape[1])
+    points[chosen] = even.points.reshape(len(chosen), -1, 3)
+    return replace(strands, points=points.reshape(-1, 3))
