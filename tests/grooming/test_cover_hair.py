@@ -55,6 +55,16 @@ def test_no_cell_is_bare_where_strands_are_drawn_before_it_or_the_head_hides_it(
     assert not len(low)
 
 
+def test_few_guides_stand_for_the_hair_between_them() -> None:
+    """Every ninth strand of hair all around leaves next to no bare cell."""
+    cells = HULL.grid.centres_of(HULL.dense)[::9]
+    points = np.repeat(cells, 2, axis=0).astype(np.float32)
+    points[1::2, 1] += 0.1 * CELL
+    few = Strands(points, np.arange(len(cells) + 1) * 2)
+    bare = find_bare_cells(few, HULL, masks(), CLOSE, ball_head())
+    assert len(bare) < 0.01 * HULL.dense.sum()
+
+
 def test_ways_join_the_nearest_free_roots() -> None:
     """Two ways from one place join two roots; a third, from far away, none. The rest stays."""
     roots = scalp_roots(ball_head()).positions
