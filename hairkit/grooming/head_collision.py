@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.field.sampling_kernels import copy_point, gradient_at, sample_at
 from hairkit.parallel import compiled, parallel_for
 from hairkit.types.strands import Strands
@@ -15,19 +15,22 @@ from hairkit.types.volume import Hull
 
 ROUNDS = 3
 """Times that a point is moved along the gradient of the sampled distance."""
+FULL_AFTER = 0.004
+"""Metres from the root after which a strand keeps its whole distance from the head."""
 MIN_POINTS = 2048
 """Least number of points that are worth another thread."""
 
 
 def push_out_of_head(strands: Strands, hull: Hull, clearance: float) -> Strands:
-    """Return strands whose points, but for the roots, keep `clearance` metres from the head."""
+    """Return strands whose points, but for the roots, keep `clearance` metres from the head.
+
+    It grows from 0 at the root: a strand that keeps all of it at once would leave the skin upright.
+    """
     points = strands.points.copy()
-    free = np.ones(len(points), bool)
-    free[strands.offsets[:-1]] = False
+    apart = clearance * np.minimum(strands.arc_lengths() / FULL_AFTER, 1.0)
+    apart[strands.offsets[:-1]] = -np.inf
     field = _HeadDistance(hull.grid.origin, float(hull.grid.spacing), hull.head_distance[..., None])
-    parallel_for(
-        _push_points, len(points), field, float(clearance), free, points, min_chunk=MIN_POINTS
-    )
+    parallel_for(_push_points, len(points), field, apart, points, min_chunk=MIN_POINTS)
     return replace(strands, points=points)
 
 
@@ -47,19 +50,16 @@ def _push_points(
     first: int,
     last: int,
     head: _HeadDistance,
-    clearance: float,
-    free: BoolArray,
+    apart: Float64Array,
     points: Float32Array,
 ) -> None:
-    """Move free points (P, 3) along the distance's gradient until they are `clearance` off."""
+    """Move points (P, 3) along the distance's gradient until they are `apart` (P,) off."""
     p, level, normal = np.empty(3), np.empty(1), np.empty(3)
     for i in range(first, last):
-        if not free[i]:
-            continue
         copy_point(points[i], p)
         for _ in range(ROUNDS):
             sample_at(head.origin, head.spacing, head.values, p, level)
-            lack = clearance - level[0]
+            lack = apart[i] - level[0]
             if lack <= 0:
                 break
             gradient_at(head.origin, head.spacing, head.values, p, normal)

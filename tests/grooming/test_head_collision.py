@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hairkit.field.growth_prior import gradient
-from hairkit.grooming.head_collision import ROUNDS, push_out_of_head
+from hairkit.grooming.head_collision import FULL_AFTER, ROUNDS, push_out_of_head
 from hairkit.testing import shell_hull
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
@@ -18,10 +18,11 @@ HULL = shell_hull(0.01)
 def twin(strands: Strands, hull: Hull, clearance: float) -> np.ndarray[tuple[int, int], np.dtype]:
     """The readable twin of the compiled kernel."""
     points = strands.points.astype(np.float64)
+    apart = clearance * np.minimum(strands.arc_lengths() / FULL_AFTER, 1)
     free = np.ones(len(points), bool)
     free[strands.offsets[:-1]] = False
     for _ in range(ROUNDS):
-        lack = clearance - hull.grid.sample(hull.head_distance, points)
+        lack = apart - hull.grid.sample(hull.head_distance, points)
         near = np.flatnonzero((lack > 0) & free)
         points[near] += lack[near, None] * gradient(hull.grid, hull.head_distance, points[near])
     return points
@@ -48,3 +49,12 @@ def test_points_keep_the_clearance_and_roots_stay(rng: np.random.Generator) -> N
     assert (away[~deep] > 0.1 + 0.001).all()
     outside = np.linalg.norm(points[rest], axis=1) > 0.104
     np.testing.assert_array_equal(found.points[rest][outside], points[rest][outside])
+
+
+def test_hair_leaves_the_skin_as_it_was_combed() -> None:
+    """Strands that run flat over the ball turn up by no more than the clearance over its way."""
+    angle = np.linspace(0, 0.3, 64)
+    arc = 0.1 * np.stack([np.sin(angle), np.cos(angle), 0 * angle], axis=1)
+    found = push_out_of_head(Strands.from_list([arc.astype(np.float32)]), HULL, 0.001)
+    first = np.diff(found.points, axis=0)[0]
+    assert first[1] / np.linalg.norm(first) < 0.35
