@@ -134,11 +134,22 @@ def nearest_edge(points: Float64Array) -> Float64Array:
     return np.asarray(np.column_stack([points[:, 0], 1e-3 * nearer, points[:, 2]]))
 
 
-def near_edge(points: Float64Array) -> BoolArray:
-    """Return (N,) whether points (N, 3), metres, belong on an edge of the lids."""
+def near_edge(points: Float64Array, faces: Int32Array) -> BoolArray:
+    """Return (N,) whether points (N, 3), metres, belong on an edge of the lids.
+
+    They do where they are near it, or nearer than the other end of a side of faces (F, 3) that
+    crosses it: afterwards none does, and the lids have smooth edges.
+    """
     x = 1e3 * np.abs(points[:, 0])
-    along = (x > UPPER_LID[0][0]) & (x < UPPER_LID[-1][0])
-    return np.asarray(along & (np.abs(between_lids(points)) < NEAR_EDGE))
+    depth = between_lids(points)
+    near = (x > UPPER_LID[0][0]) & (x < UPPER_LID[-1][0]) & (np.abs(depth) < NEAR_EDGE)
+    depth[near] = 0
+    sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    crossing = sides[(depth[sides] * [1, -1]).min(axis=1) > 0]
+    crossing = crossing[(x[crossing] > UPPER_LID[0][0]).all(axis=1)]
+    nearer = np.abs(depth[crossing]).argmin(axis=1)
+    near[crossing[np.arange(len(crossing)), nearer]] = True
+    return near
 
 
 def open_lids(points: Float64Array) -> Float64Array:

@@ -78,7 +78,7 @@ def default_head() -> Head:
     targets = _landmarks()
     landmarks = cKDTree(vertices).query(targets)[1]
     directions[landmarks] = _fit_directions(directions[landmarks], targets)
-    directions = _trace_lids(directions, landmarks)
+    directions = _trace_lids(directions, faces, landmarks)
     polar, azimuth = _angles(directions)
     vertices = open_lids(head_surface(polar, azimuth))
     radius = 0.5 * polar / np.pi
@@ -128,10 +128,10 @@ def _refine_regions(directions: Float64Array) -> Float64Array:
     return directions
 
 
-def _trace_lids(directions: Float64Array, landmarks: Int32Array) -> Float64Array:
+def _trace_lids(directions: Float64Array, faces: Int32Array, landmarks: Int32Array) -> Float64Array:
     """Return the directions (N, 3), those of vertices near a lid's edge moved onto it."""
     points = head_surface(*_angles(directions))
-    near = near_edge(points)
+    near = near_edge(points, faces)
     near[landmarks] = False
     traced = directions.copy()
     traced[near] = _fit_directions(directions[near], nearest_edge(points[near]))
