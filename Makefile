@@ -1,6 +1,7 @@
 # `make test` and `make demo` need Python 3.11 or newer and make; what else they need they fetch:
 # into .venv by pip and, as root on Debian or Ubuntu, the OpenGL libraries by apt.
-# `make test-clients` adds what Blender 4.5 and 5.0 make of the files; both need Python 3.11.
+# `make test-clients` adds what Blender 4.5 and 5.0 (both need Python 3.11), three.js and Godot 3
+# make of the files.
 
 PYTHON ?= python3
 VENV := .venv
@@ -11,6 +12,7 @@ DEMO := demo-out
 EXAMPLE := examples/hairkit-sobel
 LIBRARIES := libegl1 libgl1 libgl1-mesa-dri libosmesa6
 DISPLAYS := xvfb chromium
+ENGINES := xvfb xauth godot3
 
 .PHONY: test test-clients demo lint docs matrix wheel bench clean
 
@@ -23,6 +25,7 @@ test: $(VENV)/.tests $(VENV)/.models
 	$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/clients
 
 test-clients: $(VENV)/.tests $(CLIENTS)/.blender
+	@sh .ci/libraries $(ENGINES)
 	@sh .ci/validator $(CLIENTS)
 	@sh .ci/three $(CLIENTS)
 	$(BIN)/python -m pytest -n auto --dist worksteal tests/clients

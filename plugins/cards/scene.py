@@ -54,7 +54,7 @@ def with_chains(
     if chains is None:
         return Skeleton(names, places, parents, head, begin)
     number = np.searchsorted(chains.first, np.arange(len(chains.places)), side="right") - 1
-    added = [f"hair_{c:02}_{j - chains.first[c]}" for j, c in enumerate(number)]
+    added = [f"hair_{c}_{j - chains.first[c]}" for j, c in enumerate(number)]
     above = [head[HEAD_JOINT] if p < 0 else int(p) + begin for p in chains.parent]
     return Skeleton(
         names + added, np.concatenate([places, chains.places]), parents + above, head, begin

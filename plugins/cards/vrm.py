@@ -100,7 +100,7 @@ def _springs(groom: Groom, chains: Chains, skeleton: Skeleton, nodes: list[int])
         members = [nodes[skeleton.chains + j] for j in range(first, last)]
         springs.append(
             {
-                "name": f"hair_{number:02}",
+                "name": f"hair_{number}",
                 "joints": [{"node": node, **joint} for node in members],
                 "colliderGroups": [0],
             }

@@ -1,7 +1,8 @@
-"""What the checks by Blender share. They are skipped where there is no Blender as a module."""
+"""What the checks by other programs share. They are skipped where a program is missing."""
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from blender_session import PROJECT, VARIABLE, BlenderSession, blender_pythons, z_up
 from client_groom import wandering
 from rich_groom import rich_groom
+from three_session import CLIENTS
 
 from hairkit.grooming.guide_weights import follow
 from hairkit.types.groom import Groom
@@ -51,6 +53,15 @@ def addon(blender: BlenderSession, tmp_path_factory: pytest.TempPathFactory) -> 
     state = blender.call("addon.installed", package=package)
     assert state == {"enabled": True, "operators": OPERATORS, "menu": True}
     return blender
+
+
+@pytest.fixture(scope="session")
+def node() -> str:
+    """Node, where three.js and three-vrm are installed for it."""
+    found = shutil.which("node")
+    if found is None or not (CLIENTS / "node_modules" / "@pixiv" / "three-vrm").exists():
+        pytest.skip("no three.js: run `make test-clients`")
+    return found
 
 
 @pytest.fixture(scope="session")

@@ -85,7 +85,7 @@ if (vrm) {
   told.vrm = {
     version: vrm.meta.metaVersion,
     bones: Object.keys(vrm.humanoid.humanBones),
-    joints: joints.length,
+    joints: joints.map((j) => j.bone.name),
     colliders: vrm.springBoneManager.colliders.length,
     before,
     after,
