@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from hairkit.types.scene import Scene
     from hairkit.types.strands import Strands
     from hairkit.types.tie import Tail, Tie, TiedHair
+    from hairkit.types.torso_shape import TorsoShape
     from hairkit.types.turnaround import Turnaround
     from hairkit.types.volume import Hull, OrientationField, ScalpDistance, VoxelGrid
     from hairkit.types.waves import Waves
@@ -116,6 +117,7 @@ __all__ = [
     "Tail",
     "Tie",
     "TiedHair",
+    "TorsoShape",
     "Turnaround",
     "View",
     "VoxelGrid",
@@ -171,6 +173,7 @@ _HOMES = {
     "types.scene": ("Scene",),
     "types.strands": ("Strands",),
     "types.tie": ("Tail", "Tie", "TiedHair"),
+    "types.torso_shape": ("TorsoShape",),
     "types.turnaround": ("Turnaround",),
     "types.volume": ("Hull", "OrientationField", "ScalpDistance", "VoxelGrid"),
     "types.waves": ("Waves",),

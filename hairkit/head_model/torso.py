@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cache
 from typing import NamedTuple
 
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
 from hairkit.parallel import compiled, parallel_for
 from hairkit.types.head import Head
+from hairkit.types.torso_shape import TorsoShape
 from hairkit.types.volume import VoxelGrid
 
 RINGS = np.array(
@@ -43,39 +44,26 @@ _THINNEST = 1e-6
 """Metres; least half breadth and depth of a section that `depth` makes smaller."""
 
 
-@dataclass(frozen=True, eq=False)
-class Torso:
-    """Neck, shoulders and chest of a person; ratios are to an adult's, lengths to the head's."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Torso(TorsoShape):
+    """Neck, shoulders and chest of a person, in their place under a head."""
 
     joint: Float64Array
     """(3,) the head's root joint, metres, head frame."""
     scale: float = 1.0
     """Size of the head."""
-    breadth: float = 1.0
-    """Ratio, of shoulders and chest."""
-    depth: float = 1.0
-    """Ratio, of shoulders and chest."""
-    drop: float = 0.0
-    """Metres that the torso lies lower."""
-    slope: float = 1.0
-    """Ratio of the way down from the neck to the shoulders' ends."""
-    forward: float = 0.0
-    """Metres that the chest lies further in front."""
-    lean: float = 0.0
-    """Metres further in front for each metre up."""
-    sideways: float = 0.0
-    """Metres that the chest lies further to the subject's left."""
-    roll: float = 0.0
-    """Metres that the shoulders rise for each metre to the left."""
-    yaw: float = 0.0
-    """Radians that the chest is turned to the subject's left."""
 
     @classmethod
     def under(cls, head: Head) -> Torso:
-        """Return an adult's torso under a head, in the head's size."""
+        """Return the torso under a head, in its size: the person's, or an average adult's."""
         joints = head.joints.astype(np.float64)
         apart = float(np.linalg.norm(joints[2] - joints[0]))
-        return cls(joints[0], apart / JOINTS_APART if apart > 0 else 1.0)
+        shape = {} if head.torso is None else asdict(head.torso)
+        return cls(joint=joints[0], scale=apart / JOINTS_APART if apart > 0 else 1.0, **shape)
+
+    def shape(self) -> TorsoShape:
+        """Return its shape without its place."""
+        return TorsoShape(**{field.name: getattr(self, field.name) for field in fields(TorsoShape)})
 
     @property
     def top(self) -> float:

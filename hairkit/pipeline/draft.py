@@ -109,6 +109,7 @@ def draft(
         scene.head,
         density=_read(Hairline, work, "hairline").density,
         maps=_read(SkinMaps, work, "skin"),
+        torso=hull.torso,
     )
     roots = sample_roots(head, guides, 0, rest=default_head())
     strands = _call(manager, recipe, "track", **seen, field=field, roots=roots)

@@ -243,7 +243,9 @@ def _grow(
     parting, tied = seen["parting"].value, seen["tied"].value
     hairline = run.derive("hairline", Hairline, measure_hairline, scene=scene, masks=masks)
     skin = find_skin(run, photos, masks, scene)
-    grown = replace(scene.value.head, density=hairline.value.density, maps=skin)
+    grown = replace(
+        scene.value.head, density=hairline.value.density, maps=skin, torso=hull.value.torso
+    )
     roots = Given.of(sample_roots(grown, guides, seed, rest=head))
     strands = run.once("track", Strands, **seen, field=field, roots=roots)
     labels = tuple(mask.result().value for mask in masks)

@@ -23,6 +23,7 @@ the packages named after the subject.
 * `strands`: packed polylines
 * `texture_example`: what a texture is to become
 * `tie`: ties, and the tails that hang from them
+* `torso_shape`: how a torso differs from an average one
 * `turnaround`: from where each photo was taken
 * `volume`: grid, hull, orientation field, distance from the scalp
 * `waves`: radius, pitch and slant of wavy hair

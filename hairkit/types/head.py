@@ -13,6 +13,7 @@ from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.preview import Previewed, draw_turn
 from hairkit.types.skin import Blendshape, SkinMaps
+from hairkit.types.torso_shape import TorsoShape
 
 LANDMARKS = 68
 """Landmarks of a face, in the order of iBUG (Sagonas et al. 2013)."""
@@ -67,6 +68,8 @@ class Head(Previewed, Stored):
     """Shapes of the head's own vertices, such as expressions."""
     eye_vertices: Int32Array | None = None
     """(2, E) vertices of the left and the right eyeball, None on a head without eyeballs."""
+    torso: TorsoShape | None = None
+    """The torso below; None: an average adult's."""
 
     def __post_init__(self) -> None:
         vertices = frozen_array(self.vertices, np.float32, (None, 3), "head vertices")

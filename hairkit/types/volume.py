@@ -12,6 +12,7 @@ import numpy.typing as npt
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, frozen_array
 from hairkit.errors import DataError
 from hairkit.storage import Stored
+from hairkit.types.torso_shape import TorsoShape
 
 MAX_CELLS = 256**3
 """Largest number of cells a grid may have."""
@@ -106,6 +107,8 @@ class Hull(Stored):
     """(X, Y, Z) cells that may hold hair; contains `dense`."""
     head_distance: Float32Array
     """(X, Y, Z) signed distance to the head in metres, negative inside."""
+    torso: TorsoShape | None = None
+    """The torso that the photos show under the hair, or None."""
 
     def __post_init__(self) -> None:
         shape = self.grid.shape

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Capsules, Head
 from hairkit.types.tie import Tie
+from hairkit.types.torso_shape import TorsoShape
 
 VERSION = 1
 _PHYSICS = ("stiffness", "bend_stiffness", "damping", "friction", "gravity")
@@ -46,6 +47,7 @@ def groom_extras(groom: Groom) -> dict[str, Any]:
         ],
         "landmark_vertices": None if landmarks is None else landmarks.tolist(),
         "eye_vertices": None if head.eye_vertices is None else head.eye_vertices.tolist(),
+        "torso": None if head.torso is None else asdict(head.torso),
     }
 
 
@@ -86,9 +88,13 @@ def capsules_of(extras: dict[str, Any]) -> Capsules:
 
 
 def with_landmarks(head: Head, extras: dict[str, Any]) -> Head:
-    """Return the head with the file's landmarks and eyes, checked."""
-    eyes = extras.get("eye_vertices")
-    head = replace(head, eye_vertices=None if eyes is None else np.array(eyes, np.int32))
+    """Return the head with the file's landmarks, eyes and torso, checked."""
+    eyes, torso = extras.get("eye_vertices"), extras.get("torso")
+    head = replace(
+        head,
+        eye_vertices=None if eyes is None else np.array(eyes, np.int32),
+        torso=None if torso is None else TorsoShape(**{k: float(v) for k, v in torso.items()}),
+    )
     numbers = extras.get("landmark_vertices")
     if numbers is None:
         return head

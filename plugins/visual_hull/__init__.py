@@ -112,23 +112,21 @@ def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
     distance = signed_distance(scene.head, grid)
     outside = distance > 0 if options.cut_head else np.ones(grid.shape, bool)
     near = np.ones(grid.shape, bool)
-    torso = _torso(scene, masks, grid, options)
-    if torso is not None:
+    torso = _torso(scene, masks, options)
+    if torso is not None and grid.origin[1] < torso.top:
         outside &= ~torso.inside(grid, options.body_depth)
         above = grid.origin[1] + np.arange(grid.shape[1]) * grid.spacing > torso.top
         near = torso.inside(grid, -LYING) | above[:, None]
         views = views.in_front_of(torso)
     loose, dense = _carve_both(grid, outside, near, views, options)
     scalp = _scalp_shell(scene, grid, distance) if options.cut_head else np.zeros(grid.shape, bool)
-    return Hull(grid, dense, loose | dense | scalp, distance)
+    shape = None if torso is None else torso.shape()
+    return Hull(grid, dense, loose | dense | scalp, distance, shape)
 
 
-def _torso(
-    scene: Scene, masks: tuple[Mask, ...], grid: VoxelGrid, options: Options
-) -> Torso | None:
-    """Return the fitted torso, None if disabled or if the hair ends above it."""
-    reached = grid.origin[1] < Torso.under(scene.head).top
-    if not (options.cut_body and options.mode == "labels" and reached):
+def _torso(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Torso | None:
+    """Return the fitted torso, None if disabled."""
+    if not (options.cut_body and options.mode == "labels"):
         return None
     return fit_torso(scene.head, scene.cameras, masks)
 

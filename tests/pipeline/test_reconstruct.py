@@ -58,6 +58,8 @@ def test_photos_become_a_groom_and_its_files(tmp_path: Path) -> None:
     """Every root grows a strand; groom, cameras, export and log lie in the folder."""
     groom = run(tmp_path / "out")
     assert len(groom.strands) == 40
+    assert groom.head.torso is not None
+    assert groom.head.torso.breadth == 1.1
     assert set(files(tmp_path / "out")) == {"groom.npz", "scene.json", "groom.ball"}
     kept = to_arrays(Groom.load(tmp_path / "out" / "groom.npz"))
     assert all(np.array_equal(array, kept[name]) for name, array in to_arrays(groom).items())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,7 @@ from hairkit.testing import (
 from hairkit.types.face import Face
 from hairkit.types.mask import Masks
 from hairkit.types.person import Person
+from hairkit.types.torso_shape import TorsoShape
 from hairkit.types.turnaround import Turnaround
 
 FORMAT = FileFormat("Ball", (".ball",))
@@ -117,7 +118,7 @@ def orient(view: View, mask: Mask, options: Options) -> OrientationMap:
 @hookimpl
 def build_hull(options: Options) -> Any:
     _begin("hull", options)
-    return shell_hull()
+    return replace(shell_hull(), torso=TorsoShape(breadth=1.1))
 
 
 @hookimpl

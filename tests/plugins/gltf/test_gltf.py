@@ -24,6 +24,7 @@ from hairkit.testing import ball_head, bristle_groom
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.point_cache import PointCache
 from hairkit.types.strands import Strands
+from hairkit.types.torso_shape import TorsoShape
 
 
 def rich_groom() -> Groom:
@@ -80,8 +81,11 @@ def attribute(file: GlbFile, mesh: str, name: str) -> np.ndarray:
 @pytest.mark.parametrize("hair", ["none", "ribbons"])
 def test_round_trip_is_identity(tmp_path: Path, hair: str) -> None:
     """Everything that the format declares exact comes back within float32."""
-    groom = rich_groom()
+    plain = rich_groom()
+    torso = TorsoShape(breadth=1.2, drop=-0.01, yaw=0.1)
+    groom = replace(plain, head=replace(plain.head, torso=torso))
     found = gltf.import_groom(written(tmp_path, groom, hair=hair, strips=50), gltf.Options())
+    assert vars(found.head.torso) == vars(torso)
     for name in ("points", "offsets", "widths", "group", "guide"):
         np.testing.assert_array_equal(getattr(found.strands, name), getattr(groom.strands, name))
     np.testing.assert_allclose(found.strands.root_uv, groom.strands.root_uv, atol=1e-7)

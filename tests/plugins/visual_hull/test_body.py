@@ -69,7 +69,10 @@ def test_a_fitted_torso_is_taken_out_of_the_hull() -> None:
     options = Options(voxel_size=0.008, opening=0.0)
     filled = build_hull(scene, masks, replace(options, cut_body=False))
     carved = build_hull(scene, masks, options)
+    assert filled.torso is None
+    assert carved.torso is not None
     true = Torso.under(scene.head)
+    assert abs(np.log(carved.torso.breadth / true.breadth)) < 0.1
     deep = true.inside(carved.grid, 0.02)
     assert np.count_nonzero(filled.loose & deep) > 100
     assert not (carved.loose & deep).any()
