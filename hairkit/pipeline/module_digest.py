@@ -9,6 +9,7 @@ that a module loads at run time, such as shaders, are not covered.
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import hashlib
 import importlib.util
@@ -18,6 +19,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from hairkit.storage import parsing
 
@@ -51,10 +53,41 @@ def module_digest(module: str, roots: Roots | None = None) -> str:
     roots
         Where to look for sources; by default where Python finds hairkit and the module's package.
     """
+    key = (module, *(() if roots is None else roots.items()))
+    known = _DIGESTS.get(key)
+    if known is not None and known.states == _states(known.files):
+        return known.digest
+    found = sorted(imported_modules(module, roots).items())
+    files = tuple(path for _, path in found)
+    states = _states(files)
     digest = hashlib.sha256()
-    for name, path in sorted(imported_modules(module, roots).items()):
+    for name, path in found:
         digest.update(f"{name} {_read(path).digest}\n".encode())
-    return digest.hexdigest()
+    known = _DIGESTS[key] = _Known(files, states, digest.hexdigest())
+    return known.digest
+
+
+class _Known(NamedTuple):
+    """A digest, and the files that it holds for as long as they do not change."""
+
+    files: tuple[Path, ...]
+    states: list[tuple[int, int]]
+    digest: str
+
+
+_DIGESTS: dict[tuple[object, ...], _Known] = {}
+
+
+def _states(files: Iterable[Path]) -> list[tuple[int, int]]:
+    """Return time and size of files; -1 of those that are gone."""
+    states = []
+    for file in files:
+        with contextlib.suppress(OSError):
+            state = file.stat()
+            states.append((state.st_mtime_ns, state.st_size))
+            continue
+        states.append((-1, -1))
+    return states
 
 
 def imported_modules(module: str, roots: Roots | None = None) -> dict[str, Path]:
