@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import functools
 import json
 import os
 import resource
@@ -23,7 +24,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -132,23 +132,20 @@ def _child(ending: str, folder: Path, rounds: int) -> int:
     options = manager.options(name, SETTINGS[ending])
     held = _held_bytes()
     _forget_peak()
-    seconds, processor = _best(lambda: _export(manager, name, options, groom, path), rounds)
+    write = functools.partial(manager.call, "export_groom", name, options, groom=groom, path=path)
+    seconds, processor = _best(write, rounds, path)
     peak = _peak_bytes() - held
     data = path.read_bytes()
-    raw = _best(lambda: write_bytes(folder / "raw", data), rounds)[0]
+    raw = _best(lambda: write_bytes(folder / "raw", data), rounds, folder / "raw")[0]
     print(json.dumps(vars(Measured(ending, seconds, processor, raw, peak, len(data)))))
     return 0
 
 
-def _export(manager: Manager, name: str, options: Any, groom: Groom, path: Path) -> None:
-    path.unlink(missing_ok=True)
-    manager.call("export_groom", name, options, groom=groom, path=path)
-
-
-def _best(job: Callable[[], object], rounds: int) -> tuple[float, float]:
-    """Return the least wall and processor seconds of the rounds."""
+def _best(job: Callable[[], object], rounds: int, path: Path) -> tuple[float, float]:
+    """Return the least wall and processor seconds of the rounds; `path` is not there before any."""
     took = []
     for _ in range(rounds):
+        path.unlink(missing_ok=True)
         wall, processor = time.perf_counter(), time.process_time()
         job()
         took.append((time.perf_counter() - wall, time.process_time() - processor))

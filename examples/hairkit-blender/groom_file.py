@@ -1,6 +1,7 @@
 """A groom read from hairkit's native file with NumPy alone, turned to Blender's axes."""
 
 import zipfile
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,14 +48,21 @@ class GroomArrays:
 
 def read_groom(path):
     """Return the groom in an .npz file; `GroomError` when it is anything else."""
+    with stored_arrays(path, "a groom") as stored:
+        version = int(stored["hairkit_groom"])
+        if version != NEWEST:
+            raise GroomError(f"{path}: a groom of version {version}, this reads {NEWEST}")
+        return _arranged({name: stored[name] for name in stored.files})
+
+
+@contextmanager
+def stored_arrays(path, kind):
+    """Give the arrays of an .npz file by name; `GroomError` when they are not of this kind."""
     try:
         with np.load(path, allow_pickle=False) as stored:
-            version = int(stored["hairkit_groom"])
-            if version != NEWEST:
-                raise GroomError(f"{path}: a groom of version {version}, this reads {NEWEST}")
-            return _arranged({name: stored[name] for name in stored.files})
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
-        raise GroomError(f"{path}: not a groom of hairkit ({error})") from error
+            yield stored
+    except (OSError, KeyError, TypeError, ValueError, zipfile.BadZipFile) as error:
+        raise GroomError(f"{path}: not {kind} of hairkit ({error})") from error
 
 
 def z_up(points):

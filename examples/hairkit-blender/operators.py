@@ -119,9 +119,10 @@ class ImportGroom(bpy.types.Operator, ImportHelper):
         words, scene = child.hairkit(chosen_python()), context.scene
         place = playback.folder(hair.name)
         stored = bpy.path.abspath(hair[playback.GROOM])
-        playback.play(hair, playback.write_playable(words, stored, frames, place), 0)
-        if playback.moves(frames.head_from_rest):
-            playback.set_keys(head, frames.head_from_rest, 0)
+        carried = frames.head_from_rest
+        playback.play(hair, playback.write_playable(words, stored, frames, carried, place), 0)
+        if playback.moves(carried):
+            playback.set_keys(head, carried, 0)
         scene.frame_start, scene.frame_end = 0, len(frames.times) - 1
         scene.frame_set(0)
 

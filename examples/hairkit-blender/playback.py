@@ -13,7 +13,7 @@ import numpy as np
 from mathutils import Matrix
 
 from . import child, interpolation
-from .groom_file import GroomError
+from .groom_file import stored_arrays
 from .objects import FOLLOW
 
 MODIFIER = "hairkit simulation"
@@ -41,11 +41,8 @@ class Frames:
 
 def read_frames(path):
     """Return the `Frames` of a cache that `hairkit simulate` wrote; `GroomError` else."""
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return Frames(*(stored[name] for name in ("points", "times", "head_from_rest")))
-    except (OSError, KeyError, ValueError) as error:
-        raise GroomError(f"{path}: not a simulation of hairkit ({error})") from error
+    with stored_arrays(path, "a simulation") as stored:
+        return Frames(*(stored[name] for name in ("points", "times", "head_from_rest")))
 
 
 def folder(name):
@@ -64,18 +61,19 @@ def free_name(place, stem, ending):
     return place / f"{stem}-{number}{ending}"
 
 
-def on_the_head(frames):
-    """Return the same frames seen from the moving head, which then rests."""
-    back = np.linalg.inv(frames.head_from_rest)
+def on_the_head(frames, carried):
+    """Return the same frames seen from an object that moves as `carried` (T, 4, 4) says."""
+    back = np.linalg.inv(carried)
     points = np.einsum("tij,tpj->tpi", back[:, :3, :3], frames.points) + back[:, None, :3, 3]
     still = np.tile(np.eye(4), (len(points), 1, 1))
     return Frames(points.astype(np.float32), frames.times, still)
 
 
-def write_playable(words, groom, frames, place):
+def write_playable(words, groom, frames, carried, place):
     """Return the Alembic file that hairkit (`words` run it) makes of a groom's frames.
 
-    Frames of all strands move all of them, frames of the guides the others with them.
+    `carried` (T, 4, 4) is the motion of the object that the hair hangs on. Frames of all strands
+    move all of them, frames of the guides the others with them.
     """
     with np.load(groom, allow_pickle=False) as stored:
         arrays = dict(stored)
@@ -83,7 +81,7 @@ def write_playable(words, groom, frames, place):
         arrays.pop("guide", None)
     source, cache = place / "playing.npz", place / "frames.npz"
     np.savez(source, **arrays)
-    np.savez(cache, **vars(on_the_head(frames)))
+    np.savez(cache, **vars(on_the_head(frames, carried)))
     target = free_name(place, "simulation", ".abc")
     try:
         child.run([*words, "export", str(source), "-o", str(target), "--set", f"cache={cache}"])
@@ -108,16 +106,48 @@ def play(hair, path, start):
     interpolation.follow_frames(hair)
 
 
-def head_motion(context, head):
-    """Return (T, 4, 4) how the scene moves the head since its first frame, in the head frame."""
+def head_motion(context, head, scalp):
+    """Return how the scene moves a head's object and its scalp, both (T, 4, 4), in the head frame.
+
+    Both are motions since the object's place at the first frame, with the mesh at rest. They differ
+    where bones move the scalp; of a scalp that is bent the rigid part counts.
+    """
     scene, now = context.scene, context.scene.frame_current
-    places = []
+    rest = _vertices(head.data)
+    chosen = _members(head, scalp)
+    places, shapes = [], [rest[chosen]]
     for frame in range(scene.frame_start, scene.frame_end + 1):
         scene.frame_set(frame)
-        places.append(np.array(head.evaluated_get(context.evaluated_depsgraph_get()).matrix_world))
+        whole = head.evaluated_get(context.evaluated_depsgraph_get())
+        places.append(np.array(whole.matrix_world))
+        shape = _vertices(whole.data)  # modifiers that add vertices tell no motion of one
+        shapes.append((shape if len(shape) == len(rest) else rest)[chosen])
     scene.frame_set(now)
-    since = np.linalg.inv(places[0]) @ np.stack(places)
-    return np.linalg.inv(Z_UP) @ since @ Z_UP
+    carried = np.linalg.inv(places[0]) @ np.stack(places)
+    shapes = np.stack(shapes)
+    bent = rigid_motion(shapes)[1:]
+    bent[np.abs(shapes[1:] - shapes[0]).max(axis=(1, 2)) < STILL] = np.eye(4)
+    back = np.linalg.inv(Z_UP)
+    return back @ carried @ Z_UP, back @ carried @ bent @ Z_UP
+
+
+def _vertices(mesh):
+    """Return (V, 3) in the object."""
+    places = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", places)
+    return places.reshape(-1, 3).astype(float)
+
+
+def _members(thing, name):
+    """Return the vertices that belong to a group by more than a half; all where none do."""
+    group = thing.vertex_groups.get(name)
+    number = -1 if group is None else group.index
+    found = [
+        vertex.index
+        for vertex in thing.data.vertices
+        if any(each.group == number and each.weight > 0.5 for each in vertex.groups)
+    ]
+    return found or list(range(len(thing.data.vertices)))
 
 
 def moves(motion):

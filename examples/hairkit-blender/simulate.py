@@ -9,6 +9,7 @@ import numpy as np
 from . import child, playback
 from .background import Background
 from .groom_file import GroomError, y_up, z_up
+from .objects import SCALP
 from .preferences import chosen_python
 
 EDITED = 1e-6
@@ -45,12 +46,14 @@ class Simulate(bpy.types.Operator, Background):
         place, scene = playback.folder(hair.name), context.scene
         groom, out = place / "groom.npz", place / "simulation.npz"
         write_current(hair, groom)
-        motion = playback.head_motion(context, hair.parent)
+        carried, motion = playback.head_motion(context, hair.parent, SCALP)
         yield [*words, *self._command(scene, motion, groom, out)]
         frames = playback.read_frames(out)
-        playback.play(hair, playback.write_playable(words, groom, frames, place), scene.frame_start)
         if self.shake and not playback.moves(motion):
-            playback.set_keys(hair.parent, frames.head_from_rest, scene.frame_start)
+            carried = frames.head_from_rest
+            playback.set_keys(hair.parent, carried, scene.frame_start)
+        playable = playback.write_playable(words, groom, frames, carried, place)
+        playback.play(hair, playable, scene.frame_start)
         scene.frame_set(scene.frame_start)
         if not bpy.data.filepath:
             self.report({"WARNING"}, "save the file and simulate again to keep the simulation")

@@ -133,19 +133,28 @@ def test_a_simulation_of_guides_moves_all_hair(
         np.testing.assert_allclose(seen[name], z_up(wanted), atol=NEAR)
 
 
+@pytest.mark.parametrize("by", ["object", "bone"])
 def test_hair_is_simulated_on_the_head_of_the_scene(
-    addon: BlenderSession, stored: Path, guides: Groom
+    addon: BlenderSession, stored: Path, guides: Groom, by: str
 ) -> None:
-    """Roots stay on a head that was keyed in Blender; tips lag behind; lengths stay."""
-    frames, keys = list(range(5, 15)), [(5, 0.0, 0.0), (14, 0.1, 40.0)]
+    """Roots stay on a head that keys or a bone turn; tips lag behind; lengths stay.
+
+    The bone, which stays at the origin, turns what the keys have shifted.
+    """
+    frames, whole = list(range(5, 15)), by == "object"
+    keys = [(5, 0.0, 0.0), (14, 0.1, 40.0 if whole else 0.0)]
     seen = addon.call(
-        "addon.simulated", path=stored, python=sys.executable, keys=keys, frames=frames, edit=0.0
-    )
+        "addon.simulated", path=stored, python=sys.executable, keys=keys, frames=frames, edit=0.0,
+        bone=[] if whole else [(5, 0.0), (14, 40.0)],
+    )  # fmt: skip
     hair, strands = seen["hair"], guides.strands
     np.testing.assert_allclose(hair[0], z_up(strands.points), atol=NEAR)
     turn = np.radians(40.0)
     z = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-    rigid = z_up(strands.points) @ z.T + [0.1, 0, 0]
+    shift = np.array([0.1, 0, 0]) @ (np.eye(3) if whole else z.T)
+    skin = z_up(guides.head.vertices) @ z.T + shift
+    np.testing.assert_allclose(seen["head"][-1], skin, atol=2 * NEAR)
+    rigid = z_up(strands.points) @ z.T + shift
     first, last = strands.offsets[:-1], strands.offsets[1:] - 1
     np.testing.assert_allclose(hair[-1, first], rigid[first], atol=2 * NEAR)
     assert np.linalg.norm(hair[-1, last] - rigid[last], axis=1).max() > 0.01

@@ -68,9 +68,11 @@ def simulated(path: str, python: str, keys: list, frames: list, edit: float, **w
     """Import a groom, give its head keys (frame, x, degrees about Z), simulate, return `_at`.
 
     `edit` metres are added to the height of all points but roots before that, as by combing.
+    `bone` are keys (frame, degrees about Z) of an armature's bone that all of the head follows.
     """
     imported(path, python, fill=words.pop("fill", 0))
     scene, hair = bpy.context.scene, _hair()
+    _follow_bone(hair.parent, words.pop("bone", []))
     scene.frame_start, scene.frame_end, scene.render.fps = frames[0], frames[-1], 24
     for frame, x, degrees in keys:
         hair.parent.location.x = x
@@ -87,6 +89,26 @@ def simulated(path: str, python: str, keys: list, frames: list, edit: float, **w
     bpy.context.view_layer.objects.active = hair
     bpy.ops.hairkit.simulate(**words)
     return _at(frames)
+
+
+def _follow_bone(head: Any, keys: list) -> None:
+    """Skin a head to the only bone of an armature, which gets keys; no keys: nothing happens."""
+    if not keys:
+        return
+    frame = bpy.data.objects.new("frame", bpy.data.armatures.new("frame"))
+    bpy.context.collection.objects.link(frame)
+    bpy.context.view_layer.objects.active = frame
+    bpy.ops.object.mode_set(mode="EDIT")
+    frame.data.edit_bones.new("head").tail = (0, 0, 0.1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    group = head.vertex_groups.new(name="head")
+    group.add(list(range(len(head.data.vertices))), 1.0, "REPLACE")
+    head.modifiers.new("frame", "ARMATURE").object = frame
+    bone = frame.pose.bones["head"]
+    bone.rotation_mode = "XYZ"
+    for number, degrees in keys:
+        bone.rotation_euler.y = np.radians(degrees)  # the bone's own axis, which stands upright
+        bone.keyframe_insert("rotation_euler", frame=number)
 
 
 def progress(lines: list) -> list:
