@@ -33,6 +33,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `hookspecs`: the hooks that plugins implement
 * `kernel_cache`: compiled functions of the machine, and those that a wheel brings along
 * `manager`: plugins by name
+* `memory`: freed memory, kept for the next arrays
 * `options`: options of plugins
 * `parallel`: compiled loops on threads
 * `progress`: progress reporting

@@ -18,7 +18,9 @@ def main() -> int:
     try:
         _end_at_second_interrupt()
         from hairkit.cli import main as run
+        from hairkit.memory import keep_freed_memory
 
+        keep_freed_memory()
         return run()
     except KeyboardInterrupt:
         print("hairkit: interrupted", file=sys.stderr)

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from hairkit import worker
 from hairkit.errors import HairkitError
+from hairkit.memory import keep_freed_memory
 
 if TYPE_CHECKING:
     from hairkit.batches.jobs import Job, Settings
@@ -216,4 +217,5 @@ class _Told:
 
 if __name__ == "__main__":
     os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
+    keep_freed_memory()
     main()

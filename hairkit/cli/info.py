@@ -21,8 +21,11 @@ Example: hairkit info out/groom.npz
 
 Print what a file contains: a groom (.npz or what an import plugin reads; --scale, --up and --set
 give what bare strands do not define), a simulation (.npz), a scene.json, a head (.obj, .ply, .glb),
-hair cards (.glb, .vrm, .obj), or a capture's folder. Lengths are in metres."""
+hair cards (.glb, .vrm, .obj), or a capture: a folder, a video, a URL, or what else the recipe's
+stage `capture` takes. Lengths are in metres."""
 
+_OWN = (".npz", ".json")
+"""Files that need no libraries to be known."""
 _HEADS = (".obj", ".ply", ".glb")
 _CARDS = (".glb", ".gltf", ".vrm", ".obj")
 
@@ -32,7 +35,8 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "info", help="print what a file contains", description=_DESCRIPTION
     )
-    parser.add_argument("file", metavar="FILE", help="a file, or the folder of a capture")
+    parser.add_argument("file", metavar="FILE", help="a file, or a capture")
+    parser.add_argument("--recipe", metavar="R", help="FILE is a capture that this recipe takes")
     parser.add_argument(
         "--head-units", default="m", metavar="U", help="units of a head file (default m)"
     )
@@ -46,14 +50,24 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print what the file contains."""
-    facts = _facts(Path(args.file), args)
+    facts = _capture(args) if _is_capture(args) else _facts(Path(args.file), args)
     print(json.dumps(facts, indent=1) if args.json else "\n".join(_lines(facts)))
     return 0
 
 
+def _is_capture(args: argparse.Namespace) -> bool:
+    from hairkit.remote import is_url
+
+    if args.recipe is not None or is_url(args.file) or Path(args.file).is_dir():
+        return True
+    if Path(args.file).suffix.lower() in _OWN:
+        return False
+    from hairkit.io.video import is_video
+
+    return is_video(Path(args.file))
+
+
 def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
-    if path.is_dir():
-        return _capture(path)
     if not path.exists():
         raise InputError(f"{path}: no such file")
     if path.suffix == ".json":
@@ -153,10 +167,14 @@ def _scene(path: Path) -> dict[str, Any]:
     return {"kind": "scene", "views": views}
 
 
-def _capture(path: Path) -> dict[str, Any]:
-    from hairkit.io.capture_reader import read_capture
+def _capture(args: argparse.Namespace) -> dict[str, Any]:
+    from hairkit.manager import Manager
+    from hairkit.pipeline.recipe import load_recipe
+    from hairkit.pipeline.take_capture import take_capture
 
-    capture = read_capture(path)
+    recipe = load_recipe(args.recipe or "default").alone("capture")
+    needed = [choice.plugin for stage in recipe.stages for choice in stage.choices]
+    capture = take_capture(args.file, recipe, Manager.loaded(args.plugin, only=needed))
     views = {
         view.name: {
             "photo": view.photo_path.name if view.photo_path is not None else "",

@@ -29,7 +29,7 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser("view", help="show a groom in motion", description=_DESCRIPTION)
     add = parser.add_argument
     add("groom", metavar="GROOM", type=Path, help="groom.npz, importable file or folder of results")
-    add("--capture", type=Path, metavar="FOLDER", help="the photos, to show them in space")
+    add("--capture", metavar="C", help="the photos, to show them in space: a folder, a video, ...")
     add("--simulator", metavar="NAME", help="simulator plugin (pbd), or none")
     add_setting(add)
     add("--preset", metavar="NAME", help="simulator options saved beside the groom")
@@ -76,8 +76,6 @@ def _check(args: argparse.Namespace) -> None:
     groom_path(args.groom)
     if args.hairs is not None and not 0 <= args.hairs <= MOST_HAIRS:
         raise InputError(f"--hairs is {args.hairs}, expected 0 to {MOST_HAIRS}")
-    if args.capture is not None and not args.capture.is_dir():
-        raise InputError(f"--capture {args.capture}: no such folder")
 
 
 def _window(args: argparse.Namespace) -> int:
@@ -121,15 +119,19 @@ def _headless(args: argparse.Namespace) -> int:
 
 
 def _manager(args: argparse.Namespace) -> Any:
-    """Return the plugins; raises when none reads the groom or a `--set` has another form."""
+    """Return the plugins; raises when none reads groom or photos or a `--set` has another form."""
     from hairkit.cli.settings import importer_of
     from hairkit.manager import Manager
     from hairkit.options import split_setting
+    from hairkit.pipeline.open_groom import groom_path
+    from hairkit.viewer.layers import PHOTO_EDGE, Layers
 
     manager = Manager.loaded(args.plugin)
     importer_of(manager, args.groom)
     for text in args.set:
         split_setting(text)
+    if args.capture is not None:
+        Layers(manager, groom_path(args.groom).parent, args.capture).take_capture(PHOTO_EDGE)
     return manager
 
 

@@ -10,7 +10,7 @@ import importlib.metadata
 import logging
 import os
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -51,15 +51,23 @@ class Manager:
 
     @classmethod
     def loaded(
-        cls, plugin_files: Sequence[str | os.PathLike[str]] = (), *, autoload: bool = True
+        cls,
+        plugin_files: Sequence[str | os.PathLike[str]] = (),
+        *,
+        autoload: bool = True,
+        only: Collection[str] | None = None,
     ) -> Manager:
         """Return a manager on which `load` was called."""
         manager = cls()
-        manager.load(plugin_files, autoload=autoload)
+        manager.load(plugin_files, autoload=autoload, only=only)
         return manager
 
     def load(
-        self, plugin_files: Sequence[str | os.PathLike[str]] = (), *, autoload: bool = True
+        self,
+        plugin_files: Sequence[str | os.PathLike[str]] = (),
+        *,
+        autoload: bool = True,
+        only: Collection[str] | None = None,
     ) -> None:
         """Load installed plugins, note those of `HAIRKIT_PLUGIN_PATH`, load plugin files.
 
@@ -70,6 +78,9 @@ class Manager:
         autoload
             False, or the environment variable `HAIRKIT_DISABLE_PLUGIN_AUTOLOAD`: of the installed
             plugins take only those that ship with hairkit.
+        only
+            Names of the installed plugins that are needed, since importing all takes a second; None
+            for all.
 
         Raises
         ------
@@ -78,7 +89,8 @@ class Manager:
         """
         own_only = not autoload or bool(os.environ.get(DISABLE_AUTOLOAD))
         for distribution, version, entry in entry_points():
-            if distribution == hookspecs.PROJECT or not own_only:
+            wanted = only is None or entry.name in only
+            if wanted and (distribution == hookspecs.PROJECT or not own_only):
                 self._load_entry_point(entry, distribution, version)
         for manifest in () if own_only else find_manifests():
             self._add_manifest(manifest)

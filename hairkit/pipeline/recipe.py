@@ -103,6 +103,14 @@ class Recipe:
         """Return the stage of a table, or None when the recipe leaves it out."""
         return next((stage for stage in self.stages if stage.table == table), None)
 
+    def alone(self, table: str) -> Recipe:
+        """Return the recipe with one stage, for those who need none of the others' plugins."""
+        stages = tuple(stage for stage in self.stages if stage.table == table)
+        names = {choice.plugin for stage in stages for choice in stage.choices}
+        commands = tuple(command for command in self.commands if command.name in names)
+        lock = {name: version for name, version in self.lock.items() if name in names}
+        return replace(self, stages=stages, commands=commands, lock=lock)
+
     def with_set(self, assignments: Sequence[str]) -> Recipe:
         """Return the recipe changed by `plugin.option=value` or `stage=plugin` texts.
 

@@ -36,6 +36,7 @@ def take_capture(
         The recipe leaves the stage out, or there is something wrong with the photos.
     """
     text = os.fspath(source)
+    recipe.alone("capture").check(manager)
     stage = recipe.stage("capture")
     if stage is None:
         raise InputError(

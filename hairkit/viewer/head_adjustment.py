@@ -20,9 +20,9 @@ from scipy.spatial.transform import Rotation
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.cameras.similarity import fit_similarity
 from hairkit.errors import InputError
-from hairkit.io.capture_reader import read_capture
 from hairkit.io.capture_toml import head_entry, write_head_entry
 from hairkit.manager import Manager
+from hairkit.remote import is_url
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.head import Head
@@ -63,10 +63,15 @@ class Adjustment:
 
     @classmethod
     def of(
-        cls, manager: Manager, folder: Path, head: Head, cameras: dict[str, Camera]
+        cls, manager: Manager, capture: Capture, head: Head, cameras: dict[str, Camera]
     ) -> Adjustment:
-        """Return the alignment saved in capture.toml; without one, fit it to `cameras`."""
-        capture = read_capture(folder, EDGE)
+        """Return the alignment saved in capture.toml; without one, fit it to `cameras`.
+
+        Raises `InputError` for a capture that is no folder on this machine.
+        """
+        folder, asked = capture.source, capture.asked or "these photos"
+        if folder is None or not folder.is_dir() or is_url(asked):
+            raise InputError(f"{asked}: no folder of photos, in which the pose could be saved")
         if capture.head_pose is not None:
             return cls(manager, folder, capture, head, capture.head_pose)
         start = cls(manager, folder, capture, head, np.eye(4))

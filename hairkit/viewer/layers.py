@@ -15,11 +15,14 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.errors import HairkitError, InputError
 from hairkit.field.isosurface import volume_surface
-from hairkit.io.capture_reader import read_capture
-from hairkit.pipeline.run_record import RECORD, read_record
+from hairkit.manager import Manager
+from hairkit.pipeline.recipe import load_recipe
+from hairkit.pipeline.run_record import RECORD, RunRecord, read_record
+from hairkit.pipeline.take_capture import take_capture
 from hairkit.rendering.head import Solid
 from hairkit.storage import Stored, from_arrays, read_npz
 from hairkit.types.camera import Camera
+from hairkit.types.capture import Capture
 from hairkit.types.mask import HAIR, PERSON, Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import Scene
@@ -48,10 +51,14 @@ _Found = TypeVar("_Found", bound=Stored)
 class Layers:
     """The layers that a folder of results offers."""
 
-    def __init__(self, results: Path | None, capture: Path | None = None) -> None:
+    def __init__(self, manager: Manager, results: Path | None, capture: str | None = None) -> None:
+        self._manager = manager
         self._work = None if results is None else results / "work"
-        self.capture = _find_capture(results) if capture is None else capture
-        """Folder of the photos; None if unknown."""
+        record = _find_record(results)
+        self._recipe = load_recipe("default") if record is None else record.as_recipe()
+        self.capture = _find_capture(record) if capture is None else capture
+        """What the stage `capture` is asked for, such as the folder of the photos; None if
+        unknown."""
 
     @property
     def available(self) -> tuple[str, ...]:
@@ -75,6 +82,12 @@ class Layers:
                 else "open a folder that hairkit reconstruct wrote"
             )
             raise InputError(f"no data for the layer {name!r}; {cure}")
+
+    def take_capture(self, edge: int) -> Capture:
+        """Return the photos, scaled down to a long edge; `InputError` when they are unknown."""
+        if self.capture is None:
+            raise InputError("the folder of the photos is unknown; pass it with --capture")
+        return take_capture(self.capture, self._recipe, self._manager, edge)
 
     @cached_property
     def cameras(self) -> dict[str, Camera]:
@@ -152,7 +165,7 @@ class Layers:
     def _photos(self) -> dict[str, UInt8Array]:
         if self.capture is None:
             return {}
-        capture, turn = read_capture(self.capture, PHOTO_EDGE), self._read(Turnaround, "turn")
+        capture, turn = self.take_capture(PHOTO_EDGE), self._read(Turnaround, "turn")
         if turn is not None and len(turn.names) == len(capture.views):
             capture = capture.arranged(turn)
         return {view.name: _add_alpha(view.image) for view in capture.views}
@@ -192,15 +205,21 @@ class Layers:
             return None
 
 
-def _find_capture(results: Path | None) -> Path | None:
-    """Return the photos that the record of a reconstruction names, None if they are gone."""
+def _find_record(results: Path | None) -> RunRecord | None:
+    """Return the record of a reconstruction, None where there is none that can be read."""
     if results is None or not (results / RECORD).is_file():
         return None
     try:
-        photos = Path(read_record(results / RECORD).photos or "")
+        return read_record(results / RECORD)
     except HairkitError:
         return None
-    return photos if photos.is_dir() else None
+
+
+def _find_capture(record: RunRecord | None) -> str | None:
+    """Return the photos that a record names, None if they lay on this machine and are gone."""
+    photos = None if record is None else record.photos
+    gone = photos is not None and Path(photos).is_absolute() and not Path(photos).exists()
+    return None if gone else photos
 
 
 def _hsv_picture(found: OrientationMap) -> UInt8Array:

@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.simulation.simulator import Measures, Surroundings
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw.hair_data import GuideSampler, HairBody, split_guides
-from hairkit.viewer.head_adjustment import Adjustment, Rerun
+from hairkit.viewer.head_adjustment import EDGE, Adjustment, Rerun
 from hairkit.viewer.head_motion import HeadMotion
 from hairkit.viewer.layers import Layers
 from hairkit.viewer.opening import Opened, open_path
@@ -91,7 +90,7 @@ class Session:
         size: tuple[int, int] = (1280, 720),
         simulator: str | None = None,
         hairs: int = HAIRS,
-        capture: Path | None = None,
+        capture: str | None = None,
         seed: int = 0,
         reading: Mapping[str, object] | None = None,
     ) -> None:
@@ -183,12 +182,8 @@ class Session:
             if not before.photos:
                 self.shown.layers.discard("photos")
         if on:
-            folder = self.layers.capture
-            if folder is None:
-                raise InputError("the folder of the photos is unknown; pass it with --capture")
-            self.adjustment = Adjustment.of(
-                self.manager, folder, self.opened.groom.head, self.layers.cameras
-            )
+            capture, head = self.layers.take_capture(EDGE), self.opened.groom.head
+            self.adjustment = Adjustment.of(self.manager, capture, head, self.layers.cameras)
             self.update_photo_cameras()
         elif self.shown.through not in self.layers.cameras:
             self.shown.through = None
@@ -288,7 +283,7 @@ class Session:
         self.simulation = TunableSimulator(self.manager, self._guides, self._simulator)
         self.motion = HeadMotion(opened.groom.head.joints[1].astype(np.float64))
         self.adjustment, self.adjusted = None, None
-        self.layers = Layers(opened.results, self._capture)
+        self.layers = Layers(self.manager, opened.results, self._capture)
         self.grabbed_lock = self.picked = None
         self.steps, self._time_debt = 0, 0.0
         self._make_body()

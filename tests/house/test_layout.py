@@ -31,6 +31,7 @@ FLOORS = (
         "remote",
         "parallel",
         "kernel_cache",
+        "memory",
         "compilation",
         "child_process",
         "worker",

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 from ball import PLUGIN_FILE, RECIPE, write_capture
 
+import hairkit
 from hairkit.cli import main
 from hairkit.errors import InputError, PluginError
 from hairkit.io.capture_reader import read_capture
@@ -15,6 +17,7 @@ from hairkit.manager import Manager
 from hairkit.pipeline.recipe import load_recipe, parse_recipe
 from hairkit.pipeline.run_record import read_record
 from hairkit.pipeline.take_capture import take_capture
+from hairkit.viewer.layers import PHOTO_EDGE, Layers
 
 SHELF = '''
 """Captures that lie beside this file."""
@@ -76,6 +79,41 @@ def test_a_name_that_nobody_knows_is_no_folder() -> None:
     bare = parse_recipe(b"capture = false", "bare", "bare.toml")
     with pytest.raises(InputError, match="asset:hero: recipe bare has no stage 'capture'"):
         take_capture("asset:hero", bare, manager)
+
+
+def test_nobody_reads_a_capture_but_plugins() -> None:
+    """Commands, viewer and studio ask the stage; others get `read_capture` for their programs."""
+    package = Path(hairkit.__file__).parent
+    readers = {
+        path.relative_to(package).as_posix()
+        for path in package.rglob("*.py")
+        if re.search(r"capture_reader import .*read_(capture|folder)", path.read_text())
+    }
+    assert readers == {"__init__.py", "api.py", "cli/scaffold_sketches.py"}
+
+
+def test_info_tells_of_a_name(shelf: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of what only the recipe's plugin knows it says the same as of the folder."""
+    recipe = ["--recipe", str(shelf / "shelf.toml"), "--plugin", str(shelf / "shelf.py")]
+    told = []
+    for words in (["shelf:hero", *recipe, "--plugin", str(PLUGIN_FILE)], [str(shelf / "hero")]):
+        assert main(["info", *words, "--json"]) == 0
+        told.append(json.loads(capsys.readouterr().out))
+    assert told[0] == told[1]
+    assert told[0]["kind"] == "capture"
+
+
+def test_the_viewer_shows_the_photos_of_a_name(shelf: Path) -> None:
+    """The layer of photos asks the plugin that the record of the run names."""
+    words = ["reconstruct", "shelf:hero", "-o", str(shelf / "out"), "--quiet", "--no-sheet"]
+    words += ["--recipe", str(shelf / "shelf.toml"), "--plugin", str(shelf / "shelf.py")]
+    assert main([*words, "--plugin", str(PLUGIN_FILE), "--guides", "20"]) == 0
+    layers = Layers(Manager.loaded([shelf / "shelf.py"]), shelf / "out")
+    shown = layers.billboards("photos")
+    photos = {view.name: view.image for view in read_capture(shelf / "hero", PHOTO_EDGE).views}
+    assert {name: each.image[..., :3].tobytes() for name, each in shown.items()} == {
+        name: image.tobytes() for name, image in photos.items()
+    }
 
 
 def test_a_run_of_a_name_is_made_again(shelf: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hairkit.api import sample_capture
 from hairkit.errors import InputError
-from hairkit.io.capture_reader import sample_folder
 from hairkit.io.capture_toml import HeadEntry, head_entry, read_capture_file, write_head_entry
 from hairkit.manager import Manager
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera
 from hairkit.viewer.actions.actions import perform
-from hairkit.viewer.head_adjustment import Adjustment, Rerun
+from hairkit.viewer.head_adjustment import EDGE, Adjustment, Rerun
 from hairkit.viewer.session import Session
 
 angles = st.floats(-80, 80)
@@ -27,7 +27,7 @@ ways = st.floats(-0.2, 0.2)
 @pytest.fixture
 def adjustment(manager: Manager) -> Adjustment:
     """The sample capture before the ball head, nothing known."""
-    return Adjustment.of(manager, sample_folder(), ball_head(), {})
+    return Adjustment.of(manager, sample_capture(EDGE), ball_head(), {})
 
 
 @given(st.floats(0.5, 2.0), st.tuples(angles, angles, angles), st.tuples(ways, ways, ways))
@@ -106,7 +106,7 @@ def test_it_begins_where_the_cameras_were_found(manager: Manager, adjustment: Ad
     adjustment.move(adjustment.cameras()["front"], 0.03, -0.02, 0.01)
     adjustment.turn("yaw", 8.0)
     found = adjustment.cameras()
-    again = Adjustment.of(manager, sample_folder(), ball_head(), found)
+    again = Adjustment.of(manager, sample_capture(EDGE), ball_head(), found)
     np.testing.assert_allclose(again.pose, adjustment.pose, atol=1e-6)
 
 
@@ -116,7 +116,7 @@ def test_it_begins_where_photos_show_the_head(manager: Manager, adjustment: Adju
         name: replace(camera, focal=1.3 * camera.focal, camera_from_head=farther(camera, 1.3))
         for name, camera in adjustment.cameras().items()
     }
-    cameras = Adjustment.of(manager, sample_folder(), ball_head(), found).cameras()
+    cameras = Adjustment.of(manager, sample_capture(EDGE), ball_head(), found).cameras()
     points = ball_head().vertices[::7]
     for name, camera in found.items():
         gap = np.linalg.norm(camera.project(points) - cameras[name].project(points), axis=1)
@@ -153,7 +153,8 @@ def test_leaving_the_adjustment_shows_what_was_shown_before(
 ) -> None:
     """Photos, their opacity, the view and the time are as they were; doing it twice is once."""
     monkeypatch.setattr(Adjustment, "of", lambda *_: adjustment)
-    monkeypatch.setattr(session.layers, "capture", adjustment.folder)
+    monkeypatch.setattr(session.layers, "capture", str(adjustment.folder))
+    monkeypatch.setattr(session.layers, "_manager", adjustment.manager)
     shown = session.shown
     before = (session.paused, shown.opacity, shown.through, set(shown.layers))
     perform(session, "adjust")

@@ -49,7 +49,7 @@ def results(tmp_path: Path) -> Path:
 
 def test_a_picture_in_space_covers_what_its_camera_sees(results: Path) -> None:
     """Its corners project onto the corners of the photo."""
-    layers = Layers(results)
+    layers = Layers(Manager(), results)
     for layer in ("masks", "orientation"):
         billboards = layers.billboards(layer)
         assert sorted(billboards) == sorted(SCENE.names)
@@ -61,7 +61,7 @@ def test_a_picture_in_space_covers_what_its_camera_sees(results: Path) -> None:
 
 def test_masks_show_hair_and_orientation_shows_upright_strands_in_one_hue(results: Path) -> None:
     """Opaque where hair is, clear in the background."""
-    layers = Layers(results)
+    layers = Layers(Manager(), results)
     mask = ball_mask(SCENE.cameras[0])
     image = layers.billboards("masks")["front"].image
     assert (image[mask.hair][:, 3] > 200).all()
@@ -72,7 +72,7 @@ def test_masks_show_hair_and_orientation_shows_upright_strands_in_one_hue(result
 
 def test_field_lines_run_along_the_field(results: Path) -> None:
     """Each stroke of a field combed down the ball lies square to the ball's radius."""
-    lines = Layers(results).field_lines()
+    lines = Layers(Manager(), results).field_lines()
     assert lines is not None
     ends = lines.points.reshape(-1, 2, 3)
     way, middle = ends[:, 1] - ends[:, 0], ends.mean(axis=1)
@@ -85,17 +85,17 @@ def test_field_lines_run_along_the_field(results: Path) -> None:
 def test_confidence_is_the_fields_at_the_guides(results: Path) -> None:
     """Guides inside the certain shell are certain, far away they are not."""
     inside = np.array([[[0.0, 0.112, 0.0], [0.0, 0.115, 0.0]]], np.float32)
-    confidence = Layers(results).confidence(inside)
+    confidence = Layers(Manager(), results).confidence(inside)
     assert confidence is not None
     assert (confidence > 0.4).all()
-    far = Layers(results).confidence(inside * 0)
+    far = Layers(Manager(), results).confidence(inside * 0)
     assert far is not None
     assert (far < 0.1).all()
 
 
 def test_a_groom_alone_has_the_head_alone(tmp_path: Path) -> None:
     """Layers that are not there are refused with what to do."""
-    layers = Layers(None)
+    layers = Layers(Manager(), None)
     assert layers.available == ("head", "torso")
     with pytest.raises(InputError, match="open a folder that hairkit reconstruct wrote"):
         layers.check("hull")
@@ -108,8 +108,8 @@ def test_a_groom_alone_has_the_head_alone(tmp_path: Path) -> None:
 def test_a_damaged_stage_is_left_out(results: Path) -> None:
     """A file that cannot be read shows nothing, and nothing else suffers."""
     (results / "work" / "field.npz").write_bytes(b"PK broken")
-    assert Layers(results).field_lines() is None
-    assert Layers(results).hull() is not None
+    assert Layers(Manager(), results).field_lines() is None
+    assert Layers(Manager(), results).hull() is not None
 
 
 def test_every_layer_changes_the_picture(results: Path, swaying_manager: Manager) -> None:
