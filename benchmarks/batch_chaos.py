@@ -1,10 +1,11 @@
 """A batch through all that goes wrong at once, against a quiet one: do the same bytes come out?
 
-Captures run on a Dask scheduler and two workers, on a disk that is too small. A worker or a
-capture's process is killed every 10 s, the scheduler once; one capture hangs and one eats memory.
-When the batch has ended the disk grows and it is run again, until all good captures are done.
+Captures run on a Dask scheduler and two workers, on a disk that holds half of the results. A worker
+or a capture's process is killed every 10 s until the good captures are done, the scheduler once;
+one capture hangs and one eats memory. When a batch has ended that found the disk full, the disk
+grows; batches are run until all good captures are done and all of this has been met.
 
-The small disk is a tmpfs, which needs root; without, the program says so and leaves it out.
+The small disk is a tmpfs. Mounting it needs root, or a Linux that lets `unshare` give it.
 """
 
 from __future__ import annotations
@@ -43,9 +44,17 @@ SCHEDULER = {
 """Settings of a scheduler as docs/tutorials/batch.md advises, and as `--dask local` has them."""
 QUIET = ("--workers", str(WORKERS), "--time-limit", "3600")
 ROUNDS = 8
-"""Most batches that are run until all captures are done."""
-GROWN_MB = 4000
-"""Size of the disk once it has been full."""
+"""Most batches that are run."""
+DISK = 0.5
+"""Size of the small disk, in shares of what the quiet results take."""
+GROWN = 3.0
+"""Its size once it has been full."""
+SAID = {
+    "hang": "no answer within",
+    "eat": "GiB of memory",
+    "a full disk": "No space left",
+}
+"""Words of the lines that tell what was met."""
 SAME = ("groom.npz", "scene.json", "groom.apx", "groom.ball")
 """Files that are compared, where they are."""
 POISON = """
@@ -142,8 +151,9 @@ def main() -> int:
         good = sorted(path.name for path in captures.iterdir() if path.name not in BAD)
         only = [word for name in good for word in ("--only", name)]
         quiet = run_batch(args, folder, "quiet", [*only, *QUIET])
-        print(f"quiet: {quiet['done']} of {len(good)} captures done", flush=True)
-        with small_disk(folder / "chaos", args.disk) as grow:
+        taken = sum(path.stat().st_size for path in (folder / "quiet").rglob("*"))
+        print(f"quiet: {quiet['done']} of {len(good)} captures done, {taken / 1e6:.0f} MB")
+        with small_disk(folder / "chaos", taken) as grow:
             farm = Farm(folder, free_port())
             said = run_chaos(args, folder, farm, good, grow)
             return print_verdict(folder, good, farm, said)
@@ -159,7 +169,6 @@ def arguments() -> argparse.Namespace:
     add("--scheduler-after", type=float, default=25.0, help="seconds before the scheduler's end")
     add("--time-limit", type=float, default=30.0, help="seconds of a capture")
     add("--memory", type=float, default=1.5, help="GiB of a capture")
-    add("--disk", type=int, default=120, help="MB of the small disk")
     add("--recipe", default="default", help="recipe")
     add("--set", action="append", default=[], help="changes of the recipe")
     add("--plugin", action="append", default=[], help="plugin file")
@@ -208,7 +217,8 @@ def run_chaos(
     """Run the batch until all good captures are done; return what each run said."""
     said: list[Counter[str]] = []
     ended = threading.Event()
-    threads = [threading.Thread(target=kill_workers, args=(farm, args.every, ended))]
+    chaos = folder / "chaos"
+    threads = [threading.Thread(target=kill_workers, args=(farm, args.every, chaos, good, ended))]
     threads += [threading.Thread(target=kill_scheduler, args=(farm, args.scheduler_after, ended))]
     farm.start()
     try:
@@ -218,13 +228,14 @@ def run_chaos(
             farm.start()
             said.append(run_batch(args, folder, "chaos", ["--scheduler", farm_address(farm)]))
             print(f"run {number + 1}: {'; '.join(f'{n} {what}' for what, n in said[-1].items())}")
-            if any("No space left" in text for text in said[-1]):
+            sys.stdout.flush()
+            if line_about("a full disk", said[-1:]):
                 grow()
-            made = [name for name in good if (folder / "chaos" / name / "batch.json").is_file()]
-            if len(made) == len(good) and farm.killed["scheduler"]:
+            met = all(line_about(what, said) for what in SAID)
+            if not missing(chaos, good) and farm.killed["scheduler"] and met:
                 break
         else:
-            print(f"{len(made)} of {len(good)} captures done after {ROUNDS} runs")
+            print(f"{len(missing(chaos, good))} good captures are not done after {ROUNDS} runs")
     finally:
         ended.set()
         for thread in threads:
@@ -238,11 +249,25 @@ def farm_address(farm: Farm) -> str:
     return f"tcp://127.0.0.1:{farm.port}"
 
 
-def kill_workers(farm: Farm, every: float, ended: threading.Event) -> None:
-    """Kill one after the other until the end."""
+def missing(chaos: Path, good: Sequence[str]) -> list[str]:
+    """Return the good captures that are not done."""
+    return [name for name in good if not (chaos / name / "batch.json").is_file()]
+
+
+def line_about(what: str, said: Sequence[Counter[str]]) -> str:
+    """Return a line that tells that something was met, empty where none does."""
+    lines = [text for each in said for text in each if SAID[what] in text]
+    own = [text for text in lines if what not in BAD or text.startswith(f"{what}: ")]
+    return own[0] if own else ""
+
+
+def kill_workers(
+    farm: Farm, every: float, chaos: Path, good: Sequence[str], ended: threading.Event
+) -> None:
+    """Kill one after the other while good captures are missing."""
     while not ended.wait(every / 2):
         farm.start_workers()
-        if not ended.wait(every / 2):
+        if not ended.wait(every / 2) and missing(chaos, good):
             farm.kill_one()
 
 
@@ -256,51 +281,51 @@ def print_verdict(
     folder: Path, good: Sequence[str], farm: Farm, said: Sequence[Counter[str]]
 ) -> int:
     """Print what was killed, what was full, and what is equal."""
-    every = [text for each in said for text in each]
-    full = sum(n for each in said for text, n in each.items() if "No space left" in text)
-    equal = [name for name in good if same_files(folder / "quiet" / name, folder / "chaos" / name)]
+    full = sum(n for each in said for text, n in each.items() if SAID["a full disk"] in text)
+    others = {name: other_files(folder / "quiet" / name, folder / "chaos" / name) for name in good}
+    equal = [name for name, files in others.items() if not files]
     killed = ", ".join(f"{count} x {what}" for what, count in sorted(farm.killed.items()))
     print(f"killed: {killed}; captures that met a full disk: {full}")
-    for name, words in (("hang", "no answer within"), ("eat", "GiB of memory")):
-        line = next((text for text in every if text.startswith(name) and words in text), "NOT SAID")
-        print(f"{name}: {line.partition(': ')[2] or line}")
+    for what in SAID:
+        print(line_about(what, said) or f"{what}: NOT MET")
     print(f"{len(equal)} of {len(good)} good captures have the bytes of the quiet batch")
-    return 0 if len(equal) == len(good) else 2
+    for name, files in others.items():
+        if files:
+            print(f"{name}: other bytes in {', '.join(files)}")
+    met = full and farm.killed["scheduler"] and all(line_about(what, said) for what in SAID)
+    return 0 if len(equal) == len(good) and met else 2
 
 
-def same_files(first: Path, second: Path) -> bool:
-    """Return whether two results have the same files with the same bytes."""
+def other_files(first: Path, second: Path) -> list[str]:
+    """Return the files of two results that have other bytes, or that one of them lacks."""
     contents = [
         {name: (folder / name).read_bytes() for name in SAME if (folder / name).is_file()}
         for folder in (first, second)
     ]
-    return bool(contents[0]) and contents[0] == contents[1]
+    if not contents[0]:
+        return ["all"]
+    return [name for name in SAME if contents[0].get(name) != contents[1].get(name)]
 
 
 class Growing:
-    """Makes the small disk large; the first call counts."""
+    """Makes the small disk large."""
 
-    def __init__(self, path: Path | None) -> None:
-        self._path = path
+    def __init__(self, path: Path, size: int) -> None:
+        self._path, self._size = path, size
 
     def __call__(self) -> None:
-        if self._path is not None:
-            words = ["mount", "-o", f"remount,size={GROWN_MB}m", str(self._path)]
-            subprocess.run(words, check=True)
+        words = ["mount", "-o", f"remount,size={self._size}", str(self._path)]
+        subprocess.run(words, check=True)
 
 
 @contextlib.contextmanager
-def small_disk(path: Path, megabytes: int) -> Iterator[Growing]:
-    """Mount a small disk at a new folder, where that is allowed."""
+def small_disk(path: Path, taken: int) -> Iterator[Growing]:
+    """Mount a disk at a new folder that is too small for what is taken."""
     path.mkdir()
-    words = ["mount", "-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs", str(path)]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    if done.returncode:
-        print(f"the disk is as large as it is: {done.stderr.strip()}")
-        yield Growing(None)
-        return
+    words = ["mount", "-t", "tmpfs", "-o", f"size={int(DISK * taken)}", "tmpfs", str(path)]
+    subprocess.run(words, check=True)
     try:
-        yield Growing(path)
+        yield Growing(path, int(GROWN * taken))
     finally:
         subprocess.run(["umount", "-l", str(path)], check=True)
 
@@ -329,4 +354,7 @@ def free_port() -> int:
 
 
 if __name__ == "__main__":
+    if os.geteuid() != 0:  # user and mounts of its own, in which it may mount
+        namespace = ["unshare", "--user", "--map-root-user", "--mount"]
+        os.execvp(namespace[0], [*namespace, sys.executable, *sys.argv])
     sys.exit(main())

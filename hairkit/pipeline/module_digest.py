@@ -53,7 +53,9 @@ def module_digest(module: str, roots: Roots | None = None) -> str:
     roots
         Where to look for sources; by default where Python finds hairkit and the module's package.
     """
-    key = (module, *(() if roots is None else roots.items()))
+    # a module of the same name may since lie elsewhere: a plugin file in another folder
+    roots = _default_roots(module) if roots is None else roots
+    key = (module, *roots.items())
     known = _DIGESTS.get(key)
     if known is not None and known.states == _states(known.files):
         return known.digest

@@ -23,7 +23,7 @@ from hairkit.pipeline.module_digest import module_digest
 from hairkit.pipeline.recipe import Recipe, Stage, stage_digest
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.work_folder import WorkFolder, digest_of
-from hairkit.storage import Stored
+from hairkit.storage import Stored, from_arrays, to_arrays
 from hairkit.types.capture import View
 from hairkit.types.groom import Groom
 
@@ -190,8 +190,9 @@ class _Steps:
         reused = result is not None
         if result is None:
             made: _Result = self._call({name: given.value for name, given in arguments.items()})
-            runner._work.put(made, digest, table, view)
-            result = made
+            # as a run that was interrupted reads it: a float of NumPy's counts in another precision
+            result = from_arrays(kind, to_arrays(made), table)
+            runner._work.put(result, digest, table, view)
         self._ended(index, result, reused)
         return Given(result, digest)
 

@@ -15,7 +15,7 @@ from hairkit.pipeline.find_views import find_views
 from hairkit.pipeline.recipe import parse_recipe
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.stage_runner import StageRunner
-from hairkit.pipeline.work_folder import WorkFolder
+from hairkit.pipeline.work_folder import WorkFolder, digest_of
 from hairkit.progress import Silent
 from hairkit.types.capture import Capture, View
 from hairkit.types.face import Face
@@ -104,3 +104,13 @@ def test_how_a_camera_was_held_changes_nothing(
             assert other.person is not None
             assert np.array_equal(one.landmarks, other.landmarks)
             assert np.array_equal(one.person.alpha, other.person.alpha)
+
+
+def test_what_is_read_again_counts_as_what_was_made(
+    rng: np.random.Generator, tmp_path: Path
+) -> None:
+    """A face whose yaw is a float of NumPy's has the same digest once it is read: later stages of a
+    run that was interrupted are not run again, and count in the same precision."""
+    capture = photos(rng)
+    first, again = (find(capture, tmp_path)[0] for _ in range(2))
+    assert digest_of(first.views) == digest_of(again.views)

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from hairkit.manager import Manager
+from hairkit.manager.loading import import_file
 from hairkit.pipeline import recipe as recipe_module
 from hairkit.pipeline.module_digest import Roots, imported_modules, module_digest
 from hairkit.pipeline.recipe import load_recipe, stage_digest
@@ -139,3 +140,14 @@ def test_a_plugin_file_has_the_digest_of_its_content(tmp_path: Path) -> None:
         assert stage is not None
         digests.append(stage_digest(manager, stage))
     assert digests[0] == digests[1] != digests[2]
+
+
+def test_a_plugin_file_in_another_folder_is_another(tmp_path: Path) -> None:
+    """Files of one name are loaded as one module; the digest is that of the file loaded last."""
+    digests = []
+    for text in ("first = 1\n", "second = 2\n"):
+        path = tmp_path / text.split()[0] / "mine.py"
+        path.parent.mkdir()
+        path.write_text(text)
+        digests.append(module_digest(import_file(path).__name__))
+    assert digests[0] != digests[1]
