@@ -32,6 +32,7 @@ from hairkit.errors import InputError
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
+from hairkit.memory import keep_freed_memory
 from hairkit.storage import write_bytes
 from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
@@ -124,7 +125,8 @@ def _measured(ending: str, folder: str, rounds: int) -> Measured:
 
 
 def _child(ending: str, folder: Path, rounds: int) -> int:
-    """Write the groom in the folder; print what it took."""
+    """Write the groom in the folder, with memory as the command line has it; print what it took."""
+    keep_freed_memory()
     manager = Manager.loaded(autoload=False)
     groom = Groom.load(folder / "groom.npz")
     path = folder / f"hair{ending.split()[0]}"
