@@ -1,10 +1,10 @@
 """Find how the crown is combed: as the user says, as skin shows a parting, or as directions tell.
 
 Level views see the crown at a grazing angle, so that the 2D orientation of the strands there tells
-little of where a parting is. Skin that shows inside the hair does: its median is the parting; where
-there is a photo from above, it alone is asked. What the user says counts first: `parting` in
-capture.toml or on the command line, then a stroke labelled `parting`. Where no skin shows, and of a
-fringe, the directions of all views tell (`hairkit.field.scalp_comb`).
+little of where a parting is. Skin that shows inside the hair does: its median is the parting; a
+photo from above says whether there is one. What the user says counts first: `parting` in
+capture.toml or on the command line, then a stroke labelled `parting`. Where no skin shows, and of
+a fringe, the directions of all views tell (`hairkit.field.scalp_comb`).
 """
 
 from __future__ import annotations
@@ -39,13 +39,17 @@ LEAST_SKIN = 0.004
 one, 0.000 on curls."""
 LEAST_SKIN_ABOVE = 0.03
 """The same in photos from above: 0.08 to 0.15 on heads that have a parting, 0.01 on curls."""
+SAME_PARTING = 0.015
+"""Metres between the parting from above and that of level views, at most, for these to count: twice
+the largest difference on the heads of `FROM_ABOVE`."""
 QUARTILES = (0.25, 0.5, 0.75)
 WIDEST_SKIN = 0.05
 """Distance in metres between the quartiles of the skin's x from which it is no line but a hairline
 whose hair is tied back: 9 cm there, at most 3.5 cm on partings, 6.6 cm if spread evenly."""
 FROM_ABOVE = 30.0
-"""Degrees of elevation from which a view looks down into the parting: alone it finds a parting to
-2 mm, eight level views to 5 mm (`benchmarks/parting.py`)."""
+"""Degrees of elevation from which a view looks down into the parting. On six heads it alone finds
+a parting to 3.1 mm, eight level views to 3.3 mm, the mean of both to 1.5 mm, because what limits
+either is the pose of its own cameras (`benchmarks/parting.py`)."""
 
 
 def measure_parting(
@@ -84,10 +88,22 @@ def measure_parting(
 
 
 def parting_from_skin(masks: Sequence[Mask], cameras: Sequence[Camera], head: Head) -> Parting:
-    """Return the parting that skin shows on the crown, in photos from above if there are any."""
-    views = list(zip(masks, cameras, strict=True))
-    above = [(mask, camera) for mask, camera in views if _elevation(camera) > FROM_ABOVE]
-    return _measure_skin(above or views, head, LEAST_SKIN_ABOVE if above else LEAST_SKIN)
+    """Return the parting that skin shows on the crown.
+
+    A photo from above says whether there is one; where level views see it near there, too, its
+    place is the mean of both.
+    """
+    above: list[tuple[Mask, Camera]] = []
+    beside: list[tuple[Mask, Camera]] = []
+    for mask, camera in zip(masks, cameras, strict=True):
+        (above if _elevation(camera) > FROM_ABOVE else beside).append((mask, camera))
+    level = _measure_skin(beside, head, LEAST_SKIN)
+    if not above:
+        return level
+    found = _measure_skin(above, head, LEAST_SKIN_ABOVE)
+    if not (found.seen and level.seen) or abs(found.x - level.x) > SAME_PARTING:
+        return found
+    return Parting.at(0.5 * (found.x + level.x), found.skin_share, found.spread)
 
 
 def _measure_skin(views: Sequence[tuple[Mask, Camera]], head: Head, least: float) -> Parting:

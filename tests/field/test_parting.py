@@ -80,22 +80,23 @@ def test_a_crown_without_skin_has_no_parting() -> None:
     assert not measure(turn_capture(), unknown, large_cameras()).seen
 
 
-def test_a_view_from_above_alone_tells_the_parting() -> None:
-    """What level views call skin does not count once a camera looks down."""
-    masks, cameras = masks_of(-0.03), large_cameras()
+@pytest.mark.parametrize(("level", "above", "both"), [(-0.03, 0.02, 0.02), (0.012, 0.02, 0.016)])
+def test_a_view_from_above_tells_the_parting(level: float, above: float, both: float) -> None:
+    """What level views call skin elsewhere does not count once a camera looks down."""
+    masks, cameras = masks_of(level), large_cameras()
     front = cameras[0]
-    above = Camera.on_turn(
+    down = Camera.on_turn(
         0.0,
         elevation_deg=70.0,
         focal=front.focal,
         width=front.width,
         height=front.height,
     )
-    masks, cameras = [*masks, parted_mask(above, 0.02)], [*cameras, above]
+    masks, cameras = [*masks, parted_mask(down, above)], [*cameras, down]
     turn = turn_capture()
     capture = replace(turn, views=(*turn.views, turn.views[0]))
     found = measure(capture, masks, cameras)
-    assert found.x == pytest.approx(0.02, abs=0.003)
+    assert found.x == pytest.approx(both, abs=0.003)
     assert found.spread < 2 * LINE
 
 
