@@ -80,9 +80,10 @@ class Story:
                 self.lost.append(f"{there} photos, {least} were confirmed")
             count = there
 
-    def draw(self, photo: dict[str, Any], number: int) -> None:
-        """Draw a stroke whose last point is `number` pixels down."""
-        self.doing = f"stroke on photo {photo['id']}"
+    def draw(self, identity: int, number: int) -> None:
+        """Draw a stroke whose last point is `number` pixels down, once the photo has its outline."""
+        self.doing = f"stroke on photo {identity}"
+        photo = self.insist("GET", f"/api/photos/{identity}/outline")
         x = photo["width"] / 2
         points = [[x, 0.3 * photo["height"]], [x + STROKE_PX, 0.3 * photo["height"] + number]]
         shape = {"label": "foreground", "shape_type": "linestrip", "points": points}
@@ -90,8 +91,8 @@ class Story:
             "flags": {"corrects": True}, "shapes": [shape],
             "imageWidth": photo["width"], "imageHeight": photo["height"],
         }  # fmt: skip
-        self.insist("PUT", f"/api/photos/{photo['id']}/strokes", document)
-        self.drawn[photo["id"]] = number
+        self.insist("PUT", f"/api/photos/{identity}/strokes", document)
+        self.drawn[identity] = number
 
     def choose(self, width_mm: float) -> None:
         """Choose the width of the hair."""
@@ -206,7 +207,7 @@ def _live(story: Story, killer: Killer, photos: list[Path]) -> None:
     while killer.is_alive():
         shown = story.insist("GET", "/api/project")["photos"]
         number += 1
-        story.draw(shown[number % len(shown)], number)
+        story.draw(shown[number % len(shown)]["id"], number)
         pauses = killer.generator.uniform(0, MOST_WAIT_S, 2)
         story.wait_for_hair("hair after a stroke", pauses[0])
         story.choose(0.05 + number / 1000)
