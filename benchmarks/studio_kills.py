@@ -81,7 +81,7 @@ class Story:
             count = there
 
     def draw(self, identity: int, number: int) -> None:
-        """Draw a stroke whose last point is `number` pixels down, once the photo has its outline."""
+        """Draw a stroke whose last point is `number` pixels down, once the outline is there."""
         self.doing = f"stroke on photo {identity}"
         photo = self.insist("GET", f"/api/photos/{identity}/outline")
         x = photo["width"] / 2
