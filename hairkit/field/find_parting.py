@@ -2,9 +2,10 @@
 
 Level views see the crown at a grazing angle, so that the 2D orientation of the strands there tells
 little of where a parting is. Skin that shows inside the hair does: its median is the parting; a
-photo from above says whether there is one. What the user says counts first: `parting` in
-capture.toml or on the command line, then a stroke labelled `parting`. Where no skin shows, and of
-a fringe, the directions of all views tell (`hairkit.field.scalp_comb`).
+photo from above says whether there is one, and counts as much as all level ones. What the user
+says counts first: `parting` in capture.toml or on the command line, then a stroke labelled
+`parting`. Where no skin shows, and of a fringe, the directions of all views tell
+(`hairkit.field.scalp_comb`).
 """
 
 from __future__ import annotations
@@ -40,16 +41,16 @@ one, 0.000 on curls."""
 LEAST_SKIN_ABOVE = 0.03
 """The same in photos from above: 0.08 to 0.15 on heads that have a parting, 0.01 on curls."""
 SAME_PARTING = 0.015
-"""Metres between the parting from above and that of level views, at most, for these to count: twice
-the largest difference on the heads of `FROM_ABOVE`."""
+"""Metres between the parting from above and that of level views up to which these count: twice the
+largest difference on the heads of `FROM_ABOVE`."""
 QUARTILES = (0.25, 0.5, 0.75)
 WIDEST_SKIN = 0.05
 """Distance in metres between the quartiles of the skin's x from which it is no line but a hairline
 whose hair is tied back: 9 cm there, at most 3.5 cm on partings, 6.6 cm if spread evenly."""
 FROM_ABOVE = 30.0
-"""Degrees of elevation from which a view looks down into the parting. On six heads it alone finds
-a parting to 3.1 mm, eight level views to 3.3 mm, the mean of both to 1.5 mm, because what limits
-either is the pose of its own cameras (`benchmarks/parting.py`)."""
+"""Degrees of elevation from which a view looks down into the parting. On six heads
+(docs/benchmarks.md) it alone finds a parting to 3.1 mm, eight level views to 3.3 mm, the mean of
+both to 1.5 mm: what limits either is the pose of its own cameras."""
 
 
 def measure_parting(

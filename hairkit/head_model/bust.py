@@ -1,9 +1,9 @@
 """A clothed bust under a head that ends at the neck: what pictures and exported scenes show.
 
 The torso of `hairkit.head_model.torso`, from a collar that lies on the head's own neck down to a
-rounded end, as of a sculpture. Where strands run inside of it, it gives way: clothes have
-folds that it has not, and no hair may be hidden. In simulations it keeps hair out; reconstruction
-does not use it.
+rounded end, as of a sculpture. Where strands run inside of it, it gives way: it fits a person's
+shoulders roughly, and no hair may be hidden. In simulations it keeps hair out; reconstruction does
+not use it.
 """
 
 from __future__ import annotations

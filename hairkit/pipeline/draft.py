@@ -36,12 +36,14 @@ from hairkit.pipeline.work_folder import read_latest, stage_file
 from hairkit.storage import Stored
 from hairkit.types.capture import Capture
 from hairkit.types.groom import Groom
+from hairkit.types.head import Head
 from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
 from hairkit.types.skin import SkinMaps
 from hairkit.types.turnaround import Turnaround
+from hairkit.types.volume import Hull
 from hairkit.types.waves import Waves
 
 _Result = TypeVar("_Result", bound=Stored)
@@ -105,17 +107,18 @@ def draft(
     check()
     field = _call(manager, recipe, "field", **seen)
     check()
-    head = replace(
-        scene.head,
-        density=_read(Hairline, work, "hairline").density,
-        maps=_read(SkinMaps, work, "skin"),
-        torso=hull.torso,
-    )
+    head = _complete_head(scene.head, hull, work)
     roots = sample_roots(head, guides, 0, rest=default_head())
     strands = _call(manager, recipe, "track", **seen, field=field, roots=roots)
     return assemble_groom(
         capture.views, masks, head, roots, strands, waves, tied, capture.chosen.hair
     )
+
+
+def _complete_head(head: Head, hull: Hull, work: Path) -> Head:
+    """Return the head with the hairline and skin of the last run and the torso of a hull."""
+    density, skin = _read(Hairline, work, "hairline").density, _read(SkinMaps, work, "skin")
+    return replace(head, density=density, maps=skin, torso=hull.torso)
 
 
 def _arranged(capture: Capture, work: Path, recipe: Recipe) -> Capture:

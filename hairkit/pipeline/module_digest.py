@@ -9,7 +9,6 @@ that a module loads at run time, such as shaders, are not covered.
 from __future__ import annotations
 
 import ast
-import contextlib
 import functools
 import hashlib
 import importlib.util
@@ -82,14 +81,15 @@ _DIGESTS: dict[tuple[object, ...], _Known] = {}
 
 def _states(files: Iterable[Path]) -> list[tuple[int, int]]:
     """Return time and size of files; -1 of those that are gone."""
-    states = []
-    for file in files:
-        with contextlib.suppress(OSError):
-            state = file.stat()
-            states.append((state.st_mtime_ns, state.st_size))
-            continue
-        states.append((-1, -1))
-    return states
+    return [_state(file) for file in files]
+
+
+def _state(file: Path) -> tuple[int, int]:
+    try:
+        state = file.stat()
+    except OSError:
+        return -1, -1
+    return state.st_mtime_ns, state.st_size
 
 
 def imported_modules(module: str, roots: Roots | None = None) -> dict[str, Path]:

@@ -9,7 +9,7 @@ import pytest
 
 from hairkit.arrays import Float64Array
 from hairkit.grooming.plait import plait
-from hairkit.grooming.tie_strands import lead_to_ties
+from hairkit.grooming.tie_strands import RISE, SKIN, lead_to_ties
 from hairkit.types.strands import Strands
 from hairkit.types.tie import Tail, Tie, TiedHair
 from tests.support import tied_ball as ball
@@ -62,6 +62,21 @@ def test_strands_stay_out_of_the_ball_and_in_the_hair(led: Float64Array) -> None
     hull = ball.tied_hull()
     sample = hull.grid.sample(hull.dense.astype(np.float32), led.reshape(-1, 3))
     assert (sample > 0.05).mean() > 0.95
+
+
+def test_strands_rise_from_the_skin_evenly(rng: np.random.Generator) -> None:
+    """At a hairline, where no hair lies underneath, strands do not jump to the top of the hull."""
+    count, across = 600, np.cross(ball.TIE, [1.0, 0.0, 0.0])
+    turn, angle = rng.uniform(-0.3, 0.3, count), rng.uniform(1.6, 1.62, count)
+    side = np.outer(np.sin(turn), [1, 0, 0]) - np.outer(np.cos(turn), across)
+    out = np.cos(angle)[:, None] * ball.TIE + np.sin(angle)[:, None] * side
+    course = out[:, None] * np.linspace(ball.BALL, 0.12, 48)[:, None]
+    hairline = Strands(course.reshape(-1, 3).astype(np.float32), np.arange(count + 1) * 48)
+    led = lead_to_ties(hairline, TiedHair((tube(),)), ball.tied_hull(), ball.tied_field())
+    points = led.points.reshape(count, 48, 3).astype(np.float64)
+    height = np.linalg.norm(points[:, 1], axis=1) - ball.BALL
+    arc = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+    assert (height < SKIN + RISE * arc).all()
 
 
 def test_the_tail_is_filled(led: Float64Array) -> None:
