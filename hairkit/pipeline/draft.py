@@ -110,9 +110,8 @@ def draft(
     head = _complete_head(scene.head, hull, work)
     roots = sample_roots(head, guides, 0, rest=default_head())
     strands = _call(manager, recipe, "track", **seen, field=field, roots=roots)
-    return assemble_groom(
-        capture.views, masks, head, roots, strands, waves, tied, capture.chosen.hair
-    )
+    hair = capture.chosen.hair
+    return assemble_groom(capture.views, masks, head, roots, strands, waves, tied, hair)
 
 
 def _complete_head(head: Head, hull: Hull, work: Path) -> Head:
