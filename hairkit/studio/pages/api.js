@@ -60,10 +60,10 @@ export function listen() {
 
 let shown;
 export function say(text) {
-  const toast = document.getElementById("toast");
-  toast.textContent = text;
+  const notice = document.getElementById("notice"); // above the page: it covers no control
+  notice.textContent = text;
   clearTimeout(shown);
-  shown = setTimeout(() => { toast.textContent = ""; }, 7000);
+  shown = setTimeout(() => { notice.textContent = ""; }, 7000);
 }
 
 // make("button", {class: "primary", onclick: f}, "Text", child)

@@ -1,5 +1,5 @@
 // The hair that turns and moves, and its files.
-import { make, onChange, refill, say, send, state } from "./api.js";
+import { make, onChange, refill, refresh, say, send, state } from "./api.js";
 import { showHair } from "./hair_controls.js";
 
 const engines = {
@@ -33,12 +33,14 @@ export function show(main) {
       const response = await fetch(`/api/result/${state.draft ? "draft" : "hair"}?v=${version}`);
       if (!response.ok) throw new Error("the hair could not be read");
       const packet = await response.arrayBuffer();
+      if (shown !== version) return; // newer hair came meanwhile
       close();
       const stage = make("section", { class: "stage", id: "hair", "aria-label": "The hair in motion" });
-      refill(main, make("div", { class: "split" }, stage, side()));
       close = showHair(stage, packet);
+      refill(main, make("div", { class: "split" }, stage, side()));
     } catch (error) {
-      say(error.message);
+      await refresh().catch(() => {}); // a draft goes when the whole hair comes
+      if (shown === version && (state.draft || state.result) === version) say(error.message);
     }
   }
 
