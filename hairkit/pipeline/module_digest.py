@@ -2,13 +2,13 @@
 
 The digest of a module covers its own source and every module that it imports, directly or not,
 as far as they belong to hairkit or to the module's own top-level package. Imports are read from
-the source without running it. Modules named only in strings (`importlib.import_module`) and files
-that a module loads at run time, such as shaders, are not covered.
+the source by their form, without running or parsing it. Modules named only in strings
+(`importlib.import_module`) and files that a module loads at run time, such as shaders, are not
+covered.
 """
 
 from __future__ import annotations
 
-import ast
 import functools
 import hashlib
 import importlib.util
@@ -20,10 +20,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from hairkit.storage import parsing
-
 FRONT_DOOR = "hairkit"
 """This package loads its names lazily: each stands for the module that defines it."""
+
+_STATEMENT = re.compile(
+    r"(?:^|[:;])[ \t]*(?:from[ \t]+(\.*)[ \t]*([\w.]*)[ \t]+import\b[ \t]*(\([^)]*\)|[^#;\n]+)"
+    r"|import[ \t]+([^#;\n]+))",
+    re.MULTILINE,
+)
+"""An import: leading dots, module and names, or modules alone. A line of a docstring that reads
+like one only makes the digest cover more."""
+_FOR_TYPES = re.compile(
+    r"^([ \t]*)if (?:typing\.)?TYPE_CHECKING:.*\n((?:\1[ \t]+.*(?:\n|$)|[ \t]*\n)*)", re.MULTILINE
+)
+_COMMENT = re.compile(r"#.*")
 
 Roots = Mapping[str, Path]
 """Folder of a top-level package, or file of a top-level module, by name."""
@@ -195,32 +205,26 @@ def _read(path: Path) -> _Source:
 def _parse(path: Path, modified: int, size: int) -> _Source:
     """Read a file once; `modified` and `size` are there to read it again after a change."""
     data = path.read_bytes()
-    try:
-        with parsing:
-            tree = ast.parse(data)
-        imports = tuple(_imports(tree.body, False))
-    except (SyntaxError, ValueError):  # it cannot be imported either
-        imports = ()
+    text = data.decode(errors="replace").replace("\r\n", "\n").replace("\\\n", " ")
+    typing = [inner for _, inner in _FOR_TYPES.findall(text)]
+    imports = [*_imports(_FOR_TYPES.sub("", text), False), *_imports("".join(typing), True)]
     if any(item.module == FRONT_DOOR and not item.names for item in imports):
-        used = re.findall(rf"\b{FRONT_DOOR}\.([A-Za-z]\w*)", data.decode(errors="replace"))
-        imports += (_Import(FRONT_DOOR, tuple(dict.fromkeys(used))),)
-    return _Source(hashlib.sha256(data).hexdigest(), imports)
+        used = re.findall(rf"\b{FRONT_DOOR}\.([A-Za-z]\w*)", text)
+        imports.append(_Import(FRONT_DOOR, tuple(dict.fromkeys(used))))
+    return _Source(hashlib.sha256(data).hexdigest(), tuple(imports))
 
 
-def _imports(statements: Iterable[ast.AST], for_types: bool) -> Iterator[_Import]:
-    """Yield every import of a block, those inside functions and branches too."""
-    for node in statements:
-        if isinstance(node, ast.Import):
-            yield from (_Import(alias.name, for_types=for_types) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            names = tuple(alias.name for alias in node.names)
-            yield _Import(node.module or "", names, node.level, for_types)
-        for block in ("body", "orelse", "finalbody", "handlers", "cases"):
-            inner = getattr(node, block, None)
-            if isinstance(inner, list):
-                typing = block == "body" and isinstance(node, ast.If) and _types_only(node.test)
-                yield from _imports(inner, for_types or typing)
+def _imports(text: str, for_types: bool) -> Iterator[_Import]:
+    """Yield every import statement of a source, those inside functions and branches too."""
+    for dots, module, names, modules in _STATEMENT.findall(text):
+        if modules:
+            yield from (_Import(name, for_types=for_types) for name in _listed(modules))
+        else:
+            yield _Import(module, tuple(_listed(names)), len(dots), for_types)
 
 
-def _types_only(test: ast.expr) -> bool:
-    return ast.unparse(test) in ("TYPE_CHECKING", "typing.TYPE_CHECKING")
+def _listed(names: str) -> Iterator[str]:
+    """Yield the names of a list `a, b as c`, with or without brackets."""
+    for item in _COMMENT.sub("", names).strip("() \t\n").split(","):
+        if words := item.split():
+            yield words[0]

@@ -166,9 +166,12 @@ def _run(
             raise
         work.flush()
         exports = export_paths(folder, recipe, manager)
-        _write(folder, run, capture, made, exports)
+        for name in (RECORD, SHEET):
+            (folder / name).unlink(missing_ok=True)
+        written = run.beside(_write, folder, run, capture, made, exports)
         if sheet:
             _draw_sheet(folder / SHEET, capture, made, log)
+        written.result()
         manager.notify("groom_ready", groom=made.groom)
         log.message(made.parting.summary)
         for figure in made.health:
@@ -236,18 +239,17 @@ def _grow(
     scene = fit_scene(run, photos, masks, head, first)
     if capture.chosen.head is not None:
         scene = Given.of(move_head(scene.value, capture.chosen.head))
+    skin = run.beside(find_skin, run, photos, masks, scene)  # strands need none of it
     hull = run.once("hull", Hull, scene=scene, masks=masks)
     seen = _measure(run, photos, masks, orientations, scene, hull, capture.chosen.hair)
     field = run.once("field", OrientationField, **seen)
     waves, distance = seen["waves"].value, seen["scalp_distance"].value
     parting, tied = seen["parting"].value, seen["tied"].value
     hairline = run.derive("hairline", Hairline, measure_hairline, scene=scene, masks=masks)
-    skin = find_skin(run, photos, masks, scene)
-    grown = replace(
-        scene.value.head, density=hairline.value.density, maps=skin, torso=hull.value.torso
-    )
+    grown = replace(scene.value.head, density=hairline.value.density, torso=hull.value.torso)
     roots = Given.of(sample_roots(grown, guides, seed, rest=head))
     strands = run.once("track", Strands, **seen, field=field, roots=roots)
+    grown = replace(grown, maps=skin.result())
     labels = tuple(mask.result().value for mask in masks)
     angles = tuple(orientation.result().value for orientation in orientations)
     groom = assemble_groom(
@@ -299,15 +301,13 @@ def _write(
     made: _Made,
     exports: Sequence[tuple[str, Path]],
 ) -> None:
-    """Write the groom, the scene and the exports; remove sheet and record of an older run."""
-    (folder / RECORD).unlink(missing_ok=True)
+    """Write the groom, the scene and the exports."""
     made.groom.save(folder / "groom.npz")
     photos = [None if v.photo_path is None else v.photo_path.name for v in capture.views]
     sizes = [view.photo_size for view in capture.views]
     made.scene.resized(sizes).write_json(folder / "scene.json", photos)
     for plugin, path in exports:
         run.export(plugin, made.groom, path)
-    (folder / SHEET).unlink(missing_ok=True)
 
 
 def _draw_sheet(path: Path, capture: Capture, made: _Made, log: RunLog) -> None:

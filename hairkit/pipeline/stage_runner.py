@@ -113,6 +113,10 @@ class StageRunner:
 
         return [self._pool.submit(run, index, view) for index, view in enumerate(views)]
 
+    def beside(self, work: Callable[..., _Value], *args: Any) -> Future[_Value]:
+        """Start what nothing waits for yet on another thread."""
+        return self._pool.submit(work, *args)
+
     def export(self, plugin: str, groom: Groom, path: Path) -> None:
         """Write one of the recipe's files."""
         stage = self._stage("export")

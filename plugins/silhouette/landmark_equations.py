@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.head_model.cranium import Cranium
@@ -235,24 +236,18 @@ class LandmarkFit:
         offset: Float64Array,
     ) -> LandmarkEquations:
         """Eliminate the offsets: the Schur complement of their block."""
-        unknowns = rows.shape[1]
         residual = residual + (by_shape * offset[point]).sum(1)
-        count = len(self.landmarks)
-        blocks = np.zeros((count, 3, 3))
-        np.add.at(blocks, point, by_shape[:, :, None] * by_shape[:, None, :])
-        coupling = np.zeros((count, 3, unknowns))
-        np.add.at(coupling, point, by_shape[:, :, None] * rows[:, None, :])
-        pull = np.zeros((count, 3))
-        np.add.at(pull, point, by_shape * residual[:, None])
-        shape = self.precision.copy()
-        diagonal = np.arange(count)
-        shape.reshape(count, 3, count, 3)[diagonal, :, diagonal] += blocks
-        flat = coupling.reshape(3 * count, unknowns)
-        solved = np.linalg.solve(shape, np.column_stack([flat, pull.ravel()]))
+        columns = 3 * point[:, None] + np.arange(3)
+        ends = np.arange(0, columns.size + 1, 3)
+        size = self.landmarks.size
+        by_offset = csr_matrix((by_shape.ravel(), columns.ravel(), ends), (len(rows), size))
+        flat, pull = by_offset.T @ rows, by_offset.T @ residual
+        shape = self.precision + (by_offset.T @ by_offset).toarray()
+        solved = np.linalg.solve(shape, np.column_stack([flat, pull]))
         normal = rows.T @ rows - flat.T @ solved[:, :-1]
         right = rows.T @ residual - flat.T @ solved[:, -1]
-        cost = float(residual @ residual - pull.ravel() @ solved[:, -1])
-        return LandmarkEquations((normal + normal.T) / 2, right, cost, pull.ravel(), flat, shape)
+        cost = float(residual @ residual - pull @ solved[:, -1])
+        return LandmarkEquations((normal + normal.T) / 2, right, cost, pull, flat, shape)
 
 
 CameraArrays = tuple[Float64Array, Float64Array, Float64Array, Float64Array]
