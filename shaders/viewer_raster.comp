@@ -23,7 +23,7 @@ uniform sampler3D u_opacity;
 uniform ivec2 u_picture;
 uniform float u_smooth;         // 1: partial coverage across the stroke; 0: whole pixels, faster
 
-const float BOUNCED = 0.1;      // share of the sky's light that scatters through hair
+const float BOUNCED = 0.35;      // share of the sky's light that scatters through hair
 const float HIDDEN = 0.14;      // segments with a lower transmittance are not drawn
 const float DENSE = 0.4;       // share of a tile's mean optical depth: locks are denser than gaps
 const float WIDEST = 64.0;      // pixels
@@ -34,7 +34,7 @@ float arriving(Seen s) {
     if (s.depth < 0.0) return 0.0;
     float slice = clamp((s.depth - u_slice_range.x) * u_slice_range.y, 0.0, float(SLICES));
     vec3 at = vec3(s.pixel.xy / (float(TILE) * vec2(u_tiles)), (slice + 0.5) / float(SLICES + 1));
-    return exp(-DENSE * textureLod(u_opacity, at, 0.0).r);
+    return exp(-DENSE * u_dimming * textureLod(u_opacity, at, 0.0).r);
 }
 
 vec3 seen_colour(vec3 position, vec3 tangent, float share, float random) {
@@ -57,7 +57,7 @@ bool hidden_by_solid(vec3 pixel) {
 }
 
 void add(ivec2 pixel, vec4 colour_weight, float dither) {
-    uvec4 whole = uvec4(colour_weight * SUM_UNIT + dither);
+    uvec4 whole = uvec4(colour_weight * sum_unit() + dither);
     uint index = sum_index(pixel, u_picture.x);
     atomicAdd(sums[index], whole.r << 16 | whole.g);
     atomicAdd(sums[index + 1], whole.b << 16 | whole.a);

@@ -18,6 +18,6 @@ void main() {
     sums[index + 1] = 0u;
     float weight = float(blue_weight & 0xFFFFu);
     vec3 total = vec3(red_green >> 16, red_green & 0xFFFFu, blue_weight >> 16);
-    float cover = weight / SUM_UNIT;
+    float cover = weight / sum_unit();
     out_colour = vec4(total / max(weight, 1.0), min(cover * (1.0 + 0.8 * cover), 1.0));
 }

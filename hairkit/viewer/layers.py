@@ -41,8 +41,8 @@ FIELD_LINES = 4000
 """Line segments drawn of an orientation field at most."""
 FIELD_LINE_HALF = 1.6
 """Half the length of such a segment, voxels."""
-PHOTO_EDGE = 640
-"""Long edge of the photos on billboards, pixels."""
+PHOTO_EDGE, COMPARED_EDGE = 640, 1280
+"""Long edges of the photos on billboards and of those beside the picture, pixels."""
 FRUSTUM_COLOUR = (0.15, 0.35, 0.75, 0.8)
 """Linear RGB and opacity of the view frusta."""
 _Found = TypeVar("_Found", bound=Stored)
@@ -162,13 +162,21 @@ class Layers:
         """True if the confidence of a field can be shown."""
         return "field" in self.available
 
+    @cached_property
+    def photos(self) -> dict[str, UInt8Array]:
+        """The photos (H, W, 3) RGB by view name; empty where they are unknown."""
+        return self._images(COMPARED_EDGE)
+
     def _photos(self) -> dict[str, UInt8Array]:
+        return {name: _add_alpha(image) for name, image in self._images(PHOTO_EDGE).items()}
+
+    def _images(self, edge: int) -> dict[str, UInt8Array]:
         if self.capture is None:
             return {}
-        capture, turn = self.take_capture(PHOTO_EDGE), self._read(Turnaround, "turn")
+        capture, turn = self.take_capture(edge), self._read(Turnaround, "turn")
         if turn is not None and len(turn.names) == len(capture.views):
             capture = capture.arranged(turn)
-        return {view.name: _add_alpha(view.image) for view in capture.views}
+        return {view.name: view.image for view in capture.views}
 
     def _masks(self) -> dict[str, UInt8Array]:
         pictures = {}

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from hairkit.types.camera import Camera
 
 VERTICAL_ANGLE = np.radians(28.0)
-"""Vertical field of view, radians."""
+"""Field of view of the shorter edge, radians."""
 MARGIN = 1.12
 """Distance over the one at which the points just fit into the picture."""
 NEAREST, FARTHEST = 0.05, 20.0
@@ -36,21 +36,28 @@ class OrbitView:
         middle = (low + high) / 2
         radius = float(np.hypot(*(high - low)[[0, 2]])) / 2
         half = np.tan(VERTICAL_ANGLE / 2)
+        aspect = max(aspect, 1.0)  # narrow pictures have this angle across
         up = (high[1] - low[1]) / 2 / half + radius
         across = radius / np.sin(np.arctan(half * aspect))
         x, y, z = middle.tolist()
         return cls(distance=float(MARGIN * max(up, across)), target=(x, y, z))
 
-    def camera(self, width: int, height: int) -> Camera:
-        """Return the camera for a picture of `width` x `height` pixels."""
+    def camera(self, width: int, height: int, free: int | None = None) -> Camera:
+        """Return the camera for a picture of `width` x `height` pixels.
+
+        The target is in the middle of its first `free` columns (None: of all), and the angle of
+        view is that of the shorter edge, so that what was framed stays in view.
+        """
+        free = width if free is None else free
         return Camera.on_turn(
             self.azimuth,
             elevation_deg=self.elevation,
             distance=self.distance,
             target=self.target,
-            focal=height / 2 / float(np.tan(VERTICAL_ANGLE / 2)),
+            focal=min(free, height) / 2 / float(np.tan(VERTICAL_ANGLE / 2)),
             width=width,
             height=height,
+            centre=(free / 2, height / 2),
         )
 
     def orbited(self, right: float, up: float) -> OrbitView:

@@ -7,18 +7,23 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from hairkit.arrays import UInt8Array
 from hairkit.rendering.context import Renderer
+from hairkit.rendering.gl_camera import NEAREST
 from hairkit.rendering.head import Solid, bust_solid, head_solid
 from hairkit.simulation.rigid_motion import follow_head
+from hairkit.types.camera import Camera
 from hairkit.viewer.draw.colouring import point_values, ramp
 from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
-from hairkit.viewer.draw.frame_budget import LEVELS, Budget
+from hairkit.viewer.draw.frame_budget import LEVELS, Budget, Quality
 from hairkit.viewer.draw.interface import HairLook
 from hairkit.viewer.draw.lines import LineSet
+from hairkit.viewer.draw.still import Lens, Still, sample_camera
 from hairkit.viewer.layers import BILLBOARDS
+from hairkit.viewer.picking import surface_point
 from hairkit.viewer.recording import free_name, write_png
 from hairkit.viewer.session import Session
 from hairkit.viewer.window.hud import Readings
@@ -33,6 +38,10 @@ PICKED_COLOUR = (1.0, 0.85, 0.1)
 """sRGB of the picked guide."""
 TIME_SMOOTHING = 0.2
 """Weight of the newest frame in the displayed times."""
+SAMPLE = Quality(False, 1.0, 1.0)
+"""Quality of a sample of a still picture: many of them are smooth together."""
+WIPE_EDGE = 2
+"""Width of the line between photo and hair, pixels."""
 MIN_EDGE = 16
 """Smallest edge of the picture, pixels, in a window that is almost closed."""
 
@@ -60,6 +69,8 @@ class Preview:
         self._kept: dict[str, list[str]] = {}
         self._lines: dict[str, LineSet | None] = {}
         self._places: dict[str, object] = {}
+        self._photo: tuple[object, UInt8Array] | None = None
+        self._still = Still()
         self._pictures = 0
         self._times: dict[str, float] = {}
 
@@ -92,25 +103,70 @@ class Preview:
     def frame(self, seconds: float, *, still: bool = False) -> None:
         """Simulate `seconds`, draw, and write pending screenshots and the recording.
 
-        `still` draws at the best quality, whatever the budget.
+        `still` draws at the best quality, whatever the budget; a screenshot is a still picture.
         """
         began = time.perf_counter()
         self.session.advance(seconds)
         simulated = time.perf_counter()
-        self.draw(still=still)
+        shot = bool(self.session.screenshots)
+        if shot:
+            self._still.clear()
+            while self.refine(fine=True):
+                pass
+        else:
+            self.draw(still=still)
         self._save_picture()
         drawn = time.perf_counter()
-        self.budget.record(drawn - simulated, simulated - began)
+        if not (shot or still):
+            self.budget.record(drawn - simulated, simulated - began)
         self._update_readings(simulated - began, drawn - simulated)
+
+    def refine(self, *, fine: bool = False) -> bool:
+        """Add a sample to the still picture of the present state; return whether more are wanted.
+
+        Does nothing once the picture is complete; `draw` begins another one. `fine` diffuses the
+        light in skin where hair is drawn on the CPU too, which takes seconds there.
+        """
+        count = self._still.count
+        if count == 0:
+            self._lens = self._focus()
+        if count < self._lens.samples:
+            camera = sample_camera(self.session.camera(), self._lens, count)
+            fine = fine or not self.frame_renderer.soft
+            self._draw(SAMPLE, camera, first=count == 0, fine=fine)
+            self.frame_renderer.write(self._still.add(self.picture()))
+            self._compare()
+        return self._still.count < self._lens.samples
+
+    def _focus(self) -> Lens:
+        """Return the lens, focused on the head at the middle of the picture."""
+        session = self.session
+        camera = session.camera()
+        found = surface_point(camera, session.opened.groom.head, camera.centre)
+        focus = session.view.distance if found is None else float(camera.depth(found))
+        return Lens(session.shown.aperture, max(focus, NEAREST))
 
     def draw(self, *, still: bool = False) -> None:
         """Draw the present state of the session."""
-        frame_renderer, session = self.frame_renderer, self.session
+        self._still.clear()
         quality = LEVELS[0] if still else self.budget.quality
-        width, height = (max(round(n * quality.scale), MIN_EDGE) for n in session.size)
+        width, height = (max(round(n * quality.scale), MIN_EDGE) for n in self.session.size)
+        self._draw(quality, self.session.camera((width, height)), first=still)
+        self._compare()
+
+    def _draw(
+        self,
+        quality: Quality,
+        camera: Camera,
+        *,
+        first: bool,
+        fine: bool = False,
+    ) -> None:
+        """Draw a picture, or a sample of a still one, whose `first` brings the light up to date."""
+        frame_renderer, session = self.frame_renderer, self.session
         buffer = None if frame_renderer.soft else session.guide_buffer()
         rows = session.guide_rows() if buffer is None or self._needs_rows else None
-        look = self._look(quality.smooth, quality.share)
+        look = self._look(quality.smooth, quality.share, sample=quality is SAMPLE)
         overlays = self._overlays(rows)
         billboards, solids = (
             self._load_billboards(frame_renderer),
@@ -118,14 +174,18 @@ class Preview:
         )
         frame_renderer.draw(
             FrameInputs(
-                session.camera((width, height)),
+                camera,
                 session.world_from_head,
                 rows if buffer is None else buffer,
                 look,
                 show_head="head" in session.shown.layers,
                 floor=session.floor,
                 exposure=session.shown.exposure,
-                whole_light=still,
+                light_turn=float(np.radians(session.shown.light)),
+                backdrop=session.shown.backdrop,
+                whole_light=first,
+                same_light=quality is SAMPLE and not first,
+                fine_skin=fine,
                 lines=overlays,
                 billboards=billboards,
                 billboard_opacity=session.shown.opacity,
@@ -149,7 +209,7 @@ class Preview:
         """Return the last picture (H, W, 3) RGB, at the size at which it was drawn."""
         return self.frame_renderer.read()
 
-    def _look(self, smooth: bool, share: float) -> HairLook | None:
+    def _look(self, smooth: bool, share: float, *, sample: bool) -> HairLook | None:
         session, material = self.session, self.session.opened.groom.material
         shown = session.shown
         guides = len(session.body.guides)
@@ -159,7 +219,7 @@ class Preview:
         count = max(round(count * (1.0 if shown.guides_only else share)), 1)
         return HairLook(
             count,
-            smooth or count <= MIN_SMOOTH,
+            smooth or (count <= MIN_SMOOTH and not sample),
             _triple(material.root_colour),
             _triple(material.tip_colour),
             by_direction=shown.colours == "direction",
@@ -218,6 +278,26 @@ class Preview:
                 if solid is not None:
                     frame_renderer.upload_solid(name, solid)
         return tuple(kept for name in names for kept in self._kept[name])
+
+    def _compare(self) -> None:
+        """Cover the left of the picture with the photo whose camera it is seen through."""
+        session, frame_renderer = self.session, self.frame_renderer
+        wipe, name = session.shown.wipe, session.shown.through
+        if wipe is None or name is None:
+            return
+        width, height = frame_renderer.framebuffer.size
+        now, taken = session.camera((width, height)), session.photo_cameras[name]
+        scale = now.focal / taken.focal
+        left, top = np.rint(now.centre - taken.centre * scale).astype(int).tolist()
+        size = round(taken.width * scale), round(taken.height * scale)
+        if self._photo is None or self._photo[0] != (session.opened, name, size):
+            image = cv2.resize(session.layers.photos[name], size, interpolation=cv2.INTER_AREA)
+            self._photo = (session.opened, name, size), np.asarray(image, np.uint8)
+        edge = int(np.clip(round(wipe * width), 0, width - WIPE_EDGE))
+        photo = self._photo[1][: height - top, : max(edge - left, 0)]
+        if photo.size:
+            frame_renderer.write(photo, left, top)
+        frame_renderer.write(np.full((height, WIPE_EDGE, 3), 255, np.uint8), edge)
 
     def _save_picture(self) -> None:
         session = self.session

@@ -28,7 +28,9 @@ from hairkit.viewer.recording import Recorder
 from hairkit.viewer.simulation import TunableSimulator
 
 STEP = 1 / 60
-"""Time step of the simulator, seconds."""
+"""Time step of the simulator in scripts and films, seconds."""
+TICK, MOST_TICKS = 1 / 120, 4
+"""In a window a picture is one step of a few ticks: seconds, and how many of them at most."""
 HAIRS = 10_000
 """Strands drawn by default."""
 MAX_WIND = 60.0
@@ -66,10 +68,17 @@ class Shown:
     hairs: int = HAIRS
     guides_only: bool = False
     colours: str = "hair"
-    layers: set[str] = field(default_factory=lambda: {"head"})
+    layers: set[str] = field(default_factory=lambda: {"head", "torso"})
     opacity: float = 0.8
     """Opacity of the photos."""
     exposure: float = 0.75
+    light: float = 0.0
+    """Degrees by which the lights are turned round the head, seen from above to the right."""
+    backdrop: str = "grey"
+    aperture: float = 0.0
+    """Diameter of the lens of still pictures, metres; 0 is sharp everywhere."""
+    wipe: float | None = None
+    """Share of the picture's width that shows the photo; None: no comparison."""
     help: bool = False
     panel: bool = True
     numbers: bool = True
@@ -116,12 +125,16 @@ class Session:
         """Cameras of the photos during the manual alignment."""
         self.rerun: Rerun | None = None
         """The running reconstruction."""
+        self.covered = 0
+        """Pixels at the right edge of the picture that the panel covers."""
         self.max_seconds: float | None = None
-        """Longest simulation time of a frame, seconds: slow machines show slow motion. None: no
-        limit, as for scripts."""
+        """Time that the simulation of a picture may take, seconds, in one step: slow machines show
+        slow motion. None: as many steps as the picture needs, as for scripts."""
         self.steps = 0
         """Simulation steps since the groom was opened."""
         self._time_debt = 0.0
+        self._ticks = MOST_TICKS
+        """Longest step of a picture at present, ticks."""
         self.guides_on_gpu = False
         """True if the guides are drawn from a buffer of the simulator."""
         self.overwrite = False
@@ -150,7 +163,7 @@ class Session:
         """Fit groom and head into the picture, from the front and a little to the side."""
         groom = self.opened.groom
         points = np.concatenate([groom.strands.points, groom.head.vertices])
-        self.view = OrbitView.around(points, self.size[0] / self.size[1])
+        self.view = OrbitView.around(points, self._free(self.size[0]) / self.size[1])
         self.floor = float(points[:, 1].min()) - FLOOR_GAP
         self.shown.through = None
 
@@ -162,10 +175,14 @@ class Session:
     def camera(self, size: tuple[int, int] | None = None) -> Camera:
         """Return the camera of the picture, world frame."""
         width, height = size or self.size
-        through = self.shown.through
+        through, free = self.shown.through, self._free(width)
         if through is not None and through in self.photo_cameras:
-            return fit_camera(self.photo_cameras[through], width, height)
-        return self.view.camera(width, height)
+            return replace(fit_camera(self.photo_cameras[through], free, height), width=width)
+        return self.view.camera(width, height, free)
+
+    def _free(self, width: int) -> int:
+        """Return how many columns of a picture of that width the panel leaves free."""
+        return max(width - round(self.covered * width / self.size[0]), 1)
 
     @property
     def photo_cameras(self) -> dict[str, Camera]:
@@ -212,12 +229,12 @@ class Session:
         if self.paused:
             return
         self._time_debt += seconds
-        before, began = self.steps, time.perf_counter()
-        while self._time_debt >= STEP * (1 - 1e-6):
+        before = self.steps
+        if self.max_seconds is not None:
+            self._step_once(self.max_seconds)
+        while self.max_seconds is None and self._time_debt >= STEP * (1 - 1e-6):
             self._time_debt -= STEP
             self._step()
-            if self.max_seconds is not None and time.perf_counter() - began > self.max_seconds:
-                self._time_debt = 0.0
         if self.steps > before and not self.guides_on_gpu:
             self.check_stability()
 
@@ -226,15 +243,29 @@ class Session:
         self._step()
         self.check_stability()
 
-    def _step(self) -> None:
-        self.motion.advance(STEP)
+    def _step_once(self, most: float) -> None:
+        """Simulate the time of a picture in one step, a shorter one if the last took over `most`.
+
+        Steps are whole ticks, so that simulators can keep what they prepare for a length.
+        """
+        ticks = min(int(self._time_debt / TICK + 1e-6), self._ticks)
+        if ticks == 0:
+            return
+        began = time.perf_counter()
+        self._step(ticks * TICK)
+        slow = time.perf_counter() - began > most
+        self._ticks = max(ticks // 2, 1) if slow else min(2 * self._ticks, MOST_TICKS)
+        self._time_debt = min(self._time_debt - ticks * TICK, TICK)
+
+    def _step(self, seconds: float = STEP) -> None:
+        self.motion.advance(seconds)
         surroundings = Surroundings(
             head_from_rest=self.world_from_head,
             wind=self.wind.velocity(),
             turbulence=self.wind.turbulence,
             grabs=() if self.grabbed_lock is None else self.grabbed_lock.grabs(),
         )
-        self.simulation.simulator.advance(STEP, surroundings)
+        self.simulation.simulator.advance(seconds, surroundings)
         self.steps += 1
 
     def check_stability(self) -> None:

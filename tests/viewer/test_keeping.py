@@ -16,7 +16,7 @@ from hairkit.rendering.context import renderer
 from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import Recorder, free_name, write_png
-from hairkit.viewer.session import Session
+from hairkit.viewer.session import TICK, Session
 from hairkit.viewer.simulation import RigidHair
 from hairkit.viewer.window.file_watcher import POLL_INTERVAL, FileWatcher, shader_files
 
@@ -92,6 +92,22 @@ def test_runaway_hair_is_put_back_to_rest(
     session.advance(0.05)
     np.testing.assert_array_equal(session.simulation.simulator.points, rest)
     assert "diverged" in session.message
+
+
+def test_a_picture_is_one_step_at_most(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As long as the picture, if that is fast enough; slow steps become shorter: slow motion."""
+    steps: list[float] = []
+    monkeypatch.setattr(session.simulation.simulator, "advance", lambda dt, _: steps.append(dt))
+    session.max_seconds = 1.0
+    for count in range(1, 31):
+        session.advance(1 / 37)
+        assert len(steps) == count
+    assert sum(steps) == pytest.approx(30 / 37, abs=2 * TICK)
+    assert {round(step / TICK, 6) for step in steps} <= {1, 2, 3, 4}
+    session.max_seconds = 0.0  # no step is fast enough
+    for _ in range(4):
+        session.advance(1 / 10)
+    assert steps[-1] == pytest.approx(TICK)
 
 
 def test_without_a_simulator_hair_goes_rigidly_with_the_head(session: Session) -> None:

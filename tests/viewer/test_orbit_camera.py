@@ -26,6 +26,16 @@ def test_a_framed_cloud_is_seen_whole_from_anywhere(
     assert (pixels <= [camera.width, camera.height]).all()
 
 
+@given(st.integers(60, 900), st.integers(60, 900), st.floats(0, 0.6))
+def test_what_was_framed_stays_in_view_in_any_window(width: int, height: int, panel: float) -> None:
+    """However narrow it becomes, and beside a panel that covers its right."""
+    cloud = np.random.default_rng(3).uniform((-0.1, -0.5, -0.2), (0.2, 0.1, 0.1), (60, 3))
+    free = max(round((1 - panel) * width), 40)
+    pixels = OrbitView.around(cloud, 16 / 9).camera(width, height, free).project(cloud)
+    assert (pixels >= 0).all()
+    assert (pixels <= [free, height]).all()
+
+
 @given(st.floats(-60, 60), st.floats(-40, 40))
 def test_turning_back_gives_the_same_view(right: float, up: float) -> None:
     """Orbits add up, and end at the same camera."""

@@ -17,4 +17,6 @@ machines without a graphics card (`*_cpu`); tests compare both.
 * `place_kernels`: compiled interpolation of hair from guides
 * `raster_kernels`: compiled rasteriser of hair
 * `shade_kernels`: compiled fibre shading
+* `still`: samples of a still picture: antialiasing and depth of field
+* `studio`: wall and floor behind the head
 """

@@ -5,17 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import cv2
 import moderngl
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.rendering.context import Renderer
-from hairkit.rendering.gl_camera import DepthRange, set_uniforms
+from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.head import Solid
 from hairkit.rendering.light import Lights
-from hairkit.rendering.picture import BACKDROP_BOTTOM, BACKDROP_TOP, HEAD_PUSH
+from hairkit.rendering.picture import HEAD_PUSH
+from hairkit.rendering.skin_passes import draw_skin
 from hairkit.simulation.rigid_motion import inverse_motion
 from hairkit.types.camera import Camera
+from hairkit.types.skin_look import SkinLook
 from hairkit.viewer.draw.hair_cpu import SoftHairPass
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.hair_gpu import HairPass
@@ -24,13 +27,14 @@ from hairkit.viewer.draw.light_cpu import SoftLightPass
 from hairkit.viewer.draw.light_gpu import TURNS, LightPass
 from hairkit.viewer.draw.lines import Billboard, BillboardPass, LineSet, draw_lines
 from hairkit.viewer.draw.meshes import SolidPass
+from hairkit.viewer.draw.studio import StudioPass
 
 KEY = (-0.45, 0.6, 0.75)
 """Direction towards the key light, camera axes: right, up, back."""
 RIM = (0.55, 0.6, -0.55)
 """Direction towards the rim light, same axes."""
-STUDIO_SIZE = (160, 90)
-"""Pixels of the studio picture, which is smooth and is scaled up to the frame."""
+EDGE_SAMPLES = 4
+"""Samples of a pixel at the edges of meshes."""
 FIXED_SOLIDS = ("torso",)
 """Meshes that do not move with the head."""
 PULL = 0.002
@@ -53,8 +57,16 @@ class FrameInputs:
     floor: float = -0.4
     """Height of the floor, world, metres."""
     exposure: float = 0.75
+    light_turn: float = 0.0
+    """Angle by which the lights are turned round the head, radians."""
+    backdrop: str = "grey"
+    """One of `studio.BACKDROPS`."""
     whole_light: bool = False
     """True updates the whole light volume in this frame, for still pictures."""
+    same_light: bool = False
+    """True leaves the light volume as it is, for another sample of a still picture."""
+    fine_skin: bool = False
+    """True diffuses the light in skin and draws all its maps, for still pictures."""
     lines: tuple[tuple[LineSet, bool], ...] = ()
     """Line sets, and for each whether it moves with the head."""
     billboards: tuple[str, ...] = ()
@@ -77,6 +89,8 @@ class FrameRenderer:
     """True draws hair on the CPU, False on the GPU; None: CPU for software renderers."""
     _size: tuple[int, int] = (0, 0)
     _solids: dict[str, SolidPass] = field(default_factory=dict)
+    _reaches: dict[str, float] = field(default_factory=dict)
+    """Farthest vertex of each solid from the middle of the head, metres."""
     _billboards: dict[str, BillboardPass] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -91,22 +105,14 @@ class FrameRenderer:
         size = float(np.linalg.norm(self.head.vertices - middle, axis=1).max())
         self._head_room = middle, size
         self._fresh = True
-        self._studio_upscale_quad, self._studio_quad = (
-            self.gl.context.vertex_array(self.gl.program("viewer_screen", fragment), [])
-            for fragment in ("viewer_backdrop", "viewer_studio")
-        )
-        self._small_studio_texture = self.gl.context.texture(STUDIO_SIZE, 4, dtype="f2")
-        self._small_studio_texture.repeat_x = self._small_studio_texture.repeat_y = False
-        self._small_studio = self.gl.context.framebuffer([self._small_studio_texture])
-        self._studio_made: object = None
+        self._studio = StudioPass(self.gl)
         self._backdrop_made: object = None
         self._age = 0
 
     def release(self) -> None:
         """Free all GPU objects."""
         parts: list[Any] = [self.hair, self._light, self._head, *self._solids.values()]
-        parts += [*self._billboards.values(), self._studio_upscale_quad, self._studio_quad]
-        for part in [*parts, self._small_studio, self._small_studio_texture]:
+        for part in [*parts, *self._billboards.values(), self._studio]:
             part.release()
         self._release_targets()
 
@@ -122,6 +128,8 @@ class FrameRenderer:
         if name in self._solids:
             self._solids[name].release()
         self._solids[name] = SolidPass(self.gl, solid, by_vertex=bool(self.soft))
+        off = solid.vertices - self._head_room[0]
+        self._reaches[name] = float(np.linalg.norm(off, axis=1).max())
 
     def upload_billboard(self, name: str, board: Billboard) -> None:
         """Upload a billboard that frames refer to by name."""
@@ -133,7 +141,7 @@ class FrameRenderer:
         """Draw a frame; `read` and `texture` return it until the next one."""
         self._resize((inputs.camera.width, inputs.camera.height))
         own = _camera_in_head(inputs.camera, inputs.world_from_head)
-        lights = studio_lights(own, inputs.exposure)
+        lights = studio_lights(own, inputs.exposure, inputs.light_turn)
         lighting = {**lights.uniforms(), **self._light.uniforms()}
         if inputs.guide_rows is not None or self._fresh:
             rows = self.body.guide_rest if inputs.guide_rows is None else inputs.guide_rows
@@ -144,8 +152,9 @@ class FrameRenderer:
         if inputs.hair is not None:
             self.hair.place(view, inputs.hair)
         hairs = 0 if inputs.hair is None else inputs.hair.hairs
-        whole = inputs.whole_light or self._fresh
-        self._light.update(self.hair, hairs, lights, whole=whole)
+        if self._fresh or not inputs.same_light:
+            whole = inputs.whole_light or self._fresh
+            self._light.update(self.hair, hairs, lights, whole=whole)
         self._fresh = False
         self._light.texture.use(0)
         self._draw_backdrop(inputs, own, depth, lighting)
@@ -165,11 +174,18 @@ class FrameRenderer:
         shape = (self._size[1], self._size[0], 3)
         return np.frombuffer(data, np.uint8).reshape(shape)
 
+    def write(self, picture: UInt8Array, left: int = 0, top: int = 0) -> None:
+        """Put a picture (H, W, 3) RGB over a part of the frame."""
+        height, width = picture.shape[:2]
+        opaque = cv2.cvtColor(picture, cv2.COLOR_RGB2RGBA)
+        self.texture.write(opaque, viewport=(left, top, width, height))
+
     def _depth(self, inputs: FrameInputs, own: Camera) -> DepthRange:
         """Return a depth range in coarse steps, so that frames can reuse the backdrop."""
         middle, size = self._head_room
         off = self.cloud - middle.astype(np.float32)
         farthest = max(size, float(np.sqrt(np.einsum("pc,pc->p", off, off).max())))
+        farthest = max([farthest, *(self._reaches[name] for name in inputs.solids)])
         radius = np.ceil(farthest / 0.25 + 0.1) * 0.25 + (
             0.6 if inputs.billboards or inputs.lines else 0
         )
@@ -185,50 +201,34 @@ class FrameRenderer:
         if key == self._backdrop_made and self._age < TURNS and not inputs.whole_light:
             return
         self._backdrop_made, self._age = key, 0
-        self._draw_studio(inputs)
-        self.gl.context.copy_framebuffer(self._backdrop, self._studio)
-        self._depths.clear(depth=1.0)
-        self._backdrop.use()
+        self._studio.draw(self._samples, inputs.camera, inputs.floor, inputs.backdrop)
+        self._sample_depths.clear(depth=1.0)
+        self._samples.use()
+        self._draw_meshes(inputs, own, depth, lighting)
+        self.gl.context.copy_framebuffer(self._backdrop, self._samples)  # averages the samples
+
+    def _draw_meshes(
+        self, inputs: FrameInputs, own: Camera, depth: DepthRange, lighting: dict[str, Any]
+    ) -> None:
+        for name in FIXED_SOLIDS:
+            if name in inputs.solids:
+                head_from_world = inverse_motion(inputs.world_from_head)
+                self._solids[name].place(head_from_world @ inputs.world_from_torso)
+        parts = [self._head] if inputs.show_head else []
+        parts += [self._solids[name] for name in inputs.solids]
+        if inputs.fine_skin and parts:
+            eye = {"u_eye": tuple(own.position.tolist())}
+            solids, maps = [part.placed() for part in parts], [part.maps for part in parts]
+            look, lit = SkinLook(), {**lighting, **eye}
+            draw_skin(self.gl, solids, maps, own, depth, HEAD_PUSH, look, lit)
+            return
         self.gl.context.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
         self.gl.context.cull_face = (
             "front"  # the picture is drawn upside down, which swaps the winding
         )
-        if inputs.show_head:
-            self._head.draw(own, depth, HEAD_PUSH, lighting)
-        for name in inputs.solids:
-            if name in FIXED_SOLIDS:
-                head_from_world = inverse_motion(inputs.world_from_head)
-                self._solids[name].place(head_from_world @ inputs.world_from_torso)
-            self._solids[name].draw(own, depth, 0.0, lighting)
+        for part in parts:
+            part.draw(own, depth, HEAD_PUSH if part is self._head else 0.0, lighting)
         self.gl.context.cull_face = "back"
-
-    def _draw_studio(self, inputs: FrameInputs) -> None:
-        """Draw the studio at low resolution and scale it up, only if the camera has changed."""
-        camera = inputs.camera.resized(*STUDIO_SIZE)
-        key = (camera.camera_from_head.tobytes(), camera.focal, inputs.floor)
-        if key == self._studio_made:
-            return
-        self._studio_made = key
-        self._small_studio.use()
-        self.gl.context.enable_only(moderngl.NOTHING)
-        shares = np.diag([camera.width, camera.height, 1.0])
-        rays = camera.rotation.T @ np.linalg.inv(_intrinsics(camera)) @ shares
-        set_uniforms(
-            self.gl.program("viewer_screen", "viewer_studio"),
-            u_size=STUDIO_SIZE,
-            u_eye=tuple(camera.position.tolist()),
-            u_ray_from_place=tuple(rays.T.ravel().tolist()),
-            u_wall_top=tuple(c / 255 for c in BACKDROP_TOP),
-            u_wall_bottom=tuple(c / 255 for c in BACKDROP_BOTTOM),
-            u_floor=inputs.floor,
-            u_shadow_radius=0.35,
-        )
-        self._studio_quad.render(moderngl.TRIANGLES, vertices=3)
-        self._studio.use()
-        self._small_studio_texture.use(4)
-        spread = self.gl.program("viewer_screen", "viewer_backdrop")
-        set_uniforms(spread, u_studio=4, u_size=self._size)
-        self._studio_upscale_quad.render(moderngl.TRIANGLES, vertices=3)
 
     def _draw_overlays(self, inputs: FrameInputs, own: Camera, depth: DepthRange) -> None:
         if not inputs.lines and not inputs.billboards:
@@ -249,39 +249,42 @@ class FrameRenderer:
             return
         self._release_targets()
         context = self.gl.context
-        self._studio_texture = context.texture(size, 4)
-        self._studio = context.framebuffer([self._studio_texture])
+        samples = min(EDGE_SAMPLES, context.max_samples)
+        self._sample_buffers = (
+            context.renderbuffer(size, 4, samples=samples),
+            context.depth_renderbuffer(size, samples=samples),
+        )
+        self._samples = context.framebuffer([self._sample_buffers[0]], self._sample_buffers[1])
+        self._sample_depths = context.framebuffer([], self._sample_buffers[1])
         self._backdrop_texture = context.texture(size, 4)
         self._depth_texture = context.depth_texture(size)
         self._depth_texture.compare_func = ""
         self._depth_texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._backdrop = context.framebuffer([self._backdrop_texture], self._depth_texture)
-        self._depths = context.framebuffer([], self._depth_texture)
         self.texture = context.texture(size, 4)
         self.framebuffer = context.framebuffer([self.texture])
         self._overlaid = context.framebuffer([self.texture], self._depth_texture)
         self._size = size
-        self._backdrop_made = self._studio_made = None
+        self._backdrop_made = None
 
     def _release_targets(self) -> None:
         if self._size == (0, 0):
             return
-        for part in (self.framebuffer, self._overlaid, self._backdrop, self._studio, self._depths):
+        frames = self.framebuffer, self._overlaid, self._backdrop, self._samples
+        textures = self.texture, self._backdrop_texture, self._depth_texture
+        for part in (*frames, self._sample_depths, *textures, *self._sample_buffers):
             part.release()
-        for texture in (
-            self.texture,
-            self._backdrop_texture,
-            self._studio_texture,
-            self._depth_texture,
-        ):
-            texture.release()
         self._size = (0, 0)
 
 
-def studio_lights(camera: Camera, exposure: float) -> Lights:
-    """Return lights fixed to a camera: key above on the left, rim behind on the right."""
+def studio_lights(camera: Camera, exposure: float, turn: float = 0.0) -> Lights:
+    """Return lights fixed to a camera: key above on the left, rim behind on the right.
+
+    They are turned about the picture's vertical by `turn` radians, from above to the right.
+    """
     x, y, z = camera.rotation[0], -camera.rotation[1], -camera.rotation[2]
-    axes = np.stack([x, y, z])
+    cosine, sine = np.cos(turn), np.sin(turn)
+    axes = np.stack([cosine * x - sine * z, y, cosine * z + sine * x])
     return Lights.studio(np.array(KEY) @ axes, np.array(RIM) @ axes, exposure)
 
 
@@ -301,11 +304,8 @@ def _backdrop_key(inputs: FrameInputs, depth: DepthRange) -> tuple[object, ...]:
         camera.camera_from_head.tobytes(),
         (camera.focal, camera.width, camera.height),
         inputs.world_from_head.tobytes(),
+        camera.centre.tobytes(),
         (inputs.show_head, inputs.solids, inputs.floor, inputs.exposure),
+        (inputs.light_turn, inputs.backdrop, inputs.fine_skin),
         depth,
     )
-
-
-def _intrinsics(camera: Camera) -> Float64Array:
-    x, y = camera.centre
-    return np.array([[camera.focal, 0, x], [0, camera.focal, y], [0, 0, 1]])

@@ -71,7 +71,8 @@ class SoftHairPass:
         body, camera = self.body, view.camera
         self._camera = pack_camera(view)
         near, far = view.hair_depth.near, view.hair_depth.far
-        self._slices = np.array([near, place_kernels.SLICES / (far - near)], np.float32)
+        per_metre = place_kernels.SLICES / (far - near)
+        self._slices = np.array([near, per_metre, look.dimming], np.float32)
         tiles = (-(-camera.height // place_kernels.TILE), -(-camera.width // place_kernels.TILE))
         filled = np.empty((self._chunks, place_kernels.SLICES, *tiles), np.uint32)
         corners = np.empty((self._chunks, 4), np.float32)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
-from hairkit.grooming.densify import densify
+from hairkit.grooming.densify import densify, roots_between
 from hairkit.grooming.guide_weights import closest_guides, guide_mask
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
@@ -19,10 +20,14 @@ TOLERANCE = 8e-4
 """Allowed RMS distance between guides and drawn strands, metres."""
 COUNTS, POWERS = (8, 10, 12, 14, 16, 20, 24, 32, 48), (1.0, 1.5, 2.0)
 """Point counts tried, and exponents of their density towards the root, where hair bends most."""
+TAPER = 0.7
+"""Share of its width that a strand loses towards the tip, so that locks do not end bluntly."""
 TUFT = 8
 """Neighbouring strands that stay adjacent in the order of drawing."""
 FINE = 256
 """Points of the dense resampling from which drawn points are interpolated."""
+BLOCK = 20_000
+"""Strands that are made at a time: they have more points until they are resampled."""
 MAX_HAIRS = 200_000
 MAX_GUIDES = 2_000
 """Most strands taken as guides in a groom that marks none; the others follow them."""
@@ -76,14 +81,16 @@ class HairBody:
             raise InputError(f"hairs is {hairs}, expected 0 to {MAX_HAIRS}")
         shares = choose_shares(guides)
         rest = GuideSampler(guides, shares)(guides.points)
-        hair = _arrange_hair(groom, hairs, own, seed, shares)
-        mix = closest_guides(hair)
-        shape = hair.points.reshape(-1, len(shares), 3)
-        course = np.einsum("sk,skmc->smc", mix.weights, rest[mix.guides], optimize=True)
-        offsets = (shape - course).astype(np.float32)
-        offsets[: len(guides)] = 0  # a guide is where it is
-        widths = np.full(shape.shape[:2], groom.material.width, np.float32)
-        return cls(guides, shares, rest, mix.guides, mix.weights, offsets, widths)
+        shape = _arrange_hair(groom, hairs, own, seed, shares)
+        points, count = shape.reshape(-1, 3), len(shape)
+        marked = np.arange(count) < len(guides)
+        mix = closest_guides(Strands(points, np.arange(count + 1) * len(shares), guide=marked))
+        for some in _blocks(count):
+            shape[some] -= np.einsum("sk,skmc->smc", mix.weights[some], rest[mix.guides[some]])
+        shape[: len(guides)] = 0  # a guide is where it is
+        taper = (1 - TAPER * shares**4).astype(np.float32)
+        widths = np.tile(np.float32(groom.material.width) * taper, (count, 1))
+        return cls(guides, shares, rest, mix.guides, mix.weights, shape, widths)
 
 
 class GuideSampler:
@@ -177,24 +184,45 @@ def _places(guides: Strands, shares: Float64Array) -> tuple[Int64Array, Float32A
 
 def _arrange_hair(
     groom: Groom, hairs: int, own: Strands | None, seed: int, shares: Float64Array
-) -> Strands:
-    """Return the guides, marked as such, then other hair in tufts in random order."""
-    guides, count = groom.strands, len(groom.strands)
-    parts = [_sample_rows(_resample_fine(guides), shares)]
-    order = np.random.default_rng(seed)
+) -> Float32Array:
+    """Return (S, m, 3) the guides, then other hair in tufts in random order."""
+    guides, order = groom.strands, np.random.default_rng(seed)
+    others = max(hairs - len(guides), 0)
     if own is not None:
-        chosen = _shuffle_tufts(own.roots, order)[: max(hairs - count, 0)]
-        parts.append(_sample_rows(_resample_fine(own.select(chosen)), shares))
-    elif hairs > count:
-        new = densify(groom, hairs, seed)
-        shuffled = new.select(count + _shuffle_tufts(new.roots[count:], order))
-        parts.append(_sample_rows(_resample_fine(shuffled), shares))
-    total = sum(len(part) for part in parts)
-    return Strands(
-        np.concatenate(parts).reshape(-1, 3),
-        np.arange(total + 1) * len(shares),
-        guide=np.arange(total) < count,
-    )
+        chosen = _shuffle_tufts(own.roots, order)[:others]
+        made = _sampled(own.select(chosen), shares)
+    elif others:
+        made = _interpolate(groom, others, seed, shares)
+        made = made[_shuffle_tufts(made[:, 0], order)]
+    else:
+        made = np.empty((0, len(shares), 3), np.float32)
+    return np.concatenate([_sampled(guides, shares), made])
+
+
+def _interpolate(groom: Groom, count: int, seed: int, shares: Float64Array) -> Float32Array:
+    """Return (count, m, 3) hair between the guides."""
+    guides, roots = groom.strands, roots_between(groom, count, seed).positions
+    made = np.empty((count, len(shares), 3), np.float32)
+    for number, some in enumerate(_blocks(count)):
+        wanted = len(guides) + len(roots[some])
+        block = densify(groom, wanted, seed + number, roots=roots[some])
+        new = np.arange(len(guides), wanted)
+        made[some] = _sample_rows(_resample_fine(block.select(new)), shares)
+    return made
+
+
+def _sampled(strands: Strands, shares: Float64Array) -> Float32Array:
+    """Return points (S, m, 3) of strands at shares of their length."""
+    rows = np.empty((len(strands), len(shares), 3), np.float32)
+    index = np.arange(len(strands))
+    for some in _blocks(len(strands)):
+        rows[some] = _sample_rows(_resample_fine(strands.select(index[some])), shares)
+    return rows
+
+
+def _blocks(count: int) -> Iterator[slice]:
+    for first in range(0, count, BLOCK):
+        yield slice(first, min(first + BLOCK, count))
 
 
 def _shuffle_tufts(roots: Float32Array, generator: np.random.Generator) -> Int64Array:

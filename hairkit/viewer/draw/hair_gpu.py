@@ -145,17 +145,20 @@ class HairPass:
             u_opacity=2,
             u_picture=buffers.size,
             u_smooth=float(look.smooth),
+            u_dimming=look.dimming,
             **self._shared,
             **scene.lights.uniforms(),
             **scene.light.uniforms(),
         )
-        self._composite(scene.target, buffers, _frame_of(view.camera, self._cloud))
+        frame = _frame_of(view.camera, self._cloud)
+        self._composite(scene.target, buffers, frame, look.dimming)
 
     def _composite(
         self,
         target: moderngl.Framebuffer,
         buffers: _ViewBuffers,
         frame: tuple[int, int, int, int],
+        dimming: float,
     ) -> None:
         """Blend the accumulated hair over `target` inside a frame, and clear the sums."""
         context = self._gl.context
@@ -163,7 +166,8 @@ class HairPass:
         target.scissor = frame
         context.enable_only(moderngl.BLEND)
         context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-        set_uniforms(self._gl.program("viewer_screen", "viewer_resolve"), u_picture=buffers.size)
+        program = self._gl.program("viewer_screen", "viewer_resolve")
+        set_uniforms(program, u_picture=buffers.size, u_dimming=dimming)
         buffers.sums.bind_to_storage_buffer(7)
         self._resolve.render(moderngl.TRIANGLES, vertices=3)
         target.scissor = (0, 0, *buffers.size)

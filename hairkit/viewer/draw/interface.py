@@ -21,8 +21,13 @@ GuidePlaces = Any
 """(G, m, 3) float32: an array, or a moderngl buffer for the GPU renderer."""
 FULL_LOOK = 50_000
 """Fewer strands are drawn wider, so that they cover the head as this many would."""
-WIDEST = 5.0
-"""Largest factor of that widening."""
+FEW = 10_000
+"""Fewer strands than this are locks: their width grows faster, with the power `LOCK_GROWTH`."""
+LOCK_GROWTH, WIDEST = 0.75, 80.0
+"""That power of what they lack of `FEW`, chosen by eye, and the largest widening."""
+DEEPEST = float(np.sqrt(FULL_LOOK * FEW))
+"""Strands times widening from which more of them do not lie in deeper shade: those of 10,000. The
+cells of the view are coarser than dense hair, of which they would show the foremost scraps only."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,14 @@ class HairLook:
         """Drawn over true width."""
         if self.wider is not None:
             return self.wider
-        return float(np.clip(np.sqrt(FULL_LOOK / max(self.hairs, 1)), 1.0, WIDEST))
+        hairs = max(self.hairs, 1)
+        locks = max(FEW / hairs, 1.0) ** LOCK_GROWTH
+        return float(np.clip(np.sqrt(FULL_LOOK / max(hairs, FEW)) * locks, 1.0, WIDEST))
+
+    @property
+    def dimming(self) -> float:
+        """Share of the optical depth in front of a strand that dims it; 1 for few strands."""
+        return min(1.0, DEEPEST / max(self.hairs * self.times_wider, 1.0))
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from dataclasses import replace
 from typing import Any
 
 import moderngl
@@ -35,18 +36,24 @@ class SolidPass:
             index_buffer=self._faces,
         )
         self._kept = contextlib.ExitStack()
-        self._maps = self._kept.enter_context(upload_maps(gl, solid))
+        self.maps = self._kept.enter_context(upload_maps(gl, solid))
+        """Its pictures on the GPU, by kind."""
 
     def place(self, matrix: Float64Array) -> None:
         """Move the mesh by a rigid motion (4, 4) from its original pose."""
         if np.array_equal(matrix, self._placed):
             return
         self._placed = matrix
-        moved = self._values.copy()
-        turn = matrix[:3, :3].T.astype(np.float32)
-        moved[:, :3] = self._values[:, :3] @ turn + matrix[:3, 3].astype(np.float32)
-        moved[:, 3:6] = self._values[:, 3:6] @ turn
+        solid, moved = self.placed(), self._values.copy()
+        moved[:, :3], moved[:, 3:6] = solid.vertices, solid.normals
         self._vertices.write(moved)
+
+    def placed(self) -> Solid:
+        """Return the mesh where it is now."""
+        matrix = self._placed.astype(np.float32)
+        turn = matrix[:3, :3].T
+        vertices = self.solid.vertices @ turn + matrix[:3, 3]
+        return replace(self.solid, vertices=vertices, normals=self.solid.normals @ turn)
 
     def draw(
         self, camera: Camera, depth: DepthRange, push: float, lighting: dict[str, Any]
@@ -60,7 +67,7 @@ class SolidPass:
             u_scatter=self.solid.scatter,
             u_wrapped=1.0,
             **SkinLook().uniforms(),
-            **bind_maps(self._maps),
+            **bind_maps(self.maps),
             **lighting,
         )
         self._array.render(moderngl.TRIANGLES)

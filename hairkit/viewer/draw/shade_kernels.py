@@ -29,7 +29,7 @@ EYE, FORWARD, KEY, KEY_COLOUR, RIM, RIM_COLOUR, SKY, ORIGIN, PER_METRE, EXPOSURE
 """First index of each group of three values in `shading`; the last group is the exposure, whether
 the camera is perspective, and whether directions are shown."""
 _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
-_BOUNCED, _TINY = np.float32(0.1), np.float32(1e-20)
+_BOUNCED, _TINY = np.float32(0.35), np.float32(1e-20)
 _TILT, _ROUGHNESS = np.float32(0.0524), np.float32(0.14)
 _FRESNEL, _TT, _TRT = np.float32(0.0465), np.float32(0.09), np.float32(0.17)
 _OTHER, _JITTER = np.float32(61.8034), np.float32(0.12)
@@ -77,8 +77,9 @@ def shade_hair(  # type: ignore[no-untyped-def]
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Write `looks` (S, m, 4) of some strands: colour, and transmittance towards the camera.
 
-    `seen`, `places` and `opacity` come from `place_kernels`; `light` (Z, Y, X, 4) is the light
-    volume. Points with a transmittance up to `HIDDEN` are not shaded.
+    `seen`, `places` and `opacity` come from `place_kernels`; `slices` are the nearest depth, slices
+    per metre and `HairLook.dimming`; `light` (Z, Y, X, 4) is the light volume. Points with a
+    transmittance up to `HIDDEN` are not shaded.
     """
     points = np.empty(FIELDS * LANES, np.float32)
     lit = np.empty(3 * LANES, np.float32)
@@ -289,7 +290,7 @@ def _visibility(seen, s, k, opacity, slices):  # type: ignore[no-untyped-def] # 
             part = along * (v if b else _ONE - v)
             here, beside = opacity[layer + a, j + b, i], opacity[layer + a, j + b, i + 1]
             total += part * (here + u * (beside - here))
-    return _decay(-DENSE * total)
+    return _decay(-DENSE * slices[2] * total)
 
 
 @inlined

@@ -44,6 +44,13 @@ class WindowContext:
         return None
 
     @property
+    def refresh_rate(self) -> int:
+        """Pictures a second of the screen, 0 if unknown."""
+        monitor = self.glfw.get_primary_monitor()
+        mode = self.glfw.get_video_mode(monitor) if monitor else None
+        return int(mode.refresh_rate) if mode else 0
+
+    @property
     def settings(self) -> Any:
         """Keyword arguments for `moderngl.create_context`."""
         return {"context": self}

@@ -17,6 +17,8 @@ ZOOM_NOTCHES = 20
 """Notches of the wheel that a drag over the height of the picture counts for."""
 DOUBLE_SECONDS = 0.3
 """Longest time between the clicks of a double click."""
+WIPE_PIXELS = 8.0
+"""Distance from the line between photo and hair at which a drag moves it, pixels."""
 STILL_PIXELS = 4.0
 """Largest motion between press and release of a click, pixels."""
 
@@ -30,6 +32,9 @@ class Mouse:
     perform: Perform
     height: float
     """Height of the picture, pixels."""
+    width: float = 1.0
+    wipe: float | None = None
+    """Share of the width left of the line between photo and hair; None: there is none."""
     x: float = 0.0
     y: float = 0.0
     _drags: str | None = None
@@ -46,8 +51,14 @@ class Mouse:
             self._drags = "pan"
         elif button == RIGHT:
             self._drags = "zoom"
+        elif button == LEFT and self._at_wipe:
+            self._drags = "wipe"
         elif button == LEFT:
             self._drags = "orbit"
+
+    @property
+    def _at_wipe(self) -> bool:
+        return self.wipe is not None and abs(self.x - self.wipe * self.width) < WIPE_PIXELS
 
     def release(self, now: float) -> None:
         """Handle a released button, at `now` seconds."""
@@ -75,6 +86,8 @@ class Mouse:
             self.perform("zoom", {"factor": WHEEL ** (-ZOOM_NOTCHES * down)})
         elif self._drags == "grab":
             self.perform("drag", {"x": x, "y": y})
+        elif self._drags == "wipe":
+            self.perform("wipe", {"at": x / self.width})
 
     def scroll(self, notches: float) -> None:
         """Handle a turn of the wheel."""

@@ -18,13 +18,14 @@ from hairkit.options import OptionInfo
 from hairkit.viewer.actions.actions import LOOKS
 from hairkit.viewer.actions.presets import preset_names, presets_path
 from hairkit.viewer.draw.colouring import COLOURINGS
+from hairkit.viewer.draw.studio import BACKDROPS
 from hairkit.viewer.head_motion import AXES
 from hairkit.viewer.layers import BILLBOARDS
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
 
-WIDTH = 340
-"""Pixels."""
+WIDTH, NARROW = 340, 680
+"""Pixels; in a window narrower than the second the panel is folded at first."""
 LABELS = 116.0
 """Width of the names beside sliders, pixels."""
 HINT = 48
@@ -33,6 +34,8 @@ NAME_WIDTH = 0.4 * WIDTH
 """Width of the field for a preset's name, pixels; leaves room for the button beside it."""
 HAIRS = (100, 50_000)
 """Range of the slider for the drawn strands; the action `hairs` goes further."""
+LENSES = 60.0
+"""Upper end of the slider for the lens, millimetres; the action `lens` goes further."""
 EXPOSURES = (0.1, 3.0)
 """Range of the slider for the exposure; the action `exposure` goes further."""
 WIND_RANGES = (
@@ -75,6 +78,8 @@ class Panel:
 
     def __init__(self, window: Any) -> None:
         self._imgui, self._backend, self.missing = _load(window)
+        self.covered = 0
+        """Pixels of the window's right edge that the panel covers."""
         self._shown = False
         self._size: tuple[int, int] | None = None
         self._preset = "preset"
@@ -121,6 +126,7 @@ class Panel:
         imgui = self._imgui
         self._shown = imgui is not None and session.shown.panel and not session.shown.help
         if not self._shown:
+            self.covered = 0
             return
         self._backend.process_inputs()
         imgui.new_frame()
@@ -128,7 +134,11 @@ class Panel:
         self._size = session.size
         imgui.set_next_window_pos((session.size[0] - WIDTH - 8, 8), when)
         imgui.set_next_window_size((WIDTH, session.size[1] - 16), when)
-        imgui.begin("hairkit")
+        imgui.set_next_window_collapsed(session.size[0] < NARROW, when)
+        unfolded = bool(imgui.begin("hairkit")[0])
+        left = int(imgui.get_window_pos().x)
+        beside = unfolded and left > session.size[0] // 2  # not if it was moved elsewhere
+        self.covered = max(session.size[0] - left, 0) if beside else 0
         imgui.push_item_width(-LABELS)
         if imgui.collapsing_header("View", imgui.TreeNodeFlags_.default_open):
             _draw_view(imgui, session, perform)
@@ -183,6 +193,7 @@ def _draw_view(imgui: Any, session: Session, perform: Perform) -> None:
     changed, value = imgui.slider_float("exposure", shown.exposure, *EXPOSURES)
     if changed:
         perform("exposure", {"value": value})
+    _draw_scene(imgui, session, perform)
     if shown.layers & set(BILLBOARDS):
         changed, value = imgui.slider_float("opacity", shown.opacity, 0.0, 1.0)
         _hint(imgui, "Opacity of the photos.")
@@ -192,6 +203,25 @@ def _draw_view(imgui: Any, session: Session, perform: Perform) -> None:
         changed, on = imgui.checkbox(name, name in shown.layers)
         if changed:
             perform("layer", {"name": name, "on": on})
+
+
+def _draw_scene(imgui: Any, session: Session, perform: Perform) -> None:
+    shown, names = session.shown, list(BACKDROPS)
+    changed, value = imgui.slider_float("light", shown.light, -180.0, 180.0, "%.0f deg")
+    _hint(imgui, "Turns the lights round the head.")
+    if changed:
+        perform("light", {"degrees": value})
+    changed, place = imgui.combo("backdrop", names.index(shown.backdrop), names)
+    if changed:
+        perform("backdrop", {"name": names[place]})
+    changed, value = imgui.slider_float("lens", 1e3 * shown.aperture, 0.0, LENSES, "%.0f mm")
+    _hint(imgui, "Diameter of the lens: depth of field while nothing moves.")
+    if changed:
+        perform("lens", {"aperture": value})
+    if "photos" in session.layers.available:
+        changed, on = imgui.checkbox("photo beside the hair", shown.wipe is not None)
+        if changed:
+            perform("wipe", {"on": on})
 
 
 def _draw_presets(imgui: Any, session: Session, name: str, perform: Perform) -> str:

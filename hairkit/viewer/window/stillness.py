@@ -1,4 +1,4 @@
-"""When the window may sleep: nothing moves, and nobody has done anything for a while."""
+"""When pictures need not be drawn: nothing moves, and nobody has done anything for a while."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 from hairkit.arrays import Float32Array
 from hairkit.viewer.session import Session
 
-AWAKE = 1.0
-"""Seconds of pictures after the last event: light is brought up to date in turns."""
+AWAKE = 0.25
+"""Seconds of pictures after the last event: then a still picture is worth its samples."""
 CHECK = 0.5
 """Seconds between two looks at the hair."""
 RESTING = 1e-4
@@ -21,7 +21,7 @@ class Stillness:
     def __init__(self, session: Session, now: float) -> None:
         self._session = session
         self._stirred = self._looked = now
-        self._seen: Float32Array | None = None
+        self._seen: Float32Array = session.simulation.simulator.points
         self._resting = False
 
     def stir(self, now: float) -> None:
@@ -44,7 +44,7 @@ class Stillness:
         self._seen = points = session.simulation.simulator.points
         self._looked = now
         driven = session.wind.blowing or session.grabbed_lock is not None or session.motion.shakes
-        moved = before is None or before.shape != points.shape
-        if before is not None and not moved:
+        moved = before.shape != points.shape
+        if not moved:
             moved = float(np.abs(points - before).max(initial=0.0)) > RESTING
         self._resting = not driven and not moved

@@ -37,7 +37,9 @@ from hairkit.viewer.window.stillness import Stillness
 TEXT_EVERY = 0.25
 """Seconds between two updates of the read-outs; messages appear at once."""
 IDLE = 0.1
-"""Seconds between frames while the simulation is paused, and between looks at files in sleep."""
+"""Seconds between pictures while the simulation is paused, and between looks in sleep."""
+REFRESH_RATE = 60
+"""Pictures a second at most where the screen does not tell its own."""
 MAX_FRAME_STEP = 0.1
 """Longest time step of a frame, seconds; slower frames slow the simulation down."""
 SIMULATION_SHARE = 0.4
@@ -128,8 +130,11 @@ class Window:
         self._watched = session.opened.path
         self._watch_groom = FileWatcher([self._watched])
         self._watch_shaders = FileWatcher(shader_files())
+        self._period = 1 / (context.refresh_rate or REFRESH_RATE)
         self._pace = 0.0
         """Moving average of the frame time, seconds."""
+        self._shown_samples = True
+        """False once the still picture is complete and shown."""
         self._told: object = None
         self._told_at = 0.0
         with renderer() as gl:
@@ -163,7 +168,7 @@ class Window:
         before = time.perf_counter()
         while not (self.session.finished or self._glfw.window_should_close(self._window)):
             if steps is None and self._stillness.asleep(time.monotonic()):
-                self._glfw.wait_events_timeout(IDLE)
+                self._refine_or_sleep()
                 self._reload_changed()
                 before = time.perf_counter()
                 continue
@@ -177,6 +182,19 @@ class Window:
             passed = min(passed, MAX_FRAME_STEP)
             self.picture(passed)
             self.session.pending = max(self.session.pending - passed, 0.0)
+            time.sleep(max(before + self._period - time.perf_counter(), 0.0))
+
+    def _refine_or_sleep(self) -> None:
+        """Add a sample to the still picture and show it; wait for events once it is complete."""
+        with renderer() as gl:
+            sampled = self.preview.refine()
+            if sampled or self._shown_samples:
+                self._present(gl)
+        self._shown_samples = sampled
+        if sampled:
+            self._glfw.poll_events()
+        else:
+            self._glfw.wait_events_timeout(IDLE)
 
     def _stir(self, *_: object) -> None:
         """Draw for a while: an event has arrived."""
@@ -216,11 +234,9 @@ class Window:
                 self.session.message = " ".join(str(error).split())
                 self.session.paused, self.session.recorder = True, None
                 self.session.screenshots = []
-            self._show(gl)
-            self._panel.draw(self.session, self.preview, self.perform)
-            self._glfw.swap_buffers(self._window)
-            gl.home.use()
-        taken = time.perf_counter() - began
+            self._present(gl)
+        self._shown_samples = True
+        taken = max(time.perf_counter() - began, self._period)
         self._pace += PACE_SMOOTHING * (taken - self._pace) if self._pace else taken
 
     def _next(self, steps: Iterator[None] | None) -> Iterator[None] | None:
@@ -237,6 +253,13 @@ class Window:
             session.message = " ".join(str(error).split())
             return None
         return steps
+
+    def _present(self, gl: Any) -> None:
+        """Show the picture, the text and the panel on the screen."""
+        self._show(gl)
+        self._panel.draw(self.session, self.preview, self.perform)
+        self._glfw.swap_buffers(self._window)
+        gl.home.use()
 
     def _show(self, gl: Any) -> None:
         """Draw the picture and the text to the screen."""
@@ -275,7 +298,9 @@ class Window:
         width, height = self._glfw.get_framebuffer_size(self._window)
         if width > 0 and height > 0:
             self.session.size = (width, height)
-            self.mouse.height = height
+            self.mouse.width, self.mouse.height = width, height
+        self.mouse.wipe = self.session.shown.wipe if self.session.shown.through else None
+        self.session.covered = self._panel.covered
 
     def _reload_changed(self) -> None:
         now = time.monotonic()

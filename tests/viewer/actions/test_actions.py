@@ -13,7 +13,7 @@ from hairkit.viewer.actions.actions import ACTIONS, LOOKS, bindings, perform
 from hairkit.viewer.actions.presets import presets_path
 from hairkit.viewer.session import STEP, Session
 
-NEEDS_RESULTS = ("layer", "through", "preset_load", "adjust", "reconstruct")
+NEEDS_RESULTS = ("layer", "through", "preset_load", "adjust", "reconstruct", "wipe")
 NEEDS_RESULTS += ("head_move", "head_turn", "head_scale", "head_save")
 
 

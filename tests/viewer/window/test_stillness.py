@@ -32,7 +32,7 @@ def test_the_window_sleeps_once_hair_rests_and_wakes_for_events(session: Session
     """Not before a second has passed; again a second after an event."""
     stillness = Stillness(session, 0.0)
     assert not passed(session, stillness, 0.0, 0.9 * AWAKE)
-    assert passed(session, stillness, 0.9 * AWAKE, 2 * AWAKE)
+    assert passed(session, stillness, 0.9 * AWAKE, 2 * CHECK)
     stillness.stir(3.0)
     assert not stillness.asleep(3.0 + 0.5 * AWAKE)
     assert passed(session, stillness, 3.0 + 0.5 * AWAKE, AWAKE)
