@@ -286,7 +286,8 @@ def _point_cloud(path: Path) -> Float64Array | None:
     vertex = read_elements(data, path).get("vertex", {})
     if not all(axis in vertex for axis in "xyz"):
         raise FormatError(f"{path}: its vertices have no x, y and z")
-    points: Float64Array = np.stack([np.asarray(vertex[a], np.float64) for a in "xyz"], axis=1)
+    with np.errstate(invalid="ignore"):  # signalling NaNs
+        points: Float64Array = np.stack([vertex[a].astype(np.float64) for a in "xyz"], axis=1)
     if not np.isfinite(points).all():
         raise FormatError(f"{path}: holds coordinates that are not finite numbers")
     return points

@@ -73,7 +73,7 @@ def _read(reader: ByteReader) -> npt.NDArray[np.floating]:
     if kind.kind != "f" or kind.itemsize > np.dtype(np.float64).itemsize:
         raise FormatError(f"{reader.source}: an array of {kind}, expected floating point numbers")
     if len(shape) > _AXES:
-        raise FormatError(f"{reader.source}: an array of {len(shape)} dimensions")
+        raise FormatError(f"{reader.source}: an array of {len(shape)} dimensions, expected {_AXES}")
     read = reader.array(kind, tuple(reversed(shape) if columns_first else shape), "the array")
     array: npt.NDArray[np.floating] = read.T if columns_first else read
     return array

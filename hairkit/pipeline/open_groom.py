@@ -72,7 +72,6 @@ def plugin_for(manager: Manager, stage: str, path: Path) -> str:
     ]
     if not fitting:
         known = sorted({s for name in manager.names(stage) for s in manager.info(name).suffixes})
-        raise InputError(
-            f"{path}: no plugin reads or writes this suffix; known: {', '.join(known)}"
-        )
+        what = "reads" if stage == "import_groom" else "writes"
+        raise InputError(f"{path}: no plugin {what} this suffix; known: {', '.join(known)}")
     return str(max(fitting)[1])

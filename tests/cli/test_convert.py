@@ -68,10 +68,10 @@ def test_options_go_to_reader_and_writer(folder: Path) -> None:
     ("words", "reason"),
     [
         (["none.data", "b.npz"], "none.data: no such file"),
-        (["bare.data", "b.xyz"], "no plugin reads or writes this suffix; known: "),
+        (["bare.data", "b.xyz"], "no plugin writes this suffix; known: "),
         (["bare.xyz", "b.npz"], "no such file"),
         (["bare.data", "none/b.npz"], "no such folder"),
-        (["bare.data", "."], "no plugin reads or writes this suffix"),
+        (["bare.data", "."], "no plugin writes this suffix"),
         (["bare.data", "bare.data", "--scale", "0.01"], "is the input file"),
         (["bare.data", "b.npz"], "give metres per unit of the file: scale=0.0"),
         (["bare.data", "b.npz", "--scale", "-1"], "scale is '-1', expected a number"),

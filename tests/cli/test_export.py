@@ -41,7 +41,7 @@ def test_native_copies_are_equal(groom_file: Path) -> None:
     ("words", "reason"),
     [
         (["none.npz", "-o", "b.npz"], "no such file"),
-        (["groom.npz", "-o", "b.xyz"], "no plugin reads or writes this suffix; known: "),
+        (["groom.npz", "-o", "b.xyz"], "no plugin writes this suffix; known: "),
         (["groom.npz", "-o", "none/b.npz"], "no such folder"),
         (["groom.npz", "-o", "b.npz", "--using", "gabor"], "implements 'export_groom'"),
         (["groom.npz", "-o", "b.npz", "--set", "native.x=1"], "no option 'x'"),

@@ -138,7 +138,7 @@ def test_a_file_that_no_plugin_reads_is_refused_before_a_window_opens(
     (tmp_path / "notes.txt").write_text("hello")
     assert view(tmp_path / "notes.txt") == 2
     said = capsys.readouterr().err.strip()
-    assert "no plugin reads or writes this suffix" in said
+    assert "no plugin reads this suffix" in said
     assert "\n" not in said
 
 

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hairkit_plugins.nonrigid_icp import Options, Scan, bend, place, read_scan
+from hairkit_plugins.nonrigid_icp import Options, Scan, bend, fit_head, place, read_scan
 from scipy.spatial.transform import Rotation
 
 from hairkit import Head
 from hairkit.arrays import Float64Array
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.signed_distance import distance_to
-from hairkit.testing import ball_head
+from hairkit.testing import ball_head, turn_capture, turn_scene
 
 HEAD = ball_head()
 
@@ -86,6 +86,22 @@ def test_landmarks_turn_and_scale_the_scan() -> None:
     marks = 1.3 * head.vertices[index] @ turn.T + [1.0, 2.0, 3.0]
     placed = place(Scan(moved, np.empty((0, 3), np.int64), marks), head)
     np.testing.assert_allclose(placed.points, points, atol=0.004)
+
+
+def test_the_points_of_a_scene_are_a_scan() -> None:
+    """What cameras found on the head bends it; points of the room behind it do not."""
+    rng = np.random.default_rng(1)
+    on_head = rng.permutation(dense(true_head()))[:3000]
+    room = rng.uniform((-1, -1, -4), (1, 1, -2), (500, 3))
+    scene = replace(turn_scene(), points=np.concatenate([on_head, room]).astype(np.float32))
+    found = fit_head(turn_capture(), (), scene, Options()).head
+    assert distance(found) < 0.5 * distance(HEAD)
+    assert np.abs(found.vertices).max() < 1.3 * np.abs(HEAD.vertices).max()
+    few = replace(scene, points=scene.points[-500:])
+    with pytest.raises(InputError, match="there are 0"):
+        fit_head(turn_capture(), (), few, Options())
+    with pytest.raises(InputError, match="there are 0"):
+        fit_head(turn_capture(), (), turn_scene(), Options())
 
 
 def write_cloud(path: Path, points: Float64Array) -> Path:
