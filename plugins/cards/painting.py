@@ -2,7 +2,8 @@
 
 Every point of a strand is brought into the card's own frame: along its middle, across it, and above
 it. The line between two points is then drawn with its coverage shared by the two nearest texels
-(Wu 1991, "An efficient antialiasing technique").
+(Wu 1991, "An efficient antialiasing technique"). Hair is thinner than a texel and drawn as wide as
+one; thicker strands are lines side by side.
 """
 
 from __future__ import annotations
@@ -58,7 +59,6 @@ class _Sheet(NamedTuple):
     half: Float64Array
     corner: Int64Array
     size: Int64Array
-    texel: float
     points: Float32Array
     widths: Float32Array
     offsets: Int64Array
@@ -95,7 +95,7 @@ def paint(
     order = np.argsort(cards.lock, kind="stable")
     first = np.searchsorted(cards.lock[order], np.arange(len(cards) + 1))
     sheet = _Sheet(
-        cards.centre, cards.across, cards.outward, cards.half, at.corner, at.size, at.texel,
+        cards.centre, cards.across, cards.outward, cards.half, at.corner, at.size,
         strands.points, widths, strands.offsets, order, first, share,
     )  # fmt: skip
     parallel_for(_paint_cards, len(cards), sheet, atlas, min_chunk=MIN_CARDS)
@@ -120,8 +120,12 @@ def _paint_cards(begin: int, end: int, sheet: _Sheet, atlas: Atlas) -> None:
                 station = _locate(card, sheet, sheet.points[i], station, here)
                 here[3] = (i - root) / (tip - 1 - root)
                 if i > root:
-                    cover = min(1.0, max(sheet.widths[i] / sheet.texel, 1.0))
-                    _line(card, sheet, atlas, strand, (column, row, cover), before, here)
+                    lines = max(int(sheet.widths[i] / column + 0.5), 1)
+                    for n in range(lines):
+                        shift = n - 0.5 * (lines - 1)
+                        before[0], here[0] = before[0] + shift, here[0] + shift
+                        _line(card, sheet, atlas, strand, (column, row), before, here)
+                        before[0], here[0] = before[0] - shift, here[0] - shift
                 for k in range(4):
                     before[k] = here[k]
 
@@ -189,15 +193,15 @@ def _line(
     sheet: _Sheet,
     atlas: Atlas,
     strand: int,
-    scale: tuple[float, float, float],
+    scale: tuple[float, float],
     start: Float64Array,
     end: Float64Array,
 ) -> None:
     """Draw the line between two places (4,): column, row, metres above, share of the strand.
 
-    `scale` holds the metres of a column and of a row, and the coverage of a texel on the line.
+    `scale` holds the metres of a column and of a row.
     """
-    column, row_size, cover = scale
+    column, row_size = scale
     columns, rows = sheet.size[card]
     dx, dy = end[0] - start[0], end[1] - start[1]
     across = column * dx
@@ -209,7 +213,7 @@ def _line(
     tx, ty, tz = across / size, along / size, above / size
     steps = int(np.ceil(max(abs(dx), abs(dy), 1e-6)))
     steep = abs(dy) >= abs(dx)
-    weight = cover * min(1.0, max(abs(dx), abs(dy)))
+    weight = min(1.0, max(abs(dx), abs(dy)))
     for n in range(steps):
         t = (n + 0.5) / steps
         x, y = start[0] + t * dx, start[1] + t * dy

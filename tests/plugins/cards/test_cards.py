@@ -93,6 +93,21 @@ def test_cards_cover_what_the_strands_cover(level: int) -> None:
     assert np.mean(score) > (0.85, 0.82, 0.78, 0.75)[level], score
 
 
+def test_thick_strands_are_as_wide_on_cards() -> None:
+    """Hair is drawn one texel wide; strands of several texels cover as many."""
+    hair = groom()
+    few = hair.strands.select(np.arange(len(hair.strands)) < 30)
+    alone = replace(hair, strands=few, root_triangle=hair.root_triangle[:30],
+                    root_barycentric=hair.root_barycentric[:30])  # fmt: skip
+    covered = []
+    for width in (8e-5, 4e-3):
+        wide = replace(few, widths=np.full(len(few.points), width, np.float32))
+        maps = build_cards(replace(alone, strands=wide), replace(SMALL, cards=30, levels=1)).maps
+        alpha = cv2.imdecode(np.frombuffer(maps["alpha"], np.uint8), cv2.IMREAD_UNCHANGED)
+        covered.append(int((alpha > 127).sum()))
+    assert covered[1] > 2 * covered[0]
+
+
 def test_cards_are_as_long_as_their_strands_and_face_away_from_the_head() -> None:
     """Lengths agree in the mean, normals point outward and are at right angles to the card."""
     level = cards().levels[0]
