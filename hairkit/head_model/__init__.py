@@ -9,6 +9,7 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `cranium`: the cranium's rim and where outlines are bare
 * `delighting`: the light of photos taken out of colours
 * `eye_colours`: the colours of a person's eyes, from photos
+* `exposures`: exposures of photos evened where they overlap
 * `eyes`: eyeballs in open lids, and the picture of them
 * `gradient_blend`: pictures joined in their gradients
 * `hairline`: where the photos show that hair grows

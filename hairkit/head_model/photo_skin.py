@@ -16,6 +16,8 @@ seen skin before (`hairkit.head_model.delighting`).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple
 
 import cv2
@@ -25,9 +27,11 @@ from scipy.spatial import cKDTree
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, UInt8Array
 from hairkit.cameras.depth_raster import depth_behind, head_depth, mesh_depth
 from hairkit.head_model.delighting import find_shading
+from hairkit.head_model.exposures import FLOOR, even_exposures
 from hairkit.head_model.eye_colours import find_eye_colours, mark_beside_eyes
 from hairkit.head_model.eyes import has_default_eyes, paint_over
 from hairkit.head_model.gradient_blend import join_gradients
+from hairkit.parallel import thread_count
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.head import JAW_LANDMARKS, Head
@@ -75,10 +79,6 @@ LEAST = 1e-6
 """Least weight that colours are divided by."""
 STEP = 4
 """Texels between those at which exposures and the tone of skin are measured."""
-GAIN_PRIOR = 0.05
-"""Weight of the belief that a view needs no gain, in shares of a texel that two views share."""
-FLOOR = 4.0
-"""Levels of 255 added before logarithms."""
 
 
 class _Surface(NamedTuple):
@@ -109,10 +109,9 @@ def photograph_skin(capture: Capture, scene: Scene, masks: Sequence[Mask]) -> Sk
     """Return the maps of the scene's fitted head, with an albedo taken from the photos."""
     photos = [view.image for view in capture.views]
     surface = _unwrap(scene.head)
-    views = [
-        _project(surface, scene.head, camera, photo, mask)
-        for camera, photo, mask in zip(scene.cameras, photos, masks, strict=True)
-    ]
+    project = partial(_project, surface, scene.head)
+    with ThreadPoolExecutor(thread_count()) as pool:
+        views = list(pool.map(project, scene.cameras, photos, masks))
     views = _skin_alone(views, scene.head, surface)
     gains = even_exposures(
         [view.coarse[::STEP, ::STEP] for view in views],
@@ -124,42 +123,10 @@ def photograph_skin(capture: Capture, scene: Scene, masks: Sequence[Mask]) -> Sk
         blended, seen = _mirror(blended, seen)
     albedo = _fill(blended, seen, surface, _own_skin(scene.head))
     maps = scene.head.maps or SkinMaps()
-    pixels = np.rint(albedo).clip(0, 255).astype(np.uint8)
+    pixels = np.rint(albedo, out=albedo).clip(0, 255, out=albedo).astype(np.uint8)
     if has_default_eyes(scene.head):
         pixels = paint_over(pixels, *find_eye_colours(capture.views, gains))
     return SkinMaps(Texture.encode(pixels, lossless=False), maps.roughness, maps.normal, maps.bump)
-
-
-def even_exposures(
-    colours: Sequence[Float32Array], weights: Sequence[Float32Array]
-) -> Float64Array:
-    """Return gains (V, 3) that make the colours of views agree where they overlap.
-
-    `colours` (H, W, 3) and `weights` (H, W) of V views. The logarithms of the gains minimise the
-    weighted squared differences over all pairs, and their weighted mean is 0.
-    """
-    logs = [np.log(colour + FLOOR).reshape(-1, 3).astype(np.float64) for colour in colours]
-    flat = [weight.ravel().astype(np.float64) for weight in weights]
-    count = len(logs)
-    normal, right = np.zeros((count, count)), np.zeros((count, 3))
-    for i in range(count):
-        for j in range(i):
-            both = flat[i] * flat[j]
-            total = both.sum()
-            if total <= 0:
-                continue
-            apart = both @ (logs[j] - logs[i])
-            normal[i, i] += total
-            normal[j, j] += total
-            normal[i, j] -= total
-            normal[j, i] -= total
-            right[i] += apart
-            right[j] -= apart
-    prior = np.array([weight.sum() for weight in flat]) * GAIN_PRIOR
-    gains = np.linalg.solve(normal + np.diag(prior + 1e-9), right)
-    mean = (prior[:, None] * gains).sum(axis=0) / max(prior.sum(), 1e-9)
-    result: Float64Array = np.exp(gains - mean)
-    return result
 
 
 def _skin_alone(views: Sequence[_Seen], head: Head, surface: _Surface) -> list[_Seen]:
@@ -184,10 +151,11 @@ def _features(head: Head, surface: _Surface) -> BoolArray:
 
 
 def _delight(blended: Float32Array, seen: Float32Array, surface: _Surface) -> Float32Array:
-    """Return the colours (S, S, 3) without the light of the photos."""
+    """Return the colours (S, S, 3), in their place, without the light of the photos."""
     coarse = _shrink(blended, COARSE)
     shading = find_shading(coarse, seen * _like_skin(coarse, seen), surface.normals)
-    return blended / _upsample(shading)[..., None]
+    blended /= _upsample(shading)[..., None]
+    return blended
 
 
 def _unwrap(head: Head) -> _Surface:
@@ -271,7 +239,8 @@ def _blend(
     for view, photo, factor, low, share in zip(views, photos, factors, smooth, shares, strict=True):
         if share.any():
             _add_details(details, view, photo, factor, low, share)
-    return _upsample(join_gradients(mean, smooth, shares)) + details, total
+    details += _upsample(join_gradients(mean, smooth, shares))
+    return details, total
 
 
 def _add_details(
@@ -290,9 +259,10 @@ def _add_details(
         _enlarge(each[part], times) for each in (view.column, view.row, share, smooth)
     )
     pixels = cv2.remap(photo, column, row, cv2.INTER_LINEAR) * gain
+    pixels -= fine_smooth
+    pixels *= fine_share[..., None]
     top, left = part[0].start * times, part[1].start * times
-    target = details[top : top + pixels.shape[0], left : left + pixels.shape[1]]
-    target += fine_share[..., None] * (pixels - fine_smooth)
+    details[top : top + pixels.shape[0], left : left + pixels.shape[1]] += pixels
 
 
 def _enlarge(picture: Float32Array, times: int) -> Float32Array:
@@ -326,13 +296,15 @@ def _is_symmetric(surface: _Surface) -> bool:
 
 
 def _mirror(blended: Float32Array, seen: Float32Array) -> tuple[Float32Array, Float32Array]:
-    """Return colours and weights, completed by those of the other side."""
+    """Return colours, in their place, and weights, completed by those of the other side."""
     other = seen[:, ::-1]
     lacking = _fade(seen < LEAST_SEEN)
     lacking = np.where(seen < LEAST_SEEN, 1.0, lacking) * (other >= LEAST_SEEN)
     fine = _upsample(lacking.astype(np.float32))[..., None]
-    mixed = blended + fine * (blended[:, ::-1] - blended)
-    return mixed, np.maximum(seen, lacking * other).astype(np.float32)
+    mirrored = blended[:, ::-1] - blended
+    mirrored *= fine
+    blended += mirrored
+    return blended, np.maximum(seen, lacking * other).astype(np.float32)
 
 
 def _fade(region: BoolArray) -> Float32Array:
@@ -353,7 +325,10 @@ def _own_skin(head: Head) -> Float32Array:
 def _fill(
     blended: Float32Array, seen: Float32Array, surface: _Surface, own: Float32Array
 ) -> Float32Array:
-    """Return (S, S, 3) the blended skin, and the head's own in the seen skin's tone elsewhere."""
+    """Return (S, S, 3) the blended skin, and the head's own in the seen skin's tone elsewhere.
+
+    `blended` is used up.
+    """
     taken = (seen >= LEAST_SEEN) & surface.known
     if not taken.any():
         return own
@@ -363,9 +338,13 @@ def _fill(
     small /= np.maximum(weight, LEAST)[..., None]
     ratio = np.log(np.maximum(small, 0) + FLOOR) - np.log(_shrink(own, TONE) + FLOOR)
     tone = extend(ratio, weight * _like_skin(small, weight) ** SURE_SKIN)
-    filled = _upsample(np.exp(tone)) * (own + FLOOR) - FLOOR
-    share = _upsample(1 - _fade(~taken))[..., None]
-    return np.asarray(filled + share * (blended - filled), np.float32)
+    filled = _upsample(np.exp(tone))
+    filled *= own + FLOOR
+    filled -= FLOOR
+    blended -= filled
+    blended *= _upsample(1 - _fade(~taken))[..., None]
+    filled += blended
+    return filled
 
 
 def _like_skin(colours: Float32Array, weight: Float32Array) -> Float32Array:

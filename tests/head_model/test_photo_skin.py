@@ -10,7 +10,8 @@ import pytest
 from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.cameras.depth_raster import head_depth
 from hairkit.head_model import photo_skin
-from hairkit.head_model.photo_skin import even_exposures, extend, photograph_skin
+from hairkit.head_model.exposures import even_exposures
+from hairkit.head_model.photo_skin import extend, photograph_skin
 from hairkit.head_model.template import default_head
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
