@@ -1,7 +1,8 @@
-// Constants of a rod, which change with the options only; masses are relative to the rod's mean.
-// Rows: root frame; two per node: rest position and mass, then drag, shape rate, clearance, 1/mass;
-// three per element, with the mean mass in kg as the last value of the first; metric of the lengths.
-const int NODE_ROW = 1, ELEMENT_ROW = NODE_ROW + 2 * NODES, METRIC_ROW = ELEMENT_ROW + 3 * SEGMENTS;
+// Constants of a rod, which change with the options only; see CONSTANTS in plugins/pbd/block.py. Five rows
+// a node: rest place and mass; drag, pull, clearance, 1/mass; of the segment that ends there two lower
+// entries and 1/pivot of the banded factor, length; bend, twist, natural twist, 1/length; natural turn.
+// The root's third row is its frame. After them the metric of the lengths.
+const int NODE_ROWS = 5, ROOT_FRAME = 2, METRIC_ROW = NODE_ROWS * NODES;
 const int PAIRS = SEGMENTS * NODES / 2, QUADS = (PAIRS + 3) / 4, ROWS = METRIC_ROW + QUADS;
 uniform sampler2D u_constants;
 

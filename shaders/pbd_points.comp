@@ -4,11 +4,11 @@
 #include "pbd_layout.glsl"
 #include "pbd_quaternion.glsl"
 #include "pbd_distance.glsl"
-layout(std430, binding = 0) readonly buffer Offsets { vec4 offsets[]; };  // in the frame; share of segment
-layout(std430, binding = 1) readonly buffer Kinds { vec4 kinds[]; };      // segment, least distance, length
-layout(std430, binding = 2) readonly buffer Starts { int starts[]; };
-layout(std430, binding = 3) writeonly buffer Local { float local[]; };    // x, y, z, head axes
-layout(std430, binding = 4) writeonly buffer Points { float points[]; };  // x, y, z, world
+struct Guide { vec4 offset, kind; };  // in the frame, share of segment; segment, least distance, length
+layout(std430, binding = 0) readonly buffer Guides { Guide guides[]; };
+layout(std430, binding = 1) readonly buffer Starts { int starts[]; };
+layout(std430, binding = 2) writeonly buffer Local { float local[]; };    // x, y, z, head axes
+layout(std430, binding = 3) writeonly buffer Points { float points[]; };  // x, y, z, world
 uniform vec4 u_head[3];  // rows of the motion from the head's axes to the world
 uniform vec4 u_torso_from_head[3];
 const float CHASE = 0.3, TINY = 1e-20;
@@ -39,9 +39,10 @@ void main() {
     vec3 before = vec3(0.0), place = vec3(0.0), normal;
     bool on_torso;
     for (int i = starts[rod]; i < starts[rod + 1]; i++) {
-        int j = int(kinds[i].x);
-        float t = offsets[i].w, least = kinds[i].y, size = kinds[i].z;
-        vec3 curve = on_rod(rod, j, t) + rotate(frame_at(rod, j, t), offsets[i].xyz), start = place;
+        vec4 offset = guides[i].offset, kind = guides[i].kind;
+        int j = int(kind.x);
+        float t = offset.w, least = kind.y, size = kind.z;
+        vec3 curve = on_rod(rod, j, t) + rotate(frame_at(rod, j, t), offset.xyz), start = place;
         place = i == starts[rod] ? curve : along(start, curve - before + CHASE * (before - start), size);
         before = curve;
         for (int turn = 0; turn < 3; turn++) {

@@ -37,11 +37,11 @@ vec3 edge[SEGMENT_ROOM], direction[SEGMENT_ROOM];
 float pivot[SEGMENT_ROOM], beside[SEGMENT_ROOM], value[NODE_ROOM];
 
 // Constants are read where they are used, which saves local memory.
-vec4 rest_and_mass(int j) { return constant(rod, NODE_ROW + 2 * j); }
-vec4 rates(int j) { return constant(rod, NODE_ROW + 2 * j + 1); }          // drag, pull, clearance, 1/mass
-vec4 banded(int j) { return constant(rod, ELEMENT_ROW + 3 * j); }          // two lower entries, 1/pivot; length
-vec4 stiffness(int j) { return constant(rod, ELEMENT_ROW + 3 * j + 1); }   // bend, twist, natural twist, 1/length
-vec3 curvature(int j) { return constant(rod, ELEMENT_ROW + 3 * j + 2).xyz; }
+vec4 rest_and_mass(int j) { return constant(rod, NODE_ROWS * j); }
+vec4 rates(int j) { return constant(rod, NODE_ROWS * j + 1); }             // drag, pull, clearance, 1/mass
+vec4 banded(int j) { return constant(rod, NODE_ROWS * (j + 1) + 2); }      // two lower entries, 1/pivot; length
+vec4 stiffness(int j) { return constant(rod, NODE_ROWS * (j + 1) + 3); }   // bend, twist, natural twist, 1/length
+vec3 curvature(int j) { return constant(rod, NODE_ROWS * (j + 1) + 4).xyz; }
 vec4 metrics;
 float next_metric(int pair) {  // called with consecutive pairs
     if (pair % 4 == 0) metrics = constant(rod, METRIC_ROW + pair / 4);
@@ -101,7 +101,7 @@ void solve_tridiagonal() {
 
 // Rotate frames about their segments until torques balance: one Newton step.
 void relax_twist() {
-    vec4 before = constant(rod, 0);
+    vec4 before = constant(rod, ROOT_FRAME);
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
@@ -131,7 +131,7 @@ void relax_twist() {
 
 // Add the node forces of bending and twist: the negative gradient of the energy.
 void add_elastic() {
-    vec4 before = constant(rod, 0);
+    vec4 before = constant(rod, ROOT_FRAME);
     vec3 reach_before = third_axis(before), pull = vec3(0.0);
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];

@@ -7,33 +7,27 @@ with the metric of the implicit system). Stiffness depends neither on iterations
 rate. The natural shape comes from inverse statics, so that captured hair stays in place under
 gravity. Despite the plugin's name this is not position-based dynamics.
 
-* `backend`: what all backends provide
-* `drawn_points`: the guides' own points on the rods
+* `backend`: what all backends provide, and the reference backend
+* `block`: strands side by side; constants and substeps of both float32 backends
+* `embedding`: the guides' own points on the rods
 * `energies`: stretch and elastic energy
-* `factor_layout`: the factorised matrix in the order of the float32 backends
 * `gl_backend`: substeps in compute shaders
 * `gl_buffers`: textures and buffers of the compute backend
-* `gl_constants`: data of rods and points that stay on the GPU
-* `gl_grab`: held points in the compute backend
-* `gl_obstacles`: obstacles as textures
-* `gl_uniforms`: a substep's inputs packed for the shaders
-* `grab`: forces on held points
+* `gl_uniforms`: what the shaders are given
+* `grab`: held points
 * `hair_grid`: hair-hair contact: density and velocity on a grid
 * `head_steps`: how finely a frame is divided for a fast head
 * `kernel_contact`: contact and friction, compiled
-* `kernel_embedding`: the guides' own points, compiled
-* `kernel_hair_grid`: hair-hair contact, compiled
-* `kernel_rows`: one node or element of all strands of a block
-* `kernel_solve`: banded, tridiagonal and dense solvers, compiled
-* `kernel_wind`: gusts, compiled
+* `kernel_elastic`: inertia, air, frames, torsion and bending, compiled
+* `kernel_lengths`: banded and dense solves, compiled
+* `kernel_math`: vectors and quaternions of numbers or lanes
 * `kernels`: a substep, compiled
 * `linear_system`: the banded matrix of a substep
 * `numba_backend`: substeps in compiled kernels on all cores
 * `reference`: a substep in NumPy float64
-* `resampling`: guides to rods and back
+* `resampling`: guides to rods
 * `rods`: the discrete rod, its rest state, inverse statics
-* `simd`: vector registers as Numba types
-* `simd_math`: vectors and quaternions of registers
+* `simd`: vector registers as a Numba type
 * `simulator`: the simulator
 """
 

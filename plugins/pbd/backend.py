@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 
-from .drawn_points import draw_curve
+from .embedding import Embedding, drawn_points
 from .hair_grid import HairGrid
 from .linear_system import System
 from .reference import Contact, Load, State, rest_state, substep, transform_points
-from .resampling import Embedding
 from .rods import Rods
 
 
@@ -33,10 +33,6 @@ class Engine(Protocol):
         self, hair_grid: HairGrid, head_step: Float64Array, rates: tuple[float, float, float]
     ) -> None:
         """Apply hair-hair interaction; `rates` are cohesion, pressure, seconds."""
-        ...
-
-    def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
-        """Return places and velocities (n, 3) of one rod, head axes."""
         ...
 
     def points(self, embedding: Embedding, head: Float64Array) -> Float32Array:
@@ -61,14 +57,12 @@ class ReferenceEngine:
         self, hair_grid: HairGrid, head_step: Float64Array, rates: tuple[float, float, float]
     ) -> None:
         """Apply hair-hair interaction."""
-        self.state = hair_grid.mix_velocities(self.state, self._rods.mass, head_step, rates)
-
-    def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
-        """Return places and velocities (n, 3) of one rod, head axes."""
-        return self.state.position[rod], self.state.velocity[rod]
+        velocity = self.state.velocity.copy()
+        hair_grid.mix(self.state.position, velocity, self._rods.mass, head_step, rates)
+        self.state = replace(self.state, velocity=velocity)
 
     def points(self, embedding: Embedding, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
-        curve = embedding.curve(self.state.position, self.state.frames)
-        local = draw_curve(embedding, curve, self._contact, self.torso_from_head)
+        state, torso = self.state, self.torso_from_head
+        local = drawn_points(embedding, state.position, state.frames, self._contact, torso)
         return transform_points(head, local).astype(np.float32)

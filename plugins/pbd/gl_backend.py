@@ -16,17 +16,24 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.rendering.context import renderer
-from hairkit.simulation import Grab, quaternion
+from hairkit.simulation import quaternion
 
+from .block import STEP, steps_of
+from .embedding import Embedding
 from .gl_buffers import Store
-from .gl_constants import constant_rows, kind_words, offset_words, share_words
-from .gl_grab import GpuGrabs
-from .gl_obstacles import contact_uniforms, faces
-from .gl_uniforms import MOST_STEPS, AirWaves, Units, air_uniforms, step_words, steps_at_once
+from .gl_uniforms import (
+    MOST_STEPS,
+    Units,
+    between_words,
+    constant_rows,
+    contact_uniforms,
+    faces,
+    point_words,
+    steps_at_once,
+)
 from .hair_grid import HairGrid
 from .linear_system import System
 from .reference import Contact, Load, State, obstacles_of, rest_state
-from .resampling import Embedding
 from .rods import Rods
 
 _STILL = (0.0, 0.0, 0.0)
@@ -43,21 +50,19 @@ class ComputeEngine:
         self._units: Units | None = None
         self._embedding: Embedding | None = None
         self._before: npt.NDArray[np.integer[Any]] | None = None
-        self._gusty = False
         with renderer() as gl:
             self._store = Store(gl, self._count, self._nodes)
             for name, body in zip(("head", "torso"), obstacles_of(contact), strict=True):
                 self._store.put_grid(f"u_{name}_distances", faces(body))
             for name in ("u_wind", "u_force"):
                 self._store.put_rods(name, np.zeros((self._count, 1, 3)))
-        self._held = GpuGrabs(self._store, self._nodes)
         self.state = rest_state(rods)
         self.torso_from_head = np.eye(4)
         weakref.finalize(self, self._store.release).atexit = False
 
     @property
     def state(self) -> State:
-        """The present state, read back; setting it moves the rods and releases grabbed points."""
+        """The present state, read back; setting it moves the rods."""
         with renderer():
             rows = self._store.rods("u_state")
         ends, gain = 2 * self._nodes, 3 * self._nodes - 1
@@ -73,48 +78,21 @@ class ComputeEngine:
         rows[:, gain:, :3] = value.acceleration
         with renderer():
             self._store.put_rods("u_state", rows)
-        self._held.clear()
-
-    def set_gusts(self, waves: AirWaves | None, wind: Float64Array, head: Float64Array) -> None:
-        """Compute the gusts at the nodes, for a head at `head`, for the following runs.
-
-        `waves` are those of `hairkit.simulation.wind.gust_waves`; None: loads hold the air.
-        """
-        self._gusty = waves is not None
-        if waves is None:
-            return
-        with renderer():
-            self._store.make_rods("u_wind", self._nodes)
-            self._store.written_by("u_wind")
-            uniforms = air_uniforms(waves, wind, head)
-            self._store.dispatch("pbd_wind", self._count, uniforms, WAVES=len(waves[0]))
-
-    def set_grabs(
-        self, grabs: tuple[Grab, ...], embedding: Embedding, back: Float64Array, speed: float
-    ) -> None:
-        """Pull these points in the following runs, at no more than `speed`, m/s.
-
-        `back` (4, 4) brings the world to the head axes before the first substep of the next run.
-        """
-        with renderer():
-            self._held.take(grabs, embedding, back, speed)
 
     def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
         """Do one substep for each load."""
         with renderer():
             if self._system is not system:
-                rows = constant_rows(self._rods, system, self._contact, self._unit)
+                rows = constant_rows(self._rods, system, self._contact)
                 self._store.put_rods("u_constants", rows)
                 self._system = system
             settings = self._settings(system, loads[0], iterations)
             most = steps_at_once(self._nodes, iterations)
             for start in range(0, len(loads), MOST_STEPS):
-                some = loads[start : start + MOST_STEPS]
-                self._store.put_words("steps", step_words(some, system.step))
+                some, words = loads[start : start + MOST_STEPS], np.zeros(MOST_STEPS, STEP)
+                words[: len(some)] = steps_of(some, system.step)
+                self._store.put_words("steps", words)
                 self._store["steps"].bind_to_uniform_block(0)
-                if self._held:
-                    self._run_with_grabs(some, settings)
-                    continue
                 for first in range(0, len(some), most):
                     self._step(first, min(most, len(some) - first), settings)
 
@@ -129,34 +107,9 @@ class ComputeEngine:
             self._store.read_by("filled")
             self._store.dispatch("pbd_hair_grid_splat", self._count * self._nodes, uniforms)
             self._store.written_by("u_means")
-            self._store.dispatch("pbd_hair_grid_average", int(np.prod(hair_grid.shape)), uniforms)
+            self._store.dispatch("pbd_hair_grid_average", hair_grid.density.size, uniforms)
             self._store.written_by("u_state")
             self._store.dispatch("pbd_hair_grid_apply", self._count * (self._nodes - 1), uniforms)
-
-    def rod(self, rod: int) -> tuple[Float64Array, Float64Array]:
-        """Return places and velocities (n, 3) of one rod, head axes."""
-        ends, rows = 2 * self._nodes, 4 * self._nodes - 1
-        with renderer():
-            self._store.make_words("one", 4 * rows)
-            self._store.read_by("one")
-            self._store.dispatch("pbd_read_rod", rows, {"u_rod": rod})
-            found = self._store.words("one").reshape(-1, 4)[:ends, :3].astype(np.float64)
-        return found[0::2], found[1::2]
-
-    def measure_energies(self, gravity: Float64Array) -> tuple[float, float, float, float] | None:
-        """Return the largest stretch, and kinetic, gravitational and elastic energy, joules.
-
-        `gravity` (3,) m/s^2 is in head axes. None before the first run.
-        """
-        if self._system is None:
-            return None
-        with renderer():
-            self._store.make_words("sums", 4 * int(np.prod(self._store.groups(self._count))))
-            self._store.read_by("sums")
-            self._store.dispatch("pbd_energies", self._count, {"u_gravity": tuple(gravity)})
-            sums = self._store.words("sums").reshape(-1, 4).astype(np.float64)
-        kinetic, weight, elastic = sums[:, 1:].sum(axis=0).tolist()
-        return float(sums[:, 0].max()), kinetic, weight, elastic
 
     def points(self, embedding: Embedding, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
@@ -171,7 +124,7 @@ class ComputeEngine:
         """
         with renderer():
             uniforms = self._upload_embedding(embedding)
-            self._store.read_by("offsets", "kinds", "starts", "local", "points")
+            self._store.read_by("guides", "starts", "local", "points")
             uniforms["u_head"] = [tuple(row) for row in head[:3]]
             uniforms["u_torso_from_head"] = [tuple(row) for row in self.torso_from_head[:3]]
             self._store.dispatch("pbd_points", self._count, uniforms)
@@ -191,7 +144,7 @@ class ComputeEngine:
         with renderer():
             self.points_buffer(embedding, np.eye(4))
             if self._before is not before:
-                self._store.put_words("between", share_words(before, part))
+                self._store.put_words("between", between_words(before, part))
                 self._store.make_words("rows", 3 * before.size)
                 self._before = before
             self._store.read_by("local", "rows", "between")
@@ -200,8 +153,8 @@ class ComputeEngine:
 
     def _settings(self, system: System, load: Load, iterations: int) -> dict[str, Any]:
         """Return the uniforms of substeps; upload the per-node values of the load."""
-        everywhere, force = load.air.ndim == 1 and not self._gusty, load.force
-        if load.air.ndim > 1:
+        everywhere, force = load.air.ndim == 1, load.force
+        if not everywhere:
             self._store.put_rods("u_wind", load.air)
         if force is not None:
             self._store.put_rods("u_force", force / self._unit[:, None, None])
@@ -211,14 +164,8 @@ class ComputeEngine:
             "u_damping": system.rates.damping,
             "u_air": tuple(load.air) if everywhere else _STILL,
             "u_gusts": not everywhere,
-            "u_forced": force is not None or bool(self._held),
+            "u_forced": force is not None,
         } | contact_uniforms(self._contact)
-
-    def _run_with_grabs(self, loads: Sequence[Load], settings: dict[str, Any]) -> None:
-        """Compute pulls and step, load by load: a pull depends on the node's position."""
-        for k, load in enumerate(loads):
-            self._held.pull(k, load.head_step, settings["u_seconds"])
-            self._step(k, 1, settings)
 
     def _step(self, first: int, count: int, settings: dict[str, Any]) -> None:
         self._store.written_by("u_state")
@@ -231,16 +178,15 @@ class ComputeEngine:
         self._store.put_grid(
             "u_uncrowded_mass", (hair_grid.uncrowded_mass * units.mass).astype(np.float32)
         )
-        self._store.put_grid("u_means", np.zeros((*hair_grid.shape, 4), np.float32))
-        self._store.make_words("filled", 4 * int(np.prod(hair_grid.shape)))
+        self._store.put_grid("u_means", np.zeros((*hair_grid.density.shape, 4), np.float32))
+        self._store.make_words("filled", 4 * hair_grid.density.size)
         return units
 
     def _upload_embedding(self, embedding: Embedding) -> dict[str, Any]:
         """Upload the embedding unless it is there; return the uniforms of its points."""
         deepest = None if self._contact is None else self._contact.deepest
         if self._embedding is not embedding:
-            self._store.put_words("kinds", kind_words(embedding, deepest))
-            self._store.put_words("offsets", offset_words(embedding))
+            self._store.put_words("guides", point_words(embedding, deepest))
             self._store.put_words("starts", embedding.starts.astype(np.int32))
             for name in ("local", "points"):
                 self._store.make_words(name, 3 * len(embedding.rod))

@@ -33,9 +33,6 @@ class Store:
         """Return the moderngl texture or buffer of this name."""
         return self._named[name]
 
-    def __contains__(self, name: str) -> bool:
-        return name in self._named
-
     def groups(self, invocations: int) -> tuple[int, int]:
         """Return the number of work groups along x and y."""
         count = -(-invocations // GROUP)
@@ -64,16 +61,6 @@ class Store:
     def written_by(self, name: str) -> None:
         """Bind the texture that the next shader writes."""
         self._named[name].bind_to_image(0, read=False, write=True)
-
-    def make_rods(self, name: str, rows: int) -> None:
-        """Make a texture of `rows` rows per rod for a shader to write, unless it exists."""
-        size = self._size(rows)
-        if name not in self._named or self._named[name].size != size:
-            self._texture(name, size, 4, None)
-
-    def clear_rods(self, name: str) -> None:
-        """Fill a texture of one row per node with zeros."""
-        self.put_rods(name, np.zeros((self._count, self._nodes, 1), np.float32))
 
     def put_rods(self, name: str, values: npt.ArrayLike) -> None:
         """Write values (S, R, up to 4) of rods to a texture (see `pbd_layout.glsl`)."""
@@ -131,11 +118,9 @@ class Store:
     def _size(self, rows: int) -> tuple[int, int]:
         return self.width, -(-self._count // self.width) * rows
 
-    def _texture(
-        self, name: str, size: tuple[int, ...], parts: int, words: Float32Array | None
-    ) -> None:
+    def _texture(self, name: str, size: tuple[int, ...], parts: int, words: Float32Array) -> None:
         old = self._named.get(name)
-        if old is not None and old.size == size and words is not None:
+        if old is not None and old.size == size:
             old.write(words)
             return
         limit = "GL_MAX_TEXTURE_SIZE" if len(size) == 2 else "GL_MAX_3D_TEXTURE_SIZE"

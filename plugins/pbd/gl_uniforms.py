@@ -1,20 +1,24 @@
-"""Pack a substep's inputs for the shaders."""
+"""What the shaders are given: constants, obstacles, points, integer units."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import RenderError
 from hairkit.rendering.context import on_graphics_card
-from hairkit.simulation import quaternion
+from hairkit.simulation.obstacles import Obstacles
 
+from .block import constants, drift_rows
+from .embedding import Embedding
 from .hair_grid import SPACING, HairGrid
-from .reference import Load, TorsoStep
+from .linear_system import System
+from .reference import Contact
+from .rods import Rods
 
 UNITS = 2.0**30
 """Units of the mass of all hair, and of the largest momentum of a cell."""
@@ -26,24 +30,16 @@ MOST_TURNS = 64_000
 """Most loop iterations in one dispatch: Mesa's llvmpipe leaves all loops after 65536 in all."""
 FULLEST, FASTEST = 32.0, 10.0
 """A cell can hold the momentum of FULLEST times the densest captured mass at FASTEST m/s."""
+ROOM, NOWHERE = 0.02, -1e9
+"""Least distance outside the grids of obstacles, and of points without a limit, metres."""
 
-AirWaves: TypeAlias = tuple[Float64Array, Float64Array, Float64Array]
-"""Vectors (M, 3), amplitudes (M, 3) and phases (M,) of `hairkit.simulation.wind.gust_waves`."""
 
-
-def step_words(loads: Sequence[Load], step: float) -> Float32Array:
-    """Return (MOST_STEPS, 16, 4) words of substeps: see `Step` in the shader."""
-    words = np.zeros((MOST_STEPS, 16, 4))
-    for k, load in enumerate(loads):
-        words[k, :3] = load.head_step[:3]
-        words[k, 3:6] = drift_rows(load.head_step, step)
-        words[k, 6:9, :3] = load.turn
-        words[k, 6:9, 3] = load.turn @ load.gravity
-        words[k, 9] = np.roll(quaternion.from_matrix(load.head_step[:3, :3]), -1)
-        torso = load.torso or TorsoStep(np.eye(4), load.head_step)
-        words[k, 10:13] = torso.from_head[:3]
-        words[k, 13:16] = drift_rows(torso.step, step)
-    return words.astype(np.float32)
+def constant_rows(rods: Rods, system: System, contact: Contact | None) -> Float32Array:
+    """Return (S, R, 4) rows of a rod as `pbd_constants.glsl` reads them."""
+    nodes, metric = constants(rods, system, contact)
+    short = -metric.shape[1] % 4
+    parts = [nodes.reshape(len(nodes), -1), np.pad(metric, ((0, 0), (0, short)))]
+    return np.concatenate(parts, axis=1).reshape(len(nodes), -1, 4)
 
 
 def steps_at_once(nodes: int, iterations: int) -> int:
@@ -64,23 +60,46 @@ def steps_at_once(nodes: int, iterations: int) -> int:
     return min(max(MOST_TURNS // turns, 1), MOST_STEPS)
 
 
-def air_uniforms(waves: AirWaves, wind: Float64Array, head: Float64Array) -> dict[str, Any]:
-    """Return the uniforms of gusts on a head at `head`: waves in its axes, the air in the world."""
-    vectors, amplitudes, phases = waves
-    # reduced here in float64; float32 would lose digits
-    turned = np.fmod(phases + vectors @ head[:3, 3], 2 * np.pi)
-    local = np.concatenate([vectors @ head[:3, :3], turned[:, None]], axis=1)
+def contact_uniforms(contact: Contact | None) -> dict[str, Any]:
+    """Return the uniforms of contacts."""
+    if contact is None:
+        return {"u_obstacles": False}
+    torso = contact.bodies.torso
+    grids = [body.grid for body in (contact.bodies.head, torso or contact.bodies.head)]
     return {
-        "u_mean": tuple(wind),
-        "u_waves": [tuple(wave) for wave in local],
-        "u_amplitudes": [(*amplitude, 0.0) for amplitude in amplitudes],
+        "u_obstacles": True,
+        "u_torso": torso is not None,
+        "u_friction": contact.friction,
+        "u_fastest": contact.fastest,
+        "u_rounds": contact.rounds,
+        "u_cells": [grid.shape for grid in grids],
+        "u_grid": [(*(grid.origin + 0.5 * grid.spacing), 1 / grid.spacing) for grid in grids],
+        "u_room": ROOM,
     }
 
 
-def drift_rows(head_step: Float64Array, seconds: float) -> Float64Array:
-    """Return rows (3, 4) that map a point to the velocity of the head there, head axes, m/s."""
-    result: Float64Array = (np.eye(4) - head_step)[:3] / seconds
-    return result
+def faces(body: Obstacles | None) -> Float32Array:
+    """Return (X, Y, Z, 4) distances of the corners (y, z), (y, z + 1), (y + 1, z), both + 1."""
+    if body is None:
+        return np.zeros((1, 1, 1, 4), np.float32)
+    full = np.pad(body.distance, ((0, 0), (0, 1), (0, 1)), mode="edge")
+    parts = [full[:, :-1, :-1], full[:, :-1, 1:], full[:, 1:, :-1], full[:, 1:, 1:]]
+    return np.stack(parts, axis=-1)
+
+
+def point_words(embedding: Embedding, deepest: Float64Array | None) -> Float32Array:
+    """Return (P, 8): offset in the rod's frame, share; segment, least distance, length, 0."""
+    least = np.full(len(embedding.rod), NOWHERE) if deepest is None else deepest
+    parts = (*embedding.offset.T, embedding.share, embedding.segment, least, embedding.length)
+    return np.stack([*parts, 0 * least], axis=1).astype(np.float32)
+
+
+def between_words(
+    before: npt.NDArray[np.integer[Any]], part: npt.NDArray[np.floating[Any]]
+) -> npt.NDArray[np.int32]:
+    """Return (N, 2): the point before; the bits of the float32 fraction."""
+    parts = np.ascontiguousarray(part, np.float32).view(np.int32)
+    return np.stack([before.ravel().astype(np.int32), parts.ravel()], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +127,7 @@ class Units:
         """Return the uniforms of the hair-grid passes."""
         cohesion, pressure, seconds = rates
         return {
-            "u_cells": self.hair_grid.shape,
+            "u_cells": self.hair_grid.density.shape,
             "u_grid": (*self.hair_grid.origin, 1 / SPACING),
             "u_drift": [tuple(row) for row in drift_rows(head_step, seconds)],
             "u_momentum": self.momentum,

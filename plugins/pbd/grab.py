@@ -1,104 +1,75 @@
-"""Forces on grabbed points that bring their nodes to the targets within two substeps."""
+"""Held points: their nodes are pulled to the hand as hair is to its captured shape."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from hairkit.arrays import Float64Array
-from hairkit.simulation import Grab, quaternion
+from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.simulation import Grab
 
-from .backend import Engine
-from .linear_system import System
-from .reference import Load, transform_points
-from .resampling import Embedding
+from .embedding import Embedding
+from .reference import transform_points
 from .rods import Rods
 
-SOFTEST = 0.3
-"""Compliance added, as a share of a free node's: limits the force along a taut strand."""
-LEARNT, KEPT = 0.15, 0.99
-"""Gain of the integral term on the remaining error, and its decay in a substep."""
-MOST = 0.005
-"""Largest error that the integral term sees in a substep, metres: anti-windup."""
-STRONGEST = 1.5
-"""Largest force over the one that accelerates a free node to full speed in a substep."""
-AHEAD = 2.0
-"""Divides what is missing two substeps ahead: a free node needs `1 + 1 / IMPLICIT`; from 1.3 on
-down a held tip jitters."""
+FIRM = 4e5
+"""1/s^2: squared frequency, of 100 Hz, of the pull to a hand: a strand's weight moves it 0.3 mm."""
 TAUT = 0.999
-"""Largest distance of a target from the root, as a share of the strand's length."""
+"""Largest distance of a hand from the root, as a share of the strand's length."""
 
 
-class GrabForces:
-    """Forces of all grabbed points: a proportional and an integral term for each."""
+class Hands:
+    """Hands on their way to the targets of grabs."""
 
     def __init__(self) -> None:
-        self._held: dict[int, tuple[Float64Array, Float64Array]] = {}
+        self._places: dict[int, Float64Array] = {}
 
-    def compute(
-        self,
-        grabs: tuple[Grab, ...],
-        engine: Engine,
-        rods: Rods,
-        embedding: Embedding,
-        system: System,
-        load: Load,
-        back: Float64Array,
-        speed: float,
-    ) -> Float64Array:
-        """Return the force (S, n, 3) on the nodes nearest to the held points, newtons.
+    @property
+    def held(self) -> tuple[int, ...]:
+        """The held points."""
+        return tuple(self._places)
 
-        `back` (4, 4) transforms the world to the head axes after the substep; a node moves at no
-        more than `speed`, m/s. The force is the distance to the target over the compliance of the
-        rod with its length constraints, plus an integral term for other forces on the node.
-        """
-        force = np.zeros_like(rods.points)
-        held: dict[int, tuple[Float64Array, Float64Array]] = {}
+    def move(
+        self, grabs: tuple[Grab, ...], points: Callable[[], Float32Array], most: float
+    ) -> None:
+        """Move hands by up to `most` metres; a new one starts at its point (P, 3), world."""
+        places = {}
         for grab in grabs:
-            rod = int(embedding.rod[grab.point])
-            node = max(int(embedding.segment[grab.point] + (embedding.share[grab.point] >= 0.5)), 1)
-            place, velocity = engine.rod(rod)
-            carried = transform_points(load.head_step, place)
-            way = system.step * velocity @ load.head_step[:3, :3].T
-            expected = carried + way
-            target = _reachable(
-                transform_points(back, np.asarray(grab.target, np.float64)), rods, rod, node
-            )
-            far = float(np.linalg.norm(target - carried[node]))
-            share = min(1.0, 2 * speed * system.step / max(far, 1e-12))
-            # at the target a substep later: a change of place goes on as one of velocity
-            ahead = share * (target - carried[node]) - 2 * way[node]
-            wanted = ahead / AHEAD
-            stiff = np.linalg.inv(_compliance(system, expected, rod, node))
-            standing, hoped = self._held.get(grab.point, (np.zeros(3), carried[node]))
-            short = hoped - carried[node]
-            short *= min(1.0, MOST / max(float(np.linalg.norm(short)), 1e-12))
-            free = system.inverse[rod, node - 1, node - 1]
-            standing = KEPT * standing + LEARNT / free * short
-            held[grab.point] = (standing, expected[node] + wanted)
-            pull = stiff @ wanted + standing
-            most = STRONGEST * speed * system.step / free
-            force[rod, node] += pull * min(1.0, most / max(float(np.linalg.norm(pull)), 1e-30))
-        self._held = held
+            start = self._places.get(grab.point)
+            start = points()[grab.point].astype(np.float64) if start is None else start
+            way = np.asarray(grab.target, np.float64) - start
+            size = max(float(np.linalg.norm(way)), 1e-12)
+            places[grab.point] = start + min(1.0, most / size) * way
+        self._places = places
+
+    def pull(self, embedding: Embedding, shape: Float64Array) -> Float64Array:
+        """Return the squared frequencies (S, n) of pulls, `shape` where nothing is held."""
+        result = shape.copy()
+        np.add.at(result, _nodes(embedding, self.held), FIRM)
+        return result
+
+    def force(self, rods: Rods, embedding: Embedding, back: Float64Array) -> Float64Array | None:
+        """Return the force (S, n, 3) that makes hands, not rest, the ends of these pulls, newtons.
+
+        `back` (4, 4) transforms the world to the head axes. A hand that the strand does not reach
+        pulls to the nearest point that it does.
+        """
+        if not self._places:
+            return None
+        force = np.zeros_like(rods.points)
+        rod, node = _nodes(embedding, self.held)
+        root = rods.points[rod, 0]
+        away = transform_points(back, np.array([*self._places.values()])) - root
+        reach = TAUT * np.cumsum(rods.length, axis=1)[rod, node - 1]
+        away *= np.minimum(1.0, reach / np.maximum(np.linalg.norm(away, axis=1), 1e-12))[:, None]
+        pull = FIRM * rods.mass[rod, node, None] * (root + away - rods.points[rod, node])
+        np.add.at(force, (rod, node), pull)
         return force
 
 
-def _reachable(target: Float64Array, rods: Rods, rod: int, node: int) -> Float64Array:
-    """Return the target, or the nearest point that the strand's length allows."""
-    root = rods.points[rod, 0]
-    away = target - root
-    most = TAUT * float(rods.length[rod, :node].sum())
-    result: Float64Array = root + away * min(1.0, most / max(float(np.linalg.norm(away)), 1e-12))
-    return result
-
-
-def _compliance(system: System, position: Float64Array, rod: int, node: int) -> Float64Array:
-    """Return the compliance (3, 3), m/N, of a node whose rod keeps its lengths."""
-    inverse = system.inverse[rod]
-    way = quaternion.normalize(np.diff(position, axis=0))
-    free = inverse[node - 1, node - 1]
-    column = inverse[:, node - 1]
-    coupled = np.diff(column, prepend=0.0)[:, None] * way
-    matrix = system.metric[rod] * (way @ way.T)
-    held = coupled.T @ np.linalg.solve(matrix, coupled)
-    result: Float64Array = (1 + SOFTEST) * free * np.eye(3) - held
-    return result
+def _nodes(embedding: Embedding, held: tuple[int, ...]) -> tuple[Int64Array, Int64Array]:
+    """Return rod and node (G,) nearest to the held points; roots are not held."""
+    index = np.array(held, np.int64)
+    node = embedding.segment[index] + (embedding.share[index] >= 0.5)
+    return embedding.rod[index], np.maximum(node, 1)

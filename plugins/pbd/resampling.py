@@ -1,17 +1,10 @@
-"""Resampling of guides to rods, and the embedding of guide points in rods.
-
-All rods have the same number of nodes, so that they can be solved in parallel. Each guide point
-keeps its offset in the rod's frame at its arc length, so that curls finer than the nodes move and
-rotate with the rod and are exact at rest.
-"""
+"""Resampling of guides to rods, which all have as many nodes, and what they can follow."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from hairkit.arrays import Float64Array, Int64Array
+from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
 from hairkit.types.strands import Strands
 
@@ -86,82 +79,3 @@ def _largest_turn(points: Float64Array) -> Float64Array:
     cosine = (direction[:, 1:] * direction[:, :-1]).sum(axis=-1)
     result: Float64Array = np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1)
     return result
-
-
-@dataclass(frozen=True, eq=False)
-class Embedding:
-    """Guide points embedded in rods."""
-
-    identity: bool
-    """True where the guides' points are the nodes themselves."""
-    rod: Int64Array
-    """(P,) rod index."""
-    segment: Int64Array
-    """(P,) segment index in the rod."""
-    share: Float64Array
-    """(P,) fraction along the segment."""
-    offset: Float64Array
-    """(P, 3) offset from the rod, in its frame there, metres."""
-    length: Float64Array
-    """(P,) distance to the point before, metres; 0 at roots."""
-    starts: Int64Array
-    """(S + 1,) where the points of each rod begin."""
-
-    def curve(self, position: Float64Array, frames: Float64Array) -> Float64Array:
-        """Return the places (P, 3) that rods at `position` (S, n, 3) carry the points to.
-
-        They are farther apart or closer than the points where a rod bends; see
-        `drawn_points.draw_points`.
-        """
-        if self.identity:
-            return position.reshape(-1, 3)
-        place, frame = _places(position, frames, self.rod, self.segment, self.share)
-        return place + quaternion.rotate(frame, self.offset)
-
-
-def embed_points(strands: Strands, position: Float64Array, frames: Float64Array) -> Embedding:
-    """Embed guide points in rods at rest, (S, n, 3) with segment frames (S, n - 1, 4)."""
-    segments = position.shape[1] - 1
-    rod = strands.strand_of_point
-    arc = strands.arc_lengths()
-    length = np.linalg.norm(np.diff(position, axis=1), axis=-1).sum(axis=1)
-    total = np.maximum(arc[strands.offsets[1:] - 1], length)[rod]
-    along = arc / total * segments
-    segment = np.minimum(along.astype(np.int64), segments - 1)
-    share = along - segment
-    place, frame = _places(position, frames, rod, segment, share)
-    apart = strands.points - place
-    same = (strands.counts == segments + 1).all() and float(np.abs(apart).max(initial=0)) < 1e-7
-    offset = quaternion.rotate(quaternion.inverse(frame), apart)
-    own = strands.points.astype(np.float64)
-    size = np.linalg.norm(np.diff(own, axis=0, prepend=own[:1]), axis=1)
-    size[strands.offsets[:-1]] = 0.0
-    return Embedding(same, rod, segment, share, offset, size, strands.offsets)
-
-
-def _places(
-    position: Float64Array,
-    frames: Float64Array,
-    rod: Int64Array,
-    segment: Int64Array,
-    share: Float64Array,
-) -> tuple[Float64Array, Float64Array]:
-    """Return positions on the Catmull-Rom curve through the nodes, and interpolated frames."""
-    last = position.shape[1] - 1
-    t = share[:, None]
-    a, b = position[rod, segment], position[rod, segment + 1]
-    before, after = (
-        position[rod, np.maximum(segment - 1, 0)],
-        position[rod, np.minimum(segment + 2, last)],
-    )
-    slope_a = np.where((segment == 0)[:, None], b - a, (b - before) / 2)
-    slope_b = np.where((segment == last - 1)[:, None], b - a, (after - a) / 2)
-    one, two = t * t * (3 - 2 * t), t * (1 - t)
-    place = a + (b - a) * one + two * ((1 - t) * slope_a - t * slope_b)
-    # a segment's frame is at its middle
-    towards = np.where(share < 0.5, -1, 1)
-    other = np.clip(segment + towards, 0, last - 1)
-    part = np.abs(share - 0.5)[:, None]
-    here, there = frames[rod, segment], frames[rod, other]
-    sign = np.where((here * there).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
-    return place, quaternion.normalize((1 - part) * here + part * sign * there)

@@ -13,7 +13,7 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.rendering.context import on_graphics_card
-from hairkit.simulation import Measures, Surroundings
+from hairkit.simulation import Grab, Measures, Surroundings
 from hairkit.simulation.obstacles import Bodies, groom_bodies
 from hairkit.simulation.rigid_motion import (
     follow_head,
@@ -22,18 +22,19 @@ from hairkit.simulation.rigid_motion import (
     motion_steps,
 )
 from hairkit.simulation.ties import held_lengths
-from hairkit.simulation.wind import air_velocity, gust_waves
+from hairkit.simulation.wind import gust_waves
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 from .backend import Engine, ReferenceEngine
+from .embedding import embed_points
 from .energies import elastic_energy, largest_stretch
-from .grab import GrabForces
+from .grab import Hands
 from .hair_grid import HairGrid, make_hair_grid
 from .head_steps import finer_steps
 from .linear_system import Rates, System, assemble
-from .reference import Contact, Load, TorsoStep, rest_state, transform_points
-from .resampling import embed_points, max_stiffness, node_points, overhang
+from .reference import Contact, Load, TorsoStep, rest_state
+from .resampling import max_stiffness, node_points, overhang
 from .rods import Rods, balance_load, clamp_roots, make_rods
 
 if TYPE_CHECKING:
@@ -63,6 +64,8 @@ buckles at w L^3 = 12.85 sqrt(EI GJ)). A guide stands for the hair around it, wh
 what lies out: it is at least so stiff that it stays."""
 SMALLEST = 2e-5
 """Metres between points of which float32 has digits enough for a stretch of 1 %."""
+APART = 4
+"""Nodes between those at which gusts are evaluated: shorter than half a gust is long."""
 _KEPT_SYSTEMS = 4
 
 
@@ -76,7 +79,7 @@ class PbdSimulator:
         self._points: Float32Array | None = None
         self._head: Float64Array = np.eye(4)
         self._torso: Float64Array = np.eye(4)
-        self._grab_forces = GrabForces()
+        self._hands = Hands()
         self._rest_energy: float | None = None
         self._tune(options)
         self.reset()
@@ -150,7 +153,7 @@ class PbdSimulator:
         self._head = np.eye(4) if head_from_rest is None else np.asarray(head_from_rest, np.float64)
         self._torso, self._engine.torso_from_head = self._head, np.eye(4)
         self._engine.state = rest_state(self._rods)
-        self._grab_forces = GrabForces()
+        self._hold((), 0.0)
         self._time = 0.0
         self._points = None
 
@@ -168,16 +171,11 @@ class PbdSimulator:
         if self._rest_energy is None:
             self._rest_energy = elastic_energy(rods, rest_state(rods), shape)
         down = self._head[:3, :3].T @ self._gravity(None)
-        measure = getattr(self._engine, "measure_energies", None)
-        found = None if measure is None else measure(down)
-        if found is None:
-            state = self._engine.state
-            kinetic = 0.5 * float((rods.mass[..., None] * state.velocity**2).sum())
-            fallen = ((state.position - rods.points) * down).sum(axis=-1)
-            weight = -float((rods.mass * fallen).sum())
-            elastic = elastic_energy(rods, state, shape)
-            found = largest_stretch(rods, state), kinetic, weight, elastic
-        stretch, kinetic, weight, elastic = found
+        state = self._engine.state
+        kinetic = 0.5 * float((rods.mass[..., None] * state.velocity**2).sum())
+        fallen = ((state.position - rods.points) * down).sum(axis=-1)
+        weight = -float((rods.mass * fallen).sum())
+        elastic, stretch = elastic_energy(rods, state, shape), largest_stretch(rods, state)
         energy = weight + elastic - self._rest_energy
         # in head axes, since float32 is coarse far away
         points = self._engine.points(self._embedding, np.eye(4)).astype(np.float64)
@@ -202,8 +200,7 @@ class PbdSimulator:
             self._stiffen(resolved)
         if new:
             self._embedding = embed_points(self._groom.strands, self._nodes, self._rods.frames)
-            mass = self._rods.mass.reshape(-1)
-            self._hair_grid: HairGrid = make_hair_grid(self._nodes.reshape(-1, 3), mass)
+            self._hair_grid: HairGrid = make_hair_grid(self._nodes, self._rods.mass)
         self._options = resolved
         self._rates = self._rates_of(resolved)
         self._systems: dict[float, System] = {}
@@ -261,7 +258,8 @@ class PbdSimulator:
         if key not in self._systems:
             if len(self._systems) >= _KEPT_SYSTEMS:
                 self._systems.pop(next(iter(self._systems)))
-            self._systems[key] = assemble(self._rods, self._rates, step)
+            shape = self._hands.pull(self._embedding, self._rates.shape)
+            self._systems[key] = assemble(self._rods, replace(self._rates, shape=shape), step)
         return self._systems[key]
 
     def _piece(
@@ -276,26 +274,18 @@ class PbdSimulator:
             self._engine.state = self._engine.state  # known distances to the torso are void
         count = max(1, math.ceil(self._options.substeps * seconds / FRAME - 1e-6)) * finer
         step = seconds / count
-        system = self._system(step)
+        self._hold(around.grabs, self._options.grab_speed * seconds)
         gravity, air = self._gravity(around), self._air(around, start)
+        force = self._hands.force(self._rods, self._embedding, inverse_motion(end))
         if self._options.cohesion > 0 or self._options.pressure > 0:
             rates = (self._options.cohesion, self._options.pressure, seconds)
             self._engine.apply_hair_grid(self._hair_grid, inverse_motion(end) @ start, rates)
-        held = self._grabs_on_engine(around, start)
-        loads = []
-        torsos = self._move_torso(start, end, count)
-        for (after, head_step), torso in zip(motion_steps(start, end, count), torsos, strict=True):
-            load = Load(head_step, after[:3, :3].T, gravity, air, None, torso)
-            if around.grabs and not held:  # a pull depends on the node's position
-                force = self._grab_forces.compute(
-                    around.grabs, self._engine, self._rods, self._embedding, system, load,
-                    inverse_motion(after), self._options.grab_speed,
-                )  # fmt: skip
-                self._engine.run(system, [replace(load, force=force)], self._options.iterations)
-            else:
-                loads.append(load)
-        if loads:
-            self._engine.run(system, loads, self._options.iterations)
+        heads, torsos = motion_steps(start, end, count), self._move_torso(start, end, count)
+        loads = [
+            Load(head_step, after[:3, :3].T, gravity, air, force, torso)
+            for (after, head_step), torso in zip(heads, torsos, strict=True)
+        ]
+        self._engine.run(self._system(step), loads, self._options.iterations)
         self._time += seconds
 
     def _move_torso(
@@ -313,13 +303,12 @@ class PbdSimulator:
         self._engine.torso_from_head = inverse_motion(self._torso) @ end
         return steps
 
-    def _grabs_on_engine(self, around: Surroundings, head: Float64Array) -> bool:
-        """Pass the grabs to the engine; return False if it cannot pull points itself."""
-        set_grabs = getattr(self._engine, "set_grabs", None)
-        if set_grabs is None:
-            return False
-        set_grabs(around.grabs, self._embedding, inverse_motion(head), self._options.grab_speed)
-        return True
+    def _hold(self, grabs: tuple[Grab, ...], most: float) -> None:
+        """Move the hands by up to `most` metres; other held points are another system."""
+        before = self._hands.held
+        self._hands.move(grabs, lambda: self.points, most)
+        if self._hands.held != before:
+            self._systems.clear()
 
     def _gravity(self, around: Surroundings | None) -> Float64Array:
         if around is None or around.gravity is None:
@@ -327,26 +316,25 @@ class PbdSimulator:
         return around.gravity
 
     def _air(self, around: Surroundings, head: Float64Array) -> Float64Array:
-        """Return the air velocity at the nodes, world; gusts are evaluated at every fourth node."""
-        wind, gusty = np.asarray(around.wind, np.float64), around.turbulence != 0.0
-        gusty = gusty and bool(wind.any())
-        set_gusts = getattr(self._engine, "set_gusts", None)
-        if set_gusts is not None:  # the engine evaluates the gusts itself
-            seed = self._options.seed
-            waves = gust_waves(self._time, wind, around.turbulence, seed) if gusty else None
-            set_gusts(waves, wind, head)
-        if set_gusts is not None or not gusty:
+        """Return the air velocity at the nodes, world; gusts are those where the head carries them.
+
+        They are evaluated at every `APART`-th node and interpolated between.
+        """
+        wind = np.asarray(around.wind, np.float64)
+        if around.turbulence == 0.0 or not wind.any():
             return wind
+        waves, amplitudes, phases = gust_waves(
+            self._time, wind, around.turbulence, self._options.seed
+        )
         nodes = self._rods.nodes
-        some = np.unique(np.append(np.arange(0, nodes, 4), nodes - 1))
-        where = transform_points(head, self._engine.state.position[:, some])
-        found = air_velocity(
-            where.reshape(-1, 3), self._time, around.wind, around.turbulence, self._options.seed
-        ).reshape(where.shape)
-        at = np.arange(nodes)
-        after = np.clip(np.searchsorted(some, at), 1, len(some) - 1)
-        share = ((at - some[after - 1]) / (some[after] - some[after - 1]))[:, None]
-        result: Float64Array = found[:, after - 1] * (1 - share) + found[:, after] * share
+        some = np.unique(np.append(np.arange(0, nodes, APART), nodes - 1))
+        share = np.stack([np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))], 1)
+        # reduced in float64: far from the origin float32 has no digits for them
+        turned = np.fmod(phases + waves @ head[:3, 3], 2 * np.pi).astype(np.float32)
+        places = self._rods.points[:, some].astype(np.float32)
+        angle = places @ (waves @ head[:3, :3]).T.astype(np.float32) + turned
+        gusts = np.cos(angle) @ amplitudes.astype(np.float32)
+        result: Float64Array = wind + share @ gusts
         return result
 
 

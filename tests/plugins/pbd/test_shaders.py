@@ -1,4 +1,4 @@
-"""What the shaders find by themselves: gusts, pulls, covered points, rows to draw; many nodes."""
+"""What the shaders meet: gusts, pulls, covered points, rows to draw, many nodes."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_many_held_points_go_where_the_reference_puts_them(groom: Groom) -> None
 
 
 def test_reset_lets_go(groom: Groom) -> None:
-    """What a hand has learnt is forgotten: after a reset the same pull gives the same motion."""
+    """After a reset the same pull gives the same motion."""
     simulator, grabs = PbdSimulator(groom, Options(backend="compute", nodes=8)), pulled(groom, [5])
     ends = []
     for _ in range(2):

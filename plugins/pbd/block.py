@@ -1,0 +1,148 @@
+"""What the kernels work on: strands side by side, and the constants of both float32 backends.
+
+A block is `LANES` strands; each field of a node holds that many numbers in a row. The same
+constants, strand by strand, are the textures
+of the shaders. Masses, stiffness and forces are shares of the rod's mean mass, so that stiffness is
+in 1/s^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.arrays import Float32Array, Float64Array
+from hairkit.simulation import quaternion
+
+from .linear_system import System
+from .reference import Contact, Load, TorsoStep
+from .rods import Rods
+from .simd import LANES
+
+Records = npt.NDArray[np.void]
+
+CONSTANTS = {
+    "rest": 3, "mass": 1, "drag": 1, "shape": 1, "clear": 1, "ease": 1, "first": 1, "second": 1,
+    "pivot": 1, "length": 1, "bend": 1, "twist": 1, "natural": 1, "over": 1, "curve": 3, "unit": 1,
+}  # fmt: skip
+"""Of a node: rest place, mass, rates of drag and of the pull to rest, clearance, 1 / mass (0 at the
+root); of the segment that ends there, at its bend before: the banded factor's two lower entries and
+reciprocal pivot, length, stiffnesses, natural twist, 1 / length, natural turn, mean mass in kg. The
+root's `first` to `length` are its frame (x, y, z, w) instead."""
+WORK = {
+    "place": 3, "speed": 3, "gain": 3, "slack": 1, "aside": 1, "frame": 4, "wind": 3, "push": 3,
+    "force": 3, "edge": 3, "way": 3, "reach": 3, "pull": 3, "torque": 1, "pivot": 1, "beside": 1,
+    "value": 1, "free": 3, "solved": 3, "normal": 3, "surface": 3, "depth": 1, "grip": 1,
+}  # fmt: skip
+"""Of a node: state; air and further force; what a substep works out for it and its segment."""
+STEP = np.dtype([(name, "f4", (3, 4)) for name in ("head_step", "drift", "air")]
+                + [("turn", "f4", (4,))]
+                + [(name, "f4", (3, 4)) for name in ("torso", "torso_drift")])  # fmt: skip
+"""Of a substep: motion of the head axes, rows; velocity of a point that rides on the head; turn
+from the world's axes, and gravity; the head's turn (x, y, z, w); head axes to the torso's; velocity
+of a point that rides on the torso."""
+
+
+def lanes_of(fields: dict[str, int]) -> np.dtype[Any]:
+    """Return the type of records whose fields hold `LANES` numbers, or as many vectors."""
+    sizes = {name: (size, LANES) if size > 1 else (LANES,) for name, size in fields.items()}
+    return np.dtype([(name, "f4", size) for name, size in sizes.items()])
+
+
+NODE, CONSTANT = lanes_of(WORK), lanes_of(CONSTANTS)
+
+
+class Packed(NamedTuple):
+    """Constants of blocks."""
+
+    nodes: Records
+    """(B, n) of `CONSTANT`."""
+    metric: Float32Array
+    """(B, n (n - 1) / 2, LANES) lower rows."""
+
+
+class State(NamedTuple):
+    """Places and velocities of rods as in `reference.State`, float32."""
+
+    place: Float32Array
+    speed: Float32Array
+    gain: Float32Array
+    frame: Float32Array
+    slack: Float32Array
+    """(S, n, 2) how far nodes may move before a lookup of the head, and of the torso, metres."""
+
+
+class Settings(NamedTuple):
+    """Numbers of a run."""
+
+    seconds: np.float32
+    damping: np.float32
+    friction: np.float32
+    fastest: np.float32
+    iterations: int
+    rounds: int
+    """Of friction; -1 without obstacles."""
+
+
+def constants(
+    rods: Rods, system: System, contact: Contact | None
+) -> tuple[Float32Array, Float32Array]:
+    """Return (S, n, 20) `CONSTANTS` and (S, n (n - 1) / 2) lower rows of the metric."""
+    count, nodes = rods.mass.shape
+    unit = rods.mass.mean(axis=1)
+    made = np.zeros((count, nodes, sum(CONSTANTS.values())), np.float32)
+    mean = unit[:, None]
+    made[..., :3], made[..., 3] = rods.points, rods.mass / mean
+    made[..., 4], made[..., 5] = system.rates.drag, system.rates.shape
+    made[..., 6] = -1.0 if contact is None else contact.clearance
+    made[:, 1:, 7] = mean / rods.mass[:, 1:]
+    made[:, 1:, 8:11] = banded_factor(system.banded / mean[..., None])
+    made[:, 0, 8:12], made[:, 1:, 11] = np.roll(rods.root_frame, -1, axis=-1), rods.length
+    made[:, 1:, 12], made[:, 1:, 13] = rods.bend / mean, rods.twist / mean
+    made[:, 1:, 14], made[:, 1:, 15] = rods.natural_twist, 1.0 / rods.length
+    made[:, 1:, 16:19], made[..., 19] = rods.curvature, mean
+    row, column = np.tril_indices(nodes - 1)
+    return made, (system.metric[:, row, column] * mean).astype(np.float32)
+
+
+def banded_factor(bands: Float64Array) -> Float64Array:
+    """Return L D L^T of matrices with two lower bands (S, m, 3): both lower entries and 1/D."""
+    result = np.zeros_like(bands)
+    pivot = np.ones((len(bands), bands.shape[1] + 2))
+    first = np.zeros(pivot.shape)
+    for j in range(bands.shape[1]):
+        own, one, two = bands[:, j, 0], bands[:, j, 1], bands[:, j, 2]
+        second = two / pivot[:, j]  # the pivot of row j - 2 is at index j
+        first[:, j + 2] = (one - second * pivot[:, j] * first[:, j + 1]) / pivot[:, j + 1]
+        pivot[:, j + 2] = own - first[:, j + 2] ** 2 * pivot[:, j + 1] - second**2 * pivot[:, j]
+        result[:, j] = np.stack([first[:, j + 2], second, 1 / pivot[:, j + 2]], axis=-1)
+    return result
+
+
+def steps_of(loads: Sequence[Load], seconds: float) -> Records:
+    """Return (K,) `STEP` of substeps of so many seconds."""
+    steps = np.zeros(len(loads), STEP)
+    for step, load in zip(steps, loads, strict=True):
+        torso = load.torso or TorsoStep(np.eye(4), load.head_step)
+        step["head_step"], step["torso"] = load.head_step[:3], torso.from_head[:3]
+        step["drift"] = drift_rows(load.head_step, seconds)
+        step["torso_drift"] = drift_rows(torso.step, seconds)
+        step["air"][:, :3], step["air"][:, 3] = load.turn, load.turn @ load.gravity
+        step["turn"] = np.roll(quaternion.from_matrix(load.head_step[:3, :3]), -1)
+    return steps
+
+
+def drift_rows(head_step: Float64Array, seconds: float) -> Float64Array:
+    """Return rows (3, 4) that map a point to the velocity of the head there, head axes, m/s."""
+    result: Float64Array = (np.eye(4) - head_step)[:3] / seconds
+    return result
+
+
+def pack_lanes(values: Float32Array) -> Float32Array:
+    """Return values (S, n, ...) of strands as (B, n, -1), lanes last; the last one fills blocks."""
+    rows = np.minimum(np.arange(-(-len(values) // LANES) * LANES), len(values) - 1)
+    spread = np.moveaxis(values[rows].reshape(-1, LANES, *values.shape[1:]), 1, -1)
+    return np.ascontiguousarray(spread).reshape(len(spread), values.shape[1], -1)
