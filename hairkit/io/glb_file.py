@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
-from hairkit.errors import FormatError, HairkitError
+from hairkit.errors import DataError, FormatError, HairkitError
 from hairkit.storage import MAX_FILE_BYTES, read_bytes
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -47,6 +47,8 @@ def readable(source: str | os.PathLike[str], what: str) -> Iterator[None]:
         # numbers beyond all bounds are found by what they lead to, not by NumPy's warnings
         with np.errstate(all="ignore"):
             yield
+    except DataError as error:  # of a type, which does not know the file
+        raise FormatError(f"{source}: not a readable {what} ({error})") from error
     except HairkitError:
         raise
     except KeyError as error:

@@ -194,6 +194,20 @@ def test_hostile_documents_are_refused(tmp_path: Path, name: str) -> None:
     assert peak < 20_000_000
 
 
+def test_values_that_no_type_takes_name_the_file(tmp_path: Path) -> None:
+    """What a type refuses, as a torso of no breadth, is said of the file that holds it."""
+    path = tmp_path / "worn.glb"
+    groom = bristle_groom()
+    gltf.export_groom(groom, path, gltf.Options(strips=8))
+    data = path.read_bytes()
+    (length,) = struct.unpack_from("<I", data, 12)
+    document = json.loads(data[20 : 20 + length])
+    document["extras"]["hairkit"]["torso"] = {"breadth": 0.0}
+    path.write_bytes(glb(document, data[28 + length :]))
+    with pytest.raises(FormatError, match=r"worn\.glb: .*torso breadth is 0"):
+        strands_in(path)
+
+
 @pytest.mark.parametrize("times", ["primitives", "indices"])
 def test_small_files_do_not_become_large(tmp_path: Path, times: str) -> None:
     """Data that is used over and over is refused before it takes memory."""
