@@ -131,7 +131,8 @@ def steps_of(loads: Sequence[Load], seconds: float) -> Records:
         step["drift"] = drift_rows(load.head_step, seconds)
         step["torso_drift"] = drift_rows(torso.step, seconds)
         step["air"][:, :3], step["air"][:, 3] = load.turn, load.turn @ load.gravity
-        step["turn"] = np.roll(quaternion.from_matrix(load.head_step[:3, :3]), -1)
+        w, x, y, z = quaternion.from_matrix(load.head_step[:3, :3])
+        step["turn"] = x, y, z, w
     return steps
 
 
