@@ -167,6 +167,20 @@ def test_a_grabbed_point_is_at_the_hand(groom: Groom, backend: str, share: float
     assert simulator.measure().stretch < 0.01
 
 
+def test_a_hand_goes_no_faster_than_it_may(groom: Groom) -> None:
+    """At 0.5 m/s a held tip has come 5 cm nearer after 0.1 s, to 1 cm, and no farther."""
+    simulator = PbdSimulator(groom, Options(backend="fast", grab_speed=0.5))
+    tip = int(groom.strands.offsets[39]) - 1
+    root, start = groom.strands.roots[38], groom.strands.points[tip].astype(np.float64)
+    target = root + 0.9 * np.linalg.norm(start - root) * np.array([0.0, 0.0, 1.0])
+    grab = Grab(tip, (float(target[0]), float(target[1]), float(target[2])))
+    for _ in range(6):
+        simulator.advance(1 / 60, Surroundings(grabs=(grab,)))
+    way = np.linalg.norm(target - start) - np.linalg.norm(target - simulator.points[tip])
+    assert np.linalg.norm(target - start) > 0.1
+    assert way == pytest.approx(0.05, abs=0.01)
+
+
 def test_a_hand_out_of_reach_stretches_nothing(groom: Groom) -> None:
     """A tip drawn a metre away ends on a taut strand of its own length."""
     simulator = PbdSimulator(groom, Options(backend="fast"))
