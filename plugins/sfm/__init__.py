@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
-from hairkit.arrays import BoolArray
+from hairkit.arrays import BoolArray, Float64Array
 from hairkit.cameras.similarity import Similarity, fit_similarity, triangulate
 from hairkit.errors import InputError
 from hairkit.options import option
@@ -32,6 +32,10 @@ from .sparse_model import Model, solve
 
 FEWEST = 16
 """Photos: between neighbours farther than 22 degrees apart SIFT finds too few points again."""
+FARTHER = 2.0
+"""Times the usual distance, or part of it, at which no camera of a turn stands."""
+LEAST_SEEN = 0.6
+"""Share of the scalp that is on the person of each photo, at least."""
 JAW_WEIGHT = 0.1
 """Weight of the jaw's landmarks beside the others: detectors trace the outline."""
 
@@ -79,6 +83,7 @@ def estimate_scene(
     place = place_on_head(capture, cameras, head)
     bare = place.apply(model.points[_on_skin(model, masks)])
     moved = tuple(place.moved_camera(camera) for camera in cameras)
+    refuse_astray(names, moved, head, masks)
     return Scene(names, moved, head, model.residual_px, np.asarray(bare, np.float32))
 
 
@@ -94,6 +99,36 @@ def place_on_head(capture: Capture, cameras: Sequence[Camera], head: Head) -> Si
     points = triangulate([cameras[i] for i in seen], pixels)
     weights = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_WEIGHT, 1.0)
     return fit_similarity(points, head.vertices[head.landmark_vertices], weights)
+
+
+def refuse_astray(
+    names: Sequence[str], cameras: Sequence[Camera], head: Head, masks: Sequence[Mask]
+) -> None:
+    """Raise `InputError` where cameras stand where the head is not on the person of their photo."""
+    scalp = head.vertices[head.scalp > 0.5].astype(np.float64)
+    middle = scalp.mean(axis=0)
+    away = np.array([np.linalg.norm(camera.position - middle) for camera in cameras])
+    ratio = away / np.median(away)
+    astray = [
+        name
+        for name, camera, mask, far in zip(names, cameras, masks, ratio, strict=True)
+        if not 1 / FARTHER < far < FARTHER or _share_on(mask, camera, scalp) < LEAST_SEEN
+    ]
+    if astray:
+        raise InputError(
+            f"sfm: {len(astray)} of {len(names)} cameras are not where their photos can be from"
+            f" ({', '.join(astray[:4])}{', ...' if len(astray) > 4 else ''}); hair looks different"
+            " from every side; use --set scene=silhouette"
+        )
+
+
+def _share_on(mask: Mask, camera: Camera, points: Float64Array) -> float:
+    """Return the share of points (N, 3) that a camera sees on hair or person."""
+    height, width = mask.labels.shape
+    pixels = camera.project(points) * [width / camera.width, height / camera.height]
+    inside = ((pixels >= 0) & (pixels < [width, height])).all(axis=1)
+    column, row = pixels[inside].astype(np.int64).T
+    return float((mask.labels[row, column] > 0).sum() / len(points))
 
 
 def _on_skin(model: Model, masks: Sequence[Mask]) -> BoolArray:

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from hairkit_plugins import sfm
-from hairkit_plugins.sfm import Options, estimate_scene, place_on_head
+from hairkit_plugins.sfm import Options, estimate_scene, place_on_head, refuse_astray
 from hairkit_plugins.sfm.sparse_model import Model
 
 from hairkit import Camera, Capture, Head, Mask, Scene, View
@@ -139,6 +139,20 @@ def test_landmarks_give_frame_and_size() -> None:
     np.testing.assert_allclose(place.scale, 1 / 7, rtol=1e-5)
     points = np.random.default_rng(0).normal(size=(20, 3))
     np.testing.assert_allclose(place.apply(moved.apply(points)), points, atol=1e-5)
+
+
+def test_cameras_that_are_astray_are_refused() -> None:
+    """One that came out four times as near, or looks past the head, is named with what to do."""
+    capture, masks = _turn(16)
+    names = [view.name for view in capture.views]
+    cameras = [_camera(view.azimuth_deg) for view in capture.views]
+    head = default_head()
+    refuse_astray(names, cameras, head, masks)
+    for matrix in (Similarity(0.25, np.eye(3), np.zeros(3)),
+                   Similarity(1.0, np.eye(3), np.array([0, 0.3, 0]))):  # fmt: skip
+        wrong = [*cameras[:5], matrix.moved_camera(cameras[5]), *cameras[6:]]
+        with pytest.raises(InputError, match=rf"1 of 16 cameras .*\({names[5]}\).*silhouette"):
+            refuse_astray(names, wrong, head, masks)
 
 
 def test_without_a_face_there_is_no_size() -> None:
