@@ -4,14 +4,18 @@ python benchmarks/viewer.py --guides 600 --hairs 10000 --size 1280x720
 
 Each row is the median frame of a shaken head in wind: as wall time, and as CPU time of all threads
 over the number of cores, which is the wall time on an otherwise idle machine. `chosen` is what the
-frame budget settles on. Hair is drawn by compute shaders, meant for a graphics card, or by
-compiled loops on the processor, which the viewer uses without one.
+frame budget settles on; a picture is 1/60 s. Hair is drawn by compute shaders, meant for a graphics
+card, or by compiled loops on the processor, which the viewer uses without one.
+
+The last line is a still picture with all its samples, and the most memory that the program took
+until then; `--still` measures nothing else.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import resource
 import statistics
 import tempfile
 import time
@@ -25,7 +29,7 @@ from hairkit.synth import grow
 from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.draw.frame_budget import LEVELS, Budget
 from hairkit.viewer.preview import Preview
-from hairkit.viewer.session import Session
+from hairkit.viewer.session import STEP, Session
 
 HEADINGS = (
     "simulation", "hair by", "quality", "wall ms", "fps", "processor ms / cores",
@@ -48,7 +52,7 @@ def main() -> int:
         print(f"{gl.description}, {os.cpu_count()} cores\n")
         print(f"{args.guides} guides, {args.hairs} hairs, {args.size}, {args.pictures} pictures\n")
         print(f"| {' | '.join(HEADINGS)} |\n|{'---|' * len(HEADINGS)}")
-        for simulator in ("none", None):
+        for simulator in () if args.still else ("none", None):
             session = Session(
                 Manager.loaded(),
                 path,
@@ -58,7 +62,26 @@ def main() -> int:
             )
             for soft, level in ROWS:
                 _row(args, gl, session, level, soft)
+        _still(args, gl, path)
     return 0
+
+
+def _still(args: argparse.Namespace, gl: Renderer, path: Path) -> None:
+    """Print the time of a still picture as the window refines it, and the program's memory."""
+    size = parse_size(args.size)
+    session = Session(Manager.loaded(), path, size=size, hairs=args.hairs)
+    preview = Preview(gl, session)
+    preview.draw(still=True)
+    wall, processor = time.perf_counter(), time.process_time()
+    while preview.refine():
+        pass
+    wall, processor = time.perf_counter() - wall, time.process_time() - processor
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    print(
+        f"\nstill picture: {wall:.2f} s, {processor:.2f} processor seconds;"
+        f" {args.hairs} hairs, at most {most:.2f} GB"
+    )
+    preview.release()
 
 
 def _row(
@@ -76,7 +99,7 @@ def _row(
         if level is not None:
             budget.level, budget._wait = level, 99
         wall, processor = time.perf_counter(), time.process_time()
-        preview.frame(1 / 30)
+        preview.frame(STEP)
         gl.context.finish()
         walls.append(time.perf_counter() - wall)
         processors.append(time.process_time() - processor)
@@ -104,6 +127,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--hairs", type=int, default=10_000)
     parser.add_argument("--size", default="1280x720", metavar="WxH")
     parser.add_argument("--pictures", type=int, default=40)
+    parser.add_argument("--still", action="store_true", help="measure a still picture only")
     return parser.parse_args()
 
 

@@ -143,3 +143,31 @@ def test_looking_through_a_photos_camera_sees_what_the_photo_saw(
     np.testing.assert_allclose(camera.project(points), expected, atol=1e-6)
     perform(session, "orbit", {"right": 5.0})
     assert session.shown.through is None
+
+
+def test_a_wipe_shows_the_photo_left_of_its_line(
+    results: Path, swaying_manager: Manager, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Photo, white line, hair; it goes with its key, and where no photo's camera is used."""
+    session = Session(swaying_manager, results, size=(160, 120), hairs=200)
+    photo = SCENE.cameras[0]
+    image = np.full((photo.height, photo.width, 3), (250, 0, 250), np.uint8)
+    monkeypatch.setattr(Layers, "check", lambda self, name: None)
+    monkeypatch.setattr(Layers, "photos", dict.fromkeys(SCENE.names, image))
+    with renderer() as gl:
+        preview = Preview(gl, session)
+        perform(session, "wipe", {"at": 0.25})
+        preview.draw(still=True)
+        picture = preview.picture().copy()
+        assert (picture[:, 40:42] == 255).all()
+        left = round(80 - photo.width * min(160 / photo.width, 120 / photo.height) / 2)
+        assert (picture[5:115, left + 1 : 40] == (250, 0, 250)).all()
+        assert not (picture == (250, 0, 250)).all(axis=2)[:, 42:].any()
+        perform(session, "wipe")
+        preview.draw(still=True)
+        assert not (preview.picture() == (250, 0, 250)).all(axis=2).any()
+        perform(session, "wipe")
+        perform(session, "orbit", {"right": 5.0})
+        preview.draw(still=True)
+        assert not (preview.picture() == (250, 0, 250)).all(axis=2).any()
+        preview.release()

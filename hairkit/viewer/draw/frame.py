@@ -34,7 +34,8 @@ KEY = (-0.45, 0.6, 0.75)
 RIM = (0.55, 0.6, -0.55)
 """Direction towards the rim light, same axes."""
 EDGE_SAMPLES = 4
-"""Samples of a pixel at the edges of meshes."""
+"""Samples of a pixel at the edges of meshes on graphics cards. Software renderers take longer for
+them than for the picture; there edges are smooth once the picture is refined."""
 FIXED_SOLIDS = ("torso",)
 """Meshes that do not move with the head."""
 PULL = 0.002
@@ -205,7 +206,8 @@ class FrameRenderer:
         self._sample_depths.clear(depth=1.0)
         self._samples.use()
         self._draw_meshes(inputs, own, depth, lighting)
-        self.gl.context.copy_framebuffer(self._backdrop, self._samples)  # averages the samples
+        if self._sample_buffers:
+            self.gl.context.copy_framebuffer(self._backdrop, self._samples)  # averages the samples
 
     def _draw_meshes(
         self, inputs: FrameInputs, own: Camera, depth: DepthRange, lighting: dict[str, Any]
@@ -249,18 +251,21 @@ class FrameRenderer:
             return
         self._release_targets()
         context = self.gl.context
-        samples = min(EDGE_SAMPLES, context.max_samples)
-        self._sample_buffers = (
-            context.renderbuffer(size, 4, samples=samples),
-            context.depth_renderbuffer(size, samples=samples),
-        )
-        self._samples = context.framebuffer([self._sample_buffers[0]], self._sample_buffers[1])
-        self._sample_depths = context.framebuffer([], self._sample_buffers[1])
         self._backdrop_texture = context.texture(size, 4)
         self._depth_texture = context.depth_texture(size)
         self._depth_texture.compare_func = ""
         self._depth_texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._backdrop = context.framebuffer([self._backdrop_texture], self._depth_texture)
+        colour: Any = self._backdrop_texture
+        depth: Any = self._depth_texture
+        self._backdrop = context.framebuffer([colour], depth)
+        samples = 0 if self.soft else min(EDGE_SAMPLES, context.max_samples)
+        self._sample_buffers: tuple[moderngl.Renderbuffer, ...] = ()
+        if samples:
+            colour = context.renderbuffer(size, 4, samples=samples)
+            depth = context.depth_renderbuffer(size, samples=samples)
+            self._sample_buffers = colour, depth
+        self._samples = context.framebuffer([colour], depth)
+        self._sample_depths = context.framebuffer([], depth)
         self.texture = context.texture(size, 4)
         self.framebuffer = context.framebuffer([self.texture])
         self._overlaid = context.framebuffer([self.texture], self._depth_texture)
@@ -270,9 +275,9 @@ class FrameRenderer:
     def _release_targets(self) -> None:
         if self._size == (0, 0):
             return
-        frames = self.framebuffer, self._overlaid, self._backdrop, self._samples
-        textures = self.texture, self._backdrop_texture, self._depth_texture
-        for part in (*frames, self._sample_depths, *textures, *self._sample_buffers):
+        parts: list[Any] = [self.framebuffer, self._overlaid, self._backdrop, self._samples]
+        parts += [self._sample_depths, self.texture, self._backdrop_texture]
+        for part in [*parts, self._depth_texture, *self._sample_buffers]:
             part.release()
         self._size = (0, 0)
 

@@ -37,25 +37,48 @@ class StudioPass:
         self._texture = gl.context.texture(SIZE, 4, dtype="f2")
         self._texture.repeat_x = self._texture.repeat_y = False
         self._small = gl.context.framebuffer([self._texture])
+        self._full: moderngl.Framebuffer | None = None
         self._made: object = None
 
     def release(self) -> None:
         """Free all GPU objects."""
         for part in (self._wide, self._fine, self._small, self._texture):
             part.release()
+        self._release_full()
+
+    def _release_full(self) -> None:
+        if self._full is not None:
+            self._full.color_attachments[0].release()
+            self._full.release()
+            self._full = None
 
     def draw(self, target: moderngl.Framebuffer, full: Camera, floor: float, backdrop: str) -> None:
-        """Fill `target`, the picture of a camera `full` in the world, of the same size."""
+        """Fill `target`, the picture of a camera `full` in the world, of the same size.
+
+        What is the same as before is copied, which is much faster on software renderers.
+        """
         key = (full.camera_from_head.tobytes(), full.focal, full.centre.tobytes(), floor, backdrop)
-        self._gl.context.enable_only(moderngl.NOTHING)
-        if key != self._made:
+        size = full.width, full.height
+        if self._full is None or self._full.size != size or key != self._made:
             self._made = key
-            self._draw_small(full.resized(*SIZE), floor, backdrop)
-        target.use()
+            self._full = self._draw_full(size, full.resized(*SIZE), floor, backdrop)
+        self._gl.context.copy_framebuffer(target, self._full)
+
+    def _draw_full(
+        self, size: tuple[int, int], small: Camera, floor: float, backdrop: str
+    ) -> moderngl.Framebuffer:
+        context = self._gl.context
+        context.enable_only(moderngl.NOTHING)
+        self._draw_small(small, floor, backdrop)
+        if self._full is None or self._full.size != size:
+            self._release_full()
+        full = self._full or context.framebuffer([context.texture(size, 4)])
+        full.use()
         self._texture.use(4)
         spread = self._gl.program("viewer_screen", "viewer_backdrop")
-        set_uniforms(spread, u_studio=4, u_size=(full.width, full.height))
+        set_uniforms(spread, u_studio=4, u_size=size)
         self._wide.render(moderngl.TRIANGLES, vertices=3)
+        return full
 
     def _draw_small(self, camera: Camera, floor: float, backdrop: str) -> None:
         self._small.use()

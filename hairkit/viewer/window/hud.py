@@ -52,6 +52,8 @@ PADDING = (6, 4)
 """Space beside and above a text in its box, pixels."""
 BASELINE = 5
 """Height of the baseline above the bottom of a line, pixels."""
+NARROW = 640
+"""Width of the picture below which only the first read-out is shown, pixels."""
 SMALLEST = 0.75
 """Smallest scale of the help sheet; a window too small for it cuts it off."""
 
@@ -144,7 +146,8 @@ def overlay(size: tuple[int, int], session: Session, readings: Readings) -> UInt
     image = np.zeros((height, width, 4), np.uint8)
     drawn = False
     if session.shown.numbers and not session.shown.help:
-        _write(image, status_lines(session, readings), (CORNER, CORNER))
+        lines = status_lines(session, readings)
+        _write(image, lines if width >= NARROW else lines[:1], (CORNER, CORNER))
         drawn = True
     if session.shown.help:
         _write_sheet(image, help_lines())

@@ -132,8 +132,9 @@ class Panel:
         imgui.new_frame()
         when = imgui.Cond_.first_use_ever if session.size == self._size else imgui.Cond_.always
         self._size = session.size
-        imgui.set_next_window_pos((session.size[0] - WIDTH - 8, 8), when)
-        imgui.set_next_window_size((WIDTH, session.size[1] - 16), when)
+        width = WIDTH if session.size[0] >= NARROW else WIDTH // 2
+        imgui.set_next_window_pos((session.size[0] - width - 8, 8), when)
+        imgui.set_next_window_size((width, session.size[1] - 16), when)
         imgui.set_next_window_collapsed(session.size[0] < NARROW, when)
         unfolded = bool(imgui.begin("hairkit")[0])
         left = int(imgui.get_window_pos().x)

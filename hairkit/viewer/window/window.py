@@ -166,6 +166,7 @@ class Window:
     def loop(self, steps: Iterator[None] | None = None) -> None:
         """Draw until the window is closed; `next(steps)` performs an action of a script."""
         before = time.perf_counter()
+        self._stir()
         while not (self.session.finished or self._glfw.window_should_close(self._window)):
             if steps is None and self._stillness.asleep(time.monotonic()):
                 self._refine_or_sleep()
@@ -258,6 +259,9 @@ class Window:
         """Show the picture, the text and the panel on the screen."""
         self._show(gl)
         self._panel.draw(self.session, self.preview, self.perform)
+        if self._panel.covered != self.session.covered:
+            self.session.covered = self._panel.covered
+            self._stir()  # the hair moves beside the panel
         self._glfw.swap_buffers(self._window)
         gl.home.use()
 
@@ -300,7 +304,6 @@ class Window:
             self.session.size = (width, height)
             self.mouse.width, self.mouse.height = width, height
         self.mouse.wipe = self.session.shown.wipe if self.session.shown.through else None
-        self.session.covered = self._panel.covered
 
     def _reload_changed(self) -> None:
         now = time.monotonic()

@@ -13,6 +13,7 @@ from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.head import head_solid
 from hairkit.testing import bristle_groom
 from hairkit.types.camera import Camera
+from hairkit.viewer.draw import frame
 from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import HairLook
@@ -244,8 +245,11 @@ def test_guides_may_stay_on_the_card() -> None:
 
 @pytest.mark.parametrize("smooth", [True, False])
 @pytest.mark.parametrize("direction", [True, False])
-def test_processor_and_shaders_draw_the_same(smooth: bool, direction: bool) -> None:
+def test_processor_and_shaders_draw_the_same(
+    smooth: bool, direction: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Both ways to draw differ by roundings, and by how finely skin and shadows are sampled."""
+    monkeypatch.setattr(frame, "EDGE_SAMPLES", 0)  # as on the processor
     look = replace(LOOK, smooth=smooth, by_direction=direction, wider=2.0)
     wanted = inputs(hair=look)
     with renderer() as gl:

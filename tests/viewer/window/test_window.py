@@ -179,3 +179,17 @@ def test_a_grab_is_let_go_with_the_button() -> None:
         ("drag", {"x": 15.0, "y": 20.0}),
         ("release", {}),
     ]
+
+
+def test_a_drag_at_the_line_between_photo_and_hair_moves_it() -> None:
+    """Elsewhere it orbits."""
+    heard = Heard()
+    heard.mouse.width, heard.mouse.wipe = 200.0, 0.5
+    heard.mouse.move(103.0, 20.0)
+    heard.mouse.press(LEFT, 0)
+    heard.mouse.move(150.0, 20.0)
+    heard.mouse.release(1.0)
+    assert heard.done == [("wipe", {"at": 0.75})]
+    heard.mouse.press(LEFT, 0)
+    heard.mouse.move(160.0, 20.0)
+    assert heard.names[-1] == "orbit"
