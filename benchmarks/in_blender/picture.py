@@ -7,17 +7,15 @@ The scene names the files, the camera and the lights; see benchmarks/blender_pic
 
 import importlib.util
 import json
-import math
 import sys
 from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Vector
+from mathutils import Vector
+from scene_camera import Z_UP, add_camera
 
 ADDON = Path(__file__).parents[2] / "examples" / "hairkit-blender"
-Z_UP = Matrix(((1, 0, 0), (0, 0, -1), (0, 1, 0)))
-"""Head frame to Blender."""
 
 
 def main() -> None:
@@ -26,7 +24,7 @@ def main() -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.alembic_import(filepath=scene["alembic"])
     _dress(bpy.context.selected_objects[0], scene)
-    _add_camera(scene)
+    add_camera(scene)
     for light in scene["lights"]:
         _add_sun(light)
     _add_sky(scene["sky"])
@@ -55,20 +53,6 @@ def _addon():
     for name in ("groom_file", "materials", "objects"):
         importlib.import_module(f"addon.{name}")
     return package
-
-
-def _add_camera(scene: dict) -> None:
-    """OpenCV axes (y down, z ahead) become Blender's (y up, z back)."""
-    camera = bpy.data.cameras.new("camera")
-    camera.sensor_fit = "VERTICAL"
-    camera.angle_y = 2 * math.atan(scene["height"] / 2 / scene["focal"])
-    camera.clip_start = 0.01
-    thing = bpy.data.objects.new("camera", camera)
-    rotation = Z_UP @ Matrix(scene["rotation"]).transposed()
-    turned = rotation @ Matrix.Diagonal((1, -1, -1))
-    thing.matrix_world = Matrix.Translation(Z_UP @ Vector(scene["position"])) @ turned.to_4x4()
-    bpy.context.collection.objects.link(thing)
-    bpy.context.scene.camera = thing
 
 
 def _add_sun(light: dict) -> None:

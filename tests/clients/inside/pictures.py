@@ -1,17 +1,18 @@
 """Pictures that Blender's Cycles makes of imported files, without a further step."""
 
-import math
 import os
+import sys
 import tempfile
+from pathlib import Path
 
 import bpy
 import numpy as np
 from contents import imported
-from mathutils import Matrix, Vector
+
+sys.path.append(str(Path(__file__).parents[3] / "benchmarks" / "in_blender"))
+from scene_camera import add_camera
 
 SAMPLES = 8
-Z_UP = Matrix(((1, 0, 0), (0, 0, -1), (0, 1, 0)))
-"""Head frame to Blender."""
 
 
 def seen(path: str, operator: str, cameras: list, hidden: list) -> np.ndarray:
@@ -31,7 +32,7 @@ def seen(path: str, operator: str, cameras: list, hidden: list) -> np.ndarray:
 
 
 def _picture(camera: dict) -> np.ndarray:
-    _add_camera(camera)
+    add_camera(camera)
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.device, scene.cycles.samples, scene.cycles.seed = "CPU", SAMPLES, 0
@@ -50,17 +51,3 @@ def _picture(camera: dict) -> np.ndarray:
         image.pixels.foreach_get(pixels)
         bpy.data.images.remove(image)
     return pixels.reshape(camera["height"], camera["width"], 4)[::-1].copy()
-
-
-def _add_camera(scene: dict) -> None:
-    """OpenCV axes (y down, z ahead) become Blender's (y up, z back)."""
-    camera = bpy.data.cameras.new("camera")
-    camera.sensor_fit = "VERTICAL"
-    camera.angle_y = 2 * math.atan(scene["height"] / 2 / scene["focal"])
-    camera.clip_start = 0.01
-    thing = bpy.data.objects.new("camera", camera)
-    rotation = Z_UP @ Matrix(scene["rotation"]).transposed()
-    turned = rotation @ Matrix.Diagonal((1, -1, -1))
-    thing.matrix_world = Matrix.Translation(Z_UP @ Vector(scene["position"])) @ turned.to_4x4()
-    bpy.context.collection.objects.link(thing)
-    bpy.context.scene.camera = thing
