@@ -283,7 +283,7 @@ class Preview:
         """Cover the left of the picture with the photo whose camera it is seen through."""
         session, frame_renderer = self.session, self.frame_renderer
         wipe, name = session.shown.wipe, session.shown.through
-        if wipe is None or name is None:
+        if wipe is None or name is None or name not in session.layers.photos:
             return
         width, height = frame_renderer.framebuffer.size
         now, taken = session.camera((width, height)), session.photo_cameras[name]

@@ -171,3 +171,20 @@ def test_a_wipe_shows_the_photo_left_of_its_line(
         preview.draw(still=True)
         assert not (preview.picture() == (250, 0, 250)).all(axis=2).any()
         preview.release()
+
+
+def test_a_photo_that_the_capture_lacks_is_not_compared(
+    results: Path, swaying_manager: Manager, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Photos of another capture: one line, and the next view is drawn without them."""
+    session = Session(swaying_manager, results, size=(160, 120), hairs=200)
+    monkeypatch.setattr(Layers, "check", lambda self, name: None)
+    monkeypatch.setattr(Layers, "photos", {})
+    with pytest.raises(InputError, match=r"no photo '.*--capture"):
+        perform(session, "wipe", {"at": 0.25})
+    assert session.shown.wipe is None
+    session.shown.through, session.shown.wipe = SCENE.names[0], 0.5
+    with renderer() as gl:
+        preview = Preview(gl, session)
+        preview.draw(still=True)
+        preview.release()

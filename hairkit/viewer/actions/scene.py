@@ -51,7 +51,9 @@ def wipe(session: Session, at: float | None = None, on: bool | None = None) -> N
         shown.wipe = None
         return
     session.layers.check("photos")
-    if shown.through is None:
-        shown.through = next(iter(session.photo_cameras))
+    name = shown.through or next(iter(session.photo_cameras))
+    if name not in session.layers.photos:
+        raise InputError(f"the capture has no photo {name!r}; pass its folder with --capture")
+    shown.through = name
     middle = 0.5 if shown.wipe is None else shown.wipe
     shown.wipe = float(np.clip(middle if at is None else at, 0.0, 1.0))
