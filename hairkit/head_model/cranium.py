@@ -83,11 +83,13 @@ class Cranium:
 def _far_from_hair(mask: Mask, size: tuple[int, int]) -> Float32Array:
     """Return 1 where no hair is near, in a smaller picture."""
     reach = max(1, round(HAIR_GAP * mask.labels.shape[0]))
-    window = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    near = cv2.dilate((mask.labels == HAIR).astype(np.uint8), window)
+    away = cv2.distanceTransform(
+        (mask.labels != HAIR).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
+    )
+    far = (away > reach).astype(np.float32)
     result = np.zeros(size[::-1], np.float32)
     share = min(1.0, size[1] / mask.labels.shape[0])
-    small = cv2.resize(1.0 - near, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
+    small = cv2.resize(far, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
     rows, columns = min(small.shape[0], size[1]), min(small.shape[1], size[0])
     result[:rows, :columns] = small[:rows, :columns] > 1 - LEAST_SHARE
     return result

@@ -47,8 +47,12 @@ class Reach:
     def covers(self, points: npt.ArrayLike, margin: npt.ArrayLike = 0.0) -> BoolArray:
         """Return (N,) which points (N, 3) a guide reaches, or nearly: within a margin (N,)."""
         places = np.asarray(points, np.float64).reshape(-1, 3)
-        count = min(_COVERING, len(self.radius))
-        distance, near = self.tree.query(places, k=list(range(1, count + 1)))
-        room = np.asarray(margin, np.float64).reshape(-1, 1)
-        covered: BoolArray = (distance <= self.radius[near] + room).any(axis=1)
+        room = np.broadcast_to(np.asarray(margin, np.float64), len(places))
+        distance, near = self.tree.query(places)
+        covered: BoolArray = distance <= self.radius[near] + room
+        rest = np.flatnonzero(~covered)  # most points lie within reach of the nearest guide
+        others = range(2, min(_COVERING, len(self.radius)) + 1)
+        if len(rest) and others:
+            distance, near = self.tree.query(places[rest], k=[*others])
+            covered[rest] = (distance <= self.radius[near] + room[rest, None]).any(axis=1)
         return covered

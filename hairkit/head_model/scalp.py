@@ -180,9 +180,13 @@ def _growing_roots(
     head: Head, count: int, seed: int, reach: Reach | None
 ) -> tuple[Int32Array, Float64Array]:
     """Return the first `count` roots of a seed's sequence that its density keeps."""
-    wanted = count
+    area = _scalp_area(head, reach)
+    bearing = np.flatnonzero(area)
+    middle = np.full((len(bearing), 3), 1 / 3)
+    share = float(np.average(head.density_at(bearing, middle), weights=area[bearing]))
+    wanted = _with_spare(count, share)
     while True:
-        triangle, barycentric = _progressive_roots(head, wanted, seed, reach)
+        triangle, barycentric = _progressive_roots(head, area, wanted, seed, reach)
         chance = np.arange(1, wanted + 1) * _GOLDEN % 1.0
         kept = np.flatnonzero(head.density_at(triangle, barycentric) > chance)[:count]
         if len(kept) == count:
@@ -191,15 +195,20 @@ def _growing_roots(
             raise InputError(
                 f"hair grows at {len(kept)} of {MAX_ROOTS} roots, expected {count}; ask for fewer"
             )
-        share = max(len(kept) / wanted, 1 / _MOST_TIMES)
-        wanted = min(int(count / share * _SPARE) + 1, MAX_ROOTS)
+        wanted = max(_with_spare(count, len(kept) / wanted), min(2 * wanted, MAX_ROOTS))
+
+
+def _with_spare(count: int, share: float) -> int:
+    """Return how many roots leave `count` when a share of them, at most 1, is kept."""
+    if share >= 1:
+        return count
+    return min(int(count / max(share, 1 / _MOST_TIMES) * _SPARE) + 1, MAX_ROOTS)
 
 
 def _progressive_roots(
-    head: Head, count: int, seed: int, reach: Reach | None
+    head: Head, area: Float64Array, count: int, seed: int, reach: Reach | None
 ) -> tuple[Int32Array, Float64Array]:
     """Return the first `count` roots of a seed's sequence: faces (N,) and weights (N, 3)."""
-    area = _scalp_area(head, reach)
     shift = np.random.PCG64(seed).random_raw(3)  # raw bits are the same in every NumPy (NEP 19)
     faces, weights, points = np.empty(0, np.int32), np.empty((0, 3)), np.empty((0, 3))
     apart, tried = np.empty(0), 0  # metres to the root that is known to be nearest
@@ -269,18 +278,19 @@ def take_free(
     -------
     How many are taken now.
     """
-    low, size = points.min(axis=0), np.ptp(points, axis=0)
+    low = points.min(axis=0)
+    size = points.max(axis=0) - low
     edge = max(radius, float(size.max()) / MOST_CELLS)
-    cells = ((points - low) / edge).astype(np.int64) + 1
     heads = np.full(tuple((size / edge).astype(np.int64) + 3), -1, np.int32)
     following = np.full(len(taken), -1, np.int32)
-    return int(_take_free(points, cells, apart, radius, heads, following, taken, found))
+    return int(_take_free(points, low, edge, apart, radius, heads, following, taken, found))
 
 
 @compiled
 def _take_free(
     points: Float64Array,
-    cells: Int64Array,
+    low: Float64Array,
+    edge: float,
     apart: Float64Array,
     radius: float,
     heads: Int32Array,
@@ -288,26 +298,36 @@ def _take_free(
     taken: Int64Array,
     found: int,
 ) -> int:  # pragma: no cover - compiled
-    """Do the work of `take_free` with cells (M, 3) of the points and chains of taken ones."""
+    """Do the work of `take_free` with chains of the taken points of each cell."""
     for n in range(found):
-        _link(n, cells[taken[n]], heads, following)
+        _link(n, _cell_of(points[taken[n]], low, edge), heads, following)
     for i in range(len(points)):
         if apart[i] < radius:
             continue
         if found == len(taken):
             break
-        apart[i] = _distance_to_taken(points, i, cells[i], heads, following, taken)
+        cell = _cell_of(points[i], low, edge)
+        apart[i] = _distance_to_taken(points, i, cell, heads, following, taken)
         if apart[i] >= radius:
             apart[i] = 0.0
             taken[found] = i
-            _link(found, cells[i], heads, following)
+            _link(found, cell, heads, following)
             found += 1
     return found
 
 
 @compiled
+def _cell_of(
+    point: Float64Array, low: Float64Array, edge: float
+) -> tuple[int, int, int]:  # pragma: no cover - compiled
+    """Return the cell of a point; there is an empty one before the first and after the last."""
+    x, y, z = (point[0] - low[0]) / edge, (point[1] - low[1]) / edge, (point[2] - low[2]) / edge
+    return int(x) + 1, int(y) + 1, int(z) + 1
+
+
+@compiled
 def _link(
-    n: int, cell: Int64Array, heads: Int32Array, following: Int32Array
+    n: int, cell: tuple[int, int, int], heads: Int32Array, following: Int32Array
 ) -> None:  # pragma: no cover - compiled
     """Put taken point n in front of the chain of its cell."""
     following[n] = heads[cell[0], cell[1], cell[2]]
@@ -318,7 +338,7 @@ def _link(
 def _distance_to_taken(
     points: Float64Array,
     i: int,
-    cell: Int64Array,
+    cell: tuple[int, int, int],
     heads: Int32Array,
     following: Int32Array,
     taken: Int64Array,

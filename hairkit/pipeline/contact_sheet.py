@@ -97,6 +97,7 @@ def contact_sheet(
     size = _tile_size(scene.cameras)
     photos = [_fit(view.image, size) for view in capture.views]
     cameras = [camera.resized(*size) for camera in scene.cameras]
+    groom = _with_small_maps(groom)
     rows = (
         photos,
         [_mask_picture(photo, mask) for photo, mask in zip(photos, masks, strict=True)],
@@ -111,6 +112,15 @@ def contact_sheet(
 
 def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
     return TILE_WIDTH, round(TILE_WIDTH * cameras[0].height / cameras[0].width)
+
+
+def _with_small_maps(groom: Groom) -> Groom:
+    """Return the groom with textures as fine as heads on the sheet are, where they are finer."""
+    if groom.head.maps is None:
+        return groom
+    small = {name: map_.at_eighth() for name, map_ in groom.head.maps.present().items()}
+    fine = {name: map_ for name, map_ in small.items() if len(map_.pixels) >= TILE_WIDTH}
+    return replace(groom, head=replace(groom.head, maps=replace(groom.head.maps, **fine)))
 
 
 def _fit(image: npt.NDArray[np.uint8], size: tuple[int, int]) -> UInt8Array:

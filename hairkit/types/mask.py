@@ -26,9 +26,10 @@ class Mask(Stored):
 
     def __post_init__(self) -> None:
         labels = frozen_array(self.labels, np.uint8, (None, None), "mask labels")
-        stray = np.setdiff1d(np.unique(labels), [BACKGROUND, PERSON, HAIR])
-        if stray.size:
-            raise DataError(f"mask holds the value {stray[0]}, expected only 0, 128 and 255")
+        known = (labels == BACKGROUND) | (labels == PERSON) | (labels == HAIR)
+        if not known.all():
+            stray = labels[~known].min()
+            raise DataError(f"mask holds the value {stray}, expected only 0, 128 and 255")
         if not (labels == HAIR).any():
             raise DataError("mask is empty: no pixel is marked as hair (255)")
         object.__setattr__(self, "labels", labels)

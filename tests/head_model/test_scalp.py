@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
+from hairkit.head_model import scalp
 from hairkit.head_model.scalp import bind, evaluate, growth_mesh, sample_roots, take_free
 from hairkit.head_model.template import default_head
 from hairkit.types.head import Head
@@ -104,6 +107,21 @@ def test_the_sequence_is_the_same_on_every_machine() -> None:
     """The first roots of seed 0 lie on known faces, whatever libraries compute them."""
     first = sample_roots(default_head(), 6).triangle
     np.testing.assert_array_equal(first, [14640, 302, 6464, 4162, 8102, 1648])
+
+
+def test_a_thin_scalp_is_covered_in_one_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    """How many roots of the sequence are kept is known before it is made: it is made once."""
+    thin = replace(default_head(), density=np.full(len(default_head().vertices), 0.4, np.float32))
+    asked, make = [], scalp._progressive_roots
+
+    def note(head: Head, area: Float64Array, count: int, *rest: Any) -> Any:
+        asked.append(count)
+        return make(head, area, count, *rest)
+
+    monkeypatch.setattr(scalp, "_progressive_roots", note)
+    assert len(sample_roots(thin, 700)) == 700
+    assert len(asked) == 1
+    assert 700 / 0.4 < asked[0] < 1.1 * 700 / 0.4
 
 
 def test_taking_free_points_equals_the_slow_rule() -> None:

@@ -169,3 +169,14 @@ def test_textures_keep_their_file_and_sample_linearly() -> None:
         Texture(np.zeros(20, np.uint8))
     with pytest.raises(DataError, match="damaged"):
         _ = Texture(texture.data[:30]).pixels
+
+
+def test_an_eighth_of_a_texture_is_the_mean_of_its_pixels() -> None:
+    """Heads that are drawn small take 1/64 of the pixels; damaged pictures are refused."""
+    pixels = np.random.default_rng(0).integers(0, 256, (64, 32, 3), np.uint8)
+    small = Texture.encode(pixels).at_eighth().pixels
+    means = pixels.reshape(8, 8, 4, 8, 3).mean(axis=(1, 3))
+    assert small.shape == (8, 4, 3)
+    assert np.abs(small - means).max() < 2
+    with pytest.raises(DataError, match="damaged"):
+        Texture(np.frombuffer(b"\x89PNG\r\n\x1a\n", np.uint8)).at_eighth()
