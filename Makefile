@@ -53,7 +53,8 @@ wheel: $(VENV)/.tests $(VENV)/.models $(VENV)/.lint
 	$(BIN)/python .ci/wheel.py dist
 
 bench: $(VENV)/.tests
-	@for program in benchmarks/*.py; do echo "== $$program"; $(BIN)/python $$program || exit 1; done
+	$(BIN)/python benchmarks/bench.py -o bench.json
+	@echo "bench.json keeps tables and seconds: python -m benchmarks.compare OLD bench.json"
 
 clean:
 	rm -rf $(VENV) $(CLIENTS) $(DEMO) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -14,6 +14,7 @@ from hairkit.arrays import UInt8Array
 from hairkit.errors import InputError
 from hairkit.field.isosurface import volume_surface
 from hairkit.grooming.densify import densify
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.pipeline.health import AMBER, GREEN, RED, Figure
 from hairkit.rendering import Lights, Solid, draw_views
 from hairkit.storage import write_bytes
@@ -97,7 +98,7 @@ def contact_sheet(
     size = _tile_size(scene.cameras)
     photos = [_fit(view.image, size) for view in capture.views]
     cameras = [camera.resized(*size) for camera in scene.cameras]
-    groom = _with_small_maps(groom)
+    groom = _with_small_maps(_with_few_guides(groom))
     rows = (
         photos,
         [_mask_picture(photo, mask) for photo, mask in zip(photos, masks, strict=True)],
@@ -112,6 +113,12 @@ def contact_sheet(
 
 def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
     return TILE_WIDTH, round(TILE_WIDTH * cameras[0].height / cameras[0].width)
+
+
+def _with_few_guides(groom: Groom) -> Groom:
+    """Return the groom with as many guides as the last row has hairs; the first cover the scalp."""
+    few = np.arange(len(groom.strands)) < HAIRS
+    return groom if few.all() else select_strands(groom, few)
 
 
 def _with_small_maps(groom: Groom) -> Groom:

@@ -83,7 +83,9 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
 """Constants and arguments that make a program quick. CAPTURES is a folder with one capture."""
 ELSEWHERE = {
     "batch_chaos",
+    "bench",
     "blender_picture",
+    "compare",
     "export",
     "face_landmarks",
     "fidelity",

@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from hairkit.pipeline import contact_sheet as sheets
 from hairkit.pipeline.contact_sheet import (
     GAP,
     HEADER,
@@ -64,3 +65,14 @@ def test_the_hue_tells_the_angle() -> None:
     assert level.argmax() != upright.argmax()
     assert level.max() > 240
     assert unsure.max() == 0
+
+
+def test_more_guides_than_hairs_are_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many guides the sheet takes the first, bound to the head as they were; few stay."""
+    groom = bristle_groom()
+    assert sheets._with_few_guides(groom) is groom
+    monkeypatch.setattr(sheets, "HAIRS", 7)
+    few = sheets._with_few_guides(groom)
+    assert len(few.strands) == 7
+    np.testing.assert_array_equal(few.strands.roots, groom.strands.roots[:7])
+    np.testing.assert_array_equal(few.root_triangle, groom.root_triangle[:7])
