@@ -10,6 +10,7 @@ What field and tracking plugins share: fusing views, priors, diffusion, and samp
 * `hanging_hair`: the field of tight curls
 * `isosurface`: the smooth surface of a volume of cells
 * `parting`: how hair on the crown is combed from its parting
+* `relaxed_signs`: signs of directions measured without one
 * `sampling_kernels`: compiled look-ups in volumes
 * `smooth_volume`: Gaussian smoothing of volumes
 * `scalp_comb`: which way the hair on the crown is combed, as all views see it

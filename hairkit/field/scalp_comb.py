@@ -1,9 +1,9 @@
 """Which way the hair on the scalp is combed, from the directions that all views see there.
 
 A level view sees the crown at a grazing angle, but eight of them together tell the directions on
-it to 7 to 18 degrees (medians of five heads). They have no sign. At first each points up the growth
-potential, hair above the hairline in front forward where it covers the forehead and else back; then
-neighbours vote, as those of the segments do (`plugins.hybrid_field.segments`).
+it to 7 to 18 degrees (medians of five heads). They have no sign. Each should point up the growth
+potential, hair above the hairline in front forward where it covers the forehead and else back, and
+along with its neighbours (`hairkit.field.relaxed_signs`).
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.field.growth_prior import gradient
 from hairkit.field.parting import FRONT_FADE, comb_from_parting, front_share
+from hairkit.field.relaxed_signs import relaxed_signs
 from hairkit.field.scalp_sight import LEAST_FACING, ScalpSight, look_at, scalp_places
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
@@ -30,13 +31,13 @@ CROWN = 0.09
 """Height below the top of the head above which directions are measured, metres."""
 PLACES = 600
 """Places on the crown at which the comb is kept, 8 mm apart."""
-SIGHT_BLUR, FLOW_BLUR, VOTE_BLUR = 0.02, 0.02, 0.015
-"""Standard deviations in metres of the neighbourhoods over which directions, the flow to the tips
-and votes on signs are averaged."""
+SIGHT_BLUR, SIGN_BLUR = 0.02, 0.015
+"""Standard deviations in metres of the neighbourhoods over which directions are averaged, and in
+which signs should agree."""
+SIGN_WEIGHT = 3.0
+"""Weight of a parallel neighbour's sign against the cosine to the way to the tips."""
 BLUR_REACH = 2.5
 """Reach of a neighbourhood in standard deviations."""
-VOTES = 10
-"""Rounds of votes."""
 LEAST_ORDER, FULL_ORDER = 0.5, 0.9
 """Share of the directions in neighbourhoods that agree, from which they count at all and for sure:
 0.57 on short hair that stands, 0.78 to 0.90 on hair that is combed, and 0.80 on curls: measured
@@ -105,17 +106,15 @@ def comb_scalp(
     order = (value[:, 2] - value[:, 1]).sum() / max(float(value.sum()), 1e-9)
     if order < LEAST_ORDER:
         return skin
-    flow = _tangent(gradient(hull.grid, growth, places), normals)
-    towards = _neighbours(places, places, FLOW_BLUR) @ flow
+    towards = _tangent(gradient(hull.grid, growth, places), normals)
+    main = np.where(value[:, 2:] > 0, _tangent(vector[:, :, 2], normals), towards)
     if front.forward:
         share = front_share(head, places)[:, None]
         ahead = comb_from_parting(Parting(fringe=True), head, places, normals)
-        towards = (1 - share) * towards + share * front.forward * ahead * len(places)
-    main = np.where(value[:, 2:] > 0, _tangent(vector[:, :, 2], normals), flow)
-    votes = _neighbours(places, places, VOTE_BLUR)
-    comb = _signed(main, towards)
-    for _ in range(VOTES):
-        comb = _signed(comb, votes @ comb)
+        towards = (1 - share) * towards + share * front.forward * ahead
+    near = _neighbours(places, places, SIGN_BLUR)
+    cosines = SIGN_WEIGHT * near.multiply(main @ main.T).tocsr()
+    comb = main * relaxed_signs((main * towards).sum(axis=1), cosines)[:, None]
     return replace(
         skin, places=places, directions=comb, sureness=_share(order, LEAST_ORDER, FULL_ORDER),
         fringe=front.forward > 0,
@@ -136,11 +135,6 @@ def _neighbours(at: Float64Array, of: Float64Array, blur: float) -> sparse.csr_m
     near = cKDTree(at).sparse_distance_matrix(cKDTree(of), reach, output_type="coo_matrix").tocsr()
     near.data = np.exp(-0.5 * (near.data / blur) ** 2)
     return near
-
-
-def _signed(vectors: Float64Array, towards: Float64Array) -> Float64Array:
-    """Return vectors (N, 3), turned round where they point away from others (N, 3)."""
-    return np.where((vectors * towards).sum(axis=1, keepdims=True) < 0, -vectors, vectors)
 
 
 def _tangent(vectors: Float64Array, normals: Float64Array) -> Float64Array:

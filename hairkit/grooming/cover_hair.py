@@ -112,7 +112,8 @@ def lead_to_roots(
     """Return the strands, some replaced by ways `back` to the scalp and `ahead` (K, M, 3).
 
     Both begin at the same places. A way back ends where it comes nearest to a root (N, 3), and
-    joins the nearest root that bears no other way; ways that end too far from all are left out.
+    joins the nearest root that bears no other way, as far along as the root is off it, so that it
+    bends towards the root; ways that end too far from all are left out.
     """
     tree = cKDTree(roots)
     nearest = tree.query(back.reshape(-1, 3))[0].reshape(len(back), -1)
@@ -122,10 +123,15 @@ def lead_to_roots(
         near = np.array(tree.query_ball_point(way[end], ROOT_REACH), np.int64)
         near = near[free[near]]
         if len(near):
-            root = near[np.argmin(np.linalg.norm(roots[near] - way[end], axis=1))]
-            free[root] = False
-            chosen.append(root)
-            lines.append(np.concatenate([roots[root, None], way[end::-1], on[1:]]))
+            off = np.linalg.norm(roots[near] - way[end], axis=1)
+            led = np.concatenate([way[end::-1], on[1:]])
+            along = np.cumsum(np.linalg.norm(np.diff(led, axis=0), axis=1))
+            beyond = led[1:][along > off.min()]
+            if len(beyond):
+                root = near[np.argmin(off)]
+                free[root] = False
+                chosen.append(root)
+                lines.append(np.concatenate([roots[root, None], beyond]))
     if not chosen:
         return strands
     points = strands.points.reshape(len(strands), -1, 3).copy()

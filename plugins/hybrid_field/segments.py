@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from scipy import sparse
 from scipy.spatial import cKDTree
 
 from hairkit import Camera, Head, Hull, Mask, Parting, Strands
@@ -13,6 +14,7 @@ from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.field.cell_shells import erode_cells
 from hairkit.field.growth_prior import combing_direction, gradient, long_share, parts
 from hairkit.field.parting import crown_share
+from hairkit.field.relaxed_signs import relaxed_signs
 from hairkit.field.sampling_kernels import copy_point, make_unit, principal_direction, sample_at
 from hairkit.field.view_fusion import FusedViews
 from hairkit.parallel import compiled, parallel_for
@@ -29,13 +31,14 @@ from .photo_lines import (
     lift_photo_lines,
 )
 
-NEIGHBOURS, ROUNDS = 8, 10
-"""Nearest segments that a segment compares its sign with, and the rounds of it."""
-NEIGHBOUR_WEIGHT = 0.5
+NEIGHBOURS = 8
+"""Nearest segments that a segment compares its sign with."""
+NEIGHBOUR_WEIGHT = 2.0
 """Weight of a parallel neighbour's sign against a growth of one metre per metre."""
-HANGING_WEIGHT, HANGS_OFF = 0.5, 0.02
+HANGING_WEIGHT, HANGS_OFF = 1.0, 0.02
 """Weight of hanging down against a growth of one metre per metre, and the metres off the head from
-which hair hangs: where a tuft stands out, the potential leads hair below it upwards."""
+which hair hangs: where a tuft stands out or a fringe ends on the forehead, the potential leads
+hair below it upwards."""
 OUTER_CELLS = 2
 """Depth in cells of the hull's outer shell, which photos see."""
 BEST = 95
@@ -176,10 +179,9 @@ def _follow_tensors(
 def orient_segments(segments: Strands, hull: Hull, way: Way) -> Strands:
     """Return the segments root to tip, those that ran tip to root reversed.
 
-    Each starts with the sign of the way to the tips along it: that of the growth potential, and of
+    What a segment wishes is the way to the tips along it: that of the growth potential, and of
     gravity beside the head; that of the comb in short hair, whose ends lie everywhere, and on a
-    crown that is known. In each round it then takes the sign of a vote: that way, and the signs of
-    its nearest segments weighted by the cosine between them.
+    crown that is known. Its neighbours wish the sign that makes them parallel to it.
     """
     count = len(segments)
     level = hull.grid.sample(way.growth, np.concatenate([segments.roots, segments.tips]))
@@ -197,12 +199,10 @@ def orient_segments(segments: Strands, hull: Hull, way: Way) -> Strands:
     hangs = -HANGING_WEIGHT * off * beside * unit[:, 1]
     wish = (1 - combed) * (rise + hangs) + combed * (unit * comb).sum(axis=1)
     near = cKDTree(middle).query(middle, k=min(NEIGHBOURS + 1, count))[1].reshape(count, -1)[:, 1:]
-    parallel = np.einsum("nkc,nc->nk", unit[near], unit)
-    sign = np.where(wish < 0, -1.0, 1.0)
-    for _ in range(ROUNDS):
-        vote = wish + NEIGHBOUR_WEIGHT * (parallel * sign[near]).sum(axis=1)
-        sign = np.where(vote < 0, -1.0, 1.0)
-    return _reverse(segments, sign < 0)
+    parallel = NEIGHBOUR_WEIGHT * np.einsum("nkc,nc->nk", unit[near], unit)
+    owner = np.repeat(np.arange(count), near.shape[1])
+    cosines = sparse.csr_matrix((parallel.ravel(), (owner, near.ravel())), (count, count))
+    return _reverse(segments, relaxed_signs(wish, cosines) < 0)
 
 
 def _reverse(segments: Strands, turned: BoolArray) -> Strands:
