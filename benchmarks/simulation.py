@@ -175,11 +175,11 @@ def ours_moved(groom: Groom, backend: str, substeps: int, frames: int) -> tuple[
 def ours_speed(groom: Groom, backend: str, substeps: int, steps: int) -> Speed:
     """Return how fast pbd is."""
     simulator = PbdSimulator(groom, Options(backend=backend, substeps=substeps))
-    motion = add_shakes(SHAKE, groom.head)
+    heads = heads_of(groom, 3 * steps, 1)  # for the peers, too, known before
     simulator.advance(FRAME, Surroundings())
 
     def step(frame: int) -> None:
-        simulator.advance(FRAME, Surroundings(motion((frame + 1) * FRAME)))
+        simulator.advance(FRAME, Surroundings(heads[frame]))
         if (frame + 1) % steps == 0:  # shaders may still be at work
             _ = simulator.points
 

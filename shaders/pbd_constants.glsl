@@ -1,8 +1,8 @@
 // Constants of a rod, which change with the options only; see CONSTANTS in plugins/pbd/block.py. Five rows
 // a node: rest place and mass; drag, pull, clearance, 1/mass; of the segment that ends there two lower
 // entries and 1/pivot of the banded factor, length; bend, twist, natural twist, 1/length; natural turn.
-// The root's third row is its frame. After them the metric of the lengths.
-const int NODE_ROWS = 5, ROOT_FRAME = 2, METRIC_ROW = NODE_ROWS * NODES;
+// After them the metric of the lengths.
+const int NODE_ROWS = 5, METRIC_ROW = NODE_ROWS * NODES;
 const int PAIRS = SEGMENTS * NODES / 2, QUADS = (PAIRS + 3) / 4, ROWS = METRIC_ROW + QUADS;
 uniform sampler2D u_constants;
 

@@ -2,8 +2,8 @@
 // follow below. NODES is a #define of the host program.
 // Software renderers read textures many times faster than buffers.
 const int SEGMENTS = NODES - 1;
-// Place and slack, velocity of nodes; frames (x, y, z, w); acceleration of nodes.
-const int GAIN_ROW = 2 * NODES + SEGMENTS, STATE_ROWS = GAIN_ROW + NODES;
+// Of each node: place and slack, velocity, acceleration, frame (w, x, y, z) of the segment that ends there.
+const int STATE_ROWS = 4 * NODES;
 layout(local_size_x = 64) in;
 
 // Global index of this invocation; work groups beyond the limit of x continue along y.
@@ -32,6 +32,4 @@ uniform int u_width;
 
 ivec2 texel(int rod, int row, int rows) { return ivec2(rod % u_width, rod / u_width * rows + row); }
 vec4 state(int rod, int row) { return texelFetch(u_state, texel(rod, row, STATE_ROWS), 0); }
-vec4 node_place(int rod, int j) { return state(rod, 2 * j); }
-vec4 node_speed(int rod, int j) { return state(rod, 2 * j + 1); }
-vec4 segment_frame(int rod, int j) { return state(rod, 2 * NODES + j); }
+vec4 frame_before(int rod, int j) { return state(rod, 4 * j + 3).yzwx; }

@@ -5,7 +5,7 @@ struct Step {
     vec4 head_step[3];     // rows of turn and shift from the axes before
     vec4 drift[3];    // rows of velocity of a point that rides on the head: matrix and minus shift
     vec4 air[3];      // rows of the turn from the world's axes, and gravity
-    vec4 head_turn;   // as a quaternion
+    vec4 head_turn;   // as a quaternion (w, x, y, z)
     vec4 torso[3];    // rows from the head's axes to the torso's
     vec4 torso_drift[3];  // as `drift`, of a point that rides on the torso
 };

@@ -15,9 +15,7 @@ const float IMPLICIT = 2.0 / 3.0, PASSED = 1.0 - IMPLICIT, DRIFT = 0.5 - IMPLICI
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
 uniform sampler2D u_wind;      // of each node, world, m/s
 uniform sampler2D u_force;     // on each node over the rod's mean mass, head axes
-uniform int u_first;           // substep
-uniform int u_substeps;
-uniform int u_iterations;
+uniform int u_substeps;         // in this dispatch
 uniform float u_seconds;       // of a substep
 uniform float u_damping;       // 1/s
 uniform vec3 u_air;            // m/s, world, where u_gusts is false
@@ -32,7 +30,7 @@ vec3 place[NODE_ROOM], speed[NODE_ROOM], gain[NODE_ROOM], force[NODE_ROOM], solv
 vec3 free[NODE_ROOM];          // the solution without lengths
 vec3 held_back;                // force of the root's acceleration on the next node
 float slack[NODE_ROOM];
-vec4 frame[SEGMENT_ROOM];
+vec4 frame[SEGMENT_ROOM], root_frame;
 vec3 edge[SEGMENT_ROOM], direction[SEGMENT_ROOM];
 float pivot[SEGMENT_ROOM], beside[SEGMENT_ROOM], value[NODE_ROOM];
 
@@ -101,7 +99,7 @@ void solve_tridiagonal() {
 
 // Rotate frames about their segments until torques balance: one Newton step.
 void relax_twist() {
-    vec4 before = constant(rod, ROOT_FRAME);
+    vec4 before = root_frame;
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
         vec3 quarter, axis = third_axis(before);
@@ -131,7 +129,7 @@ void relax_twist() {
 
 // Add the node forces of bending and twist: the negative gradient of the energy.
 void add_elastic() {
-    vec4 before = constant(rod, ROOT_FRAME);
+    vec4 before = root_frame;
     vec3 reach_before = third_axis(before), pull = vec3(0.0);
     for (int j = 0; j < EACH_SEGMENT; j++) {
         vec4 after = frame[j];
@@ -184,26 +182,18 @@ void solve_banded() {
 #include "pbd_lengths.glsl"
 #endif
 
-// Solve for the forces, then alternate between lengths and their tensions, linearised about the
-// directions of the last solution; move the nodes.
+// Solve for the forces, and for the tensions that keep the lengths; move the nodes.
 void go_on() {
-    for (int turn = 0; turn <= u_iterations; turn++) {
-        solve_banded();
-        if (turn == 0) {
-            for (int j = 0; j < EACH_NODE; j++) free[j] = solved[j];
-        } else if (turn < u_iterations) {
-            for (int j = 0; j < EACH_SEGMENT; j++)
-                direction[j] = normalize(edge[j] + (free[j + 1] - solved[j + 1]) - (free[j] - solved[j]));
-        }
-        if (turn == u_iterations) break;
-        solve_lengths();
-        vec3 before = vec3(0.0);
-        for (int j = 0; j < EACH_NODE; j++) {
-            vec3 after = j < SEGMENTS ? value[j] * direction[j] : vec3(0.0);
-            force[j] = before - after;
-            before = after;
-        }
+    solve_banded();
+    for (int j = 0; j < EACH_NODE; j++) free[j] = solved[j];
+    solve_lengths();
+    vec3 before = vec3(0.0);
+    for (int j = 0; j < EACH_NODE; j++) {
+        vec3 after = j < SEGMENTS ? value[j] * direction[j] : vec3(0.0);
+        force[j] = before - after;
+        before = after;
     }
+    solve_banded();
     for (int j = 1; j < EACH_NODE; j++) {
         vec3 change = free[j] - solved[j], added = change / (IMPLICIT * u_seconds);
         place[j] += change;
@@ -232,19 +222,20 @@ void main() {
     rod = invocation();
     if (rod >= u_rods) return;
     for (int j = 0; j < EACH_NODE; j++) {
-        vec4 at = node_place(rod, j);
+        vec4 at = state(rod, 4 * j);
         place[j] = at.xyz;
         slack[j] = at.w;
-        speed[j] = node_speed(rod, j).xyz;
-        gain[j] = state(rod, GAIN_ROW + j).xyz;
+        speed[j] = state(rod, 4 * j + 1).xyz;
+        gain[j] = state(rod, 4 * j + 2).xyz;
     }
-    for (int j = 0; j < EACH_SEGMENT; j++) frame[j] = segment_frame(rod, j);
-    for (int k = u_first; k < u_first + u_substeps; k++) {
+    root_frame = frame_before(rod, 0);
+    for (int j = 0; j < EACH_SEGMENT; j++) frame[j] = frame_before(rod, j + 1);
+    for (int k = 0; k < u_substeps; k++) {
         for (int j = 0; j < EACH_NODE; j++) predict(k, j);
         for (int j = 0; j < EACH_SEGMENT; j++) {
             edge[j] = place[j + 1] - place[j];
             direction[j] = normalize(edge[j]);
-            frame[j] = transport_frame(product(steps[k].head_turn, frame[j]), direction[j]);
+            frame[j] = transport_frame(product(steps[k].head_turn.yzwx, frame[j]), direction[j]);
         }
         relax_twist();
         add_elastic();
@@ -253,10 +244,10 @@ void main() {
         keep_lengths();
     }
     for (int j = 0; j < EACH_NODE; j++) {
-        imageStore(u_new_state, texel(rod, 2 * j, STATE_ROWS), vec4(place[j], slack[j]));
-        imageStore(u_new_state, texel(rod, 2 * j + 1, STATE_ROWS), vec4(speed[j], 0.0));
-        imageStore(u_new_state, texel(rod, GAIN_ROW + j, STATE_ROWS), vec4(gain[j], 0.0));
+        imageStore(u_new_state, texel(rod, 4 * j, STATE_ROWS), vec4(place[j], slack[j]));
+        imageStore(u_new_state, texel(rod, 4 * j + 1, STATE_ROWS), vec4(speed[j], 0.0));
+        imageStore(u_new_state, texel(rod, 4 * j + 2, STATE_ROWS), vec4(gain[j], 0.0));
+        vec4 turn = j > 0 ? frame[max(j - 1, 0)].wxyz : root_frame.wxyz;
+        imageStore(u_new_state, texel(rod, 4 * j + 3, STATE_ROWS), turn);
     }
-    for (int j = 0; j < EACH_SEGMENT; j++)
-        imageStore(u_new_state, texel(rod, 2 * NODES + j, STATE_ROWS), frame[j]);
 }

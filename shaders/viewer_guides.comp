@@ -1,14 +1,10 @@
 #version 430
-// Position of each guide point and rotation of the guide there since rest; bounding box of all.
+// Position of each guide point and rotation of the guide there since rest.
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Rest { float rest[]; };
 layout(std430, binding = 1) readonly buffer Now { float now[]; };
 layout(std430, binding = 2) writeonly buffer Guides { uint guides[]; };   // 5 words per point
-layout(std430, binding = 3) buffer Bounds { int bounds[]; };    // lowest and highest x, y, z
-
-shared int low[3];
-shared int high[3];
 
 uniform int u_points;
 uniform int u_count;    // of guide points
@@ -19,12 +15,6 @@ vec3 now_at(int i) { return vec3(now[3 * i], now[3 * i + 1], now[3 * i + 2]); }
 vec4 quaternion_between(vec3 a, vec3 b) {
     vec4 q = vec4(cross(a, b), 1.0 + dot(a, b));
     return dot(q, q) > 1e-8 ? normalize(q) : vec4(0.0, 0.0, 1.0, 0.0);
-}
-
-// Maps the bits of floats to integers of the same order.
-int ordered(float x) {
-    int bits = floatBitsToInt(x);
-    return bits < 0 ? bits ^ 0x7FFFFFFF : bits;
 }
 
 void place_guide(int index) {
@@ -41,23 +31,9 @@ void place_guide(int index) {
     guides[5 * index + 2] = floatBitsToUint(place.z);
     guides[5 * index + 3] = packSnorm2x16(turn.xy);
     guides[5 * index + 4] = packSnorm2x16(turn.zw);
-    for (int c = 0; c < 3; c++) {
-        atomicMin(low[c], ordered(place[c]));
-        atomicMax(high[c], ordered(place[c]));
-    }
 }
 
 void main() {
     int index = int(gl_GlobalInvocationID.x);
-    if (gl_LocalInvocationID.x < 3u) {
-        low[gl_LocalInvocationID.x] = 0x7FFFFFFF;
-        high[gl_LocalInvocationID.x] = int(0x80000000u);
-    }
-    barrier();
     if (index < u_count) place_guide(index);
-    barrier();
-    if (gl_LocalInvocationID.x < 3u) {
-        atomicMin(bounds[gl_LocalInvocationID.x], low[gl_LocalInvocationID.x]);
-        atomicMax(bounds[gl_LocalInvocationID.x + 3u], high[gl_LocalInvocationID.x]);
-    }
 }

@@ -58,14 +58,14 @@ def follow_head(torso: Float64Array, head: Float64Array, joint: Float64Array) ->
     The torso stays on the head's neck `joint` (3,), rest coordinates, and keeps its orientation
     until the head has turned against it by more than `NECK_REACH`.
     """
-    old, new = (quaternion.from_matrix(motion[:3, :3]) for motion in (torso, head))
-    turn = quaternion.product(new, quaternion.inverse(old))
-    angle = 2 * math.atan2(float(np.linalg.norm(turn[1:])), abs(float(turn[0])))
     result = torso.copy()
-    if angle > NECK_REACH:
-        result[:3, :3] = quaternion.to_matrix(quaternion.slerp(old, new, 1 - NECK_REACH / angle))
+    cosine = 0.5 * (float((head[:3, :3] * torso[:3, :3]).sum()) - 1)
+    if cosine < math.cos(NECK_REACH):
+        old, new = (quaternion.from_matrix(motion[:3, :3]) for motion in (torso, head))
+        share = 1 - NECK_REACH / math.acos(max(cosine, -1.0))
+        result[:3, :3] = quaternion.to_matrix(quaternion.slerp(old, new, share))
     result[:3, 3] = head[:3, :3] @ joint + head[:3, 3] - result[:3, :3] @ joint
-    return torso if np.allclose(result, torso, rtol=0.0, atol=1e-12) else result
+    return torso if np.abs(result - torso).max() <= 1e-12 else result
 
 
 def _along_screw(start: Float64Array, end: Float64Array, share: Float64Array) -> Float64Array:

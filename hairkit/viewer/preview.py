@@ -164,8 +164,7 @@ class Preview:
     ) -> None:
         """Draw a picture, or a sample of a still one, whose `first` brings the light up to date."""
         frame_renderer, session = self.frame_renderer, self.session
-        buffer = None if frame_renderer.soft else session.guide_buffer()
-        rows = session.guide_rows() if buffer is None or self._needs_rows else None
+        rows = session.guide_rows()
         look = self._look(quality.smooth, quality.share, sample=quality is SAMPLE)
         overlays = self._overlays(rows)
         billboards, solids = (
@@ -176,7 +175,7 @@ class Preview:
             FrameInputs(
                 camera,
                 session.world_from_head,
-                rows if buffer is None else buffer,
+                rows,
                 look,
                 show_head="head" in session.shown.layers,
                 floor=session.floor,
@@ -198,12 +197,6 @@ class Preview:
         self._hairs = 0 if look is None else look.hairs
         if not np.isfinite(frame_renderer.cloud).all():
             session.check_stability()
-
-    @property
-    def _needs_rows(self) -> bool:
-        """True if lines are drawn along guides."""
-        shown = self.session.shown.colours
-        return shown not in ("hair", "direction") or self.session.picked is not None
 
     def picture(self) -> UInt8Array:
         """Return the last picture (H, W, 3) RGB, at the size at which it was drawn."""

@@ -9,7 +9,6 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -135,8 +134,6 @@ class Session:
         self._time_debt = 0.0
         self._ticks = MOST_TICKS
         """Longest step of a picture at present, ticks."""
-        self.guides_on_gpu = False
-        """True if the guides are drawn from a buffer of the simulator."""
         self.overwrite = False
         """True overwrites existing screenshots and recordings."""
         self.finished = False
@@ -235,7 +232,7 @@ class Session:
         while self.max_seconds is None and self._time_debt >= STEP * (1 - 1e-6):
             self._time_debt -= STEP
             self._step()
-        if self.steps > before and not self.guides_on_gpu:
+        if self.steps > before:
             self.check_stability()
 
     def step(self) -> None:
@@ -286,17 +283,6 @@ class Session:
         matrix = self.world_from_head.astype(np.float32)
         rows = self._sampler(self.simulation.simulator.points)
         return np.asarray((rows - matrix[:3, 3]) @ matrix[:3, :3], np.float32)
-
-    def guide_buffer(self) -> Any:
-        """Return the guides as a moderngl buffer, None if the simulator does not run on the GPU.
-
-        A simulator on the GPU has a method `rows_buffer(before, part)`, see that of `pbd`; use it
-        inside `renderer()`.
-        """
-        made = getattr(self.simulation.simulator, "rows_buffer", None)
-        buffer = None if made is None else made(self._sampler.before, self._sampler.part)
-        self.guides_on_gpu = buffer is not None
-        return buffer
 
     def measures(self) -> Measures:
         """Return the simulator's read-outs."""

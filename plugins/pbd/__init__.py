@@ -7,27 +7,19 @@ with the metric of the implicit system). Stiffness depends neither on iterations
 rate. The natural shape comes from inverse statics, so that captured hair stays in place under
 gravity. Despite the plugin's name this is not position-based dynamics.
 
-* `backend`: what all backends provide, and the reference backend
+* `backend`: the reference and the compiled backend
 * `block`: strands side by side; constants and substeps of both float32 backends
 * `embedding`: the guides' own points on the rods
-* `energies`: stretch and elastic energy
 * `gl_backend`: substeps in compute shaders
-* `gl_buffers`: textures and buffers of the compute backend
-* `gl_uniforms`: what the shaders are given
 * `grab`: held points
 * `hair_grid`: hair-hair contact: density and velocity on a grid
-* `head_steps`: how finely a frame is divided for a fast head
 * `kernel_contact`: contact and friction, compiled
-* `kernel_elastic`: inertia, air, frames, torsion and bending, compiled
-* `kernel_lengths`: banded and dense solves, compiled
-* `kernel_math`: vectors and quaternions of numbers or lanes
 * `kernels`: a substep, compiled
 * `linear_system`: the banded matrix of a substep
-* `numba_backend`: substeps in compiled kernels on all cores
-* `reference`: a substep in NumPy float64
-* `resampling`: guides to rods
+* `reference`: a substep in NumPy float64, and energies
+* `resampling`: guides to rods, and what these can follow
 * `rods`: the discrete rod, its rest state, inverse statics
-* `simd`: vector registers as a Numba type
+* `simd`: vector registers as a Numba type, vectors and quaternions of them
 * `simulator`: the simulator
 """
 
@@ -119,9 +111,6 @@ class Options:
         16, low=4, high=64, doc="Nodes of each rod; finer guide points are embedded."
     )
     substeps: int = option(4, low=1, high=64, doc="Substeps in 1/60 s.")
-    iterations: int = option(
-        1, low=1, high=8, doc="Linearisations of the length constraints in a substep."
-    )
     seed: int = option(0, low=0, doc="Seed of the gusts.")
     backend: str = option(
         "auto",

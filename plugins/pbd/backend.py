@@ -1,68 +1,114 @@
-"""The protocol of the backends, and the reference backend."""
+"""The reference backend, what all backends share, and the fast one: compiled, on all cores."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
+from hairkit.parallel import parallel_for
+from hairkit.simulation.obstacle_kernels import NO_FIELDS
 
+from . import block
 from .embedding import Embedding, drawn_points
 from .hair_grid import HairGrid
+from .kernels import run_substeps
 from .linear_system import System
 from .reference import Contact, Load, State, rest_state, substep, transform_points
 from .rods import Rods
+from .simd import LANES
+
+WORTH = 64 // LANES
+"""Blocks that are worth another thread's while."""
 
 
-class Engine(Protocol):
-    """A backend: the rods' state and the substeps on it."""
+class Engine:
+    """The reference backend, NumPy float64; others override how the state is kept and advanced."""
 
-    state: State
-    """The present state; setting it moves the rods."""
-    torso_from_head: Float64Array
-    """(4, 4) from the head axes to the torso's, for the points."""
+    rows: Any
+    """(B, L, n, 16 or more) `block.STATE` of B times L rods, of which the last ones may be void."""
+    mass: Any
+    """(B, L, n) kilograms; 0 of void rods."""
 
-    def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
+    def __init__(self, rods: Rods, contact: Contact | None) -> None:
+        self.rods, self.contact = rods, contact
+        self.torso_from_head = np.eye(4)
+        """(4, 4) from the head axes to the torso's, for the points."""
+        self.mass = rods.mass[:, None]
+        self.state = rest_state(rods)
+
+    @property
+    def state(self) -> State:
+        """The present state; setting it moves the rods."""
+        return block.state_of(self.rows.reshape(-1, *self.rows.shape[2:])[: len(self.rods.mass)])
+
+    @state.setter
+    def state(self, value: State) -> None:
+        self._keep(block.state_rows(self.rods, value))
+
+    def _keep(self, rows: Float64Array) -> None:
+        """Take the state (S, n, 16)."""
+        self.rows = rows[:, None]
+
+    def run(self, system: System, loads: Sequence[Load]) -> None:
         """Do one substep for each load."""
-        ...
+        for load in loads:
+            self.state = substep(self.rods, system, self.state, load, self.contact)
 
     def apply_hair_grid(
         self, hair_grid: HairGrid, head_step: Float64Array, rates: tuple[float, float, float]
     ) -> None:
         """Apply hair-hair interaction; `rates` are cohesion, pressure, seconds."""
-        ...
+        hair_grid.mix(self.rows[..., :3], self.rows[..., 4:7], self.mass, head_step, rates)
 
     def points(self, embedding: Embedding, head: Float64Array) -> Float32Array:
         """Return the guides' points (P, 3) in the world."""
-        ...
+        place, frames = self.rows[..., :3], self.rows[..., 1:, 12:16]
+        local = drawn_points(embedding, place, frames, self.contact, self.torso_from_head)
+        return transform_points(head.astype(local.dtype), local).astype(np.float32)
 
 
-class ReferenceEngine:
-    """The reference backend: NumPy, float64."""
+class FastEngine(Engine):
+    """Rods in blocks of lanes."""
 
     def __init__(self, rods: Rods, contact: Contact | None) -> None:
-        self._rods, self._contact = rods, contact
-        self.state = rest_state(rods)
-        self.torso_from_head = np.eye(4)
+        super().__init__(rods, contact)
+        self._system: System | None = None
+        self.mass = np.moveaxis(block.pack_lanes(rods.mass), -1, 1)
+        self.mass[-1, (len(rods.mass) - 1) % LANES + 1 :] = 0.0  # only fills the block
 
-    def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
+    def _keep(self, rows: Float64Array) -> None:
+        planes = sum(block.STATE.values()) - rows.shape[2]
+        self._packed_state = block.pack_lanes(np.pad(rows, ((0, 0), (0, 0), (0, planes))))
+        self.rows = np.moveaxis(self._packed_state, -1, 1)
+
+    def run(self, system: System, loads: Sequence[Load]) -> None:
         """Do one substep for each load."""
-        for load in loads:
-            self.state = substep(self._rods, system, self.state, load, self._contact, iterations)
-
-    def apply_hair_grid(
-        self, hair_grid: HairGrid, head_step: Float64Array, rates: tuple[float, float, float]
-    ) -> None:
-        """Apply hair-hair interaction."""
-        velocity = self.state.velocity.copy()
-        hair_grid.mix(self.state.position, velocity, self._rods.mass, head_step, rates)
-        self.state = replace(self.state, velocity=velocity)
-
-    def points(self, embedding: Embedding, head: Float64Array) -> Float32Array:
-        """Return the guides' points (P, 3) in the world."""
-        state, torso = self.state, self.torso_from_head
-        local = drawn_points(embedding, state.position, state.frames, self._contact, torso)
-        return transform_points(head, local).astype(np.float32)
+        contact = self.contact
+        if self._system is not system:
+            nodes, metric = block.constants(self.rods, system, contact)
+            fields = block.records(block.pack_lanes(nodes), block.CONSTANTS)
+            self._system, self._packed = system, block.Packed(fields, block.pack_lanes(metric))
+        settings = block.Settings(
+            np.float32(system.step),
+            np.float32(system.rates.damping),
+            np.float32(0.0 if contact is None else contact.friction),
+            np.float32(0.0 if contact is None else contact.fastest),
+            -1 if contact is None else contact.rounds,
+        )
+        air, force = loads[0].air, loads[0].force
+        pushed = np.zeros((1, 1, 3)) if force is None else force / block.unit_mass(self.rods)
+        parallel_for(
+            run_substeps,
+            len(self._packed.nodes),
+            block.records(self._packed_state, block.STATE),
+            self._packed,
+            block.steps_of(loads, system.step),
+            block.pack_lanes(air if air.ndim > 1 else air[None, None]),
+            block.pack_lanes(pushed),
+            NO_FIELDS if contact is None else contact.bodies.fields,
+            settings,
+            min_chunk=WORTH,
+        )

@@ -18,31 +18,37 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.simulation import quaternion
 
 from .linear_system import System
-from .reference import Contact, Load, TorsoStep
+from .reference import Contact, Load, State, TorsoStep
 from .rods import Rods
 from .simd import LANES
 
 Records = npt.NDArray[np.void]
 
+STATE = {
+    "place": 3, "room": 1, "speed": 3, "aside": 1, "gain": 3, "spare": 1, "frame": 4,
+    "wall": 4, "beside": 4,
+}  # fmt: skip
+"""Of a node: place; how far it may move before the next lookup of the head, metres; velocity; the
+same of the torso; acceleration; frame (w, x, y, z) of the segment that ends there, of the root that
+which the head holds; planes (normal and offset, the body's axes) of head and torso. Shaders have no
+planes."""
 CONSTANTS = {
     "rest": 3, "mass": 1, "drag": 1, "shape": 1, "clear": 1, "ease": 1, "first": 1, "second": 1,
     "pivot": 1, "length": 1, "bend": 1, "twist": 1, "natural": 1, "over": 1, "curve": 3, "unit": 1,
 }  # fmt: skip
 """Of a node: rest place, mass, rates of drag and of the pull to rest, clearance, 1 / mass (0 at the
 root); of the segment that ends there, at its bend before: the banded factor's two lower entries and
-reciprocal pivot, length, stiffnesses, natural twist, 1 / length, natural turn, mean mass in kg. The
-root's `first` to `length` are its frame (x, y, z, w) instead."""
-WORK = {
-    "place": 3, "speed": 3, "gain": 3, "slack": 1, "aside": 1, "frame": 4, "wind": 3, "push": 3,
+reciprocal pivot, length, stiffnesses, natural twist, 1 / length, natural turn, mean mass in kg."""
+_WORK = {
     "force": 3, "edge": 3, "way": 3, "reach": 3, "pull": 3, "torque": 1, "pivot": 1, "beside": 1,
     "value": 1, "free": 3, "solved": 3, "normal": 3, "surface": 3, "depth": 1, "grip": 1,
 }  # fmt: skip
-"""Of a node: state; air and further force; what a substep works out for it and its segment."""
+"""Of a node: what a substep works out for it and its segment."""
 STEP = np.dtype([(name, "f4", (3, 4)) for name in ("head_step", "drift", "air")]
                 + [("turn", "f4", (4,))]
                 + [(name, "f4", (3, 4)) for name in ("torso", "torso_drift")])  # fmt: skip
 """Of a substep: motion of the head axes, rows; velocity of a point that rides on the head; turn
-from the world's axes, and gravity; the head's turn (x, y, z, w); head axes to the torso's; velocity
+from the world's axes, and gravity; the head's turn (w, x, y, z); head axes to the torso's; velocity
 of a point that rides on the torso."""
 
 
@@ -52,7 +58,7 @@ def lanes_of(fields: dict[str, int]) -> np.dtype[Any]:
     return np.dtype([(name, "f4", size) for name, size in sizes.items()])
 
 
-NODE, CONSTANT = lanes_of(WORK), lanes_of(CONSTANTS)
+WORK = lanes_of(_WORK)
 
 
 class Packed(NamedTuple):
@@ -64,17 +70,6 @@ class Packed(NamedTuple):
     """(B, n (n - 1) / 2, LANES) lower rows."""
 
 
-class State(NamedTuple):
-    """Places and velocities of rods as in `reference.State`, float32."""
-
-    place: Float32Array
-    speed: Float32Array
-    gain: Float32Array
-    frame: Float32Array
-    slack: Float32Array
-    """(S, n, 2) how far nodes may move before a lookup of the head, and of the torso, metres."""
-
-
 class Settings(NamedTuple):
     """Numbers of a run."""
 
@@ -82,7 +77,6 @@ class Settings(NamedTuple):
     damping: np.float32
     friction: np.float32
     fastest: np.float32
-    iterations: int
     rounds: int
     """Of friction; -1 without obstacles."""
 
@@ -100,7 +94,7 @@ def constants(
     made[..., 6] = -1.0 if contact is None else contact.clearance
     made[:, 1:, 7] = mean / rods.mass[:, 1:]
     made[:, 1:, 8:11] = banded_factor(system.banded / mean[..., None])
-    made[:, 0, 8:12], made[:, 1:, 11] = np.roll(rods.root_frame, -1, axis=-1), rods.length
+    made[:, 1:, 11] = rods.length
     made[:, 1:, 12], made[:, 1:, 13] = rods.bend / mean, rods.twist / mean
     made[:, 1:, 14], made[:, 1:, 15] = rods.natural_twist, 1.0 / rods.length
     made[:, 1:, 16:19], made[..., 19] = rods.curvature, mean
@@ -131,8 +125,7 @@ def steps_of(loads: Sequence[Load], seconds: float) -> Records:
         step["drift"] = drift_rows(load.head_step, seconds)
         step["torso_drift"] = drift_rows(torso.step, seconds)
         step["air"][:, :3], step["air"][:, 3] = load.turn, load.turn @ load.gravity
-        w, x, y, z = quaternion.from_matrix(load.head_step[:3, :3])
-        step["turn"] = x, y, z, w
+        step["turn"] = quaternion.from_matrix(load.head_step[:3, :3])
     return steps
 
 
@@ -142,8 +135,35 @@ def drift_rows(head_step: Float64Array, seconds: float) -> Float64Array:
     return result
 
 
-def pack_lanes(values: Float32Array) -> Float32Array:
-    """Return values (S, n, ...) of strands as (B, n, -1), lanes last; the last one fills blocks."""
+def unit_mass(rods: Rods) -> Float64Array:
+    """Return (S, 1, 1) the unit of masses and forces, kilograms."""
+    result: Float64Array = rods.mass.mean(axis=1)[:, None, None]
+    return result
+
+
+def state_rows(rods: Rods, state: State) -> Float64Array:
+    """Return (S, n, 16) the fields of `STATE` before the planes."""
+    rows = np.zeros((*rods.mass.shape, 16))
+    for first, values in ((0, state.position), (4, state.velocity), (8, state.acceleration)):
+        rows[..., first : first + 3] = values
+    rows[:, 0, 12:], rows[:, 1:, 12:] = rods.root_frame, state.frames
+    return rows
+
+
+def state_of(rows: npt.NDArray[np.floating[Any]]) -> State:
+    """Return the state in rows as those of `state_rows`."""
+    some = rows.astype(np.float64)
+    frames = quaternion.normalize(some[:, 1:, 12:16])
+    return State(some[..., :3], some[..., 4:7], frames, some[..., 8:11])
+
+
+def pack_lanes(values: npt.NDArray[np.floating[Any]]) -> Float32Array:
+    """Return values (S, ...) of strands as (B, ..., LANES); the last strand fills blocks."""
     rows = np.minimum(np.arange(-(-len(values) // LANES) * LANES), len(values) - 1)
-    spread = np.moveaxis(values[rows].reshape(-1, LANES, *values.shape[1:]), 1, -1)
-    return np.ascontiguousarray(spread).reshape(len(spread), values.shape[1], -1)
+    spread = values.astype(np.float32)[rows].reshape(-1, LANES, *values.shape[1:])
+    return np.ascontiguousarray(np.moveaxis(spread, 1, -1))
+
+
+def records(values: Float32Array, fields: dict[str, int]) -> Records:
+    """Return packed values (B, n, k, LANES) as records (B, n) of these fields."""
+    return values.reshape(*values.shape[:2], -1).view(lanes_of(fields))[..., 0]

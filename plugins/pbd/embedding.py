@@ -14,8 +14,8 @@ from hairkit.parallel import compiled, parallel_for
 from hairkit.simulation.obstacle_kernels import NO_FIELDS, Drawn, draw_points
 from hairkit.types.strands import Strands
 
-from .kernel_math import Frame, Vector, cross, inlined, minus, plus, times
 from .reference import Contact
+from .simd import Frame, Vector, cross, inlined, minus, plus, times
 
 WORTH = 256
 """Rods that are worth another thread's while."""
@@ -51,7 +51,7 @@ def embed_points(strands: Strands, position: Float64Array, frames: Float64Array)
     size = np.linalg.norm(np.diff(own, axis=0, prepend=own[:1]), axis=1)
     size[strands.offsets[:-1]] = 0.0
     made = Embedding(strands.offsets, rod, segment, along - segment, np.zeros_like(own), size)
-    measure_offsets(made, position, frames, own)
+    measure_offsets(made, position[:, None], frames[:, None], own)
     return made
 
 
@@ -62,7 +62,9 @@ def drawn_points(
     contact: Contact | None,
     torso_from_head: Float64Array,
 ) -> Any:
-    """Return the guides' points (P, 3), head axes, of rods (S, n, 3) with frames (S, n - 1, 4).
+    """Return the guides' points (P, 3), head axes, of rods with segment frames.
+
+    Rods stand in blocks, (B, L, n, 3) and (B, L, n - 1, 4).
 
     Each follows the curve that the rods carry it on, out of the obstacles; see
     `hairkit.simulation.obstacle_kernels.draw_points`.
@@ -70,7 +72,7 @@ def drawn_points(
     points = np.empty((len(embedding.rod), 3), position.dtype)
     deepest = np.zeros(0) if contact is None or contact.deepest is None else contact.deepest
     fields = NO_FIELDS if contact is None else contact.bodies.fields
-    drawn, rods = Drawn(embedding.starts, embedding.length, deepest), len(position)
+    drawn, rods = Drawn(embedding.starts, embedding.length, deepest), len(embedding.starts) - 1
     parallel_for(carry_points, rods, embedding, position, frames, points, min_chunk=WORTH)
     parallel_for(draw_points, rods, drawn, fields, torso_from_head, points, min_chunk=WORTH)
     return points
@@ -82,12 +84,11 @@ def carry_points(
 ) -> None:
     """Write where rods `first` to before `last` carry their points (P, 3) to."""
     for rod in range(first, last):
+        nodes, axes = in_block(position, rod), in_block(frames, rod)
         for i in range(on.starts[rod], on.starts[rod + 1]):
             j, t = on.segment[i], on.share[i]
             offset = (on.offset[i, 0], on.offset[i, 1], on.offset[i, 2])
-            a, b, c = plus(
-                on_curve(position[rod], j, t), rotate(frame_on(frames[rod], j, t), offset)
-            )
+            a, b, c = plus(on_curve(nodes, j, t), rotate(frame_on(axes, j, t), offset))
             points[i, 0], points[i, 1], points[i, 2] = a, b, c
 
 
@@ -96,10 +97,16 @@ def measure_offsets(on: Embedding, position: Any, frames: Any, points: Float64Ar
     """Write the offsets of points (P, 3) at rest."""
     for i in range(len(points)):
         rod, j, t = on.rod[i], on.segment[i], on.share[i]
-        a, b, c = on_curve(position[rod], j, t)
-        w, x, y, z = frame_on(frames[rod], j, t)
+        a, b, c = on_curve(in_block(position, rod), j, t)
+        w, x, y, z = frame_on(in_block(frames, rod), j, t)
         away = (points[i, 0] - a, points[i, 1] - b, points[i, 2] - c)
         on.offset[i, 0], on.offset[i, 1], on.offset[i, 2] = rotate((w, -x, -y, -z), away)
+
+
+@inlined
+def in_block(values: Any, rod: int) -> Any:
+    """Return a rod's values of (B, L, n, k)."""
+    return values[rod // values.shape[1], rod % values.shape[1]]
 
 
 @inlined

@@ -1,8 +1,7 @@
-"""The compute backend: rods in GLSL compute shaders, float32, on a graphics card or Mesa's CPU.
+"""The compute backend: substeps in GLSL compute shaders, float32, on a graphics card or Mesa's CPU.
 
-Each invocation simulates one rod in local arrays. The state stays in textures between steps; only
-requested values are read back, so that the CPU time of a step does not depend on the number of
-rods. The hair grid sums integers, so that equal input gives equal motion.
+Each invocation simulates one rod in local arrays. Constants stay in a texture; the state goes there
+and back in every run, so that neighbours and drawn points are the same code as elsewhere.
 """
 
 from __future__ import annotations
@@ -15,187 +14,172 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.rendering.context import renderer
-from hairkit.simulation import quaternion
+from hairkit.errors import RenderError
+from hairkit.rendering.context import Renderer, on_graphics_card, renderer
+from hairkit.rendering.gl_camera import set_uniforms
+from hairkit.simulation.obstacles import Obstacles
 
-from .block import STEP, steps_of
-from .embedding import Embedding
-from .gl_buffers import Store
-from .gl_uniforms import (
-    MOST_STEPS,
-    Units,
-    between_words,
-    constant_rows,
-    contact_uniforms,
-    faces,
-    point_words,
-    steps_at_once,
-)
-from .hair_grid import HairGrid
+from .backend import Engine
+from .block import STEP, constants, steps_of, unit_mass
 from .linear_system import System
-from .reference import Contact, Load, State, obstacles_of, rest_state
+from .reference import Contact, Load
 from .rods import Rods
 
-_STILL = (0.0, 0.0, 0.0)
+WIDTH = 4096
+"""Rods in a row of a texture; further rods go into further rows."""
+GROUP, MOST_GROUPS = 64, 65535
+"""Invocations of a work group; work groups along an axis that every OpenGL 4.3 supports."""
+MOST_STEPS = 64
+"""Most substeps in one dispatch of the shader."""
+UNROLLED = 16
+"""Nodes up to which compilers unroll the shader's loops, see `pbd_layout.glsl`."""
+MOST_TURNS = 64_000
+"""Most loop iterations in one dispatch: Mesa's llvmpipe leaves all loops after 65536 in all."""
+ROOM = 0.02
+"""Least distance outside the grids of obstacles, metres."""
 
 
-class ComputeEngine:
+class ComputeEngine(Engine):
     """Rods in textures of the process's OpenGL context."""
 
     def __init__(self, rods: Rods, contact: Contact | None) -> None:
-        self._rods, self._contact = rods, contact
-        self._count, self._nodes = rods.mass.shape
-        self._unit = rods.mass.mean(axis=1)
+        super().__init__(rods, contact)
         self._system: System | None = None
-        self._units: Units | None = None
-        self._embedding: Embedding | None = None
-        self._before: npt.NDArray[np.integer[Any]] | None = None
+        self._textures: dict[str, Any] = {}
+        count = len(rods.mass)
+        # a power of two, so that drivers compile few variants
+        self._width = min(1 << (count - 1).bit_length(), WIDTH)
         with renderer() as gl:
-            self._store = Store(gl, self._count, self._nodes)
-            for name, body in zip(("head", "torso"), obstacles_of(contact), strict=True):
-                self._store.put_grid(f"u_{name}_distances", faces(body))
-            for name in ("u_wind", "u_force"):
-                self._store.put_rods(name, np.zeros((self._count, 1, 3)))
-        self.state = rest_state(rods)
-        self.torso_from_head = np.eye(4)
-        weakref.finalize(self, self._store.release).atexit = False
+            for name in ("head", "torso"):
+                body = None if contact is None else getattr(contact.bodies, name)
+                self._texture(f"u_{name}_distances", faces(body))
+            self._put("u_state", self.rows.reshape(count, -1))
+            self._words = gl.context.buffer(reserve=MOST_STEPS * STEP.itemsize)
+        weakref.finalize(self, _release, gl, self._textures, self._words).atexit = False
 
-    @property
-    def state(self) -> State:
-        """The present state, read back; setting it moves the rods."""
-        with renderer():
-            rows = self._store.rods("u_state")
-        ends, gain = 2 * self._nodes, 3 * self._nodes - 1
-        frames = _quaternions(rows[:, ends:gain])
-        return State(rows[:, 0:ends:2, :3], rows[:, 1:ends:2, :3], frames, rows[:, gain:, :3])
+    def _keep(self, rows: Float64Array) -> None:
+        super()._keep(rows.astype(np.float32))
 
-    @state.setter
-    def state(self, value: State) -> None:
-        ends, gain = 2 * self._nodes, 3 * self._nodes - 1
-        rows = np.zeros((self._count, gain + self._nodes, 4), np.float32)
-        rows[:, 0:ends:2, :3], rows[:, 1:ends:2, :3] = value.position, value.velocity
-        rows[:, ends:gain] = np.roll(value.frames, -1, axis=-1)
-        rows[:, gain:, :3] = value.acceleration
-        with renderer():
-            self._store.put_rods("u_state", rows)
-
-    def run(self, system: System, loads: Sequence[Load], iterations: int) -> None:
+    def run(self, system: System, loads: Sequence[Load]) -> None:
         """Do one substep for each load."""
-        with renderer():
+        count, nodes = self.rods.mass.shape
+        with renderer() as gl:
             if self._system is not system:
-                rows = constant_rows(self._rods, system, self._contact)
-                self._store.put_rods("u_constants", rows)
+                made, metric = constants(self.rods, system, self.contact)
+                self._put("u_constants", made.reshape(count, -1), metric)
                 self._system = system
-            settings = self._settings(system, loads[0], iterations)
-            most = steps_at_once(self._nodes, iterations)
-            for start in range(0, len(loads), MOST_STEPS):
-                some, words = loads[start : start + MOST_STEPS], np.zeros(MOST_STEPS, STEP)
-                words[: len(some)] = steps_of(some, system.step)
-                self._store.put_words("steps", words)
-                self._store["steps"].bind_to_uniform_block(0)
-                for first in range(0, len(some), most):
-                    self._step(first, min(most, len(some) - first), settings)
+            self._put("u_state", self.rows.reshape(count, -1))
+            program = gl.compute("pbd_substeps", NODES=nodes)
+            set_uniforms(program, **self._settings(system, loads[0]))
+            for unit, name in enumerate(n for n in self._textures if n in program):
+                program[name] = unit
+                self._textures[name].use(unit)
+            self._textures["u_state"].bind_to_image(0, read=False, write=True)
+            most = steps_at_once(nodes)
+            for first in range(0, len(loads), most):
+                some = steps_of(loads[first : first + most], system.step)
+                self._words.orphan()
+                self._words.write(some)
+                self._words.bind_to_uniform_block(0)
+                set_uniforms(program, u_substeps=len(some))
+                groups = -(-count // GROUP)
+                deep = -(-groups // MOST_GROUPS)
+                program.run(-(-groups // deep), deep)
+                gl.context.memory_barrier()
+            self.rows = self._read("u_state").reshape(self.rows.shape)
 
-    def apply_hair_grid(
-        self, hair_grid: HairGrid, head_step: Float64Array, rates: tuple[float, float, float]
-    ) -> None:
-        """Apply hair-hair interaction."""
-        with renderer():
-            if self._units is None or self._units.hair_grid is not hair_grid:
-                self._units = self._upload_hair_grid(hair_grid)
-            uniforms = self._units.uniforms(head_step, rates)
-            self._store.read_by("filled")
-            self._store.dispatch("pbd_hair_grid_splat", self._count * self._nodes, uniforms)
-            self._store.written_by("u_means")
-            self._store.dispatch("pbd_hair_grid_average", hair_grid.density.size, uniforms)
-            self._store.written_by("u_state")
-            self._store.dispatch("pbd_hair_grid_apply", self._count * (self._nodes - 1), uniforms)
-
-    def points(self, embedding: Embedding, head: Float64Array) -> Float32Array:
-        """Return the guides' points (P, 3) in the world."""
-        with renderer():
-            self.points_buffer(embedding, head)
-            return self._store.words("points").reshape(-1, 3)
-
-    def points_buffer(self, embedding: Embedding, head: Float64Array) -> Any:
-        """Return the moderngl buffer of the guides' points: (P, 3) float32, world, metres.
-
-        This call writes it and the engine owns it; use it inside `renderer()`.
-        """
-        with renderer():
-            uniforms = self._upload_embedding(embedding)
-            self._store.read_by("guides", "starts", "local", "points")
-            uniforms["u_head"] = [tuple(row) for row in head[:3]]
-            uniforms["u_torso_from_head"] = [tuple(row) for row in self.torso_from_head[:3]]
-            self._store.dispatch("pbd_points", self._count, uniforms)
-            return self._store["points"]
-
-    def rows_buffer(
-        self,
-        embedding: Embedding,
-        before: npt.NDArray[np.integer[Any]],
-        part: npt.NDArray[np.floating[Any]],
-    ) -> Any:
-        """Return the moderngl buffer (*before.shape, 3) of samples between points, head axes.
-
-        Each is at fraction `part` between point `before` and the next one; both arrays are uploaded
-        when `before` is another object than in the last call. Otherwise as `points_buffer`.
-        """
-        with renderer():
-            self.points_buffer(embedding, np.eye(4))
-            if self._before is not before:
-                self._store.put_words("between", between_words(before, part))
-                self._store.make_words("rows", 3 * before.size)
-                self._before = before
-            self._store.read_by("local", "rows", "between")
-            self._store.dispatch("pbd_guide_samples", before.size, {"u_count": before.size})
-            return self._store["rows"]
-
-    def _settings(self, system: System, load: Load, iterations: int) -> dict[str, Any]:
+    def _settings(self, system: System, load: Load) -> dict[str, Any]:
         """Return the uniforms of substeps; upload the per-node values of the load."""
-        everywhere, force = load.air.ndim == 1, load.force
-        if not everywhere:
-            self._store.put_rods("u_wind", load.air)
-        if force is not None:
-            self._store.put_rods("u_force", force / self._unit[:, None, None])
-        return {
-            "u_iterations": iterations,
+        contact, (count, nodes) = self.contact, self.rods.mass.shape
+        everywhere = load.air.ndim == 1
+        force = np.zeros((1, 1, 3)) if load.force is None else load.force / unit_mass(self.rods)
+        for name, values in (("u_wind", load.air), ("u_force", force)):
+            if values.size > 3:
+                self._put(name, np.pad(values, ((0, 0), (0, 0), (0, 1))).reshape(count, -1))
+        result = {
+            "u_rods": count,
+            "u_nodes": nodes,
+            "u_width": self._width,
             "u_seconds": system.step,
             "u_damping": system.rates.damping,
-            "u_air": tuple(load.air) if everywhere else _STILL,
+            "u_air": tuple(load.air) if everywhere else (0.0, 0.0, 0.0),
             "u_gusts": not everywhere,
-            "u_forced": force is not None,
-        } | contact_uniforms(self._contact)
+            "u_forced": load.force is not None,
+            "u_obstacles": contact is not None,
+        }
+        if contact is not None:
+            torso = contact.bodies.torso
+            grids = [body.grid for body in (contact.bodies.head, torso or contact.bodies.head)]
+            result |= {
+                "u_torso": torso is not None,
+                "u_friction": contact.friction,
+                "u_fastest": contact.fastest,
+                "u_rounds": contact.rounds,
+                "u_cells": [grid.shape for grid in grids],
+                "u_grid": [(*(g.origin + 0.5 * g.spacing), 1 / g.spacing) for g in grids],
+                "u_room": ROOM,
+            }
+        return result
 
-    def _step(self, first: int, count: int, settings: dict[str, Any]) -> None:
-        self._store.written_by("u_state")
-        uniforms = settings | {"u_first": first, "u_substeps": count}
-        self._store.dispatch("pbd_substeps", self._count, uniforms)
+    def _put(self, name: str, *parts: npt.NDArray[Any]) -> None:
+        """Write values (S, R) of rods to a texture (see `pbd_layout.glsl`)."""
+        rows = np.concatenate(parts, axis=1).astype(np.float32)
+        high = -(-rows.shape[1] // 4)
+        tall = -(-len(rows) // self._width)
+        words = np.zeros((tall * self._width, high * 4), np.float32)
+        words[: len(rows), : rows.shape[1]] = rows
+        self._texture(name, words.reshape(tall, self._width, high, 4).swapaxes(1, 2), flat=True)
 
-    def _upload_hair_grid(self, hair_grid: HairGrid) -> Units:
-        units = Units.of(hair_grid)
-        self._store.put_rods("u_masses", (self._rods.mass * units.mass)[..., None])
-        self._store.put_grid(
-            "u_uncrowded_mass", (hair_grid.uncrowded_mass * units.mass).astype(np.float32)
-        )
-        self._store.put_grid("u_means", np.zeros((*hair_grid.density.shape, 4), np.float32))
-        self._store.make_words("filled", 4 * hair_grid.density.size)
-        return units
+    def _read(self, name: str) -> Float32Array:
+        """Read back values (S, R) that `_put` or the shader wrote."""
+        texture = self._textures[name]
+        tall = -(-len(self.rows) // self._width)
+        words = np.frombuffer(texture.read(), np.float32).reshape(tall, -1, self._width, 4)
+        result: Float32Array = words.swapaxes(1, 2).reshape(tall * self._width, -1)
+        return result[: len(self.rows)].copy()
 
-    def _upload_embedding(self, embedding: Embedding) -> dict[str, Any]:
-        """Upload the embedding unless it is there; return the uniforms of its points."""
-        deepest = None if self._contact is None else self._contact.deepest
-        if self._embedding is not embedding:
-            self._store.put_words("guides", point_words(embedding, deepest))
-            self._store.put_words("starts", embedding.starts.astype(np.int32))
-            for name in ("local", "points"):
-                self._store.make_words(name, 3 * len(embedding.rod))
-            self._embedding = embedding
-        if deepest is None:
-            return {"u_obstacles": False}
-        return contact_uniforms(self._contact)
+    def _texture(self, name: str, values: Float32Array, flat: bool = False) -> None:
+        """Write (Z, Y, X, 4) to a texture, with the first two axes in one where `flat`."""
+        deep, high, wide = values.shape[:3]
+        size = (wide, deep * high) if flat else (wide, high, deep)
+        words, old = np.ascontiguousarray(values), self._textures.get(name)
+        if old is not None and old.size == size:
+            old.write(words)
+            return
+        with renderer() as gl:
+            context: Any = gl.context
+            most = int(context.info["GL_MAX_TEXTURE_SIZE" if flat else "GL_MAX_3D_TEXTURE_SIZE"])
+            if max(size) > most:
+                raise RenderError(
+                    f"a texture's side for {name} would be {max(size)}, expected at most {most} on"
+                    " this renderer; simulate fewer guides, or with pbd.backend=fast"
+                )
+            make = context.texture if flat else context.texture3d
+            self._textures[name] = make(size, 4, words, dtype="f4")
 
 
-def _quaternions(frames: Float64Array) -> Float64Array:
-    """Convert (x, y, z, w) of the shaders to unit (w, x, y, z)."""
-    return quaternion.normalize(np.roll(frames, 1, axis=-1))
+def steps_at_once(nodes: int) -> int:
+    """Return how many substeps the shader may do in one dispatch."""
+    if nodes <= UNROLLED or on_graphics_card():
+        return MOST_STEPS
+    segments = nodes - 1
+    # the factor of the lengths takes four entries in a turn, a row for each segment before
+    turns = segments**3 // 24 + segments**2 + 5 * segments + 20 * nodes
+    return min(max(MOST_TURNS // turns, 1), MOST_STEPS)
+
+
+def faces(body: Obstacles | None) -> Float32Array:
+    """Return (X, Y, Z, 4) distances of the corners (y, z), (y, z + 1), (y + 1, z), both + 1."""
+    if body is None:
+        return np.zeros((1, 1, 1, 4), np.float32)
+    full = np.pad(body.distance, ((0, 0), (0, 1), (0, 1)), mode="edge")
+    parts = [full[:, :-1, :-1], full[:, :-1, 1:], full[:, 1:, :-1], full[:, 1:, 1:]]
+    return np.stack(parts, axis=-1)
+
+
+def _release(owner: Renderer, textures: dict[str, Any], words: Any) -> None:
+    """Free the textures, if their context is still that of the process."""
+    with renderer() as gl:
+        if gl is owner:
+            for one in (*textures.values(), words):
+                one.release()

@@ -18,7 +18,7 @@ from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled_with, parallel_for
 
 from .block import drift_rows
-from .kernel_math import ONE, ZERO, inlined
+from .simd import ONE, ZERO, inlined
 
 SPACING = 0.02
 """Edge of a cell, metres: several distances between guides."""
@@ -64,21 +64,22 @@ class HairGrid:
     def mix(
         self, place: Any, speed: Any, mass: Any, head_step: Float64Array, rates: tuple[float, ...]
     ) -> None:
-        """Change the velocities (S, n, 3), world, of nodes at (S, n, 3), head axes, in place.
+        """Change velocities, world, of nodes at `place`, head axes, in place; roots keep theirs.
 
-        Roots keep theirs. `mass` (S, n), `head_step` (4, 4) the head's motion, `rates` cohesion in
-        1/s, pressure in m/s^2, seconds.
+        Both are (B, L, n, 3), of B times L strands. `mass` (B, L, n), `head_step` (4, 4) the head's
+        motion, `rates` cohesion in 1/s, pressure in m/s^2, seconds.
         """
         cohesion, pressure, seconds = rates
         kind = place.dtype.type
         drift = drift_rows(head_step, seconds).astype(kind)
         taken, push = kind(1 - np.exp(-cohesion * seconds)), kind(pressure * seconds)
         flow = Flow(self.origin.astype(kind), drift, kind(1 / SPACING), taken, push)
-        grids = 1 if len(place) < FEW else GRIDS
+        grids = 1 if mass[..., 0].size < FEW else GRIDS
         cells = np.zeros((grids, *self.density.shape, 4), kind)
         parallel_for(spread_nodes, grids, place, speed, mass, flow, cells)
         settle_cells(cells.reshape(grids, -1, 4), self.uncrowded_mass.ravel().astype(kind))
-        parallel_for(draw_nodes, len(place), place, speed, flow, cells[0], min_chunk=WORTH)
+        worth = max(WORTH // place.shape[1], 1)
+        parallel_for(draw_nodes, len(place), place, speed, flow, cells[0], min_chunk=worth)
 
 
 def make_hair_grid(position: Float64Array, mass: Float64Array) -> HairGrid:
@@ -86,7 +87,8 @@ def make_hair_grid(position: Float64Array, mass: Float64Array) -> HairGrid:
     origin = position.min(axis=(0, 1)) - ROOM
     size = np.ceil((position.max(axis=(0, 1)) + ROOM - origin) / SPACING).astype(int) + 1
     cells, still = np.zeros((1, *size, 4)), Flow(origin, np.zeros((3, 4)), 1 / SPACING, 0.0, 0.0)
-    spread_nodes(0, 1, position, np.zeros_like(position), mass, still, cells)
+    place = position[:, None]
+    spread_nodes(0, 1, place, np.zeros_like(place), mass[:, None], still, cells)
     return HairGrid(origin, cells[0, ..., 0].copy())
 
 
@@ -101,13 +103,15 @@ def spread_nodes(
     count, grids = len(place), len(cells)
     for grid in range(first, last):
         into = cells[grid]
-        for rod in range(count * grid // grids, count * (grid + 1) // grids):
-            for node in range(place.shape[1]):
-                i, j, k, a, b, c = cell_of(place[rod, node], flow, into)
-                u, v, w = relative(place[rod, node], speed[rod, node], flow.drift)
+        for block in range(count * grid // grids, count * (grid + 1) // grids):
+            for row in range(place.shape[1] * place.shape[2]):
+                rod, node = row // place.shape[2], row % place.shape[2]
+                here, own = place[block, rod, node], mass[block, rod, node]
+                i, j, k, a, b, c = cell_of(here, flow, into)
+                u, v, w = relative(here, speed[block, rod, node], flow.drift)
                 for bit in range(8):
                     up, over, on = bit >> 2, bit >> 1 & 1, bit & 1
-                    part = mass[rod, node] * (a if up else ONE - a)
+                    part = own * (a if up else ONE - a)
                     part *= (b if over else ONE - b) * (c if on else ONE - c)
                     cell = into[i + up, j + over, k + on]
                     cell[0] += part
@@ -133,11 +137,14 @@ def settle_cells(cells: Any, uncrowded_mass: Any) -> None:
 @compiled_with(fastmath=True)
 def draw_nodes(first: int, last: int, place: Any, speed: Any, flow: Flow, cells: Any) -> None:
     """Relax velocities towards the mean around, and push nodes out of crowded cells, in place."""
-    for rod in range(first, last):
-        for node in range(1, place.shape[1]):
-            own = speed[rod, node]
-            i, j, k, a, b, c = cell_of(place[rod, node], flow, cells)
-            u, v, w = relative(place[rod, node], own, flow.drift)
+    for block in range(first, last):
+        for row in range(place.shape[1] * place.shape[2]):
+            rod, node = row // place.shape[2], row % place.shape[2]
+            if node == 0:
+                continue
+            own = speed[block, rod, node]
+            i, j, k, a, b, c = cell_of(place[block, rod, node], flow, cells)
+            u, v, w = relative(place[block, rod, node], own, flow.drift)
             p, q, r = -flow.taken * u, -flow.taken * v, -flow.taken * w
             for bit in range(8):
                 up, over, on = bit >> 2, bit >> 1 & 1, bit & 1

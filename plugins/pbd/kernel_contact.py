@@ -8,107 +8,132 @@ import numpy as np
 
 from hairkit.simulation.obstacle_kernels import distance_at
 
-from .kernel_elastic import solve_tridiagonal
-from .kernel_math import (
+from .reference import SOFTEST as SOFTEST64
+from .simd import (
     HALF,
+    LANES,
     ONE,
     ZERO,
     Vector,
     dot,
     inlined,
     larger,
+    least,
+    load,
     minus,
     moved,
     one,
+    pick,
     plus,
     put,
     put_one,
+    root,
     rows_of,
     smaller,
     stage,
+    store,
     three,
     times,
 )
-from .reference import SOFTEST as SOFTEST64
-from .simd import LANES, root
 
 FAR = 1.0
 """Metres up to which distances are exact: bounds would be looked up again sooner."""
+NEAR = np.float32(0.0003)
+"""Metres that a node near an obstacle moves before the next lookup: so long the plane of the last
+one stands for the obstacle, off by less than 0.01 mm on a head's curvature."""
 FURTHER = np.float32(1.05)
 """Safety factor on the distance that a node has moved since its last lookup."""
-SOFTEST, STILL = np.float32(SOFTEST64), np.float32(1e-12)
+SOFTEST, STILL = np.float32(1 + SOFTEST64), np.float32(1e-12)
 HEAD = ((ONE, ZERO, ZERO, ZERO), (ZERO, ONE, ZERO, ZERO), (ZERO, ZERO, ONE, ZERO))
 
 
 @stage
-def resolve_contacts(x: Any, rod: Any, step: Any, fields: Any, settings: Any) -> None:
+def resolve_contacts(s: Any, x: Any, rod: Any, step: Any, fields: Any, settings: Any) -> None:
     """Push nodes out of the obstacles, with friction, and restore the lengths."""
     touching, h, with_torso = False, settings.seconds, fields.torso.distance.shape[0] > 0
     drift, pose, beside = rows_of(step.drift), rows_of(step.torso), rows_of(step.torso_drift)
     for j in range(1, len(x)):
-        node, clear = x[j], rod[j].clear
-        put(node.normal, (ZERO, ZERO, ZERO))
-        put_one(node.depth, ZERO)
-        put_one(node.grip, ZERO)
-        place = three(node.place)
-        way = times(h, minus(three(node.speed), times(HALF * h, three(node.gain))))
-        by = minus(way, times(h, moved(drift, place)))
-        near = approach(node, node.slack, by, fields.head, HEAD, drift, clear)
+        put(x[j].normal, (ZERO, ZERO, ZERO))
+        put(x[j].surface, (ZERO, ZERO, ZERO))
+        put_one(x[j].depth, ZERO)
+        put_one(x[j].grip, ZERO)
+        place = three(s[j].place)
+        way = times(h, minus(three(s[j].speed), times(HALF * h, three(s[j].gain))))
+        ride, clear = moved(drift, place), rod[j].clear
+        by = minus(way, times(h, ride))
+        near = meets(x[j], s[j].room, s[j].wall, place, by, fields.head, HEAD, ride, clear)
         if with_torso:
-            by = minus(way, times(h, moved(beside, place)))
-            near |= approach(node, node.aside, by, fields.torso, pose, beside, clear)
+            ride = moved(beside, place)
+            by = minus(way, times(h, ride))
+            near |= meets(x[j], s[j].aside, s[j].beside, place, by, fields.torso, pose, ride, clear)
         if near:
-            push_out(node, settings)
+            push_out(s[j], x[j], settings)
             touching = True
-    restore_lengths(x, rod, settings)
+    restore_lengths(s, x, rod, settings, False)
     # without contact, one more iteration is enough
     for _ in range(settings.rounds if touching else min(settings.rounds, 1)):
-        if touching:
-            apply_friction(x, h)
-        restore_lengths(x, rod, settings)
+        restore_lengths(s, x, rod, settings, touching)
 
 
 @inlined
-def approach(
-    node: Any, slack: Any, way: Vector, field: Any, pose: Any, drift: Any, clear: Any
+def meets(
+    node: Any,
+    room: Any,
+    wall: Any,
+    place: Vector,
+    by: Vector,
+    field: Any,
+    pose: Any,
+    ride: Vector,
+    clear: Any,
 ) -> bool:
-    """Look up a body for nodes whose slack is used up on their way; return if one touches it.
+    """Note depth, normal and velocity of a body where it is the deepest yet; return if it is.
 
-    `pose` brings head axes to the body's; `drift` is the velocity of a point that rides on it.
+    The body is the plane `wall` (normal and offset, its own axes), which is looked up again where
+    the way `by` against it has used up the `room`. `pose` brings head axes to the body's, `ride` is
+    the velocity of a point that rides on it.
     """
-    put_one(slack, one(slack) - FURTHER * root(dot(way, way)))
-    found = False
-    for w in range(LANES):
-        if slack[w] < ZERO:
-            at = (node.place[0, w], node.place[1, w], node.place[2, w])
-            x, y, z = moved(pose, at)
-            distance, a, b, c = distance_at(field, x, y, z, FAR)
-            slack[w] = distance - clear[w]
-            if -slack[w] > node.depth[w]:
-                found, node.depth[w] = True, -slack[w]
-                surface, n = node.surface, node.normal
-                surface[0, w], surface[1, w], surface[2, w] = moved(drift, at)
-                n[0, w] = pose[0][0] * a + pose[1][0] * b + pose[2][0] * c
-                n[1, w] = pose[0][1] * a + pose[1][1] * b + pose[2][1] * c
-                n[2, w] = pose[0][2] * a + pose[1][2] * b + pose[2][2] * c
-    return found
+    left = one(room) - FURTHER * root(dot(by, by))
+    put_one(room, left)
+    closest = least(left)
+    if closest > NEAR:
+        return False
+    at = moved(pose, place)
+    if closest < ZERO:
+        put(node.way, at)
+        for w in range(LANES):
+            if room[w] < ZERO:
+                x, y, z = node.way[0, w], node.way[1, w], node.way[2, w]
+                distance, a, b, c = distance_at(field, x, y, z, FAR)
+                room[w] = max(np.float32(distance) - clear[w], NEAR)
+                wall[0, w], wall[1, w], wall[2, w] = a, b, c
+                wall[-1, w] = distance - (a * x + b * y + c * z)
+    n = three(wall)
+    depth, deepest = one(clear) - (dot(n, at) + load(wall, len(wall) - 1)), one(node.depth)
+    if least(deepest - depth) >= ZERO:
+        return False
+    put_one(node.depth, larger(depth, deepest))
+    for c in range(3):
+        across = pose[0][c] * n[0] + pose[1][c] * n[1] + pose[2][c] * n[2]
+        store(node.normal, c, pick(deepest, depth, across, load(node.normal, c)))
+        store(node.surface, c, pick(deepest, depth, ride[c], load(node.surface, c)))
+    return True
 
 
 @inlined
-def push_out(node: Any, settings: Any) -> None:
+def push_out(s: Any, x: Any, settings: Any) -> None:
     """Push nodes out of the obstacles, with friction; nothing happens where normals are 0."""
-    h, normal = settings.seconds, three(node.normal)
-    relative = minus(three(node.speed), three(node.surface))
+    h, normal = settings.seconds, three(x.normal)
+    relative = minus(three(s.speed), three(x.surface))
     across = dot(relative, normal)
     inward = larger(ZERO - across, ZERO)
     # depth of this substep is removed at once, older depth at a limited speed
-    depth = smaller(one(node.depth), h * (inward + settings.fastest))
+    depth = smaller(one(x.depth), h * (inward + settings.fastest))
     slide = minus(relative, times(across, normal))
     brake, grip = braked(slide, settings.friction * inward)
-    put_one(node.grip, grip)
-    put(node.speed, plus(three(node.speed), minus(times(inward, normal), brake)))
-    out = minus(times(depth, normal), times(HALF * h, brake))
-    put(node.place, plus(three(node.place), out))
+    put_one(x.grip, grip)
+    put(s.speed, plus(three(s.speed), minus(times(inward, normal), brake)))
+    put(s.place, plus(three(s.place), minus(times(depth, normal), times(HALF * h, brake))))
 
 
 @inlined
@@ -119,49 +144,54 @@ def braked(slide: Vector, grip: Any) -> tuple[Vector, Any]:
     return times(slowed / size, slide), grip - slowed
 
 
-@stage
-def apply_friction(x: Any, h: Any) -> None:
-    """Let nodes that touch rub once more, by what the strands' own tension adds to their grip."""
-    for j in range(1, len(x)):
-        speed, normal = three(x[j].speed), three(x[j].normal)
-        relative = minus(speed, three(x[j].surface))
-        along = minus(relative, times(dot(relative, normal), normal))
-        brake, grip = braked(along, one(x[j].grip))
-        put_one(x[j].grip, grip)
-        put(x[j].speed, minus(speed, brake))
-        put(x[j].place, minus(three(x[j].place), times(HALF * h, brake)))
+@inlined
+def rub(s: Any, x: Any, h: Any) -> None:
+    """Let a node that touches rub once more, by what the strand's own tension adds to its grip."""
+    speed, normal = three(s.speed), three(x.normal)
+    relative = minus(speed, three(x.surface))
+    brake, grip = braked(minus(relative, times(dot(relative, normal), normal)), one(x.grip))
+    put_one(x.grip, grip)
+    put(s.speed, minus(speed, brake))
+    put(s.place, minus(three(s.place), times(HALF * h, brake)))
 
 
 @stage
-def restore_lengths(x: Any, rod: Any, settings: Any) -> None:
-    """Restore the lengths; a touching node moves only along the obstacle, and is pressed on it."""
-    place, normal, ease = three(x[0].place), times(ZERO, three(x[1].normal)), one(rod[0].ease)
-    end = still = normal
-    for j in range(1, len(x)):
-        here, own, wall = three(x[j].place), one(rod[j].ease), three(x[j].normal)
+def restore_lengths(s: Any, x: Any, rod: Any, settings: Any, rubs: bool) -> None:
+    """Restore the lengths; a touching node moves only along the obstacle, and is pressed on it.
+
+    One tridiagonal solve, eliminated on the way to the tip; nodes that touch rub before where
+    `rubs`.
+    """
+    last, zero = len(x) - 1, ZERO * one(rod[1].ease)
+    place, ease, normal = three(s[0].place), one(rod[0].ease), (zero, zero, zero)
+    way, across, pivot, value = normal, zero, zero, zero
+    for j in range(1, last + 1):
+        if rubs:
+            rub(s[j], x[j], settings.seconds)
+        here, wall, own = three(s[j].place), three(x[j].normal), one(rod[j].ease)
         edge = minus(here, place)
         square = dot(edge, edge)
         size = ONE / root(square)
-        way = times(size, edge)
-        put_one(x[j].beside, ZERO - dot(end, way))
-        start, end = _mobility(ease, way, normal), _mobility(own, way, wall)
-        put_one(x[j].pivot, dot(way, plus(start, end)) + SOFTEST * (ease + own))
-        put_one(x[j].value, square * size - one(rod[j].length))
-        put(x[j].way, way)
-        place, normal, ease = here, wall, own
-    solve_tridiagonal(x)
-    over, after = ONE / settings.seconds, still
-    for j in range(len(x) - 1, 0, -1):
-        own = times(one(x[j].value), three(x[j].way))
+        along = times(size, edge)
+        start, end = dot(along, normal), dot(along, wall)
+        beside = ease * (across * start - dot(way, along))
+        factor = beside * pivot
+        firm = ease * (SOFTEST - start * start) + own * (SOFTEST - end * end)
+        pivot = ONE / (firm - factor * beside)
+        value = square * size - one(rod[j].length) - factor * value
+        put(x[j].way, along)
+        put_one(x[j].beside, beside)
+        put_one(x[j].pivot, pivot)
+        put_one(x[j].value, value)
+        place, ease, normal, way, across = here, own, wall, along, end
+    over = ONE / settings.seconds
+    value, beside, after = zero, zero, (zero, zero, zero)
+    for j in range(last, 0, -1):
+        value, beside = (one(x[j].value) - beside * value) * one(x[j].pivot), one(x[j].beside)
+        own = times(value, three(x[j].way))
         pull, normal, ease = minus(after, own), three(x[j].normal), one(rod[j].ease)
         away, after = dot(pull, normal), own
         change = times(ease, minus(pull, times(away, normal)))
-        put(x[j].place, plus(three(x[j].place), change))
-        put(x[j].speed, plus(three(x[j].speed), times(over, change)))
+        put(s[j].place, plus(three(s[j].place), change))
+        put(s[j].speed, plus(three(s[j].speed), times(over, change)))
         put_one(x[j].grip, one(x[j].grip) - settings.friction * over * ease * away)
-
-
-@inlined
-def _mobility(ease: Any, way: Vector, normal: Vector) -> Vector:
-    """Return the displacement of an end node by a unit pull of its segment."""
-    return times(ease, minus(way, times(dot(way, normal), normal)))

@@ -14,7 +14,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
-from hairkit.simulation.obstacles import Bodies, Obstacles
+from hairkit.simulation.obstacles import Bodies
 
 from .linear_system import IMPLICIT, System
 from .rods import Rods, half_binormal, midpoint_frame, next_element, split_torque, twist_between
@@ -94,11 +94,6 @@ class Load:
     """Where the torso is; None: it goes with the head, as at rest."""
 
 
-def obstacles_of(contact: Contact | None) -> tuple[Obstacles | None, Obstacles | None]:
-    """Return head and torso, None where there is none."""
-    return (None, None) if contact is None else (contact.bodies.head, contact.bodies.torso)
-
-
 def rest_state(rods: Rods) -> State:
     """Return the captured state with zero velocity."""
     still = np.zeros_like(rods.points)
@@ -158,22 +153,20 @@ def solve_substep(
     change = free
     pull = np.zeros_like(rods.length)
     for _ in range(iterations):
-        pull = solve_tension(system, edge + _edges(free), direction, rods.length)
-        change = free - system.inverse @ _apply_edges_transposed(pull[..., None] * direction)
-        direction = quaternion.normalize(edge + _edges(change))
+        pull = solve_tension(
+            system, edge + np.diff(free, axis=1, prepend=0.0), direction, rods.length
+        )
+        force = pull[..., None] * direction
+        change = free - system.inverse @ (force - next_element(force))
+        direction = quaternion.normalize(edge + np.diff(change, axis=1, prepend=0.0))
     position, acceleration = predicted.copy(), passed
     position[:, 1:] += change
     velocity[:, 1:] += change / (IMPLICIT * h)
     acceleration[:, :1] = root
     acceleration[:, 1:] += change / (IMPLICIT * h**2)
-    return State(position, velocity, frames, _bound(acceleration)), pull
-
-
-def _bound(acceleration: Float64Array) -> Float64Array:
-    """Return accelerations of no more than `FASTEST_CHANGE`."""
     size = np.sqrt((acceleration * acceleration).sum(axis=-1, keepdims=True) + TINY)
-    result: Float64Array = np.minimum(FASTEST_CHANGE / size, 1.0) * acceleration
-    return result
+    acceleration *= np.minimum(FASTEST_CHANGE / size, 1.0)
+    return State(position, velocity, frames, acceleration), pull
 
 
 def transform_points(motion: Float64Array, points: Float64Array) -> Float64Array:
@@ -363,20 +356,11 @@ def restore_lengths(
     fixed = position.copy()
     fixed[:, :-1] += pull[..., None] * start
     fixed[:, 1:] -= pull[..., None] * end
-    push = _apply_edges_transposed(pull[..., None] * direction)
+    push = pull[..., None] * direction
+    push = push - next_element(push)
     pressed = np.zeros_like(ease)
     pressed[:, 1:] = ease[:, 1:] * (push * normal[:, 1:]).sum(axis=-1)
     return fixed, pull, pressed
-
-
-def _edges(change: Float64Array) -> Float64Array:
-    """Return the change of the segments' vectors for a change of the free nodes."""
-    return np.diff(change, axis=1, prepend=np.zeros_like(change[:, :1]))
-
-
-def _apply_edges_transposed(pull: Float64Array) -> Float64Array:
-    """Return the force on the free nodes for forces on the segments."""
-    return pull - next_element(pull)
 
 
 def _tridiagonal(diagonal: Float64Array, beside: Float64Array, right: Float64Array) -> Float64Array:
@@ -391,3 +375,24 @@ def _tridiagonal(diagonal: Float64Array, beside: Float64Array, right: Float64Arr
     for j in range(count - 2, -1, -1):
         value[:, j] = (value[:, j] - beside[:, j] * value[:, j + 1]) / pivot[:, j]
     return value
+
+
+def elastic_energy(rods: Rods, state: State, shape: Float64Array | None = None) -> float:
+    """Return the energy of bending, twist and the pull to the captured shape, joules.
+
+    `shape` (S, n): squared frequencies of that pull, 1/s^2.
+    """
+    edge = np.diff(state.position, axis=1)
+    frames = transport_frames(state.frames, quaternion.normalize(edge))
+    before = rods.before(frames)
+    reach = edge / rods.length[..., None]
+    held = quaternion.third_axis(rods.root_frame)[:, None]
+    turn = reach - np.concatenate([held, reach[:, :-1]], axis=1)
+    off = turn - quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
+    energy = 0.5 * float((rods.bend[..., None] * off**2).sum())
+    twist = twist_between(before, frames) - rods.natural_twist
+    energy += 0.5 * float((rods.twist * twist**2).sum())
+    if shape is not None:
+        moved = ((state.position - rods.points) ** 2).sum(axis=-1)
+        energy += 0.5 * float((rods.mass * shape * moved).sum())
+    return energy

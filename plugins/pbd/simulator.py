@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -26,15 +26,13 @@ from hairkit.simulation.wind import gust_waves
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
-from .backend import Engine, ReferenceEngine
+from .backend import Engine, FastEngine
 from .embedding import embed_points
-from .energies import elastic_energy, largest_stretch
 from .grab import Hands
 from .hair_grid import HairGrid, make_hair_grid
-from .head_steps import finer_steps
 from .linear_system import Rates, System, assemble
-from .reference import Contact, Load, TorsoStep, rest_state
-from .resampling import max_stiffness, node_points, overhang
+from .reference import Contact, Load, TorsoStep, elastic_energy, rest_state
+from .resampling import finer_steps, max_stiffness, node_points, overhang
 from .rods import Rods, balance_load, clamp_roots, make_rods
 
 if TYPE_CHECKING:
@@ -112,26 +110,6 @@ class PbdSimulator:
             self._points.setflags(write=False)
         return self._points
 
-    @property
-    def points_buffer(self) -> Any:
-        """The points as a moderngl buffer of (P, 3) float32, for drawing without read-back.
-
-        Each access updates it; use it inside `renderer()`. None unless the backend is `compute`.
-        """
-        made = getattr(self._engine, "points_buffer", None)
-        return None if made is None else made(self._embedding, self._head)
-
-    def rows_buffer(
-        self, before: npt.NDArray[np.integer[Any]], part: npt.NDArray[np.floating[Any]]
-    ) -> Any:
-        """Return samples between the points, head axes, as a moderngl buffer (*before.shape, 3).
-
-        Each is at fraction `part` between point `before` and the next one. Both arrays are uploaded
-        when `before` is another object than in the last call. Otherwise as `points_buffer`.
-        """
-        made = getattr(self._engine, "rows_buffer", None)
-        return None if made is None else made(self._embedding, before, part)
-
     def advance(self, seconds: float, surroundings: Surroundings) -> None:
         """Advance by `seconds`, in pieces of at most `FRAME`, each in substeps."""
         if not seconds > 0:
@@ -175,8 +153,9 @@ class PbdSimulator:
         kinetic = 0.5 * float((rods.mass[..., None] * state.velocity**2).sum())
         fallen = ((state.position - rods.points) * down).sum(axis=-1)
         weight = -float((rods.mass * fallen).sum())
-        elastic, stretch = elastic_energy(rods, state, shape), largest_stretch(rods, state)
-        energy = weight + elastic - self._rest_energy
+        length = np.linalg.norm(np.diff(state.position, axis=1), axis=-1)
+        stretch = float(np.abs(length / rods.length - 1).max())
+        energy = weight + elastic_energy(rods, state, shape) - self._rest_energy
         # in head axes, since float32 is coarse far away
         points = self._engine.points(self._embedding, np.eye(4)).astype(np.float64)
         depth = self._bodies.deepest(points, self._engine.torso_from_head, self._deepest)
@@ -226,6 +205,7 @@ class PbdSimulator:
 
     def _stiffen(self, options: Options) -> None:
         """Make the rods, whose natural shape balances gravity at the captured shape."""
+        self._segment = float(np.median(np.linalg.norm(np.diff(self._nodes, axis=1), axis=-1)))
         density = HAIR_DENSITY * np.pi / 4 * self._width[:, None] ** 2
         most = max_stiffness(self._nodes, FRAME / options.substeps)[:, None]
         length = np.linalg.norm(np.diff(self._nodes, axis=1), axis=-1).min(axis=1, keepdims=True)
@@ -266,11 +246,10 @@ class PbdSimulator:
         self, seconds: float, around: Surroundings, start: Float64Array, end: Float64Array
     ) -> None:
         """Advance by up to `FRAME`: update wind and hair grid once, then do substeps."""
-        segment = float(np.median(self._rods.length))
-        finer = finer_steps(start, end, self._rods.points[:, 0], segment)
+        finer = finer_steps(start, end, self._rods.points[:, 0], self._segment)
         if finer == 0:
             start, finer = end, 1  # hair and torso go with a head that is elsewhere at once
-            self._move_torso(end, end, 1)
+            self._move_torso([(end, np.eye(4))])
             self._engine.state = self._engine.state  # known distances to the torso are void
         count = max(1, math.ceil(self._options.substeps * seconds / FRAME - 1e-6)) * finer
         step = seconds / count
@@ -280,24 +259,24 @@ class PbdSimulator:
         if self._options.cohesion > 0 or self._options.pressure > 0:
             rates = (self._options.cohesion, self._options.pressure, seconds)
             self._engine.apply_hair_grid(self._hair_grid, inverse_motion(end) @ start, rates)
-        heads, torsos = motion_steps(start, end, count), self._move_torso(start, end, count)
+        heads = motion_steps(start, end, count)
         loads = [
             Load(head_step, after[:3, :3].T, gravity, air, force, torso)
-            for (after, head_step), torso in zip(heads, torsos, strict=True)
+            for (after, head_step), torso in zip(heads, self._move_torso(heads), strict=True)
         ]
-        self._engine.run(self._system(step), loads, self._options.iterations)
+        self._engine.run(self._system(step), loads)
         self._time += seconds
 
-    def _move_torso(
-        self, start: Float64Array, end: Float64Array, count: int
-    ) -> list[TorsoStep | None]:
-        """Let the torso follow the head, which goes from `start` to `end`; return its substeps."""
+    def _move_torso(self, heads: list[tuple[Float64Array, Float64Array]]) -> list[TorsoStep | None]:
+        """Let the torso follow the head's `motion_steps`; return its own."""
         if self._bodies.torso is None:
-            return [None] * count
-        before, self._torso = self._torso, follow_head(self._torso, end, self._bodies.joint)
-        heads, torsos = motion_steps(start, end, count), motion_steps(before, self._torso, count)
+            return [None] * len(heads)
+        before, end = self._torso, heads[-1][0]
+        self._torso = follow_head(before, end, self._bodies.joint)
         steps: list[TorsoStep | None] = []
-        for (head, _), (torso, change) in zip(heads, torsos, strict=True):
+        for (head, _), (torso, change) in zip(
+            heads, motion_steps(before, self._torso, len(heads)), strict=True
+        ):
             from_head = inverse_motion(torso) @ head
             steps.append(TorsoStep(from_head, inverse_motion(from_head) @ change @ from_head))
         self._engine.torso_from_head = inverse_motion(self._torso) @ end
@@ -344,13 +323,11 @@ def _stiffness(options: Options) -> tuple[object, ...]:
 
 def _engine(name: str, rods: Rods, contact: Contact) -> Engine:
     if name == "reference":
-        return ReferenceEngine(rods, contact)
+        return Engine(rods, contact)
     if name == "compute" or (name == "auto" and on_graphics_card()):
         from .gl_backend import ComputeEngine
 
         return ComputeEngine(rods, contact)
-    from .numba_backend import FastEngine  # Numba loads where it is used
-
     return FastEngine(rods, contact)
 
 

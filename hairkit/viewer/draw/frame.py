@@ -22,7 +22,7 @@ from hairkit.types.skin_look import SkinLook
 from hairkit.viewer.draw.hair_cpu import SoftHairPass
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.hair_gpu import HairPass
-from hairkit.viewer.draw.interface import GuidePlaces, HairDrawer, HairLook, HairScene, HairView
+from hairkit.viewer.draw.interface import HairDrawer, HairLook, HairScene, HairView
 from hairkit.viewer.draw.light_cpu import SoftLightPass
 from hairkit.viewer.draw.light_gpu import TURNS, LightPass
 from hairkit.viewer.draw.lines import Billboard, BillboardPass, LineSet, draw_lines
@@ -50,8 +50,8 @@ class FrameInputs:
     """World frame, at the size of the frame."""
     world_from_head: Float64Array
     """(4, 4) pose of the head."""
-    guide_rows: GuidePlaces | None
-    """(G, m, 3) guides, head frame: an array or, on the GPU, a moderngl buffer; None: as before."""
+    guide_rows: Float32Array | None
+    """(G, m, 3) guides, head frame, metres; None: as before."""
     hair: HairLook | None
     """None: no hair."""
     show_head: bool = True

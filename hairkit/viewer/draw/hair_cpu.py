@@ -16,7 +16,7 @@ from hairkit.rendering.gl_camera import clip_from_camera, set_uniforms
 from hairkit.rendering.hair import strand_numbers
 from hairkit.viewer.draw import place_kernels, raster_kernels, shade_kernels
 from hairkit.viewer.draw.hair_data import HairBody
-from hairkit.viewer.draw.interface import GuidePlaces, HairLook, HairScene, HairView
+from hairkit.viewer.draw.interface import HairLook, HairScene, HairView
 
 MOST_CHUNKS = 8
 """Each thread draws into sums of its own, which are added up for every picture."""
@@ -58,7 +58,7 @@ class SoftHairPass:
         """Return the last positions (S, m, 3) of the hair, head frame, metres."""
         return self._places
 
-    def move_guides(self, rows: GuidePlaces) -> Float32Array:
+    def move_guides(self, rows: Float32Array) -> Float32Array:
         """Move the guides to `rows` (G, m, 3), head frame, metres; return them as points (N, 3)."""
         # compiled loops do not check bounds: replace NaN and infinity of a diverged simulation
         tame = np.nan_to_num(np.clip(rows, -FARTHEST, FARTHEST))

@@ -6,7 +6,6 @@ is splatted into view cells; accumulation of opacity by depth; shading and raste
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,15 +19,12 @@ from hairkit.rendering.gl_camera import set_camera, set_uniforms
 from hairkit.rendering.hair import strand_numbers
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw.hair_data import HairBody
-from hairkit.viewer.draw.interface import GuidePlaces, HairLook, HairScene, HairView
+from hairkit.viewer.draw.interface import HairLook, HairScene, HairView
 
 SLICES, TILE = 32, 8
 """As in viewer_hair.glsl."""
 _GROUP = 64
 MOST_GUIDES = 65_535
-LATE = 0.05
-"""Margin added to the bounding box of the previous frame, metres."""
-_NOTHING = np.array([2**31 - 1] * 3 + [-(2**31)] * 3, np.int32).tobytes()
 NEAR_HAIR, OFF_GUIDES = 0.05, 0.06
 """Metres: hair nearer to the camera than the first may cover the whole picture; hair is within the
 second of its guides."""
@@ -52,15 +48,13 @@ class HairPass:
         self._hairs = context.buffer(_hair_records(body))
         self._offsets = context.buffer(_offset_records(body))
         self._places = context.buffer(reserve=12 * count * points)
-        self._bounds = context.buffer(_NOTHING)
-        self._box = False
         self._view: _ViewBuffers | None = None
         self._resolve = context.vertex_array(gl.program("viewer_screen", "viewer_resolve"), [])
 
     def release(self) -> None:
         """Free the buffers."""
         buffers = (self._rest, self._now, self._guides, self._hairs, self._offsets, self._places)
-        for buffer in (*buffers, self._bounds):
+        for buffer in buffers:
             buffer.release()
         self._resolve.release()
         if self._view is not None:
@@ -70,39 +64,14 @@ class HairPass:
         """Return the last positions (S, m, 3) of the hair, float32, head frame, metres."""
         return self._places
 
-    def move_guides(self, rows: GuidePlaces) -> Float32Array:
-        """Move the guides to `rows` (G, m, 3), head frame, metres; return points that bound them.
-
-        Guides in a buffer are not read back, only their bounding box of the previous frame, which
-        is already computed; it is enlarged by `LATE`.
-        """
-        given = isinstance(rows, moderngl.Buffer)
-        if not given:
-            self._now.write(np.ascontiguousarray(rows, np.float32))
-        self._rest.bind_to_storage_buffer(0)
-        (rows if given else self._now).bind_to_storage_buffer(1)
-        self._guides.bind_to_storage_buffer(2)
-        before = self._box
-        self._bounds.bind_to_storage_buffer(3)
-        late = self._read_box() if given and before else None
-        self._bounds.write(_NOTHING)
+    def move_guides(self, rows: Float32Array) -> Float32Array:
+        """Move the guides to `rows` (G, m, 3), head frame, metres; return them as points (N, 3)."""
+        self._now.write(np.ascontiguousarray(rows, np.float32))
+        for binding, buffer in enumerate((self._rest, self._now, self._guides)):
+            buffer.bind_to_storage_buffer(binding)
         self._run("viewer_guides", len(self.body.guides) * self.body.points_each)
-        self._box = given
-        if not given:
-            self._cloud = np.asarray(rows, np.float32).reshape(-1, 3)
-            return self._cloud
-        low, high = self._read_box() if late is None else late
-        box = np.stack([low - LATE, high + LATE])
-        corners = np.array(list(itertools.product((0, 1), repeat=3)))
-        self._cloud = box[corners, np.arange(3)].astype(np.float32)
+        self._cloud = np.asarray(rows, np.float32).reshape(-1, 3)
         return self._cloud
-
-    def _read_box(self) -> tuple[Float32Array, Float32Array]:
-        """Return the corners (3,) of the guides' bounding box."""
-        code = np.frombuffer(self._bounds.read(), np.int32)
-        # the shader maps floats to integers of the same order; undo that
-        values = np.where(code < 0, code ^ 0x7FFFFFFF, code).astype(np.int32).view(np.float32)
-        return values[:3], values[3:]
 
     def place(self, view: HairView, look: HairLook) -> None:
         """Interpolate the hair from the guides and accumulate its opacity by depth."""

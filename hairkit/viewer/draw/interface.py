@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from hairkit.viewer.draw.hair_data import HairBody
 
-GuidePlaces = Any
-"""(G, m, 3) float32: an array, or a moderngl buffer for the GPU renderer."""
 FULL_LOOK = 50_000
 """Fewer strands are drawn wider, so that they cover the head as this many would."""
 FEW = 10_000
@@ -99,12 +97,8 @@ class HairDrawer(Protocol):
     def places(self) -> Any:
         """Return the last positions (S, m, 3) of the hair, metres: a float32 buffer or array."""
 
-    def move_guides(self, rows: GuidePlaces) -> Float32Array:
-        """Move the guides to `rows` (G, m, 3), head frame, metres; return points (N, 3).
-
-        The points are the guides' own, or the corners of their bounding box if the guides are only
-        on the GPU.
-        """
+    def move_guides(self, rows: Float32Array) -> Float32Array:
+        """Move the guides to `rows` (G, m, 3), head frame, metres; return them as points (N, 3)."""
 
     def place(self, view: HairView, look: HairLook) -> None:
         """Interpolate the hair from the guides and accumulate its opacity by depth."""

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd.energies import elastic_energy
 from hairkit_plugins.pbd.linear_system import Rates, assemble
 from hairkit_plugins.pbd.reference import (
     Load,
     State,
+    elastic_energy,
     elastic_force,
     rest_state,
     solve_substep,

@@ -317,7 +317,7 @@ def mixed(
 @pytest.mark.parametrize("copies", [1, 60])
 def test_hair_among_hair_moves_as_its_twin(groom: Groom, copies: int) -> None:
     """Crowded and moving, on a moving head: velocities of metres a second agree to 0.01 mm/s."""
-    from hairkit_plugins.pbd.numba_backend import FastEngine
+    from hairkit_plugins.pbd.backend import FastEngine
 
     rods = PbdSimulator(groom, Options(backend="reference")).rods
     pick = np.tile(np.arange(len(rods.points)), copies)

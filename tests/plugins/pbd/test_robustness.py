@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd import Options
-from hairkit_plugins.pbd.head_steps import FARTHEST, FINEST, finer_steps
+from hairkit_plugins.pbd.resampling import FARTHEST, FINEST, finer_steps
 from hairkit_plugins.pbd.simulator import PbdSimulator
 
 from hairkit.head_model.template import default_head

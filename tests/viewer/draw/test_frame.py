@@ -221,28 +221,6 @@ def test_hair_that_is_nowhere_harms_nothing(place: float) -> None:
         frame_renderer.release()
 
 
-def test_guides_may_stay_on_the_card() -> None:
-    """A buffer of guides gives the picture that the same array gives, and a box that holds them."""
-    t = np.linspace(0, 1, 64, dtype=np.float32)[None, :, None]
-    with renderer() as gl:
-        frame_renderer = make_frame_renderer(gl, soft=False)
-        rest = frame_renderer.body.guide_rest
-        rows = rest + np.float32([0.02, -0.01, 0.0]) * t[:, : rest.shape[1]] ** 2
-        buffer = gl.context.buffer(np.ascontiguousarray(rows, np.float32))
-        by_array = picture(frame_renderer, inputs(guide_rows=rows))
-        for _ in range(2):  # the box of the second picture is that of the first
-            by_buffer = picture(frame_renderer, inputs(guide_rows=buffer))
-            low, high = frame_renderer.cloud.min(axis=0), frame_renderer.cloud.max(axis=0)
-            assert (low <= rows.min(axis=(0, 1))).all()
-            assert (high >= rows.max(axis=(0, 1))).all()
-            assert (high - low).max() < 2 * np.ptp(rows, axis=(0, 1)).max()
-        frame_renderer.release()
-        buffer.release()
-    off = np.abs(by_array.astype(int) - by_buffer)
-    assert off.mean() < 1
-    assert np.quantile(off, 0.99) < 16
-
-
 @pytest.mark.parametrize("smooth", [True, False])
 @pytest.mark.parametrize("direction", [True, False])
 def test_processor_and_shaders_draw_the_same(
