@@ -63,6 +63,7 @@ def test_a_cache_that_names_a_type_of_an_older_version_is_replaced(
 ) -> None:
     """A module updated with a type renamed compiles again, and finds its own cache afterwards."""
     monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # two versions in one second look alike
     for name in ("Older", "Newer", "Newer"):
         (tmp_path / "updated_kernels.py").write_text(KERNELS.format(name=name))
         monkeypatch.delitem(sys.modules, "updated_kernels", raising=False)

@@ -112,8 +112,9 @@ def lead_to_roots(
     """Return the strands, some replaced by ways `back` to the scalp and `ahead` (K, M, 3).
 
     Both begin at the same places. A way back ends where it comes nearest to a root (N, 3), and
-    joins the nearest root that bears no other way, as far along as the root is off it, so that it
-    bends towards the root; ways that end too far from all are left out.
+    joins the nearest root that bears no other way, as far along as the root is off it, but not
+    beyond its beginning, so that it bends towards the root; ways that end too far from all are
+    left out.
     """
     tree = cKDTree(roots)
     nearest = tree.query(back.reshape(-1, 3))[0].reshape(len(back), -1)
@@ -124,14 +125,13 @@ def lead_to_roots(
         near = near[free[near]]
         if len(near):
             off = np.linalg.norm(roots[near] - way[end], axis=1)
-            led = np.concatenate([way[end::-1], on[1:]])
-            along = np.cumsum(np.linalg.norm(np.diff(led, axis=0), axis=1))
-            beyond = led[1:][along > off.min()]
-            if len(beyond):
-                root = near[np.argmin(off)]
-                free[root] = False
-                chosen.append(root)
-                lines.append(np.concatenate([roots[root, None], beyond]))
+            root = near[np.argmin(off)]
+            free[root] = False
+            chosen.append(root)
+            led = way[end::-1]
+            along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(led, axis=0), axis=1))]
+            start = min(int(np.searchsorted(along, off.min())), end)
+            lines.append(np.concatenate([roots[root, None], led[start:], on[1:]]))
     if not chosen:
         return strands
     points = strands.points.reshape(len(strands), -1, 3).copy()
