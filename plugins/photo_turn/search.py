@@ -40,7 +40,7 @@ def find_arrangements(evidence: Evidence, above: BoolArray, level: BoolArray) ->
     rows = [(row, 0.0)] + [(row[row != one], ABOVE) for one in free if len(row) > 3]
     found = [place(ring, evidence) for order, prior in rows for ring in rings_of(order, prior)]
     placed = sorted((p for p in found if p is not None), key=lambda p: p.cost)
-    if placed and placed[0].cost > FITS * len(row):
+    if placed and (placed[0].cost > FITS * len(row) or placed[0].above.sum() > above.sum()):
         odd = free[np.argsort(_oddness(evidence)[free])[::-1][:ODD_PHOTOS]]
         rows = [(row, 0.0)] + [(row[row != one], ABOVE) for one in odd if len(row) > 3]
         for order, prior in rows:

@@ -12,7 +12,7 @@ import pytest
 from hairkit_plugins.photo_turn import find_turn
 from hairkit_plugins.photo_turn.arrangement import Placed, wrap
 from hairkit_plugins.photo_turn.refuse import check_turn
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hairkit import Camera, Capture, View
@@ -116,6 +116,7 @@ def test_neither_direction_nor_first_photo_matters(
 
 
 @given(seed=st.integers(0, 999))
+@example(seed=10)  # fits in the order of the names if one photo is from above
 @settings(max_examples=5, deadline=None)
 def test_shuffled_photos_are_sorted(seed: int) -> None:
     """Photos in no order are put into the order of the turn."""
