@@ -33,9 +33,9 @@ from .photo_lines import (
 
 NEIGHBOURS = 8
 """Nearest segments that a segment compares its sign with."""
-NEIGHBOUR_WEIGHT = 2.0
+NEIGHBOUR_WEIGHT = 4.0
 """Weight of a parallel neighbour's sign against a growth of one metre per metre."""
-HANGING_WEIGHT, HANGS_OFF = 1.0, 0.02
+HANGING_WEIGHT, HANGS_OFF = 2.0, 0.02
 """Weight of hanging down against a growth of one metre per metre, and the metres off the head from
 which hair hangs: where a tuft stands out or a fringe ends on the forehead, the potential leads
 hair below it upwards."""
