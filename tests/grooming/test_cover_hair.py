@@ -85,3 +85,19 @@ def test_ways_join_the_nearest_free_roots() -> None:
     np.testing.assert_array_equal(led.roots, roots)
     np.testing.assert_allclose(led.tips[changed], np.stack([ahead[0, -1]] * 2), atol=1e-6)
     np.testing.assert_allclose(led.lengths()[7], 0.03 + 0.05, rtol=0.03)
+
+
+def test_a_way_beside_its_root_bends_towards_it() -> None:
+    """A way runs on past its root, 1 cm beside it: the strand leaves the root at half a right
+    angle, not square to the way; the place that it was led to is still covered."""
+    roots = scalp_roots(ball_head()).positions[:1]
+    shares = np.linspace(0, 1, 41, dtype=np.float32)[:, None]
+    beside, along = np.array([0.01, 0, 0], np.float32), np.array([0, 0.04, 0], np.float32)
+    back = (roots + beside + along * (1 - shares))[None]
+    ahead = (roots + beside + along * (1 + shares))[None]
+    strands = Strands(np.repeat(roots, 41, axis=0), np.array([0, 41]))
+    led = lead_to_roots(strands, roots, back, ahead).points
+    steps = np.diff(led, axis=0)
+    steps /= np.linalg.norm(steps, axis=1, keepdims=True)
+    assert (steps[1:] * steps[:-1]).sum(axis=1).min() > np.cos(np.radians(50))
+    assert np.linalg.norm(led - back[0, 0], axis=1).min() < 0.002
