@@ -1,4 +1,4 @@
-"""Picking: the guide point under the mouse, and the lock of hair grabbed around it."""
+"""Picking: the guide under the mouse, and the lock of hair grabbed around it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,14 @@ from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 
 PICK_RADIUS = 14.0
-"""Largest distance from the mouse at which a guide point is picked, pixels."""
+"""Largest distance from the mouse at which a guide is picked, pixels."""
 LOCK_RADIUS = 0.02
 """Strands within this distance of the picked point belong to the lock, metres."""
 DEPTH_PER_PIXEL = 1e-3
 """Metres of depth that a pixel of distance from the mouse counts for, so that the front wins."""
+
+PARTS = 8
+"""Parts of the segment between two points whose ends are looked at: guides have few points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,32 +60,54 @@ def nearest_point(camera: Camera, points: Float32Array, pixel: npt.ArrayLike) ->
     return int(near[np.argmin(cost)])
 
 
+def nearest_hair(
+    camera: Camera, points: Float32Array, offsets: Int64Array, pixel: npt.ArrayLike
+) -> tuple[int, Float32Array] | None:
+    """Return the guide point that is nearest to what is seen at a pixel, and that place (3,)."""
+    places, ends = _places_along(points, offsets)
+    picked = nearest_point(camera, places, pixel)
+    return None if picked is None else (int(ends[picked]), places[picked])
+
+
 def grab_lock(
     camera: Camera,
     points: Float32Array,
     offsets: Int64Array,
     pixel: npt.ArrayLike,
 ) -> GrabbedLock | None:
-    """Return the lock around the guide point at a pixel; None if there is no hair.
+    """Return the lock around the place of a guide at a pixel; None if there is no hair.
 
     It has one point for each strand, never one of the first two, which the scalp holds.
     """
-    picked = nearest_point(camera, points, pixel)
+    picked = nearest_hair(camera, points, offsets, pixel)
     if picked is None:
         return None
-    distance = np.linalg.norm(points - points[picked], axis=1)
-    distance[offsets[:-1]] = np.inf
-    distance[offsets[:-1] + 1] = np.inf
-    nearest = np.minimum.reduceat(distance, offsets[:-1])
-    owner = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-    held = np.flatnonzero((distance == nearest[owner]) & (distance < LOCK_RADIUS))
-    _, first = np.unique(owner[held], return_index=True)
-    held = held[first]
+    grab_point = picked[1].astype(np.float64)
+    places, ends = _places_along(points, offsets)
+    distance = np.linalg.norm(places - picked[1], axis=1)
+    fixed = np.zeros(len(points), bool)
+    fixed[offsets[:-1]] = fixed[offsets[:-1] + 1] = True
+    distance[fixed[ends]] = np.inf
+    starts = (offsets[:-1] - np.arange(len(offsets) - 1)) * (PARTS + 1)
+    nearest = np.minimum.reduceat(distance, starts)
+    owner = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(places)))
+    near = np.flatnonzero((distance == nearest[owner]) & (distance < LOCK_RADIUS))
+    _, first = np.unique(owner[near], return_index=True)
+    held = ends[near[first]]
     if not len(held):
         return None
-    grab_point = points[picked].astype(np.float64)
     depth = float(camera.depth(grab_point))
     return GrabbedLock(held, points[held] - grab_point, grab_point, depth)
+
+
+def _places_along(points: Float32Array, offsets: Int64Array) -> tuple[Float32Array, Int64Array]:
+    """Return places (N, 3) along the segments of strands, and the nearer end (N,) of each."""
+    first = np.delete(np.arange(len(points)), offsets[1:] - 1)
+    share = np.linspace(0, 1, PARTS + 1, dtype=np.float32)
+    way = points[first + 1] - points[first]
+    places = points[first][:, None] + share[:, None] * way[:, None]
+    ends = first[:, None] + (share >= 1 / 2)
+    return places.reshape(-1, 3), ends.ravel()
 
 
 def surface_point(camera: Camera, head: Head, pixel: npt.ArrayLike) -> Float64Array | None:

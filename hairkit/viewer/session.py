@@ -16,7 +16,7 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.manager import Manager
 from hairkit.simulation.simulator import Measures, Surroundings
 from hairkit.types.camera import Camera
-from hairkit.viewer.draw.hair_data import GuideSampler, HairBody, split_guides
+from hairkit.viewer.draw.hair_data import HairBody, choose_shares, sample_guides, split_guides
 from hairkit.viewer.head_adjustment import EDGE, Adjustment, Rerun
 from hairkit.viewer.head_motion import HeadMotion
 from hairkit.viewer.layers import Layers
@@ -281,7 +281,7 @@ class Session:
     def guide_rows(self) -> Float32Array:
         """Return the present guides (G, m, 3), head frame, metres."""
         matrix = self.world_from_head.astype(np.float32)
-        rows = self._sampler(self.simulation.simulator.points)
+        rows = self.simulation.simulator.points.reshape(-1, len(self._shares), 3)
         return np.asarray((rows - matrix[:3, 3]) @ matrix[:3, :3], np.float32)
 
     def measures(self) -> Measures:
@@ -297,7 +297,10 @@ class Session:
     def _take(self, opened: Opened) -> None:
         self._guides, self._own = split_guides(opened.groom)
         self.opened = opened
-        self.simulation = TunableSimulator(self.manager, self._guides, self._simulator)
+        self._shares = choose_shares(self._guides.strands)
+        strands = sample_guides(self._guides.strands, self._shares)  # no more than is drawn
+        drawn = replace(self._guides, strands=strands)
+        self.simulation = TunableSimulator(self.manager, drawn, self._simulator)
         self.motion = HeadMotion(opened.groom.head.joints[1].astype(np.float64))
         self.adjustment, self.adjusted = None, None
         self.layers = Layers(self.manager, opened.results, self._capture)
@@ -306,11 +309,8 @@ class Session:
         self._make_body()
 
     def _make_body(self) -> None:
-        strands = self.simulation.simulator.strands
-        hairs = max(self.shown.hairs, len(strands))
-        moving = replace(self._guides, strands=strands)
-        self.body = HairBody.of(moving, hairs, self._own, self.seed)
-        self._sampler = GuideSampler(strands, self.body.shares)
+        hairs = max(self.shown.hairs, len(self._guides.strands))
+        self.body = HairBody.of(self._guides, hairs, self._own, self.seed, self._shares)
 
 
 def fit_camera(camera: Camera, width: int, height: int) -> Camera:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -10,9 +11,11 @@ import numpy as np
 import pytest
 
 from hairkit.errors import InputError, RenderError
+from hairkit.manager import Manager
 from hairkit.options import describe
 from hairkit.rendering import context
 from hairkit.rendering.context import renderer
+from hairkit.testing import bristle_groom
 from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import Recorder, free_name, write_png
@@ -108,6 +111,19 @@ def test_a_picture_is_one_step_at_most(session: Session, monkeypatch: pytest.Mon
     for _ in range(4):
         session.advance(1 / 10)
     assert steps[-1] == pytest.approx(TICK)
+
+
+def test_no_more_points_are_simulated_than_are_drawn(
+    swaying_manager: Manager, tmp_path: Path
+) -> None:
+    """Guides of hundreds of points are simulated with the few that pictures show."""
+    groom = bristle_groom()
+    replace(groom, strands=groom.strands.resampled(300)).save(tmp_path / "fine.npz")
+    session = Session(swaying_manager, tmp_path / "fine.npz", size=(160, 120), hairs=600)
+    body = session.body
+    assert len(session.simulation.simulator.points) == len(groom.strands) * body.points_each
+    assert body.points_each < 20
+    np.testing.assert_array_equal(session.guide_rows(), body.guide_rest)
 
 
 def test_without_a_simulator_hair_goes_rigidly_with_the_head(session: Session) -> None:

@@ -19,7 +19,7 @@ from hairkit.viewer.actions.registry import ACTIONS, action, bindings, check_val
 from hairkit.viewer.draw.colouring import COLOURINGS
 from hairkit.viewer.draw.hair_data import MAX_HAIRS
 from hairkit.viewer.head_motion import AXES, MAX_TURN, Shake
-from hairkit.viewer.picking import grab_lock, nearest_point, surface_point
+from hairkit.viewer.picking import grab_lock, nearest_hair, surface_point
 from hairkit.viewer.recording import Recorder, free_name
 from hairkit.viewer.session import MAX_TURBULENCE, MAX_WIND, Session
 
@@ -58,11 +58,11 @@ def zoom(session: Session, factor: float) -> None:
 def recentre(session: Session, x: float, y: float) -> None:
     """Orbit around the point under a pixel."""
     camera = session.camera()
-    points = session.simulation.simulator.points
-    picked = nearest_point(camera, points, (x, y))
-    point = points[picked] if picked is not None else None
-    if point is None:
-        point = surface_point(camera, session.opened.groom.head, (x, y))
+    simulator = session.simulation.simulator
+    picked = nearest_hair(camera, simulator.points, simulator.strands.offsets, (x, y))
+    point = (
+        surface_point(camera, session.opened.groom.head, (x, y)) if picked is None else picked[1]
+    )
     if point is not None:
         session.shown.through = None
         session.view = session.view.centred(point)
@@ -217,9 +217,9 @@ def release(session: Session) -> None:
 @action()
 def pick(session: Session, x: float, y: float) -> None:
     """Show the length and stretch of the guide under a pixel; none beside hair."""
-    simulator = session.simulation.simulator
-    picked = nearest_point(session.camera(), simulator.points, (x, y))
-    session.picked = None if picked is None else int(simulator.strands.strand_of_point[picked])
+    simulator, strands = session.simulation.simulator, session.simulation.simulator.strands
+    picked = nearest_hair(session.camera(), simulator.points, strands.offsets, (x, y))
+    session.picked = None if picked is None else int(strands.strand_of_point[picked[0]])
 
 
 @action(LEFT_BRACKET={"times": 0.8}, RIGHT_BRACKET={"times": 1.25})

@@ -24,7 +24,7 @@ from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.hair_gpu import HairPass
 from hairkit.viewer.draw.interface import HairDrawer, HairLook, HairScene, HairView
 from hairkit.viewer.draw.light_cpu import SoftLightPass
-from hairkit.viewer.draw.light_gpu import TURNS, LightPass
+from hairkit.viewer.draw.light_gpu import LightPass
 from hairkit.viewer.draw.lines import Billboard, BillboardPass, LineSet, draw_lines
 from hairkit.viewer.draw.meshes import SolidPass
 from hairkit.viewer.draw.studio import StudioPass
@@ -38,6 +38,8 @@ EDGE_SAMPLES = 4
 them than for the picture; there edges are smooth once the picture is refined."""
 FIXED_SOLIDS = ("torso",)
 """Meshes that do not move with the head."""
+DEPTH_STEP, DEPTH_MARGIN = 0.25, 0.025
+"""Metres: steps of the depth range, and what it has beyond the farthest point at least."""
 PULL = 0.002
 """Depth bias of overlaid lines, as a share of the depth range: skin does not hide them."""
 
@@ -108,7 +110,7 @@ class FrameRenderer:
         self._fresh = True
         self._studio = StudioPass(self.gl)
         self._backdrop_made: object = None
-        self._age = 0
+        self._scenery_made: object = None
 
     def release(self) -> None:
         """Free all GPU objects."""
@@ -182,42 +184,61 @@ class FrameRenderer:
         self.texture.write(opaque, viewport=(left, top, width, height))
 
     def _depth(self, inputs: FrameInputs, own: Camera) -> DepthRange:
-        """Return a depth range in coarse steps, so that frames can reuse the backdrop."""
+        """Return a depth range in coarse steps, so that frames can reuse the scenery."""
         middle, size = self._head_room
         off = self.cloud - middle.astype(np.float32)
         farthest = max(size, float(np.sqrt(np.einsum("pc,pc->p", off, off).max())))
         farthest = max([farthest, *(self._reaches[name] for name in inputs.solids)])
-        radius = np.ceil(farthest / 0.25 + 0.1) * 0.25 + (
-            0.6 if inputs.billboards or inputs.lines else 0
-        )
+        reach = farthest + DEPTH_MARGIN + (0.6 if inputs.billboards or inputs.lines else 0)
         centre = float(own.depth(middle))
-        return DepthRange(max(centre - radius, 0.01), centre + radius)
+        near, far = np.floor((centre - reach) / DEPTH_STEP), np.ceil((centre + reach) / DEPTH_STEP)
+        return DepthRange(max(DEPTH_STEP * float(near), 0.01), DEPTH_STEP * float(far))
 
     def _draw_backdrop(
         self, inputs: FrameInputs, own: Camera, depth: DepthRange, lighting: dict[str, Any]
     ) -> None:
-        """Draw studio and meshes if they changed, or every `TURNS` frames for the light on them."""
-        key = _backdrop_key(inputs, depth)
-        self._age += 1
-        if key == self._backdrop_made and self._age < TURNS and not inputs.whole_light:
+        """Draw scenery and meshes if they or the light changed."""
+        scenery = (self._light.shown, _scenery_key(inputs, depth))
+        key = (scenery, inputs.world_from_head.tobytes(), inputs.show_head, inputs.solids)
+        if key == self._backdrop_made:
             return
-        self._backdrop_made, self._age = key, 0
-        self._studio.draw(self._samples, inputs.camera, inputs.floor, inputs.backdrop)
-        self._sample_depths.clear(depth=1.0)
+        self._backdrop_made = key
+        fixed, moving = self._parts(inputs)
+        if scenery != self._scenery_made:
+            self._scenery_made = scenery
+            self._studio.draw(self._scenery, inputs.camera, inputs.floor, inputs.backdrop)
+            self._scenery_depths.clear(depth=1.0)
+            self._scenery.use()
+            self._draw_meshes(fixed, inputs, own, depth, lighting)
+        self.gl.context.copy_framebuffer(self._samples, self._scenery)
         self._samples.use()
-        self._draw_meshes(inputs, own, depth, lighting)
+        self._draw_meshes(moving, inputs, own, depth, lighting)
         if self._sample_buffers:
             self.gl.context.copy_framebuffer(self._backdrop, self._samples)  # averages the samples
 
+    def _parts(self, inputs: FrameInputs) -> tuple[list[SolidPass], list[SolidPass]]:
+        """Return the meshes of the scenery, which stay when the head moves, and the others.
+
+        Where light is diffused in skin, all are drawn at once and none belongs to the scenery.
+        """
+        fixed = [] if inputs.fine_skin else [n for n in inputs.solids if n in FIXED_SOLIDS]
+        head = [self._head] if inputs.show_head else []
+        moving = [self._solids[name] for name in inputs.solids if name not in fixed]
+        return [self._solids[name] for name in fixed], head + moving
+
     def _draw_meshes(
-        self, inputs: FrameInputs, own: Camera, depth: DepthRange, lighting: dict[str, Any]
+        self,
+        parts: list[SolidPass],
+        inputs: FrameInputs,
+        own: Camera,
+        depth: DepthRange,
+        lighting: dict[str, Any],
     ) -> None:
-        for name in FIXED_SOLIDS:
-            if name in inputs.solids:
+        """Draw meshes into the frame buffer in use."""
+        for part in parts:
+            if any(part is self._solids.get(name) for name in FIXED_SOLIDS):
                 head_from_world = inverse_motion(inputs.world_from_head)
-                self._solids[name].place(head_from_world @ inputs.world_from_torso)
-        parts = [self._head] if inputs.show_head else []
-        parts += [self._solids[name] for name in inputs.solids]
+                part.place(head_from_world @ inputs.world_from_torso)
         if inputs.fine_skin and parts:
             eye = {"u_eye": tuple(own.position.tolist())}
             solids, maps = [part.placed() for part in parts], [part.maps for part in parts]
@@ -265,19 +286,24 @@ class FrameRenderer:
             depth = context.depth_renderbuffer(size, samples=samples)
             self._sample_buffers = colour, depth
         self._samples = context.framebuffer([colour], depth)
-        self._sample_depths = context.framebuffer([], depth)
+        colour = context.renderbuffer(size, 4, samples=samples)
+        depth = context.depth_renderbuffer(size, samples=samples)
+        self._scenery_buffers = colour, depth
+        self._scenery = context.framebuffer([colour], depth)
+        self._scenery_depths = context.framebuffer([], depth)
         self.texture = context.texture(size, 4)
         self.framebuffer = context.framebuffer([self.texture])
         self._overlaid = context.framebuffer([self.texture], self._depth_texture)
         self._size = size
-        self._backdrop_made = None
+        self._backdrop_made = self._scenery_made = None
 
     def _release_targets(self) -> None:
         if self._size == (0, 0):
             return
         parts: list[Any] = [self.framebuffer, self._overlaid, self._backdrop, self._samples]
-        parts += [self._sample_depths, self.texture, self._backdrop_texture]
-        for part in [*parts, self._depth_texture, *self._sample_buffers]:
+        parts += [self._scenery, self._scenery_depths, *self._scenery_buffers]
+        parts += [self.texture, self._backdrop_texture, self._depth_texture]
+        for part in [*parts, *self._sample_buffers]:
             part.release()
         self._size = (0, 0)
 
@@ -303,14 +329,16 @@ def _hair_depth(camera: Camera, cloud: Float32Array) -> DepthRange:
     return DepthRange(float(depth.min()) - 0.005, float(depth.max()) + 0.005)
 
 
-def _backdrop_key(inputs: FrameInputs, depth: DepthRange) -> tuple[object, ...]:
+def _scenery_key(inputs: FrameInputs, depth: DepthRange) -> tuple[object, ...]:
+    """Return what studio and fixed meshes are drawn from."""
     camera = inputs.camera
     return (
         camera.camera_from_head.tobytes(),
         (camera.focal, camera.width, camera.height),
-        inputs.world_from_head.tobytes(),
         camera.centre.tobytes(),
-        (inputs.show_head, inputs.solids, inputs.floor, inputs.exposure),
+        inputs.world_from_torso.tobytes(),
+        tuple(name for name in inputs.solids if name in FIXED_SOLIDS),
+        (inputs.floor, inputs.exposure),
         (inputs.light_turn, inputs.backdrop, inputs.fine_skin),
         depth,
     )

@@ -108,7 +108,8 @@ class SoftHairPass:
         (x, y), (width, height) = self._frame[0].tolist(), self._frame[1].tolist()
         frame = (x, y, width, height)
         depth = scene.solids.read(frame, components=1, attachment=-1, alignment=1, dtype="f4")
-        solid = np.frombuffer(depth, np.float32).reshape(height, width)
+        solid = np.ascontiguousarray(np.frombuffer(depth, np.float32).reshape(height, width).T)
+        corner = self._frame[0].astype(np.float32)
         if self._sums.shape[1] < width * height:
             pixels = view.camera.width * view.camera.height
             self._sums = np.zeros((self._chunks, pixels, 4), np.float32)
@@ -127,6 +128,8 @@ class SoftHairPass:
             shading,
             scene.light.array,
             self._tones,
+            solid,
+            corner,
             self._looks,
             min_chunk=PIECE,
         )
@@ -141,7 +144,7 @@ class SoftHairPass:
             np.float32(look.times_wider),
             int(look.smooth),
             look.hairs,
-            self._frame[0].astype(np.float32),
+            corner,
             self._sums,
         )
         picture = np.empty((height, width, 4), np.uint8)

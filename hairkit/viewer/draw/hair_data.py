@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,9 +67,11 @@ class HairBody:
         hairs: int,
         own: Strands | None = None,
         seed: int = 0,
+        shares: Float64Array | None = None,
     ) -> HairBody:
         """Return `hairs` strands: the guides, then hair of `own` or, without it, interpolated hair.
 
+        They have points at `shares` of their length; None: at `choose_shares` of the guides.
         All strands of the groom are guides. After them the order is random, so that any first part
         covers the scalp evenly. Raises `InputError` if there are no guides or `hairs` is out of
         range.
@@ -79,8 +81,8 @@ class HairBody:
             raise InputError("the groom has 0 guides, expected at least 1")
         if not 0 <= hairs <= MAX_HAIRS:
             raise InputError(f"hairs is {hairs}, expected 0 to {MAX_HAIRS}")
-        shares = choose_shares(guides)
-        rest = GuideSampler(guides, shares)(guides.points)
+        shares = choose_shares(guides) if shares is None else shares
+        rest = sample_guides(guides, shares).points.reshape(len(guides), -1, 3)
         shape = _arrange_hair(groom, hairs, own, seed, shares)
         points, count = shape.reshape(-1, 3), len(shape)
         marked = np.arange(count) < len(guides)
@@ -93,18 +95,21 @@ class HairBody:
         return cls(guides, shares, rest, mix.guides, mix.weights, shape, widths)
 
 
-class GuideSampler:
-    """Resamples moving guides at shares (m,) of their arc length at rest."""
+def sample_guides(guides: Strands, shares: Float64Array) -> Strands:
+    """Return guides with the points that are drawn, at shares (m,) of their arc length."""
+    before, part = _places(guides, shares)
+    offsets = np.arange(len(guides) + 1) * len(shares)
+    points = _between(guides.points, before, part[..., None]).reshape(-1, 3)
+    widths = guides.widths
+    if widths is not None:
+        widths = _between(widths, before, part).ravel()
+    return replace(guides, points=points, offsets=offsets, widths=widths)
 
-    def __init__(self, guides: Strands, shares: Float64Array) -> None:
-        self.before, self.part = _places(guides, shares)
-        """(G, m) point before each sample, and (G, m, 1) fraction towards the next one."""
 
-    def __call__(self, points: Float32Array) -> Float32Array:
-        """Return the samples (G, m, 3) of points (P, 3)."""
-        low = points[self.before]
-        rows: Float32Array = low + (points[self.before + 1] - low) * self.part
-        return rows
+def _between(values: Float32Array, before: Int64Array, part: Float32Array) -> Float32Array:
+    low = values[before]
+    result: Float32Array = low + (values[before + 1] - low) * part
+    return result
 
 
 def split_guides(groom: Groom, most: int = MAX_GUIDES) -> tuple[Groom, Strands | None]:
@@ -169,16 +174,17 @@ def _sample_rows(fine: Float32Array, shares: Float64Array) -> Float32Array:
 
 
 def _places(guides: Strands, shares: Float64Array) -> tuple[Int64Array, Float32Array]:
+    """Return the point (G, m) before each sample, and the fraction (G, m) towards the next one."""
     arc = guides.arc_lengths()
     before = np.zeros((len(guides), len(shares)), np.int64)
-    part = np.zeros((len(guides), len(shares), 1), np.float32)
+    part = np.zeros((len(guides), len(shares)), np.float32)
     for index, low in enumerate(guides.offsets[:-1]):
         own = arc[low : guides.offsets[index + 1]]
         wanted = shares * own[-1]
         at = np.clip(np.searchsorted(own, wanted, side="right"), 1, len(own) - 1) - 1
         before[index] = low + at
         span = np.maximum(own[at + 1] - own[at], 1e-12)
-        part[index, :, 0] = np.clip((wanted - own[at]) / span, 0, 1)
+        part[index] = np.clip((wanted - own[at]) / span, 0, 1)
     return before, part
 
 

@@ -37,6 +37,8 @@ class LightVolume(ABC):
         self._cells: tuple[int, int, int] = (cells[0], cells[1], cells[2])
         self.texture = self._volume(4, "f2")
         """Transmittance towards key and rim light, visible share of the sky."""
+        self.shown = 0
+        """Number of volumes shown so far."""
         self._turn = 0
         self._lights: Lights | None = None
 
@@ -69,6 +71,7 @@ class LightVolume(ABC):
         self._turn += 1
         if self._turn == turns:
             self._show()
+            self.shown += 1
             self._turn = 0
 
     @abstractmethod

@@ -37,6 +37,8 @@ class SolidPass:
         )
         self._kept = contextlib.ExitStack()
         self.maps = self._kept.enter_context(upload_maps(gl, solid))
+        for texture in self.maps.values() if by_vertex else ():
+            texture.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)  # half the work
         """Its pictures on the GPU, by kind."""
 
     def place(self, matrix: Float64Array) -> None:

@@ -87,6 +87,14 @@ def pixels_per_metre(camera, depth):  # type: ignore[no-untyped-def] # pragma: n
     return camera[22] / max(depth, _CLOSE) if camera[23] > _HALF else camera[22]
 
 
+@inlined
+def behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return 1 if a mesh, `solid` (W, H), is nearer than a point in pixels of the frame; else 0."""
+    column = min(max(np.int64(x), 0), solid.shape[0] - 1)
+    row = min(max(np.int64(y), 0), solid.shape[1] - 1)
+    return 1 if depth > solid[column, row] else 0
+
+
 @shared
 def place_hair(  # type: ignore[no-untyped-def]
     first_chunk, last_chunk, guides, turns, followed, weights, offsets, widths, camera, slices,

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.viewer.draw.place_kernels import inlined, pixels_per_metre, shared
+from hairkit.viewer.draw.place_kernels import behind, inlined, pixels_per_metre, shared
 from hairkit.viewer.draw.shade_kernels import HIDDEN
 
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
@@ -25,10 +25,11 @@ def draw_hair(  # type: ignore[no-untyped-def]
     first_chunk, last_chunk, seen, looks, widths, solid, camera, wider, smooth, count,
     frame, sums,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Draw chunks of `count` strands into `sums` (chunks, at least H W, 4).
+    """Draw chunks of `count` strands into `sums` (chunks, at least W H, 4).
 
     `seen` comes from `place_hair`, `looks` from `shade_hair`; `frame` holds the lowest x and y of
-    the drawn part of the picture, and `solid` (H, W) its depth buffer.
+    the drawn part of the picture, and `solid` (W, H) its depth buffer. Both are stored column by
+    column: most hair hangs, so that a stroke's pixels lie side by side in memory.
     """
     chunks = sums.shape[0]
     for chunk in range(first_chunk, last_chunk):
@@ -57,8 +58,8 @@ def _stroke(  # type: ignore[no-untyped-def]
     """Draw the segment from point k - 1 to k."""
     ax, ay, az = seen[s, k - 1, 0] - frame[0], seen[s, k - 1, 1] - frame[1], seen[s, k - 1, 2]
     bx, by, bz = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
-    hidden = _time_debt(ax, ay, az, solid) + _time_debt(bx, by, bz, solid)
-    hidden += _time_debt(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid)
+    hidden = behind(ax, ay, az, solid) + behind(bx, by, bz, solid)
+    hidden += behind(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid)
     if hidden == 3:
         return
     steep = abs(by - ay) > abs(bx - ax)
@@ -68,9 +69,9 @@ def _stroke(  # type: ignore[no-untyped-def]
     if bx < ax:
         ax, ay, az, bx, by, bz = bx, by, bz, ax, ay, az
         begin, end = k, k - 1
-    high, wide = solid.shape
-    solids = solid.reshape(high * wide)
-    stride_x, stride_y, limit_x, limit_y = (wide, 1, high, wide) if steep else (1, wide, wide, high)
+    wide, high = solid.shape
+    solids = solid.reshape(wide * high)
+    stride_x, stride_y, limit_x, limit_y = (1, high, high, wide) if steep else (high, 1, wide, high)
     along, slope = bx - ax, by - ay
     across = min(width * np.sqrt(along * along + slope * slope) / max(along, _TINY), _WIDEST)
     pace = _ONE / max(along, _TINY)
@@ -127,21 +128,13 @@ def _add(sums, at, part, red, green, blue, weight):  # type: ignore[no-untyped-d
     sums[at, 3] += part * weight
 
 
-@inlined
-def _time_debt(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return 1 if a mesh is nearer than a point, given in pixels of the frame."""
-    column = min(max(np.int64(x), 0), solid.shape[1] - 1)
-    row = min(max(np.int64(y), 0), solid.shape[0] - 1)
-    return 1 if depth > solid[row, column] else 0
-
-
 @shared
 def resolve(first, last, sums, picture) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Convert the sums to rows of (H, W, 4) bytes, colour and opacity, and clear them."""
-    wide = picture.shape[1]
-    for y in range(first, last):
-        for x in range(wide):
-            at = y * wide + x
+    high, wide = picture.shape[:2]
+    for x in range(wide):
+        for y in range(first, last):
+            at = x * high + y
             red = green = blue = weight = _ZERO
             for chunk in range(sums.shape[0]):
                 red += sums[chunk, at, 0]

@@ -14,7 +14,7 @@ from hairkit.parallel import compiled_with
 from hairkit.rendering.light import Lights
 from hairkit.types.camera import Camera
 from hairkit.types.volume import VoxelGrid
-from hairkit.viewer.draw.place_kernels import TILE, inlined, shared
+from hairkit.viewer.draw.place_kernels import TILE, behind, inlined, shared
 
 LANES, FIELDS = 64, 14
 """Points shaded together, and values of each."""
@@ -73,35 +73,41 @@ def fibre_colours(
 
 @compiled_with(fastmath=True)
 def shade_hair(  # type: ignore[no-untyped-def]
-    first, last, seen, places, colours, random, opacity, slices, shading, light, tones, looks,
+    first, last, seen, places, colours, random, opacity, slices, shading, light, tones, solid,
+    frame, looks,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Write `looks` (S, m, 4) of some strands: colour, and transmittance towards the camera.
 
     `seen`, `places` and `opacity` come from `place_kernels`; `slices` are the nearest depth, slices
-    per metre and `HairLook.dimming`; `light` (Z, Y, X, 4) is the light volume. Points with a
-    transmittance up to `HIDDEN` are not shaded.
+    per metre and `HairLook.dimming`; `light` (Z, Y, X, 4) is the light volume; `solid` and `frame`
+    are those of `raster_kernels.draw_hair`. Points with a transmittance up to `HIDDEN` are not
+    shaded, and those of which both strokes are behind meshes get a transmittance of 0.
     """
     points = np.empty(FIELDS * LANES, np.float32)
     lit = np.empty(3 * LANES, np.float32)
     which = np.empty((LANES, 2), np.int64)
     _shade_chunk(
-        seen, places, colours, random, opacity, slices, shading, light, tones, first, last, looks,
-        points, lit, which,
+        seen, places, colours, random, opacity, slices, shading, light, tones, solid, frame,
+        first, last, looks, points, lit, which,
     )  # fmt: skip
 
 
 @shared
 def _shade_chunk(  # type: ignore[no-untyped-def]
-    seen, places, colours, random, opacity, slices, shading, light, tones, first, last, looks,
-    points, lit, which,
+    seen, places, colours, random, opacity, slices, shading, light, tones, solid, frame,
+    first, last, looks, points, lit, which,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Gather visible points, shade them in batches of `LANES`, and scatter the results."""
     waiting = 0
     for s in range(first, last):
         other = random[s] * _OTHER
         other -= np.floor(other)
+        covered = True
         for k in range(looks.shape[1]):
-            arriving = _visibility(seen, s, k, opacity, slices)
+            before, covered = covered, _stroke_behind(seen, s, k, solid, frame)
+            arriving = _ZERO
+            if not (before and covered):
+                arriving = _visibility(seen, s, k, opacity, slices)
             looks[s, k, 3] = arriving
             if arriving <= HIDDEN:
                 continue
@@ -112,6 +118,21 @@ def _shade_chunk(  # type: ignore[no-untyped-def]
                 _flush(points, shading, tones, lit, which, waiting, looks)
                 waiting = 0
     _flush(points, shading, tones, lit, which, waiting, looks)
+
+
+@inlined
+def _stroke_behind(seen, s, k, solid, frame):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return whether meshes are nearer than both ends and the middle of the stroke from point k.
+
+    There is none from the last point.
+    """
+    if k == seen.shape[1] - 1:
+        return True
+    ax, ay, az = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
+    bx, by, bz = seen[s, k + 1, 0] - frame[0], seen[s, k + 1, 1] - frame[1], seen[s, k + 1, 2]
+    if behind(ax, ay, az, solid) == 0 or behind(bx, by, bz, solid) == 0:
+        return False
+    return behind(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid) == 1
 
 
 @shared

@@ -244,12 +244,13 @@ def _guide_lines(session: Session) -> list[str]:
     if session.picked is None:
         return []
     strands, points = session.simulation.simulator.strands, session.simulation.simulator.points
+    counts = session.body.guides.counts
     low, high = strands.offsets[session.picked], strands.offsets[session.picked + 1]
     now = np.linalg.norm(np.diff(points[low:high], axis=0), axis=1).sum()
     rest = strands.lengths()[session.picked]
     root, tip = points[low], points[high - 1]
     return [
-        f"guide {session.picked}: {high - low} points, {1e3 * rest:.1f} mm,"
+        f"guide {session.picked}: {counts[session.picked]} points, {1e3 * rest:.1f} mm,"
         f" stretch {100 * (now / rest - 1):+.2f} %",
         f"root {_vector(root)}  tip {_vector(tip)} mm",
     ]

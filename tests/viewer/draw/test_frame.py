@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,10 +16,12 @@ from hairkit.testing import bristle_groom
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw import frame
 from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
+from hairkit.viewer.draw.hair_cpu import SoftHairPass
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import HairLook
 from hairkit.viewer.draw.light_gpu import TURNS
 from hairkit.viewer.draw.lines import LineSet
+from hairkit.viewer.draw.meshes import SolidPass
 from hairkit.viewer.head_motion import rotation_about
 
 GROOM = bristle_groom()
@@ -206,6 +209,56 @@ def test_light_made_in_turns_is_light_made_at_once(frame_renderer: FrameRenderer
         for _ in range(2 * TURNS + 1):
             in_turns = picture(frame_renderer, inputs(whole_light=False))
     assert np.abs(once.astype(int) - in_turns).max() <= 1
+
+
+def test_what_stays_is_drawn_again_with_new_light_only(
+    frame_renderer: FrameRenderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The torso is drawn once in `TURNS` pictures of a head that turns, and is where it was."""
+    below = replace(GROOM.head, vertices=GROOM.head.vertices - np.float32([0.05, 0.1, 0.0]))
+    count, draw = [0], SolidPass.draw
+    with renderer():
+        frame_renderer.upload_solid("torso", head_solid(below, GROOM.material))
+
+        def counted(part: SolidPass, *values: Any) -> None:
+            count[0] += part is frame_renderer._solids["torso"]
+            draw(part, *values)
+
+        monkeypatch.setattr(SolidPass, "draw", counted)
+        for turn in np.linspace(0.0, 0.3, 2 * TURNS):
+            pose = rotation_about((0, 1, 0), turn, np.zeros(3))
+            turned = inputs(whole_light=False, solids=("torso",), world_from_head=pose)
+            kept = picture(frame_renderer, turned)
+        assert 2 <= count[0] <= 3
+        frame_renderer._scenery_made = frame_renderer._backdrop_made = None
+        anew = picture(frame_renderer, replace(turned, same_light=True))
+    assert count[0] >= 3
+    assert changed(kept, anew).mean() < 0.01
+
+
+def test_hair_behind_meshes_is_not_shaded() -> None:
+    """Points are shaded where a stroke from them may be seen: of which an end or the middle is."""
+    with renderer() as gl:
+        frame_renderer = make_frame_renderer(gl, soft=True)
+        picture(frame_renderer, inputs())
+        hair = frame_renderer.hair
+        assert isinstance(hair, SoftHairPass)
+        looks, seen = hair._looks[: LOOK.hairs, :, 3], hair._seen[: LOOK.hairs]
+        data = frame_renderer._backdrop.read(components=1, attachment=-1, dtype="f4")
+        mesh = np.frombuffer(data, np.float32).reshape(CAMERA.height, CAMERA.width)
+        frame_renderer.release()
+
+    def behind(places: Float32Array) -> np.ndarray:
+        x, y = (np.clip(places[..., n].astype(int), 0, s) for n, s in ((0, 159), (1, 119)))
+        result: np.ndarray = places[..., 2] > mesh[y, x]
+        return result
+
+    ends = behind(seen)
+    strokes = ends[:, 1:] & ends[:, :-1] & behind((seen[:, 1:] + seen[:, :-1]) / 2)
+    hidden = np.pad(strokes, ((0, 0), (1, 0)), constant_values=True)
+    hidden &= np.pad(strokes, ((0, 0), (0, 1)), constant_values=True)
+    assert 0.2 < hidden.mean() < 0.8
+    assert ((looks == 0) == hidden).mean() > 0.999  # places are rounded otherwise here
 
 
 @pytest.mark.parametrize("place", [np.nan, np.inf, -np.inf, 1e30, -1e30])

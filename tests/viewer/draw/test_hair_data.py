@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,9 +14,9 @@ from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 from hairkit.viewer.draw.hair_data import (
     COUNTS,
-    GuideSampler,
     HairBody,
     choose_shares,
+    sample_guides,
     split_guides,
 )
 
@@ -53,12 +55,18 @@ def test_fewer_hairs_are_a_first_part_of_more_hairs_of_the_same_spread() -> None
     np.testing.assert_allclose(some.std(axis=0), roots.std(axis=0), atol=0.03)
 
 
-def test_sampling_keeps_roots_and_tips() -> None:
-    """Whatever the number of points, ends stay."""
-    groom = bristle_groom()
-    rows = GuideSampler(groom.strands, np.linspace(0, 1, 9) ** 1.5)(groom.strands.points)
-    np.testing.assert_allclose(rows[:, 0], groom.strands.roots, atol=1e-7)
-    np.testing.assert_allclose(rows[:, -1], groom.strands.tips, atol=1e-7)
+def test_sampled_guides_keep_roots_tips_and_widths() -> None:
+    """Whatever the number of points, ends stay, and a point's width goes with its place."""
+    bristles = bristle_groom().strands
+    strands = replace(bristles, widths=bristles.arc_lengths().astype(np.float32))
+    shares = np.linspace(0, 1, 9) ** 1.5
+    sampled = sample_guides(strands, shares)
+    assert (sampled.counts == 9).all()
+    np.testing.assert_allclose(sampled.roots, strands.roots, atol=1e-7)
+    np.testing.assert_allclose(sampled.tips, strands.tips, atol=1e-7)
+    assert sampled.widths is not None
+    wanted = shares * strands.lengths()[:, None]
+    np.testing.assert_allclose(sampled.widths.reshape(-1, 9), wanted, atol=1e-6)
 
 
 def test_straight_hair_needs_the_fewest_points_and_curls_more() -> None:
