@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,8 @@ Int32Array = npt.NDArray[np.int32]
 Int64Array = npt.NDArray[np.int64]
 UInt8Array = npt.NDArray[np.uint8]
 BoolArray = npt.NDArray[np.bool_]
+
+_Array = TypeVar("_Array", bound=npt.NDArray[Any])
 
 MAX_REACH = 1000.0
 """Metres from the origin that lengths and points of files may reach.
@@ -43,6 +45,12 @@ def frozen_array(
         )
     if array.base is not None or (array is value and array.flags.writeable):
         array = array.copy()
+    array.setflags(write=False)
+    return array
+
+
+def read_only(array: _Array) -> _Array:
+    """Return an array that nobody writes again, so that `frozen_array` need not copy it."""
     array.setflags(write=False)
     return array
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import io
 import math
 import os
 import stat
@@ -122,14 +121,16 @@ def write_npz(
         False does not wait for the disk: a power failure, not a crash, may lose the file.
     """
     method = zipfile.ZIP_DEFLATED if packed else zipfile.ZIP_STORED
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", method, compresslevel=1) as archive:
+    with (
+        replace_file(path, durable=durable) as part,
+        part.open("wb") as file,
+        zipfile.ZipFile(file, "w", method, compresslevel=1) as archive,
+    ):
         for name, array in arrays.items():
             info = zipfile.ZipInfo(name + ".npy", _EPOCH)
             info.compress_type = method
             with archive.open(info, "w", force_zip64=array.nbytes > 2**31) as member:
                 np.lib.format.write_array(member, np.asarray(array), allow_pickle=False)
-    write_bytes(path, buffer.getbuffer(), durable=durable)
 
 
 def open_file(path: str | os.PathLike[str]) -> BinaryIO:

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from hairkit.arrays import Float32Array
+from hairkit.arrays import Float32Array, read_only
 from hairkit.hookspecs import hookimpl
 from hairkit.imaging.masked_filters import (
     blur,
@@ -117,10 +117,10 @@ def orient(view: View, mask: Mask, options: Options) -> OrientationMap:
     vectors = _refine(levels, options)
     confidence = _confidence(vectors, levels[0].weight, options, scale)
 
-    angle_map, confidence_map = np.zeros((2, *hair.shape), np.float32)
+    angle_map, confidence_map = (np.zeros(hair.shape, np.float32) for _ in range(2))
     angle_map[hair] = single_angle(_resize(vectors, core.shape)[hair[box]])
     confidence_map[hair] = _resize(confidence, core.shape)[hair[box]]
-    return OrientationMap(angle_map, confidence_map)
+    return OrientationMap(read_only(angle_map), read_only(confidence_map))
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,8 @@ STEEPEST_VIEW = 30.0
 """Degrees of elevation above which a view does not see hair hang upright."""
 CONTRAST_SCALE = 0.014
 """Gaussian over which brightness is brought to equal mean and contrast, metres."""
+BLUR_STEP = 4
+"""Pixels that are averaged to one before that Gaussian, which is five times as wide."""
 LEAST_CONTRAST = 1.0
 """Grey levels added to the standard deviation."""
 PITCH_PATCH, PITCH_STEP, PITCH_FILLED = (0.128, 0.064), 0.02, 0.85
@@ -131,11 +133,16 @@ def _normalise(grey: Float32Array, hair: Float32Array) -> tuple[Float32Array, Fl
     Normalised convolution (Knutsson and Westin 1993) keeps the backdrop out of the averages.
     """
 
-    def average(values: Float32Array) -> Float32Array:
-        blurred = cv2.GaussianBlur(values * hair, (0, 0), CONTRAST_SCALE * RESOLUTION)
-        return np.asarray(blurred / known, np.float32)
+    def blur(values: Float32Array) -> Float32Array:
+        size = [max(1, edge // BLUR_STEP) for edge in hair.shape[::-1]]
+        small = cv2.resize(values, size, interpolation=cv2.INTER_AREA)
+        small = cv2.GaussianBlur(small, (0, 0), CONTRAST_SCALE * RESOLUTION / BLUR_STEP)
+        return np.asarray(cv2.resize(small, hair.shape[::-1]), np.float32)
 
-    known = np.maximum(cv2.GaussianBlur(hair, (0, 0), CONTRAST_SCALE * RESOLUTION), 1e-3)
+    def average(values: Float32Array) -> Float32Array:
+        return np.asarray(blur(values * hair) / known, np.float32)
+
+    known = np.maximum(blur(hair), 1e-3)
     centred = grey - average(grey)
     deviation = np.sqrt(np.maximum(average(centred**2), 0)) + LEAST_CONTRAST
     return np.asarray(centred / deviation * hair, np.float32), hair

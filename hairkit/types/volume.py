@@ -204,7 +204,21 @@ def outer_products(directions: npt.ArrayLike) -> Float64Array:
     return np.stack([d[..., i] * d[..., j] for i, j in TENSOR_INDICES], axis=-1)
 
 
-def cell_slopes(values: npt.NDArray[np.float32]) -> Float32Array:
-    """Return (X, Y, Z, 3) central differences of values (X, Y, Z), per cell."""
-    parts: Any = np.gradient(values)
-    return np.stack(list(parts), axis=-1).astype(np.float32)
+def cell_slopes(values: Float32Array, cells: BoolArray | None = None) -> Float32Array:
+    """Return (X, Y, Z, 3) central differences of values (X, Y, Z), per cell.
+
+    With `cells` (X, Y, Z), those of marked cells alone, (N, 3).
+    """
+    if cells is None:
+        parts: Any = np.gradient(values)
+        return np.stack(list(parts), axis=-1).astype(np.float32)
+    at = np.nonzero(cells)
+    result = np.empty((len(at[0]), 3), np.float32)
+    for axis in range(3):
+        after, before = ([*at], [*at])
+        after[axis] = np.minimum(at[axis] + 1, values.shape[axis] - 1)
+        before[axis] = np.maximum(at[axis] - 1, 0)
+        result[:, axis] = (values[tuple(after)] - values[tuple(before)]) / np.maximum(
+            after[axis] - before[axis], 1
+        )
+    return result

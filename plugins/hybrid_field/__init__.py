@@ -39,6 +39,7 @@ from hairkit import (
     Waves,
     hookimpl,
 )
+from hairkit.arrays import read_only
 from hairkit.field.growth_prior import (
     TIP_SHARE,
     ScalpPrior,
@@ -154,4 +155,6 @@ def solve_field(
     direction, outer = blend(hull, band, fields, options)
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
-    return OrientationField(hull.grid, outer, confidence, growth, direction, distance)
+    return OrientationField(
+        hull.grid, outer, read_only(confidence), read_only(growth), direction, read_only(distance)
+    )

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from hairkit import Head, Hull, Parting, Strands
-from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, read_only
 from hairkit.field.cell_shells import erode_cells
 from hairkit.field.diffusion import solve_screened
 from hairkit.field.growth_prior import combing_direction
@@ -54,7 +54,7 @@ class FieldOptions(Protocol):
 def surface_structure(hull: Hull, band: Band, tolerance: float) -> Float32Array:
     """Return S (N, 3) of the loose cells: the ribbons' tangents, spread by diffusion."""
     weight = np.where(band.cells[hull.loose], FIXED, 0).astype(np.float32)
-    data = band.direction[hull.loose].copy()
+    data = band.direction.copy()
     if not weight.any():
         return data
     return solve_screened(hull.loose, data, weight, 1.0, tolerance=tolerance)
@@ -70,7 +70,7 @@ def growth_direction(
     options: FieldOptions,
 ) -> Float32Array:
     """Return O (N, 3) of the loose cells: ribbons and the scalp prior, diffused as vectors."""
-    data = band.direction[hull.loose].copy()
+    data = band.direction.copy()
     weight = np.where(band.cells[hull.loose], FIXED, 0).astype(np.float32)
     near = (hull.head_distance[hull.loose] < options.scalp_reach) & (weight == 0)
     at = hull.grid.centres_of(hull.loose)[near]
@@ -89,7 +89,7 @@ def internal_direction(
 ) -> Float32Array:
     """Return V (N, 6) of the loose cells: `wanted` by `weight`, and ribbons, diffused."""
     on = band.cells[hull.loose]
-    tangent = band.direction[hull.loose][on].astype(np.float64)
+    tangent = band.direction[on].astype(np.float64)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
     data, total = wanted.copy(), weight.copy()
     total[on] += options.strand_weight
@@ -174,7 +174,7 @@ def blend(
     off = _distance_to(band.cells, hull.loose) * spacing
     main = smallest_eigenvectors(-fields.inner.astype(np.float64))[0]  # V's largest eigenvector
     main *= np.where((main * fields.growth).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
-    slope = cell_slopes(fields.distance)[hull.loose]
+    slope = cell_slopes(fields.distance, hull.loose)
     slope /= np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
     near_scalp = np.exp(-np.maximum(hull.head_distance[hull.loose], 0) / (SCALP_CELLS * spacing))
     a_s = options.surface * np.exp(-off / options.surface_reach)
@@ -186,7 +186,7 @@ def blend(
     direction[hull.loose] = _unit(mixed)
     tensor = np.zeros((*hull.grid.shape, 6), np.float32)
     tensor[hull.loose] = outer_products(direction[hull.loose])
-    return direction, tensor
+    return read_only(direction), read_only(tensor)
 
 
 def _distance_to(cells: BoolArray, around: BoolArray) -> Float32Array:

@@ -29,7 +29,7 @@ class Band:
     cells: BoolArray
     """(X, Y, Z) loose cells that a ribbon runs through."""
     direction: Float32Array
-    """(X, Y, Z, 3) mean signed tangent, not longer than 1; 0 elsewhere."""
+    """(N, 3) mean signed tangent of the loose cells, not longer than 1; 0 where none runs."""
 
 
 def ribbons(segments: Strands, hull: Hull, reach: float) -> Band:
@@ -52,8 +52,7 @@ def ribbons(segments: Strands, hull: Hull, reach: float) -> Band:
     on = weight > 0
     drawn = np.zeros(grid.shape, bool)
     drawn[hull.loose] = on
-    direction = np.zeros((*grid.shape, 3), np.float32)
-    direction[drawn] = total[on] / weight[on, None]
+    direction = (total / np.where(on, weight, 1.0)[:, None]).astype(np.float32)
     return Band(drawn, direction)
 
 

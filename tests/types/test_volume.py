@@ -14,6 +14,7 @@ from hairkit.errors import InputError
 from hairkit.types.volume import (
     TENSOR_INDICES,
     VoxelGrid,
+    cell_slopes,
     outer_products,
     symmetric_matrices,
 )
@@ -118,3 +119,14 @@ def test_fields_must_fit_their_grid() -> None:
     for name in ("tensor", "confidence", "growth"):
         with pytest.raises(InputError, match=name):
             replace(field, **{name: getattr(field, name)[1:]})
+
+
+def test_slopes_of_marked_cells_are_those_of_all_cells() -> None:
+    """At the grid's border as well, where differences are one-sided."""
+    rng = np.random.default_rng(2)
+    values = rng.normal(size=(4, 5, 3)).astype(np.float32)
+    marked = rng.random(values.shape) < 0.6
+    marked[0, 0, 0] = marked[-1, -1, -1] = True
+    np.testing.assert_allclose(
+        cell_slopes(values, marked), cell_slopes(values)[marked], rtol=1e-6, atol=1e-6
+    )
