@@ -150,12 +150,14 @@ def recorded(
         grow(style, default_head(), GUIDES).save(groom)
     session = Session(Manager.loaded(), groom, size=size, simulator=simulator, hairs=hairs)
     preview, frames = Preview(gl, session), []
-    perform(session, "layer", {"name": "torso"})
+    perform(session, "layer", {"name": "torso", "on": True})
     perform(session, "orbit", {"right": 15.0})
     for frame in range(round(SECONDS / FRAME)):
         motion(session, frame)
-        preview.frame(FRAME, still=True)
-        if frame % EVERY == 0:
+        if frame % EVERY:
+            session.advance(FRAME)
+        else:
+            preview.frame(FRAME, still=True)
             frames.append(preview.picture().copy())
     preview.release()
     return frames

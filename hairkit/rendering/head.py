@@ -64,6 +64,8 @@ class Solid:
     """(V, 2) texture coordinates."""
     maps: SkinMaps | None = None
     """Pictures of the surface; the colours are multiplied by the albedo."""
+    held: Float32Array | None = None
+    """(V,) share by which a vertex goes with what the mesh stands on: 1 at the end of a neck."""
 
 
 def head_solid(head: Head, material: HairMaterial) -> Solid:
@@ -75,7 +77,17 @@ def head_solid(head: Head, material: HairMaterial) -> Solid:
     if albedo is not None:
         colours = colours / skin  # the picture has the skin's colour
     normals = head.normals().astype(np.float32)
-    return Solid(head.vertices, head.faces, normals, colours, uv=head.uv, maps=head.maps)
+    return Solid(
+        head.vertices, head.faces, normals, colours, uv=head.uv, maps=head.maps, held=_neck(head)
+    )
+
+
+def _neck(head: Head) -> Float32Array:
+    """Return (V,) 1 at the lower joint of the neck and below, 0 at the upper one and above."""
+    low, high = head.joints[:2, 1]
+    share = np.clip((high - head.vertices[:, 1]) / max(float(high - low), 1e-6), 0.0, 1.0)
+    result: Float32Array = (share * share * (3 - 2 * share)).astype(np.float32)
+    return result
 
 
 def bust_solid(head: Head, strands: Strands | None = None) -> Solid | None:

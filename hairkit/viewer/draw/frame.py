@@ -234,11 +234,14 @@ class FrameRenderer:
         depth: DepthRange,
         lighting: dict[str, Any],
     ) -> None:
-        """Draw meshes into the frame buffer in use."""
+        """Draw meshes into the frame buffer in use; the neck bends between head and torso."""
+        fixed = [name for name in FIXED_SOLIDS if name in inputs.solids]
+        head_from_torso = inverse_motion(inputs.world_from_head) @ inputs.world_from_torso
         for part in parts:
-            if any(part is self._solids.get(name) for name in FIXED_SOLIDS):
-                head_from_world = inverse_motion(inputs.world_from_head)
-                part.place(head_from_world @ inputs.world_from_torso)
+            if part is self._head:
+                part.place(head_from_torso if fixed else np.eye(4))
+            elif any(part is self._solids[name] for name in fixed):
+                part.place(head_from_torso)
         if inputs.fine_skin and parts:
             eye = {"u_eye": tuple(own.position.tolist())}
             solids, maps = [part.placed() for part in parts], [part.maps for part in parts]

@@ -12,7 +12,7 @@ import numpy as np
 from hairkit.arrays import Float32Array
 from hairkit.parallel import parallel_for, thread_count
 from hairkit.rendering.context import Renderer
-from hairkit.rendering.gl_camera import clip_from_camera, set_uniforms
+from hairkit.rendering.gl_camera import NEAREST, clip_from_camera, set_uniforms
 from hairkit.rendering.hair import strand_numbers
 from hairkit.viewer.draw import place_kernels, raster_kernels, shade_kernels
 from hairkit.viewer.draw.hair_data import HairBody
@@ -38,11 +38,12 @@ class SoftHairPass:
         self._places = np.empty((count, points, 3), np.float32)
         self._seen = np.empty((count, points, 4), np.float32)
         self._looks = np.zeros((count, points, 4), np.float32)
+        self._reach = np.empty((count, 2), np.float32)
         self._random = np.asarray(strand_numbers(count), np.float32)
         self._rest = np.ascontiguousarray(body.guide_rest, np.float32)
         self._tones = shade_kernels.tone_table()
         self._chunks = min(thread_count(), MOST_CHUNKS)
-        self._sums = np.zeros((self._chunks, 0, 4), np.float32)
+        self._sums = np.zeros((0, 4), np.float32)
         self._colours: tuple[object, Float32Array] | None = None
         self._texture: moderngl.Texture | None = None
         lay = gl.program("viewer_screen", "viewer_composite")
@@ -110,9 +111,9 @@ class SoftHairPass:
         depth = scene.solids.read(frame, components=1, attachment=-1, alignment=1, dtype="f4")
         solid = np.ascontiguousarray(np.frombuffer(depth, np.float32).reshape(height, width).T)
         corner = self._frame[0].astype(np.float32)
-        if self._sums.shape[1] < width * height:
-            pixels = view.camera.width * view.camera.height
-            self._sums = np.zeros((self._chunks, pixels, 4), np.float32)
+        if len(self._sums) < width * height:
+            self._sums = np.zeros((view.camera.width * view.camera.height, 4), np.float32)
+        wider = np.float32(look.times_wider)
         shading = shade_kernels.pack_shading(
             view.camera, scene.lights, scene.light.grid, direction=look.by_direction
         )
@@ -130,18 +131,21 @@ class SoftHairPass:
             self._tones,
             solid,
             corner,
+            self._beside(view, float(wider)),
             self._looks,
+            self._reach,
             min_chunk=PIECE,
         )
         parallel_for(
             raster_kernels.draw_hair,
-            self._chunks,
+            -(-width // raster_kernels.STRIP),
             self._seen,
             self._looks,
+            self._reach,
             self.body.widths,
             solid,
             self._camera,
-            np.float32(look.times_wider),
+            wider,
             int(look.smooth),
             look.hairs,
             corner,
@@ -169,6 +173,14 @@ class SoftHairPass:
         set_uniforms(self._gl.program("viewer_screen", "viewer_composite"), u_hair=5)
         self._composite_quad.render(moderngl.TRIANGLES, vertices=3)
         target.scissor = (0, 0, *size)
+
+    def _beside(self, view: HairView, wider: float) -> np.float32:
+        """Return how far a stroke may reach beside its ends, pixels."""
+        scale = view.camera.focal
+        if view.camera.model == "perspective":
+            scale /= max(view.hair_depth.near, NEAREST)
+        widest = float(self.body.widths.max(initial=0.0)) * wider * scale
+        return np.float32(min(widest, raster_kernels.WIDEST) + 1)
 
     def _fibres(self, look: HairLook) -> Float32Array:
         key = (look.root_colour, look.tip_colour)

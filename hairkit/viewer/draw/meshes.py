@@ -9,7 +9,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from hairkit.arrays import Float64Array
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
 from hairkit.rendering.head import Solid, bind_maps, upload_maps
@@ -28,6 +28,9 @@ class SolidPass:
         values = np.concatenate([solid.vertices, solid.normals, solid.colours, uv], axis=1)
         self._values = np.ascontiguousarray(values, np.float32)
         self._placed = np.eye(4)
+        held = np.ones(len(solid.vertices), np.float32) if solid.held is None else solid.held
+        self._held = np.flatnonzero(held)
+        self._share = held[self._held, None]
         self._vertices = gl.context.buffer(self._values)
         self._faces = gl.context.buffer(np.ascontiguousarray(solid.faces, np.uint32))
         self._array = gl.context.vertex_array(
@@ -42,20 +45,27 @@ class SolidPass:
         """Its pictures on the GPU, by kind."""
 
     def place(self, matrix: Float64Array) -> None:
-        """Move the mesh by a rigid motion (4, 4) from its original pose."""
+        """Move the mesh by a rigid motion (4, 4) from its original pose, as far as it is `held`."""
         if np.array_equal(matrix, self._placed):
             return
         self._placed = matrix
-        solid, moved = self.placed(), self._values.copy()
-        moved[:, :3], moved[:, 3:6] = solid.vertices, solid.normals
+        moved = self._values.copy()
+        moved[self._held, :3], moved[self._held, 3:6] = self._motion()
         self._vertices.write(moved)
 
     def placed(self) -> Solid:
         """Return the mesh where it is now."""
+        vertices, normals = self.solid.vertices.copy(), self.solid.normals.copy()
+        vertices[self._held], normals[self._held] = self._motion()
+        return replace(self.solid, vertices=vertices, normals=normals)
+
+    def _motion(self) -> tuple[Float32Array, Float32Array]:
+        """Return positions and normals of the vertices that `place` moves."""
         matrix = self._placed.astype(np.float32)
-        turn = matrix[:3, :3].T
-        vertices = self.solid.vertices @ turn + matrix[:3, 3]
-        return replace(self.solid, vertices=vertices, normals=self.solid.normals @ turn)
+        place, normal = self.solid.vertices[self._held], self.solid.normals[self._held]
+        turn, share = matrix[:3, :3].T, self._share
+        place = place + share * (place @ turn + matrix[:3, 3] - place)
+        return place, normal + share * (normal @ turn - normal)
 
     def draw(
         self, camera: Camera, depth: DepthRange, push: float, lighting: dict[str, Any]

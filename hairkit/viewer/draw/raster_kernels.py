@@ -1,8 +1,8 @@
 """Rasterise hair into a weighted sum for each pixel: the compiled twin of viewer_raster.comp.
 
 A sum holds red, green and blue times the weight, and the weight: the coverage of the pixel times
-the transmittance of the hair before it. Each chunk has its own sums, which `resolve` adds in order,
-so that equal input gives equal pictures.
+the transmittance of the hair before it. Strips of columns are drawn apart, each on one thread, in
+the order of the strands, so that equal input gives equal pictures; the sums of a strip fit a cache.
 """
 
 from __future__ import annotations
@@ -14,48 +14,54 @@ import numpy as np
 from hairkit.viewer.draw.place_kernels import behind, inlined, pixels_per_metre, shared
 from hairkit.viewer.draw.shade_kernels import HIDDEN
 
+STRIP = 64
+"""Columns of a strip: 0.5 MB of sums where hair is 500 pixels high, as much as a core's cache."""
+WIDEST = 64.0
+"""Largest width of a stroke, pixels."""
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
-_WIDEST = np.float32(64)
+_WIDEST = np.float32(WIDEST)
 _TINY = np.float32(1e-6)
 _WHITE = np.float32(255)
 
 
 @shared
 def draw_hair(  # type: ignore[no-untyped-def]
-    first_chunk, last_chunk, seen, looks, widths, solid, camera, wider, smooth, count,
+    first_strip, last_strip, seen, looks, reach, widths, solid, camera, wider, smooth, count,
     frame, sums,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Draw chunks of `count` strands into `sums` (chunks, at least W H, 4).
+    """Draw strips of `count` strands into `sums` (at least W H, 4).
 
-    `seen` comes from `place_hair`, `looks` from `shade_hair`; `frame` holds the lowest x and y of
-    the drawn part of the picture, and `solid` (W, H) its depth buffer. Both are stored column by
-    column: most hair hangs, so that a stroke's pixels lie side by side in memory.
+    `seen` comes from `place_hair`, `looks` and `reach` from `shade_hair`; `frame` holds the least x
+    and y of the drawn part of the picture, and `solid` (W, H) its depth buffer. Both are stored
+    column by column: most hair hangs, so that a stroke's pixels lie side by side in memory.
     """
-    chunks = sums.shape[0]
-    for chunk in range(first_chunk, last_chunk):
-        first, last = count * chunk // chunks, count * (chunk + 1) // chunks
-        _draw_chunk(
-            seen, looks, widths, solid, camera, wider, smooth, first, last, frame,
-            sums[chunk],
-        )  # fmt: skip
+    for strip in range(first_strip, last_strip):
+        left, right = strip * STRIP, min((strip + 1) * STRIP, solid.shape[0])
+        for s in range(count):
+            if reach[s, 0] - frame[0] < right and reach[s, 1] - frame[0] >= left:
+                _draw_strand(
+                    seen, looks, widths, solid, camera, wider, smooth, s, frame, left, right, sums
+                )
 
 
 @shared
-def _draw_chunk(  # type: ignore[no-untyped-def]
-    seen, looks, widths, solid, camera, wider, smooth, first, last, frame, sums
+def _draw_strand(  # type: ignore[no-untyped-def]
+    seen, looks, widths, solid, camera, wider, smooth, s, frame, left, right, sums
 ) -> None:  # pragma: no cover - compiled
-    for s in range(first, last):
-        for k in range(1, seen.shape[1]):
-            if looks[s, k, 3] > HIDDEN and looks[s, k - 1, 3] > HIDDEN:
-                width = widths[s, k] * wider * pixels_per_metre(camera, seen[s, k, 3])
-                _stroke(seen, looks, s, k, width, smooth, solid, frame, sums)
+    """Draw the strokes of a strand in the columns `left` to before `right`."""
+    for k in range(1, seen.shape[1]):
+        if looks[s, k, 3] > HIDDEN and looks[s, k - 1, 3] > HIDDEN:
+            width = widths[s, k] * wider * pixels_per_metre(camera, seen[s, k, 3])
+            a, b, beside = seen[s, k - 1, 0] - frame[0], seen[s, k, 0] - frame[0], width + _ONE
+            if min(a, b) - beside < right and max(a, b) + beside >= left:
+                _stroke(seen, looks, s, k, width, smooth, solid, frame, left, right, sums)
 
 
 @shared
 def _stroke(  # type: ignore[no-untyped-def]
-    seen, looks, s, k, width, smooth, solid, frame, sums
+    seen, looks, s, k, width, smooth, solid, frame, left, right, sums
 ) -> None:  # pragma: no cover - compiled
-    """Draw the segment from point k - 1 to k."""
+    """Draw the segment from point k - 1 to k in some columns."""
     ax, ay, az = seen[s, k - 1, 0] - frame[0], seen[s, k - 1, 1] - frame[1], seen[s, k - 1, 2]
     bx, by, bz = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
     hidden = behind(ax, ay, az, solid) + behind(bx, by, bz, solid)
@@ -71,11 +77,13 @@ def _stroke(  # type: ignore[no-untyped-def]
         begin, end = k, k - 1
     wide, high = solid.shape
     solids = solid.reshape(wide * high)
-    stride_x, stride_y, limit_x, limit_y = (1, high, high, wide) if steep else (high, 1, wide, high)
+    stride_x, stride_y = (1, high) if steep else (high, 1)
+    least_x, limit_x = (0, high) if steep else (left, right)
+    least_y, limit_y = (left, right) if steep else (0, high)
     along, slope = bx - ax, by - ay
     across = min(width * np.sqrt(along * along + slope * slope) / max(along, _TINY), _WIDEST)
     pace = _ONE / max(along, _TINY)
-    x: Any = max(np.int64(np.ceil(ax - _HALF)), 0)
+    x: Any = max(np.int64(np.ceil(ax - _HALF)), least_x)
     last = min(np.int64(np.ceil(bx - _HALF)), limit_x)
     t = (np.float32(x) + _HALF - ax) * pace
     y, slope = ay + t * slope, slope * pace
@@ -91,17 +99,17 @@ def _stroke(  # type: ignore[no-untyped-def]
             low = np.int64(np.floor(y - _HALF))
             part = y - _HALF - np.float32(low)
             at = x * stride_x + low * stride_y
-            if 0 <= low < limit_y and (free or depth <= solids[at]):
+            if least_y <= low < limit_y and (free or depth <= solids[at]):
                 _add(sums, at, _ONE - part, red, green, blue, weight)
-            if -1 <= low < limit_y - 1 and (free or depth <= solids[at + stride_y]):
+            if least_y - 1 <= low < limit_y - 1 and (free or depth <= solids[at + stride_y]):
                 _add(sums, at + stride_y, part, red, green, blue, weight)
         elif narrow:
             low = np.int64(np.floor(y))
             at = x * stride_x + low * stride_y
-            if 0 <= low < limit_y and (free or depth <= solids[at]):
+            if least_y <= low < limit_y and (free or depth <= solids[at]):
                 _add(sums, at, _ONE, red, green, blue, weight)
         else:
-            first: Any = max(np.int64(np.floor(y - half)), 0)
+            first: Any = max(np.int64(np.floor(y - half)), least_y)
             top: Any = min(np.int64(np.floor(y + half)), limit_y - 1)
             for line in range(first, top + 1):
                 at = x * stride_x + line * stride_y
@@ -135,14 +143,8 @@ def resolve(first, last, sums, picture) -> None:  # type: ignore[no-untyped-def]
     for x in range(wide):
         for y in range(first, last):
             at = x * high + y
-            red = green = blue = weight = _ZERO
-            for chunk in range(sums.shape[0]):
-                red += sums[chunk, at, 0]
-                green += sums[chunk, at, 1]
-                blue += sums[chunk, at, 2]
-                weight += sums[chunk, at, 3]
-                sums[chunk, at, 0] = sums[chunk, at, 1] = _ZERO
-                sums[chunk, at, 2] = sums[chunk, at, 3] = _ZERO
+            red, green, blue, weight = sums[at, 0], sums[at, 1], sums[at, 2], sums[at, 3]
+            sums[at, 0] = sums[at, 1] = sums[at, 2] = sums[at, 3] = _ZERO
             share = _WHITE / max(weight, _TINY)
             picture[y, x, 0] = np.uint8(min(red * share + _HALF, _WHITE))
             picture[y, x, 1] = np.uint8(min(green * share + _HALF, _WHITE))

@@ -29,7 +29,7 @@ EYE, FORWARD, KEY, KEY_COLOUR, RIM, RIM_COLOUR, SKY, ORIGIN, PER_METRE, EXPOSURE
 """First index of each group of three values in `shading`; the last group is the exposure, whether
 the camera is perspective, and whether directions are shown."""
 _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
-_BOUNCED, _TINY = np.float32(0.35), np.float32(1e-20)
+_BOUNCED, _TINY, _FAR = np.float32(0.35), np.float32(1e-20), np.float32(1e9)
 _TILT, _ROUGHNESS = np.float32(0.0524), np.float32(0.14)
 _FRESNEL, _TT, _TRT = np.float32(0.0465), np.float32(0.09), np.float32(0.17)
 _OTHER, _JITTER = np.float32(61.8034), np.float32(0.12)
@@ -74,28 +74,29 @@ def fibre_colours(
 @compiled_with(fastmath=True)
 def shade_hair(  # type: ignore[no-untyped-def]
     first, last, seen, places, colours, random, opacity, slices, shading, light, tones, solid,
-    frame, looks,
+    frame, beside, looks, reach,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Write `looks` (S, m, 4) of some strands: colour, and transmittance towards the camera.
 
     `seen`, `places` and `opacity` come from `place_kernels`; `slices` are the nearest depth, slices
     per metre and `HairLook.dimming`; `light` (Z, Y, X, 4) is the light volume; `solid` and `frame`
     are those of `raster_kernels.draw_hair`. Points with a transmittance up to `HIDDEN` are not
-    shaded, and those of which both strokes are behind meshes get a transmittance of 0.
+    shaded, and those of which both strokes are behind meshes get a transmittance of 0. The columns
+    of the others and `beside` pixels on either side are in between `reach` (S, 2).
     """
     points = np.empty(FIELDS * LANES, np.float32)
     lit = np.empty(3 * LANES, np.float32)
     which = np.empty((LANES, 2), np.int64)
     _shade_chunk(
         seen, places, colours, random, opacity, slices, shading, light, tones, solid, frame,
-        first, last, looks, points, lit, which,
+        beside, first, last, looks, reach, points, lit, which,
     )  # fmt: skip
 
 
 @shared
 def _shade_chunk(  # type: ignore[no-untyped-def]
     seen, places, colours, random, opacity, slices, shading, light, tones, solid, frame,
-    first, last, looks, points, lit, which,
+    beside, first, last, looks, reach, points, lit, which,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Gather visible points, shade them in batches of `LANES`, and scatter the results."""
     waiting = 0
@@ -103,6 +104,7 @@ def _shade_chunk(  # type: ignore[no-untyped-def]
         other = random[s] * _OTHER
         other -= np.floor(other)
         covered = True
+        reach[s, 0], reach[s, 1] = _FAR, -_FAR
         for k in range(looks.shape[1]):
             before, covered = covered, _stroke_behind(seen, s, k, solid, frame)
             arriving = _ZERO
@@ -111,6 +113,8 @@ def _shade_chunk(  # type: ignore[no-untyped-def]
             looks[s, k, 3] = arriving
             if arriving <= HIDDEN:
                 continue
+            reach[s, 0] = min(reach[s, 0], seen[s, k, 0] - beside)
+            reach[s, 1] = max(reach[s, 1], seen[s, k, 0] + beside)
             _gather(places, colours, s, k, random[s], other, shading, light, points, waiting)
             which[waiting, 0], which[waiting, 1] = s, k
             waiting += 1

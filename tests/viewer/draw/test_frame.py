@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hairkit.arrays import Float32Array, UInt8Array
+from hairkit.head_model.template import default_head
 from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.head import head_solid
 from hairkit.testing import bristle_groom
@@ -234,6 +235,28 @@ def test_what_stays_is_drawn_again_with_new_light_only(
         anew = picture(frame_renderer, replace(turned, same_light=True))
     assert count[0] >= 3
     assert changed(kept, anew).mean() < 0.01
+
+
+def test_the_neck_ends_in_the_collar_of_a_head_that_nods() -> None:
+    """Its end goes with the torso, what is above its upper joint with the head, and it is whole."""
+    head = default_head()
+    nod = rotation_about((1, 0, 0), 0.4, head.joints[1].astype(np.float64))
+    with renderer() as gl:
+        part = SolidPass(gl, head_solid(head, GROOM.material))
+        part.place(np.linalg.inv(nod))
+        bent = part.placed()
+        part.release()
+    rest, y = head.vertices, head.vertices[:, 1]
+    above, below = y > head.joints[1, 1], y <= head.joints[0, 1]
+    np.testing.assert_array_equal(bent.vertices[above], rest[above])
+    in_world = bent.vertices @ nod[:3, :3].T + nod[:3, 3]
+    assert below.sum() > 10
+    np.testing.assert_allclose(in_world[below], rest[below], atol=1e-6)
+    edges = np.concatenate([head.faces[:, [0, 1]], head.faces[:, [1, 2]]])
+    was, now = (
+        np.linalg.norm(v[edges[:, 0]] - v[edges[:, 1]], axis=1) for v in (rest, bent.vertices)
+    )
+    assert (np.abs(now - was) < 0.01).all()
 
 
 def test_hair_behind_meshes_is_not_shaded() -> None:
