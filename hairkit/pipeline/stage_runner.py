@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import os
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -21,6 +19,7 @@ import scipy
 import hairkit
 from hairkit.errors import PluginError
 from hairkit.manager import Manager
+from hairkit.memory import give_back_memory
 from hairkit.pipeline.module_digest import module_digest
 from hairkit.pipeline.recipe import Recipe, Stage, stage_digest
 from hairkit.pipeline.run_log import RunLog
@@ -81,7 +80,7 @@ class StageRunner:
         ready, stage = _all_ready(arguments), self._stage(table)
         steps = self._steps_of(stage, 1, name or table)
         result = steps.run(0, kind, self._code(stage), "", ready)
-        _give_back_memory()
+        give_back_memory()
         return result
 
     def derive(
@@ -157,13 +156,6 @@ class StageRunner:
 
     def _code(self, stage: Stage) -> str:
         return stage_digest(self._manager, stage)
-
-
-def _give_back_memory() -> None:
-    """Let the C library return freed memory: glibc keeps up to 0.2 GB of a stage's work arrays."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
-    if trim is not None:
-        trim(0)
 
 
 class _Steps:
