@@ -79,12 +79,12 @@ def grab_lock(
 
     It has one point for each strand, never one of the first two, which the scalp holds.
     """
-    picked = nearest_hair(camera, points, offsets, pixel)
+    places, ends = _places_along(points, offsets)
+    picked = nearest_point(camera, places, pixel)
     if picked is None:
         return None
-    grab_point = picked[1].astype(np.float64)
-    places, ends = _places_along(points, offsets)
-    distance = np.linalg.norm(places - picked[1], axis=1)
+    grab_point = places[picked].astype(np.float64)
+    distance = np.linalg.norm(places - places[picked], axis=1)
     fixed = np.zeros(len(points), bool)
     fixed[offsets[:-1]] = fixed[offsets[:-1] + 1] = True
     distance[fixed[ends]] = np.inf

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -152,3 +153,16 @@ def test_a_head_without_maps_gets_one(painted: tuple[Capture, Scene, list[Mask]]
     maps = photograph_skin(capture, plain, masks)
     assert maps.albedo is not None
     assert maps.albedo.pixels.shape == (photo_skin.SIZE, photo_skin.SIZE, 3)
+
+
+def test_rows_enlarged_by_strips_are_those_enlarged_at_once() -> None:
+    """No seams: a strip knows the rows beside it."""
+    rng = np.random.default_rng(4)
+    picture = rng.random((photo_skin.COARSE, 9), dtype=np.float32)
+    strips = [
+        photo_skin._enlarge_rows(picture, top, min(top + 37, photo_skin.COARSE))
+        for top in range(0, photo_skin.COARSE, 37)
+    ]
+    times = photo_skin.SIZE // photo_skin.COARSE
+    whole = cv2.resize(picture, None, fx=times, fy=times, interpolation=cv2.INTER_LINEAR)
+    np.testing.assert_allclose(np.concatenate(strips), whole, atol=1e-6)

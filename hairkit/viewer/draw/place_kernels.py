@@ -88,7 +88,17 @@ def pixels_per_metre(camera, depth):  # type: ignore[no-untyped-def] # pragma: n
 
 
 @inlined
-def behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+def count_hidden(ax, ay, az, bx, by, bz, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return how many of a stroke's ends and its middle are behind meshes, 0 to 3.
+
+    Ends a and b in pixels of the frame and depth; `solid` (W, H) is the depth buffer of meshes.
+    """
+    hidden = _behind(ax, ay, az, solid) + _behind(bx, by, bz, solid)
+    return hidden + _behind(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid)
+
+
+@inlined
+def _behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
     """Return 1 if a mesh, `solid` (W, H), is nearer than a point in pixels of the frame; else 0."""
     column = min(max(np.int64(x), 0), solid.shape[0] - 1)
     row = min(max(np.int64(y), 0), solid.shape[1] - 1)

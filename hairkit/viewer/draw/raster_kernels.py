@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.viewer.draw.place_kernels import behind, inlined, pixels_per_metre, shared
+from hairkit.viewer.draw.place_kernels import count_hidden, inlined, pixels_per_metre, shared
 from hairkit.viewer.draw.shade_kernels import HIDDEN
 
 STRIP = 64
@@ -64,8 +64,7 @@ def _stroke(  # type: ignore[no-untyped-def]
     """Draw the segment from point k - 1 to k in some columns."""
     ax, ay, az = seen[s, k - 1, 0] - frame[0], seen[s, k - 1, 1] - frame[1], seen[s, k - 1, 2]
     bx, by, bz = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
-    hidden = behind(ax, ay, az, solid) + behind(bx, by, bz, solid)
-    hidden += behind(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid)
+    hidden = count_hidden(ax, ay, az, bx, by, bz, solid)
     if hidden == 3:
         return
     steep = abs(by - ay) > abs(bx - ax)

@@ -14,7 +14,7 @@ from hairkit.parallel import compiled_with
 from hairkit.rendering.light import Lights
 from hairkit.types.camera import Camera
 from hairkit.types.volume import VoxelGrid
-from hairkit.viewer.draw.place_kernels import TILE, behind, inlined, shared
+from hairkit.viewer.draw.place_kernels import TILE, count_hidden, inlined, shared
 
 LANES, FIELDS = 64, 14
 """Points shaded together, and values of each."""
@@ -134,9 +134,7 @@ def _stroke_behind(seen, s, k, solid, frame):  # type: ignore[no-untyped-def] # 
         return True
     ax, ay, az = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
     bx, by, bz = seen[s, k + 1, 0] - frame[0], seen[s, k + 1, 1] - frame[1], seen[s, k + 1, 2]
-    if behind(ax, ay, az, solid) == 0 or behind(bx, by, bz, solid) == 0:
-        return False
-    return behind(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid) == 1
+    return count_hidden(ax, ay, az, bx, by, bz, solid) == 3
 
 
 @shared
