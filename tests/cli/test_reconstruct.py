@@ -69,6 +69,8 @@ def test_results_on_stdout_progress_on_stderr(
     for name in ("groom.ball", "contact_sheet.png"):
         assert str(tmp_path / "out" / name) in printed.out
     told = [line.split()[0] for line in printed.err.splitlines()]
+    assert told.index("skin") < told.index("ball_plugin")
+    told.remove("skin")  # photographed beside hull, field and track, and may end after them
     assert told[told.index("track") + 1 :][:2] == ["ball_plugin", "sheet"]
     assert told[-1] in ("green", "amber", "red")
     assert "\nhealth: " in printed.out
