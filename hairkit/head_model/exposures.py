@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 
 GAIN_PRIOR = 0.05
 """Weight of the belief that a view needs no gain, in shares of a texel that two views share."""
@@ -15,7 +15,7 @@ FLOOR = 4.0
 
 
 def even_exposures(
-    colours: Sequence[Float32Array], weights: Sequence[Float32Array]
+    colours: Sequence[Float32Array | UInt8Array], weights: Sequence[Float32Array]
 ) -> Float64Array:
     """Return gains (V, 3) that make the colours of views agree where they overlap.
 

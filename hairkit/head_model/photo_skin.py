@@ -15,7 +15,7 @@ seen skin before (`hairkit.head_model.delighting`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import NamedTuple
@@ -43,8 +43,8 @@ SIZE = 2048
 """Edge of the albedo map, texels: 0.25 mm on the face."""
 COARSE = 512
 """Edge of the maps in which places, visibility and weights are found, texels."""
-STRIP = 32
-"""Rows of those maps whose details are taken from a photo at a time."""
+STRIP = 128
+"""Rows of the albedo map that are worked on at a time: a whole map of colours takes 50 MB."""
 TONE = 128
 """Edge of the map in which tones are extended over what no view sees, texels."""
 LEAST_FACING, WHOLE_FACING = 0.15, 0.8
@@ -103,8 +103,8 @@ class _Seen(NamedTuple):
     """(C, C) pixels of the photo, for `cv2.remap`."""
     row: Float32Array
     """(C, C)."""
-    coarse: Float32Array
-    """(C, C, 3) the photo's colours, 0 to 255."""
+    coarse: UInt8Array
+    """(C, C, 3) the photo's colours."""
 
 
 def photograph_skin(capture: Capture, scene: Scene, masks: Sequence[Mask]) -> SkinMaps:
@@ -124,9 +124,8 @@ def photograph_skin(capture: Capture, scene: Scene, masks: Sequence[Mask]) -> Sk
     blended = _delight(blended, seen, surface)
     if _is_symmetric(surface):
         blended, seen = _mirror(blended, seen)
-    albedo = _fill(blended, seen, surface, _own_skin(scene.head))
+    pixels = _fill(blended, seen, surface, _own_skin(scene.head))
     maps = scene.head.maps or SkinMaps()
-    pixels = np.rint(albedo, out=albedo).clip(0, 255, out=albedo).astype(np.uint8)
     if has_default_eyes(scene.head):
         pixels = paint_over(pixels, *find_eye_colours(capture.views, gains))
     return SkinMaps(Texture.encode(pixels, lossless=False), maps.roughness, maps.normal, maps.bump)
@@ -157,7 +156,8 @@ def _delight(blended: Float32Array, seen: Float32Array, surface: _Surface) -> Fl
     """Return the colours (S, S, 3), in their place, without the light of the photos."""
     coarse = _shrink(blended, COARSE)
     shading = find_shading(coarse, seen * _like_skin(coarse, seen), surface.normals)
-    blended /= _upsample(shading)[..., None]
+    for rows in _strips():
+        blended[rows] /= _enlarge_rows(shading, rows)[..., None]
     return blended
 
 
@@ -196,7 +196,7 @@ def _project(surface: _Surface, head: Head, camera: Camera, photo: UInt8Array, m
     column[surface.known], row[surface.known] = pixels.T
     usable = _usable(sized, mask, photo) * mark_beside_eyes(head, sized)
     weight *= cv2.remap(usable, column, row, cv2.INTER_LINEAR)
-    coarse = cv2.remap(photo, column, row, cv2.INTER_LINEAR).astype(np.float32)
+    coarse = np.asarray(cv2.remap(photo, column, row, cv2.INTER_LINEAR), np.uint8)
     return _Seen(weight, column, row, coarse)
 
 
@@ -242,7 +242,9 @@ def _blend(
     for view, photo, factor, low, share in zip(views, photos, factors, smooth, shares, strict=True):
         if share.any():
             _add_details(details, view, photo, factor, low, share)
-    details += _upsample(join_gradients(mean, smooth, shares))
+    coarse = join_gradients(mean, smooth, shares)
+    for rows in _strips():
+        details[rows] += _enlarge_rows(coarse, rows)
     return details, total
 
 
@@ -254,27 +256,36 @@ def _add_details(
     smooth: Float32Array,
     share: Float32Array,
 ) -> None:
-    """Add a view's share of the details, within the part of the map that it sees.
-
-    By `STRIP` rows at a time, which takes a tenth of the memory.
-    """
-    rows, columns = (np.flatnonzero(share.any(axis=axis)) for axis in (1, 0))
-    seen, times = slice(columns[0], columns[-1] + 1), SIZE // COARSE
-    for top in range(rows[0], rows[-1] + 1, STRIP):
-        bottom = min(top + STRIP, rows[-1] + 1)
+    """Add a view's share of the details, within the part of the map that it sees."""
+    times = SIZE // COARSE
+    first, last = np.flatnonzero(share.any(axis=1))[[0, -1]] * times
+    columns = np.flatnonzero(share.any(axis=0))
+    seen = slice(columns[0], columns[-1] + 1)
+    for rows in _strips(first, last + times):
         column, row, fine_share, fine_smooth = (
-            _enlarge_rows(each[:, seen], top, bottom)
-            for each in (view.column, view.row, share, smooth)
+            _enlarge_rows(each[:, seen], rows) for each in (view.column, view.row, share, smooth)
         )
         pixels = cv2.remap(photo, column, row, cv2.INTER_LINEAR) * gain
         pixels -= fine_smooth
         pixels *= fine_share[..., None]
-        details[top * times : bottom * times, seen.start * times : seen.stop * times] += pixels
+        details[rows, seen.start * times : seen.stop * times] += pixels
 
 
-def _enlarge_rows(picture: Float32Array, top: int, bottom: int) -> Float32Array:
-    """Return the rows from `top` to `bottom` at the size of the map, as if all were enlarged."""
-    times, first = SIZE // COARSE, max(top - 1, 0)
+def _strips(first: int = 0, last: int | None = None) -> Iterator[slice]:
+    """Yield slices of up to `STRIP` rows of the map, of those from `first` to `last`."""
+    last = SIZE if last is None else last
+    for top in range(first, last, STRIP):
+        yield slice(top, min(top + STRIP, last))
+
+
+def _enlarge_rows(picture: Float32Array, rows: slice) -> Float32Array:
+    """Return these rows of the map of a picture as high as a coarser map, as if all were enlarged.
+
+    Rows begin and end where those of the picture do.
+    """
+    times = SIZE // len(picture)
+    top, bottom = rows.start // times, rows.stop // times
+    first = max(top - 1, 0)
     part = picture[first : bottom + 1]
     larger = cv2.resize(part, None, fx=times, fy=times, interpolation=cv2.INTER_LINEAR)
     return np.asarray(larger[(top - first) * times : (bottom - first) * times], np.float32)
@@ -288,12 +299,9 @@ def _smooth(colours: Float32Array, weight: Float32Array) -> Float32Array:
     return np.asarray(blurred / np.maximum(share, LEAST)[..., None], np.float32)
 
 
-def _upsample(picture: Float32Array) -> Float32Array:
-    return np.asarray(cv2.resize(picture, (SIZE, SIZE), interpolation=cv2.INTER_LINEAR), np.float32)
-
-
-def _shrink(picture: Float32Array, edge: int) -> Float32Array:
-    shrunk = cv2.resize(picture, (edge, edge), interpolation=cv2.INTER_AREA)
+def _shrink(picture: Float32Array, width: int) -> Float32Array:
+    size = (width, len(picture) * width // picture.shape[1])
+    shrunk = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
     return np.asarray(shrunk, np.float32)
 
 
@@ -310,10 +318,11 @@ def _mirror(blended: Float32Array, seen: Float32Array) -> tuple[Float32Array, Fl
     other = seen[:, ::-1]
     lacking = _fade(seen < LEAST_SEEN)
     lacking = np.where(seen < LEAST_SEEN, 1.0, lacking) * (other >= LEAST_SEEN)
-    fine = _upsample(lacking.astype(np.float32))[..., None]
-    mirrored = blended[:, ::-1] - blended
-    mirrored *= fine
-    blended += mirrored
+    share = lacking.astype(np.float32)
+    for rows in _strips():
+        mirrored = blended[rows, ::-1] - blended[rows]
+        mirrored *= _enlarge_rows(share, rows)[..., None]
+        blended[rows] += mirrored
     return blended, np.maximum(seen, lacking * other).astype(np.float32)
 
 
@@ -323,22 +332,18 @@ def _fade(region: BoolArray) -> Float32Array:
     return np.asarray(np.clip(2 * blurred, 0, 1), np.float32)
 
 
-def _own_skin(head: Head) -> Float32Array:
-    """Return (S, S, 3) the head's own albedo, 0 to 255; grey without one."""
+def _own_skin(head: Head) -> UInt8Array:
+    """Return (S, S, 3) the head's own albedo; grey without one."""
     if head.maps is None or head.maps.albedo is None:
-        return np.full((SIZE, SIZE, 3), 128, np.float32)
+        return np.full((SIZE, SIZE, 3), 128, np.uint8)
     pixels = head.maps.albedo.pixels
-    resized = cv2.resize(pixels, (SIZE, SIZE), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(resized, np.float32)
+    return np.asarray(cv2.resize(pixels, (SIZE, SIZE), interpolation=cv2.INTER_LINEAR), np.uint8)
 
 
 def _fill(
-    blended: Float32Array, seen: Float32Array, surface: _Surface, own: Float32Array
-) -> Float32Array:
-    """Return (S, S, 3) the blended skin, and the head's own in the seen skin's tone elsewhere.
-
-    `blended` and `own` are used up.
-    """
+    blended: Float32Array, seen: Float32Array, surface: _Surface, own: UInt8Array
+) -> UInt8Array:
+    """Return (S, S, 3) the blended skin, and the head's own in the seen skin's tone elsewhere."""
     taken = (seen >= LEAST_SEEN) & surface.known
     if not taken.any():
         return own
@@ -346,22 +351,23 @@ def _fill(
     weight = _shrink(mask, TONE)
     small = _shrink(_shrink(blended, COARSE) * mask[..., None], TONE)
     small /= np.maximum(weight, LEAST)[..., None]
-    ratio = np.log(np.maximum(small, 0) + FLOOR) - np.log(_shrink(own, TONE) + FLOOR)
-    tone = extend(ratio, weight * _like_skin(small, weight) ** SURE_SKIN)
-    filled = _upsample(np.exp(tone))
-    own += FLOOR
-    filled *= own
-    filled -= FLOOR
-    del own
-    blended -= filled
-    blended *= _upsample(1 - _fade(~taken))[..., None]
-    filled += blended
+    own_tone = np.concatenate([_shrink(own[rows].astype(np.float32), TONE) for rows in _strips()])
+    ratio = np.log(np.maximum(small, 0) + FLOOR) - np.log(own_tone + FLOOR)
+    tone = np.exp(extend(ratio, weight * _like_skin(small, weight) ** SURE_SKIN))
+    share = 1 - _fade(~taken)
+    filled = np.empty_like(own)
+    for rows in _strips():
+        skin = _enlarge_rows(tone, rows)
+        skin *= own[rows] + np.float32(FLOOR)
+        skin -= FLOOR
+        skin += (blended[rows] - skin) * _enlarge_rows(share, rows)[..., None]
+        filled[rows] = np.rint(skin).clip(0, 255)
     return filled
 
 
-def _like_skin(colours: Float32Array, weight: Float32Array) -> Float32Array:
+def _like_skin(colours: Float32Array | UInt8Array, weight: Float32Array) -> Float32Array:
     """Return (T, T) how much colours are like most of the seen ones: collars are not skin."""
-    logs = np.log(np.maximum(colours, 0) + FLOOR)
+    logs = np.log(np.maximum(colours, 0) + np.float32(FLOOR))
     green = logs[..., 1:2]
     tones = np.concatenate([green, logs[..., :1] - green, logs[..., 2:] - green], axis=-1)
     sure = tones[weight > 0.5][::STEP]

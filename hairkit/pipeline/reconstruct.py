@@ -24,6 +24,7 @@ from hairkit.head_model.template import default_head
 from hairkit.imaging.waves import measure_waves
 from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
+from hairkit.memory import give_back_memory
 from hairkit.parallel import one_blas_thread, thread_count
 from hairkit.pipeline.find_skin import find_skin
 from hairkit.pipeline.find_views import find_views
@@ -165,6 +166,7 @@ def _run(
             pool.shutdown(wait=False, cancel_futures=True)
             raise
         work.flush()
+        give_back_memory()
         exports = export_paths(folder, recipe, manager)
         for name in (RECORD, SHEET):
             (folder / name).unlink(missing_ok=True)

@@ -14,7 +14,7 @@ from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.torso_shape import TorsoShape
 
-MAX_CELLS = 256**3
+MAX_CELLS = 400**3
 """Largest number of cells a grid may have."""
 
 

@@ -155,14 +155,11 @@ def test_a_head_without_maps_gets_one(painted: tuple[Capture, Scene, list[Mask]]
     assert maps.albedo.pixels.shape == (photo_skin.SIZE, photo_skin.SIZE, 3)
 
 
-def test_rows_enlarged_by_strips_are_those_enlarged_at_once() -> None:
+@pytest.mark.parametrize("edge", [photo_skin.COARSE, photo_skin.TONE])
+def test_rows_enlarged_by_strips_are_those_enlarged_at_once(edge: int) -> None:
     """No seams: a strip knows the rows beside it."""
-    rng = np.random.default_rng(4)
-    picture = rng.random((photo_skin.COARSE, 9), dtype=np.float32)
-    strips = [
-        photo_skin._enlarge_rows(picture, top, min(top + 37, photo_skin.COARSE))
-        for top in range(0, photo_skin.COARSE, 37)
-    ]
-    times = photo_skin.SIZE // photo_skin.COARSE
+    picture = np.random.default_rng(4).random((edge, 9), dtype=np.float32)
+    strips = [photo_skin._enlarge_rows(picture, rows) for rows in photo_skin._strips()]
+    times = photo_skin.SIZE // edge
     whole = cv2.resize(picture, None, fx=times, fy=times, interpolation=cv2.INTER_LINEAR)
     np.testing.assert_allclose(np.concatenate(strips), whole, atol=1e-6)
