@@ -129,7 +129,7 @@ def _grow(
 ) -> tuple[Float32Array, Int64Array]:
     """Return padded points (N, M, 3) and how many of each strand are real (N,), at least two."""
     step = options.step * field.grid.spacing
-    volumes = Volumes(field.grid.origin, field.grid.spacing, field.tensor, hull.dense)
+    volumes = Volumes(field.grid.origin, field.grid.spacing, field.tensors(), hull.dense)
     least = float(np.cos(np.radians(options.max_turn_deg)))
     rules = Rules(step, least, options.max_score, options.root_inertia)
     steps = max(int(options.max_length / step + _WHOLE), 1)

@@ -215,8 +215,9 @@ def _sign_directions(field: OrientationField) -> Float32Array:
     """Return the field's own signed direction, or its tensors' along the growth."""
     if field.direction is not None:
         return field.direction
-    known = np.abs(field.tensor).max(axis=3) > 0
-    main = np.linalg.eigh(symmetric_matrices(field.tensor[known]))[1][:, :, 2]
+    tensors = field.tensors()
+    known = np.abs(tensors).max(axis=3) > 0
+    main = np.linalg.eigh(symmetric_matrices(tensors[known]))[1][:, :, 2]
     slope = cell_slopes(field.growth, known)
     main *= np.where((main * slope).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     direction = np.zeros((*field.grid.shape, 3), np.float32)

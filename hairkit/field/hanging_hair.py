@@ -11,7 +11,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.field.growth_prior import WHORL_BEHIND
 from hairkit.types.head import Head
-from hairkit.types.volume import Hull, OrientationField, outer_products
+from hairkit.types.volume import Hull, OrientationField
 
 AWAY = 0.4
 """Part of the direction away from the whorl, against 1 straight down: 0.7 leaves F at 4 mm within 1
@@ -27,9 +27,8 @@ def hang_curls(head: Head, hull: Hull, growth: Float32Array) -> OrientationField
     cells = hull.loose
     axes = hanging_axes(head, hull.grid.centres_of(cells), hull.head_distance[cells])
     direction = np.zeros((*hull.grid.shape, 3), np.float32)
-    tensor = np.zeros((*hull.grid.shape, 6), np.float32)
-    direction[cells], tensor[cells] = axes, outer_products(axes)
-    return OrientationField(hull.grid, tensor, cells.astype(np.float32), growth, direction)
+    direction[cells] = axes
+    return OrientationField(hull.grid, None, cells.astype(np.float32), growth, direction)
 
 
 def hanging_axes(head: Head, points: Float32Array, height: Float32Array) -> Float64Array:

@@ -104,6 +104,7 @@ def _ways_to_tie(
     going = np.arange(len(roots))
     ring = tail.tie.centre.astype(np.float64)
     heading = np.zeros_like(roots)
+    tensors = field.tensors()
     for step in range(1, steps + 1):
         going = going[np.linalg.norm(at[going] - ring, axis=1) > TURN_IN]
         if not len(going):
@@ -111,8 +112,8 @@ def _ways_to_tie(
         p = at[going]
         outward = _outward(hull, p)
         goal = _unit(_tangent(ring - p, outward))
-        tensors = symmetric_matrices(hull.grid.sample(field.tensor, p + SKIN * outward))
-        measured = _unit(_tangent(np.einsum("nij,nj->ni", tensors, goal), outward))
+        around = symmetric_matrices(hull.grid.sample(tensors, p + SKIN * outward))
+        measured = _unit(_tangent(np.einsum("nij,nj->ni", around, goal), outward))
         wanted = _unit(goal + TRUST * (measured - goal))
         heading[going] = _unit(heading[going] + wanted)
         p = p + STEP * heading[going]

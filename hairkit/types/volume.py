@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -149,11 +149,12 @@ XX, YY, ZZ, XY, XZ, YZ = range(len(TENSOR_INDICES))
 
 @dataclass(frozen=True, eq=False)
 class OrientationField(Stored):
-    """Undirected 3D orientation in the hull as a symmetric tensor per cell, with confidence."""
+    """3D orientation in the hull: a symmetric tensor or a direction per cell, with confidence."""
 
     grid: VoxelGrid
-    tensor: Float32Array
-    """(X, Y, Z, 6) xx, yy, zz, xy, xz, yz; the strand runs along the main eigenvector."""
+    tensor: Float32Array | None
+    """(X, Y, Z, 6) xx, yy, zz, xy, xz, yz; the strand runs along the main eigenvector. None where
+    `direction` says all: `tensors()` returns either."""
     confidence: Float32Array
     """(X, Y, Z) in [0, 1]; 0 where nothing is known."""
     growth: Float32Array
@@ -174,9 +175,11 @@ class OrientationField(Stored):
                 self.internal_distance, np.float32, shape, "field internal_distance"
             )
             object.__setattr__(self, "internal_distance", inner)
-        object.__setattr__(
-            self, "tensor", frozen_array(self.tensor, np.float32, (*shape, 6), "field tensor")
-        )
+        if self.tensor is not None:
+            tensor = frozen_array(self.tensor, np.float32, (*shape, 6), "field tensor")
+            object.__setattr__(self, "tensor", tensor)
+        elif self.direction is None:
+            raise DataError("the field has neither tensor nor direction")
         confidence = frozen_array(self.confidence, np.float32, shape, "field confidence")
         if confidence.min() < 0 or confidence.max() > 1:
             raise DataError(
@@ -187,6 +190,21 @@ class OrientationField(Stored):
         object.__setattr__(
             self, "growth", frozen_array(self.growth, np.float32, shape, "field growth")
         )
+
+    def tensors(self) -> Float32Array:
+        """Return `tensor`, or d d^T (X, Y, Z, 6) of unit vectors d along `direction`.
+
+        Cells of no direction have a tensor of zeros.
+        """
+        if self.tensor is not None:
+            return self.tensor
+        direction = cast(Float32Array, self.direction)  # one of them is there
+        known = direction.any(axis=3)
+        along = direction[known]
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        tensor = np.zeros((*self.grid.shape, 6), np.float32)
+        tensor[known] = outer_products(along)
+        return tensor
 
 
 def symmetric_matrices(components: npt.ArrayLike) -> Float64Array:

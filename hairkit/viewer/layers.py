@@ -27,7 +27,7 @@ from hairkit.types.mask import HAIR, PERSON, Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import Scene
 from hairkit.types.turnaround import Turnaround
-from hairkit.types.volume import Hull, OrientationField, VoxelGrid
+from hairkit.types.volume import Hull, OrientationField, VoxelGrid, symmetric_matrices
 from hairkit.viewer.draw.lines import Billboard, LineSet
 
 BILLBOARDS = ("photos", "masks", "orientation")
@@ -133,9 +133,8 @@ class Layers:
             return None
         cells = np.argwhere(hull.dense & (field.confidence > 0))
         chosen = cells[np.linspace(0, len(cells) - 1, min(FIELD_LINES, len(cells))).astype(int)]
-        tensor = field.tensor[tuple(chosen.T)].astype(np.float64)
-        full = tensor[:, [0, 3, 4, 3, 1, 5, 4, 5, 2]].reshape(-1, 3, 3)
-        way = np.linalg.eigh(full)[1][:, :, 2]
+        tensors = field.tensors()[tuple(chosen.T)]
+        way = np.linalg.eigh(symmetric_matrices(tensors))[1][:, :, 2]
         middle = field.grid.origin + (chosen + 0.5) * field.grid.spacing
         half = FIELD_LINE_HALF * field.grid.spacing * way
         points = np.stack([middle - half, middle + half], axis=1).reshape(-1, 3)

@@ -152,9 +152,9 @@ def solve_field(
     distance = internal_distance(hull, segments, options.tolerance)
     surface = surface_structure(hull, band, options.tolerance)
     fields = Fields(surface, inner, distance, signs)
-    direction, outer = blend(hull, band, fields, options)
+    direction = blend(hull, band, fields, options)
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
     return OrientationField(
-        hull.grid, outer, read_only(confidence), read_only(growth), direction, read_only(distance)
+        hull.grid, None, read_only(confidence), read_only(growth), direction, read_only(distance)
     )

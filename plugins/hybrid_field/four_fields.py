@@ -162,10 +162,8 @@ class Fields:
     """O, (N, 3)."""
 
 
-def blend(
-    hull: Hull, band: Band, fields: Fields, options: FieldOptions
-) -> tuple[Float32Array, Float32Array]:
-    """Return H (X, Y, Z, 3) and its tensor (X, Y, Z, 6), both 0 outside the loose hull.
+def blend(hull: Hull, band: Band, fields: Fields, options: FieldOptions) -> Float32Array:
+    """Return H (X, Y, Z, 3), 0 outside the loose hull.
 
     The weights differ from cell to cell: S counts on strands, V away from them, grad(I) at the
     scalp, O a little everywhere. V takes its sign from O.
@@ -184,9 +182,7 @@ def blend(
     mixed += a_i[:, None] * slope + options.signed * _unit(fields.growth)
     direction = np.zeros((*hull.grid.shape, 3), np.float32)
     direction[hull.loose] = _unit(mixed)
-    tensor = np.zeros((*hull.grid.shape, 6), np.float32)
-    tensor[hull.loose] = outer_products(direction[hull.loose])
-    return read_only(direction), read_only(tensor)
+    return read_only(direction)
 
 
 def _distance_to(cells: BoolArray, around: BoolArray) -> Float32Array:

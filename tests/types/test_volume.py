@@ -95,10 +95,10 @@ def test_impossible_grids_are_refused(spacing: float, shape: tuple[int, ...]) ->
 
 
 def test_grids_too_large_for_a_laptop_are_refused() -> None:
-    """More than 256^3 cells are an error that names the cure, not a full memory."""
-    VoxelGrid(np.zeros(3), 1.0, (256, 256, 256))
+    """More than 400^3 cells are an error that names the cure, not a full memory."""
+    VoxelGrid(np.zeros(3), 1.0, (400, 400, 400))
     with pytest.raises(InputError, match="use a larger voxel size"):
-        VoxelGrid(np.zeros(3), 1.0, (257, 256, 256))
+        VoxelGrid(np.zeros(3), 1.0, (401, 400, 400))
     with pytest.raises(InputError, match="use a larger voxel size"):
         VoxelGrid.around(np.zeros(3), np.ones(3), 1e-9)
 
@@ -119,6 +119,23 @@ def test_fields_must_fit_their_grid() -> None:
     for name in ("tensor", "confidence", "growth"):
         with pytest.raises(InputError, match=name):
             replace(field, **{name: getattr(field, name)[1:]})
+    with pytest.raises(InputError, match="neither tensor nor direction"):
+        replace(field, tensor=None)
+
+
+def test_a_field_of_directions_has_their_tensors() -> None:
+    """Whatever their length, and zeros where there is none; given tensors are returned."""
+    field = testing.combed_field(testing.shell_hull(0.03).grid)
+    assert field.tensors() is field.tensor
+    direction = np.random.default_rng(7).normal(size=(*field.grid.shape, 3)).astype(np.float32)
+    direction[0] = 0.0
+    signed = replace(field, tensor=None, direction=direction)
+    tensors = symmetric_matrices(signed.tensors())
+    assert not tensors[0].any()
+    np.testing.assert_allclose(np.trace(tensors[1:], axis1=-2, axis2=-1), 1, atol=1e-6)
+    along = direction[1:] / np.linalg.norm(direction[1:], axis=-1, keepdims=True)
+    turned = np.einsum("...ij,...j->...i", tensors[1:], along)
+    np.testing.assert_allclose(turned, along, atol=1e-6)
 
 
 def test_slopes_of_marked_cells_are_those_of_all_cells() -> None:

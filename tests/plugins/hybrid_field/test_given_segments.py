@@ -100,7 +100,7 @@ def test_the_field_follows_given_segments_where_photos_are_wrong(tmp_path: Path)
             Parting(),
             replace(options, segments=given),
         )
-        errors.append(np.median(off_deg(main_directions(field.tensor[hull.dense]))))
+        errors.append(np.median(off_deg(main_directions(field.tensors()[hull.dense]))))
     assert errors[1] < 8 < 15 < errors[0]
 
 
