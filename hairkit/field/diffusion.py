@@ -8,24 +8,18 @@ a very large `c` makes a cell fixed.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
+from scipy.sparse import csr_matrix
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
+from hairkit.arrays import BoolArray, Float32Array, Int32Array
 from hairkit.errors import InputError
-from hairkit.parallel import compiled, parallel_for
 
-CHUNKS = 64
-"""Sums are taken over this many parts of the cells, whatever the number of threads."""
 COARSEST_CELLS = 4000
 """Below this many cells no coarser grid is made."""
 COARSE_TOLERANCE = 1e-2
 """Relative residual of the solution on a coarser grid: it is only a first guess."""
 NO_WEIGHT = 1e-30
 """Cells of less weight than this hold no data."""
-MIN_CELLS = 4096
-"""Least number of cells that are worth another thread."""
 
 
 def solve_screened(
@@ -65,17 +59,27 @@ def solve_screened(
     if not (weight > 0).any():
         raise InputError("diffusion needs at least one cell with a weight above 0")
     guess = start if start is not None else _coarse_guess(occupied, data, weight, smoothness)
+    system = diffusion_matrix(occupied, weight, smoothness)
+    columns = [
+        _conjugate_gradients(system, weight * column, start, tolerance, max_iterations)
+        for column, start in zip(data.T, np.array(guess.T, np.float32, order="C"), strict=True)
+    ]
+    return np.stack(columns, axis=1)
+
+
+def diffusion_matrix(occupied: BoolArray, weight: Float32Array, smoothness: float) -> csr_matrix:
+    """Return the matrix (N, N) `diag(c) + s L` of the linear system, float32."""
     neighbours = cell_neighbours(occupied)
-    weight = np.ascontiguousarray(weight, np.float32)
-    inverse = np.empty(count, np.float32)
-    _invert_diagonal(neighbours, weight, np.float32(smoothness), inverse)
-    return _conjugate_gradients(
-        _System(neighbours, weight, np.float32(smoothness), inverse),
-        np.ascontiguousarray(data, np.float32),
-        np.array(guess, np.float32, order="C"),
-        float(np.float32(tolerance)),
-        max_iterations,
-    )
+    count = len(neighbours)
+    there = neighbours >= 0
+    degree = np.count_nonzero(there, axis=1)
+    diagonal = weight + np.float32(smoothness) * degree.astype(np.float32)
+    columns = np.column_stack([neighbours, np.arange(count, dtype=np.int32)])
+    values = np.full(columns.shape, -smoothness, np.float32)
+    values[:, -1] = diagonal
+    kept = np.column_stack([there, np.ones(count, bool)])
+    starts = np.concatenate([[0], np.cumsum(degree + 1)]).astype(np.int32)
+    return csr_matrix((values[kept], columns[kept], starts), shape=(count, count))
 
 
 def _coarse_guess(
@@ -119,168 +123,39 @@ def cell_neighbours(occupied: BoolArray) -> Int32Array:
     return np.ascontiguousarray(np.stack(columns, axis=1))
 
 
-class _System(NamedTuple):
-    """The linear system `(diag(c) + s L) u = c d`."""
-
-    neighbours: Int32Array
-    """(N, 6) rows of the face neighbours, see `cell_neighbours`."""
-    weight: Float32Array
-    """(N,) `c`."""
-    smoothness: np.float32
-    """`s`."""
-    inverse: Float32Array
-    """(N,) inverse of the diagonal, the preconditioner."""
-
-
-class _Iterate(NamedTuple):
-    """State of the conjugate gradients, (N, C) each."""
-
-    solution: Float32Array
-    residual: Float32Array
-    direction: Float32Array
-    image: Float32Array
-    """The operator applied to the direction."""
-
-
 def _conjugate_gradients(
-    system: _System,
-    data: Float32Array,
-    guess: Float32Array,
+    system: csr_matrix,
+    right: Float32Array,
+    solution: Float32Array,
     tolerance: float,
     max_iterations: int,
 ) -> Float32Array:
-    """Return the solution (N, C) by Jacobi-preconditioned conjugate gradients from a guess.
+    """Return the solution (N,) by Jacobi-preconditioned conjugate gradients from a guess.
 
-    Each column is a problem of its own (Shewchuk 1994, algorithm B3); all take their steps
-    together. Sums are taken over a fixed number of chunks, so the result does not depend on the
-    number of threads.
+    Algorithm B3 of Shewchuk 1994. `scipy.sparse.linalg.cg` does the same, but ends by the residual
+    itself, see `solve_screened`.
     """
-    count, channels = data.shape
-    least = max(1, CHUNKS * MIN_CELLS // count)
-    now = _Iterate(guess, *(np.empty_like(guess) for _ in range(3)))
-    products, squares = np.zeros((CHUNKS, channels)), np.zeros((CHUNKS, channels))
-    parallel_for(_apply, CHUNKS, system, now.solution, now.image, products, min_chunk=least)
-    energy, size = np.zeros(channels), np.zeros(channels)
-    _begin(system, data, now, energy, size)
+    diagonal = system.diagonal()
+    inverse = np.asarray(1 / np.where(diagonal > 0, diagonal, 1), np.float32)
+    residual = right - system @ solution
+    scaled = inverse * residual
+    direction = scaled.copy()
+    energy = _product(residual, scaled)
+    enough = tolerance**2 * _product(inverse * right, inverse * right)
     for _ in range(max_iterations):
-        parallel_for(_apply, CHUNKS, system, now.direction, now.image, products, min_chunk=least)
-        step = _ratio(energy, products.sum(axis=0))
-        parallel_for(_advance, CHUNKS, system, now, step, squares, products, min_chunk=least)
-        if (squares.sum(axis=0) <= tolerance * tolerance * size).all():
+        if _product(scaled, scaled) <= enough:
             break
-        before, energy = energy, products.sum(axis=0)
-        turn = _ratio(energy, before)
-        parallel_for(_turn_direction, CHUNKS, system, now, turn, min_chunk=least)
-    return now.solution
+        image = system @ direction
+        step = np.float32(energy / _product(direction, image))
+        solution += step * direction
+        residual -= step * image
+        np.multiply(inverse, residual, out=scaled)
+        before, energy = energy, _product(residual, scaled)
+        direction *= np.float32(energy / before)
+        direction += scaled
+    return solution
 
 
-def _ratio(value: Float64Array, divisor: Float64Array) -> Float32Array:
-    """Return (C,) the quotients, 0 where the divisor is not positive."""
-    positive = np.where(divisor > 0, divisor, 1.0)
-    return np.where(divisor > 0, value / positive, 0.0).astype(np.float32)
-
-
-@compiled
-def _invert_diagonal(
-    neighbours: Int32Array, weight: Float32Array, smoothness: np.float32, inverse: Float32Array
-) -> None:
-    """Write the inverse of the operator's diagonal (N,), 1 where a cell is alone and unknown."""
-    for i in range(len(inverse)):
-        diagonal = weight[i]
-        for k in range(6):
-            if neighbours[i, k] >= 0:
-                diagonal += smoothness
-        inverse[i] = 1 / diagonal if diagonal > 0 else np.float32(1.0)
-
-
-@compiled
-def _chunk_of_cells(chunk: int, count: int) -> tuple[int, int]:
-    """Return the first cell of a chunk and the one after its last."""
-    size = (count + CHUNKS - 1) // CHUNKS
-    return chunk * size, min((chunk + 1) * size, count)
-
-
-@compiled
-def _apply(
-    first: int,
-    last: int,
-    system: _System,
-    values: Float32Array,
-    image: Float32Array,
-    products: Float64Array,
-) -> None:
-    """Write the operator's image (N, C) of values (N, C), and chunks' sums of values * image."""
-    count, channels = values.shape
-    for chunk in range(first, last):
-        products[chunk] = 0
-        begin, end = _chunk_of_cells(chunk, count)
-        for i in range(begin, end):
-            degree = system.weight[i]
-            for k in range(6):
-                if system.neighbours[i, k] >= 0:
-                    degree += system.smoothness
-            for c in range(channels):
-                image[i, c] = degree * values[i, c]
-            for k in range(6):
-                j = system.neighbours[i, k]
-                if j >= 0:
-                    for c in range(channels):
-                        image[i, c] -= system.smoothness * values[j, c]
-            for c in range(channels):
-                products[chunk, c] += values[i, c] * image[i, c]
-
-
-@compiled
-def _begin(
-    system: _System, data: Float32Array, now: _Iterate, energy: Float64Array, size: Float64Array
-) -> None:
-    """Write first residual and direction; sums of r^2 / diagonal and (right side / diagonal)^2."""
-    count, channels = data.shape
-    for i in range(count):
-        for c in range(channels):
-            b = system.weight[i] * data[i, c]
-            size[c] += (b * system.inverse[i]) ** 2
-            now.residual[i, c] = b - now.image[i, c]
-            now.direction[i, c] = system.inverse[i] * now.residual[i, c]
-            energy[c] += now.residual[i, c] * now.direction[i, c]
-
-
-@compiled
-def _advance(
-    first: int,
-    last: int,
-    system: _System,
-    now: _Iterate,
-    step: Float32Array,
-    squares: Float64Array,
-    products: Float64Array,
-) -> None:
-    """Step (C,) along the direction; write chunks' sums of (r / diagonal)^2 and r^2 / diagonal."""
-    count, channels = now.solution.shape
-    for chunk in range(first, last):
-        squares[chunk] = 0
-        products[chunk] = 0
-        begin, end = _chunk_of_cells(chunk, count)
-        for i in range(begin, end):
-            for c in range(channels):
-                now.solution[i, c] += step[c] * now.direction[i, c]
-                residual = now.residual[i, c] - step[c] * now.image[i, c]
-                now.residual[i, c] = residual
-                scaled = residual * system.inverse[i]
-                squares[chunk, c] += scaled * scaled
-                products[chunk, c] += residual * scaled
-
-
-@compiled
-def _turn_direction(
-    first: int, last: int, system: _System, now: _Iterate, turn: Float32Array
-) -> None:
-    """Make the directions conjugate: the preconditioned residual plus turn (C,) times the last."""
-    count, channels = now.direction.shape
-    for chunk in range(first, last):
-        begin, end = _chunk_of_cells(chunk, count)
-        for i in range(begin, end):
-            for c in range(channels):
-                now.direction[i, c] = (
-                    system.inverse[i] * now.residual[i, c] + turn[c] * now.direction[i, c]
-                )
+def _product(first: Float32Array, second: Float32Array) -> float:
+    """Return the scalar product of (N,), the same whatever the number of threads of BLAS."""
+    return float(np.einsum("n,n", first, second, dtype=np.float64))

@@ -86,7 +86,7 @@ def signed_distance(head: Surface, grid: VoxelGrid, band: float | None = None) -
     cell gets one of the feet by a separable transform (after Felzenszwalb and Huttenlocher 2012,
     with points in place of cells). Up to `band` metres from the surface (`None`: `BAND`) a walk
     along the surface then looks for the nearest foot, and the distance to its triangle is taken:
-    the error is 0.01 mm on average on a 3 mm grid and a fifth of a cell at most. Farther away,
+    the error is 0.01 mm on average on a 3 mm grid and a third of a cell at most. Farther away,
     distances are too large by up to half a cell.
     """
     vertices, faces = closed_surface(head)

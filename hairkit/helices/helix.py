@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from hairkit.arrays import Float64Array
 
@@ -67,11 +68,8 @@ def cross_matrix(vector: npt.ArrayLike) -> Float64Array:
 def rotation(vector: npt.ArrayLike) -> Float64Array:
     """Return (..., 3, 3) the rotation by |v| radians about v (Rodrigues)."""
     v = np.asarray(vector, np.float64)
-    sine, versine, _ = turn_coefficients(np.einsum("...i,...i->...", v, v))
-    turn = cross_matrix(v)
-    result: Float64Array = (
-        np.eye(3) + sine[..., None, None] * turn + versine[..., None, None] * (turn @ turn)
-    )
+    turns = Rotation.from_rotvec(v.reshape(-1, 3)).as_matrix()
+    result: Float64Array = turns.reshape(*v.shape, 3)
     return result
 
 

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from hairkit.arrays import Float64Array
 from hairkit.errors import DataError, FormatError, HairkitError
@@ -195,22 +196,12 @@ def node_matrix(node: dict[str, Any]) -> Float64Array:
     else:
         rotation = np.array(node.get("rotation", (0, 0, 0, 1)), np.float64)
         matrix = np.eye(4)
-        matrix[:3, :3] = rotations(rotation) * np.array(node.get("scale", (1, 1, 1)), np.float64)
+        turn = Rotation.from_quat(rotation).as_matrix()
+        matrix[:3, :3] = turn * np.array(node.get("scale", (1, 1, 1)), np.float64)
         matrix[:3, 3] = node.get("translation", (0, 0, 0))
     if not np.isfinite(matrix).all():
         raise ValueError("a node's transform is not finite")
     return matrix
-
-
-def rotations(quaternions: Float64Array) -> Float64Array:
-    """Return (..., 3, 3) rotations of unit quaternions (..., 4) in the order x, y, z, w."""
-    x, y, z, w = np.moveaxis(np.asarray(quaternions, np.float64), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _chunks(data: bytes) -> tuple[memoryview, memoryview | None]:

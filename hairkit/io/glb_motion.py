@@ -9,9 +9,10 @@ import os
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from hairkit.arrays import Float64Array, Int64Array
-from hairkit.io.glb_file import GlbFile, node_matrix, readable, rotations
+from hairkit.io.glb_file import GlbFile, node_matrix, readable
 
 RATE = 60.0
 """Samples a second."""
@@ -127,7 +128,8 @@ def _local(
         for name, rest in _REST.items()
     }
     matrices = np.tile(np.eye(4), (len(times), 1, 1))
-    matrices[:, :3, :3] = rotations(parts["rotation"]) * parts["scale"][:, None]
+    turns = Rotation.from_quat(parts["rotation"]).as_matrix()
+    matrices[:, :3, :3] = turns * parts["scale"][:, None]
     matrices[:, :3, 3] = parts["translation"]
     return matrices
 

@@ -16,7 +16,10 @@ from hairkit.cli import main as hairkit
 from hairkit.synth.foreign_heads import make_coarse_head
 
 PROJECT = Path(__file__).parents[2]
-SHARED = {"captures_argument", "example_textures", "plain_analogies", "random_hair", "xpbd_peer"}
+SHARED = {
+    "captures_argument", "example_textures", "peer_cases", "peer_surfaces", "peer_views",
+    "peer_volumes", "plain_analogies", "random_hair", "xpbd_peer",
+}  # fmt: skip
 """Modules that programs import."""
 PROGRAMS = sorted({path.stem for path in (PROJECT / "benchmarks").glob("*.py")} - SHARED)
 KNOWN_TURN = SimpleNamespace(
@@ -62,6 +65,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
     "skin": ({"HEIGHT": 120}, ["CAPTURES"]),
     "skin_looks": ({"HEIGHT": 80}, ["-o", "CAPTURES/looks_of_skin.jpg"]),
+    "peers": ({}, ["--rounds", "1", "--size", "0.02"]),
     "strokes": ({"STROKES": 1}, ["CAPTURES", "--tool", "brush"]),
     "studio": (
         {"GUIDES": 30},

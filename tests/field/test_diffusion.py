@@ -10,10 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hairkit import parallel
 from hairkit.arrays import BoolArray, Float32Array, Int32Array
 from hairkit.errors import InputError
-from hairkit.field import diffusion
 from hairkit.field.diffusion import cell_neighbours, solve_screened
 
 
@@ -136,18 +134,6 @@ def test_turning_the_block_turns_the_solution() -> None:
     result = np.zeros(occupied.shape, np.float32)
     result[occupied] = straight[:, 0]
     np.testing.assert_allclose(result.transpose(2, 0, 1)[turned], other[:, 0], atol=1e-3)
-
-
-def test_the_number_of_threads_does_not_change_a_byte(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One thread and three give the same result."""
-    occupied = porous((20, 21, 22), 0.8)
-    data, weight = problem(occupied, columns=6)
-    results = []
-    monkeypatch.setattr(diffusion, "MIN_CELLS", 100)
-    for threads in (1, 3):
-        monkeypatch.setattr(parallel, "thread_count", lambda threads=threads: threads)
-        results.append(solve_screened(occupied, data, weight, 0.4).tobytes())
-    assert results[0] == results[1]
 
 
 def test_a_good_start_needs_no_iteration_and_a_bad_one_no_luck() -> None:
