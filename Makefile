@@ -30,7 +30,7 @@ test-clients: $(VENV)/.tests $(CLIENTS)/.blender
 	@sh .ci/three $(CLIENTS)
 	$(BIN)/python -m pytest -n auto --dist worksteal tests/clients
 
-demo: $(VENV)/.hairkit $(VENV)/.models
+demo: $(VENV)/.kernels
 	$(BIN)/hairkit reconstruct hairkit/sample -o $(DEMO)
 	@echo "Your hair is in $(DEMO)/: look at $(DEMO)/contact_sheet.png, open groom.glb (head and"
 	@echo "hair) or groom.abc (strands) in Blender, groom.apx in HairWorks, or move it here:"
@@ -76,6 +76,13 @@ $(VENV)/.models: $(VENV)/.hairkit hairkit/nets/known_models.py
 	@if $(BIN)/hairkit models install >/dev/null; then touch $@; else \
 	  echo "the networks could not be installed: faces and persons are not found, and tests that" >&2; \
 	  echo "need networks are skipped; get them by hand: $(BIN)/hairkit models --help" >&2; fi
+
+# A part of the installation: the first reconstruction is then as fast as any other.
+$(VENV)/.kernels: $(VENV)/.models
+	@echo "compiling the kernels of a reconstruction, once on this machine"
+	@$(BIN)/hairkit reconstruct hairkit/sample -o $(VENV)/first --guides 50 --quiet
+	@rm -rf $(VENV)/first
+	@touch $@
 
 $(VENV)/.tests: $(VENV)/.hairkit $(wildcard $(EXAMPLE)/*.*)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'

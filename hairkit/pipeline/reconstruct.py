@@ -55,6 +55,8 @@ from hairkit.types.waves import Waves
 
 MAX_GUIDES = 100_000
 SHEET = "contact_sheet.png"
+THINNED = 320
+"""Least width of an orientation map that is kept for the contact sheet: two pixels a pixel."""
 """Name of the picture that shows the result of every stage."""
 _log = logging.getLogger("hairkit")
 
@@ -205,6 +207,7 @@ class _Made:
 
     masks: tuple[Mask, ...]
     orientations: tuple[OrientationMap, ...]
+    """Thinned, for the contact sheet."""
     hull: Hull
     scene: Scene
     parting: Parting
@@ -253,7 +256,7 @@ def _grow(
     strands = run.once("track", Strands, **seen, field=field, roots=roots)
     grown = replace(grown, maps=skin.result())
     labels = tuple(mask.result().value for mask in masks)
-    angles = tuple(orientation.result().value for orientation in orientations)
+    angles = tuple(_thinned(orientation.result().value) for orientation in orientations)
     groom = assemble_groom(
         capture.views, labels, grown, roots.value, strands.value, waves, tied, capture.chosen.hair
     )
@@ -262,6 +265,12 @@ def _grow(
         parting, tied,
     )  # fmt: skip
     return _Made(labels, angles, hull.value, scene.value, parting, groom, health)
+
+
+def _thinned(map_: OrientationMap) -> OrientationMap:
+    """Return every n-th pixel of a map, so that at least `THINNED` columns are left."""
+    every = max(map_.angle.shape[1] // THINNED, 1)
+    return OrientationMap(map_.angle[::every, ::every], map_.confidence[::every, ::every])
 
 
 def _measure(
