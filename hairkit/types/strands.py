@@ -108,17 +108,22 @@ class Strands(Previewed, Stored):
 
     def arc_lengths(self) -> Float64Array:
         """Return (P,) the distance of every point from its root along the strand, metres."""
-        step = np.zeros(len(self.points))
-        step[1:] = np.linalg.norm(np.diff(self.points.astype(np.float64), axis=0), axis=1)
-        step[self.offsets[:-1]] = 0
-        total = np.cumsum(step)
+        total = np.cumsum(self._steps())
         result: Float64Array = total - np.repeat(total[self.offsets[:-1]], self.counts)
         return result
 
     def lengths(self) -> Float64Array:
         """Return (S,) strand lengths, metres."""
-        result: Float64Array = self.arc_lengths()[self.offsets[1:] - 1]
+        result: Float64Array = np.add.reduceat(self._steps(), self.offsets[:-1])
         return result
+
+    def _steps(self) -> Float64Array:
+        """Return (P,) the distance of every point from the one before it, 0 at roots, metres."""
+        edges = np.diff(self.points.astype(np.float64), axis=0)
+        steps = np.zeros(len(self.points))
+        steps[1:] = np.sqrt(np.einsum("pk,pk->p", edges, edges))
+        steps[self.offsets[:-1]] = 0
+        return steps
 
     def tangents(self) -> Float32Array:
         """Return (P, 3) unit directions root to tip: forward differences, repeated at the tip."""
