@@ -107,21 +107,29 @@ class Options:
 def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
     """Carve the masks in a grid of `voxel_size` cells around the hair."""
     views = _Views.of(scene, masks, options)
-    box = _bounding_box(scene, views, options)
+    torso = _torso(scene, masks, options)
+    box = _bounding_box(scene, views, torso, options)
     grid = VoxelGrid.around(box[0], box[1], options.voxel_size)
     distance = signed_distance(scene.head, grid)
-    outside = distance > 0 if options.cut_head else np.ones(grid.shape, bool)
-    near = np.ones(grid.shape, bool)
-    torso = _torso(scene, masks, options)
+    outside, near = _room(grid, torso, options)
+    if options.cut_head:
+        outside &= distance > 0
     if torso is not None and grid.origin[1] < torso.top:
-        outside &= ~torso.inside(grid, options.body_depth)
-        above = grid.origin[1] + np.arange(grid.shape[1]) * grid.spacing > torso.top
-        near = torso.inside(grid, -LYING) | above[:, None]
         views = views.in_front_of(torso)
     loose, dense = _carve_both(grid, outside, near, views, options)
     scalp = _scalp_shell(scene, grid, distance) if options.cut_head else np.zeros(grid.shape, bool)
     shape = None if torso is None else torso.shape()
     return Hull(grid, dense, loose | dense | scalp, distance, shape)
+
+
+def _room(grid: VoxelGrid, torso: Torso | None, options: Options) -> tuple[BoolArray, BoolArray]:
+    """Return the cells (X, Y, Z) outside of the torso, and those near enough to the person."""
+    outside, near = np.ones(grid.shape, bool), np.ones(grid.shape, bool)
+    if torso is not None and grid.origin[1] < torso.top:
+        outside = ~torso.inside(grid, options.body_depth)
+        above = grid.origin[1] + np.arange(grid.shape[1]) * grid.spacing > torso.top
+        near = torso.inside(grid, -LYING) | above[:, None]
+    return outside, near
 
 
 def _torso(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Torso | None:
@@ -233,14 +241,16 @@ def _disc(radius: float) -> UInt8Array:
 
 
 def _bounding_box(
-    scene: Scene, views: _Views, options: Options
+    scene: Scene, views: _Views, torso: Torso | None, options: Options
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return the corners of the box that holds the hair, found on coarse cells."""
     low = scene.head.vertices.min(axis=0).astype(np.float64) - BELOW_HEAD
     high = scene.head.vertices.max(axis=0).astype(np.float64) + ABOVE_HEAD
     coarse = VoxelGrid.around(low, high, COARSE_CELLS * options.voxel_size)
-    everywhere = np.ones(coarse.shape, bool)
-    occupied = carve(coarse, everywhere, everywhere, views.loose(), _rule(options, views.forgive))
+    outside, near = _room(coarse, torso, options)
+    if torso is not None:
+        views = views.in_front_of(torso)
+    occupied = carve(coarse, outside, near, views.loose(), _rule(options, views.forgive))
     cells = np.argwhere(_largest_part(occupied))
     if not len(cells):
         raise InputError(

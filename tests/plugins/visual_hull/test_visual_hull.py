@@ -335,7 +335,7 @@ def test_the_finest_cells_allowed_fit_long_hair() -> None:
     """What can be judged before any stage runs is refused there: no allowed size is too fine."""
     (finest,) = (each.low for each in describe(Options) if each.name == "voxel_size")
     VoxelGrid.around([-0.225, -0.55, -0.225], [0.225, 0.1, 0.225], finest)
-    with pytest.raises(OptionError, match=r"voxel_size is '0\.001', expected a number from 0\.002"):
+    with pytest.raises(OptionError, match=r"'0\.001', expected a number from 0\.0015"):
         make_options(Options, {"voxel_size": "0.001"}, "visual_hull")
 
 
