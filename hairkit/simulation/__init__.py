@@ -12,6 +12,7 @@ The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)`
 * `running`: runs a simulator without a window
 * `simulator`: the protocol of all simulators
 * `ties`: which part of every strand its tie holds to the head
+* `vectors`: vectors and quaternions of numbers, for compiled code
 * `wind`: mean wind and gusts
 """
 

@@ -15,11 +15,11 @@ gravity. Despite the plugin's name this is not position-based dynamics.
 * `hair_grid`: hair-hair contact: density and velocity on a grid
 * `kernel_contact`: contact and friction, compiled
 * `kernels`: a substep, compiled
+* `lanes`: numbers, vectors and frames of the strands of a block
 * `linear_system`: the banded matrix of a substep
 * `reference`: a substep in NumPy float64, and energies
 * `resampling`: guides to rods, and what these can follow
 * `rods`: the discrete rod, its rest state, inverse statics
-* `simd`: vector registers as a Numba type, vectors and quaternions of them
 * `simulator`: the simulator
 """
 

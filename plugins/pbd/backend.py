@@ -18,10 +18,6 @@ from .kernels import run_substeps
 from .linear_system import System
 from .reference import Contact, Load, State, rest_state, substep, transform_points
 from .rods import Rods
-from .simd import LANES
-
-WORTH = 64 // LANES
-"""Blocks that are worth another thread's while."""
 
 
 class Engine:
@@ -74,23 +70,25 @@ class FastEngine(Engine):
     """Rods in blocks of lanes."""
 
     def __init__(self, rods: Rods, contact: Contact | None) -> None:
+        blocks = -(-len(rods.mass) // block.LANES)
+        self._planes = np.zeros((blocks, rods.nodes, block.PLANES, block.LANES), np.float32)
+        self.rows = np.moveaxis(self._planes[:, :, : block.CONSTANT], -1, 1)
         super().__init__(rods, contact)
         self._system: System | None = None
         self.mass = np.moveaxis(block.pack_lanes(rods.mass), -1, 1)
-        self.mass[-1, (len(rods.mass) - 1) % LANES + 1 :] = 0.0  # only fills the block
+        self.mass[-1, (len(rods.mass) - 1) % block.LANES + 1 :] = 0.0  # only fills the block
 
     def _keep(self, rows: Float64Array) -> None:
-        planes = sum(block.STATE.values()) - rows.shape[2]
-        self._packed_state = block.pack_lanes(np.pad(rows, ((0, 0), (0, 0), (0, planes))))
-        self.rows = np.moveaxis(self._packed_state, -1, 1)
+        self._planes[:, :, : block.CONSTANT] = 0.0
+        self._planes[:, :, : rows.shape[2]] = block.pack_lanes(rows)
 
     def run(self, system: System, loads: Sequence[Load]) -> None:
         """Do one substep for each load."""
         contact = self.contact
         if self._system is not system:
             nodes, metric = block.constants(self.rods, system, contact)
-            fields = block.records(block.pack_lanes(nodes), block.CONSTANTS)
-            self._system, self._packed = system, block.Packed(fields, block.pack_lanes(metric))
+            self._planes[:, :, block.CONSTANT :] = block.pack_lanes(nodes)
+            self._system, self._metric = system, block.pack_lanes(metric)
         settings = block.Settings(
             np.float32(system.step),
             np.float32(system.rates.damping),
@@ -98,17 +96,12 @@ class FastEngine(Engine):
             np.float32(0.0 if contact is None else contact.fastest),
             -1 if contact is None else contact.rounds,
         )
-        air, force = loads[0].air, loads[0].force
-        pushed = np.zeros((1, 1, 3)) if force is None else force / block.unit_mass(self.rods)
         parallel_for(
             run_substeps,
-            len(self._packed.nodes),
-            block.records(self._packed_state, block.STATE),
-            self._packed,
+            len(self._planes),
+            block.Packed(block.records(self._planes, block.NODE), self._metric),
             block.steps_of(loads, system.step),
-            block.pack_lanes(air if air.ndim > 1 else air[None, None]),
-            block.pack_lanes(pushed),
+            block.acting(self.rods, loads[0]),
             NO_FIELDS if contact is None else contact.bodies.fields,
             settings,
-            min_chunk=WORTH,
         )

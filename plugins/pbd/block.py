@@ -20,9 +20,11 @@ from hairkit.simulation import quaternion
 from .linear_system import System
 from .reference import Contact, Load, State, TorsoStep
 from .rods import Rods
-from .simd import LANES
 
 Records = npt.NDArray[np.void]
+LANES = 64
+"""Strands in a block. Compilers make vector instructions of loops over so many; shorter ones they
+unroll into instructions for single numbers."""
 
 STATE = {
     "place": 3, "room": 1, "speed": 3, "aside": 1, "gain": 3, "spare": 1, "frame": 4,
@@ -58,14 +60,18 @@ def lanes_of(fields: dict[str, int]) -> np.dtype[Any]:
     return np.dtype([(name, "f4", size) for name, size in sizes.items()])
 
 
-WORK = lanes_of(_WORK)
+NODE, WORK = lanes_of({**STATE, **CONSTANTS}), lanes_of(_WORK)
+CONSTANT, PLANES = sum(STATE.values()), sum(STATE.values()) + sum(CONSTANTS.values())
+"""Numbers of a node before those of `CONSTANTS`, and all."""
+ACTING = lanes_of({"air": 3, "force": 3})
+"""Of a node: velocity of the air, world; force over the rod's mean mass, head axes."""
 
 
 class Packed(NamedTuple):
-    """Constants of blocks."""
+    """Blocks of rods."""
 
     nodes: Records
-    """(B, n) of `CONSTANT`."""
+    """(B, n) of `NODE`."""
     metric: Float32Array
     """(B, n (n - 1) / 2, LANES) lower rows."""
 
@@ -129,6 +135,13 @@ def steps_of(loads: Sequence[Load], seconds: float) -> Records:
     return steps
 
 
+def acting(rods: Rods, load: Load) -> Records:
+    """Return (B or 1, n or 1) `ACTING` of a load."""
+    force = np.zeros(3) if load.force is None else load.force / unit_mass(rods)
+    both = np.concatenate(np.broadcast_arrays(load.air, force), axis=-1)
+    return records(pack_lanes(both if both.ndim > 1 else both[None, None]), ACTING)
+
+
 def drift_rows(head_step: Float64Array, seconds: float) -> Float64Array:
     """Return rows (3, 4) that map a point to the velocity of the head there, head axes, m/s."""
     result: Float64Array = (np.eye(4) - head_step)[:3] / seconds
@@ -164,6 +177,6 @@ def pack_lanes(values: npt.NDArray[np.floating[Any]]) -> Float32Array:
     return np.ascontiguousarray(np.moveaxis(spread, 1, -1))
 
 
-def records(values: Float32Array, fields: dict[str, int]) -> Records:
-    """Return packed values (B, n, k, LANES) as records (B, n) of these fields."""
-    return values.reshape(*values.shape[:2], -1).view(lanes_of(fields))[..., 0]
+def records(values: Float32Array, kind: np.dtype[Any]) -> Records:
+    """Return packed values (B, n, k, LANES) as records (B, n)."""
+    return values.reshape(*values.shape[:2], -1).view(kind)[..., 0]

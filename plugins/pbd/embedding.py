@@ -12,10 +12,10 @@ import numpy as np
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.parallel import compiled, parallel_for
 from hairkit.simulation.obstacle_kernels import NO_FIELDS, Drawn, draw_points
+from hairkit.simulation.vectors import Frame, Vector, inlined, minus, plus, rotate, times
 from hairkit.types.strands import Strands
 
 from .reference import Contact
-from .simd import Frame, Vector, cross, inlined, minus, plus, times
 
 WORTH = 256
 """Rods that are worth another thread's while."""
@@ -107,15 +107,6 @@ def measure_offsets(on: Embedding, position: Any, frames: Any, points: Float64Ar
 def in_block(values: Any, rod: int) -> Any:
     """Return a rod's values of (B, L, n, k)."""
     return values[rod // values.shape[1], rod % values.shape[1]]
-
-
-@inlined
-def rotate(q: Frame, v: Vector) -> Vector:
-    """Rotate a vector by a unit quaternion."""
-    axis = (q[1], q[2], q[3])
-    turn = cross(axis, v)
-    turn = plus(turn, turn)
-    return plus(plus(v, times(q[0], turn)), cross(axis, turn))
 
 
 @inlined

@@ -16,9 +16,10 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled_with, parallel_for
+from hairkit.simulation.vectors import ONE, inlined
 
 from .block import drift_rows
-from .simd import ONE, ZERO, inlined
+from .lanes import ZERO
 
 SPACING = 0.02
 """Edge of a cell, metres: several distances between guides."""

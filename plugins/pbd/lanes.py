@@ -1,0 +1,124 @@
+"""Numbers, vectors and quaternions of the strands of a block, and turns of frames, for kernels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+
+from hairkit.parallel import compiled_with
+from hairkit.simulation.vectors import (
+    ONE,
+    TWO,
+    Frame,
+    Rows,
+    Vector,
+    cross,
+    dot,
+    inlined,
+    minus,
+    plus,
+    product,
+    third_axis,
+    times,
+)
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+ZERO, HALF = np.float32(0), np.float32(0.5)
+THIRD, FIFTH, SEVENTH = np.float32(1 / 3), np.float32(1 / 5), np.float32(1 / 7)
+OPPOSITE = np.float32(1e-4)
+"""Least 1 + cosine between an axis and where it is swung to."""
+_A, _B, _C, _D, _E = (
+    np.float32(c) for c in (0.9998660, -0.3302995, 0.1801410, -0.0851330, 0.0208351)
+)
+_HALF_PI, _SMALL = np.float32(np.pi / 2), np.float32(0.04)
+
+
+def stage(function: _Function) -> _Function:
+    """Compile one step of the method for a block, by itself."""
+    return compiled_with(fastmath=True)(function)
+
+
+@inlined
+def three(field: Any, w: int) -> Vector:
+    """Return the vector of strand w in a field (3, LANES)."""
+    return field[0, w], field[1, w], field[2, w]
+
+
+@inlined
+def four(field: Any, w: int) -> Frame:
+    """Return the quaternion of strand w in a field (4, LANES)."""
+    return field[0, w], field[1, w], field[2, w], field[3, w]
+
+
+@inlined
+def put(field: Any, w: int, value: Any) -> None:
+    """Store a vector of strand w."""
+    field[0, w], field[1, w], field[2, w] = value[0], value[1], value[2]
+
+
+@inlined
+def put_four(field: Any, w: int, value: Frame) -> None:
+    """Store a quaternion of strand w."""
+    field[0, w], field[1, w], field[2, w], field[3, w] = value
+
+
+@inlined
+def rows_of(matrix: Any) -> Rows:
+    """Return (3, 4) as tuples, which stay in registers."""
+    return (
+        (matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3]),
+        (matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[1, 3]),
+        (matrix[2, 0], matrix[2, 1], matrix[2, 2], matrix[2, 3]),
+    )
+
+
+@inlined
+def swing_frame(q: Frame, way: Vector) -> Frame:
+    """Rotate a frame by the shortest arc that brings its third axis to `way`; normalise it."""
+    axis = third_axis(q)
+    about = cross(axis, way)
+    q = product((max(ONE + dot(axis, way), OPPOSITE), about[0], about[1], about[2]), q)
+    size = ONE / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return size * q[0], size * q[1], size * q[2], size * q[3]
+
+
+@inlined
+def half_way(a: Frame, b: Frame, v: Vector) -> tuple[Vector, Vector]:
+    """Return v rotated by the frame half way from a to b, and the axis of b a^-1 times the tangent
+    of a quarter of its angle.
+
+    The sum of two unit quaternions has the square 2 + 2 w, w their product.
+    """
+    w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    sign = -ONE if w < ZERO else ONE
+    over = ONE / (ONE + sign * w)
+    va, vb = (a[1], a[2], a[3]), (b[1], b[2], b[3])
+    axis = plus(va, times(sign, vb))
+    aside = cross(axis, v)
+    turn = plus(times(a[0] + sign * b[0], aside), cross(axis, aside))
+    vector = minus(minus(times(a[0], vb), times(b[0], va)), cross(vb, va))
+    return plus(v, times(over, turn)), times(sign * over, vector)
+
+
+@inlined
+def twist_angle(a: Frame, b: Frame) -> Any:
+    """Return twice the angle of (w, z) of a^-1 b: the twist between frames, radians.
+
+    The arc tangent's polynomial is off by at most 1e-5 (Abramowitz and Stegun 1964, 4.4.49); for
+    small twists it would be off by a share of 1.3e-4, so that there its series is taken.
+    """
+    w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+    z = a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0]
+    z, w = (-z if w < ZERO else z), abs(w)
+    size = abs(z)
+    t = min(size, w) / max(size, w)
+    s = t * t
+    wide = t * (_A + s * (_B + s * (_C + s * (_D + s * _E))))
+    small = t * (ONE - s * (THIRD - s * (FIFTH - s * SEVENTH)))
+    angle = small if s < _SMALL else wide
+    angle = TWO * (_HALF_PI - angle if w < size else angle)
+    return -angle if z < ZERO else angle
