@@ -23,7 +23,7 @@ Rows = tuple[Frame, Frame, Frame]
 """The upper rows of a rigid motion (4, 4)."""
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-ONE, TWO = np.float32(1), np.float32(2)
+ZERO, HALF, ONE, TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
 
 
 def inlined(function: _Function) -> _Function:

@@ -9,7 +9,9 @@ import numpy as np
 
 from hairkit.simulation.obstacle_kernels import distance_at
 from hairkit.simulation.vectors import (
+    HALF,
     ONE,
+    ZERO,
     Rows,
     Vector,
     dot,
@@ -21,7 +23,7 @@ from hairkit.simulation.vectors import (
 )
 
 from .block import LANES
-from .lanes import HALF, ZERO, put, rows_of, stage, three
+from .lanes import put, rows_of, stage, three
 from .reference import SOFTEST as SOFTEST64
 
 FAR = 1.0

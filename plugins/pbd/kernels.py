@@ -15,7 +15,9 @@ import numpy as np
 from hairkit.parallel import compiled_with
 from hairkit.simulation.obstacle_kernels import Fields
 from hairkit.simulation.vectors import (
+    HALF,
     ONE,
+    ZERO,
     cross,
     dot,
     inlined,
@@ -32,9 +34,7 @@ from .block import LANES, WORK, Packed, Records, Settings
 from .kernel_contact import resolve_contacts
 from .lanes import (
     FIFTH,
-    HALF,
     THIRD,
-    ZERO,
     four,
     half_way,
     put,

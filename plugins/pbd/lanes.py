@@ -12,6 +12,7 @@ from hairkit.parallel import compiled_with
 from hairkit.simulation.vectors import (
     ONE,
     TWO,
+    ZERO,
     Frame,
     Rows,
     Vector,
@@ -27,7 +28,6 @@ from hairkit.simulation.vectors import (
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
-ZERO, HALF = np.float32(0), np.float32(0.5)
 THIRD, FIFTH, SEVENTH = np.float32(1 / 3), np.float32(1 / 5), np.float32(1 / 7)
 OPPOSITE = np.float32(1e-4)
 """Least 1 + cosine between an axis and where it is swung to."""

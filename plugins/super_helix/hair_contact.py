@@ -12,13 +12,12 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled
+from hairkit.simulation.hair_cells import Cells, cell_of, spread_nodes
 
 CELL = 0.01
 """Edge of a cell in metres: about the width of a lock."""
 ROOM = 0.3
 """Metres around the hair at rest that the grid covers."""
-INSIDE = 1.001
-"""Cells between the last corner and the farthest point that is spread on it."""
 WIDEST = 256
 """Cells along an edge of the grid at most; points beyond are clamped to its border."""
 
@@ -30,12 +29,11 @@ class Neighbours:
         """Keep the density at rest: `rest` (E, NODES, 3) in the head frame."""
         self._masses = np.ascontiguousarray(masses.ravel())
         points = np.ascontiguousarray(rest.reshape(-1, 3))
-        self._low = points.min(axis=0) - ROOM if len(points) else np.zeros(3)
-        self._size = np.zeros(3, np.int64)
+        low, size = np.zeros(3), np.zeros(3, np.int64)
         if len(points):
-            wide = (points.max(axis=0) + ROOM - self._low) / CELL
-            self._size = np.minimum(wide, WIDEST).astype(np.int64) + 2
-        self._corners = np.zeros((*self._size, 4))
+            low = points.min(axis=0) - ROOM
+            size = np.minimum((points.max(axis=0) + ROOM - low) / CELL, WIDEST).astype(np.int64) + 2
+        self._cells, self._corners = Cells(low, 1 / CELL), np.zeros((*size, 4))
         found = self._around(points, np.zeros_like(points), 1.0)
         self._rest = found[:, 0]
         self._floor = float(np.median(self._rest)) if len(found) else 1.0
@@ -85,42 +83,17 @@ class Neighbours:
         """
         result = np.empty((len(points), 7))
         if len(points):
-            inside = np.clip(points, self._low, self._low + CELL * (self._size - INSIDE))
-            spread(inside, self._low, velocity, self._masses, self._corners)
-            gather(inside, self._low, self._corners, floor, result)
-            clear(inside, self._low, self._corners)
+            nodes = points[None, None], velocity[None, None], self._masses[None, None]
+            spread_nodes(0, 1, *nodes, np.zeros((3, 4)), self._cells, self._corners[None])
+            gather(points, self._cells, self._corners, floor, result)
+            clear(points, self._cells, self._corners)
         return result
-
-
-@compiled
-def spread(
-    points: Float64Array,
-    low: Float64Array,
-    velocity: Float64Array,
-    masses: Float64Array,
-    corners: Float64Array,
-) -> None:
-    """Add masses and momenta to the corners (X, Y, Z, 4) of the points' cells, trilinear."""
-    for p in range(len(points)):
-        x, y, z = (points[p] - low) / CELL
-        i, j, k = (
-            min(int(x), corners.shape[0] - 2),
-            min(int(y), corners.shape[1] - 2),
-            min(int(z), corners.shape[2] - 2),
-        )
-        u, v, w = min(x - i, 1.0), min(y - j, 1.0), min(z - k, 1.0)
-        for bit in range(8):
-            a, b, c = bit >> 2, bit >> 1 & 1, bit & 1
-            part = (u if a else 1 - u) * (v if b else 1 - v) * (w if c else 1 - w) * masses[p]
-            corners[i + a, j + b, k + c, 0] += part
-            for axis in range(3):
-                corners[i + a, j + b, k + c, 1 + axis] += part * velocity[p, axis]
 
 
 @compiled
 def gather(
     points: Float64Array,
-    low: Float64Array,
+    cells: Cells,
     corners: Float64Array,
     floor: float,
     result: Float64Array,
@@ -128,13 +101,7 @@ def gather(
     """Write density, mean velocity and the direction of falling density at the points."""
     value, slope = np.empty(4), np.empty(3)
     for p in range(len(points)):
-        x, y, z = (points[p] - low) / CELL
-        i, j, k = (
-            min(int(x), corners.shape[0] - 2),
-            min(int(y), corners.shape[1] - 2),
-            min(int(z), corners.shape[2] - 2),
-        )
-        u, v, w = min(x - i, 1.0), min(y - j, 1.0), min(z - k, 1.0)
+        i, j, k, (u, v, w) = cell_of(points[p], cells, corners)
         value[:], slope[:] = 0.0, 0.0
         for bit in range(8):
             a, b, c = bit >> 2, bit >> 1 & 1, bit & 1
@@ -153,13 +120,8 @@ def gather(
 
 
 @compiled
-def clear(points: Float64Array, low: Float64Array, corners: Float64Array) -> None:
+def clear(points: Float64Array, cells: Cells, corners: Float64Array) -> None:
     """Set the corners (X, Y, Z, 4) of the points' cells to 0: far fewer than the grid has."""
     for p in range(len(points)):
-        x, y, z = (points[p] - low) / CELL
-        i, j, k = (
-            min(int(x), corners.shape[0] - 2),
-            min(int(y), corners.shape[1] - 2),
-            min(int(z), corners.shape[2] - 2),
-        )
+        i, j, k, _ = cell_of(points[p], cells, corners)
         corners[i : i + 2, j : j + 2, k : k + 2] = 0.0
