@@ -198,56 +198,61 @@ def transport_frames(frames: Float64Array, direction: Float64Array) -> Float64Ar
     return quaternion.normalize(quaternion.product(turn, frames))
 
 
+def elements(
+    rods: Rods, frames: Float64Array, way: Float64Array
+) -> tuple[Float64Array, Float64Array, Float64Array, Float64Array]:
+    """Return the elements' turns and natural turns (S, n - 1, 3), torques, and frames' torques.
+
+    The turns are those between the segments `way` (S, n - 1, 3), over their lengths; the last are
+    the torques (S, n - 1, 3) that bending has on the segments' frames.
+    """
+    before, held = rods.before(frames), quaternion.third_axis(rods.root_frame)[:, None]
+    turn = way - np.concatenate([held, way[:, :-1]], axis=1)
+    natural = quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
+    torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
+    spun = rods.bend[..., None] * np.cross(natural, turn)
+    first, second = split_torque(before, frames, spun)
+    return turn, natural, torque, second + next_element(first)
+
+
 def relax_twist(rods: Rods, frames: Float64Array) -> Float64Array:
     """Return frames rotated about their segments so that torques balance (one Newton step).
 
     Torsional waves are much faster than the hair, so twist is quasi-static (Bergou et al. 2008);
     the system is tridiagonal.
     """
-    before = rods.before(frames)
-    torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
-    natural = quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
     direction = quaternion.third_axis(frames)
-    turn = direction - quaternion.third_axis(before)
-    spun = rods.bend[..., None] * np.cross(natural, turn)
-    first, second = split_torque(before, frames, spun)
-    gradient = (
-        torque - next_element(torque) - (direction * (second + next_element(first))).sum(axis=-1)
-    )
+    turn, natural, torque, turning = elements(rods, frames, direction)
+    gradient = torque - next_element(torque) - (direction * turning).sum(axis=-1)
     firm = 0.25 * rods.bend * np.maximum((natural * turn).sum(axis=-1), 0.0)
     diagonal = rods.twist + next_element(rods.twist) + firm + next_element(firm)
     beside = firm[:, 1:] - rods.twist[:, 1:]
     if rods.tip_held:
         gradient[:, -1], beside[:, -1] = 0.0, 0.0
-    angle = _tridiagonal(np.where(diagonal > 0, diagonal, 1.0), beside, -gradient)
-    angle = np.clip(angle, -LARGEST_SPIN, LARGEST_SPIN)
+    at, matrix = np.arange(diagonal.shape[1]), np.zeros((*diagonal.shape, diagonal.shape[1]))
+    matrix[:, at, at] = np.where(diagonal > 0, diagonal, 1.0)
+    matrix[:, at[1:], at[:-1]] = matrix[:, at[:-1], at[1:]] = beside
+    angle = -np.linalg.solve(matrix, gradient[..., None])
+    half = 0.5 * np.clip(angle, -LARGEST_SPIN, LARGEST_SPIN)
     # half angles by a rational cosine and sine: exact turns, the angle right to third order
-    turn_by = quaternion.normalize(
-        np.concatenate([np.ones_like(angle)[..., None], 0.5 * angle[..., None] * direction], -1)
-    )
-    return quaternion.product(turn_by, frames)
+    turn_by = np.concatenate([np.ones_like(half), half * direction], axis=-1)
+    return quaternion.product(quaternion.normalize(turn_by), frames)
 
 
 def elastic_force(rods: Rods, edge: Float64Array, frames: Float64Array) -> Float64Array:
     """Return the node force (S, n, 3) of bending and twist, minus the energy gradient."""
-    before = rods.before(frames)
     reach = edge / rods.length[..., None]
-    held = quaternion.third_axis(rods.root_frame)[:, None]
-    turn = reach - np.concatenate([held, reach[:, :-1]], axis=1)
-    natural = quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
+    turn, natural, torque, turning = elements(rods, frames, reach)
     moment = rods.bend[..., None] * (natural - turn)
-    spun = rods.bend[..., None] * np.cross(natural, turn)
-    torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
-    twisting = torque[..., None] * half_binormal(before, frames)
-    first, second = split_torque(before, frames, spun)
-    direction = quaternion.third_axis(frames)
+    twisting = torque[..., None] * half_binormal(rods.before(frames), frames)
     pull = moment - twisting - next_element(moment + twisting)
-    pull += np.cross(second + next_element(first), direction)
-    pull /= rods.length[..., None]
-    force = np.zeros((*edge.shape[:1], edge.shape[1] + 1, 3))
-    force[:, 1:] += pull
-    force[:, :-1] -= pull
-    return force
+    pull += np.cross(turning, quaternion.third_axis(frames))
+    return -along_segments(pull / rods.length[..., None])
+
+
+def along_segments(pull: Float64Array) -> Float64Array:
+    """Return the node forces (S, n, 3) of segments (S, n - 1, 3): towards and from the tip."""
+    return np.pad(pull, ((0, 0), (0, 1), (0, 0))) - np.pad(pull, ((0, 0), (1, 0), (0, 0)))
 
 
 def solve_tension(
@@ -332,49 +337,26 @@ def restore_lengths(
 ) -> tuple[Float64Array, Float64Array, Float64Array]:
     """Return positions with restored lengths, the pulls used and their contact pressure.
 
-    One tridiagonal solve (Han and Harada 2013). A node in contact moves only perpendicular to
-    `normal` (S, n, 3), which is 0 for free nodes; the root does not move. The pulls (S, n - 1) are
-    in kg m; the pressure (S, n) is how far they would press nodes into the obstacles, metres.
+    One solve (Han and Harada 2013). A node in contact moves only perpendicular to `normal`
+    (S, n, 3), which is 0 for free nodes; the root does not move. The pulls (S, n - 1) are in kg m;
+    the pressure (S, n) is how far they would press nodes into the obstacles, metres.
     """
     ease = 1.0 / rods.mass
     ease[:, 0] = 0.0
     edge = np.diff(position, axis=1)
     reach = np.linalg.norm(edge, axis=-1)
-    direction = edge / reach[..., None]
-
-    def mobility(nodes: slice) -> Float64Array:
-        """Displacement of the start or end node by a unit pull of each segment."""
-        across = (normal[:, nodes] * direction).sum(axis=-1, keepdims=True) * normal[:, nodes]
-        moved_by: Float64Array = ease[:, nodes, None] * (direction - across)
-        return moved_by
-
-    start, end = mobility(slice(None, -1)), mobility(slice(1, None))
-    diagonal = (direction * (start + end)).sum(axis=-1)
-    diagonal += SOFTEST * (ease[:, :-1] + ease[:, 1:])
-    beside = -(end[:, :-1] * direction[:, 1:]).sum(axis=-1)
-    pull = _tridiagonal(diagonal, beside, reach - rods.length)
-    fixed = position.copy()
-    fixed[:, :-1] += pull[..., None] * start
-    fixed[:, 1:] -= pull[..., None] * end
-    push = pull[..., None] * direction
-    push = push - next_element(push)
-    pressed = np.zeros_like(ease)
-    pressed[:, 1:] = ease[:, 1:] * (push * normal[:, 1:]).sum(axis=-1)
-    return fixed, pull, pressed
-
-
-def _tridiagonal(diagonal: Float64Array, beside: Float64Array, right: Float64Array) -> Float64Array:
-    """Solve symmetric tridiagonal systems (S, m) by elimination along the rods (Thomas)."""
-    count = diagonal.shape[1]
-    pivot, value = diagonal.copy(), right.copy()
-    for j in range(1, count):
-        factor = beside[:, j - 1] / pivot[:, j - 1]
-        pivot[:, j] -= factor * beside[:, j - 1]
-        value[:, j] -= factor * value[:, j - 1]
-    value[:, -1] /= pivot[:, -1]
-    for j in range(count - 2, -1, -1):
-        value[:, j] = (value[:, j] - beside[:, j] * value[:, j + 1]) / pivot[:, j]
-    return value
+    at = np.arange(rods.nodes - 1)
+    # unit pulls of each segment on each node (S, n - 1, n, 3), and how these move
+    pulled = np.zeros((*reach.shape, *position.shape[1:]))
+    pulled[:, at, at] = edge / reach[..., None]
+    pulled[:, at, at + 1] = -pulled[:, at, at]
+    pressed = (pulled * normal[:, None]).sum(axis=-1)
+    moved = ease[:, None, :, None] * (pulled - pressed[..., None] * normal[:, None])
+    matrix = np.einsum("sinc,sjnc->sij", pulled, moved)
+    matrix[:, at, at] += SOFTEST * (ease[:, :-1] + ease[:, 1:])
+    pull = np.linalg.solve(matrix, (reach - rods.length)[..., None])[..., 0]
+    fixed = position + np.einsum("si,sinc->snc", pull, moved)
+    return fixed, pull, -ease * np.einsum("si,sin->sn", pull, pressed)
 
 
 def elastic_energy(rods: Rods, state: State, shape: Float64Array | None = None) -> float:
@@ -384,15 +366,10 @@ def elastic_energy(rods: Rods, state: State, shape: Float64Array | None = None) 
     """
     edge = np.diff(state.position, axis=1)
     frames = transport_frames(state.frames, quaternion.normalize(edge))
-    before = rods.before(frames)
-    reach = edge / rods.length[..., None]
-    held = quaternion.third_axis(rods.root_frame)[:, None]
-    turn = reach - np.concatenate([held, reach[:, :-1]], axis=1)
-    off = turn - quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
-    energy = 0.5 * float((rods.bend[..., None] * off**2).sum())
-    twist = twist_between(before, frames) - rods.natural_twist
-    energy += 0.5 * float((rods.twist * twist**2).sum())
+    turn, natural, torque, _ = elements(rods, frames, edge / rods.length[..., None])
+    energy = (rods.bend[..., None] * (turn - natural) ** 2).sum()
+    energy += (torque**2 / np.where(rods.twist > 0, rods.twist, np.inf)).sum()
     if shape is not None:
         moved = ((state.position - rods.points) ** 2).sum(axis=-1)
-        energy += 0.5 * float((rods.mass * shape * moved).sum())
-    return energy
+        energy += (rods.mass * shape * moved).sum()
+    return 0.5 * float(energy)
