@@ -135,18 +135,6 @@ class Options:
         share = self.stiffness or 0.0
         return (40.0 * share / (1.001 - share)) ** 2
 
-    def firmness(self) -> float:
-        """Return the bending stiffness over that of a single hair of the same mass."""
-        return float(10.0 ** (self.bend or 0.0))
-
-    def damping_share(self) -> float:
-        """Return the share of relative velocity lost in 1/60 s."""
-        return self.damping or 0.0
-
-    def friction_coefficient(self) -> float:
-        """Return the Coulomb friction coefficient."""
-        return self.friction or 0.0
-
 
 @hookimpl
 def make_simulator(groom: Groom, options: Options) -> Any:

@@ -92,34 +92,23 @@ def constants(
 ) -> tuple[Float32Array, Float32Array]:
     """Return (S, n, 20) `CONSTANTS` and (S, n (n - 1) / 2) lower rows of the metric."""
     count, nodes = rods.mass.shape
-    unit = rods.mass.mean(axis=1)
     made = np.zeros((count, nodes, sum(CONSTANTS.values())), np.float32)
-    mean = unit[:, None]
+    mean = rods.mass.mean(axis=1, keepdims=True)
+    lower = np.linalg.cholesky(system.matrix / mean[..., None])
+    pivot = lower.diagonal(axis1=1, axis2=2)
     made[..., :3], made[..., 3] = rods.points, rods.mass / mean
     made[..., 4], made[..., 5] = system.rates.drag, system.rates.shape
     made[..., 6] = -1.0 if contact is None else contact.clearance
     made[:, 1:, 7] = mean / rods.mass[:, 1:]
-    made[:, 1:, 8:11] = banded_factor(system.banded / mean[..., None])
-    made[:, 1:, 11] = rods.length
+    for below in (1, 2):  # the factor's bands: made[:, :, 8] and made[:, :, 9]
+        band = lower.diagonal(-below, axis1=1, axis2=2) / pivot[:, :-below]
+        made[:, 1 + below :, 7 + below] = band
+    made[:, 1:, 10], made[:, 1:, 11] = pivot**-2, rods.length
     made[:, 1:, 12], made[:, 1:, 13] = rods.bend / mean, rods.twist / mean
     made[:, 1:, 14], made[:, 1:, 15] = rods.natural_twist, 1.0 / rods.length
     made[:, 1:, 16:19], made[..., 19] = rods.curvature, mean
     row, column = np.tril_indices(nodes - 1)
     return made, (system.metric[:, row, column] * mean).astype(np.float32)
-
-
-def banded_factor(bands: Float64Array) -> Float64Array:
-    """Return L D L^T of matrices with two lower bands (S, m, 3): both lower entries and 1/D."""
-    result = np.zeros_like(bands)
-    pivot = np.ones((len(bands), bands.shape[1] + 2))
-    first = np.zeros(pivot.shape)
-    for j in range(bands.shape[1]):
-        own, one, two = bands[:, j, 0], bands[:, j, 1], bands[:, j, 2]
-        second = two / pivot[:, j]  # the pivot of row j - 2 is at index j
-        first[:, j + 2] = (one - second * pivot[:, j] * first[:, j + 1]) / pivot[:, j + 1]
-        pivot[:, j + 2] = own - first[:, j + 2] ** 2 * pivot[:, j + 1] - second**2 * pivot[:, j]
-        result[:, j] = np.stack([first[:, j + 2], second, 1 / pivot[:, j + 2]], axis=-1)
-    return result
 
 
 def steps_of(loads: Sequence[Load], seconds: float) -> Records:

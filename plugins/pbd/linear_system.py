@@ -46,8 +46,8 @@ class System:
     """Seconds h."""
     coupling: Float64Array
     """(S, 1, 1) inertia between the root and node 1, kg."""
-    banded: Float64Array
-    """(S, n - 1, 3) diagonal and two lower bands of A, kg/s^2, for the free nodes 1 to n - 1."""
+    matrix: Float64Array
+    """(S, n - 1, n - 1) A, kg/s^2, for the free nodes 1 to n - 1: two bands below its diagonal."""
     inverse: Float64Array
     """(S, n - 1, n - 1) of A."""
     metric: Float64Array
@@ -59,8 +59,7 @@ def assemble(rods: Rods, rates: Rates, step: float) -> System:
     """Return the system of substeps of `step` seconds."""
     count = rods.nodes - 1
     difference = np.eye(count) - np.eye(count, k=-1)
-    turns = (np.eye(count) - np.eye(count, k=-1))[None] / rods.length[:, None, :]
-    bending = turns @ difference
+    bending = (difference / rods.length[:, None, :]) @ difference
     inner, inertia = IMPLICIT * step, rods.inertia()
     diagonal = rods.mass[:, 1:] * ((rates.drag[:, 1:] + rates.damping) / inner + rates.shape[:, 1:])
     matrix = np.einsum("sij,si,sik->sjk", bending, rods.bend, bending)
@@ -69,13 +68,4 @@ def assemble(rods: Rods, rates: Rates, step: float) -> System:
     inverse = np.linalg.inv(matrix)
     metric = difference @ inverse @ difference.T
     metric[:, np.arange(count), np.arange(count)] *= 1 + COMPLIANCE
-    return System(step, inertia[:, 1:2, :1], _bands(matrix), inverse, metric, rates)
-
-
-def _bands(matrix: Float64Array) -> Float64Array:
-    count = matrix.shape[1]
-    bands = np.zeros((*matrix.shape[:2], 3))
-    for below in range(min(3, count)):
-        rows = np.arange(below, count)
-        bands[:, rows, below] = matrix[:, rows, rows - below]
-    return bands
+    return System(step, inertia[:, 1:2, :1], matrix, inverse, metric, rates)

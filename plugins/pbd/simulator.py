@@ -212,7 +212,7 @@ class PbdSimulator:
         most = np.minimum(most, FIRMEST * length**4 / (FRAME / options.substeps) ** 2)
         weight = abs(self._groom.physics.gravity) * overhang(self._nodes)[:, None]
         borne = weight / (UPRIGHT * np.sqrt(options.twist))
-        firm = np.maximum(SINGLE_HAIR * options.firmness(), borne)
+        firm = np.maximum(SINGLE_HAIR * 10.0 ** (options.bend or 0.0), borne)
         bending = density * np.minimum(firm, most)
         rods = make_rods(self._nodes, density, bending, bending * options.twist)
         down = np.array([0.0, -self._groom.physics.gravity, 0.0])
@@ -230,7 +230,7 @@ class PbdSimulator:
         weight = abs(self._groom.physics.gravity)
         pull += STANDING * np.clip(1 - falls, 0.0, 1.0) * weight / total
         pull = np.where(arc / total < self._held[:, None], HELD, pull)
-        damping = -math.log(1 - options.damping_share()) / FRAME
+        damping = -math.log(1 - (options.damping or 0.0)) / FRAME
         return Rates(np.repeat(drag[:, None], rods.nodes, axis=1), damping, pull)
 
     def _system(self, step: float) -> System:
@@ -335,6 +335,5 @@ def _contact(
     options: Options, bodies: Bodies, near: Float64Array, deepest: Float64Array
 ) -> Contact:
     """Return the contact parameters; hair captured nearer (S, n) keeps its own distance."""
-    clearance = np.minimum(options.clearance, near)
-    apply_hair_grid, fastest = options.friction_coefficient(), options.depenetration
-    return Contact(bodies, clearance, apply_hair_grid, fastest, deepest, options.rounds)
+    clearance, friction = np.minimum(options.clearance, near), options.friction or 0.0
+    return Contact(bodies, clearance, friction, options.depenetration, deepest, options.rounds)
