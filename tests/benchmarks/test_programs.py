@@ -62,6 +62,10 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     ),
     "robustness": ({}, ["--grooms", "2"]),
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
+    "scaling": (
+        {"PHOTOS": 8, "STEPS": {"guides": (20, 40)}},
+        ["CAPTURES/short", "--rounds", "1", "-o", "CAPTURES/growth.png"],
+    ),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
     "skin": ({"HEIGHT": 120}, ["CAPTURES"]),
     "skin_looks": ({"HEIGHT": 80}, ["-o", "CAPTURES/looks_of_skin.jpg"]),
