@@ -95,11 +95,11 @@ def _coarse_guess(
         mean = (weight[:, None] * data).sum(axis=0) / weight.sum()
         return np.broadcast_to(mean, data.shape).astype(np.float32)
     cell = np.ravel_multi_index(tuple(index // 2 for index in np.nonzero(occupied)), shape)
-    merged, row = np.unique(cell, return_inverse=True)
     coarse = np.zeros(shape, bool)
-    coarse.ravel()[merged] = True
-    total = np.bincount(row, weight, len(merged))
-    columns = [np.bincount(row, weight * column, len(merged)) for column in data.T]
+    coarse.ravel()[cell] = True
+    row = (np.cumsum(coarse) - 1)[cell]
+    total = np.bincount(row, weight)
+    columns = [np.bincount(row, weight * column) for column in data.T]
     mean = np.stack(columns, axis=1) / np.maximum(total, NO_WEIGHT)[:, None]
     solved = solve_screened(
         coarse,
@@ -113,14 +113,12 @@ def _coarse_guess(
 
 def cell_neighbours(occupied: BoolArray) -> Int32Array:
     """Return (N, 6) rows of the neighbours -x, +x, -y, +y, -z, +z of occupied cells, or -1."""
-    number = np.full(np.add(occupied.shape, 2), -1, np.int32)
-    inner = number[1:-1, 1:-1, 1:-1]
-    inner[occupied] = np.arange(np.count_nonzero(occupied), dtype=np.int32)
-    columns = []
-    for axis in range(3):
-        for shift in (1, -1):
-            columns.append(np.roll(number, shift, axis)[1:-1, 1:-1, 1:-1][occupied])
-    return np.ascontiguousarray(np.stack(columns, axis=1))
+    padded = np.pad(occupied, 1)
+    cell = np.flatnonzero(padded)
+    number = np.full(padded.size, -1, np.int32)
+    number[cell] = np.arange(len(cell), dtype=np.int32)
+    _, ny, nz = padded.shape
+    return np.stack([number[cell + step] for step in (-ny * nz, ny * nz, -nz, nz, -1, 1)], axis=1)
 
 
 def _conjugate_gradients(
