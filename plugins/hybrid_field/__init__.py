@@ -23,6 +23,7 @@ Tight curls show no direction; theirs hang down along the head (`hairkit.field.h
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,6 +50,7 @@ from hairkit.field.growth_prior import (
 from hairkit.field.hanging_hair import hang_curls
 from hairkit.field.view_fusion import FusionOptions, fuse_views
 from hairkit.options import option
+from hairkit.parallel import thread_count
 
 from .four_fields import (
     Fields,
@@ -147,14 +149,19 @@ def solve_field(
         scene.head, hull, growth, fused.tensor, fused.certainty, prior, parting, length
     )
     band = ribbons(segments, hull, options.ribbon)
-    signs = growth_direction(scene.head, hull, growth, band, parting, length, options)
-    inner = internal_direction(hull, wanted, weight, band, options)
-    distance = internal_distance(hull, segments, options.tolerance)
-    surface = surface_structure(hull, band, options.tolerance)
-    fields = Fields(surface, inner, distance, signs)
+    with ThreadPoolExecutor(thread_count()) as pool:
+        parts = (
+            pool.submit(surface_structure, hull, band, options.tolerance),
+            pool.submit(internal_direction, hull, wanted, weight, band, options),
+            pool.submit(internal_distance, hull, segments, options.tolerance),
+            pool.submit(
+                growth_direction, scene.head, hull, growth, band, parting, length, options
+            ),
+        )
+        fields = Fields(*(part.result() for part in parts))
     direction = blend(hull, band, fields, options)
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
     return OrientationField(
-        hull.grid, None, read_only(confidence), read_only(growth), direction, read_only(distance)
+        hull.grid, None, read_only(confidence), read_only(growth), direction, read_only(fields.distance)
     )
