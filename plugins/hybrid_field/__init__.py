@@ -154,14 +154,12 @@ def solve_field(
             pool.submit(surface_structure, hull, band, options.tolerance),
             pool.submit(internal_direction, hull, wanted, weight, band, options),
             pool.submit(internal_distance, hull, segments, options.tolerance),
-            pool.submit(
-                growth_direction, scene.head, hull, growth, band, parting, length, options
-            ),
+            pool.submit(growth_direction, scene.head, hull, growth, band, parting, length, options),
         )
         fields = Fields(*(part.result() for part in parts))
-    direction = blend(hull, band, fields, options)
+    direction, distance = blend(hull, band, fields, options), read_only(fields.distance)
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
     return OrientationField(
-        hull.grid, None, read_only(confidence), read_only(growth), direction, read_only(fields.distance)
+        hull.grid, None, read_only(confidence), read_only(growth), direction, distance
     )
