@@ -108,7 +108,8 @@ def _coarse_guess(
         2 * smoothness,
         tolerance=COARSE_TOLERANCE,
     )
-    return solved[row]
+    guess: Float32Array = solved[row]
+    return guess
 
 
 def cell_neighbours(occupied: BoolArray) -> Int32Array:
