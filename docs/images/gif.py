@@ -41,11 +41,11 @@ SIMULATORS = ("pbd", "super_helix")
 FRAME, EVERY = 1 / 30, 3
 """Seconds of a picture of the viewer, and of how many one is kept."""
 SECONDS = 3.0
-LARGE, SMALL = (480, 360), (216, 216)
+LARGE, SMALL = (480, 360), (200, 200)
 """Pixels of a picture alone and of one beside others."""
 HOP_M, HOP_S = 0.05, 0.5
 """Height and time of a jump, metres and seconds."""
-COLOURS, STILL = 160, 6
+COLOURS, STILL = 96, 8
 """Of the palette; largest change of a channel, of 255, that is not written again."""
 
 

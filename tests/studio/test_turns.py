@@ -62,7 +62,7 @@ def test_dragged_thumbnails_change_the_order(browser: Any, server: Any, photos: 
     cards = page.locator("li.card")
     cards.nth(3).wait_for()
     cards.nth(0).drag_to(cards.nth(2))
-    page.wait_for_function("document.querySelector('[data-order]').dataset.order === '2,3,1,4'")
+    page.locator("[data-order='2,3,1,4']").wait_for(state="attached")
     kept = json.loads((server.folder / "studio.json").read_text())["photos"]
     assert [photo["id"] for photo in kept] == [2, 3, 1, 4]
     page.close()
