@@ -45,8 +45,10 @@ LARGE, SMALL = (480, 360), (200, 200)
 """Pixels of a picture alone and of one beside others."""
 HOP_M, HOP_S = 0.05, 0.5
 """Height and time of a jump, metres and seconds."""
-COLOURS, STILL = 96, 8
-"""Of the palette; largest change of a channel, of 255, that is not written again."""
+LARGE_COLOURS, SMALL_COLOURS = 160, 96
+"""Of the palettes of pictures alone and of those beside others."""
+STILL = 8
+"""Largest change of a channel, of 255, that is not written again."""
 
 
 @dataclass
@@ -116,12 +118,12 @@ def main() -> int:
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder, renderer() as gl:
         for name in args.names or every:
-            frames = (
-                recorded(gl, Path(folder), *ALONE[name], LARGE, args.hairs)
-                if name in ALONE
-                else side_by_side(gl, Path(folder), TOGETHER[name], args.hairs)
-            )
-            pack(frames, HERE / name)
+            if name in ALONE:
+                frames = recorded(gl, Path(folder), *ALONE[name], LARGE, args.hairs)
+                pack(frames, HERE / name, LARGE_COLOURS)
+            else:
+                frames = side_by_side(gl, Path(folder), TOGETHER[name], args.hairs)
+                pack(frames, HERE / name, SMALL_COLOURS)
             print(HERE / name, flush=True)
     return 0
 
@@ -163,7 +165,7 @@ def recorded(
     return frames
 
 
-def pack(pictures: list[Picture], target: Path) -> None:
+def pack(pictures: list[Picture], target: Path, colours: int) -> None:
     """Write pictures as a GIF with one palette; what hardly changes is not written again.
 
     A pixel stays as it was shown until a channel is more than `STILL` away from that. GIF keeps
@@ -172,7 +174,7 @@ def pack(pictures: list[Picture], target: Path) -> None:
     from PIL import Image
 
     middle = Image.fromarray(pictures[len(pictures) // 3])
-    palette = middle.quantize(COLOURS, Image.Quantize.MEDIANCUT)
+    palette = middle.quantize(colours, Image.Quantize.MEDIANCUT)
     # no dithering: it would flicker, and not compress
     packed = [
         Image.fromarray(shown).quantize(palette=palette, dither=Image.Dither.NONE)
