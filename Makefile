@@ -80,7 +80,7 @@ $(VENV)/.models: $(VENV)/.hairkit hairkit/nets/known_models.py
 # A part of the installation: the first reconstruction is then as fast as any other.
 $(VENV)/.kernels: $(VENV)/.models
 	@echo "compiling the kernels of a reconstruction, once on this machine"
-	@$(BIN)/hairkit reconstruct hairkit/sample -o $(VENV)/first --guides 50 --quiet
+	@$(BIN)/hairkit reconstruct hairkit/sample -o $(VENV)/first --guides 50 --quiet >/dev/null
 	@rm -rf $(VENV)/first
 	@touch $@
 
