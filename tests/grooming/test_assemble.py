@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairkit.colour import linear_from_srgb
+from hairkit.colour import linear_from_srgb, srgb_from_linear
 from hairkit.errors import InputError
-from hairkit.grooming.assemble import assemble_groom, measure_colour
+from hairkit.grooming.assemble import TIP_SHADE, assemble_groom, measure_colour
 from hairkit.testing import ball_head, ball_mask, scalp_roots, striped_view, turn_scene
+from hairkit.types.capture import View
 from hairkit.types.head import Roots
 from hairkit.types.mask import Mask
 from hairkit.types.strands import Strands
@@ -57,17 +58,31 @@ def test_no_strands_are_no_groom(lengths: np.ndarray, reason: str) -> None:
         assemble_groom([VIEW], [MASK], HEAD, ROOTS, bristles(lengths))
 
 
-def test_colour_is_the_hairs_own() -> None:
-    """The colours come from hair only, linear: the upper is the root's, the lower the tip's."""
+def two_colours(upper: np.ndarray, lower: np.ndarray) -> tuple[list[View], list[Mask]]:
+    """A photo of hair of two linear colours (3,), before white, and its mask."""
     image = np.full((90, 60, 3), 255, np.uint8)
     labels = np.zeros((90, 60), np.uint8)
     labels[20:80, 15:45] = 255
-    image[20:50, 15:45], image[50:80, 15:45] = (120, 80, 60), (180, 140, 90)
-    material = measure_colour(
-        [replace(VIEW, image=image, photo_size=(60, 90))], [Mask(labels, True)]
-    )
-    assert material.root_colour == pytest.approx(linear_from_srgb(np.array([120, 80, 60]) / 255))
-    assert material.tip_colour == pytest.approx(linear_from_srgb(np.array([180, 140, 90]) / 255))
+    for rows, colour in ((slice(20, 50), upper), (slice(50, 80), lower)):
+        image[rows, 15:45] = np.rint(255 * srgb_from_linear(np.asarray(colour)))
+    return [replace(VIEW, image=image, photo_size=(60, 90))], [Mask(labels, True)]
+
+
+def test_colour_is_the_hairs_own() -> None:
+    """The colours come from hair only, linear; tips in the usual shade have those of the roots."""
+    colour = np.array([0.2, 0.12, 0.06])
+    material = measure_colour(*two_colours(colour, TIP_SHADE * colour))
+    assert material.root_colour == pytest.approx(colour, rel=0.02)
+    assert material.tip_colour == pytest.approx(colour, rel=0.02)
+
+
+def test_dyed_tips_keep_their_hue() -> None:
+    """The lower colour is the tip's but for its brightness; brighter tips come out brighter."""
+    upper, lower = np.array([0.2, 0.12, 0.06]), np.array([0.12, 0.03, 0.03])
+    tip = measure_colour(*two_colours(upper, lower)).tip_colour
+    assert tip / tip.sum() == pytest.approx(lower / lower.sum(), rel=0.03)
+    brighter = measure_colour(*two_colours(upper, 1.5 * lower)).tip_colour
+    assert (brighter > 1.15 * tip).all()
 
 
 def test_a_single_hair_pixel_has_a_colour() -> None:
@@ -75,7 +90,14 @@ def test_a_single_hair_pixel_has_a_colour() -> None:
     labels = np.zeros(VIEW.image.shape[:2], np.uint8)
     labels[5, 5] = 255
     material = measure_colour([VIEW], [Mask(labels, True)])
-    assert material.tip_colour == pytest.approx(linear_from_srgb(VIEW.image[5, 5] / 255))
+    assert material.root_colour == pytest.approx(linear_from_srgb(VIEW.image[5, 5] / 255))
+
+
+def test_black_pixels_are_black_hair() -> None:
+    """Hair without any light is no division by 0."""
+    material = measure_colour(*two_colours(np.zeros(3), np.zeros(3)))
+    assert not material.root_colour.any()
+    assert not material.tip_colour.any()
 
 
 def test_roots_and_strands_have_one_order() -> None:
