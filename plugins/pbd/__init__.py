@@ -7,8 +7,8 @@ with the metric of the implicit system). Stiffness depends neither on iterations
 rate. The natural shape comes from inverse statics, so that captured hair stays in place under
 gravity. Despite the plugin's name this is not position-based dynamics.
 
-* `backend`: the reference and the compiled backend
-* `block`: strands side by side; constants and substeps of both float32 backends
+* `backend`: what backends share, and the compiled ones
+* `block`: strands side by side; constants and substeps of all backends
 * `embedding`: the guides' own points on the rods
 * `gl_backend`: substeps in compute shaders
 * `grab`: held points
@@ -17,10 +17,10 @@ gravity. Despite the plugin's name this is not position-based dynamics.
 * `kernels`: a substep, compiled
 * `lanes`: numbers, vectors and frames of the strands of a block
 * `linear_system`: the banded matrix of a substep
-* `reference`: a substep in NumPy float64, and energies
 * `resampling`: guides to rods, and what these can follow
 * `rods`: the discrete rod, its rest state, inverse statics
 * `simulator`: the simulator
+* `state`: the state of rods, what acts on them, energies
 """
 
 from __future__ import annotations
@@ -115,8 +115,8 @@ class Options:
     backend: str = option(
         "auto",
         choices=("auto", "reference", "fast", "compute"),
-        doc="reference: NumPy, float64; fast: compiled, float32; compute: shaders; auto: compute"
-        " on a graphics card, else fast.",
+        doc="fast: compiled, float32; reference: the same in float64; compute: shaders; auto:"
+        " compute on a graphics card, else fast.",
     )
 
     def resolved(self, physics: HairPhysics) -> Options:

@@ -1,4 +1,4 @@
-"""The reference backend, what all backends share, and the fast one: compiled, on all cores."""
+"""What all backends share, and the compiled ones, on all cores."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .embedding import Embedding, drawn_points
 from .hair_grid import HairGrid
 from .kernels import run_substeps
 from .linear_system import System
-from .reference import Contact, Load, State, rest_state, substep, transform_points
 from .rods import Rods
+from .state import Contact, Load, State, rest_state, transform_points
 
 
 class Engine:
-    """The reference backend, NumPy float64; others override how the state is kept and advanced."""
+    """A backend: how the state is kept; subclasses advance it."""
 
     rows: Any
     """(B, L, n, 16 or more) `block.STATE` of B times L rods, of which the last ones may be void."""
@@ -50,8 +50,7 @@ class Engine:
 
     def run(self, system: System, loads: Sequence[Load]) -> None:
         """Do one substep for each load."""
-        for load in loads:
-            self.state = substep(self.rods, system, self.state, load, self.contact)
+        raise NotImplementedError
 
     def apply_hair_grid(
         self, hair_grid: HairGrid, head_step: Float64Array, rates: tuple[float, float, float]
@@ -69,39 +68,48 @@ class Engine:
 class FastEngine(Engine):
     """Rods in blocks of lanes."""
 
+    kind: block.Kind = np.float32
+
     def __init__(self, rods: Rods, contact: Contact | None) -> None:
         blocks = -(-len(rods.mass) // block.LANES)
-        self._planes = np.zeros((blocks, rods.nodes, block.PLANES, block.LANES), np.float32)
+        self._planes = np.zeros((blocks, rods.nodes, block.PLANES, block.LANES), self.kind)
         self.rows = np.moveaxis(self._planes[:, :, : block.CONSTANT], -1, 1)
         super().__init__(rods, contact)
         self._system: System | None = None
-        self.mass = np.moveaxis(block.pack_lanes(rods.mass), -1, 1)
+        self.mass = np.moveaxis(block.pack_lanes(rods.mass, self.kind), -1, 1)
         self.mass[-1, (len(rods.mass) - 1) % block.LANES + 1 :] = 0.0  # only fills the block
 
     def _keep(self, rows: Float64Array) -> None:
         self._planes[:, :, : block.CONSTANT] = 0.0
-        self._planes[:, :, : rows.shape[2]] = block.pack_lanes(rows)
+        self._planes[:, :, : rows.shape[2]] = block.pack_lanes(rows, self.kind)
 
     def run(self, system: System, loads: Sequence[Load]) -> None:
         """Do one substep for each load."""
-        contact = self.contact
+        contact, kind = self.contact, self.kind
         if self._system is not system:
             nodes, metric = block.constants(self.rods, system, contact)
-            self._planes[:, :, block.CONSTANT :] = block.pack_lanes(nodes)
-            self._system, self._metric = system, block.pack_lanes(metric)
+            self._planes[:, :, block.CONSTANT :] = block.pack_lanes(nodes, kind)
+            self._system, self._metric = system, block.pack_lanes(metric, kind)
         settings = block.Settings(
-            np.float32(system.step),
-            np.float32(system.rates.damping),
-            np.float32(0.0 if contact is None else contact.friction),
-            np.float32(0.0 if contact is None else contact.fastest),
+            kind(system.step),
+            kind(system.rates.damping),
+            kind(0.0 if contact is None else contact.friction),
+            kind(0.0 if contact is None else contact.fastest),
             -1 if contact is None else contact.rounds,
         )
+        work = np.zeros(self.rods.nodes + 2, block.WORK[kind])
         parallel_for(
             run_substeps,
             len(self._planes),
-            block.Packed(block.records(self._planes, block.NODE), self._metric),
-            block.steps_of(loads, system.step),
-            block.acting(self.rods, loads[0]),
+            block.Packed(block.records(self._planes, block.NODE[kind]), self._metric, work),
+            block.steps_of(loads, system.step, kind),
+            block.acting(self.rods, loads[0], kind),
             NO_FIELDS if contact is None else contact.bodies.fields,
             settings,
         )
+
+
+class PreciseEngine(FastEngine):
+    """The same in float64, which tells what is rounding."""
+
+    kind = np.float64

@@ -1,9 +1,8 @@
-"""What the kernels work on: strands side by side, and the constants of both float32 backends.
+"""What the kernels work on: strands side by side, and the constants of all backends.
 
 A block is `LANES` strands; each field of a node holds that many numbers in a row. The same
-constants, strand by strand, are the textures
-of the shaders. Masses, stiffness and forces are shares of the rod's mean mass, so that stiffness is
-in 1/s^2.
+constants, strand by strand, are the textures of the shaders. Masses, stiffness and forces are
+shares of the rod's mean mass, so that stiffness is in 1/s^2.
 """
 
 from __future__ import annotations
@@ -14,14 +13,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
 
 from .linear_system import System
-from .reference import Contact, Load, State, TorsoStep
 from .rods import Rods
+from .state import Contact, Load, State, TorsoStep
 
 Records = npt.NDArray[np.void]
+Floats = npt.NDArray[np.floating[Any]]
+Kind = type[np.float32] | type[np.float64]
+"""Precision of a backend."""
+KINDS: tuple[Kind, ...] = (np.float32, np.float64)
 LANES = 64
 """Strands in a block. Compilers make vector instructions of loops over so many; shorter ones they
 unroll into instructions for single numbers."""
@@ -41,30 +44,34 @@ CONSTANTS = {
 """Of a node: rest place, mass, rates of drag and of the pull to rest, clearance, 1 / mass (0 at the
 root); of the segment that ends there, at its bend before: the banded factor's two lower entries and
 reciprocal pivot, length, stiffnesses, natural twist, 1 / length, natural turn, mean mass in kg."""
-_WORK = {
-    "force": 3, "edge": 3, "way": 3, "reach": 3, "pull": 3, "torque": 1, "pivot": 1, "beside": 1,
-    "value": 1, "free": 3, "solved": 3, "normal": 3, "surface": 3, "depth": 1, "grip": 1,
-}  # fmt: skip
-"""Of a node: what a substep works out for it and its segment."""
-STEP = np.dtype([(name, "f4", (3, 4)) for name in ("head_step", "drift", "air")]
-                + [("turn", "f4", (4,))]
-                + [(name, "f4", (3, 4)) for name in ("torso", "torso_drift")])  # fmt: skip
-"""Of a substep: motion of the head axes, rows; velocity of a point that rides on the head; turn
-from the world's axes, and gravity; the head's turn (w, x, y, z); head axes to the torso's; velocity
-of a point that rides on the torso."""
-
-
-def lanes_of(fields: dict[str, int]) -> np.dtype[Any]:
-    """Return the type of records whose fields hold `LANES` numbers, or as many vectors."""
-    sizes = {name: (size, LANES) if size > 1 else (LANES,) for name, size in fields.items()}
-    return np.dtype([(name, "f4", size) for name, size in sizes.items()])
-
-
-NODE, WORK = lanes_of({**STATE, **CONSTANTS}), lanes_of(_WORK)
 CONSTANT, PLANES = sum(STATE.values()), sum(STATE.values()) + sum(CONSTANTS.values())
 """Numbers of a node before those of `CONSTANTS`, and all."""
+
+
+def lanes_of(fields: dict[str, int]) -> dict[Kind, np.dtype[Any]]:
+    """Return the types of records whose fields hold `LANES` numbers, or as many vectors."""
+    sizes = {name: (size, LANES) if size > 1 else (LANES,) for name, size in fields.items()}
+    return {kind: np.dtype([(name, kind, sizes[name]) for name in fields]) for kind in KINDS}
+
+
+NODE = lanes_of({**STATE, **CONSTANTS})
+WORK = lanes_of({
+    "force": 3, "edge": 3, "way": 3, "reach": 3, "pull": 3, "torque": 1, "pivot": 1, "beside": 1,
+    "value": 1, "free": 3, "solved": 3, "normal": 3, "surface": 3, "depth": 1, "grip": 1,
+})  # fmt: skip
+"""Of a node: what a substep works out for it and its segment."""
 ACTING = lanes_of({"air": 3, "force": 3})
 """Of a node: velocity of the air, world; force over the rod's mean mass, head axes."""
+STEP: dict[Kind, np.dtype[Any]] = {
+    kind: np.dtype(
+        [(name, kind, (3, 4)) for name in ("head_step", "drift", "air")]
+        + [("turn", kind, (4,)), ("torso", kind, (3, 4)), ("torso_drift", kind, (3, 4))]
+    )
+    for kind in KINDS
+}
+"""Of a substep: motion of the head axes, rows; velocity of a point that rides on the head; turn
+from the world's axes, and gravity; the head's turn (w, x, y, z); head axes to the torso's; velocity
+of a point that rides on the torso. Shaders have the same."""
 
 
 class Packed(NamedTuple):
@@ -72,27 +79,29 @@ class Packed(NamedTuple):
 
     nodes: Records
     """(B, n) of `NODE`."""
-    metric: Float32Array
+    metric: Floats
     """(B, n (n - 1) / 2, LANES) lower rows."""
+    work: Records
+    """(n + 2,) of `WORK`, zeros."""
 
 
 class Settings(NamedTuple):
     """Numbers of a run."""
 
-    seconds: np.float32
-    damping: np.float32
-    friction: np.float32
-    fastest: np.float32
+    seconds: np.floating[Any]
+    damping: np.floating[Any]
+    friction: np.floating[Any]
+    fastest: np.floating[Any]
     rounds: int
     """Of friction; -1 without obstacles."""
 
 
 def constants(
     rods: Rods, system: System, contact: Contact | None
-) -> tuple[Float32Array, Float32Array]:
+) -> tuple[Float64Array, Float64Array]:
     """Return (S, n, 20) `CONSTANTS` and (S, n (n - 1) / 2) lower rows of the metric."""
     count, nodes = rods.mass.shape
-    made = np.zeros((count, nodes, sum(CONSTANTS.values())), np.float32)
+    made = np.zeros((count, nodes, sum(CONSTANTS.values())))
     mean = rods.mass.mean(axis=1, keepdims=True)
     lower = np.linalg.cholesky(system.matrix / mean[..., None])
     pivot = lower.diagonal(axis1=1, axis2=2)
@@ -108,12 +117,12 @@ def constants(
     made[:, 1:, 14], made[:, 1:, 15] = rods.natural_twist, 1.0 / rods.length
     made[:, 1:, 16:19], made[..., 19] = rods.curvature, mean
     row, column = np.tril_indices(nodes - 1)
-    return made, (system.metric[:, row, column] * mean).astype(np.float32)
+    return made, system.metric[:, row, column] * mean
 
 
-def steps_of(loads: Sequence[Load], seconds: float) -> Records:
+def steps_of(loads: Sequence[Load], seconds: float, kind: Kind) -> Records:
     """Return (K,) `STEP` of substeps of so many seconds."""
-    steps = np.zeros(len(loads), STEP)
+    steps = np.zeros(len(loads), STEP[kind])
     for step, load in zip(steps, loads, strict=True):
         torso = load.torso or TorsoStep(np.eye(4), load.head_step)
         step["head_step"], step["torso"] = load.head_step[:3], torso.from_head[:3]
@@ -124,11 +133,11 @@ def steps_of(loads: Sequence[Load], seconds: float) -> Records:
     return steps
 
 
-def acting(rods: Rods, load: Load) -> Records:
+def acting(rods: Rods, load: Load, kind: Kind) -> Records:
     """Return (B or 1, n or 1) `ACTING` of a load."""
     force = np.zeros(3) if load.force is None else load.force / unit_mass(rods)
     both = np.concatenate(np.broadcast_arrays(load.air, force), axis=-1)
-    return records(pack_lanes(both if both.ndim > 1 else both[None, None]), ACTING)
+    return records(pack_lanes(both if both.ndim > 1 else both[None, None], kind), ACTING[kind])
 
 
 def drift_rows(head_step: Float64Array, seconds: float) -> Float64Array:
@@ -152,20 +161,20 @@ def state_rows(rods: Rods, state: State) -> Float64Array:
     return rows
 
 
-def state_of(rows: npt.NDArray[np.floating[Any]]) -> State:
+def state_of(rows: Floats) -> State:
     """Return the state in rows as those of `state_rows`."""
     some = rows.astype(np.float64)
     frames = quaternion.normalize(some[:, 1:, 12:16])
     return State(some[..., :3], some[..., 4:7], frames, some[..., 8:11])
 
 
-def pack_lanes(values: npt.NDArray[np.floating[Any]]) -> Float32Array:
+def pack_lanes(values: Floats, kind: Kind) -> Floats:
     """Return values (S, ...) of strands as (B, ..., LANES); the last strand fills blocks."""
     rows = np.minimum(np.arange(-(-len(values) // LANES) * LANES), len(values) - 1)
-    spread = values.astype(np.float32)[rows].reshape(-1, LANES, *values.shape[1:])
+    spread = values.astype(kind)[rows].reshape(-1, LANES, *values.shape[1:])
     return np.ascontiguousarray(np.moveaxis(spread, 1, -1))
 
 
-def records(values: Float32Array, kind: np.dtype[Any]) -> Records:
+def records(values: Floats, kind: np.dtype[Any]) -> Records:
     """Return packed values (B, n, k, LANES) as records (B, n)."""
     return values.reshape(*values.shape[:2], -1).view(kind)[..., 0]

@@ -15,7 +15,7 @@ from hairkit.simulation.obstacle_kernels import NO_FIELDS, Drawn, draw_points
 from hairkit.simulation.vectors import Frame, Vector, inlined, minus, plus, rotate, times
 from hairkit.types.strands import Strands
 
-from .reference import Contact
+from .state import Contact
 
 WORTH = 256
 """Rods that are worth another thread's while."""

@@ -22,8 +22,8 @@ from hairkit.simulation.obstacles import Obstacles
 from .backend import Engine
 from .block import STEP, constants, steps_of, unit_mass
 from .linear_system import System
-from .reference import Contact, Load
 from .rods import Rods
+from .state import Contact, Load
 
 WIDTH = 4096
 """Rods in a row of a texture; further rods go into further rows."""
@@ -54,7 +54,7 @@ class ComputeEngine(Engine):
                 body = None if contact is None else getattr(contact.bodies, name)
                 self._texture(f"u_{name}_distances", faces(body))
             self._put("u_state", self.rows.reshape(count, -1))
-            self._words = gl.context.buffer(reserve=MOST_STEPS * STEP.itemsize)
+            self._words = gl.context.buffer(reserve=MOST_STEPS * STEP[np.float32].itemsize)
         weakref.finalize(self, _release, gl, self._textures, self._words).atexit = False
 
     def _keep(self, rows: Float64Array) -> None:
@@ -77,7 +77,7 @@ class ComputeEngine(Engine):
             self._textures["u_state"].bind_to_image(0, read=False, write=True)
             most = steps_at_once(nodes)
             for first in range(0, len(loads), most):
-                some = steps_of(loads[first : first + most], system.step)
+                some = steps_of(loads[first : first + most], system.step, np.float32)
                 self._words.orphan()
                 self._words.write(some)
                 self._words.bind_to_uniform_block(0)

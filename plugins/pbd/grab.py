@@ -10,8 +10,8 @@ from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.simulation import Grab
 
 from .embedding import Embedding
-from .reference import transform_points
 from .rods import Rods
+from .state import transform_points
 
 FIRM = 4e5
 """1/s^2: squared frequency, of 100 Hz, of the pull to a hand: a strand's weight moves it 0.3 mm."""

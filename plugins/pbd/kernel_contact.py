@@ -24,7 +24,6 @@ from hairkit.simulation.vectors import (
 
 from .block import LANES
 from .lanes import put, rows_of, stage, three
-from .reference import SOFTEST as SOFTEST64
 
 FAR = 1.0
 """Metres up to which distances are exact: bounds would be looked up again sooner."""
@@ -33,7 +32,9 @@ NEAR = np.float32(0.0003)
 one stands for the obstacle, off by less than 0.01 mm on a head's curvature."""
 FURTHER = np.float32(1.05)
 """Safety factor on the distance that a node has moved since its last lookup."""
-SOFTEST, STILL = np.float32(1 + SOFTEST64), np.float32(1e-12)
+SOFTEST = np.float32(1.001)
+"""1 and the compliance added to the lengths of nodes in contact, as a share of a free one's."""
+STILL = np.float32(1e-12)
 HEAD = ((ONE, ZERO, ZERO, ZERO), (ZERO, ONE, ZERO, ZERO), (ZERO, ZERO, ONE, ZERO))
 
 

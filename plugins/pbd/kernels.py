@@ -1,4 +1,4 @@
-"""The fast backend's kernels: the reference's substep, float32, strands side by side.
+"""The compiled kernels: a substep, strands side by side, float32 or float64.
 
 Each step of the method goes along the rods, and at each node over the `LANES` strands of a block.
 Compilers make vector instructions of the loops over strands, whose bodies have no branches. `s` are
@@ -30,7 +30,7 @@ from hairkit.simulation.vectors import (
     turned,
 )
 
-from .block import LANES, WORK, Packed, Records, Settings
+from .block import LANES, Packed, Records, Settings
 from .kernel_contact import resolve_contacts
 from .lanes import (
     FIFTH,
@@ -46,16 +46,21 @@ from .lanes import (
     twist_angle,
 )
 from .linear_system import IMPLICIT
-from .reference import DRIFT as DRIFT64
-from .reference import FASTEST_CHANGE as CHANGE64
-from .reference import FASTEST_TURN as TURN64
-from .reference import LARGEST_SPIN as SPIN64
-from .reference import TINY as TINY64
 from .rods import SHARPEST as SHARPEST64
 
-AHEAD, PASSED = np.float32(1 / IMPLICIT), np.float32(1 - IMPLICIT)
-DRIFT, SHARPEST, SPIN = np.float32(DRIFT64), np.float32(SHARPEST64), np.float32(SPIN64)
-CHANGE, TURN, TINY = np.float32(CHANGE64), np.float32(TURN64), np.float32(TINY64)
+AHEAD, PASSED, DRIFT = (np.float32(c) for c in (1 / IMPLICIT, 1 - IMPLICIT, 0.5 - IMPLICIT**2))
+"""Weights: of a change of place in the velocity, over the step; of the old acceleration in the
+velocity, and in the place, where that of the new one is `IMPLICIT` squared."""
+SHARPEST, SPIN = np.float32(SHARPEST64), np.float32(0.3)
+"""See there; largest rotation of a frame by torsion in a substep, radians: limits the Newton
+step."""
+TURN = np.float32(1.0)
+"""Largest rotation of a segment in a substep, radians: more than hair does, less than what linear
+solves cannot follow."""
+CHANGE = np.float32(500.0)
+"""Largest acceleration that a substep passes on to the next, m/s^2: more is a blow."""
+TINY = np.float32(1e-20)
+"""Added to squares before a division."""
 LEAST = np.float32(1e-6)
 """Least pivot of the lengths, as a share of the metric's diagonal."""
 
@@ -75,7 +80,7 @@ def run_substeps(
     `acting` (B, n) of `ACTING` may have one block and node for all.
     """
     n, h = packed.nodes.shape[1], settings.seconds
-    x, matrix = np.zeros(n + 2, WORK), np.empty((n, n, LANES), np.float32)
+    x, matrix = np.zeros_like(packed.work), np.empty((n, n, LANES), packed.metric.dtype)
     for block in range(first, last):
         s, metric = packed.nodes[block], packed.metric[block]
         act = acting[min(block, len(acting) - 1)]

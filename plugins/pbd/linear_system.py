@@ -44,12 +44,8 @@ class System:
 
     step: float
     """Seconds h."""
-    coupling: Float64Array
-    """(S, 1, 1) inertia between the root and node 1, kg."""
     matrix: Float64Array
     """(S, n - 1, n - 1) A, kg/s^2, for the free nodes 1 to n - 1: two bands below its diagonal."""
-    inverse: Float64Array
-    """(S, n - 1, n - 1) of A."""
     metric: Float64Array
     """(S, n - 1, n - 1) D A^-1 D^T of the segments' vectors, with the compliance."""
     rates: Rates
@@ -60,12 +56,11 @@ def assemble(rods: Rods, rates: Rates, step: float) -> System:
     count = rods.nodes - 1
     difference = np.eye(count) - np.eye(count, k=-1)
     bending = (difference / rods.length[:, None, :]) @ difference
-    inner, inertia = IMPLICIT * step, rods.inertia()
+    inner = IMPLICIT * step
     diagonal = rods.mass[:, 1:] * ((rates.drag[:, 1:] + rates.damping) / inner + rates.shape[:, 1:])
     matrix = np.einsum("sij,si,sik->sjk", bending, rods.bend, bending)
-    matrix += inertia[:, 1:, 1:] / inner**2
+    matrix += rods.inertia()[:, 1:, 1:] / inner**2
     matrix[:, np.arange(count), np.arange(count)] += diagonal
-    inverse = np.linalg.inv(matrix)
-    metric = difference @ inverse @ difference.T
+    metric = difference @ np.linalg.inv(matrix) @ difference.T
     metric[:, np.arange(count), np.arange(count)] *= 1 + COMPLIANCE
-    return System(step, inertia[:, 1:2, :1], matrix, inverse, metric, rates)
+    return System(step, matrix, metric, rates)

@@ -55,9 +55,6 @@ class Rods:
     """(S, n - 1, 3) natural turn c of each element, in its midpoint frame."""
     natural_twist: Float64Array
     """(S, n - 1) natural twist of each element, radians."""
-    tip_held: bool = False
-    """True fixes the last frames: clamped tips, whose last two nodes the caller holds. Only the
-    reference backend supports it."""
 
     @property
     def nodes(self) -> int:
@@ -211,6 +208,25 @@ def _with_moments(rods: Rods, moment: Float64Array, torque: Float64Array) -> Rod
         curvature=quaternion.rotate(quaternion.inverse(middle), natural),
         natural_twist=twist_between(before, rods.frames) - torque / twisting,
     )
+
+
+def transport_frames(frames: Float64Array, direction: Float64Array) -> Float64Array:
+    """Return frames parallel-transported in time to new directions."""
+    turn = quaternion.shortest_arc(quaternion.third_axis(frames), direction)
+    return quaternion.normalize(quaternion.product(turn, frames))
+
+
+def elements(
+    rods: Rods, frames: Float64Array, way: Float64Array
+) -> tuple[Float64Array, Float64Array, Float64Array]:
+    """Return the elements' turns and natural turns (S, n - 1, 3), and torques (S, n - 1).
+
+    The turns are those between the segments `way` (S, n - 1, 3), over their lengths.
+    """
+    before, held = rods.before(frames), quaternion.third_axis(rods.root_frame)[:, None]
+    turn = way - np.concatenate([held, way[:, :-1]], axis=1)
+    natural = quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
+    return turn, natural, rods.twist * (twist_between(before, frames) - rods.natural_twist)
 
 
 def midpoint_frame(before: Float64Array, after: Float64Array) -> Float64Array:

@@ -26,14 +26,14 @@ from hairkit.simulation.wind import gust_waves
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
-from .backend import Engine, FastEngine
+from .backend import Engine, FastEngine, PreciseEngine
 from .embedding import embed_points
 from .grab import Hands
 from .hair_grid import HairGrid, make_hair_grid
 from .linear_system import Rates, System, assemble
-from .reference import Contact, Load, TorsoStep, elastic_energy, rest_state
 from .resampling import finer_steps, max_stiffness, node_points, overhang
 from .rods import Rods, balance_load, clamp_roots, make_rods
+from .state import Contact, Load, TorsoStep, elastic_energy, rest_state
 
 if TYPE_CHECKING:
     from . import Options
@@ -185,8 +185,17 @@ class PbdSimulator:
         self._systems: dict[float, System] = {}
         self._rest_energy = None
         self._contact = _contact(resolved, self._bodies, self._near, self._deepest)
-        self._engine = _engine(resolved.backend, self._rods, self._contact)
+        self._engine = self._make_engine(self._contact)
         self._engine.torso_from_head = inverse_motion(self._torso) @ self._head
+
+    def _make_engine(self, contact: Contact) -> Engine:
+        """Return the backend of the options."""
+        name = self._options.backend
+        if name == "compute" or (name == "auto" and on_graphics_card()):
+            from .gl_backend import ComputeEngine
+
+            return ComputeEngine(self._rods, contact)
+        return (PreciseEngine if name == "reference" else FastEngine)(self._rods, contact)
 
     def _place_nodes(self, nodes: int) -> None:
         """Place nodes along the guides; measure the captured distance to the obstacles."""
@@ -319,16 +328,6 @@ class PbdSimulator:
 
 def _stiffness(options: Options) -> tuple[object, ...]:
     return options.bend, options.twist, options.substeps
-
-
-def _engine(name: str, rods: Rods, contact: Contact) -> Engine:
-    if name == "reference":
-        return Engine(rods, contact)
-    if name == "compute" or (name == "auto" and on_graphics_card()):
-        from .gl_backend import ComputeEngine
-
-        return ComputeEngine(rods, contact)
-    return FastEngine(rods, contact)
 
 
 def _contact(

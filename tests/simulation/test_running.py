@@ -32,7 +32,7 @@ def groom() -> Groom:
 
 
 def made(manager: Manager, groom: Groom, **options: object) -> object:
-    """Return the simulator of the reference backend: nothing is compiled."""
+    """Return the simulator in float64."""
     return manager.call("make_simulator", "pbd", {"backend": "reference", **options}, groom=groom)
 
 

@@ -7,16 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 from hairkit_plugins.pbd.linear_system import IMPLICIT, Rates, System, assemble
-from hairkit_plugins.pbd.reference import (
-    Load,
-    State,
-    relax_twist,
-    rest_state,
-    solve_substep,
-    substep,
-    transport_frames,
-)
-from hairkit_plugins.pbd.rods import Rods, balance_load, make_rods
+from hairkit_plugins.pbd.rods import Rods, balance_load, make_rods, transport_frames
+from hairkit_plugins.pbd.state import Load, State, rest_state
+from pbd_reference import ClampedRods, relax_twist, solve_substep, substep
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
@@ -126,7 +119,7 @@ def clamped(rods: Rods) -> Rods:
     """Return rods whose first and last segments do not spin; something else holds their nodes."""
     firm = np.ones_like(rods.twist)
     firm[:, 0] = 1e6
-    return replace(rods, twist=firm * rods.twist, tip_held=True)
+    return ClampedRods(**{**vars(rods), "twist": firm * rods.twist})
 
 
 def naturally_bent(rods: Rods, angle: Float64Array) -> Rods:

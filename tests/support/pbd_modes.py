@@ -1,18 +1,19 @@
 """Rods of pbd linearised about an equilibrium: small motions, compliance and stability.
 
-The forces are those of the reference backend, segments keep their lengths, torsion is in balance
-(the last segment's frame is held where `tip_held` is). A virtual displacement of the free nodes is
+The forces are those of the twin, segments keep their lengths, torsion is in balance
+(the last segment's frame is held in `ClampedRods`). A virtual displacement of the free nodes is
 a combination of `free` columns; those that change no length are left over.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from hairkit_plugins.pbd.reference import State, elastic_force, transport_frames
-from hairkit_plugins.pbd.rods import Rods
+from hairkit_plugins.pbd.rods import Rods, transport_frames
+from hairkit_plugins.pbd.state import State
 from pbd_bench import balanced
+from pbd_reference import elastic_force
 from scipy.linalg import eigh, null_space
 
 from hairkit.arrays import Float64Array
@@ -115,5 +116,4 @@ def one_of(rods: Rods, index: int) -> Rods:
 
 
 def _picked(rods: Rods, pick: list[int]) -> Rods:
-    arrays = {f.name: getattr(rods, f.name) for f in fields(rods) if f.name != "tip_held"}
-    return replace(rods, **{name: array[pick] for name, array in arrays.items()})
+    return replace(rods, **{name: array[pick] for name, array in vars(rods).items()})

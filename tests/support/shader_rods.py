@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hairkit_plugins.pbd import Options
 from hairkit_plugins.pbd.simulator import PbdSimulator
+from pbd_reference import TwinSimulator
 
 from hairkit.errors import RenderError
 from hairkit.rendering.context import renderer
@@ -48,10 +49,8 @@ def bent_groom() -> Groom:
 
 def both(groom: Groom, **options: object) -> tuple[PbdSimulator, PbdSimulator]:
     """Return the reference and the shaders, at rest."""
-    settings = {"nodes": 8, **options}
-    names = ("reference", "compute")
-    first, second = (PbdSimulator(groom, Options(backend=name, **settings)) for name in names)
-    return first, second
+    settings = Options(**{"backend": "compute", "nodes": 8, **options})
+    return TwinSimulator(groom, settings), PbdSimulator(groom, settings)
 
 
 def apart(pair: tuple[PbdSimulator, PbdSimulator]) -> float:

@@ -6,16 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd.backend import Engine, FastEngine
-from hairkit_plugins.pbd.reference import (
-    Contact,
-    resolve_contacts,
-    rest_state,
-    solve_substep,
-    substep,
-)
+from hairkit_plugins.pbd.backend import FastEngine
 from hairkit_plugins.pbd.rods import make_rods
+from hairkit_plugins.pbd.state import Contact, rest_state
 from pbd_bench import DENSITY, LENGTH, G, load_of, straight, system_of
+from pbd_reference import TwinEngine, resolve_contacts, solve_substep, substep
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
@@ -75,7 +70,7 @@ def test_compiled_ropes_slip_as_those_of_the_reference(rounds: int) -> None:
     contact = Contact(Bodies(bollard()), np.zeros_like(rods.mass), 0.3, 0.5, None, rounds)
     system, load = system_of(rods, 1 / 240), load_of(force=force)
     places = []
-    for engine in (Engine(rods, contact), FastEngine(rods, contact)):
+    for engine in (TwinEngine(rods, contact), FastEngine(rods, contact)):
         for _ in range(3):
             engine.run(system, [load] * 4)
         places.append(engine.state.position)

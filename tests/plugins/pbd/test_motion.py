@@ -7,16 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd.linear_system import Rates, assemble
-from hairkit_plugins.pbd.reference import (
-    Load,
-    State,
-    elastic_energy,
-    elastic_force,
-    rest_state,
-    solve_substep,
-    substep,
-)
 from hairkit_plugins.pbd.rods import Rods, make_rods
+from hairkit_plugins.pbd.state import Load, State, elastic_energy, rest_state
 from pbd_bench import (
     DENSITY,
     DOWN,
@@ -34,6 +26,7 @@ from pbd_bench import (
     system_of,
     tangled,
 )
+from pbd_reference import elastic_force, solve_substep, substep
 from scipy.special import roots_laguerre
 
 from hairkit.arrays import Float64Array

@@ -1,6 +1,6 @@
 """The rods of pbd against the loads at which rods buckle, coil up and leave their plane.
 
-The least stiffness of small motions about the equilibrium, by the forces of the reference backend,
+The least stiffness of small motions about the equilibrium, by the forces of the twin,
 passes 0 at the critical load; runs in time a little below and above it agree.
 """
 
@@ -12,8 +12,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd.linear_system import Rates, assemble
-from hairkit_plugins.pbd.reference import State, rest_state, substep, transport_frames
-from hairkit_plugins.pbd.rods import Rods, balance_load, make_rods, twist_between
+from hairkit_plugins.pbd.rods import (
+    Rods,
+    balance_load,
+    make_rods,
+    transport_frames,
+    twist_between,
+)
+from hairkit_plugins.pbd.state import State, rest_state
 from pbd_bench import (
     DENSITY,
     DOWN,
@@ -31,6 +37,7 @@ from pbd_bench import (
     straight,
 )
 from pbd_modes import linearised, one_of
+from pbd_reference import substep
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import jv

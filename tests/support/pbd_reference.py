@@ -1,103 +1,57 @@
-"""The reference backend: one substep in plain NumPy float64, in the order of the method.
+"""The readable twin of pbd's kernels and shaders: a substep in NumPy float64, in their order.
 
-Positions are in the axes of the moving head, velocities are those in the world: the head's surface,
-the roots and the captured shape are then constant, and float32 keeps its precision wherever the
-head is. The faster backends do the same steps; tests compare them with this one.
+`TwinSimulator` is the plugin's simulator with substeps by this.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
+from hairkit_plugins.pbd import kernel_contact, kernels
+from hairkit_plugins.pbd.backend import Engine
+from hairkit_plugins.pbd.linear_system import IMPLICIT, System
+from hairkit_plugins.pbd.rods import (
+    Rods,
+    elements,
+    half_binormal,
+    next_element,
+    split_torque,
+    transport_frames,
+)
+from hairkit_plugins.pbd.simulator import PbdSimulator
+from hairkit_plugins.pbd.state import Contact, Load, State, transform_points
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
-from hairkit.simulation.obstacles import Bodies
 
-from .linear_system import IMPLICIT, System
-from .rods import Rods, half_binormal, midpoint_frame, next_element, split_torque, twist_between
-
-SOFTEST = 1e-3
-"""Compliance added to the lengths of nodes in contact, as a share of a free one's."""
-LARGEST_SPIN = 0.3
-"""Largest rotation of a frame by torsion in a substep, radians; limits the Newton step."""
-FASTEST_TURN = 1.0
-"""Largest rotation of a segment in a substep, radians: more than hair does, less than what linear
-solves cannot follow."""
 DRIFT = 0.5 - IMPLICIT**2
 """Weight of the old acceleration in the place; that of the new one is `IMPLICIT` squared."""
-FASTEST_CHANGE = 500.0
-"""Largest acceleration that a substep passes on to the next, m/s^2: more is a blow."""
-TINY = 1e-20
-"""Added to squares before a division."""
+SOFTEST = float(kernel_contact.SOFTEST) - 1
+"""Compliance added to the lengths of nodes in contact, as a share of a free one's."""
+SPIN, TURN, CHANGE, TINY = map(float, (kernels.SPIN, kernels.TURN, kernels.CHANGE, kernels.TINY))
 
 
 @dataclass(frozen=True, eq=False)
-class State:
-    """Positions, velocities and frames of rods; head axes."""
-
-    position: Float64Array
-    """(S, n, 3) metres."""
-    velocity: Float64Array
-    """(S, n, 3) m/s in the world."""
-    frames: Float64Array
-    """(S, n - 1, 4) of the segments."""
-    acceleration: Float64Array
-    """(S, n, 3) of the last substep before contact, m/s^2 in the world; 0 in equilibrium."""
+class ClampedRods(Rods):
+    """Rods whose last frames are fixed; the caller holds their last two nodes."""
 
 
-@dataclass(frozen=True, eq=False)
-class Contact:
-    """Parameters of contact between nodes and obstacles."""
+class TwinEngine(Engine):
+    """The twin as a backend."""
 
-    bodies: Bodies
-    clearance: Float64Array
-    """(S, n) least distance of the nodes, metres; less where the captured hair is nearer."""
-    friction: float
-    """Coulomb's coefficient."""
-    fastest: float
-    """Highest speed at which a penetration is resolved, m/s."""
-    deepest: Float64Array | None = None
-    """(P,) least distance of the embedded points, metres; None: no limit."""
-    rounds: int = 0
-    """Friction iterations under the tension that restores the lengths. With 0 taut strands have too
-    little friction around bends; with 4 the Euler-Eytelwein equation holds."""
+    def run(self, system: System, loads: Sequence[Load]) -> None:
+        """Do one substep for each load."""
+        for load in loads:
+            self.state = substep(self.rods, system, self.state, load, self.contact)
 
 
-class TorsoStep(NamedTuple):
-    """The torso in one substep."""
+class TwinSimulator(PbdSimulator):
+    """The simulator with the twin as its backend."""
 
-    from_head: Float64Array
-    """(4, 4) from the head axes after it to the torso's axes."""
-    step: Float64Array
-    """(4, 4) the torso's motion in it as `Load.head_step`: where its points were, head axes after
-    it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Load:
-    """Head motion and external forces of one substep."""
-
-    head_step: Float64Array
-    """(4, 4) from the head axes before the substep to those after it."""
-    turn: Float64Array
-    """(3, 3) from the world's axes to the head's after it."""
-    gravity: Float64Array
-    """(3,) m/s^2, world."""
-    air: Float64Array
-    """(S, n, 3) or (3,) velocity of the air, m/s, world."""
-    force: Float64Array | None = None
-    """(S, n, 3) further force, newtons, head axes after the substep."""
-    torso: TorsoStep | None = None
-    """Where the torso is; None: it goes with the head, as at rest."""
-
-
-def rest_state(rods: Rods) -> State:
-    """Return the captured state with zero velocity."""
-    still = np.zeros_like(rods.points)
-    return State(rods.points.copy(), still, rods.frames.copy(), still.copy())
+    def _make_engine(self, contact: Contact) -> Engine:
+        return TwinEngine(self.rods, contact)
 
 
 def substep(
@@ -148,8 +102,8 @@ def solve_substep(
     )
     if load.force is not None:
         force += load.force
-    force[:, 1:2] -= system.coupling / IMPLICIT * (root - passed[:, :1])
-    free = system.inverse @ force[:, 1:]
+    force[:, 1:2] -= rods.bars[:, :1, None] / 6 / IMPLICIT * (root - passed[:, :1])
+    free = np.linalg.solve(system.matrix, force[:, 1:])
     change = free
     pull = np.zeros_like(rods.length)
     for _ in range(iterations):
@@ -157,7 +111,7 @@ def solve_substep(
             system, edge + np.diff(free, axis=1, prepend=0.0), direction, rods.length
         )
         force = pull[..., None] * direction
-        change = free - system.inverse @ (force - next_element(force))
+        change = free - np.linalg.solve(system.matrix, force - next_element(force))
         direction = quaternion.normalize(edge + np.diff(change, axis=1, prepend=0.0))
     position, acceleration = predicted.copy(), passed
     position[:, 1:] += change
@@ -165,14 +119,8 @@ def solve_substep(
     acceleration[:, :1] = root
     acceleration[:, 1:] += change / (IMPLICIT * h**2)
     size = np.sqrt((acceleration * acceleration).sum(axis=-1, keepdims=True) + TINY)
-    acceleration *= np.minimum(FASTEST_CHANGE / size, 1.0)
+    acceleration *= np.minimum(CHANGE / size, 1.0)
     return State(position, velocity, frames, acceleration), pull
-
-
-def transform_points(motion: Float64Array, points: Float64Array) -> Float64Array:
-    """Return points (..., 3) under a rigid motion (4, 4)."""
-    result: Float64Array = points @ motion[:3, :3].T + motion[:3, 3]
-    return result
 
 
 def to_new_head_axes(
@@ -192,27 +140,10 @@ def to_new_head_axes(
     return State(position, velocity, frames, acceleration), root
 
 
-def transport_frames(frames: Float64Array, direction: Float64Array) -> Float64Array:
-    """Return frames parallel-transported in time to new directions."""
-    turn = quaternion.shortest_arc(quaternion.third_axis(frames), direction)
-    return quaternion.normalize(quaternion.product(turn, frames))
-
-
-def elements(
-    rods: Rods, frames: Float64Array, way: Float64Array
-) -> tuple[Float64Array, Float64Array, Float64Array, Float64Array]:
-    """Return the elements' turns and natural turns (S, n - 1, 3), torques, and frames' torques.
-
-    The turns are those between the segments `way` (S, n - 1, 3), over their lengths; the last are
-    the torques (S, n - 1, 3) that bending has on the segments' frames.
-    """
-    before, held = rods.before(frames), quaternion.third_axis(rods.root_frame)[:, None]
-    turn = way - np.concatenate([held, way[:, :-1]], axis=1)
-    natural = quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
-    torque = rods.twist * (twist_between(before, frames) - rods.natural_twist)
-    spun = rods.bend[..., None] * np.cross(natural, turn)
-    first, second = split_torque(before, frames, spun)
-    return turn, natural, torque, second + next_element(first)
+def frame_torques(rods: Rods, frames: Float64Array, spun: Float64Array) -> Float64Array:
+    """Return the torques (S, n - 1, 3) on the segments' frames of those on the elements."""
+    first, second = split_torque(rods.before(frames), frames, spun)
+    return second + next_element(first)
 
 
 def relax_twist(rods: Rods, frames: Float64Array) -> Float64Array:
@@ -222,18 +153,19 @@ def relax_twist(rods: Rods, frames: Float64Array) -> Float64Array:
     the system is tridiagonal.
     """
     direction = quaternion.third_axis(frames)
-    turn, natural, torque, turning = elements(rods, frames, direction)
+    turn, natural, torque = elements(rods, frames, direction)
+    turning = frame_torques(rods, frames, rods.bend[..., None] * np.cross(natural, turn))
     gradient = torque - next_element(torque) - (direction * turning).sum(axis=-1)
     firm = 0.25 * rods.bend * np.maximum((natural * turn).sum(axis=-1), 0.0)
     diagonal = rods.twist + next_element(rods.twist) + firm + next_element(firm)
     beside = firm[:, 1:] - rods.twist[:, 1:]
-    if rods.tip_held:
+    if isinstance(rods, ClampedRods):
         gradient[:, -1], beside[:, -1] = 0.0, 0.0
     at, matrix = np.arange(diagonal.shape[1]), np.zeros((*diagonal.shape, diagonal.shape[1]))
     matrix[:, at, at] = np.where(diagonal > 0, diagonal, 1.0)
     matrix[:, at[1:], at[:-1]] = matrix[:, at[:-1], at[1:]] = beside
     angle = -np.linalg.solve(matrix, gradient[..., None])
-    half = 0.5 * np.clip(angle, -LARGEST_SPIN, LARGEST_SPIN)
+    half = 0.5 * np.clip(angle, -SPIN, SPIN)
     # half angles by a rational cosine and sine: exact turns, the angle right to third order
     turn_by = np.concatenate([np.ones_like(half), half * direction], axis=-1)
     return quaternion.product(quaternion.normalize(turn_by), frames)
@@ -242,7 +174,8 @@ def relax_twist(rods: Rods, frames: Float64Array) -> Float64Array:
 def elastic_force(rods: Rods, edge: Float64Array, frames: Float64Array) -> Float64Array:
     """Return the node force (S, n, 3) of bending and twist, minus the energy gradient."""
     reach = edge / rods.length[..., None]
-    turn, natural, torque, turning = elements(rods, frames, reach)
+    turn, natural, torque = elements(rods, frames, reach)
+    turning = frame_torques(rods, frames, rods.bend[..., None] * np.cross(natural, turn))
     moment = rods.bend[..., None] * (natural - turn)
     twisting = torque[..., None] * half_binormal(rods.before(frames), frames)
     pull = moment - twisting - next_element(moment + twisting)
@@ -316,7 +249,7 @@ def friction_change(
 def keep_lengths(rods: Rods, state: State, step: float) -> State:
     """Return a state whose segments have their exact lengths, from the root to the tip.
 
-    They turn by no more than `FASTEST_TURN` in a substep. Linear solves leave little to do here;
+    They turn by no more than `TURN` in a substep. Linear solves leave little to do here;
     after jumps this is what keeps hair whole.
     """
     position, velocity = state.position.copy(), state.velocity.copy()
@@ -327,7 +260,7 @@ def keep_lengths(rods: Rods, state: State, step: float) -> State:
         position[:, j + 1] += way
         apart = velocity[:, j + 1] + way / step - velocity[:, j]
         speed = np.sqrt((apart * apart).sum(axis=1, keepdims=True) + TINY)
-        share = np.minimum(FASTEST_TURN * rods.length[:, j, None] / (step * speed), 1.0)
+        share = np.minimum(TURN * rods.length[:, j, None] / (step * speed), 1.0)
         velocity[:, j + 1] = velocity[:, j] + share * apart
     return replace(state, position=position, velocity=velocity)
 
@@ -357,19 +290,3 @@ def restore_lengths(
     pull = np.linalg.solve(matrix, (reach - rods.length)[..., None])[..., 0]
     fixed = position + np.einsum("si,sinc->snc", pull, moved)
     return fixed, pull, -ease * np.einsum("si,sin->sn", pull, pressed)
-
-
-def elastic_energy(rods: Rods, state: State, shape: Float64Array | None = None) -> float:
-    """Return the energy of bending, twist and the pull to the captured shape, joules.
-
-    `shape` (S, n): squared frequencies of that pull, 1/s^2.
-    """
-    edge = np.diff(state.position, axis=1)
-    frames = transport_frames(state.frames, quaternion.normalize(edge))
-    turn, natural, torque, _ = elements(rods, frames, edge / rods.length[..., None])
-    energy = (rods.bend[..., None] * (turn - natural) ** 2).sum()
-    energy += (torque**2 / np.where(rods.twist > 0, rods.twist, np.inf)).sum()
-    if shape is not None:
-        moved = ((state.position - rods.points) ** 2).sum(axis=-1)
-        energy += (rods.mass * shape * moved).sum()
-    return 0.5 * float(energy)
