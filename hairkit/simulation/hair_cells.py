@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled_with
 from hairkit.simulation.vectors import ONE, ZERO, Vector, inlined
 
@@ -41,6 +42,30 @@ def cell_of(place: Floats, cells: Cells, corners: Floats) -> tuple[int, int, int
 
 
 @inlined
+def around(cell: tuple[int, int, int, Vector], corners: Floats) -> tuple[Any, Vector, Vector]:
+    """Return the first value of corners (X, Y, Z, 4) at a place in its cell, the others, the slope.
+
+    The slope is that of the first value across a cell.
+    """
+    i, j, k, (a, b, c) = cell
+    value, u, v, w = ZERO, ZERO, ZERO, ZERO
+    x, y, z = ZERO, ZERO, ZERO
+    for bit in range(8):
+        up, over, on = bit >> 2, bit >> 1 & 1, bit & 1
+        f, g, h = (a if up else ONE - a), (b if over else ONE - b), (c if on else ONE - c)
+        corner, share = corners[i + up, j + over, k + on], f * g * h
+        first = corner[0]
+        value += share * first
+        u += share * corner[1]
+        v += share * corner[2]
+        w += share * corner[3]
+        x += (first if up else -first) * g * h
+        y += (first if over else -first) * f * h
+        z += (first if on else -first) * f * g
+    return value, (u, v, w), (x, y, z)
+
+
+@inlined
 def relative_velocity(place: Floats, velocity: Floats, drift: Floats) -> Vector:
     """Return a node's velocity less that of a point that rides on the head: `drift` (3, 4)."""
     x, y, z = place[0], place[1], place[2]
@@ -49,6 +74,12 @@ def relative_velocity(place: Floats, velocity: Floats, drift: Floats) -> Vector:
         velocity[1] - (drift[1, 0] * x + drift[1, 1] * y + drift[1, 2] * z + drift[1, 3]),
         velocity[2] - (drift[2, 0] * x + drift[2, 1] * y + drift[2, 2] * z + drift[2, 3]),
     )
+
+
+def drift_rows(head_step: Float64Array, seconds: float) -> Float64Array:
+    """Return rows (3, 4) that map a point to the velocity of the head there, head axes, m/s."""
+    result: Float64Array = (np.eye(4) - head_step)[:3] / seconds
+    return result
 
 
 @compiled_with(fastmath=True)

@@ -12,7 +12,6 @@ gravity. Despite the plugin's name this is not position-based dynamics.
 * `embedding`: the guides' own points on the rods
 * `gl_backend`: substeps in compute shaders
 * `grab`: held points
-* `hair_grid`: hair-hair contact: density and velocity on a grid
 * `kernel_contact`: contact and friction, compiled
 * `kernels`: a substep, compiled
 * `lanes`: numbers, vectors and frames of the strands of a block

@@ -9,11 +9,11 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.parallel import parallel_for
+from hairkit.simulation.hair_grid import HairGrid
 from hairkit.simulation.obstacle_kernels import NO_FIELDS
 
 from . import block
 from .embedding import Embedding, drawn_points
-from .hair_grid import HairGrid
 from .kernels import run_substeps
 from .linear_system import System
 from .rods import Rods

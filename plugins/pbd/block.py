@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
+from hairkit.simulation.hair_cells import drift_rows
 
 from .linear_system import System
 from .rods import Rods
@@ -138,12 +139,6 @@ def acting(rods: Rods, load: Load, kind: Kind) -> Records:
     force = np.zeros(3) if load.force is None else load.force / unit_mass(rods)
     both = np.concatenate(np.broadcast_arrays(load.air, force), axis=-1)
     return records(pack_lanes(both if both.ndim > 1 else both[None, None], kind), ACTING[kind])
-
-
-def drift_rows(head_step: Float64Array, seconds: float) -> Float64Array:
-    """Return rows (3, 4) that map a point to the velocity of the head there, head axes, m/s."""
-    result: Float64Array = (np.eye(4) - head_step)[:3] / seconds
-    return result
 
 
 def unit_mass(rods: Rods) -> Float64Array:

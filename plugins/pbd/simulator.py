@@ -14,6 +14,7 @@ from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.rendering.context import on_graphics_card
 from hairkit.simulation import Grab, Measures, Surroundings
+from hairkit.simulation.hair_grid import HairGrid, make_hair_grid
 from hairkit.simulation.obstacles import Bodies, groom_bodies
 from hairkit.simulation.rigid_motion import (
     follow_head,
@@ -29,7 +30,6 @@ from hairkit.types.strands import Strands
 from .backend import Engine, FastEngine, PreciseEngine
 from .embedding import embed_points
 from .grab import Hands
-from .hair_grid import HairGrid, make_hair_grid
 from .linear_system import Rates, System, assemble
 from .resampling import finer_steps, max_stiffness, node_points, overhang
 from .rods import Rods, balance_load, clamp_roots, make_rods

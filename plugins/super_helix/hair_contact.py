@@ -12,7 +12,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled
-from hairkit.simulation.hair_cells import Cells, cell_of, spread_nodes
+from hairkit.simulation.hair_cells import Cells, around, cell_of, spread_nodes
 
 CELL = 0.01
 """Edge of a cell in metres: about the width of a lock."""
@@ -99,23 +99,12 @@ def gather(
     result: Float64Array,
 ) -> None:
     """Write density, mean velocity and the direction of falling density at the points."""
-    value, slope = np.empty(4), np.empty(3)
     for p in range(len(points)):
-        i, j, k, (u, v, w) = cell_of(points[p], cells, corners)
-        value[:], slope[:] = 0.0, 0.0
-        for bit in range(8):
-            a, b, c = bit >> 2, bit >> 1 & 1, bit & 1
-            f, g, h = (u if a else 1 - u), (v if b else 1 - v), (w if c else 1 - w)
-            for axis in range(4):
-                value[axis] += f * g * h * corners[i + a, j + b, k + c, axis]
-            density = corners[i + a, j + b, k + c, 0]
-            slope[0] += (2 * a - 1) * g * h * density
-            slope[1] += (2 * b - 1) * f * h * density
-            slope[2] += (2 * c - 1) * f * g * density
+        density, momentum, slope = around(cell_of(points[p], cells, corners), corners)
         size = np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2 + floor**2)
-        result[p, 0] = value[0]
+        result[p, 0] = density
         for axis in range(3):
-            result[p, 1 + axis] = value[1 + axis] / max(value[0], 1e-30)
+            result[p, 1 + axis] = momentum[axis] / max(density, 1e-30)
             result[p, 4 + axis] = -slope[axis] / max(size, 1e-30)
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd import Options
-from hairkit_plugins.pbd.hair_grid import SPACING, HairGrid, make_hair_grid
 from hairkit_plugins.pbd.rods import Rods
 from hairkit_plugins.pbd.simulator import PbdSimulator
 from hairkit_plugins.pbd.state import State, rest_state
@@ -25,6 +24,7 @@ from hairkit.simulation import (
     run,
     static_motion,
 )
+from hairkit.simulation.hair_grid import SPACING, HairGrid, make_hair_grid
 from hairkit.simulation.wind import air_velocity
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom

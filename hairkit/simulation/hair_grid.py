@@ -1,9 +1,10 @@
-"""Hair-hair interaction: density and velocity of all nodes on a grid around the head.
+"""Contact between strands, for simulators with nodes: density and velocity on a grid.
 
-Nodes are splatted to a grid in the head frame and interpolated back (Petrovic, Henne and Anderson
-2005; particle-in-cell): velocities relax to the local mean, which models friction between hairs,
-and nodes move out of cells that are denser than in the captured hair. At rest the grid has no
-effect: nothing moves, and no cell is denser than captured.
+`HairGrid.mix` changes the velocities of all nodes, once in a frame. Nodes are splatted to a grid in
+the head frame and interpolated back (Petrovic, Henne and Anderson 2005; particle-in-cell):
+velocities relax to the local mean, which models friction between hairs, and nodes move out of cells
+that are denser than in the captured hair. At rest the grid has no effect: nothing moves, and no
+cell is denser than captured.
 """
 
 from __future__ import annotations
@@ -16,10 +17,16 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled_with, parallel_for
-from hairkit.simulation.hair_cells import Cells, cell_of, relative_velocity, spread_nodes
+from hairkit.simulation.hair_cells import (
+    Cells,
+    Floats,
+    around,
+    cell_of,
+    drift_rows,
+    relative_velocity,
+    spread_nodes,
+)
 from hairkit.simulation.vectors import ONE, ZERO
-
-from .block import drift_rows
 
 SPACING = 0.02
 """Edge of a cell, metres: several distances between guides."""
@@ -90,7 +97,7 @@ def make_hair_grid(position: Float64Array, mass: Float64Array) -> HairGrid:
 
 
 @compiled_with(fastmath=True)
-def settle_cells(corners: Any, uncrowded_mass: Any) -> None:
+def settle_cells(corners: Floats, uncrowded_mass: Floats) -> None:
     """Convert masses to crowding and momenta to velocities, in the first of grids (T, C, 4)."""
     for k in range(corners.shape[1]):
         for grid in range(1, len(corners)):
@@ -105,24 +112,14 @@ def settle_cells(corners: Any, uncrowded_mass: Any) -> None:
 
 @compiled_with(fastmath=True)
 def draw_nodes(
-    first: int, last: int, place: Any, speed: Any, flow: Flow, cells: Cells, corners: Any
+    first: int, last: int, place: Floats, speed: Floats, flow: Flow, cells: Cells, corners: Floats
 ) -> None:
     """Relax velocities towards the mean around, and push nodes out of crowded cells, in place."""
     for block in range(first, last):
         for row in range(place.shape[1], place.shape[1] * place.shape[2]):
             node, rod = row // place.shape[1], row % place.shape[1]
             here, own = place[block, rod, node], speed[block, rod, node]
-            i, j, k, (a, b, c) = cell_of(here, cells, corners)
-            u, v, w = relative_velocity(here, own, flow.drift)
-            p, q, r = -flow.taken * u, -flow.taken * v, -flow.taken * w
-            for bit in range(8):
-                up, over, on = bit >> 2, bit >> 1 & 1, bit & 1
-                f, g, h = (a if up else ONE - a), (b if over else ONE - b), (c if on else ONE - c)
-                corner = corners[i + up, j + over, k + on]
-                share, crowd = flow.taken * f * g * h, flow.push * corner[0]
-                p += share * corner[1] - (crowd if up else -crowd) * g * h
-                q += share * corner[2] - (crowd if over else -crowd) * f * h
-                r += share * corner[3] - (crowd if on else -crowd) * f * g
-            own[0] += p
-            own[1] += q
-            own[2] += r
+            relative = relative_velocity(here, own, flow.drift)
+            _, mean, slope = around(cell_of(here, cells, corners), corners)
+            for axis in range(3):
+                own[axis] += flow.taken * (mean[axis] - relative[axis]) - flow.push * slope[axis]
