@@ -22,7 +22,13 @@ from __future__ import annotations
 
 from hairkit.simulation.motion import HeadMotion, Shake, add_shakes, read_motion, static_motion
 from hairkit.simulation.running import Weather, run
-from hairkit.simulation.simulator import Grab, Measures, Simulator, Surroundings
+from hairkit.simulation.simulator import (
+    Grab,
+    Measures,
+    Simulator,
+    Surroundings,
+    check_grabs,
+)
 
 __all__ = [
     "Grab",
@@ -33,6 +39,7 @@ __all__ = [
     "Surroundings",
     "Weather",
     "add_shakes",
+    "check_grabs",
     "read_motion",
     "run",
     "static_motion",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
@@ -9,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, frozen_array
+from hairkit.errors import InputError
 from hairkit.types.strands import Strands
 
 
@@ -20,6 +22,13 @@ class Grab:
     """Index in `Strands.points`."""
     target: tuple[float, float, float]
     """World, metres."""
+
+
+def check_grabs(grabs: Sequence[Grab], points: int) -> None:
+    """Raise `InputError` where a grab names none of that many points."""
+    for grab in grabs:
+        if not 0 <= grab.point < points:
+            raise InputError(f"grab of point {grab.point}, expected 0 to {points - 1}")
 
 
 @dataclass(frozen=True, eq=False)

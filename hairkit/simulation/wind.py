@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from hairkit.arrays import Float64Array
+from hairkit.arrays import Float32Array, Float64Array
 
 MODES = 16
 """Number of plane waves in the gusts."""
@@ -17,9 +17,14 @@ LIFETIME = 0.5
 
 
 def air_velocity(
-    points: Float64Array, time: float, wind: Float64Array, turbulence: float, seed: int = 0
+    points: Float64Array | Float32Array,
+    time: float,
+    wind: Float64Array,
+    turbulence: float,
+    seed: int = 0,
+    axes: Float64Array | None = None,
 ) -> Float64Array:
-    """Return the velocity of the air (N, 3) at points (N, 3) in the world, metres per second.
+    """Return the velocity of the air (..., 3) at points (..., 3), world, metres per second.
 
     The gusts are a sum of plane waves with amplitudes perpendicular to their wave vectors, which
     makes them divergence-free (Kraichnan 1970), and with Kolmogorov's energy spectrum. They move
@@ -29,35 +34,29 @@ def air_velocity(
     Parameters
     ----------
     points
-        World, metres.
+        Metres, in `axes`. Gusts have their precision: float32 is enough within a few metres.
     time
         Seconds.
     wind
-        (3,) mean velocity, metres per second.
+        (3,) mean velocity, metres per second, world.
     turbulence
         RMS speed of the gusts over the mean speed.
     seed
         Seed of the gusts.
+    axes
+        (4, 4) rigid motion that brings points to the world; None: they are there.
     """
-    mean = np.broadcast_to(wind, points.shape)
-    waves, amplitudes, phases = gust_waves(time, wind, turbulence, seed)
-    if not amplitudes.any():
-        return mean.astype(np.float64)
-    result: Float64Array = mean + np.cos(points @ waves.T + phases) @ amplitudes
-    return result
-
-
-def gust_waves(
-    time: float, wind: Float64Array, turbulence: float, seed: int = 0
-) -> tuple[Float64Array, Float64Array, Float64Array]:
-    """Return the waves of the gusts at a time: the sum of `amplitudes` cos(waves . x + phases).
-
-    Wave vectors (M, 3) in radians a metre, amplitudes (M, 3) in metres per second, phases (M,) in
-    radians; parameters as of `air_velocity`. For simulators that evaluate gusts themselves.
-    """
+    mean = np.broadcast_to(np.asarray(wind, np.float64), points.shape)
+    strength, kind = turbulence * float(np.linalg.norm(wind)), points.dtype
+    if not strength:
+        return mean.copy()
     waves, amplitudes, rates, phases = _modes(seed)
-    strength = turbulence * float(np.linalg.norm(wind))
-    return waves, strength * amplitudes, phases - (waves @ wind + rates) * time
+    at = np.eye(4) if axes is None else axes
+    # reduced in float64: far from the origin float32 has no digits for them
+    phases = np.fmod(phases - (waves @ wind + rates) * time + waves @ at[:3, 3], 2 * np.pi)
+    angle = points @ (waves @ at[:3, :3]).T.astype(kind) + phases.astype(kind)
+    result: Float64Array = mean + np.cos(angle) @ (strength * amplitudes).astype(kind)
+    return result
 
 
 @lru_cache(maxsize=8)

@@ -13,7 +13,7 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.rendering.context import on_graphics_card
-from hairkit.simulation import Grab, Measures, Surroundings
+from hairkit.simulation import Grab, Measures, Surroundings, check_grabs
 from hairkit.simulation.hair_grid import HairGrid, make_hair_grid
 from hairkit.simulation.obstacles import Bodies, groom_bodies
 from hairkit.simulation.rigid_motion import (
@@ -23,7 +23,7 @@ from hairkit.simulation.rigid_motion import (
     motion_steps,
 )
 from hairkit.simulation.ties import held_lengths
-from hairkit.simulation.wind import gust_waves
+from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -293,6 +293,7 @@ class PbdSimulator:
 
     def _hold(self, grabs: tuple[Grab, ...], most: float) -> None:
         """Move the hands by up to `most` metres; other held points are another system."""
+        check_grabs(grabs, len(self.strands.points))
         before = self._hands.held
         self._hands.move(grabs, lambda: self.points, most)
         if self._hands.held != before:
@@ -311,18 +312,12 @@ class PbdSimulator:
         wind = np.asarray(around.wind, np.float64)
         if around.turbulence == 0.0 or not wind.any():
             return wind
-        waves, amplitudes, phases = gust_waves(
-            self._time, wind, around.turbulence, self._options.seed
-        )
         nodes = self._rods.nodes
         some = np.unique(np.append(np.arange(0, nodes, APART), nodes - 1))
         share = np.stack([np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))], 1)
-        # reduced in float64: far from the origin float32 has no digits for them
-        turned = np.fmod(phases + waves @ head[:3, 3], 2 * np.pi).astype(np.float32)
-        places = self._rods.points[:, some].astype(np.float32)
-        angle = places @ (waves @ head[:3, :3]).T.astype(np.float32) + turned
-        gusts = np.cos(angle) @ amplitudes.astype(np.float32)
-        result: Float64Array = wind + share @ gusts
+        places, seed = self._rods.points[:, some].astype(np.float32), self._options.seed
+        air = air_velocity(places, self._time, wind, around.turbulence, seed, head)
+        result: Float64Array = share @ air
         return result
 
 

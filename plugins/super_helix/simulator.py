@@ -13,7 +13,7 @@ from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.parallel import parallel_for
-from hairkit.simulation import Measures, Surroundings
+from hairkit.simulation import Measures, Surroundings, check_grabs
 from hairkit.simulation.obstacle_kernels import NO_FIELDS, Drawn, draw_points
 from hairkit.simulation.obstacles import Bodies, groom_bodies
 from hairkit.simulation.rigid_motion import follow_head, interpolate_motion, inverse_motion
@@ -202,12 +202,9 @@ class SuperHelices:
                 self._head,
             )
         spring, anchor = np.zeros(shape), np.zeros_like(motion.points)
-        drawn = self._drawn() if around.grabs else None
+        check_grabs(around.grabs, len(self._binding.arc))
+        drawn = self._drawn() if around.grabs else np.empty((0, 3))
         for grab in around.grabs:
-            if drawn is None or not 0 <= grab.point < len(drawn):
-                raise InputError(
-                    f"grab of point {grab.point}, expected 0 to {len(self._binding.arc) - 1}"
-                )
             element = self._binding.element[grab.point]
             node = int(
                 np.argmin(np.linalg.norm(motion.points[element] - drawn[grab.point], axis=1))

@@ -13,6 +13,7 @@ from hairkit_plugins.pbd.state import State, rest_state
 from pbd_reference import TwinSimulator
 
 from hairkit.arrays import Float64Array
+from hairkit.errors import InputError
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.manager import Manager
 from hairkit.simulation import (
@@ -188,6 +189,14 @@ def test_a_hand_out_of_reach_stretches_nothing(groom: Groom) -> None:
     for _ in range(60):
         simulator.advance(1 / 60, Surroundings(grabs=(Grab(tip, (1.0, 0.5, 0.3)),)))
     assert simulator.measure().stretch < 0.01
+
+
+@pytest.mark.parametrize("point", [-1, 10**9])
+def test_a_grab_of_no_point_is_told(groom: Groom, point: int) -> None:
+    """The error names the point and those that there are."""
+    simulator = PbdSimulator(groom, Options())
+    with pytest.raises(InputError, match=f"grab of point {point}"):
+        simulator.advance(1 / 60, Surroundings(grabs=(Grab(point, (0.0, 0.0, 0.0)),)))
 
 
 def test_more_stiffness_moves_less(groom: Groom) -> None:
