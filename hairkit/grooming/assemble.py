@@ -116,7 +116,8 @@ def measure_colour(views: Sequence[View], masks: Sequence[Mask]) -> HairMaterial
 
     The crown is the upper third of the hair's pixels of every view, the tips are the lower third.
     How much darker tips are tells little of their colour, since they hang in the shade: half of
-    the difference to what is usual, on a scale of logarithms, is taken for the tips' own.
+    the difference to what is usual, on a scale of logarithms, is taken for the tips' own. Shade
+    makes nothing brighter: tips become at most as bright as the brighter part was photographed.
     """
     crowns, tips = [], []
     for view, mask in zip(views, masks, strict=True):
@@ -125,9 +126,10 @@ def measure_colour(views: Sequence[View], masks: Sequence[Mask]) -> HairMaterial
         crowns.append(pixels[: third + 1])
         tips.append(pixels[-third - 1 :])
     root, tip = (np.concatenate(part).mean(axis=0) for part in (crowns, tips))
-    brighter, darker = max(float(root.mean()), DARKEST), max(float(tip.mean()), DARKEST)
-    lit = np.minimum(tip * np.sqrt(brighter / (darker * TIP_SHADE)), 1.0)
-    return HairMaterial(root.astype(np.float32), lit.astype(np.float32))
+    crown, end = max(float(root.mean()), DARKEST), max(float(tip.mean()), DARKEST)
+    unshaded = min(np.sqrt(crown / (end * TIP_SHADE)), max(crown / end, 1.0))
+    tip = np.minimum(tip * unshaded, 1.0)
+    return HairMaterial(root.astype(np.float32), tip.astype(np.float32))
 
 
 def _hair_pixels(view: View, mask: Mask) -> Float64Array:

@@ -78,11 +78,19 @@ def test_colour_is_the_hairs_own() -> None:
 
 def test_dyed_tips_keep_their_hue() -> None:
     """The lower colour is the tip's but for its brightness; brighter tips come out brighter."""
-    upper, lower = np.array([0.2, 0.12, 0.06]), np.array([0.12, 0.03, 0.03])
+    upper, lower = np.array([0.3, 0.2, 0.1]), np.array([0.08, 0.02, 0.02])
     tip = measure_colour(*two_colours(upper, lower)).tip_colour
     assert tip / tip.sum() == pytest.approx(lower / lower.sum(), rel=0.03)
     brighter = measure_colour(*two_colours(upper, 1.5 * lower)).tip_colour
     assert (brighter > 1.15 * tip).all()
+
+
+@pytest.mark.parametrize("brightness", [1.0, 2.0])
+def test_bright_tips_are_as_photographed(brightness: float) -> None:
+    """Shade makes nothing brighter: hair in flat light, or with bleached tips, stays as it is."""
+    colour = np.array([0.2, 0.12, 0.06])
+    material = measure_colour(*two_colours(colour, brightness * colour))
+    assert material.tip_colour == pytest.approx(brightness * colour, rel=0.02)
 
 
 def test_a_single_hair_pixel_has_a_colour() -> None:
