@@ -60,31 +60,21 @@ class Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class Round:
-    """The problem linearised at one vector."""
+class Evidence:
+    """What pictures say at one vector, linearised."""
 
     cost: float
     normal: Float64Array
     right: Float64Array
     landmarks: LandmarkEquations | None
 
-    def move(self, damping: float, flat: bool) -> Float64Array:
-        """Return the damped step; the perspective stays when `flat`."""
-        normal = self.normal + damping * np.diag(np.diag(self.normal))
-        free = np.arange(len(self.right))
-        if flat:
-            free = np.delete(free, PERSPECTIVE)
-        result = np.zeros(len(self.right))
-        result[free] = np.linalg.solve(normal[np.ix_(free, free)], self.right[free])
-        return result
-
 
 @dataclass(frozen=True, eq=False)
 class Search:
     """A problem to be solved."""
 
-    linearised: Callable[[Fit, float], Round]
-    """The normal equations at a solution, with the noise of outlines times a number."""
+    evidence: Callable[[Fit, float], Evidence]
+    """The evidence at a solution, with the noise of outlines times a number."""
     spread: Float64Array
     """(P,) standard deviations of the prior."""
     iterations: int
@@ -94,7 +84,8 @@ class Search:
         """Return the best solution; `restarted` are the views that may be anywhere."""
         fit = start
         for noise in COARSE_TO_FINE:
-            fit = self._with_care(self.descend(fit, noise, self.iterations))
+            fit, _ = self.descend(fit, noise, self.iterations)
+            fit = self._with_care(fit, self.evidence(fit, 1.0))
         fit = self.settle(fit)
         views = (len(self.spread) - SHARED) // PER_VIEW
         if fit.precision < CARELESS and views <= MOST_RESTARTED:
@@ -103,35 +94,69 @@ class Search:
 
     def settle(self, fit: Fit, updates: int = CARE_ROUNDS) -> Fit:
         """Return the solution with the precision that its deviations tell."""
+        seen = None
         for _ in range(updates):
-            fit = self._with_care(self.descend(fit, 1.0, self.iterations))
-        return self.descend(fit, 1.0, self.iterations)
+            fit, seen = self.descend(fit, 1.0, self.iterations, seen)
+            fit = self._with_care(fit, seen)
+        return self.descend(fit, 1.0, self.iterations, seen)[0]
 
-    def descend(self, fit: Fit, noise: float, iterations: int) -> Fit:
-        """Return the best place reached from a solution (Levenberg-Marquardt)."""
+    def descend(
+        self, fit: Fit, noise: float, iterations: int, seen: Evidence | None = None
+    ) -> tuple[Fit, Evidence]:
+        """Return the best place reached from a solution (Levenberg-Marquardt), and its evidence.
+
+        `seen` is the evidence at the solution where it is known.
+        """
         damping = FIRST_DAMPING
-        here = self.linearised(fit, noise)
+        here = self.evidence(fit, noise) if seen is None else seen
+        fit = replace(fit, cost=self.cost(fit, here))
         for _ in range(iterations):
-            move = here.move(damping, fit.flat)
+            move = self._move(fit, here, damping)
             vector = fit.vector + move
             vector[PERSPECTIVE] = max(vector[PERSPECTIVE], MIN_PERSPECTIVE)
             offset = fit.offset if here.landmarks is None else here.landmarks.offsets(move)
             trial = replace(fit, vector=vector, offset=offset)
-            there = self.linearised(trial, noise)
-            if there.cost > here.cost * (1 + WORSE):
+            there = self.evidence(trial, noise)
+            trial = replace(trial, cost=self.cost(trial, there))
+            if trial.cost > fit.cost * (1 + WORSE):
                 damping *= 10
                 if damping > MOST_DAMPING:
                     break
                 continue
-            settled = here.cost - there.cost < SETTLED * here.cost
+            settled = fit.cost - trial.cost < SETTLED * fit.cost
             fit, here, damping = trial, there, damping / 5
             if settled:
                 break
-        return replace(fit, cost=here.cost)
+        return fit, here
 
-    def _with_care(self, fit: Fit) -> Fit:
+    def cost(self, fit: Fit, seen: Evidence) -> float:
+        """Return the cost of a solution by the evidence there and by the prior."""
+        prior = (fit.prior_mean - fit.vector) / self._spread(fit)
+        numbers = len(fit.vector) - SHARED
+        return seen.cost + float(prior @ prior) + precision_cost(fit.precision, numbers)
+
+    def _move(self, fit: Fit, seen: Evidence, damping: float) -> Float64Array:
+        """Return the damped step; the perspective of orthographic cameras stays."""
+        spread = self._spread(fit)
+        normal = seen.normal + np.diag(spread**-2.0)
+        right = seen.right + (fit.prior_mean - fit.vector) / spread**2
+        normal += damping * np.diag(np.diag(normal))
+        free = np.arange(len(right))
+        if fit.flat:
+            free = np.delete(free, PERSPECTIVE)
+        result = np.zeros(len(right))
+        result[free] = np.linalg.solve(normal[np.ix_(free, free)], right[free])
+        return result
+
+    def _spread(self, fit: Fit) -> Float64Array:
+        """Return the spread of the prior; the views' with the precision of the solution."""
+        spread = self.spread.copy()
+        spread[SHARED:] /= np.sqrt(fit.precision)
+        return spread
+
+    def _with_care(self, fit: Fit, seen: Evidence) -> Fit:
         """Return the solution with the mean of the precision's posterior."""
-        covariance = np.linalg.inv(self.linearised(fit, 1.0).normal)
+        covariance = np.linalg.inv(seen.normal + np.diag(self._spread(fit) ** -2.0))
         squared = (fit.vector - fit.prior_mean) ** 2 + np.diag(covariance)
         own = (squared / self.spread**2)[SHARED:]
         precision = (len(own) + CARE_FREEDOM) / (float(own.sum()) + CARE_FREEDOM)
@@ -148,7 +173,7 @@ class Search:
                 vector[place] += side
                 trial = replace(fit, vector=vector)
                 for noise in RESTART_NOISE:
-                    trial = self.descend(trial, noise, RESTART_ROUNDS)
+                    trial, _ = self.descend(trial, noise, RESTART_ROUNDS)
                 if trial.cost < best.cost:
                     best = trial
         return best
