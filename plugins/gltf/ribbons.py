@@ -20,6 +20,8 @@ from hairkit.types.strands import Strands
 
 _NEAREST = 6
 _VERTICES = 2000
+_EVERY = 4
+"""Points of a line from one whose nearest vertices are looked for to the next."""
 _ROUNDS = 3
 _TIP_IN_LOCK = 0.4
 """Weight of a metre between tips beside a metre between roots when strands are gathered."""
@@ -106,8 +108,20 @@ def gather_locks(strands: Strands, count: int, points: int, *, mean: bool, seed:
     return Locks(matrix, nearest, spread.astype(np.float32))
 
 
-def outward(points: Float32Array, head: Head) -> Float32Array:
-    """Return (..., 3) unit vectors out of the head: the mean normal of the nearest vertices."""
+def outward(lines: Float32Array, head: Head) -> Float32Array:
+    """Return (N, K, 3) unit vectors out of the head: the mean normal of the nearest vertices.
+
+    They are found at some of the K points of a line, and interpolated between.
+    """
+    count = lines.shape[1]
+    some = np.unique(np.append(np.arange(0, count, _EVERY), count - 1))
+    found = _normals_near(lines[:, some], head)
+    share = np.stack([np.interp(np.arange(count), some, row) for row in np.eye(len(some))], axis=1)
+    return _unit(share.astype(np.float32) @ found).astype(np.float32)
+
+
+def _normals_near(points: Float32Array, head: Head) -> Float32Array:
+    """Return (..., 3) the mean normals of the vertices nearest to points (..., 3)."""
     # a sample of the vertices: strips follow the head's shape, not its ears and its nose
     sample = np.unique(head.faces)[:: max(len(head.vertices) // _VERTICES, 1)]
     tree = cKDTree(head.vertices[sample])
