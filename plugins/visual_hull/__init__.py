@@ -108,14 +108,15 @@ def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
     """Carve the masks in a grid of `voxel_size` cells around the hair."""
     views = _Views.of(scene, masks, options)
     torso = _torso(scene, masks, options)
-    box = _bounding_box(scene, views, torso, options)
+    dressed = views if torso is None else views.in_front_of(torso)
+    box = _bounding_box(scene, dressed, torso, options)
     grid = VoxelGrid.around(box[0], box[1], options.voxel_size)
     distance = signed_distance(scene.head, grid)
     outside, near = _room(grid, torso, options)
     if options.cut_head:
         outside &= distance > 0
     if torso is not None and grid.origin[1] < torso.top:
-        views = views.in_front_of(torso)
+        views = dressed
     loose, dense = _carve_both(grid, outside, near, views, options)
     scalp = _scalp_shell(scene, grid, distance) if options.cut_head else np.zeros(grid.shape, bool)
     shape = None if torso is None else torso.shape()
@@ -248,8 +249,6 @@ def _bounding_box(
     high = scene.head.vertices.max(axis=0).astype(np.float64) + ABOVE_HEAD
     coarse = VoxelGrid.around(low, high, COARSE_CELLS * options.voxel_size)
     outside, near = _room(coarse, torso, options)
-    if torso is not None:
-        views = views.in_front_of(torso)
     occupied = carve(coarse, outside, near, views.loose(), _rule(options, views.forgive))
     cells = np.argwhere(_largest_part(occupied))
     if not len(cells):
