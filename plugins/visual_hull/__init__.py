@@ -216,7 +216,7 @@ def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Arr
     scale = picture_scale(mask.labels.shape[0])
     hair = mask.hair.astype(np.uint8)
     grown = cv2.dilate(hair, _disc(options.slack * scale)) if options.slack else hair
-    rest = np.where(mask.person, PERSON, EMPTY).astype(np.uint8)
+    rest = PERSON * mask.person.astype(np.uint8)
     if not mask.person_known:
         rest[np.isfinite(depth)] = PERSON
         rest[_below_head(depth) :] = PERSON
@@ -224,11 +224,11 @@ def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Arr
     if options.mode == "labels" and options.opening:
         eroded = cv2.erode(hair, _disc(options.opening * scale), borderValue=1)
         core = cv2.dilate(eroded, _disc((options.opening + options.slack) * scale))
-    bare = np.where(hair > 0, EMPTY, rest)
-    return (
-        np.where(grown > 0, HAIR, rest).astype(np.uint8),
-        np.where(core > 0, HAIR, bare).astype(np.uint8),
-    )
+    loose, dense = rest.copy(), rest
+    loose[grown > 0] = HAIR
+    dense[hair > 0] = EMPTY
+    dense[core > 0] = HAIR
+    return loose, dense
 
 
 def _below_head(depth: Float32Array) -> int:
