@@ -148,8 +148,12 @@ def _features(head: Head, surface: _Surface) -> BoolArray:
     if head.landmark_vertices is None:
         return np.asarray(surface.places[..., 1] >= head.joints[1, 1])
     inner = head.vertices[head.landmark_vertices[JAW_LANDMARKS:]]
-    distance = cKDTree(inner).query(surface.places.reshape(-1, 3), distance_upper_bound=FEATURE)[0]
-    return np.asarray(np.isfinite(distance).reshape(surface.known.shape))
+    low, high = inner.min(axis=0) - FEATURE, inner.max(axis=0) + FEATURE
+    near = ((surface.places > low) & (surface.places < high)).all(axis=-1)
+    near[near] = np.isfinite(
+        cKDTree(inner).query(surface.places[near], distance_upper_bound=FEATURE)[0]
+    )
+    return np.asarray(near)
 
 
 def _delight(blended: Float32Array, seen: Float32Array, surface: _Surface) -> Float32Array:
@@ -189,27 +193,38 @@ def _whole_in_uv(head: Head) -> Int32Array:
 
 def _project(surface: _Surface, head: Head, camera: Camera, photo: UInt8Array, mask: Mask) -> _Seen:
     sized = camera.resized(photo.shape[1], photo.shape[0])
-    points = surface.places[surface.known]
-    weight = _view_weight(surface, head, sized, points)
-    pixels = np.nan_to_num(sized.project(points.astype(np.float64)) - 0.5, nan=-1.0)
+    weight = _view_weight(surface, head, sized)
     column, row = (np.full(surface.known.shape, -1, np.float32) for _ in range(2))
-    column[surface.known], row[surface.known] = pixels.T
+    # colours are enlarged: the places beside a seen texel count too
+    taken = surface.known & (cv2.dilate(weight, np.ones((3, 3), np.uint8)) > 0)
+    if not taken.any():
+        return _Seen(weight, column, row, np.zeros((*weight.shape, 3), np.uint8))
+    pixels = np.nan_to_num(sized.project(surface.places[taken]) - 0.5, nan=-1.0)
+    column[taken], row[taken] = pixels.T
     usable = _usable(sized, mask, photo) * mark_beside_eyes(head, sized)
     weight *= cv2.remap(usable, column, row, cv2.INTER_LINEAR)
     coarse = np.asarray(cv2.remap(photo, column, row, cv2.INTER_LINEAR), np.uint8)
     return _Seen(weight, column, row, coarse)
 
 
-def _view_weight(
-    surface: _Surface, head: Head, camera: Camera, points: Float32Array
-) -> Float32Array:
+def _view_weight(surface: _Surface, head: Head, camera: Camera) -> Float32Array:
     """Return (C, C) how well the camera sees each texel, 0 where it does not."""
-    facing = -(surface.normals[surface.known] * camera.view_direction(points)).sum(axis=1)
-    behind = depth_behind(camera, head_depth(head, camera), points)
-    share = np.clip((facing - LEAST_FACING) / (WHOLE_FACING - LEAST_FACING), 0, 1)
+    facing = _facing(surface, camera)
+    chosen = surface.known & (facing > LEAST_FACING)
+    behind = depth_behind(camera, head_depth(head, camera), surface.places[chosen])
+    share = np.clip((facing[chosen] - LEAST_FACING) / (WHOLE_FACING - LEAST_FACING), 0, 1)
     weight = np.zeros(surface.known.shape, np.float32)
-    weight[surface.known] = np.where(behind < HIDDEN, share**2, 0.0)
+    weight[chosen] = np.where(behind < HIDDEN, share**2, 0.0)
     return weight
+
+
+def _facing(surface: _Surface, camera: Camera) -> Float32Array:
+    """Return (C, C) the cosine under which the camera sees each texel's surface."""
+    if camera.model == "orthographic":
+        return np.asarray(surface.normals @ -camera.forward.astype(np.float32))
+    toward = camera.position.astype(np.float32) - surface.places
+    distance = np.sqrt(np.einsum("ijk,ijk->ij", toward, toward))
+    return np.asarray(np.einsum("ijk,ijk->ij", surface.normals, toward) / distance, np.float32)
 
 
 def _usable(camera: Camera, mask: Mask, photo: UInt8Array) -> Float32Array:
@@ -366,14 +381,21 @@ def _fill(
 
 
 def _like_skin(colours: Float32Array | UInt8Array, weight: Float32Array) -> Float32Array:
-    """Return (T, T) how much colours are like most of the seen ones: collars are not skin."""
-    logs = np.log(np.maximum(colours, 0) + np.float32(FLOOR))
-    green = logs[..., 1:2]
-    tones = np.concatenate([green, logs[..., :1] - green, logs[..., 2:] - green], axis=-1)
-    sure = tones[weight > 0.5][::STEP]
-    middle = np.median(sure, axis=0) if len(sure) else 0.0
-    away = ((tones - middle) / np.array(SKIN_SPREAD, np.float32)) ** 2
-    return np.asarray(np.exp(-0.5 * away.sum(axis=-1)), np.float32)
+    """Return (T, T) how much colours are like most of the seen ones, 0 where none is seen.
+
+    Collars are not skin.
+    """
+    seen = weight > 0
+    red, green, blue = np.log(np.maximum(colours[seen], 0).T + np.float32(FLOOR))
+    tones = [green, red - green, blue - green]
+    sure = [tone[weight[seen] > 0.5][::STEP] for tone in tones]
+    away = [
+        (tone - (np.median(known) if len(known) else np.float32(0))) / np.float32(spread)
+        for tone, known, spread in zip(tones, sure, SKIN_SPREAD, strict=True)
+    ]
+    likeness = np.zeros(weight.shape, np.float32)
+    likeness[seen] = np.exp(-0.5 * (away[0] ** 2 + away[1] ** 2 + away[2] ** 2))
+    return likeness
 
 
 def extend(values: Float32Array, weight: Float32Array) -> Float32Array:
