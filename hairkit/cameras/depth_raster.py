@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
 from hairkit.cameras.projection_kernels import (
     PackedCamera,
+    Vector,
     pack_camera,
     perspective_divisor,
     project,
@@ -35,6 +36,10 @@ MIN_POINTS = 4096
 """Least number of points that are worth another thread."""
 
 
+Pixel = tuple[float, float]
+"""u and v."""
+
+
 def head_depth(head: Head, camera: Camera) -> Float32Array:
     """Return (H, W) the depth of the head's first surface at every pixel's centre."""
     return mesh_depth(head.vertices, head.faces, camera)
@@ -42,12 +47,15 @@ def head_depth(head: Head, camera: Camera) -> Float32Array:
 
 def mesh_depth(vertices: Float32Array, faces: Int32Array, camera: Camera) -> Float32Array:
     """Return (H, W) the depth of the first of the faces (F, 3) at every pixel's centre."""
-    depth = _empty_depth(camera)
+    orthographic = camera.model == "orthographic"
+    nearness = np.full((camera.height, camera.width), -np.inf if orthographic else 0, np.float32)
     corners = np.empty((len(vertices), 3))
-    packed = pack_camera(camera)
-    _project_vertices(packed, vertices.astype(np.float64), corners)
-    _draw_faces(corners, faces, packed.orthographic, depth)
-    return depth
+    _project_vertices(pack_camera(camera), vertices.astype(np.float64), corners)
+    _draw_faces(corners, faces, orthographic, nearness)
+    if orthographic:
+        return -nearness
+    with np.errstate(divide="ignore"):
+        return np.reciprocal(nearness, out=nearness)
 
 
 def point_depth(
@@ -134,40 +142,63 @@ def _project_vertices(camera: PackedCamera, vertices: Float64Array, corners: Flo
 
 @compiled
 def _draw_faces(
-    corners: Float64Array, faces: Int32Array, orthographic: bool, depth: Float32Array
+    corners: Float64Array, faces: Int32Array, orthographic: bool, nearness: Float32Array
 ) -> None:
-    """Lower `depth` (H, W) to all faces that lie wholly before the camera."""
+    """Raise `nearness` (H, W) to all faces that lie wholly before the camera.
+
+    It is what is linear in the picture: 1 / depth, and -depth of an orthographic camera.
+    """
     for f in range(len(faces)):
-        a, b, c = corners[faces[f, 0]], corners[faces[f, 1]], corners[faces[f, 2]]
-        if a[2] > 0 and b[2] > 0 and c[2] > 0:
-            _draw_triangle(a, b, c, orthographic, depth)
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        za, zb, zc = corners[i, 2], corners[j, 2], corners[k, 2]
+        if za > 0 and zb > 0 and zc > 0:
+            near = (-za, -zb, -zc) if orthographic else (1 / za, 1 / zb, 1 / zc)
+            a = corners[i, 0], corners[i, 1]
+            b = corners[j, 0], corners[j, 1]
+            c = corners[k, 0], corners[k, 1]
+            _draw_triangle(a, b, c, near, nearness)
 
 
 @compiled
-def _draw_triangle(
-    a: Float64Array, b: Float64Array, c: Float64Array, orthographic: bool, depth: Float32Array
-) -> None:
-    """Lower `depth` (H, W) to a triangle of corners u, v, depth by barycentric coordinates."""
-    height, width = depth.shape
+def _draw_triangle(a: Pixel, b: Pixel, c: Pixel, near: Vector, nearness: Float32Array) -> None:
+    """Raise `nearness` (H, W) to a triangle of corners u, v, row by row.
+
+    The barycentric coordinates are linear along a row: where all are positive is a span of it.
+    """
+    height, width = nearness.shape
     area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     if abs(area) < LEAST_AREA:
         return
-    left = max(int(np.floor(min(a[0], b[0], c[0]))), 0)
-    right = min(int(np.ceil(max(a[0], b[0], c[0]))), width)
-    top = max(int(np.floor(min(a[1], b[1], c[1]))), 0)
-    bottom = min(int(np.ceil(max(a[1], b[1], c[1]))), height)
-    for y in range(top, bottom):
-        for x in range(left, right):
-            px, py = x + 0.5, y + 0.5
-            wa = ((b[0] - px) * (c[1] - py) - (b[1] - py) * (c[0] - px)) / area
-            wb = ((c[0] - px) * (a[1] - py) - (c[1] - py) * (a[0] - px)) / area
-            wc = 1.0 - wa - wb
-            if wa >= -EDGE_SLACK and wb >= -EDGE_SLACK and wc >= -EDGE_SLACK:
-                if orthographic:
-                    z = wa * a[2] + wb * b[2] + wc * c[2]
-                else:  # in perspective 1 / z is linear in the picture, z is not
-                    z = 1.0 / (wa / a[2] + wb / b[2] + wc / c[2])
-                depth[y, x] = min(depth[y, x], z)
+    left = max(int(np.ceil(min(a[0], b[0], c[0]) - 0.5)), 0)
+    right = min(int(np.floor(max(a[0], b[0], c[0]) - 0.5)), width - 1)
+    top = max(int(np.ceil(min(a[1], b[1], c[1]) - 0.5)), 0)
+    bottom = min(int(np.floor(max(a[1], b[1], c[1]) - 0.5)), height - 1)
+    share = 1 / area
+    step_a, step_b = (b[1] - c[1]) * share, (c[1] - a[1]) * share
+    step_c = -step_a - step_b
+    per_a, per_b, per_c = 1 / step_a, 1 / step_b, 1 / step_c
+    step = step_a * near[0] + step_b * near[1] + step_c * near[2]
+    px = left + 0.5
+    for y in range(top, bottom + 1):
+        py = y + 0.5
+        wa = ((b[0] - px) * (c[1] - py) - (b[1] - py) * (c[0] - px)) * share
+        wb = ((c[0] - px) * (a[1] - py) - (c[1] - py) * (a[0] - px)) * share
+        wc = 1.0 - wa - wb
+        first, last = _cut_span(0.0, float(right - left), wa, per_a)
+        first, last = _cut_span(first, last, wb, per_b)
+        first, last = _cut_span(first, last, wc, per_c)
+        if first <= last:
+            start = wa * near[0] + wb * near[1] + wc * near[2]
+            for k in range(int(np.ceil(first)), int(last) + 1):
+                value = np.float32(start + k * step)
+                nearness[y, left + k] = max(nearness[y, left + k], value)
+
+
+@compiled
+def _cut_span(first: float, last: float, weight: float, per: float) -> tuple[float, float]:
+    """Return the part of a span, `first` to `last`, where `weight + k / per` is not negative."""
+    end = -(weight + EDGE_SLACK) * per
+    return (max(first, end), last) if per > 0 else (first, min(last, end))
 
 
 @compiled

@@ -83,11 +83,11 @@ def _fit_light(
     """Return the light (9,) and how far each texel agrees with it (N,)."""
     degree = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2])
     ridge = np.diag(RIDGE * weight.sum() * degree**2)
-    trust = np.ones(len(weight))
+    trust, darkest = np.ones(len(weight)), DARKEST * np.median(brightness)
     for _ in range(ROUNDS):
         weighted = basis * (weight * trust)[:, None]
         light = np.linalg.solve(weighted.T @ basis + ridge, weighted.T @ brightness)
-        fitted = np.maximum(basis @ light, DARKEST * np.median(brightness))
+        fitted = np.maximum(basis @ light, darkest)
         trust = 1 / (1 + ((brightness / fitted - 1) / SPREAD) ** 2) ** 2
     result: Float64Array = np.asarray(light, np.float64)
     return result, trust

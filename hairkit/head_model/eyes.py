@@ -221,12 +221,12 @@ def paint_over(
     size = len(albedo)
     edge = int(np.ceil(2 * DISC_CENTRE * size))
     row, column = (part.ravel() for part in np.mgrid[size - edge : size, 0:edge])
+    uv = np.column_stack([(column + 0.5) / size, 1 - (row + 0.5) / size])
+    near = _from_disc(uv)[0] < 1 + 1 / (DISC_RADIUS * size)
+    colour = np.rint(paint_eyes(uv[near], iris, sclera)).astype(np.uint8)
     painted = albedo.copy()
     for columns in (column, size - 1 - column):
-        uv = np.column_stack([(columns + 0.5) / size, 1 - (row + 0.5) / size])
-        near = _from_disc(uv)[0] < 1 + 1 / (DISC_RADIUS * size)
-        colour = paint_eyes(uv[near], iris, sclera)
-        painted[row[near], columns[near]] = np.rint(colour).astype(np.uint8)
+        painted[row[near], columns[near]] = colour
     return painted
 
 

@@ -59,6 +59,8 @@ SHARPNESS = 8
 """Power of the weights from which details are taken: nearly the best view alone."""
 BLOWN, BLOWN_FADE = 250.0, 6.0
 """Levels of 255 from which a pixel has lost its colour, and over which its weight fades."""
+LEAST_SHARE = 0.01
+"""Share of a texel's best view below which another view's photo is not looked up."""
 LEAST_SEEN = 0.08
 """Weight of all views together from which a texel counts as seen."""
 FILL_FADE = 3.0
@@ -67,8 +69,8 @@ LARGEST_FACE = 0.1
 """Share of the texture's edge over which a face may reach."""
 MIRRORED = 0.01
 """Metres that mirrored texels may be apart on heads whose texture coordinates are symmetric."""
-TONE_REACHES = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Sigmas of the convolutions that extend tones, texels of `TONE`."""
+TONE_REACH, TONE_REACHES = 1.0, 6
+"""Sigma of the least of the convolutions that extend tones, texels, and how many there are."""
 TONE_TRUST = 1e-3
 """Weight of a convolution's result beside that of the next larger one."""
 FEATURE = 0.014
@@ -148,8 +150,12 @@ def _features(head: Head, surface: _Surface) -> BoolArray:
     if head.landmark_vertices is None:
         return np.asarray(surface.places[..., 1] >= head.joints[1, 1])
     inner = head.vertices[head.landmark_vertices[JAW_LANDMARKS:]]
-    distance = cKDTree(inner).query(surface.places.reshape(-1, 3), distance_upper_bound=FEATURE)[0]
-    return np.asarray(np.isfinite(distance).reshape(surface.known.shape))
+    low, high = inner.min(axis=0) - FEATURE, inner.max(axis=0) + FEATURE
+    near = ((surface.places > low) & (surface.places < high)).all(axis=-1)
+    near[near] = np.isfinite(
+        cKDTree(inner).query(surface.places[near], distance_upper_bound=FEATURE)[0]
+    )
+    return np.asarray(near)
 
 
 def _delight(blended: Float32Array, seen: Float32Array, surface: _Surface) -> Float32Array:
@@ -189,27 +195,38 @@ def _whole_in_uv(head: Head) -> Int32Array:
 
 def _project(surface: _Surface, head: Head, camera: Camera, photo: UInt8Array, mask: Mask) -> _Seen:
     sized = camera.resized(photo.shape[1], photo.shape[0])
-    points = surface.places[surface.known]
-    weight = _view_weight(surface, head, sized, points)
-    pixels = np.nan_to_num(sized.project(points.astype(np.float64)) - 0.5, nan=-1.0)
+    weight = _view_weight(surface, head, sized)
     column, row = (np.full(surface.known.shape, -1, np.float32) for _ in range(2))
-    column[surface.known], row[surface.known] = pixels.T
+    # colours are enlarged: the places beside a seen texel count too
+    taken = surface.known & (cv2.dilate(weight, np.ones((3, 3), np.uint8)) > 0)
+    if not taken.any():
+        return _Seen(weight, column, row, np.zeros((*weight.shape, 3), np.uint8))
+    pixels = np.nan_to_num(sized.project(surface.places[taken]) - 0.5, nan=-1.0)
+    column[taken], row[taken] = pixels.T
     usable = _usable(sized, mask, photo) * mark_beside_eyes(head, sized)
     weight *= cv2.remap(usable, column, row, cv2.INTER_LINEAR)
     coarse = np.asarray(cv2.remap(photo, column, row, cv2.INTER_LINEAR), np.uint8)
     return _Seen(weight, column, row, coarse)
 
 
-def _view_weight(
-    surface: _Surface, head: Head, camera: Camera, points: Float32Array
-) -> Float32Array:
+def _view_weight(surface: _Surface, head: Head, camera: Camera) -> Float32Array:
     """Return (C, C) how well the camera sees each texel, 0 where it does not."""
-    facing = -(surface.normals[surface.known] * camera.view_direction(points)).sum(axis=1)
-    behind = depth_behind(camera, head_depth(head, camera), points)
-    share = np.clip((facing - LEAST_FACING) / (WHOLE_FACING - LEAST_FACING), 0, 1)
+    facing = _facing(surface, camera)
+    chosen = surface.known & (facing > LEAST_FACING)
+    behind = depth_behind(camera, head_depth(head, camera), surface.places[chosen])
+    share = np.clip((facing[chosen] - LEAST_FACING) / (WHOLE_FACING - LEAST_FACING), 0, 1)
     weight = np.zeros(surface.known.shape, np.float32)
-    weight[surface.known] = np.where(behind < HIDDEN, share**2, 0.0)
+    weight[chosen] = np.where(behind < HIDDEN, share**2, 0.0)
     return weight
+
+
+def _facing(surface: _Surface, camera: Camera) -> Float32Array:
+    """Return (C, C) the cosine under which the camera sees each texel's surface."""
+    if camera.model == "orthographic":
+        return np.asarray(surface.normals @ -camera.forward.astype(np.float32))
+    toward = camera.position.astype(np.float32) - surface.places
+    distance = np.sqrt(np.einsum("ijk,ijk->ij", toward, toward))
+    return np.asarray(np.einsum("ijk,ijk->ij", surface.normals, toward) / distance, np.float32)
 
 
 def _usable(camera: Camera, mask: Mask, photo: UInt8Array) -> Float32Array:
@@ -232,43 +249,53 @@ def _blend(
     total = np.sum([view.weight for view in views], axis=0)
     best = np.maximum(np.max([view.weight for view in views], axis=0), LEAST)
     shares = [(view.weight / best) ** SHARPNESS for view in views]
+    shares = [np.where(share < LEAST_SHARE, 0, share) for share in shares]
     share_sum = np.maximum(np.sum(shares, axis=0), LEAST)
-    shares = [(share / share_sum).astype(np.float32) for share in shares]
+    shares = [np.asarray(share / share_sum, np.float32) for share in shares]
     factors = gains.astype(np.float32)
-    smooth = [_smooth(view.coarse * f, view.weight) for view, f in zip(views, factors, strict=True)]
-    mean = np.sum([s * v.weight[..., None] for s, v in zip(smooth, views, strict=True)], axis=0)
+    smooth = [_smooth(view, factor) for view, factor in zip(views, factors, strict=True)]
+    mean, taken = (np.zeros((COARSE, COARSE, 3), np.float32) for _ in range(2))
+    for low, view, share in zip(smooth, views, shares, strict=True):
+        part = _window(view.weight)
+        mean[part] += low[part] * view.weight[part][..., None]
+        taken[part] += low[part] * share[part][..., None]
     mean = extend(mean / np.maximum(total, LEAST)[..., None], (total > 0).astype(np.float32))
     details = np.zeros((SIZE, SIZE, 3), np.float32)
-    for view, photo, factor, low, share in zip(views, photos, factors, smooth, shares, strict=True):
-        if share.any():
-            _add_details(details, view, photo, factor, low, share)
-    coarse = join_gradients(mean, smooth, shares)
+    for view, photo, factor, share in zip(views, photos, factors, shares, strict=True):
+        _add_photo(details, view, photo, share[..., None] * factor)
+    coarse = join_gradients(mean, smooth, shares) - taken
     for rows in _strips():
         details[rows] += _enlarge_rows(coarse, rows)
     return details, total
 
 
-def _add_details(
-    details: Float32Array,
-    view: _Seen,
-    photo: UInt8Array,
-    gain: Float32Array,
-    smooth: Float32Array,
-    share: Float32Array,
-) -> None:
-    """Add a view's share of the details, within the part of the map that it sees."""
+def _add_photo(colours: Float32Array, view: _Seen, photo: UInt8Array, share: Float32Array) -> None:
+    """Add a view's share (C, C, 3) of its photo to the colours (S, S, 3) where it has one."""
     times = SIZE // COARSE
-    first, last = np.flatnonzero(share.any(axis=1))[[0, -1]] * times
-    columns = np.flatnonzero(share.any(axis=0))
-    seen = slice(columns[0], columns[-1] + 1)
-    for rows in _strips(first, last + times):
-        column, row, fine_share, fine_smooth = (
-            _enlarge_rows(each[:, seen], rows) for each in (view.column, view.row, share, smooth)
+    first, last = (times * end for end in _ends(share.any(axis=(1, 2))))
+    for rows in _strips(first, last):
+        near = slice(max(rows.start // times - 1, 0), rows.stop // times + 1)
+        left, right = _ends(share[near].any(axis=(0, 2)))
+        part = slice(max(left - 1, 0), right + 1)
+        column, row, fine = (
+            _enlarge_rows(each[:, part], rows) for each in (view.column, view.row, share)
         )
-        pixels = cv2.remap(photo, column, row, cv2.INTER_LINEAR) * gain
-        pixels -= fine_smooth
-        pixels *= fine_share[..., None]
-        details[rows, seen.start * times : seen.stop * times] += pixels
+        pixels = cv2.remap(photo, column, row, cv2.INTER_LINEAR)
+        columns = slice(part.start * times, part.start * times + pixels.shape[1])
+        colours[rows, columns] += cv2.multiply(pixels, fine, dtype=cv2.CV_32F)
+
+
+def _ends(marked: BoolArray) -> tuple[int, int]:
+    """Return the first of the marked (N,) and the one after the last, 0 and 0 without any."""
+    at = np.flatnonzero(marked)
+    return (int(at[0]), int(at[-1]) + 1) if len(at) else (0, 0)
+
+
+def _window(weight: Float32Array, margin: int = 0) -> tuple[slice, slice]:
+    """Return rows and columns of a picture (H, W) that hold all weights above 0, and a margin."""
+    ends = [_ends((weight > 0).any(axis=axis)) for axis in (1, 0)]
+    rows, columns = (slice(max(first - margin, 0), last + margin) for first, last in ends)
+    return rows, columns
 
 
 def _strips(first: int = 0, last: int | None = None) -> Iterator[slice]:
@@ -291,12 +318,16 @@ def _enlarge_rows(picture: Float32Array, rows: slice) -> Float32Array:
     return np.asarray(larger[(top - first) * times : (bottom - first) * times], np.float32)
 
 
-def _smooth(colours: Float32Array, weight: Float32Array) -> Float32Array:
+def _smooth(view: _Seen, gain: Float32Array) -> Float32Array:
     """Return (C, C, 3) colours without details, of what the view sees alone."""
-    within = (weight > 0).astype(np.float32)
-    blurred = cv2.GaussianBlur(colours * within[..., None], (0, 0), BAND)
-    share = cv2.GaussianBlur(within, (0, 0), BAND)
-    return np.asarray(blurred / np.maximum(share, LEAST)[..., None], np.float32)
+    smooth = np.zeros(view.coarse.shape, np.float32)
+    part = _window(view.weight, round(4 * BAND))
+    within = (view.weight[part] > 0).astype(np.float32)
+    if within.any():
+        blurred = cv2.GaussianBlur(view.coarse[part] * gain * within[..., None], (0, 0), BAND)
+        share = cv2.GaussianBlur(within, (0, 0), BAND)
+        smooth[part] = blurred / np.maximum(share, LEAST)[..., None]
+    return smooth
 
 
 def _shrink(picture: Float32Array, width: int) -> Float32Array:
@@ -366,31 +397,41 @@ def _fill(
 
 
 def _like_skin(colours: Float32Array | UInt8Array, weight: Float32Array) -> Float32Array:
-    """Return (T, T) how much colours are like most of the seen ones: collars are not skin."""
-    logs = np.log(np.maximum(colours, 0) + np.float32(FLOOR))
-    green = logs[..., 1:2]
-    tones = np.concatenate([green, logs[..., :1] - green, logs[..., 2:] - green], axis=-1)
-    sure = tones[weight > 0.5][::STEP]
-    middle = np.median(sure, axis=0) if len(sure) else 0.0
-    away = ((tones - middle) / np.array(SKIN_SPREAD, np.float32)) ** 2
-    return np.asarray(np.exp(-0.5 * away.sum(axis=-1)), np.float32)
+    """Return (T, T) how much colours are like most of the seen ones, 0 where none is seen.
+
+    Collars are not skin.
+    """
+    seen = weight > 0
+    red, green, blue = np.log(np.maximum(colours[seen], 0).T + np.float32(FLOOR))
+    tones = [green, red - green, blue - green]
+    sure = [tone[weight[seen] > 0.5][::STEP] for tone in tones]
+    away = [
+        (tone - (np.median(known) if len(known) else np.float32(0))) / np.float32(spread)
+        for tone, known, spread in zip(tones, sure, SKIN_SPREAD, strict=True)
+    ]
+    likeness = np.zeros(weight.shape, np.float32)
+    likeness[seen] = np.exp(-0.5 * (away[0] ** 2 + away[1] ** 2 + away[2] ** 2))
+    return likeness
 
 
 def extend(values: Float32Array, weight: Float32Array) -> Float32Array:
     """Return values (H, W, C) smoothed by their weights (H, W), and extended to where those are 0.
 
-    Normalised convolution (Knutsson and Westin 1993) with Gaussians of growing reach: each gives
-    its result where the smaller ones have found nothing.
+    Normalised convolution (Knutsson and Westin 1993) with Gaussians of doubled reach, on maps of
+    halved edge: each gives its result where the smaller ones have found nothing.
     """
-    mixed = np.zeros_like(values)
-    total = np.zeros(weight.shape, np.float32)
-    trust = 1.0
-    for reach in TONE_REACHES:
-        found = cv2.GaussianBlur(weight, (0, 0), reach)
-        sums = cv2.GaussianBlur(values * weight[..., None], (0, 0), reach)
-        mixed += trust * sums
-        total += trust * found
+    level = np.concatenate([values * weight[..., None], weight[..., None]], axis=-1)
+    sums = level.sum(axis=(0, 1))
+    size, mixed = weight.shape[::-1], np.zeros_like(level)
+    trust, further = 1.0, TONE_REACH
+    for number in range(TONE_REACHES):
+        level = cv2.GaussianBlur(level, (0, 0), further)
+        larger = cv2.resize(level, size, interpolation=cv2.INTER_LINEAR)
+        mixed = cv2.scaleAdd(larger, trust, mixed)
         trust *= TONE_TRUST
-    mean = (values * weight[..., None]).sum(axis=(0, 1)) / max(float(weight.sum()), LEAST)
-    floor = trust * TONE_TRUST
-    return np.asarray((mixed + floor * mean) / (total + floor)[..., None], np.float32)
+        further = 3**0.5 * TONE_REACH  # squares of sigmas add up: 1 + 3 is that of twice the reach
+        if number:
+            half = [(count + 1) // 2 for count in level.shape[1::-1]]
+            level = cv2.resize(level, half, interpolation=cv2.INTER_AREA)
+    mixed += trust * TONE_TRUST * sums / max(sums[-1], LEAST)
+    return np.asarray(mixed[..., :-1] / mixed[..., -1:], np.float32)

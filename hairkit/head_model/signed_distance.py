@@ -342,10 +342,12 @@ def _nearer_feet(at: Float64Array, which: int, feet: Feet, cells: Cells) -> tupl
     best, second, nearest = which, which, foot_distance(at, points[which])
     for _ in range(_WALK):
         start = best
-        low = ((points[start] - cells.first) / cells.spacing - 0.5).astype(np.int64)
-        for x in range(max(low[0], 0), min(low[0] + 3, seeds.shape[0])):
-            for y in range(max(low[1], 0), min(low[1] + 3, seeds.shape[1])):
-                for z in range(max(low[2], 0), min(low[2] + 3, seeds.shape[2])):
+        i = int((points[start, 0] - cells.first[0]) / cells.spacing - 0.5)
+        j = int((points[start, 1] - cells.first[1]) / cells.spacing - 0.5)
+        k = int((points[start, 2] - cells.first[2]) / cells.spacing - 0.5)
+        for x in range(max(i, 0), min(i + 3, seeds.shape[0])):
+            for y in range(max(j, 0), min(j + 3, seeds.shape[1])):
+                for z in range(max(k, 0), min(k + 3, seeds.shape[2])):
                     other = seeds[x, y, z]
                     if other >= 0 and other != best:
                         squared = foot_distance(at, points[other])

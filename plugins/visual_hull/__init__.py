@@ -108,14 +108,15 @@ def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
     """Carve the masks in a grid of `voxel_size` cells around the hair."""
     views = _Views.of(scene, masks, options)
     torso = _torso(scene, masks, options)
-    box = _bounding_box(scene, views, torso, options)
+    dressed = views if torso is None else views.in_front_of(torso)
+    box = _bounding_box(scene, dressed, torso, options)
     grid = VoxelGrid.around(box[0], box[1], options.voxel_size)
     distance = signed_distance(scene.head, grid)
     outside, near = _room(grid, torso, options)
     if options.cut_head:
         outside &= distance > 0
     if torso is not None and grid.origin[1] < torso.top:
-        views = views.in_front_of(torso)
+        views = dressed
     loose, dense = _carve_both(grid, outside, near, views, options)
     scalp = _scalp_shell(scene, grid, distance) if options.cut_head else np.zeros(grid.shape, bool)
     shape = None if torso is None else torso.shape()
@@ -215,7 +216,7 @@ def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Arr
     scale = picture_scale(mask.labels.shape[0])
     hair = mask.hair.astype(np.uint8)
     grown = cv2.dilate(hair, _disc(options.slack * scale)) if options.slack else hair
-    rest = np.where(mask.person, PERSON, EMPTY).astype(np.uint8)
+    rest = PERSON * mask.person.astype(np.uint8)
     if not mask.person_known:
         rest[np.isfinite(depth)] = PERSON
         rest[_below_head(depth) :] = PERSON
@@ -223,11 +224,11 @@ def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Arr
     if options.mode == "labels" and options.opening:
         eroded = cv2.erode(hair, _disc(options.opening * scale), borderValue=1)
         core = cv2.dilate(eroded, _disc((options.opening + options.slack) * scale))
-    bare = np.where(hair > 0, EMPTY, rest)
-    return (
-        np.where(grown > 0, HAIR, rest).astype(np.uint8),
-        np.where(core > 0, HAIR, bare).astype(np.uint8),
-    )
+    loose, dense = rest.copy(), rest
+    loose[grown > 0] = HAIR
+    dense[hair > 0] = EMPTY
+    dense[core > 0] = HAIR
+    return loose, dense
 
 
 def _below_head(depth: Float32Array) -> int:
@@ -248,8 +249,6 @@ def _bounding_box(
     high = scene.head.vertices.max(axis=0).astype(np.float64) + ABOVE_HEAD
     coarse = VoxelGrid.around(low, high, COARSE_CELLS * options.voxel_size)
     outside, near = _room(coarse, torso, options)
-    if torso is not None:
-        views = views.in_front_of(torso)
     occupied = carve(coarse, outside, near, views.loose(), _rule(options, views.forgive))
     cells = np.argwhere(_largest_part(occupied))
     if not len(cells):

@@ -99,47 +99,58 @@ def add_votes(
 ) -> None:
     """Add a view's votes for the layers `first` to `last` along x.
 
-    Cells that already have too many empty votes are left out: they are lost.
+    Cells that already have too many empty votes are left out: they are lost. Arrays are taken out
+    of their tuples before the loop, in which Numba would count references to them.
     """
-    _, size_y, size_z = cells.candidates.shape
+    candidates, near, origin = cells.candidates, cells.near, cells.origin
+    hair, empty, seen = votes.hair, votes.empty, votes.seen
+    camera, labels, surface = view.camera, view.labels, view.surface
+    edges = view.open_left, view.open_top, view.open_right, view.open_bottom
+    margins = rule.front_margin, rule.hidden_depth
+    _, size_y, size_z = candidates.shape
+    height, width = labels.shape
     for ix in range(first, last):
-        x = cells.origin[0] + (ix + 0.5) * cells.spacing
+        x = origin[0] + (ix + 0.5) * cells.spacing
         for iy in range(size_y):
-            y = cells.origin[1] + (iy + 0.5) * cells.spacing
+            y = origin[1] + (iy + 0.5) * cells.spacing
             for iz in range(size_z):
-                if not cells.candidates[ix, iy, iz] or votes.empty[ix, iy, iz] > rule.forgive:
+                if not candidates[ix, iy, iz] or empty[ix, iy, iz] > rule.forgive:
                     continue
-                z = cells.origin[2] + (iz + 0.5) * cells.spacing
-                u, v, depth = project(view.camera, x, y, z)
-                vote = _vote(view, u, v, depth, rule, cells.near[ix, iy, iz])
+                z = origin[2] + (iz + 0.5) * cells.spacing
+                u, v, depth = project(camera, x, y, z)
+                if u < 0 or v < 0 or u >= width or v >= height:
+                    if not (near[ix, iy, iz] and _beyond_hair(u, v, labels.shape, edges)):
+                        empty[ix, iy, iz] += 1
+                    continue
+                vote = _vote(labels[int(v), int(u)], surface[int(v), int(u)], depth, margins)
                 if vote == EMPTY:
-                    votes.empty[ix, iy, iz] += 1
+                    empty[ix, iy, iz] += 1
                 elif vote != PERSON:
-                    votes.hair[ix, iy, iz] += 1
+                    hair[ix, iy, iz] += 1
                     if vote == HAIR:
-                        votes.seen[ix, iy, iz] = True
+                        seen[ix, iy, iz] = True
 
 
 @compiled
-def _vote(view: LabelledView, u: float, v: float, depth: float, rule: Rule, near: bool) -> int:
-    """Return a view's vote on a cell at pixel u, v: EMPTY, HAIR, HIDDEN, or PERSON for no vote.
+def _beyond_hair(
+    u: float, v: float, shape: tuple[int, int], edges: tuple[bool, bool, bool, bool]
+) -> bool:
+    """Return whether pixel u, v lies beyond one of the `edges` that hair touches."""
+    left, top, right, bottom = edges
+    height, width = shape
+    return (u < 0 and left) or (v < 0 and top) or (u >= width and right) or (v >= height and bottom)
 
-    Where it sees the person, a cell farther than `front_margin` in front of the surface is empty.
+
+@compiled
+def _vote(label: int, surface: float, depth: float, margins: tuple[float, float]) -> int:
+    """Return a view's vote on a cell: EMPTY, HAIR, HIDDEN, or PERSON for no vote.
+
+    `label` and `surface` are those of its pixel, `margins` those of the rule. Where the view sees
+    the person, a cell farther than `front_margin` in front of the surface is empty.
     """
-    height, width = view.labels.shape
-    left, top, right, bottom = u < 0, v < 0, u >= width, v >= height
-    if left or top or right or bottom:
-        unknown = near and (
-            (left and view.open_left)
-            or (top and view.open_top)
-            or (right and view.open_right)
-            or (bottom and view.open_bottom)
-        )
-        return PERSON if unknown else EMPTY
-    label = view.labels[int(v), int(u)]
-    surface = view.surface[int(v), int(u)]
-    if label == PERSON and np.isfinite(surface) and depth < surface - rule.front_margin:
+    front_margin, hidden_depth = margins
+    if label == PERSON and np.isfinite(surface) and depth < surface - front_margin:
         return EMPTY
-    if label == HAIR and depth > surface + rule.hidden_depth:
+    if label == HAIR and depth > surface + hidden_depth:
         return HIDDEN
     return int(label)

@@ -185,8 +185,11 @@ def _misfits(usual: Torso, numbers: Float64Array, views: Sequence[_View]) -> Flo
     surface = np.stack([_torso(usual, row).surface(HEIGHTS, AROUND) for row in numbers])
     around = np.roll(surface, -1, axis=2) - np.roll(surface, 1, axis=2)
     normal = np.cross(np.gradient(surface, axis=1), around)
-    rows = (-1, AROUND, 3)
-    ends = [_outline(surface.reshape(rows), normal.reshape(rows), view.camera) for view in views]
+    surface, normal = surface.reshape(-1, AROUND, 3), normal.reshape(-1, AROUND, 3)
+    level, squared = (np.einsum("rai,rai->ra", part, surface) for part in (normal, surface))
+    ends = [
+        _outline(surface, _facing(surface, normal, level, squared, view.camera)) for view in views
+    ]
     found = [_look_up(view, *end) for view, end in zip(views, ends, strict=True)]
     either = np.stack(found).reshape(len(views), 2, len(numbers), len(HEIGHTS))
     parts = either.transpose(2, 0, 1, 3).reshape(len(numbers), -1)
@@ -194,11 +197,30 @@ def _misfits(usual: Torso, numbers: Float64Array, views: Sequence[_View]) -> Flo
     return np.concatenate([parts, weight * numbers], axis=1)
 
 
-def _outline(
-    surface: Float64Array, normal: Float64Array, camera: Camera
-) -> tuple[Float64Array, BoolArray]:
-    """Return points (2 R, 3) where the sections (R, A, 3) turn away, and which exist (2 R,)."""
-    facing = (normal * camera.view_direction(surface)).sum(axis=-1)
+def _facing(
+    surface: Float64Array,
+    normal: Float64Array,
+    level: Float64Array,
+    squared: Float64Array,
+    camera: Camera,
+) -> Float64Array:
+    """Return (R, A) products of normals and viewing directions at surface points (R, A, 3).
+
+    `level` and `squared` (R, A) are the points' products with their normals and with themselves:
+    what all views share.
+    """
+    if camera.model == "orthographic":
+        return np.asarray(normal @ camera.forward)
+    place = camera.position
+    distance = np.sqrt(squared - 2 * surface @ place + place @ place)
+    return np.asarray((level - normal @ place) / distance)
+
+
+def _outline(surface: Float64Array, facing: Float64Array) -> tuple[Float64Array, BoolArray]:
+    """Return points (2 R, 3) where the sections (R, A, 3) turn away, and which exist (2 R,).
+
+    They lie where `facing` (R, A) changes its sign.
+    """
     after = np.roll(facing, -1, axis=1)
     rows = np.arange(len(surface))
     points, there = [], []
