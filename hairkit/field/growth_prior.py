@@ -7,6 +7,7 @@ along the shortest path to where the hair ends; partings and bare faces follow f
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,7 @@ from hairkit.field.smooth_volume import smooth_volume
 from hairkit.parallel import compiled
 from hairkit.types.head import Head
 from hairkit.types.parting import Parting
-from hairkit.types.volume import Hull, ScalpDistance, VoxelGrid, outer_products
+from hairkit.types.volume import Hull, ScalpDistance, VoxelGrid, cell_slopes, outer_products
 
 WHORL_BEHIND = 0.03
 """Metres from the head's highest point back to the vertical axis of the crown's whorl."""
@@ -69,19 +70,60 @@ def combing_direction(
     at = np.asarray(points, np.float64)
     outward = gradient(hull.grid, hull.head_distance, at)
     flow = gradient(hull.grid, growth, at)
-    flow -= np.sum(flow * outward, axis=1, keepdims=True) * outward
+    return _comb(head, at, outward, flow, lift, parting, hair_length)
+
+
+class ScalpComb(NamedTuple):
+    """The combing direction in the loose cells near the scalp."""
+
+    near: BoolArray
+    """(N,) which loose cells these are."""
+    direction: Float64Array
+    """(M, 3) unit directions in them."""
+
+
+def comb_cells(
+    head: Head,
+    hull: Hull,
+    growth: Float32Array,
+    reach: float,
+    lift: float,
+    parting: Parting,
+    hair_length: float,
+) -> ScalpComb:
+    """Return `combing_direction` at the centres of loose cells less than `reach` off the head.
+
+    Gradients at centres are differences of cells.
+    """
+    near = hull.head_distance[hull.loose] < reach
+    cells = hull.loose & (hull.head_distance < reach)
+    at = hull.grid.centres_of(cells).astype(np.float64)
+    outward = _unit(cell_slopes(hull.head_distance, cells))
+    flow = _unit(cell_slopes(growth, cells))
+    return ScalpComb(near, _comb(head, at, outward, flow, lift, parting, hair_length))
+
+
+def _comb(
+    head: Head,
+    at: Float64Array,
+    outward: Float64Array,
+    flow: Float64Array,
+    lift: float,
+    parting: Parting,
+    hair_length: float,
+) -> Float64Array:
+    """Return the combing direction (N, 3) at points where normals and flow (N, 3) are known."""
+    flow = flow - np.sum(flow * outward, axis=1, keepdims=True) * outward
     share = long_share(hair_length)
     combed = share * flow + max(1 - share, LEAST_WHORL) * _from_crown(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
     if parts(parting, hair_length):
         crown = crown_share(parting, head, at)[:, None]
-        combed = (1 - crown) * combed + crown * comb_from_parting(parting, head, at, outward)
-        combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
-    direction = combed + lift * outward
-    result: Float64Array = direction / np.maximum(
-        np.linalg.norm(direction, axis=1, keepdims=True), 1e-9
-    )
-    return result
+        top = np.flatnonzero(crown)
+        parted = comb_from_parting(parting, head, at[top], outward[top])
+        combed[top] = (1 - crown[top]) * combed[top] + crown[top] * parted
+        combed[top] /= np.maximum(np.linalg.norm(combed[top], axis=1, keepdims=True), 1e-6)
+    return _unit(combed + lift * outward)
 
 
 def parts(parting: Parting, hair_length: float) -> bool:
@@ -91,44 +133,37 @@ def parts(parting: Parting, hair_length: float) -> bool:
 
 @dataclass(frozen=True)
 class ScalpPrior:
-    """Weight and range of the combing direction near the scalp."""
+    """Weights of the combing direction, against the certainty of fused cells, at most 1 a view."""
 
     weight: float
-    """Against the certainty of fused cells, which is at most 1 for each view."""
-    reach: float
-    """Metres from the head."""
-    lift: float
-    """Outward part against the tangential one."""
+    """In the cells near the scalp."""
     crown: float = 0.0
-    """Weight of the comb from the parting, in all the hair on the crown."""
+    """Of the comb from the parting, in all the hair on the crown."""
 
 
 def add_scalp_prior(
     head: Head,
     hull: Hull,
-    growth: Float32Array,
     tensor: Float32Array,
     certainty: Float32Array,
+    comb: ScalpComb,
     prior: ScalpPrior,
     parting: Parting,
     hair_length: float,
 ) -> tuple[Float32Array, Float32Array]:
     """Add the prior to tensors (N, 6) and certainty (N,) of the loose cells; return new ones."""
     data, weight = tensor.copy(), certainty.copy()
-    points = hull.grid.centres_of(hull.loose)
-    near = hull.head_distance[hull.loose] < prior.reach
-    if prior.weight and near.any():
-        at = points[near]
-        comb = combing_direction(head, hull, growth, at, prior.lift, parting, hair_length)
-        _mix(data, weight, near, comb, np.full(len(comb), prior.weight))
+    if prior.weight:
+        _mix(data, weight, comb.near, comb.direction, np.full(len(comb.direction), prior.weight))
     if prior.crown and parts(parting, hair_length):
-        share = prior.crown * crown_share(parting, head, points)
-        top = share > 0
-        outward = gradient(hull.grid, hull.head_distance, points[top])
-        lift = root_lift(hull, points[top])[:, None]
-        comb = comb_from_parting(parting, head, points[top], outward) + lift * outward
-        comb /= np.maximum(np.linalg.norm(comb, axis=1, keepdims=True), 1e-9)
-        _mix(data, weight, top, comb, share[top])
+        share = prior.crown * crown_share(parting, head, hull.grid.centres_of(hull.loose))
+        top, cells = share > 0, np.zeros(hull.grid.shape, bool)
+        cells[hull.loose] = top
+        points = hull.grid.centres_of(cells)
+        outward = _unit(cell_slopes(hull.head_distance, cells))
+        lift = root_lift(hull, points)[:, None]
+        direction = comb_from_parting(parting, head, points, outward) + lift * outward
+        _mix(data, weight, top, _unit(direction), share[top])
     return data, weight
 
 
@@ -166,8 +201,14 @@ def gradient(grid: VoxelGrid, values: Float32Array, points: npt.ArrayLike) -> Fl
         ],
         axis=1,
     ).astype(np.float64)
-    length = np.linalg.norm(slope, axis=1, keepdims=True)
-    result: Float64Array = np.where(length > 1e-9, slope / np.maximum(length, 1e-9), 0.0)
+    return _unit(slope)
+
+
+def _unit(vectors: npt.ArrayLike) -> Float64Array:
+    """Return vectors (N, 3) at length 1, those of nearly no length as zeros."""
+    given = np.asarray(vectors, np.float64)
+    length = np.linalg.norm(given, axis=1, keepdims=True)
+    result: Float64Array = np.where(length > 1e-9, given / np.maximum(length, 1e-9), 0.0)
     return result
 
 
