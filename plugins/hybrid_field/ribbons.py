@@ -83,6 +83,7 @@ def _draw(
     `points` (P, 3) and `offsets` (S + 1,) are those of the segments.
     """
     slope, side, along, at = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    rank, shifts, weights = cells.rank, profile.shifts, profile.weights  # counts references once
     for s in range(len(offsets) - 1):
         for i in range(offsets[s], offsets[s + 1]):
             if i + 1 < offsets[s + 1]:  # the last point has the tangent of the one before
@@ -94,12 +95,15 @@ def _draw(
             for axis in range(3):
                 at[axis] = (points[i, axis] - cells.origin[axis]) / cells.spacing
                 side[axis] /= cells.spacing
-            for k in range(len(profile.shifts)):
-                n = _row_at(cells.rank, at, profile.shifts[k], side)
+            for k in range(len(shifts)):
+                x = min(max(int(at[0] + shifts[k] * side[0]), 0), rank.shape[0] - 1)
+                y = min(max(int(at[1] + shifts[k] * side[1]), 0), rank.shape[1] - 1)
+                z = min(max(int(at[2] + shifts[k] * side[2]), 0), rank.shape[2] - 1)
+                n = rank[x, y, z]
                 if n >= 0:
                     for axis in range(3):
-                        sums[n, axis] += profile.weights[k] * along[axis]
-                    sums[n, 3] += profile.weights[k]
+                        sums[n, axis] += weights[k] * along[axis]
+                    sums[n, 3] += weights[k]
 
 
 @compiled
@@ -111,12 +115,3 @@ def _across(along: Float64Array, slope: Float64Array, side: Float64Array) -> Non
     length = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2)
     for axis in range(3):
         side[axis] /= max(length, 1e-9)
-
-
-@compiled
-def _row_at(rank: Int32Array, at: Float64Array, shift: float, side: Float64Array) -> int:
-    """Return the number of the cell that holds at + shift side (3,), in cells; clamped."""
-    x = min(max(int(at[0] + shift * side[0]), 0), rank.shape[0] - 1)
-    y = min(max(int(at[1] + shift * side[1]), 0), rank.shape[1] - 1)
-    z = min(max(int(at[2] + shift * side[2]), 0), rank.shape[2] - 1)
-    return int(rank[x, y, z])
