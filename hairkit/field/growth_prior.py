@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
 from hairkit.field.cell_shells import dilate_cells
 from hairkit.field.parting import comb_from_parting, crown_share, root_lift
 from hairkit.field.smooth_volume import smooth_volume
@@ -42,10 +42,6 @@ FLOW_SMOOTHING = 2.0
 """Standard deviation in cells that makes the chamfer distance's gradient smooth."""
 LENGTH_PERCENTILE = 98
 """Percentile of the scalp distance that is taken as the hair's length."""
-OCTANTS = 8
-"""Orders in which the cells of a grid are swept."""
-MOST_SWEEPS = 12
-"""Rounds of eight sweeps; paths round more corners than this are left too long."""
 LEAST_CHANGE = 1e-7
 """Metres by which a distance must fall to count as changed: rounding."""
 
@@ -251,59 +247,57 @@ def long_share(length: float) -> float:
 def chamfer_distance(occupied: BoolArray, start: BoolArray, spacing: float) -> Float32Array:
     """Return the shortest paths through occupied cells from the start cells, (X, Y, Z).
 
-    Infinite where no path leads. Steps go along edges and diagonals of cells; sweeps in the eight
-    diagonal orders are repeated until a round of them changes nothing.
+    Infinite where no path leads. Steps go along edges and diagonals of cells, whose neighbours are
+    looked at again as long as a shorter path to them is found (Moore 1959).
     """
     result = np.full(occupied.shape, np.inf, np.float32)
     if occupied.any():
         box = tuple(slice(cells.min(), cells.max() + 1) for cells in np.nonzero(occupied))
-        inside = np.pad(occupied[box], 1)  # no step of a sweep leaves the padded box
-        distance = np.where(inside & np.pad(start[box], 1), 0, np.inf).astype(np.float32)
-        cost = np.sqrt(np.arange(4)).astype(np.float32) * np.float32(spacing)
-        _chamfer(inside, cost, distance)
+        inside = np.pad(occupied[box], 1)  # no step leaves the padded box
+        begun = inside & np.pad(start[box], 1)
+        distance = np.where(begun, 0, np.inf).astype(np.float32)
+        queue = np.empty(np.count_nonzero(inside), np.int32)
+        first = np.flatnonzero(begun)
+        queue[: len(first)] = first
+        steps = np.sqrt(np.arange(4)).astype(np.float32) * np.float32(spacing)
+        strides = (inside.shape[1] * inside.shape[2], inside.shape[2])
+        cells = (queue, len(first), begun.ravel(), distance.ravel())
+        _chamfer(inside.ravel(), strides, steps, *cells)
         result[box] = distance[1:-1, 1:-1, 1:-1]
     result[start] = 0
     return result
 
 
 @compiled
-def _chamfer(occupied: BoolArray, cost: Float32Array, distance: Float32Array) -> None:
-    """Lower distances (X, Y, Z), infinite in unoccupied cells, until a round changes none."""
-    unchanged = 0
-    for sweep in range(OCTANTS * MOST_SWEEPS):
-        changed = _sweep(occupied, cost, sweep % OCTANTS, distance)
-        unchanged = 0 if changed else unchanged + 1
-        if unchanged == OCTANTS:
-            break
+def _chamfer(
+    occupied: BoolArray,
+    strides: tuple[int, int],
+    steps: Float32Array,
+    queue: Int32Array,
+    waiting: int,
+    queued: BoolArray,
+    distance: Float32Array,
+) -> None:
+    """Lower distances (N,), infinite but in the first cells, to those of the shortest paths.
 
-
-@compiled
-def _sweep(occupied: BoolArray, cost: Float32Array, octant: int, distance: Float32Array) -> bool:
-    """Lower distances (X, Y, Z) in one sweep of the grid; returns whether any changed.
-
-    The bits of `octant` give the direction along x, y and z; `cost` (4,) are metres of a step to a
-    cell across a face, an edge and a corner. The outermost cells are not occupied.
+    Cells are numbered in C order, `strides` apart along x and y; the outermost are not occupied.
+    `steps` (4,) are metres of a step to a cell across a face, an edge and a corner. The `queue`, as
+    long as there are occupied cells, holds the `waiting` first ones, which are `queued` (N,).
     """
-    nx, ny, nz = occupied.shape
-    sx = 1 if octant & 1 else -1
-    sy = 1 if octant & 2 else -1
-    sz = 1 if octant & 4 else -1
-    changed = False
-    for kx in range(nx):
-        ix = kx if sx > 0 else nx - 1 - kx
-        for ky in range(ny):
-            iy = ky if sy > 0 else ny - 1 - ky
-            for kz in range(nz):
-                iz = kz if sz > 0 else nz - 1 - kz
-                if not occupied[ix, iy, iz]:
-                    continue
-                best = distance[ix, iy, iz]
-                for corner in range(1, 8):
-                    a, b, c = corner & 1, corner >> 1 & 1, corner >> 2 & 1
-                    best = min(
-                        best, distance[ix - sx * a, iy - sy * b, iz - sz * c] + cost[a + b + c]
-                    )
-                if best < distance[ix, iy, iz] - LEAST_CHANGE:
-                    distance[ix, iy, iz] = best
-                    changed = True
-    return changed
+    head = 0
+    while waiting > 0:
+        cell = queue[head]
+        head = head + 1 if head + 1 < len(queue) else 0
+        waiting -= 1
+        queued[cell] = False
+        for a in range(-1, 2):
+            for b in range(-1, 2):
+                for c in range(-1, 2):
+                    other = cell + a * strides[0] + b * strides[1] + c
+                    way = distance[cell] + steps[abs(a) + abs(b) + abs(c)]
+                    if occupied[other] and way < distance[other] - LEAST_CHANGE:
+                        distance[other] = way
+                        if not queued[other]:
+                            queued[other] = True
+                            queue[(head + waiting) % len(queue)] = other
+                            waiting += 1

@@ -223,7 +223,7 @@ def _progressive_roots(
         wanted = int(CANDIDATES_PER_ROOT * PACKING * total / radius**2) + FIRST_CANDIDATES
         if wanted > tried:
             more = _candidates(head, area, tried, wanted, shift, reach, whole)
-            some = _Candidates(*map(np.concatenate, zip(some, more, strict=True)))
+            some = _Candidates(*(np.concatenate(pair) for pair in zip(some, more, strict=True)))
             apart = np.concatenate([apart, np.full(len(more.face), np.inf)])
             tried = wanted
         now = int(np.searchsorted(some.number, wanted))

@@ -341,6 +341,7 @@ def _share_along(
     `points` (P, 3) and `offsets` (S + 1,) are those of the strands, `share` is (S,).
     """
     tensor, d = np.empty(6), np.empty(3)
+    origin, spacing, values = tensors.origin, tensors.spacing, tensors.values
     for s in range(first, last):
         along, trace = 0.0, 0.0
         for i in range(offsets[s], offsets[s + 1]):
@@ -349,7 +350,7 @@ def _share_along(
             for axis in range(3):
                 d[axis] = np.float64(points[ahead + 1, axis]) - points[ahead, axis]
                 square += d[axis] * d[axis]
-            sample_at(tensors.origin, tensors.spacing, tensors.values, points[i], tensor)
+            sample_at(origin, spacing, values, points[i], tensor)
             trace += tensor[XX] + tensor[YY] + tensor[ZZ]
             if square > 0:
                 along += _quadratic_form(tensor, d) / square

@@ -163,12 +163,13 @@ def _follow_tensors(
     for axis in range(3):
         p[axis], d[axis] = seed[axis], sign * way[axis]
     tensor, share = np.empty(6), np.empty(1)
+    origin, spacing, values = tensors.origin, tensors.spacing, tensors.values
     for k in range(len(line)):
-        sample_at(tensors.origin, tensors.spacing, inside, p, share)
+        sample_at(origin, spacing, inside, p, share)
         if share[0] < 0.5:
             return k
         copy_point(p, line[k])
-        sample_at(tensors.origin, tensors.spacing, tensors.values, p, tensor)
+        sample_at(origin, spacing, values, p, tensor)
         if not principal_direction(tensor, d, d) or not make_unit(d):
             return k + 1
         for axis in range(3):

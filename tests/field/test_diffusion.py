@@ -129,7 +129,11 @@ def test_turning_the_block_turns_the_solution() -> None:
     turned, turned_volume = occupied.transpose(2, 0, 1), volume.transpose(0, 3, 1, 2)
     straight = solve_screened(CellGraph.of(occupied), data, weight, 0.5, tolerance=1e-5)
     other = solve_screened(
-        CellGraph.of(turned), turned_volume[0][turned][:, None], turned_volume[1][turned], 0.5, tolerance=1e-5
+        CellGraph.of(turned),
+        turned_volume[0][turned][:, None],
+        turned_volume[1][turned],
+        0.5,
+        tolerance=1e-5,
     )
     result = np.zeros(occupied.shape, np.float32)
     result[occupied] = straight[:, 0]

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.hybrid_growth import Options, grow, track
+from hairkit_plugins.hybrid_growth import Options, grow, signed_volume, track
 
 from hairkit.arrays import Float32Array
 from hairkit.field.growth_prior import measure_scalp_distance
@@ -107,7 +107,9 @@ def test_strands_that_meet_the_shoulders_turn_where_the_hair_goes_on(
     field = falling(growth)
     assert field.direction is not None
     below, above = (
-        grow(field, signed_volume(field, field.direction, distance), starts, 0.15, options, height).tips[0]
+        grow(
+            field, signed_volume(field, field.direction, distance), starts, 0.15, options, height
+        ).tips[0]
         for height in (0.05, -0.1)
     )
     np.testing.assert_allclose(above, [-0.05, -0.03, 0], atol=2e-3)
@@ -125,7 +127,9 @@ def test_long_strands_grow_as_far_as_their_own_tips() -> None:
     assert field.direction is not None
     starts = np.array([[0.0, 0.15, 0], [0.0, -0.15, 0]], np.float32)
     options = replace(FREE, reach=1.0)
-    far, near = grow(field, signed_volume(field, field.direction, inside), starts, 0.12, options).lengths()
+    far, near = grow(
+        field, signed_volume(field, field.direction, inside), starts, 0.12, options
+    ).lengths()
     assert far == pytest.approx(0.15, abs=2e-3)
     assert near == pytest.approx(0.12, abs=2e-3)
 
@@ -312,7 +316,13 @@ def test_sliding_strands_are_pulled_back_to_the_surface() -> None:
     starts = np.array([[-0.1, 0.02, 0.0]], np.float32)
     options = replace(FREE, slide_sine=0.5, reach=1.0, inertia=0.0, blind=0.0, bound=3.0)
     free, pulled = (
-        grow(field, signed_volume(field, field.direction, distance), starts, 0.1, replace(options, pull=p))
+        grow(
+            field,
+            signed_volume(field, field.direction, distance),
+            starts,
+            0.1,
+            replace(options, pull=p),
+        )
         for p in (0.0, 1.0)
     )
     assert abs(pulled.tips[0, 1]) < 0.5 * free.tips[0, 1]
