@@ -13,7 +13,7 @@ from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
 from hairkit.field.cell_shells import dilate_cells
-from hairkit.field.diffusion import diffusion_matrix, solve_screened
+from hairkit.field.diffusion import CellGraph, solve_screened
 from hairkit.field.growth_prior import chamfer_distance
 from hairkit.field.smooth_volume import smooth_volume
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
@@ -55,16 +55,13 @@ def diffusion(size: float) -> Iterator[Case]:
     weight = np.where(known, rng.uniform(0.1, 2, count), 0).astype(np.float32)
 
     def ours() -> Array:
-        return solve_screened(occupied, data, weight, 1.0, tolerance=TOLERANCE)
+        return solve_screened(CellGraph.of(occupied), data, weight, 1.0, tolerance=TOLERANCE)
 
     def by_columns(prepare: Callable[[Any], _Solve], rtol: float) -> Array:
-        solve = prepare(diffusion_matrix(occupied, weight, 1.0))
+        solve = prepare(_matrix(occupied, weight))
         return np.stack([solve(column, rtol) for column in (weight[:, None] * data).T], axis=1)
 
-    matrix, right = (
-        diffusion_matrix(occupied, weight, 1.0).astype(np.float64),
-        weight[:, None] * data,
-    )
+    matrix, right = _matrix(occupied, weight).astype(np.float64), weight[:, None] * data
     diagonal = matrix.diagonal()[:, None]
 
     def residual(solution: Array) -> float:
@@ -92,6 +89,12 @@ def diffusion(size: float) -> Iterator[Case]:
         f"residual (ours {residual(ours()):.2g})",
         TOLERANCE,
     )
+
+
+def _matrix(occupied: Array, weight: Array) -> Any:
+    """Return the float32 matrix (N, N) of the system, of smoothness 1."""
+    cells = CellGraph.of(occupied)
+    return (sparse.diags(weight + cells.degree) - cells.touching).tocsr()
 
 
 def _once(make: Callable[[], Callable[[], Array]]) -> Callable[[], Array]:

@@ -140,15 +140,15 @@ def track(
     if memory > options.step:
         inertia = max(options.inertia, 1 - options.step / memory)
         options = replace(options, inertia=inertia)
-    direction, distance = _sign_directions(field), _distance(field, hull)
+    volume = signed_volume(field, _sign_directions(field), _distance(field, hull))
     shoulders = float(Torso.under(scene.head).joint[1])
-    strands = grow(field, direction, distance, roots.positions, way, options, shoulders)
+    strands = grow(field, volume, roots.positions, way, options, shoulders)
     if options.cover > 0 and not tied.tails:
         bare = find_bare_cells(strands, hull, masks, scene.cameras, scene.head)
         seeds = _spread_seeds(bare, hull, options.cover * len(strands))
         if len(seeds):
-            back = grow(field, -direction, distance, seeds, way, options, shoulders)
-            ahead = grow(field, direction, distance, seeds, way, options, shoulders)
+            back = grow(field, volume, seeds, way, options, shoulders, -1.0)
+            ahead = grow(field, volume, seeds, way, options, shoulders)
             ways = (s.points.reshape(len(seeds), -1, 3) for s in (back, ahead))
             strands = lead_to_roots(strands, roots.positions, *ways)
     return finish(replace(strands, root_uv=roots.uv), waves, tied, hull, field, options)
@@ -165,26 +165,24 @@ def _spread_seeds(bare: Float64Array, hull: Hull, strands: float) -> Float32Arra
 
 def grow(
     field: OrientationField,
-    direction: Float32Array,
-    distance: Float32Array,
+    volume: SignedVolume,
     starts: Float32Array,
     way: float,
     options: Options,
     shoulders: float = -np.inf,
+    sign: float = 1.0,
 ) -> Strands:
     """Return the strands grown from `starts` (N, 3), metres.
 
     Parameters
     ----------
-    direction
-        (X, Y, Z, 3) signed field, 0 where nothing is known.
-    distance
-        (X, Y, Z) internal distance.
     way
         Longest way from the scalp through the hair, metres. Strands slide only up to this length,
         or up to that of the way from their root to the tips, by the growth potential.
     shoulders
         Height below which strands that leave the hair may have met the shoulders, metres.
+    sign
+        1 to grow along the field, -1 against it.
     """
     left = -field.grid.sample(field.growth, starts).astype(np.float64)
     ways = way + long_share(way) * np.maximum(left - way, 0)
@@ -202,13 +200,20 @@ def grow(
         shoulders,
         options.slide_from,
         options.pull,
+        sign,
     )
-    values = np.concatenate([direction, distance[..., None], field.growth[..., None]], axis=3)
-    volume = SignedVolume(field.grid.origin, field.grid.spacing, values)
     order = np.lexsort((field.grid.nearest_cell(starts) // BLOCK).T)
     growth = (volume, rules, starts, limits, order, points)
     parallel_for(_grow_strands, len(starts), *growth, min_chunk=MIN_STRANDS)
     return Strands(points.reshape(-1, 3), np.arange(len(starts) + 1) * options.points)
+
+
+def signed_volume(
+    field: OrientationField, direction: Float32Array, distance: Float32Array
+) -> SignedVolume:
+    """Return directions (X, Y, Z, 3), internal distance (X, Y, Z) and growth, side by side."""
+    values = np.concatenate([direction, distance[..., None], field.growth[..., None]], axis=3)
+    return SignedVolume(field.grid.origin, field.grid.spacing, values)
 
 
 def _sign_directions(field: OrientationField) -> Float32Array:
@@ -270,6 +275,8 @@ class Rules(NamedTuple):
     """Internal distance from which strands slide."""
     pull: float
     """Sine of the turn back for each unit of internal distance beyond `slide_from`."""
+    sign: float
+    """1 to grow along the field, -1 against it."""
 
 
 @compiled
@@ -327,9 +334,11 @@ def _grow_strand(
             break
         if known and i > 1:
             for axis in range(3):
-                d[axis] = rules.inertia * d[axis] + (1 - rules.inertia) * found[axis]
+                ahead = rules.sign * found[axis]
+                d[axis] = rules.inertia * d[axis] + (1 - rules.inertia) * ahead
         elif known:
-            copy_point(found, d)
+            for axis in range(3):
+                d[axis] = rules.sign * found[axis]
         if not make_unit(d):
             break
         slides = rules.slide_sine > 0 and i < limits[1]

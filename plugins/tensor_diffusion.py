@@ -27,7 +27,7 @@ from hairkit import (
 )
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.field.cell_shells import erode_cells
-from hairkit.field.diffusion import solve_screened
+from hairkit.field.diffusion import CellGraph, solve_screened
 from hairkit.field.growth_prior import growth_potential
 from hairkit.field.view_fusion import Fading, front_depths, fuse_planes, plane_directions
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
@@ -77,7 +77,8 @@ def solve_field(
     cut = normal.any(axis=1)
     tensor[cut], weight[cut] = outer_products(normal[cut]), FIXED
     field = np.zeros((*hull.grid.shape, 6), np.float32)
-    field[hull.loose] = solve_screened(hull.loose, tensor, weight, 1.0, tolerance=options.tolerance)
+    cells = CellGraph.of(hull.loose)
+    field[hull.loose] = solve_screened(cells, tensor, weight, 1.0, tolerance=options.tolerance)
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
     growth = growth_potential(hull, scalp_distance, TIP_SHARE)

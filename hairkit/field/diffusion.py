@@ -8,10 +8,13 @@ a very large `c` makes a cell fixed.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from hairkit.arrays import BoolArray, Float32Array, Int32Array
+from hairkit.arrays import BoolArray, Float32Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 
 COARSEST_CELLS = 4000
@@ -22,8 +25,49 @@ NO_WEIGHT = 1e-30
 """Cells of less weight than this hold no data."""
 
 
+@dataclass(frozen=True, eq=False)
+class CellGraph:
+    """Occupied cells and which of them touch; several systems on the same cells share it."""
+
+    touching: csr_matrix
+    """(N, N) float32, 1 where two cells share a face, in C order of the cells."""
+    degree: Float32Array
+    """(N,) number of the neighbours of each cell."""
+    coarser: CellGraph | None
+    """Cells twice as large; None where there are fewer than `COARSEST_CELLS`."""
+    block: Int64Array
+    """(N,) the cell of `coarser` that holds each cell; empty without one."""
+
+    def __len__(self) -> int:
+        return len(self.degree)
+
+    @classmethod
+    def of(cls, occupied: BoolArray) -> CellGraph:
+        """Return the graph of the cells that a mask (X, Y, Z) marks."""
+        neighbours = cell_neighbours(occupied)
+        count, there = len(neighbours), neighbours >= 0
+        degree = np.count_nonzero(there, axis=1)
+        columns = neighbours[there]
+        starts = np.concatenate([[0], np.cumsum(degree)]).astype(np.int32)
+        ones = np.ones(len(columns), np.float32)
+        touching = csr_matrix((ones, columns, starts), shape=(count, count))
+        if count < COARSEST_CELLS:
+            return cls(touching, degree.astype(np.float32), None, np.empty(0, np.int64))
+        coarse, block = _merge_cells(occupied)
+        return cls(touching, degree.astype(np.float32), cls.of(coarse), block)
+
+
+def _merge_cells(occupied: BoolArray) -> tuple[BoolArray, Int64Array]:
+    """Return the occupied cells of twice the size, and which of them holds each cell (N,)."""
+    shape = tuple(-(-n // 2) for n in occupied.shape)
+    cell = np.ravel_multi_index(tuple(index // 2 for index in np.nonzero(occupied)), shape)
+    coarse = np.zeros(shape, bool)
+    coarse.ravel()[cell] = True
+    return coarse, (np.cumsum(coarse) - 1)[cell]
+
+
 def solve_screened(
-    occupied: BoolArray,
+    cells: CellGraph,
     data: Float32Array,
     weight: Float32Array,
     smoothness: float,
@@ -32,12 +76,12 @@ def solve_screened(
     max_iterations: int = 400,
     start: Float32Array | None = None,
 ) -> Float32Array:
-    """Return the minimiser (N, C), one row for each occupied cell in C order.
+    """Return the minimiser (N, C), one row for each cell in C order.
 
     Parameters
     ----------
-    occupied
-        (X, Y, Z) cells that take part.
+    cells
+        The cells that take part.
     data, weight
         (N, C) wanted values and (N,) their weights `c`, 0 where nothing is known; one row a cell.
     smoothness
@@ -51,15 +95,15 @@ def solve_screened(
     Raises `InputError` when shapes disagree or no weight is positive (then there is no unique
     answer).
     """
-    count = int(np.count_nonzero(occupied))
+    count = len(cells)
     if data.shape[:1] != (count,) or weight.shape != (count,):
         raise InputError(
             f"diffusion of {count} cells got data {data.shape} and weights {weight.shape}"
         )
     if not (weight > 0).any():
         raise InputError("diffusion needs at least one cell with a weight above 0")
-    guess = start if start is not None else _coarse_guess(occupied, data, weight, smoothness)
-    system = diffusion_matrix(occupied, weight, smoothness)
+    guess = start if start is not None else _coarse_guess(cells, data, weight, smoothness)
+    system = _System(cells.touching, weight + np.float32(smoothness) * cells.degree, smoothness)
     columns = [
         _conjugate_gradients(system, weight * column, start, tolerance, max_iterations)
         for column, start in zip(data.T, np.array(guess.T, np.float32, order="C"), strict=True)
@@ -67,48 +111,28 @@ def solve_screened(
     return np.stack(columns, axis=1)
 
 
-def diffusion_matrix(occupied: BoolArray, weight: Float32Array, smoothness: float) -> csr_matrix:
-    """Return the matrix (N, N) `diag(c) + s L` of the linear system, float32."""
-    neighbours = cell_neighbours(occupied)
-    count = len(neighbours)
-    there = neighbours >= 0
-    degree = np.count_nonzero(there, axis=1)
-    diagonal = weight + np.float32(smoothness) * degree.astype(np.float32)
-    columns = np.column_stack([neighbours, np.arange(count, dtype=np.int32)])
-    values = np.full(columns.shape, -smoothness, np.float32)
-    values[:, -1] = diagonal
-    kept = np.column_stack([there, np.ones(count, bool)])
-    starts = np.concatenate([[0], np.cumsum(degree + 1)]).astype(np.int32)
-    return csr_matrix((values[kept], columns[kept], starts), shape=(count, count))
-
-
 def _coarse_guess(
-    occupied: BoolArray, data: Float32Array, weight: Float32Array, smoothness: float
+    cells: CellGraph, data: Float32Array, weight: Float32Array, smoothness: float
 ) -> Float32Array:
     """Return (N, C) the solution on cells twice as large: nested iteration (Brandt 1977).
 
     Eight cells merge into one: weights add up, data average by weight, and the factor between
     neighbours doubles (four times the face, twice the distance).
     """
-    shape = tuple(-(-n // 2) for n in occupied.shape)
-    if len(data) < COARSEST_CELLS:
+    if cells.coarser is None:
         mean = (weight[:, None] * data).sum(axis=0) / weight.sum()
         return np.broadcast_to(mean, data.shape).astype(np.float32)
-    cell = np.ravel_multi_index(tuple(index // 2 for index in np.nonzero(occupied)), shape)
-    coarse = np.zeros(shape, bool)
-    coarse.ravel()[cell] = True
-    row = (np.cumsum(coarse) - 1)[cell]
-    total = np.bincount(row, weight)
-    columns = [np.bincount(row, weight * column) for column in data.T]
+    total = np.bincount(cells.block, weight)
+    columns = [np.bincount(cells.block, weight * column) for column in data.T]
     mean = np.stack(columns, axis=1) / np.maximum(total, NO_WEIGHT)[:, None]
     solved = solve_screened(
-        coarse,
+        cells.coarser,
         mean.astype(np.float32),
         total.astype(np.float32),
         2 * smoothness,
         tolerance=COARSE_TOLERANCE,
     )
-    guess: Float32Array = solved[row]
+    guess: Float32Array = solved[cells.block]
     return guess
 
 
@@ -122,8 +146,25 @@ def cell_neighbours(occupied: BoolArray) -> Int32Array:
     return np.stack([number[cell + step] for step in (-ny * nz, ny * nz, -nz, nz, -1, 1)], axis=1)
 
 
+class _System(NamedTuple):
+    """The matrix (N, N) `diag(c) + s L` of the linear system."""
+
+    touching: csr_matrix
+    """(N, N) 1 where two cells share a face."""
+    diagonal: Float32Array
+    """(N,) weights and `s` times the number of neighbours."""
+    smoothness: float
+
+    def times(self, values: Float32Array) -> Float32Array:
+        """Return the product with values (N,)."""
+        product: Float32Array = self.touching @ values
+        product *= np.float32(-self.smoothness)
+        product += self.diagonal * values
+        return product
+
+
 def _conjugate_gradients(
-    system: csr_matrix,
+    system: _System,
     right: Float32Array,
     solution: Float32Array,
     tolerance: float,
@@ -134,9 +175,9 @@ def _conjugate_gradients(
     Algorithm B3 of Shewchuk 1994. `scipy.sparse.linalg.cg` does the same, but ends by the residual
     itself, see `solve_screened`.
     """
-    diagonal = system.diagonal()
+    diagonal = system.diagonal
     inverse = np.asarray(1 / np.where(diagonal > 0, diagonal, 1), np.float32)
-    residual = right - system @ solution
+    residual = right - system.times(solution)
     scaled = inverse * residual
     direction = scaled.copy()
     energy = _product(residual, scaled)
@@ -144,7 +185,7 @@ def _conjugate_gradients(
     for _ in range(max_iterations):
         if _product(scaled, scaled) <= enough:
             break
-        image = system @ direction
+        image = system.times(direction)
         step = np.float32(energy / _product(direction, image))
         solution += step * direction
         residual -= step * image

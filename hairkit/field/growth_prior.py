@@ -7,18 +7,19 @@ along the shortest path to where the hair ends; partings and bare faces follow f
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
 from hairkit.field.cell_shells import dilate_cells
 from hairkit.field.parting import comb_from_parting, crown_share, root_lift
 from hairkit.field.smooth_volume import smooth_volume
 from hairkit.parallel import compiled
 from hairkit.types.head import Head
 from hairkit.types.parting import Parting
-from hairkit.types.volume import Hull, ScalpDistance, VoxelGrid, outer_products
+from hairkit.types.volume import Hull, ScalpDistance, VoxelGrid, cell_slopes, outer_products
 
 WHORL_BEHIND = 0.03
 """Metres from the head's highest point back to the vertical axis of the crown's whorl."""
@@ -41,10 +42,6 @@ FLOW_SMOOTHING = 2.0
 """Standard deviation in cells that makes the chamfer distance's gradient smooth."""
 LENGTH_PERCENTILE = 98
 """Percentile of the scalp distance that is taken as the hair's length."""
-OCTANTS = 8
-"""Orders in which the cells of a grid are swept."""
-MOST_SWEEPS = 12
-"""Rounds of eight sweeps; paths round more corners than this are left too long."""
 LEAST_CHANGE = 1e-7
 """Metres by which a distance must fall to count as changed: rounding."""
 
@@ -69,19 +66,60 @@ def combing_direction(
     at = np.asarray(points, np.float64)
     outward = gradient(hull.grid, hull.head_distance, at)
     flow = gradient(hull.grid, growth, at)
-    flow -= np.sum(flow * outward, axis=1, keepdims=True) * outward
+    return _comb(head, at, outward, flow, lift, parting, hair_length)
+
+
+class ScalpComb(NamedTuple):
+    """The combing direction in the loose cells near the scalp."""
+
+    near: BoolArray
+    """(N,) which loose cells these are."""
+    direction: Float64Array
+    """(M, 3) unit directions in them."""
+
+
+def comb_cells(
+    head: Head,
+    hull: Hull,
+    growth: Float32Array,
+    reach: float,
+    lift: float,
+    parting: Parting,
+    hair_length: float,
+) -> ScalpComb:
+    """Return `combing_direction` at the centres of loose cells less than `reach` off the head.
+
+    Gradients at centres are differences of cells.
+    """
+    near = hull.head_distance[hull.loose] < reach
+    cells = hull.loose & (hull.head_distance < reach)
+    at = hull.grid.centres_of(cells).astype(np.float64)
+    outward = _unit(cell_slopes(hull.head_distance, cells))
+    flow = _unit(cell_slopes(growth, cells))
+    return ScalpComb(near, _comb(head, at, outward, flow, lift, parting, hair_length))
+
+
+def _comb(
+    head: Head,
+    at: Float64Array,
+    outward: Float64Array,
+    flow: Float64Array,
+    lift: float,
+    parting: Parting,
+    hair_length: float,
+) -> Float64Array:
+    """Return the combing direction (N, 3) at points where normals and flow (N, 3) are known."""
+    flow = flow - np.sum(flow * outward, axis=1, keepdims=True) * outward
     share = long_share(hair_length)
     combed = share * flow + max(1 - share, LEAST_WHORL) * _from_crown(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
     if parts(parting, hair_length):
         crown = crown_share(parting, head, at)[:, None]
-        combed = (1 - crown) * combed + crown * comb_from_parting(parting, head, at, outward)
-        combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
-    direction = combed + lift * outward
-    result: Float64Array = direction / np.maximum(
-        np.linalg.norm(direction, axis=1, keepdims=True), 1e-9
-    )
-    return result
+        top = np.flatnonzero(crown)
+        parted = comb_from_parting(parting, head, at[top], outward[top])
+        combed[top] = (1 - crown[top]) * combed[top] + crown[top] * parted
+        combed[top] /= np.maximum(np.linalg.norm(combed[top], axis=1, keepdims=True), 1e-6)
+    return _unit(combed + lift * outward)
 
 
 def parts(parting: Parting, hair_length: float) -> bool:
@@ -91,44 +129,37 @@ def parts(parting: Parting, hair_length: float) -> bool:
 
 @dataclass(frozen=True)
 class ScalpPrior:
-    """Weight and range of the combing direction near the scalp."""
+    """Weights of the combing direction, against the certainty of fused cells, at most 1 a view."""
 
     weight: float
-    """Against the certainty of fused cells, which is at most 1 for each view."""
-    reach: float
-    """Metres from the head."""
-    lift: float
-    """Outward part against the tangential one."""
+    """In the cells near the scalp."""
     crown: float = 0.0
-    """Weight of the comb from the parting, in all the hair on the crown."""
+    """Of the comb from the parting, in all the hair on the crown."""
 
 
 def add_scalp_prior(
     head: Head,
     hull: Hull,
-    growth: Float32Array,
     tensor: Float32Array,
     certainty: Float32Array,
+    comb: ScalpComb,
     prior: ScalpPrior,
     parting: Parting,
     hair_length: float,
 ) -> tuple[Float32Array, Float32Array]:
     """Add the prior to tensors (N, 6) and certainty (N,) of the loose cells; return new ones."""
     data, weight = tensor.copy(), certainty.copy()
-    points = hull.grid.centres_of(hull.loose)
-    near = hull.head_distance[hull.loose] < prior.reach
-    if prior.weight and near.any():
-        at = points[near]
-        comb = combing_direction(head, hull, growth, at, prior.lift, parting, hair_length)
-        _mix(data, weight, near, comb, np.full(len(comb), prior.weight))
+    if prior.weight:
+        _mix(data, weight, comb.near, comb.direction, np.full(len(comb.direction), prior.weight))
     if prior.crown and parts(parting, hair_length):
-        share = prior.crown * crown_share(parting, head, points)
-        top = share > 0
-        outward = gradient(hull.grid, hull.head_distance, points[top])
-        lift = root_lift(hull, points[top])[:, None]
-        comb = comb_from_parting(parting, head, points[top], outward) + lift * outward
-        comb /= np.maximum(np.linalg.norm(comb, axis=1, keepdims=True), 1e-9)
-        _mix(data, weight, top, comb, share[top])
+        share = prior.crown * crown_share(parting, head, hull.grid.centres_of(hull.loose))
+        top, cells = share > 0, np.zeros(hull.grid.shape, bool)
+        cells[hull.loose] = top
+        points = hull.grid.centres_of(cells)
+        outward = _unit(cell_slopes(hull.head_distance, cells))
+        lift = root_lift(hull, points)[:, None]
+        direction = comb_from_parting(parting, head, points, outward) + lift * outward
+        _mix(data, weight, top, _unit(direction), share[top])
     return data, weight
 
 
@@ -166,8 +197,14 @@ def gradient(grid: VoxelGrid, values: Float32Array, points: npt.ArrayLike) -> Fl
         ],
         axis=1,
     ).astype(np.float64)
-    length = np.linalg.norm(slope, axis=1, keepdims=True)
-    result: Float64Array = np.where(length > 1e-9, slope / np.maximum(length, 1e-9), 0.0)
+    return _unit(slope)
+
+
+def _unit(vectors: npt.ArrayLike) -> Float64Array:
+    """Return vectors (N, 3) at length 1, those of nearly no length as zeros."""
+    given = np.asarray(vectors, np.float64)
+    length = np.linalg.norm(given, axis=1, keepdims=True)
+    result: Float64Array = np.where(length > 1e-9, given / np.maximum(length, 1e-9), 0.0)
     return result
 
 
@@ -210,59 +247,57 @@ def long_share(length: float) -> float:
 def chamfer_distance(occupied: BoolArray, start: BoolArray, spacing: float) -> Float32Array:
     """Return the shortest paths through occupied cells from the start cells, (X, Y, Z).
 
-    Infinite where no path leads. Steps go along edges and diagonals of cells; sweeps in the eight
-    diagonal orders are repeated until a round of them changes nothing.
+    Infinite where no path leads. Steps go along edges and diagonals of cells, whose neighbours are
+    looked at again as long as a shorter path to them is found (Moore 1959).
     """
     result = np.full(occupied.shape, np.inf, np.float32)
     if occupied.any():
         box = tuple(slice(cells.min(), cells.max() + 1) for cells in np.nonzero(occupied))
-        inside = np.pad(occupied[box], 1)  # no step of a sweep leaves the padded box
-        distance = np.where(inside & np.pad(start[box], 1), 0, np.inf).astype(np.float32)
-        cost = np.sqrt(np.arange(4)).astype(np.float32) * np.float32(spacing)
-        _chamfer(inside, cost, distance)
+        inside = np.pad(occupied[box], 1)  # no step leaves the padded box
+        begun = inside & np.pad(start[box], 1)
+        distance = np.where(begun, 0, np.inf).astype(np.float32)
+        queue = np.empty(np.count_nonzero(inside), np.int32)
+        first = np.flatnonzero(begun)
+        queue[: len(first)] = first
+        steps = np.sqrt(np.arange(4)).astype(np.float32) * np.float32(spacing)
+        strides = (inside.shape[1] * inside.shape[2], inside.shape[2])
+        cells = (queue, len(first), begun.ravel(), distance.ravel())
+        _chamfer(inside.ravel(), strides, steps, *cells)
         result[box] = distance[1:-1, 1:-1, 1:-1]
     result[start] = 0
     return result
 
 
 @compiled
-def _chamfer(occupied: BoolArray, cost: Float32Array, distance: Float32Array) -> None:
-    """Lower distances (X, Y, Z), infinite in unoccupied cells, until a round changes none."""
-    unchanged = 0
-    for sweep in range(OCTANTS * MOST_SWEEPS):
-        changed = _sweep(occupied, cost, sweep % OCTANTS, distance)
-        unchanged = 0 if changed else unchanged + 1
-        if unchanged == OCTANTS:
-            break
+def _chamfer(
+    occupied: BoolArray,
+    strides: tuple[int, int],
+    steps: Float32Array,
+    queue: Int32Array,
+    waiting: int,
+    queued: BoolArray,
+    distance: Float32Array,
+) -> None:
+    """Lower distances (N,), infinite but in the first cells, to those of the shortest paths.
 
-
-@compiled
-def _sweep(occupied: BoolArray, cost: Float32Array, octant: int, distance: Float32Array) -> bool:
-    """Lower distances (X, Y, Z) in one sweep of the grid; returns whether any changed.
-
-    The bits of `octant` give the direction along x, y and z; `cost` (4,) are metres of a step to a
-    cell across a face, an edge and a corner. The outermost cells are not occupied.
+    Cells are numbered in C order, `strides` apart along x and y; the outermost are not occupied.
+    `steps` (4,) are metres of a step to a cell across a face, an edge and a corner. The `queue`, as
+    long as there are occupied cells, holds the `waiting` first ones, which are `queued` (N,).
     """
-    nx, ny, nz = occupied.shape
-    sx = 1 if octant & 1 else -1
-    sy = 1 if octant & 2 else -1
-    sz = 1 if octant & 4 else -1
-    changed = False
-    for kx in range(nx):
-        ix = kx if sx > 0 else nx - 1 - kx
-        for ky in range(ny):
-            iy = ky if sy > 0 else ny - 1 - ky
-            for kz in range(nz):
-                iz = kz if sz > 0 else nz - 1 - kz
-                if not occupied[ix, iy, iz]:
-                    continue
-                best = distance[ix, iy, iz]
-                for corner in range(1, 8):
-                    a, b, c = corner & 1, corner >> 1 & 1, corner >> 2 & 1
-                    best = min(
-                        best, distance[ix - sx * a, iy - sy * b, iz - sz * c] + cost[a + b + c]
-                    )
-                if best < distance[ix, iy, iz] - LEAST_CHANGE:
-                    distance[ix, iy, iz] = best
-                    changed = True
-    return changed
+    head = 0
+    while waiting > 0:
+        cell = queue[head]
+        head = head + 1 if head + 1 < len(queue) else 0
+        waiting -= 1
+        queued[cell] = False
+        for a in range(-1, 2):
+            for b in range(-1, 2):
+                for c in range(-1, 2):
+                    other = cell + a * strides[0] + b * strides[1] + c
+                    way = distance[cell] + steps[abs(a) + abs(b) + abs(c)]
+                    if occupied[other] and way < distance[other] - LEAST_CHANGE:
+                        distance[other] = way
+                        if not queued[other]:
+                            queued[other] = True
+                            queue[(head + waiting) % len(queue)] = other
+                            waiting += 1

@@ -107,14 +107,16 @@ def principal_direction(
     agree, the direction. Returns False where the tensor vanishes.
     """
     x, y, z = direction[0], direction[1], direction[2]
-    for _ in range(POWER_ROUNDS):
-        a = tensor[XX] * x + tensor[XY] * y + tensor[XZ] * z
-        b = tensor[XY] * x + tensor[YY] * y + tensor[YZ] * z
-        c = tensor[XZ] * x + tensor[YZ] * y + tensor[ZZ] * z
-        norm = math.sqrt(a * a + b * b + c * c)
-        if norm < SMALLEST_TENSOR:
+    for k in range(POWER_ROUNDS):
+        x, y, z = (
+            tensor[XX] * x + tensor[XY] * y + tensor[XZ] * z,
+            tensor[XY] * x + tensor[YY] * y + tensor[YZ] * z,
+            tensor[XZ] * x + tensor[YZ] * y + tensor[ZZ] * z,
+        )
+        if k == 0 and x * x + y * y + z * z < SMALLEST_TENSOR * SMALLEST_TENSOR:
             return False
-        x, y, z = a / norm, b / norm, c / norm
+    norm = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / norm, y / norm, z / norm
     sign = -1.0 if x * direction[0] + y * direction[1] + z * direction[2] < 0 else 1.0
     result[0], result[1], result[2] = sign * x, sign * y, sign * z
     return True

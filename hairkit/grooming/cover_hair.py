@@ -85,12 +85,14 @@ def _missing(
     scale = camera.focal
     if camera.model == "perspective":
         scale /= float(camera.depth(np.zeros(3)))
-    rim, near = (
-        cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-        for size in (2 * max(round(metres * scale), 1) + 1 for metres in (REACH, reach))
-    )
-    inner = cv2.erode(hair.astype(np.uint8), rim)
-    return np.asarray((inner > 0) & (cv2.dilate(covered, near) == 0))
+    rim, near = (max(round(metres * scale), 1) for metres in (REACH, reach))
+    return (_pixels_off(hair) > rim) & (_pixels_off(covered == 0) > near)
+
+
+def _pixels_off(marked: BoolArray) -> Float32Array:
+    """Return (H, W) the distance in pixels to the nearest pixel that is not marked."""
+    away = cv2.distanceTransform(marked.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    return np.asarray(away, np.float32)
 
 
 def _seen(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
-from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.head_model.reach import Reach
@@ -210,20 +211,24 @@ def _progressive_roots(
 ) -> tuple[Int32Array, Float64Array]:
     """Return the first `count` roots of a seed's sequence: faces (N,) and weights (N, 3)."""
     shift = np.random.PCG64(seed).random_raw(3)  # raw bits are the same in every NumPy (NEP 19)
-    faces, weights, points = np.empty(0, np.int32), np.empty((0, 3)), np.empty((0, 3))
-    apart, tried = np.empty(0), 0  # metres to the root that is known to be nearest
+    whole = None if reach is None else _covered_faces(head, area, reach, -1.0)
+    tried = CANDIDATES_PER_ROOT * count + FIRST_CANDIDATES
+    some = _candidates(head, area, 0, tried, shift, reach, whole)
+    apart = np.full(len(some.face), np.inf)  # metres to the root that is known to be nearest
     taken, found = np.empty(count, np.int64), 0
-    radius = np.sqrt(area.sum())
+    total = float(area.sum())
+    radius = np.sqrt(total)
     while found < count:
         radius *= SHRINK
-        wanted = int(CANDIDATES_PER_ROOT * PACKING * area.sum() / radius**2) + FIRST_CANDIDATES
-        face, weight = _candidates(head, area, tried, wanted, shift, reach)
-        tried = wanted
-        faces, weights = np.concatenate([faces, face]), np.concatenate([weights, weight])
-        points = np.concatenate([points, evaluate(head, face, weight)])
-        apart = np.concatenate([apart, np.full(len(face), np.inf)])
-        found = take_free(points, apart, radius, taken, found)
-    return faces[taken], weights[taken]
+        wanted = int(CANDIDATES_PER_ROOT * PACKING * total / radius**2) + FIRST_CANDIDATES
+        if wanted > tried:
+            more = _candidates(head, area, tried, wanted, shift, reach, whole)
+            some = _Candidates(*(np.concatenate(pair) for pair in zip(some, more, strict=True)))
+            apart = np.concatenate([apart, np.full(len(more.face), np.inf)])
+            tried = wanted
+        now = int(np.searchsorted(some.number, wanted))
+        found = take_free(some.point[:now], apart[:now], radius, taken, found)
+    return some.face[taken], some.weight[taken]
 
 
 def _scalp_area(head: Head, reach: Reach | None) -> Float64Array:
@@ -231,14 +236,36 @@ def _scalp_area(head: Head, reach: Reach | None) -> Float64Array:
     corners = head.vertices.astype(np.float64)[head.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     bears = head.scalp[head.faces].max(axis=1) > 0.5
-    if reach is not None:
-        middle = corners.mean(axis=1)
-        size = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-        bears &= reach.covers(middle, size)
     area: Float64Array = 0.5 * np.linalg.norm(normal, axis=1) * bears
+    if reach is not None:
+        area *= _covered_faces(head, area, reach, 1.0)
     if not area.sum() > 0:
         raise InputError("the head's scalp has no area: mark whole faces, not single vertices")
     return area
+
+
+def _covered_faces(head: Head, area: Float64Array, reach: Reach, sign: float) -> BoolArray:
+    """Return the faces (F,) of some area that guides reach: wholly for -1, nearly or more for 1."""
+    covered = np.zeros(len(area), bool)
+    some = np.flatnonzero(area)
+    corners = head.vertices.astype(np.float64)[head.faces[some]]
+    middle = corners.mean(axis=1)
+    size = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+    covered[some] = reach.covers(middle, sign * size)
+    return covered
+
+
+class _Candidates(NamedTuple):
+    """Points of an even sequence that lie on the scalp."""
+
+    number: Int64Array
+    """(N,) place of each in the sequence, ascending."""
+    face: Int32Array
+    """(N,) face that holds it."""
+    weight: Float64Array
+    """(N, 3) barycentric weights there."""
+    point: Float64Array
+    """(N, 3) metres."""
 
 
 def _candidates(
@@ -248,8 +275,9 @@ def _candidates(
     last: int,
     shift: npt.NDArray[np.uint64],
     reach: Reach | None,
-) -> tuple[Int32Array, Float64Array]:
-    """Return points `first` to `last` of an even sequence that lie on the scalp: faces, weights."""
+    whole: BoolArray | None,
+) -> _Candidates:
+    """Return points `first` to `last` of the sequence; `whole` (F,) are faces within the reach."""
     index = np.arange(first, last, dtype=np.uint64)[:, None]
     along, root, share = ((index * _STEPS + shift) >> np.uint64(11)).T * 2.0**-53
     total = np.cumsum(area)
@@ -257,9 +285,14 @@ def _candidates(
     root = np.sqrt(root)
     weight = np.stack([1 - root, root * (1 - share), root * share], axis=1)
     on_scalp = (head.scalp[head.faces[face]] * weight).sum(axis=1) > 0.5
-    if reach is not None:
-        on_scalp &= reach.covers(evaluate(head, face, weight))
-    return face[on_scalp].astype(np.int32), weight[on_scalp]
+    number = np.flatnonzero(on_scalp)
+    face, weight = face[number].astype(np.int32), weight[number]
+    some = _Candidates(number + first, face, weight, evaluate(head, face, weight))
+    if reach is None or whole is None:
+        return some
+    kept = whole[face]
+    kept[~kept] = reach.covers(some.point[~kept])
+    return _Candidates(*(values[kept] for values in some))
 
 
 def take_free(
@@ -278,8 +311,8 @@ def take_free(
     -------
     How many are taken now.
     """
-    low = points.min(axis=0)
-    size = points.max(axis=0) - low
+    low = np.array([column.min() for column in points.T])
+    size = np.array([column.max() for column in points.T]) - low
     edge = max(radius, float(size.max()) / MOST_CELLS)
     heads = np.full(tuple((size / edge).astype(np.int64) + 3), -1, np.int32)
     following = np.full(len(taken), -1, np.int32)

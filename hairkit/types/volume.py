@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -60,8 +60,12 @@ class VoxelGrid(Stored):
 
     def centres_of(self, cells: BoolArray) -> Float32Array:
         """Return the centres (N, 3) of the cells that a mask (X, Y, Z) marks, in C order."""
-        index = np.stack(np.nonzero(cells), axis=1)
-        return (self.origin + (index + 0.5) * self.spacing).astype(np.float32)
+        index = np.nonzero(cells)
+        result = np.empty((len(index[0]), 3), np.float32)
+        for i, along in enumerate(index):
+            axis = self.origin[i] + (np.arange(self.shape[i]) + 0.5) * self.spacing
+            result[:, i] = axis.astype(np.float32)[along]
+        return result
 
     def index_from_head(self, points: npt.ArrayLike) -> Float64Array:
         """Return continuous indices (..., 3) of points: whole numbers fall on cell centres."""
@@ -228,15 +232,17 @@ def cell_slopes(values: Float32Array, cells: BoolArray | None = None) -> Float32
     With `cells` (X, Y, Z), those of marked cells alone, (N, 3).
     """
     if cells is None:
-        parts: Any = np.gradient(values)
-        return np.stack(list(parts), axis=-1).astype(np.float32)
-    at = np.nonzero(cells)
-    result = np.empty((len(at[0]), 3), np.float32)
-    for axis in range(3):
-        after, before = ([*at], [*at])
-        after[axis] = np.minimum(at[axis] + 1, values.shape[axis] - 1)
-        before[axis] = np.maximum(at[axis] - 1, 0)
-        result[:, axis] = (values[tuple(after)] - values[tuple(before)]) / np.maximum(
-            after[axis] - before[axis], 1
-        )
+        slopes = np.empty((*values.shape, 3), np.float32)
+        for axis in range(3):
+            slopes[..., axis] = np.gradient(values, axis=axis)
+        return slopes
+    at, flat = np.flatnonzero(cells), values.ravel()
+    result = np.empty((len(at), 3), np.float32)
+    stride = values.size
+    for axis, size in enumerate(values.shape):
+        stride //= size
+        place = at // stride % size
+        after, before = place < size - 1, place > 0
+        rise = flat[at + stride * after] - flat[at - stride * before]
+        result[:, axis] = rise / np.maximum(np.add(after, before, dtype=np.int8), 1)
     return result

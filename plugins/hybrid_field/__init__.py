@@ -41,10 +41,12 @@ from hairkit import (
     hookimpl,
 )
 from hairkit.arrays import read_only
+from hairkit.field.diffusion import CellGraph
 from hairkit.field.growth_prior import (
     TIP_SHARE,
     ScalpPrior,
     add_scalp_prior,
+    comb_cells,
     growth_potential,
 )
 from hairkit.field.hanging_hair import hang_curls
@@ -142,19 +144,21 @@ def solve_field(
     else:
         given = segments_in_hair(read_segments(options.segments), hull, options.segments)
         segments = orient_segments(given, hull, way)
-    prior = ScalpPrior(
-        options.scalp_weight, options.scalp_reach, options.scalp_lift, crown=options.parting_weight
-    )
-    wanted, weight = add_scalp_prior(
-        scene.head, hull, growth, fused.tensor, fused.certainty, prior, parting, length
-    )
     band = ribbons(segments, hull, options.ribbon)
+    comb = comb_cells(
+        scene.head, hull, growth, options.scalp_reach, options.scalp_lift, parting, length
+    )
+    prior = ScalpPrior(options.scalp_weight, options.parting_weight)
+    wanted, weight = add_scalp_prior(
+        scene.head, hull, fused.tensor, fused.certainty, comb, prior, parting, length
+    )
+    cells = CellGraph.of(hull.loose)
     with ThreadPoolExecutor(thread_count()) as pool:
         parts = (
-            pool.submit(surface_structure, hull, band, options.tolerance),
-            pool.submit(internal_direction, hull, wanted, weight, band, options),
+            pool.submit(surface_structure, cells, band, options.tolerance),
+            pool.submit(internal_direction, cells, wanted, weight, band, options),
             pool.submit(internal_distance, hull, segments, options.tolerance),
-            pool.submit(growth_direction, scene.head, hull, growth, band, parting, length, options),
+            pool.submit(growth_direction, cells, band, comb, options.tolerance),
         )
         fields = Fields(*(part.result() for part in parts))
     direction, distance = blend(hull, band, fields, options), read_only(fields.distance)

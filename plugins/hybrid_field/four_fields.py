@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
+import cv2
 import numpy as np
 from scipy import ndimage
 
-from hairkit import Head, Hull, Parting, Strands
+from hairkit import Hull, Strands
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, read_only
 from hairkit.field.cell_shells import erode_cells
-from hairkit.field.diffusion import solve_screened
-from hairkit.field.growth_prior import combing_direction
+from hairkit.field.diffusion import CellGraph, solve_screened
+from hairkit.field.growth_prior import ScalpComb
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
 from hairkit.types.volume import cell_slopes, outer_products
 
@@ -24,6 +26,8 @@ UNIT = 0.01
 """Metres in one unit of the internal distance: a centimetre; the patent names no unit."""
 COARSE = 2
 """The internal distance is solved on cells this many times as large, then interpolated."""
+NEGLIGIBLE = 6.0
+"""Distance from strands, in `surface_reach`, from which S hardly counts: less than 0.003."""
 SCALP_CELLS = 2.0
 """Distance from the head in cells at which the weight of grad(I) falls to 1/e."""
 
@@ -51,51 +55,43 @@ class FieldOptions(Protocol):
     def tolerance(self) -> float: ...
 
 
-def surface_structure(hull: Hull, band: Band, tolerance: float) -> Float32Array:
+def surface_structure(cells: CellGraph, band: Band, tolerance: float) -> Float32Array:
     """Return S (N, 3) of the loose cells: the ribbons' tangents, spread by diffusion."""
-    weight = np.where(band.cells[hull.loose], FIXED, 0).astype(np.float32)
-    data = band.direction.copy()
+    weight = np.where(band.on, FIXED, 0).astype(np.float32)
     if not weight.any():
-        return data
-    return solve_screened(hull.loose, data, weight, 1.0, tolerance=tolerance)
+        return band.direction
+    return solve_screened(cells, band.direction, weight, 1.0, tolerance=tolerance)
 
 
 def growth_direction(
-    head: Head,
-    hull: Hull,
-    growth: Float32Array,
-    band: Band,
-    parting: Parting,
-    hair_length: float,
-    options: FieldOptions,
+    cells: CellGraph, band: Band, comb: ScalpComb, tolerance: float
 ) -> Float32Array:
-    """Return O (N, 3) of the loose cells: ribbons and the scalp prior, diffused as vectors."""
+    """Return O (N, 3) of the loose cells: ribbons and the scalp's comb, diffused as vectors."""
     data = band.direction.copy()
-    weight = np.where(band.cells[hull.loose], FIXED, 0).astype(np.float32)
-    near = (hull.head_distance[hull.loose] < options.scalp_reach) & (weight == 0)
-    at = hull.grid.centres_of(hull.loose)[near]
-    if len(at):
-        data[near] = combing_direction(
-            head, hull, growth, at, options.scalp_lift, parting, hair_length
-        )
-        weight[near] = 1.0
-    if not (weight > 0).any():
+    free = comb.near & ~band.on
+    data[free] = comb.direction[free[comb.near]]
+    weight = np.where(band.on, FIXED, free).astype(np.float32)
+    if not weight.any():
         return data
-    return solve_screened(hull.loose, data, weight, 1.0, tolerance=options.tolerance)
+    return solve_screened(cells, data, weight, 1.0, tolerance=tolerance)
 
 
 def internal_direction(
-    hull: Hull, wanted: Float32Array, weight: Float32Array, band: Band, options: FieldOptions
+    cells: CellGraph,
+    wanted: Float32Array,
+    weight: Float32Array,
+    band: Band,
+    options: FieldOptions,
 ) -> Float32Array:
     """Return V (N, 6) of the loose cells: `wanted` by `weight`, and ribbons, diffused."""
-    on = band.cells[hull.loose]
+    on = band.on
     tangent = band.direction[on].astype(np.float64)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
     data, total = wanted.copy(), weight.copy()
     total[on] += options.strand_weight
     share = (options.strand_weight / np.maximum(total[on], 1e-9))[:, None]
     data[on] = (1 - share) * wanted[on] + share * outer_products(tangent)
-    return solve_screened(hull.loose, data, total, options.smoothness, tolerance=options.tolerance)
+    return solve_screened(cells, data, total, options.smoothness, tolerance=options.tolerance)
 
 
 def internal_distance(hull: Hull, segments: Strands, tolerance: float) -> Float32Array:
@@ -119,7 +115,7 @@ def internal_distance(hull: Hull, segments: Strands, tolerance: float) -> Float3
     known = (strand | border | inside).ravel()
     weight = np.where(known, FIXED, 0).astype(np.float32)
     solved = solve_screened(
-        np.ones(shape, bool), value.reshape(-1, 1), weight, 1.0, tolerance=tolerance
+        CellGraph.of(np.ones(shape, bool)), value.reshape(-1, 1), weight, 1.0, tolerance=tolerance
     ).reshape(shape)
     for axis in range(3):
         solved = _refine(solved, axis)
@@ -169,7 +165,7 @@ def blend(hull: Hull, band: Band, fields: Fields, options: FieldOptions) -> Floa
     scalp, O a little everywhere. V takes its sign from O.
     """
     spacing = hull.grid.spacing
-    off = _distance_to(band.cells, hull.loose) * spacing
+    off = _distance_to(band.on, hull.loose, NEGLIGIBLE * options.surface_reach / spacing) * spacing
     main = smallest_eigenvectors(-fields.inner.astype(np.float64))[0]  # V's largest eigenvector
     main *= np.where((main * fields.growth).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     slope = cell_slopes(fields.distance, hull.loose)
@@ -185,11 +181,24 @@ def blend(hull: Hull, band: Band, fields: Fields, options: FieldOptions) -> Floa
     return read_only(direction)
 
 
-def _distance_to(cells: BoolArray, around: BoolArray) -> Float32Array:
-    """Return the distance (N,) of marked cells to the nearest of `cells`, which are among them."""
+def _distance_to(on: BoolArray, around: BoolArray, far: float) -> Float32Array:
+    """Return the distance (N,) in cells of marked cells to the nearest of those that are `on` (N,).
+
+    Exact up to `far`; larger ones are too large. By Saito and Toriwaki 1994, planes first, which is
+    a sixth of `scipy.ndimage.distance_transform_edt`'s time.
+    """
     box = tuple(slice(index.min(), index.max() + 1) for index in np.nonzero(around))
-    away = ndimage.distance_transform_edt(~cells[box])
-    return np.asarray(away[around[box]], np.float32)
+    off = np.ones(around.shape, np.uint8)
+    off[around] = ~on
+    square = np.stack(
+        [cv2.distanceTransform(plane, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for plane in off[box]]
+    )
+    square *= square
+    nearest = square.copy()
+    for k in range(1, min(math.ceil(far) + 1, len(square))):
+        np.minimum(nearest[k:], square[:-k] + np.float32(k * k), out=nearest[k:])
+        np.minimum(nearest[:-k], square[k:] + np.float32(k * k), out=nearest[:-k])
+    return np.asarray(np.sqrt(nearest[around[box]]), np.float32)
 
 
 def _unit(vectors: Float32Array | Float64Array) -> Float64Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -34,6 +35,8 @@ MIN_COSINE = 0.8
 """Cosine of the sharpest turn in one step; beyond 37 degrees it is another strand."""
 LEAST_TRACE = 1e-6
 """Certainty below which the tensors along a line are unknown."""
+SHORTEST_EDGE = 1e-12
+"""Metres between points of a line below which they are one."""
 MIN_LINES = 64
 """Least number of lines worth a call on another thread."""
 
@@ -67,23 +70,26 @@ def lift_photo_lines(
             _follow_photo, len(rows), photo, rows, columns, lines, counts, min_chunk=MIN_LINES
         )
         found.append(lift_lines(camera, lines, counts))
-    points = np.concatenate([points for points, _ in found])
-    counts = np.concatenate([counts for _, counts in found])
-    return _resample_lines(points, counts)
+    points, counts, lengths = map(np.concatenate, zip(*found, strict=True))
+    return _resample_lines(points, counts, lengths)
 
 
 def lift_lines(
     camera: Camera, lines: Float32Array, counts: Int64Array
-) -> tuple[Float32Array, Int64Array]:
-    """Return packed smooth points (P, 3) in the head frame of all long lines, and their counts."""
+) -> tuple[Float32Array, Int64Array, Float64Array]:
+    """Return packed smooth points (P, 3) in the head frame of all long lines.
+
+    And, of each of the lines (S,), the number of points and the length in metres.
+    """
     long = np.flatnonzero(counts >= FEWEST)
     offsets = np.concatenate([[0], np.cumsum(counts[long])])
-    points = np.empty((offsets[-1], 3), np.float32)
+    points, lengths = np.empty((offsets[-1], 3), np.float32), np.empty(len(long))
     shift = np.arange(int(KERNEL_SIGMAS * SMOOTHING) + 1)
     weights = np.exp(-0.5 * (shift / SMOOTHING) ** 2)
     view = pack_camera(camera)
-    parallel_for(_lift, len(long), view, lines, long, offsets, weights, points, min_chunk=MIN_LINES)
-    return points, counts[long]
+    lift = (view, lines, long, offsets, weights, points, lengths)
+    parallel_for(_lift, len(long), *lift, min_chunk=MIN_LINES)
+    return points, counts[long], lengths
 
 
 def agreeing(lines: Strands, hull: Hull, volume: Float32Array, angle_deg: float) -> Strands:
@@ -225,13 +231,20 @@ def _lift(
     offsets: Int64Array,
     weights: Float64Array,
     points: Float32Array,
+    lengths: Float64Array,
 ) -> None:
-    """Write the chosen lines (K,) of u, v, depth (N, M, 3) smoothed into points (P, 3)."""
+    """Write the chosen lines (K,) of u, v, depth (N, M, 3) smoothed into points (P, 3).
+
+    And their lengths (K,), metres.
+    """
     for k in range(first, last):
         rough = np.empty((offsets[k + 1] - offsets[k], 3))
         for i in range(len(rough)):
             _unproject(camera, lines[chosen[k], i], rough[i])
         _smooth(rough, weights, points[offsets[k] : offsets[k + 1]])
+        lengths[k] = 0.0
+        for i in range(offsets[k] + 1, offsets[k + 1]):
+            lengths[k] += _apart(points[i - 1], points[i])
 
 
 @compiled
@@ -264,13 +277,54 @@ def _smooth(rough: Float64Array, weights: Float64Array, smooth: Float32Array) ->
         smooth[i, 0], smooth[i, 1], smooth[i, 2] = x / norm, y / norm, z / norm
 
 
-def _resample_lines(points: Float32Array, counts: Int64Array) -> Strands:
+@compiled
+def _apart(first: Float32Array, second: Float32Array) -> float:
+    """Return the distance of two points (3,)."""
+    x, y, z = second[0] - first[0], second[1] - first[1], second[2] - first[2]
+    return math.sqrt(np.float64(x) * x + np.float64(y) * y + np.float64(z) * z)
+
+
+def _resample_lines(points: Float32Array, counts: Int64Array, lengths: Float64Array) -> Strands:
     """Return packed lines (P, 3) as strands with points `STEP` apart, without the shortest."""
-    strands = Strands(points, np.concatenate([[0], np.cumsum(counts)]))
-    if not len(strands):
-        return strands
-    strands = strands.select(strands.lengths() >= (FEWEST - 1) * STEP)
-    return strands.resampled_by_length(STEP) if len(strands) else strands
+    long = lengths >= (FEWEST - 1) * STEP
+    starts = (np.cumsum(counts) - counts)[long]
+    even = np.ceil(lengths[long] / STEP - 1e-9).astype(np.int64) + 1
+    offsets = np.concatenate([[0], np.cumsum(even)])
+    resampled = np.empty((offsets[-1], 3), np.float32)
+    lines = (points, starts, counts[long], lengths[long], offsets, resampled)
+    parallel_for(_space_evenly, len(starts), *lines, min_chunk=MIN_LINES)
+    return Strands(resampled, offsets)
+
+
+@compiled
+def _space_evenly(
+    first: int,
+    last: int,
+    points: Float32Array,
+    starts: Int64Array,
+    counts: Int64Array,
+    lengths: Float64Array,
+    offsets: Int64Array,
+    resampled: Float32Array,
+) -> None:
+    """Write lines `first` to `last` of packed points (P, 3) with equal distances along each.
+
+    `starts`, `counts` and `lengths` (S,) are those of the lines, `offsets` (S + 1,) those of the
+    result (R, 3).
+    """
+    for s in range(first, last):
+        i, end = starts[s] + 1, starts[s] + counts[s] - 1
+        before, edge = 0.0, _apart(points[i - 1], points[i])
+        step = lengths[s] / (offsets[s + 1] - offsets[s] - 1)
+        for k in range(offsets[s], offsets[s + 1]):
+            at = (k - offsets[s]) * step
+            while i < end and before + edge <= at:
+                before += edge
+                i += 1
+                edge = _apart(points[i - 1], points[i])
+            share = min((at - before) / max(edge, SHORTEST_EDGE), 1.0)
+            for axis in range(3):
+                resampled[k, axis] = points[i - 1, axis] * (1 - share) + points[i, axis] * share
 
 
 @compiled
@@ -287,6 +341,7 @@ def _share_along(
     `points` (P, 3) and `offsets` (S + 1,) are those of the strands, `share` is (S,).
     """
     tensor, d = np.empty(6), np.empty(3)
+    origin, spacing, values = tensors.origin, tensors.spacing, tensors.values
     for s in range(first, last):
         along, trace = 0.0, 0.0
         for i in range(offsets[s], offsets[s + 1]):
@@ -295,7 +350,7 @@ def _share_along(
             for axis in range(3):
                 d[axis] = np.float64(points[ahead + 1, axis]) - points[ahead, axis]
                 square += d[axis] * d[axis]
-            sample_at(tensors.origin, tensors.spacing, tensors.values, points[i], tensor)
+            sample_at(origin, spacing, values, points[i], tensor)
             trace += tensor[XX] + tensor[YY] + tensor[ZZ]
             if square > 0:
                 along += _quadratic_form(tensor, d) / square

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hairkit import Hull, Strands
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
-from hairkit.field.sampling_kernels import sample_at
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
+from hairkit.field.sampling_kernels import make_unit, sample_at
 from hairkit.field.smooth_volume import smooth_volume
 from hairkit.parallel import compiled
 from hairkit.types.volume import cell_slopes
@@ -26,8 +26,8 @@ STEP_CELLS = 0.5
 class Band:
     """Ribbons on the grid."""
 
-    cells: BoolArray
-    """(X, Y, Z) loose cells that a ribbon runs through."""
+    on: BoolArray
+    """(N,) loose cells that a ribbon runs through."""
     direction: Float32Array
     """(N, 3) mean signed tangent of the loose cells, not longer than 1; 0 where none runs."""
 
@@ -46,14 +46,10 @@ def ribbons(segments: Strands, hull: Hull, reach: float) -> Band:
     occupancy = smooth_volume(hull.dense.astype(np.float32), SURFACE)
     cells = Cells(grid.origin, grid.spacing, rank, cell_slopes(occupancy))
     profile = Profile(reach * share, np.exp(-0.5 * (EDGE_SIGMAS * share) ** 2))
-    total = np.zeros((rank.max() + 1, 3))
-    weight = np.zeros(len(total))
-    _draw(segments.points, segments.tangents(), cells, profile, total, weight)
-    on = weight > 0
-    drawn = np.zeros(grid.shape, bool)
-    drawn[hull.loose] = on
-    direction = (total / np.where(on, weight, 1.0)[:, None]).astype(np.float32)
-    return Band(drawn, direction)
+    sums = np.zeros((rank.max() + 1, 4))
+    _draw(segments.points, segments.offsets, cells, profile, sums)
+    on = sums[:, 3] > 0
+    return Band(on, (sums[:, :3] / np.where(on, sums[:, 3], 1.0)[:, None]).astype(np.float32))
 
 
 class Cells(NamedTuple):
@@ -80,34 +76,38 @@ class Profile(NamedTuple):
 
 @compiled
 def _draw(
-    points: Float32Array,
-    tangents: Float32Array,
-    cells: Cells,
-    profile: Profile,
-    total: Float64Array,
-    weight: Float64Array,
+    points: Float32Array, offsets: Int64Array, cells: Cells, profile: Profile, sums: Float64Array
 ) -> None:
-    """Add weighted tangents (P, 3), and the weights, to the cells (N, 3), (N,) under all ribbons.
+    """Add weighted tangents, and the weights, to the sums (N, 4) of the cells under all ribbons.
 
-    `points` and `tangents` are those of the segments.
+    `points` (P, 3) and `offsets` (S + 1,) are those of the segments.
     """
-    slope, side = np.empty(3), np.empty(3)
-    for i in range(len(points)):
-        sample_at(cells.origin, cells.spacing, cells.slopes, points[i], slope)
-        _across(tangents[i], slope, side)
-        for k in range(len(profile.shifts)):
-            x = _cell(cells, 0, points[i, 0] + profile.shifts[k] * side[0])
-            y = _cell(cells, 1, points[i, 1] + profile.shifts[k] * side[1])
-            z = _cell(cells, 2, points[i, 2] + profile.shifts[k] * side[2])
-            n = cells.rank[x, y, z]
-            if n >= 0:
+    slope, side, along, at = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    rank, shifts, weights = cells.rank, profile.shifts, profile.weights  # counts references once
+    for s in range(len(offsets) - 1):
+        for i in range(offsets[s], offsets[s + 1]):
+            if i + 1 < offsets[s + 1]:  # the last point has the tangent of the one before
                 for axis in range(3):
-                    total[n, axis] += profile.weights[k] * tangents[i, axis]
-                weight[n] += profile.weights[k]
+                    along[axis] = np.float64(points[i + 1, axis]) - points[i, axis]
+                make_unit(along)
+            sample_at(cells.origin, cells.spacing, cells.slopes, points[i], slope)
+            _across(along, slope, side)
+            for axis in range(3):
+                at[axis] = (points[i, axis] - cells.origin[axis]) / cells.spacing
+                side[axis] /= cells.spacing
+            for k in range(len(shifts)):
+                x = min(max(int(at[0] + shifts[k] * side[0]), 0), rank.shape[0] - 1)
+                y = min(max(int(at[1] + shifts[k] * side[1]), 0), rank.shape[1] - 1)
+                z = min(max(int(at[2] + shifts[k] * side[2]), 0), rank.shape[2] - 1)
+                n = rank[x, y, z]
+                if n >= 0:
+                    for axis in range(3):
+                        sums[n, axis] += weights[k] * along[axis]
+                    sums[n, 3] += weights[k]
 
 
 @compiled
-def _across(along: Float32Array, slope: Float64Array, side: Float64Array) -> None:
+def _across(along: Float64Array, slope: Float64Array, side: Float64Array) -> None:
     """Write the unit vector square to both, or 0 where they are parallel, into side (3,)."""
     for axis in range(3):
         b, c = (axis + 1) % 3, (axis + 2) % 3
@@ -115,11 +115,3 @@ def _across(along: Float32Array, slope: Float64Array, side: Float64Array) -> Non
     length = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2)
     for axis in range(3):
         side[axis] /= max(length, 1e-9)
-
-
-@compiled
-def _cell(cells: Cells, axis: int, at: float) -> int:
-    """Return the cell along one axis that holds a coordinate, clamped to the grid."""
-    nearest = int(np.rint((at - cells.origin[axis]) / cells.spacing - 0.5))
-    last = int(cells.rank.shape[axis]) - 1
-    return min(max(nearest, 0), last)

@@ -163,12 +163,13 @@ def _follow_tensors(
     for axis in range(3):
         p[axis], d[axis] = seed[axis], sign * way[axis]
     tensor, share = np.empty(6), np.empty(1)
+    origin, spacing, values = tensors.origin, tensors.spacing, tensors.values
     for k in range(len(line)):
-        sample_at(tensors.origin, tensors.spacing, inside, p, share)
+        sample_at(origin, spacing, inside, p, share)
         if share[0] < 0.5:
             return k
         copy_point(p, line[k])
-        sample_at(tensors.origin, tensors.spacing, tensors.values, p, tensor)
+        sample_at(origin, spacing, values, p, tensor)
         if not principal_direction(tensor, d, d) or not make_unit(d):
             return k + 1
         for axis in range(3):
@@ -189,7 +190,6 @@ def orient_segments(segments: Strands, hull: Hull, way: Way) -> Strands:
     length = np.maximum(np.linalg.norm(chord, axis=1), 1e-6)
     middle = 0.5 * (segments.tips + segments.roots)
     unit = chord / length[:, None]
-    comb = combing_direction(way.head, hull, way.growth, middle, 0.0, way.parting, way.hair_length)
     combed = np.full(count, 1 - long_share(way.hair_length))
     if parts(way.parting, way.hair_length):
         combed = np.maximum(combed, crown_share(way.parting, way.head, middle))
@@ -197,7 +197,12 @@ def orient_segments(segments: Strands, hull: Hull, way: Way) -> Strands:
     off = np.clip(hull.grid.sample(hull.head_distance, middle) / HANGS_OFF, 0, 1)
     beside = 1 - np.maximum(gradient(hull.grid, hull.head_distance, middle)[:, 1], 0)
     hangs = -HANGING_WEIGHT * off * beside * unit[:, 1]
-    wish = (1 - combed) * (rise + hangs) + combed * (unit * comb).sum(axis=1)
+    wish = (1 - combed) * (rise + hangs)
+    on = np.flatnonzero(combed)
+    comb = combing_direction(
+        way.head, hull, way.growth, middle[on], 0.0, way.parting, way.hair_length
+    )
+    wish[on] += combed[on] * (unit[on] * comb).sum(axis=1)
     near = cKDTree(middle).query(middle, k=min(NEIGHBOURS + 1, count))[1].reshape(count, -1)[:, 1:]
     parallel = NEIGHBOUR_WEIGHT * np.einsum("nkc,nc->nk", unit[near], unit)
     owner = np.repeat(np.arange(count), near.shape[1])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hairkit.arrays import BoolArray, Float32Array, Int32Array
 from hairkit.errors import InputError
-from hairkit.field.diffusion import cell_neighbours, solve_screened
+from hairkit.field.diffusion import CellGraph, cell_neighbours, solve_screened
 
 
 def porous(shape: tuple[int, int, int], filled: float, seed: int = 0) -> BoolArray:
@@ -58,7 +58,7 @@ def test_the_solution_solves_the_linear_system(size: int, tolerance: float) -> N
     """
     occupied = porous((size, size + 2, size + 1), 0.8)
     data, weight = problem(occupied, columns=3)
-    solved = solve_screened(occupied, data, weight, 0.7, tolerance=tolerance)
+    solved = solve_screened(CellGraph.of(occupied), data, weight, 0.7, tolerance=tolerance)
     wanted = weight[:, None].astype(np.float64) * data
     left = apply_operator(cell_neighbours(occupied), weight, 0.7, solved.astype(np.float64))
     residual = np.linalg.norm(left - wanted, axis=0) / np.linalg.norm(wanted, axis=0)
@@ -74,7 +74,7 @@ def test_the_solution_is_that_of_a_direct_solver() -> None:
     np.testing.assert_allclose(matrix, matrix.T)
     alone = (np.abs(matrix).sum(axis=1) == 0)[:, None]  # a cell without neighbours or data
     wanted = np.linalg.lstsq(matrix, weight[:, None].astype(np.float64) * data, rcond=None)[0]
-    solved = solve_screened(occupied, data, weight, 0.4, tolerance=1e-6)
+    solved = solve_screened(CellGraph.of(occupied), data, weight, 0.4, tolerance=1e-6)
     np.testing.assert_allclose(np.where(alone, 0, solved), np.where(alone, 0, wanted), atol=1e-3)
 
 
@@ -85,7 +85,7 @@ def test_constants_are_reproduced(constant: float, smoothness: float) -> None:
     occupied = np.ones((6, 7, 8), bool)
     _, weight = problem(occupied, known=0.1)
     data = np.full((len(weight), 1), constant, np.float32)
-    solved = solve_screened(occupied, data, weight, smoothness, tolerance=1e-5)
+    solved = solve_screened(CellGraph.of(occupied), data, weight, smoothness, tolerance=1e-5)
     np.testing.assert_allclose(solved, constant, atol=1e-3 * abs(constant) + 1e-6)
 
 
@@ -95,7 +95,7 @@ def test_heavy_cells_keep_their_values_and_the_rest_stays_in_their_range() -> No
     data, weight = problem(occupied, known=0.15)
     fixed = weight > 0
     weight[fixed] = 1e5
-    solved = solve_screened(occupied, data, weight, 0.5, tolerance=1e-7)
+    solved = solve_screened(CellGraph.of(occupied), data, weight, 0.5, tolerance=1e-7)
     np.testing.assert_allclose(solved[fixed], data[fixed], atol=1e-3)
     low, high = data[fixed].min(axis=0), data[fixed].max(axis=0)
     assert (solved > low - 1e-3).all()
@@ -106,7 +106,7 @@ def test_heavy_cells_keep_their_values_and_the_rest_stays_in_their_range() -> No
 def test_between_two_fixed_ends_values_run_straight(tolerance: float) -> None:
     """The harmonic function on a beam is linear."""
     occupied, data, weight = beam(40)
-    solved = solve_screened(occupied, data, weight, 0.4, tolerance=tolerance)
+    solved = solve_screened(CellGraph.of(occupied), data, weight, 0.4, tolerance=tolerance)
     wanted = np.repeat(np.linspace(0, 1, 40), 4)
     np.testing.assert_allclose(solved[:, 0], wanted, atol=0.01)
 
@@ -115,8 +115,8 @@ def test_scaling_weights_and_smoothness_together_changes_nothing() -> None:
     """Only their ratio matters."""
     occupied = porous((8, 8, 8), 0.9)
     data, weight = problem(occupied)
-    first = solve_screened(occupied, data, weight, 0.5, tolerance=1e-5)
-    second = solve_screened(occupied, data, 8 * weight, 4.0, tolerance=1e-6)
+    first = solve_screened(CellGraph.of(occupied), data, weight, 0.5, tolerance=1e-5)
+    second = solve_screened(CellGraph.of(occupied), data, 8 * weight, 4.0, tolerance=1e-6)
     np.testing.assert_allclose(first, second, atol=1e-3)
 
 
@@ -127,9 +127,13 @@ def test_turning_the_block_turns_the_solution() -> None:
     volume = np.zeros((2, *occupied.shape), np.float32)
     volume[0][occupied], volume[1][occupied] = data[:, 0], weight
     turned, turned_volume = occupied.transpose(2, 0, 1), volume.transpose(0, 3, 1, 2)
-    straight = solve_screened(occupied, data, weight, 0.5, tolerance=1e-5)
+    straight = solve_screened(CellGraph.of(occupied), data, weight, 0.5, tolerance=1e-5)
     other = solve_screened(
-        turned, turned_volume[0][turned][:, None], turned_volume[1][turned], 0.5, tolerance=1e-5
+        CellGraph.of(turned),
+        turned_volume[0][turned][:, None],
+        turned_volume[1][turned],
+        0.5,
+        tolerance=1e-5,
     )
     result = np.zeros(occupied.shape, np.float32)
     result[occupied] = straight[:, 0]
@@ -140,11 +144,11 @@ def test_a_good_start_needs_no_iteration_and_a_bad_one_no_luck() -> None:
     """A start at the solution is returned as it is; from elsewhere the same place is reached."""
     occupied = np.ones((8, 8, 8), bool)
     data, weight = problem(occupied)
-    solved = solve_screened(occupied, data, weight, 0.5, tolerance=1e-5)
-    again = solve_screened(occupied, data, weight, 0.5, tolerance=1e-2, start=solved)
+    solved = solve_screened(CellGraph.of(occupied), data, weight, 0.5, tolerance=1e-5)
+    again = solve_screened(CellGraph.of(occupied), data, weight, 0.5, tolerance=1e-2, start=solved)
     np.testing.assert_allclose(again, solved, atol=1e-4)
     far = np.full_like(solved, 50.0)
-    found = solve_screened(occupied, data, weight, 0.5, tolerance=1e-5, start=far)
+    found = solve_screened(CellGraph.of(occupied), data, weight, 0.5, tolerance=1e-5, start=far)
     np.testing.assert_allclose(found, solved, atol=1e-3)
     assert (far == 50).all()
 
@@ -156,7 +160,7 @@ def test_parts_without_data_stay_in_the_range_of_the_others(size: int) -> None:
     occupied[size : size + 2] = False
     data, weight = problem(occupied, columns=1)
     weight[len(weight) // 2 :] = 0
-    solved = solve_screened(occupied, data, weight, 0.5, tolerance=1e-4)
+    solved = solve_screened(CellGraph.of(occupied), data, weight, 0.5, tolerance=1e-4)
     known = data[weight > 0]
     assert np.isfinite(solved).all()
     assert known.min() - 1e-3 <= solved.min()
@@ -189,8 +193,8 @@ def test_shapes_that_disagree_and_data_without_weight_are_refused() -> None:
     occupied = np.ones((2, 2, 2), bool)
     data, weight = np.zeros((8, 1), np.float32), np.ones(8, np.float32)
     with pytest.raises(InputError, match=r"8 cells got data \(7, 1\)"):
-        solve_screened(occupied, data[:7], weight, 1.0)
+        solve_screened(CellGraph.of(occupied), data[:7], weight, 1.0)
     with pytest.raises(InputError, match=r"weights \(9,\)"):
-        solve_screened(occupied, data, np.ones(9, np.float32), 1.0)
+        solve_screened(CellGraph.of(occupied), data, np.ones(9, np.float32), 1.0)
     with pytest.raises(InputError, match="a weight above 0"):
-        solve_screened(occupied, data, 0 * weight, 1.0)
+        solve_screened(CellGraph.of(occupied), data, 0 * weight, 1.0)

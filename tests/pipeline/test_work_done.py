@@ -49,15 +49,15 @@ def test_the_coarse_start_saves_solver_steps(monkeypatch: pytest.MonkeyPatch) ->
         return product(*vectors)
 
     monkeypatch.setattr(diffusion, "_product", count)
-    occupied = np.ones((40, 40, 40), bool)
+    cells = diffusion.CellGraph.of(np.ones((40, 40, 40), bool))
     weight = np.zeros((40, 40, 40), np.float32)
     weight[0], weight[-1] = 1, 1
-    data = np.zeros((occupied.sum(), 1), np.float32)
+    data = np.zeros((len(cells), 1), np.float32)
     data[: 40 * 40] = 1
     taken = []
     for start in (None, np.zeros_like(data)):
         products.clear()
-        diffusion.solve_screened(occupied, data, weight.ravel(), 1.0, tolerance=1e-2, start=start)
+        diffusion.solve_screened(cells, data, weight.ravel(), 1.0, tolerance=1e-2, start=start)
         taken.append(len(products) // 3)  # a step computes three
     assert taken[0] <= STEPS, taken
     assert 3 * taken[0] < taken[1], taken

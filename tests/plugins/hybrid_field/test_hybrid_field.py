@@ -23,6 +23,7 @@ from hairkit_plugins.hybrid_field.ribbons import SURFACE, Band, ribbons
 from hairkit_plugins.hybrid_field.segments import Way, find_segments, orient_segments
 from scipy import ndimage
 
+from hairkit.field.diffusion import CellGraph
 from hairkit.field.growth_prior import growth_potential, measure_scalp_distance
 from hairkit.field.view_fusion import DEPTH_SHRINK, fuse_views
 from hairkit.testing import ball_head
@@ -83,7 +84,9 @@ def test_a_line_is_lifted_and_smoothed_the_same_wherever_it_stands_in_the_pack()
     lines = rng.uniform(40, 80, (5, 30, 3)).astype(np.float32)
     lines[..., 2] = rng.uniform(0.4, 0.6, (5, 30))
     counts = np.array([30, 2, 5, 12, 30])
-    points, kept = lift_lines(camera, lines, counts)
+    points, kept, lengths = lift_lines(camera, lines, counts)
+    packed = Strands(points, np.concatenate([[0], np.cumsum(kept)]))
+    np.testing.assert_allclose(lengths, packed.lengths(), rtol=1e-6)
     np.testing.assert_array_equal(kept, [30, 5, 12, 30])
     ends = np.cumsum(kept)
     for line, last, count in zip(lines[[0, 2, 3, 4]], ends, kept, strict=True):
@@ -158,8 +161,8 @@ def test_ribbons_widen_segments_along_the_surface() -> None:
     course = CENTRE + [0, 0, 0.055] + np.linspace(-0.02, 0.02, 21)[:, None] * [0, 1.0, 0]
     lone = Strands.from_list([course])
     thin, wide = (ribbons(lone, hull, reach) for reach in (0.0, 0.012))
-    assert wide.cells.sum() > 1.5 * thin.cells.sum()
-    drawn = thin.direction[thin.cells[hull.loose]]
+    assert wide.on.sum() > 1.5 * thin.on.sum()
+    drawn = thin.direction[thin.on]
     np.testing.assert_allclose(np.linalg.norm(drawn, axis=1), 1, atol=1e-5)
     assert (drawn[:, 1] > 0.99).all()
 
@@ -169,9 +172,8 @@ def test_surface_structure_keeps_ribbons_and_spreads_them() -> None:
     hull = hair()
     course = CENTRE + [0, 0, 0.05] + np.linspace(-0.02, 0.02, 21)[:, None] * [0, 1.0, 0]
     band = ribbons(Strands.from_list([course]), hull, 0.0)
-    field = surface_structure(hull, band, 1e-4)
-    on = band.cells[hull.loose]
-    np.testing.assert_allclose(field[on], band.direction[on], atol=0.02)
+    field = surface_structure(CellGraph.of(hull.loose), band, 1e-4)
+    np.testing.assert_allclose(field[band.on], band.direction[band.on], atol=0.02)
     np.testing.assert_allclose(field, np.broadcast_to([0, 1, 0], field.shape), atol=0.03)
 
 
@@ -236,7 +238,7 @@ def test_an_empty_band_has_no_direction() -> None:
     hull = hair()
     band = ribbons(Strands(np.zeros((0, 3), np.float32), np.zeros(1, np.int64)), hull, 0.004)
     assert isinstance(band, Band)
-    assert not band.cells.any()
+    assert not band.on.any()
     assert not band.direction.any()
 
 
@@ -295,8 +297,10 @@ def test_ribbons_equal_their_readable_twin() -> None:
         np.add.at(total, tuple(cells.T), part * along)
         np.add.at(weight, tuple(cells.T), part)
     drawn = (weight > 0) & hull.loose
-    assert (drawn != band.cells).mean() < 1e-4  # a point on the border of two cells
-    same = drawn & band.cells
+    by_band = np.zeros(hull.grid.shape, bool)
+    by_band[hull.loose] = band.on
+    assert (drawn != by_band).mean() < 1e-4  # a point on the border of two cells
+    same = drawn & by_band
     drawn_by_band = band.direction[same[hull.loose]]
     difference = np.abs(total[same] / weight[same, None] - drawn_by_band).max(axis=1)
     assert np.quantile(difference, 0.99) < 1e-3
