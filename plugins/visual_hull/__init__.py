@@ -67,7 +67,9 @@ class Options:
     """Settings of the hull."""
 
     mode: str = option("labels", choices=("labels", "votes"), doc="How views decide on a cell.")
-    voxel_size: float = option(0.003, low=FINEST, high=0.02, doc="Edge length of a cell.", unit="m")
+    voxel_size: float = option(
+        0.0035, low=FINEST, high=0.02, doc="Edge length of a cell.", unit="m"
+    )
     min_views: int = option(2, low=1, high=64, doc="Views that must have hair at a cell.")
     forgive: int = option(
         -1,
