@@ -172,24 +172,25 @@ def _unwrap(head: Head) -> _Surface:
     normals = head.normals()
     layers = [*head.vertices.astype(np.float64).T, *normals.T]
     offset = 2.0 + max(float(np.abs(layer).max()) for layer in layers)
-    pictures = [_over_uv(head, layer + offset) for layer in layers]
+    faces = _whole_in_uv(head)
+    pictures = [_over_uv(head.uv, faces, layer + offset) for layer in layers]
     known = np.isfinite(pictures[0])
     values = np.stack([np.where(known, p - np.float32(offset), 0) for p in pictures], axis=-1)
     return _Surface(values[..., :3], values[..., 3:], np.asarray(known))
 
 
-def _over_uv(head: Head, values: Float64Array) -> Float32Array:
-    """Return (C, C) positive values (V,) of the vertices, interpolated over the texture."""
+def _over_uv(uv: Float32Array, faces: Int32Array, values: Float64Array) -> Float32Array:
+    """Return (C, C) positive values (V,) of vertices at `uv` (V, 2), interpolated on the faces."""
     looking = np.diag([1.0, -1.0, -1.0, 1.0])  # an orthographic camera above the (u, v) plane
     camera = Camera(looking, COARSE, np.array([0.0, COARSE]), COARSE, COARSE, "orthographic")
-    corners = np.column_stack([head.uv, -values]).astype(np.float32)
-    return mesh_depth(corners, _whole_in_uv(head), camera)
+    return mesh_depth(np.column_stack([uv, -values]).astype(np.float32), faces, camera)
 
 
 def _whole_in_uv(head: Head) -> Int32Array:
     """Return the faces (F', 3) that do not reach across the texture, as those at a pole do."""
     faces = head.skin_faces()
-    longest = np.ptp(head.uv[faces], axis=1).max(axis=1)
+    a, b, c = (head.uv[corner] for corner in faces.T)
+    longest = np.maximum(np.maximum(np.abs(a - b), np.abs(b - c)), np.abs(c - a)).max(axis=1)
     return np.ascontiguousarray(faces[longest < LARGEST_FACE])
 
 
