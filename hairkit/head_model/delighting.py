@@ -9,15 +9,22 @@ divided by both.
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
+import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float32Array
+
+Floats = npt.NDArray[np.floating[Any]]
 
 GAMMA = 2.2
 """Exponent from sRGB to linear light, close enough for ratios."""
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Weights of linear red, green and blue (ITU-R BT.709)."""
+STEP = 2
+"""Texels between those to which light is fitted."""
 ROUNDS = 12
 """Rounds of reweighted least squares."""
 SPREAD = 0.18
@@ -58,47 +65,54 @@ def find_shading(
     if not seen.any():
         return np.ones(weight.shape, np.float32)
     linear = (np.maximum(colours, 1.0) / 255.0) ** GAMMA
-    brightness = (linear @ np.array(LUMINANCE, np.float32)).astype(np.float64)
-    basis = harmonics(normals)
-    light, trust = _fit_light(basis[seen], brightness[seen], weight[seen].astype(np.float64))
-    mean = float(np.average(basis[seen] @ light, weights=weight[seen]))
-    shading = np.clip(basis @ light, DARKEST * mean, BRIGHTEST * mean)
-    skin = np.zeros(weight.shape, np.float32)
-    skin[seen] = weight[seen] * trust
+    brightness = linear @ np.array(LUMINANCE, np.float32)
+    step = STEP if seen[::STEP, ::STEP].any() else 1
+    few = slice(None, None, step), slice(None, None, step)
+    light = _fit_light(normals[few], brightness[few], weight[few])
+    shading = harmonics(normals) @ light
+    mean = float(np.average(shading[seen], weights=weight[seen]))
+    trust = _agreement(brightness, np.maximum(shading, DARKEST * np.median(brightness[seen])))
+    shading = np.clip(shading, DARKEST * mean, BRIGHTEST * mean)
+    skin = np.asarray(weight * trust, np.float32)
     shading *= np.exp(TAKEN * _leftover(brightness / shading, skin))
     level = np.average(np.log(shading[seen]), weights=weight[seen])
     return np.asarray((shading / np.exp(level)) ** (1 / GAMMA), np.float32)
 
 
-def harmonics(normals: Float32Array | Float64Array) -> Float64Array:
+def harmonics(normals: Floats) -> Floats:
     """Return (..., 9) the real spherical harmonics up to degree 2, without their factors."""
-    x, y, z = np.moveaxis(np.asarray(normals, np.float64), -1, 0)
+    x, y, z = np.moveaxis(normals, -1, 0)
     terms = [np.ones_like(x), y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y]
     return np.stack(terms, axis=-1)
 
 
-def _fit_light(
-    basis: Float64Array, brightness: Float64Array, weight: Float64Array
-) -> tuple[Float64Array, Float64Array]:
-    """Return the light (9,) and how far each texel agrees with it (N,)."""
+def _fit_light(normals: Floats, brightness: Floats, weight: Floats) -> Float32Array:
+    """Return the light (9,) that fits a map's brightness (H, W) best."""
+    seen = weight > 0
+    basis, brightness = harmonics(normals[seen]).astype(np.float64), brightness[seen]
+    weight = weight[seen].astype(np.float64)
     degree = np.array([0, 1, 1, 1, 2, 2, 2, 2, 2])
     ridge = np.diag(RIDGE * weight.sum() * degree**2)
-    trust, darkest = np.ones(len(weight)), DARKEST * np.median(brightness)
+    darkest = DARKEST * np.median(brightness)
+    trust: Floats = np.ones(len(weight))
+    light: Floats = np.zeros(len(degree))
     for _ in range(ROUNDS):
         weighted = basis * (weight * trust)[:, None]
         light = np.linalg.solve(weighted.T @ basis + ridge, weighted.T @ brightness)
-        fitted = np.maximum(basis @ light, darkest)
-        trust = 1 / (1 + ((brightness / fitted - 1) / SPREAD) ** 2) ** 2
-    result: Float64Array = np.asarray(light, np.float64)
-    return result, trust
+        trust = _agreement(brightness, np.maximum(basis @ light, darkest))
+    return light.astype(np.float32)
 
 
-def _leftover(ratio: Float64Array, skin: Float32Array) -> Float64Array:
+def _agreement(brightness: Floats, fitted: Floats) -> Floats:
+    """Return (...) how far texels agree with the fit, from 0 to 1."""
+    return np.asarray(1 / (1 + ((brightness / fitted - 1) / SPREAD) ** 2) ** 2)
+
+
+def _leftover(ratio: Floats, skin: Float32Array) -> Floats:
     """Return the smooth logarithm (H, W) of brightness over fitted light, 0 far from skin."""
     logs = np.log(np.clip(ratio, np.exp(-2 * LARGEST), np.exp(2 * LARGEST)))
     level = np.average(logs, weights=skin)
     total = cv2.GaussianBlur(skin, (0, 0), REACH)
     mean = cv2.GaussianBlur(((logs - level) * skin).astype(np.float32), (0, 0), REACH)
     peak = float(total.max())
-    smooth: Float64Array = np.clip(mean / np.maximum(total, LEAST * peak), -LARGEST, LARGEST)
-    return smooth.astype(np.float64)
+    return np.asarray(np.clip(mean / np.maximum(total, LEAST * peak), -LARGEST, LARGEST))

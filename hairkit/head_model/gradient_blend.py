@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float32Array
 
 REACH = 40.0
 """Texels beyond which the result follows the mean rather than the gradients: 40 mm."""
@@ -42,13 +42,25 @@ def join_gradients(
     from scipy.fft import dctn, idctn
 
     height, width = mean.shape[:2]
-    wanted = mean.astype(np.float64) / REACH**2
+    wanted = mean / np.float32(REACH**2)
     for axis in (0, 1):
         wanted -= _divergence(_gradients(mean, pictures, shares, axis), axis)
     waves = [2 - 2 * np.cos(np.pi * np.arange(count) / count) for count in (height, width)]
-    factor = waves[0][:, None] + waves[1][None] + 1 / REACH**2
+    factor = (waves[0][:, None] + waves[1][None] + 1 / REACH**2).astype(np.float32)
     solved = idctn(dctn(wanted, axes=(0, 1)) / factor[..., None], axes=(0, 1))
     return np.asarray(solved, np.float32)
+
+
+def smallest_window(weight: Float32Array, margin: int = 0) -> tuple[slice, slice]:
+    """Return rows and columns of a picture (H, W) that hold all weights above 0, and a margin.
+
+    Both are empty where no weight is.
+    """
+    lines = [np.flatnonzero(weight.max(axis=axis) > 0) for axis in (1, 0)]
+    if not len(lines[0]):
+        return slice(0, 0), slice(0, 0)
+    rows, columns = (slice(max(at[0] - margin, 0), at[-1] + 1 + margin) for at in lines)
+    return rows, columns
 
 
 def _gradients(
@@ -56,27 +68,30 @@ def _gradients(
     pictures: Sequence[Float32Array],
     shares: Sequence[Float32Array],
     axis: int,
-) -> Float64Array:
+) -> Float32Array:
     """Return the differences of neighbours along an axis, of the pictures that show both."""
-    total = np.zeros(_pairs(shares[0], axis, np.minimum).shape)
-    mixed = np.zeros((*total.shape, mean.shape[2]))
+    gradients = np.diff(mean, axis=axis)
+    total = np.zeros(gradients.shape[:2], np.float32)
+    mixed = np.zeros_like(gradients)
     for picture, share in zip(pictures, shares, strict=True):
-        both = _pairs(share, axis, np.minimum)
-        total += both
-        mixed += both[..., None] * np.diff(picture, axis=axis)
-    own = np.diff(mean, axis=axis).astype(np.float64)
-    found = mixed / np.maximum(total, LEAST)[..., None]
-    return np.asarray(np.where(total[..., None] > LEAST, found, own), np.float64)
+        part = smallest_window(share)
+        both = _pairs(share[part], axis)
+        rows, columns = (slice(w.start, w.start + n) for w, n in zip(part, both.shape, strict=True))
+        total[rows, columns] += both
+        mixed[rows, columns] += both[..., None] * np.diff(picture[part], axis=axis)
+    known = total > LEAST
+    gradients[known] = mixed[known] / total[known][:, None]
+    return gradients
 
 
-def _pairs(values: Float32Array, axis: int, join: np.ufunc) -> Float32Array:
-    """Return what neighbours along an axis have in common."""
+def _pairs(values: Float32Array, axis: int) -> Float32Array:
+    """Return the smaller of neighbours along an axis."""
     first, second = [slice(None)] * 2, [slice(None)] * 2
     first[axis], second[axis] = slice(None, -1), slice(1, None)
-    return np.asarray(join(values[tuple(first)], values[tuple(second)]), np.float32)
+    return np.asarray(np.minimum(values[tuple(first)], values[tuple(second)]), np.float32)
 
 
-def _divergence(gradients: Float64Array, axis: int) -> Float64Array:
+def _divergence(gradients: Float32Array, axis: int) -> Float32Array:
     """Return the divergence (H, W, C) along an axis; nothing flows over the borders."""
     around = [(0, 0)] * gradients.ndim
     around[axis] = (1, 1)

@@ -30,7 +30,7 @@ from hairkit.head_model.delighting import find_shading
 from hairkit.head_model.exposures import FLOOR, even_exposures
 from hairkit.head_model.eye_colours import find_eye_colours, mark_beside_eyes
 from hairkit.head_model.eyes import has_default_eyes, paint_over
-from hairkit.head_model.gradient_blend import join_gradients
+from hairkit.head_model.gradient_blend import join_gradients, smallest_window
 from hairkit.parallel import thread_count
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
@@ -172,24 +172,25 @@ def _unwrap(head: Head) -> _Surface:
     normals = head.normals()
     layers = [*head.vertices.astype(np.float64).T, *normals.T]
     offset = 2.0 + max(float(np.abs(layer).max()) for layer in layers)
-    pictures = [_over_uv(head, layer + offset) for layer in layers]
+    faces = _whole_in_uv(head)
+    pictures = [_over_uv(head.uv, faces, layer + offset) for layer in layers]
     known = np.isfinite(pictures[0])
     values = np.stack([np.where(known, p - np.float32(offset), 0) for p in pictures], axis=-1)
     return _Surface(values[..., :3], values[..., 3:], np.asarray(known))
 
 
-def _over_uv(head: Head, values: Float64Array) -> Float32Array:
-    """Return (C, C) positive values (V,) of the vertices, interpolated over the texture."""
+def _over_uv(uv: Float32Array, faces: Int32Array, values: Float64Array) -> Float32Array:
+    """Return (C, C) positive values (V,) of vertices at `uv` (V, 2), interpolated on the faces."""
     looking = np.diag([1.0, -1.0, -1.0, 1.0])  # an orthographic camera above the (u, v) plane
     camera = Camera(looking, COARSE, np.array([0.0, COARSE]), COARSE, COARSE, "orthographic")
-    corners = np.column_stack([head.uv, -values]).astype(np.float32)
-    return mesh_depth(corners, _whole_in_uv(head), camera)
+    return mesh_depth(np.column_stack([uv, -values]).astype(np.float32), faces, camera)
 
 
 def _whole_in_uv(head: Head) -> Int32Array:
     """Return the faces (F', 3) that do not reach across the texture, as those at a pole do."""
     faces = head.skin_faces()
-    longest = np.ptp(head.uv[faces], axis=1).max(axis=1)
+    a, b, c = (head.uv[corner] for corner in faces.T)
+    longest = np.maximum(np.maximum(np.abs(a - b), np.abs(b - c)), np.abs(c - a)).max(axis=1)
     return np.ascontiguousarray(faces[longest < LARGEST_FACE])
 
 
@@ -256,46 +257,37 @@ def _blend(
     smooth = [_smooth(view, factor) for view, factor in zip(views, factors, strict=True)]
     mean, taken = (np.zeros((COARSE, COARSE, 3), np.float32) for _ in range(2))
     for low, view, share in zip(smooth, views, shares, strict=True):
-        part = _window(view.weight)
+        part = smallest_window(view.weight)
         mean[part] += low[part] * view.weight[part][..., None]
         taken[part] += low[part] * share[part][..., None]
     mean = extend(mean / np.maximum(total, LEAST)[..., None], (total > 0).astype(np.float32))
     details = np.zeros((SIZE, SIZE, 3), np.float32)
     for view, photo, factor, share in zip(views, photos, factors, shares, strict=True):
-        _add_photo(details, view, photo, share[..., None] * factor)
+        _add_photo(details, view, photo, factor, share)
     coarse = join_gradients(mean, smooth, shares) - taken
     for rows in _strips():
         details[rows] += _enlarge_rows(coarse, rows)
     return details, total
 
 
-def _add_photo(colours: Float32Array, view: _Seen, photo: UInt8Array, share: Float32Array) -> None:
-    """Add a view's share (C, C, 3) of its photo to the colours (S, S, 3) where it has one."""
+def _add_photo(
+    colours: Float32Array, view: _Seen, photo: UInt8Array, gain: Float32Array, share: Float32Array
+) -> None:
+    """Add a view's share (C, C) of its photo, times its gain, to the colours (S, S, 3)."""
     times = SIZE // COARSE
-    first, last = (times * end for end in _ends(share.any(axis=(1, 2))))
-    for rows in _strips(first, last):
+    seen = smallest_window(share)[0]
+    shares = share[..., None] * gain
+    for rows in _strips(times * seen.start, times * seen.stop):
         near = slice(max(rows.start // times - 1, 0), rows.stop // times + 1)
-        left, right = _ends(share[near].any(axis=(0, 2)))
-        part = slice(max(left - 1, 0), right + 1)
+        part = smallest_window(share[near], margin=1)[1]
         column, row, fine = (
-            _enlarge_rows(each[:, part], rows) for each in (view.column, view.row, share)
+            _enlarge_rows(each[:, part], rows) for each in (view.column, view.row, shares)
         )
         pixels = cv2.remap(photo, column, row, cv2.INTER_LINEAR)
-        columns = slice(part.start * times, part.start * times + pixels.shape[1])
-        colours[rows, columns] += cv2.multiply(pixels, fine, dtype=cv2.CV_32F)
-
-
-def _ends(marked: BoolArray) -> tuple[int, int]:
-    """Return the first of the marked (N,) and the one after the last, 0 and 0 without any."""
-    at = np.flatnonzero(marked)
-    return (int(at[0]), int(at[-1]) + 1) if len(at) else (0, 0)
-
-
-def _window(weight: Float32Array, margin: int = 0) -> tuple[slice, slice]:
-    """Return rows and columns of a picture (H, W) that hold all weights above 0, and a margin."""
-    ends = [_ends((weight > 0).any(axis=axis)) for axis in (1, 0)]
-    rows, columns = (slice(max(first - margin, 0), last + margin) for first, last in ends)
-    return rows, columns
+        first = times * part.start
+        colours[rows, first : first + pixels.shape[1]] += cv2.multiply(
+            pixels, fine, dtype=cv2.CV_32F
+        )
 
 
 def _strips(first: int = 0, last: int | None = None) -> Iterator[slice]:
@@ -321,7 +313,7 @@ def _enlarge_rows(picture: Float32Array, rows: slice) -> Float32Array:
 def _smooth(view: _Seen, gain: Float32Array) -> Float32Array:
     """Return (C, C, 3) colours without details, of what the view sees alone."""
     smooth = np.zeros(view.coarse.shape, np.float32)
-    part = _window(view.weight, round(4 * BAND))
+    part = smallest_window(view.weight, round(4 * BAND))
     within = (view.weight[part] > 0).astype(np.float32)
     if within.any():
         blurred = cv2.GaussianBlur(view.coarse[part] * gain * within[..., None], (0, 0), BAND)
@@ -433,5 +425,5 @@ def extend(values: Float32Array, weight: Float32Array) -> Float32Array:
         if number:
             half = [(count + 1) // 2 for count in level.shape[1::-1]]
             level = cv2.resize(level, half, interpolation=cv2.INTER_AREA)
-    mixed += trust * TONE_TRUST * sums / max(sums[-1], LEAST)
-    return np.asarray(mixed[..., :-1] / mixed[..., -1:], np.float32)
+    mean, floor = sums[:-1] / max(sums[-1], LEAST), trust * TONE_TRUST
+    return np.asarray((mixed[..., :-1] + floor * mean) / (mixed[..., -1:] + floor), np.float32)

@@ -78,9 +78,13 @@ def default_head() -> Head:
     targets = _landmarks()
     landmarks = cKDTree(vertices).query(targets)[1]
     directions[landmarks] = _fit_directions(directions[landmarks], targets)
-    directions = _trace_lids(directions, faces, landmarks)
+    vertices[landmarks] = head_surface(*_angles(directions[landmarks]))
+    near = near_edge(vertices, faces)
+    near[landmarks] = False
+    directions[near] = _fit_directions(directions[near], nearest_edge(vertices[near]))
+    vertices[near] = head_surface(*_angles(directions[near]))
+    vertices = open_lids(vertices)
     polar, azimuth = _angles(directions)
-    vertices = open_lids(head_surface(polar, azimuth))
     radius = 0.5 * polar / np.pi
     uv = np.stack([0.5 + radius * np.sin(azimuth), 0.5 - radius * np.cos(azimuth)], axis=1)
     spheres = (_CAPSULES * 1e-3).astype(np.float32)
@@ -126,16 +130,6 @@ def _refine_regions(directions: Float64Array) -> Float64Array:
         across /= np.maximum(np.sin(angle), 1e-9)[:, None]
         directions = np.cos(turned)[:, None] * middle + np.sin(turned)[:, None] * across
     return directions
-
-
-def _trace_lids(directions: Float64Array, faces: Int32Array, landmarks: Int32Array) -> Float64Array:
-    """Return the directions (N, 3), those of vertices near a lid's edge moved onto it."""
-    points = head_surface(*_angles(directions))
-    near = near_edge(points, faces)
-    near[landmarks] = False
-    traced = directions.copy()
-    traced[near] = _fit_directions(directions[near], nearest_edge(points[near]))
-    return traced
 
 
 def _fit_directions(directions: Float64Array, targets: Float64Array) -> Float64Array:

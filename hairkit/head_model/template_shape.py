@@ -233,13 +233,15 @@ def _nose(base: Float64Array) -> Float64Array:
 
 
 def _displacements(base: Float64Array) -> Float64Array:
-    total = np.zeros_like(base)
+    x, y, z = np.ascontiguousarray(base.T)
+    total = np.zeros((3, len(base)))
     for row in _BUMPS:
+        flat = ((y - row[1]) / row[4]) ** 2 + ((z - row[2]) / row[5]) ** 2
         for side in (1.0, -1.0) if row[0] else (1.0,):
-            mirror = np.array([side, 1.0, 1.0])
-            away = (base - row[:3] * mirror) / row[3:6]
-            total += np.exp(-0.5 * (away**2).sum(axis=1))[:, None] * row[6:] * mirror
-    return total
+            share = np.exp(-0.5 * (((x - side * row[0]) / row[3]) ** 2 + flat))
+            for axis in np.flatnonzero(row[6:]):
+                total[axis] += (side if axis == 0 else 1.0) * row[6 + axis] * share
+    return total.T
 
 
 def _ears(base: Float64Array) -> Float64Array:
