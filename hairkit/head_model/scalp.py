@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +23,9 @@ PACKING = 0.7
 """Roots that dart throwing packs into a square whose edge is their least distance."""
 FIRST_CANDIDATES = 64
 """Candidates added to those of the packing, so that large radii have some."""
+BATCH = 16_384
+"""Candidates made at once where so many are likely to be tried; each takes 0.2 kB while it is
+made."""
 SHRINK = 0.95
 """Factor from one radius of the dart throwing to the next."""
 _LONGEST_EDGE = 3.2
@@ -210,9 +212,10 @@ def _progressive_roots(
     """Return the first `count` roots of a seed's sequence: faces (N,) and weights (N, 3)."""
     shift = np.random.PCG64(seed).random_raw(3)  # raw bits are the same in every NumPy (NEP 19)
     whole = None if reach is None else _covered_faces(head, area, reach, -1.0)
-    tried = CANDIDATES_PER_ROOT * count + FIRST_CANDIDATES
-    some = _candidates(head, area, 0, tried, shift, reach, whole)
-    apart = np.full(len(some.face), np.inf)  # metres to the root that is known to be nearest
+    likely = CANDIDATES_PER_ROOT * count + FIRST_CANDIDATES
+    tried = min(likely, BATCH)
+    number, point = _candidates(head, area, 0, tried, shift, reach, whole)
+    apart = np.full(len(number), np.inf)  # metres to the root that is known to be nearest
     taken, found = np.empty(count, np.int64), 0
     total = float(area.sum())
     radius = np.sqrt(total)
@@ -220,13 +223,14 @@ def _progressive_roots(
         radius *= SHRINK
         wanted = int(CANDIDATES_PER_ROOT * PACKING * total / radius**2) + FIRST_CANDIDATES
         if wanted > tried:
-            more = _candidates(head, area, tried, wanted, shift, reach, whole)
-            some = _Candidates(*(np.concatenate(pair) for pair in zip(some, more, strict=True)))
-            apart = np.concatenate([apart, np.full(len(more.face), np.inf)])
-            tried = wanted
-        now = int(np.searchsorted(some.number, wanted))
-        found = take_free(some.point[:now], apart[:now], radius, taken, found)
-    return some.face[taken], some.weight[taken]
+            last = max(wanted, min(likely, tried + BATCH))
+            later, where = _candidates(head, area, tried, last, shift, reach, whole)
+            number, point = np.concatenate([number, later]), np.concatenate([point, where])
+            apart = np.concatenate([apart, np.full(len(later), np.inf)])
+            tried = last
+        now = int(np.searchsorted(number, wanted))
+        found = take_free(point[:now], apart[:now], radius, taken, found)
+    return _places(area, number[taken], shift)
 
 
 def _scalp_area(head: Head, reach: Reach | None) -> Float64Array:
@@ -253,19 +257,6 @@ def _covered_faces(head: Head, area: Float64Array, reach: Reach, sign: float) ->
     return covered
 
 
-class _Candidates(NamedTuple):
-    """Points of an even sequence that lie on the scalp."""
-
-    number: Int64Array
-    """(N,) place of each in the sequence, ascending."""
-    face: Int32Array
-    """(N,) face that holds it."""
-    weight: Float64Array
-    """(N, 3) barycentric weights there."""
-    point: Float64Array
-    """(N, 3) metres."""
-
-
 def _candidates(
     head: Head,
     area: Float64Array,
@@ -274,23 +265,34 @@ def _candidates(
     shift: npt.NDArray[np.uint64],
     reach: Reach | None,
     whole: BoolArray | None,
-) -> _Candidates:
-    """Return points `first` to `last` of the sequence; `whole` (F,) are faces within the reach."""
-    index = np.arange(first, last, dtype=np.uint64)[:, None]
+) -> tuple[Int64Array, Float64Array]:
+    """Return the numbers (N,) and points (N, 3) of `first` to `last` that lie on the scalp.
+
+    `whole` (F,) are the faces that lie within the reach.
+    """
+    number = np.arange(first, last)
+    face, weight = _places(area, number, shift)
+    on_scalp = (head.scalp[head.faces[face]] * weight).sum(axis=1) > 0.5
+    number, face = number[on_scalp], face[on_scalp]
+    point = evaluate(head, face, weight[on_scalp])
+    if reach is None or whole is None:
+        return number, point
+    kept = whole[face]
+    kept[~kept] = reach.covers(point[~kept])
+    return number[kept], point[kept]
+
+
+def _places(
+    area: Float64Array, number: Int64Array, shift: npt.NDArray[np.uint64]
+) -> tuple[Int32Array, Float64Array]:
+    """Return the faces (N,), weights (N, 3) at numbers (N,) of an even sequence on areas (F,)."""
+    index = number.astype(np.uint64)[:, None]
     along, root, share = ((index * _STEPS + shift) >> np.uint64(11)).T * 2.0**-53
     total = np.cumsum(area)
     face = np.minimum(np.searchsorted(total, along * total[-1], side="right"), len(area) - 1)
     root = np.sqrt(root)
     weight = np.stack([1 - root, root * (1 - share), root * share], axis=1)
-    on_scalp = (head.scalp[head.faces[face]] * weight).sum(axis=1) > 0.5
-    number = np.flatnonzero(on_scalp)
-    face, weight = face[number].astype(np.int32), weight[number]
-    some = _Candidates(number + first, face, weight, evaluate(head, face, weight))
-    if reach is None or whole is None:
-        return some
-    kept = whole[face]
-    kept[~kept] = reach.covers(some.point[~kept])
-    return _Candidates(*(values[kept] for values in some))
+    return face.astype(np.int32), weight
 
 
 def _project(points: Float64Array, normals: Float64Array) -> Float64Array:
