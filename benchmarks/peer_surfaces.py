@@ -15,7 +15,8 @@ from scipy.spatial import cKDTree
 from hairkit.cameras.depth_raster import mesh_depth
 from hairkit.field import isosurface
 from hairkit.head_model.bvh import build_tree, inside_surface, nearest_on_surface
-from hairkit.head_model.scalp import evaluate, take_free
+from hairkit.head_model.free_points import take_free
+from hairkit.head_model.scalp import evaluate
 from hairkit.head_model.signed_distance import BAND, closed_surface, signed_distance
 from hairkit.head_model.template import default_head
 from hairkit.types.camera import Camera

@@ -11,6 +11,7 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `eye_colours`: the colours of a person's eyes, from photos
 * `exposures`: exposures of photos evened where they overlap
 * `eyes`: eyeballs in open lids, and the picture of them
+* `free_points`: points that keep a distance from each other, taken in turn
 * `gradient_blend`: pictures joined in their gradients
 * `hairline`: where the photos show that hair grows
 * `identity`: shapes by which heads differ, two adults and a child

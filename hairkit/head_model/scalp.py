@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +11,9 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
+from hairkit.head_model.free_points import take_free
 from hairkit.head_model.reach import Reach
 from hairkit.head_model.template import default_head
-from hairkit.parallel import compiled
 from hairkit.types.head import Head, Roots
 
 MAX_ROOTS = 200_000
@@ -24,8 +23,9 @@ PACKING = 0.7
 """Roots that dart throwing packs into a square whose edge is their least distance."""
 FIRST_CANDIDATES = 64
 """Candidates added to those of the packing, so that large radii have some."""
-MOST_CELLS = 200
-"""Cells a side, at most, of the grid that finds roots nearby."""
+BATCH = 16_384
+"""Candidates made at once where so many are likely to be tried; each takes 0.2 kB while it is
+made."""
 SHRINK = 0.95
 """Factor from one radius of the dart throwing to the next."""
 _LONGEST_EDGE = 3.2
@@ -212,9 +212,10 @@ def _progressive_roots(
     """Return the first `count` roots of a seed's sequence: faces (N,) and weights (N, 3)."""
     shift = np.random.PCG64(seed).random_raw(3)  # raw bits are the same in every NumPy (NEP 19)
     whole = None if reach is None else _covered_faces(head, area, reach, -1.0)
-    tried = CANDIDATES_PER_ROOT * count + FIRST_CANDIDATES
-    some = _candidates(head, area, 0, tried, shift, reach, whole)
-    apart = np.full(len(some.face), np.inf)  # metres to the root that is known to be nearest
+    likely = CANDIDATES_PER_ROOT * count + FIRST_CANDIDATES
+    tried = min(likely, BATCH)
+    number, point = _candidates(head, area, 0, tried, shift, reach, whole)
+    apart = np.full(len(number), np.inf)  # metres to the root that is known to be nearest
     taken, found = np.empty(count, np.int64), 0
     total = float(area.sum())
     radius = np.sqrt(total)
@@ -222,13 +223,14 @@ def _progressive_roots(
         radius *= SHRINK
         wanted = int(CANDIDATES_PER_ROOT * PACKING * total / radius**2) + FIRST_CANDIDATES
         if wanted > tried:
-            more = _candidates(head, area, tried, wanted, shift, reach, whole)
-            some = _Candidates(*(np.concatenate(pair) for pair in zip(some, more, strict=True)))
-            apart = np.concatenate([apart, np.full(len(more.face), np.inf)])
-            tried = wanted
-        now = int(np.searchsorted(some.number, wanted))
-        found = take_free(some.point[:now], apart[:now], radius, taken, found)
-    return some.face[taken], some.weight[taken]
+            last = max(wanted, min(likely, tried + BATCH))
+            later, where = _candidates(head, area, tried, last, shift, reach, whole)
+            number, point = np.concatenate([number, later]), np.concatenate([point, where])
+            apart = np.concatenate([apart, np.full(len(later), np.inf)])
+            tried = last
+        now = int(np.searchsorted(number, wanted))
+        found = take_free(point[:now], apart[:now], radius, taken, found)
+    return _places(area, number[taken], shift)
 
 
 def _scalp_area(head: Head, reach: Reach | None) -> Float64Array:
@@ -255,19 +257,6 @@ def _covered_faces(head: Head, area: Float64Array, reach: Reach, sign: float) ->
     return covered
 
 
-class _Candidates(NamedTuple):
-    """Points of an even sequence that lie on the scalp."""
-
-    number: Int64Array
-    """(N,) place of each in the sequence, ascending."""
-    face: Int32Array
-    """(N,) face that holds it."""
-    weight: Float64Array
-    """(N, 3) barycentric weights there."""
-    point: Float64Array
-    """(N, 3) metres."""
-
-
 def _candidates(
     head: Head,
     area: Float64Array,
@@ -276,119 +265,34 @@ def _candidates(
     shift: npt.NDArray[np.uint64],
     reach: Reach | None,
     whole: BoolArray | None,
-) -> _Candidates:
-    """Return points `first` to `last` of the sequence; `whole` (F,) are faces within the reach."""
-    index = np.arange(first, last, dtype=np.uint64)[:, None]
+) -> tuple[Int64Array, Float64Array]:
+    """Return the numbers (N,) and points (N, 3) of `first` to `last` that lie on the scalp.
+
+    `whole` (F,) are the faces that lie within the reach.
+    """
+    number = np.arange(first, last)
+    face, weight = _places(area, number, shift)
+    on_scalp = (head.scalp[head.faces[face]] * weight).sum(axis=1) > 0.5
+    number, face = number[on_scalp], face[on_scalp]
+    point = evaluate(head, face, weight[on_scalp])
+    if reach is None or whole is None:
+        return number, point
+    kept = whole[face]
+    kept[~kept] = reach.covers(point[~kept])
+    return number[kept], point[kept]
+
+
+def _places(
+    area: Float64Array, number: Int64Array, shift: npt.NDArray[np.uint64]
+) -> tuple[Int32Array, Float64Array]:
+    """Return the faces (N,), weights (N, 3) at numbers (N,) of an even sequence on areas (F,)."""
+    index = number.astype(np.uint64)[:, None]
     along, root, share = ((index * _STEPS + shift) >> np.uint64(11)).T * 2.0**-53
     total = np.cumsum(area)
     face = np.minimum(np.searchsorted(total, along * total[-1], side="right"), len(area) - 1)
     root = np.sqrt(root)
     weight = np.stack([1 - root, root * (1 - share), root * share], axis=1)
-    on_scalp = (head.scalp[head.faces[face]] * weight).sum(axis=1) > 0.5
-    number = np.flatnonzero(on_scalp)
-    face, weight = face[number].astype(np.int32), weight[number]
-    some = _Candidates(number + first, face, weight, evaluate(head, face, weight))
-    if reach is None or whole is None:
-        return some
-    kept = whole[face]
-    kept[~kept] = reach.covers(some.point[~kept])
-    return _Candidates(*(values[kept] for values in some))
-
-
-def take_free(
-    points: Float64Array, apart: Float64Array, radius: float, taken: Int64Array, found: int
-) -> int:
-    """Append to `taken` in turn the points (M, 3) that have no taken one within the radius.
-
-    Parameters
-    ----------
-    apart
-        (M,) distance to some taken point, infinite where none is known, 0 for taken ones; updated.
-    taken
-        (N,) indices of taken points, `found` of them known; ends when it is full.
-
-    Returns
-    -------
-    How many are taken now.
-    """
-    low = np.array([column.min() for column in points.T])
-    size = np.array([column.max() for column in points.T]) - low
-    edge = max(radius, float(size.max()) / MOST_CELLS)
-    heads = np.full(tuple((size / edge).astype(np.int64) + 3), -1, np.int32)
-    following = np.full(len(taken), -1, np.int32)
-    return int(_take_free(points, low, edge, apart, radius, heads, following, taken, found))
-
-
-@compiled
-def _take_free(
-    points: Float64Array,
-    low: Float64Array,
-    edge: float,
-    apart: Float64Array,
-    radius: float,
-    heads: Int32Array,
-    following: Int32Array,
-    taken: Int64Array,
-    found: int,
-) -> int:  # pragma: no cover - compiled
-    """Do the work of `take_free` with chains of the taken points of each cell."""
-    for n in range(found):
-        _link(n, _cell_of(points[taken[n]], low, edge), heads, following)
-    for i in range(len(points)):
-        if apart[i] < radius:
-            continue
-        if found == len(taken):
-            break
-        cell = _cell_of(points[i], low, edge)
-        apart[i] = _distance_to_taken(points, i, cell, heads, following, taken)
-        if apart[i] >= radius:
-            apart[i] = 0.0
-            taken[found] = i
-            _link(found, cell, heads, following)
-            found += 1
-    return found
-
-
-@compiled
-def _cell_of(
-    point: Float64Array, low: Float64Array, edge: float
-) -> tuple[int, int, int]:  # pragma: no cover - compiled
-    """Return the cell of a point; there is an empty one before the first and after the last."""
-    x, y, z = (point[0] - low[0]) / edge, (point[1] - low[1]) / edge, (point[2] - low[2]) / edge
-    return int(x) + 1, int(y) + 1, int(z) + 1
-
-
-@compiled
-def _link(
-    n: int, cell: tuple[int, int, int], heads: Int32Array, following: Int32Array
-) -> None:  # pragma: no cover - compiled
-    """Put taken point n in front of the chain of its cell."""
-    following[n] = heads[cell[0], cell[1], cell[2]]
-    heads[cell[0], cell[1], cell[2]] = n
-
-
-@compiled
-def _distance_to_taken(
-    points: Float64Array,
-    i: int,
-    cell: tuple[int, int, int],
-    heads: Int32Array,
-    following: Int32Array,
-    taken: Int64Array,
-) -> float:  # pragma: no cover - compiled
-    """Return the distance of point i to the nearest taken one of the 27 cells around it."""
-    x, y, z = points[i, 0], points[i, 1], points[i, 2]
-    nearest = np.inf
-    for a in range(cell[0] - 1, cell[0] + 2):
-        for b in range(cell[1] - 1, cell[1] + 2):
-            for c in range(cell[2] - 1, cell[2] + 2):
-                n = heads[a, b, c]
-                while n >= 0:
-                    at = points[taken[n]]
-                    apart = (at[0] - x) ** 2 + (at[1] - y) ** 2 + (at[2] - z) ** 2
-                    nearest = min(nearest, apart)
-                    n = following[n]
-    return float(np.sqrt(nearest))
+    return face.astype(np.int32), weight
 
 
 def _project(points: Float64Array, normals: Float64Array) -> Float64Array:

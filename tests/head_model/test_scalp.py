@@ -12,7 +12,8 @@ from scipy.spatial import cKDTree
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
 from hairkit.head_model import scalp
-from hairkit.head_model.scalp import bind, evaluate, growth_mesh, sample_roots, take_free
+from hairkit.head_model.free_points import take_free
+from hairkit.head_model.scalp import bind, evaluate, growth_mesh, sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.types.head import Head
 
