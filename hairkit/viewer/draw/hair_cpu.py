@@ -6,14 +6,15 @@ loops draw the same hair about three times faster. Tests compare the result with
 
 from __future__ import annotations
 
-import moderngl
+from typing import Any
+
 import numpy as np
 
 from hairkit.arrays import Float32Array
 from hairkit.parallel import parallel_for, thread_count
-from hairkit.rendering.context import Renderer
-from hairkit.rendering.gl_camera import NEAREST, clip_from_camera, set_uniforms
+from hairkit.rendering.gl_camera import NEAREST, DepthRange, clip_from_camera
 from hairkit.rendering.hair import strand_numbers
+from hairkit.types.camera import Camera
 from hairkit.viewer.draw import place_kernels, raster_kernels, shade_kernels
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import HairLook, HairScene, HairView
@@ -31,8 +32,7 @@ EDGE = 3
 class SoftHairPass:
     """The hair's arrays and the compiled passes that draw it; the CPU twin of `HairPass`."""
 
-    def __init__(self, gl: Renderer, body: HairBody) -> None:
-        self._gl = gl
+    def __init__(self, body: HairBody) -> None:
         self.body = body
         count, points = len(body), body.points_each
         self._places = np.empty((count, points, 3), np.float32)
@@ -45,15 +45,9 @@ class SoftHairPass:
         self._chunks = min(thread_count(), MOST_CHUNKS)
         self._sums = np.zeros((0, 4), np.float32)
         self._colours: tuple[object, Float32Array] | None = None
-        self._texture: moderngl.Texture | None = None
-        lay = gl.program("viewer_screen", "viewer_composite")
-        self._composite_quad = gl.context.vertex_array(lay, [])
 
     def release(self) -> None:
-        """Free all GPU objects."""
-        self._composite_quad.release()
-        if self._texture is not None:
-            self._texture.release()
+        """Do nothing: there are no GPU objects."""
 
     def places(self) -> Float32Array:
         """Return the last positions (S, m, 3) of the hair, head frame, metres."""
@@ -70,7 +64,7 @@ class SoftHairPass:
     def place(self, view: HairView, look: HairLook) -> None:
         """Interpolate the hair from the guides and accumulate its opacity by depth."""
         body, camera = self.body, view.camera
-        self._camera = pack_camera(view)
+        self._camera = pack_camera(camera, view.depth)
         near, far = view.hair_depth.near, view.hair_depth.far
         per_metre = place_kernels.SLICES / (far - near)
         self._slices = np.array([near, per_metre, look.dimming], np.float32)
@@ -98,21 +92,18 @@ class SoftHairPass:
         )
         self._opacity = np.empty((place_kernels.SLICES + 1, *tiles), np.float32)
         parallel_for(place_kernels.accumulate_opacity, tiles[0], filled, self._opacity, min_chunk=8)
-        size = np.array([camera.width, camera.height])
-        low = np.clip(np.floor(corners[:, :2].min(axis=0)) - EDGE, 0, size - 1)
-        high = np.clip(np.ceil(corners[:, 2:].max(axis=0)) + EDGE, low + 1, size)
-        self._frame = low.astype(np.int64), (high - low).astype(np.int64)
+        left = int(np.clip(np.floor(corners[:, 0].min()) - EDGE, 0, camera.width - 1))
+        right = int(np.clip(np.ceil(corners[:, 2].max()) + EDGE, left + 1, camera.width))
+        self._columns = left, right
 
     def draw(self, scene: HairScene) -> None:
-        """Draw the hair over the picture, behind nearer meshes."""
+        """Draw the meshes into the picture, and over them hair that is nearer."""
         view, look = scene.view, scene.look
-        (x, y), (width, height) = self._frame[0].tolist(), self._frame[1].tolist()
-        frame = (x, y, width, height)
-        depth = scene.solids.read(frame, components=1, attachment=-1, alignment=1, dtype="f4")
-        solid = np.ascontiguousarray(np.frombuffer(depth, np.float32).reshape(height, width).T)
-        corner = self._frame[0].astype(np.float32)
-        if len(self._sums) < width * height:
-            self._sums = np.zeros((view.camera.width * view.camera.height, 4), np.float32)
+        left, right = self._columns
+        solid = scene.meshes.depth[left:right]
+        corner = np.array([left, 0], np.float32)
+        if len(self._sums) < solid.size:
+            self._sums = np.zeros((scene.meshes.depth.size, 4), np.float32)
         wider = np.float32(look.times_wider)
         shading = shade_kernels.pack_shading(
             view.camera, scene.lights, scene.light.grid, direction=look.by_direction
@@ -138,7 +129,7 @@ class SoftHairPass:
         )
         parallel_for(
             raster_kernels.draw_hair,
-            -(-width // raster_kernels.STRIP),
+            -(-(right - left) // raster_kernels.STRIP),
             self._seen,
             self._looks,
             self._reach,
@@ -151,28 +142,11 @@ class SoftHairPass:
             corner,
             self._sums,
         )
-        picture = np.empty((height, width, 4), np.uint8)
-        parallel_for(raster_kernels.resolve, height, self._sums, picture, min_chunk=32)
-        self._composite(scene.target, picture, frame)
-
-    def _composite(
-        self, target: moderngl.Framebuffer, picture: object, frame: tuple[int, int, int, int]
-    ) -> None:
-        context, size = self._gl.context, target.size
-        if self._texture is None or self._texture.size != size:
-            if self._texture is not None:
-                self._texture.release()
-            self._texture = context.texture(size, 4)
-            self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._texture.write(picture, viewport=frame)
-        target.use()
-        target.scissor = frame
-        context.enable_only(moderngl.BLEND)
-        context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-        self._texture.use(5)
-        set_uniforms(self._gl.program("viewer_screen", "viewer_composite"), u_hair=5)
-        self._composite_quad.render(moderngl.TRIANGLES, vertices=3)
-        target.scissor = (0, 0, *size)
+        picture = np.empty_like(scene.meshes.picture)
+        composited = self._sums, left, right, scene.meshes.picture, picture
+        parallel_for(raster_kernels.composite, len(picture), *composited, min_chunk=32)
+        target: Any = scene.target.color_attachments[0]
+        target.write(picture)
 
     def _beside(self, view: HairView, wider: float) -> np.float32:
         """Return how far a stroke may reach beside its ends, pixels."""
@@ -190,10 +164,9 @@ class SoftHairPass:
         return self._colours[1]
 
 
-def pack_camera(view: HairView) -> Float32Array:
+def pack_camera(camera: Camera, depth: DepthRange) -> Float32Array:
     """Return (24,): clip_from_head by rows, forward and offset, size, focal length, perspective."""
-    camera = view.camera
-    matrix = clip_from_camera(camera, view.depth) @ camera.camera_from_head
+    matrix = clip_from_camera(camera, depth) @ camera.camera_from_head
     rest = [
         *camera.forward, camera.translation[2], camera.width, camera.height, camera.focal,
         float(camera.model == "perspective"),

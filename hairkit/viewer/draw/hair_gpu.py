@@ -93,10 +93,11 @@ class HairPass:
         self._run("viewer_opacity", buffers.tiles[0] * buffers.tiles[1], **self._shared)
 
     def draw(self, scene: HairScene) -> None:
-        """Draw the hair over the picture, behind nearer meshes."""
+        """Draw the meshes into the picture, and over them hair that is nearer."""
+        scene.meshes.show(scene.target)
         view, look = scene.view, scene.look
         buffers = self._resize_buffers(view.camera)
-        scene.solid_depth.use(1)
+        scene.meshes.depth_texture().use(1)
         buffers.opacity.use(2)
         self._hairs.bind_to_storage_buffer(1)
         self._offsets.bind_to_storage_buffer(2)

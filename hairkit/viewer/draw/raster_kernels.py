@@ -136,17 +136,30 @@ def _add(sums, at, part, red, green, blue, weight):  # type: ignore[no-untyped-d
 
 
 @shared
-def resolve(first, last, sums, picture) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Convert the sums to rows of (H, W, 4) bytes, colour and opacity, and clear them."""
+def composite(first, last, sums, left, right, behind, picture) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Write rows of `picture` (H, W, 4): hair over `behind`; clear the sums.
+
+    The sums are those of the columns from `left` to before `right`.
+    """
     high, wide = picture.shape[:2]
-    for x in range(wide):
+    for y in range(first, last):
+        for x in range(wide):
+            for c in range(4):
+                picture[y, x, c] = behind[y, x, c]
+    for x in range(left, right):
         for y in range(first, last):
-            at = x * high + y
-            red, green, blue, weight = sums[at, 0], sums[at, 1], sums[at, 2], sums[at, 3]
+            at = (x - left) * high + y
+            weight = sums[at, 3]
+            if weight <= _ZERO:
+                continue
+            red, green, blue = sums[at, 0], sums[at, 1], sums[at, 2]
             sums[at, 0] = sums[at, 1] = sums[at, 2] = sums[at, 3] = _ZERO
-            share = _WHITE / max(weight, _TINY)
-            picture[y, x, 0] = np.uint8(min(red * share + _HALF, _WHITE))
-            picture[y, x, 1] = np.uint8(min(green * share + _HALF, _WHITE))
-            picture[y, x, 2] = np.uint8(min(blue * share + _HALF, _WHITE))
             opaque = min(weight * (_ONE + np.float32(0.8) * weight), _ONE)
-            picture[y, x, 3] = np.uint8(opaque * _WHITE + _HALF)
+            share = opaque * _WHITE / max(weight, _TINY)
+            through = _ONE - opaque
+            red = red * share + through * np.float32(behind[y, x, 0])
+            green = green * share + through * np.float32(behind[y, x, 1])
+            blue = blue * share + through * np.float32(behind[y, x, 2])
+            picture[y, x, 0] = np.uint8(min(red + _HALF, _WHITE))
+            picture[y, x, 1] = np.uint8(min(green + _HALF, _WHITE))
+            picture[y, x, 2] = np.uint8(min(blue + _HALF, _WHITE))

@@ -16,10 +16,10 @@ from hairkit.rendering.head import head_solid
 from hairkit.testing import bristle_groom
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw import frame
-from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
+from hairkit.viewer.draw.frame import FrameRenderer
 from hairkit.viewer.draw.hair_cpu import SoftHairPass
 from hairkit.viewer.draw.hair_data import HairBody
-from hairkit.viewer.draw.interface import HairLook
+from hairkit.viewer.draw.interface import FrameInputs, HairLook
 from hairkit.viewer.draw.light_gpu import TURNS
 from hairkit.viewer.draw.lines import LineSet
 from hairkit.viewer.draw.meshes import SolidPass

@@ -14,9 +14,9 @@ from hairkit.rendering.head import head_solid
 from hairkit.testing import bristle_groom
 from hairkit.types.camera import Camera
 from hairkit.viewer.actions.actions import perform
-from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
+from hairkit.viewer.draw.frame import FrameRenderer
 from hairkit.viewer.draw.hair_data import HairBody
-from hairkit.viewer.draw.interface import HairLook
+from hairkit.viewer.draw.interface import FrameInputs, HairLook
 from hairkit.viewer.draw.still import LENS_SAMPLES, SAMPLES, Lens, Still, sample_camera
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
