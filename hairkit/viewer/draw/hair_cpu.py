@@ -18,6 +18,7 @@ from hairkit.types.camera import Camera
 from hairkit.viewer.draw import place_kernels, raster_kernels, shade_kernels
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import HairLook, HairScene, HairView
+from hairkit.viewer.draw.region import NOWHERE, Region
 
 MOST_CHUNKS = 8
 """Each thread draws into sums of its own, which are added up for every picture."""
@@ -38,12 +39,16 @@ class SoftHairPass:
         self._places = np.empty((count, points, 3), np.float32)
         self._seen = np.empty((count, points, 4), np.float32)
         self._looks = np.zeros((count, points, 4), np.float32)
+        self._hidden = np.empty((count, points), np.int8)
         self._reach = np.empty((count, 2), np.float32)
         self._random = np.asarray(strand_numbers(count), np.float32)
         self._rest = np.ascontiguousarray(body.guide_rest, np.float32)
         self._tones = shade_kernels.tone_table()
         self._chunks = min(thread_count(), MOST_CHUNKS)
         self._sums = np.zeros((0, 4), np.float32)
+        self._picture = np.empty((0, 0, 4), np.uint8)
+        self._filled = np.empty((0, 0, 0, 0), np.uint32)
+        self._hair_region = NOWHERE
         self._colours: tuple[object, Float32Array] | None = None
 
     def release(self) -> None:
@@ -69,12 +74,14 @@ class SoftHairPass:
         per_metre = place_kernels.SLICES / (far - near)
         self._slices = np.array([near, per_metre, look.dimming], np.float32)
         tiles = (-(-camera.height // place_kernels.TILE), -(-camera.width // place_kernels.TILE))
-        filled = np.empty((self._chunks, place_kernels.SLICES, *tiles), np.uint32)
+        if self._filled.shape[2:] != tiles:
+            self._filled = np.zeros((self._chunks, place_kernels.SLICES, *tiles), np.uint32)
+            self._opacity = np.empty((place_kernels.SLICES + 1, *tiles), np.float32)
+            self._used = np.zeros(4, np.int64)
         corners = np.empty((self._chunks, 4), np.float32)
-        chunks = self._chunks
         parallel_for(
             place_kernels.place_hair,
-            chunks,
+            self._chunks,
             self._now,
             self._turns,
             body.followed,
@@ -87,19 +94,24 @@ class SoftHairPass:
             look.hairs,
             self._places,
             self._seen,
-            filled,
+            self._filled,
+            self._used,
             corners,
         )
-        self._opacity = np.empty((place_kernels.SLICES + 1, *tiles), np.float32)
-        parallel_for(place_kernels.accumulate_opacity, tiles[0], filled, self._opacity, min_chunk=8)
-        left = int(np.clip(np.floor(corners[:, 0].min()) - EDGE, 0, camera.width - 1))
-        right = int(np.clip(np.ceil(corners[:, 2].max()) + EDGE, left + 1, camera.width))
-        self._columns = left, right
+        size = np.array([camera.width, camera.height])
+        low = np.clip(np.floor(corners[:, :2].min(axis=0)) - EDGE, 0, size - 1).astype(int)
+        high = np.clip(np.ceil(corners[:, 2:].max(axis=0)) + EDGE, low + 1, size).astype(int)
+        self._hair_before, self._hair_region = self._hair_region, Region(*low, *high)
+        tile = place_kernels.TILE  # shading interpolates between neighbours
+        self._used[:2] = np.maximum(low // tile - 1, 0)
+        self._used[2:] = np.minimum(high // tile + 2, tiles[::-1])
+        opacity, rows = (self._filled, self._used, self._opacity), self._used[3] - self._used[1]
+        parallel_for(place_kernels.accumulate_opacity, int(rows), *opacity, min_chunk=8)
 
     def draw(self, scene: HairScene) -> None:
         """Draw the meshes into the picture, and over them hair that is nearer."""
         view, look = scene.view, scene.look
-        left, right = self._columns
+        left, right = self._hair_region.left, self._hair_region.right
         solid = scene.meshes.depth[left:right]
         corner = np.array([left, 0], np.float32)
         if len(self._sums) < solid.size:
@@ -124,6 +136,7 @@ class SoftHairPass:
             corner,
             self._beside(view, float(wider)),
             self._looks,
+            self._hidden,
             self._reach,
             min_chunk=PIECE,
         )
@@ -132,6 +145,7 @@ class SoftHairPass:
             -(-(right - left) // raster_kernels.STRIP),
             self._seen,
             self._looks,
+            self._hidden,
             self._reach,
             self.body.widths,
             solid,
@@ -142,11 +156,19 @@ class SoftHairPass:
             corner,
             self._sums,
         )
-        picture = np.empty_like(scene.meshes.picture)
-        composited = self._sums, left, right, scene.meshes.picture, picture
-        parallel_for(raster_kernels.composite, len(picture), *composited, min_chunk=32)
+        self._composite(scene.meshes)
         target: Any = scene.target.color_attachments[0]
-        target.write(picture)
+        target.write(self._picture)
+
+    def _composite(self, meshes: Any) -> None:
+        """Write the picture where hair or meshes are or were, and clear the sums."""
+        behind, hair = meshes.picture, self._hair_region
+        changed = self._hair_before.union(hair).union(meshes.take_changed())
+        if self._picture.shape != behind.shape:
+            self._picture, changed = np.empty_like(behind), Region(0, 0, *behind.shape[1::-1])
+        parts = self._sums, np.array(hair), np.array(changed), behind, self._picture
+        rows = changed.bottom - changed.top
+        parallel_for(raster_kernels.composite, rows, *parts, min_chunk=32)
 
     def _beside(self, view: HairView, wider: float) -> np.float32:
         """Return how far a stroke may reach beside its ends, pixels."""

@@ -22,6 +22,7 @@ from hairkit.viewer.draw.hair_cpu import pack_camera
 from hairkit.viewer.draw.interface import MeshScene
 from hairkit.viewer.draw.mesh_layer import MeshLayer
 from hairkit.viewer.draw.meshes import PlacedMesh
+from hairkit.viewer.draw.region import NOWHERE, Region
 
 CHUNKS = 8
 """Parts of a mesh whose seen faces are listed apart."""
@@ -53,6 +54,7 @@ class SoftSolid(PlacedMesh):
             np.empty(faces, np.int32),
             np.empty((faces, 2), np.int32),
             np.empty(CHUNKS, np.int32),
+            np.empty((CHUNKS, 4), np.int32),
         )
         look = SkinLook()
         self._oil = mesh_kernels.Oil(
@@ -61,10 +63,15 @@ class SoftSolid(PlacedMesh):
         textured = solid.uv is not None and solid.maps is not None
         picture = solid.maps.albedo if textured and solid.maps is not None else None
         self._albedo = mipmaps(None if picture is None else picture.pixels[::-1])
-        self._tones = shade_kernels.tone_table()
+        self._tones = np.rint(255 * shade_kernels.tone_table()).astype(np.uint8)
 
-    def draw(self, scene: MeshScene, push: float, picture: UInt8Array, depth: Float32Array) -> None:
-        """Draw the mesh into a picture (H, W, 4) and its depth (W, H), `push` metres farther."""
+    def draw(
+        self, scene: MeshScene, push: float, picture: UInt8Array, depth: Float32Array
+    ) -> Region:
+        """Draw the mesh into a picture (H, W, 4) and its depth (W, H), `push` metres farther.
+
+        Returns the region that it covers.
+        """
         mesh, state = self._mesh, self._state
         motion = self.motion[:3].astype(np.float32)
         camera = pack_camera(scene.camera, scene.depth)
@@ -81,6 +88,8 @@ class SoftSolid(PlacedMesh):
         parallel_for(kernels.light_vertices, count, *lit, min_chunk=PIECE)
         strips, drawn = -(-width // kernels.STRIP), (self._albedo, self._tones, depth, picture)
         parallel_for(kernels.draw_faces, strips, mesh, state, *drawn)
+        low, high = state.covered[:, :2].min(axis=0), state.covered[:, 2:].max(axis=0)
+        return Region(*low.tolist(), *high.tolist())
 
 
 class SoftMeshLayer(MeshLayer[SoftSolid]):
@@ -90,6 +99,14 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
     """(H, W, 4) RGBA, opaque."""
     depth: Float32Array
     """(W, H) depth buffer, 1 where there is no mesh."""
+    _changed = NOWHERE
+    _moved = NOWHERE
+    """Region of the meshes that move."""
+
+    def take_changed(self) -> Region:
+        """Return the region that has changed since the last call."""
+        changed, self._changed = self._changed, NOWHERE
+        return changed
 
     def show(self, target: moderngl.Framebuffer) -> None:
         """Copy the layer to a picture of one texture."""
@@ -121,16 +138,21 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
         self._scenery_depth[:] = 1.0
         for part in parts:
             part.draw(scene, self._push(part), self._scenery, self._scenery_depth)
+        self._moved = Region(0, 0, *self._size)
 
     def _draw_moving(self, scene: MeshScene, parts: list[SoftSolid]) -> None:
-        arrays = self._scenery, self._scenery_depth, self.picture, self.depth
-        copied = [array.reshape(-1) for array in arrays]
-        parallel_for(mesh_kernels.copy_layer, mesh_kernels.PARTS, *copied)
+        before, self._moved = self._moved, NOWHERE
+        restored = self._scenery, self._scenery_depth, self.picture, self.depth
+        columns, region = before.right - before.left, np.array(before)
+        parallel_for(mesh_kernels.restore, columns, region, *restored, min_chunk=32)
         if scene.inputs.fine_skin:
             self._read_fine_skin(scene, parts)
-            return
-        for part in parts:
-            part.draw(scene, self._push(part), self.picture, self.depth)
+            self._moved = Region(0, 0, *self._size)
+        else:
+            for part in parts:
+                covered = part.draw(scene, self._push(part), self.picture, self.depth)
+                self._moved = self._moved.union(covered)
+        self._changed = self._changed.union(before).union(self._moved)
 
     def _read_fine_skin(self, scene: MeshScene, parts: list[SoftSolid]) -> None:
         """Draw meshes with diffused light by shaders, over the studio."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Int32Array, UInt8Array
+from hairkit.arrays import Float32Array, Int32Array, Int64Array, UInt8Array
 from hairkit.viewer.draw.place_kernels import inlined, project_point, shared
 from hairkit.viewer.draw.shade_kernels import (
     BRIGHTEST,
@@ -28,8 +28,6 @@ from hairkit.viewer.draw.shade_kernels import (
 
 STRIP = 32
 """Columns of a strip, which one thread draws: 128 bytes of each row, two lines of a cache."""
-PARTS = 16
-"""Of a layer that is copied."""
 _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
 _BYTE, _TINY = np.float32(255), np.float32(1e-9)
 _EDGE = np.float32(1e-4)
@@ -74,6 +72,8 @@ class MeshState(NamedTuple):
     """(F, 2) first and last column of these faces."""
     counts: Int32Array
     """(chunks,) how many faces of a chunk are seen."""
+    covered: Int32Array
+    """(chunks, 4) pixels that they cover, the values of `region.Region`."""
 
 
 class Albedo(NamedTuple):
@@ -136,6 +136,7 @@ def select_faces(
     for chunk in range(first, last):
         start = count * chunk // chunks
         at = start
+        least_x, least_y, most_x, most_y = wide, high, 0, 0
         for f in range(start, count * (chunk + 1) // chunks):
             a, b, c = mesh.faces[f, 0], mesh.faces[f, 1], mesh.faces[f, 2]
             if min(seen[a, 3], seen[b, 3], seen[c, 3]) <= _ZERO or _area(seen, a, b, c) >= _ZERO:
@@ -145,8 +146,12 @@ def select_faces(
             if left <= right and top <= bottom:
                 state.front[at], state.columns[at, 0], state.columns[at, 1] = f, left, right
                 state.wanted[a] = state.wanted[b] = state.wanted[c] = 1
+                least_x, least_y = min(least_x, left), min(least_y, top)
+                most_x, most_y = max(most_x, right + 1), max(most_y, bottom + 1)
                 at += 1
         state.counts[chunk] = at - start
+        state.covered[chunk, 0], state.covered[chunk, 1] = least_x, least_y
+        state.covered[chunk, 2], state.covered[chunk, 3] = most_x, most_y
 
 
 @inlined
@@ -251,19 +256,23 @@ def _smith(square: Any, c: Any) -> Any:  # pragma: no cover - compiled
 
 
 @shared
-def copy_layer(
+def restore(
     first: int,
     last: int,
+    region: Int64Array,
     picture: UInt8Array,
     depth: Float32Array,
     to_picture: UInt8Array,
     to_depth: Float32Array,
 ) -> None:  # pragma: no cover - compiled
-    """Copy some of the `PARTS` of a picture and a depth buffer, both as flat arrays."""
-    for at in range(len(picture) * first // PARTS, len(picture) * last // PARTS):
-        to_picture[at] = picture[at]
-    for at in range(len(depth) * first // PARTS, len(depth) * last // PARTS):
-        to_depth[at] = depth[at]
+    """Copy columns of a region, the values of `region.Region`, of a picture and its depth."""
+    for y in range(region[1], region[3]):
+        for x in range(region[0] + first, region[0] + last):
+            for c in range(4):
+                to_picture[y, x, c] = picture[y, x, c]
+    for x in range(region[0] + first, region[0] + last):
+        for y in range(region[1], region[3]):
+            to_depth[x, y] = depth[x, y]
 
 
 @shared
@@ -273,7 +282,7 @@ def draw_faces(
     mesh: MeshData,
     state: MeshState,
     albedo: Albedo,
-    tones: Float32Array,
+    tones: UInt8Array,
     depth: Float32Array,
     picture: UInt8Array,
 ) -> None:  # pragma: no cover - compiled
@@ -298,7 +307,7 @@ def _draw_face(
     state: MeshState,
     face: int,
     albedo: Albedo,
-    tones: Float32Array,
+    tones: UInt8Array,
     begin: int,
     end: int,
     depth: Float32Array,
@@ -343,9 +352,9 @@ def _draw_face(
 
 
 @inlined
-def _tone(tones: Float32Array, x: Any, size: Any) -> Any:  # pragma: no cover - compiled
+def _tone(tones: UInt8Array, x: Any, size: Any) -> Any:  # pragma: no cover - compiled
     place: Any = min(np.int64(size * np.sqrt(max(x, _ZERO)) + _HALF), TONES - 1)
-    return np.uint8(_BYTE * tones[place] + _HALF)
+    return tones[place]
 
 
 @inlined

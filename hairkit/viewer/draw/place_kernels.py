@@ -108,18 +108,19 @@ def _behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no co
 @shared
 def place_hair(  # type: ignore[no-untyped-def]
     first_chunk, last_chunk, guides, turns, followed, weights, offsets, widths, camera, slices,
-    wider, count, places, seen, filled, frame,
+    wider, count, places, seen, filled, used, frame,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Interpolate chunks of `count` strands, and splat their segments into the view cells.
 
     Each point keeps its offset from the mean of three guides, rotated with the nearest one.
     Writes `places` (S, m, 3) in metres and `seen` (S, m, 4), the results of `project_point`. Each
     chunk also writes its part of `filled` (chunks, SLICES, tiles y, tiles x) and of `frame`
-    (chunks, 4), the lowest and highest pixel.
+    (chunks, 4), the lowest and highest pixel. `used` are the tiles that the last picture left
+    filled: first column and row, and the ends of both.
     """
     chunks = filled.shape[0]
     for chunk in range(first_chunk, last_chunk):
-        filled[chunk] = 0
+        filled[chunk, :, used[1] : used[3], used[0] : used[2]] = 0
         frame[chunk, :2], frame[chunk, 2:] = _FAR, -_FAR
         _place_chunk(
             guides, turns, followed, weights, offsets, widths, camera, slices, wider,
@@ -195,25 +196,27 @@ def _fill(filled, seen, s, k, slices, width) -> None:  # type: ignore[no-untyped
 
 
 @shared
-def accumulate_opacity(first, last, filled, opacity) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+def accumulate_opacity(first, last, filled, used, opacity) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Write rows of the optical depth (SLICES + 1, tiles y, tiles x) of hair before each slice.
 
     A coarse form of deep opacity maps (Yuksel and Keyser 2008) along the line of sight; each tile
-    is smoothed with its neighbours. `filled` is the result of `place_hair`.
+    is smoothed with its neighbours. `filled` is the result of `place_hair`. Only tiles `used` are
+    written, in rows `first` to `last` of them.
     """
     chunks, slices, rows, columns = filled.shape
-    for j in range(first, last):
+    left, top, right = used[0], used[1], used[2]
+    for j in range(top + first, top + last):
         up, down = max(j - 1, 0), min(j + 1, rows - 1)
-        for i in range(columns):
+        for i in range(left, right):
             opacity[0, j, i] = _ZERO
         for layer in range(slices):
             before, after = opacity[layer, j], opacity[layer + 1, j]
-            for i in range(columns):
+            for i in range(left, right):
                 after[i] = before[i]
             for chunk in range(chunks):
                 here = filled[chunk, layer, j]
                 above, below = filled[chunk, layer, up], filled[chunk, layer, down]
-                for i in range(columns):
+                for i in range(left, right):
                     beside = here[max(i - 1, 0)] + here[min(i + 1, columns - 1)]
                     beside += above[i] + below[i]
                     after[i] += _MIDDLE * np.float32(here[i]) + _BESIDE * np.float32(beside)
