@@ -42,7 +42,13 @@ class SoftHairPass:
         self._hidden = np.empty((count, points), np.int8)
         self._reach = np.empty((count, 2), np.float32)
         self._random = np.asarray(strand_numbers(count), np.float32)
-        self._rest = np.ascontiguousarray(body.guide_rest, np.float32)
+        rest = np.ascontiguousarray(body.guide_rest, np.float32)
+        guides = len(rest)
+        self._rest = place_kernels.RestGuides(
+            place_kernels.segments(rest), np.empty((guides, points, 4), np.float32)
+        )
+        place_kernels.carry_frames(0, guides, self._rest.segments, rest, self._rest.frames)
+        self._turns = np.empty((guides, points, 5), np.float32)
         self._tones = shade_kernels.tone_table()
         self._chunks = min(thread_count(), MOST_CHUNKS)
         self._sums = np.zeros((0, 4), np.float32)
@@ -63,7 +69,8 @@ class SoftHairPass:
         # compiled loops do not check bounds: replace NaN and infinity of a diverged simulation
         tame = np.nan_to_num(np.clip(rows, -FARTHEST, FARTHEST))
         self._now = np.ascontiguousarray(tame, np.float32)
-        self._turns = place_kernels.guide_turns(self._rest, self._now)
+        rest, turns = self._rest, self._turns
+        parallel_for(place_kernels.turn_guides, len(turns), *rest, self._now, turns, min_chunk=64)
         return self._now.reshape(-1, 3)
 
     def place(self, view: HairView, look: HairLook) -> None:
@@ -86,7 +93,7 @@ class SoftHairPass:
             self._turns,
             body.followed,
             body.weights,
-            body.offsets,
+            body.edges,
             body.widths,
             self._camera,
             self._slices,
