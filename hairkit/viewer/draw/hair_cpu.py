@@ -45,12 +45,14 @@ class SoftHairPass:
         rest = np.ascontiguousarray(body.guide_rest, np.float32)
         guides = len(rest)
         self._rest = place_kernels.RestGuides(
-            place_kernels.segments(rest), np.empty((guides, points, 4), np.float32)
+            place_kernels.segments(rest), np.empty((guides, 4, points), np.float32)
         )
         place_kernels.carry_frames(0, guides, self._rest.segments, rest, self._rest.frames)
-        self._turns = np.empty((guides, points, 5), np.float32)
+        self._turns = np.empty((guides, 5, points), np.float32)
+        self._edges = np.ascontiguousarray(body.edges.transpose(0, 2, 1), np.float32)
         self._tones = shade_kernels.tone_table()
         self._chunks = min(thread_count(), MOST_CHUNKS)
+        self._way = np.empty((self._chunks, 3, points), np.float32)
         self._sums = np.zeros((0, 4), np.float32)
         self._picture = np.empty((0, 0, 4), np.uint8)
         self._filled = np.empty((0, 0, 0, 0), np.uint32)
@@ -93,12 +95,13 @@ class SoftHairPass:
             self._turns,
             body.followed,
             body.weights,
-            body.edges,
+            self._edges,
             body.widths,
             self._camera,
             self._slices,
             np.float32(look.times_wider),
             look.hairs,
+            self._way,
             self._places,
             self._seen,
             self._filled,

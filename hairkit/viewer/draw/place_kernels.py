@@ -44,7 +44,7 @@ class RestGuides(NamedTuple):
     segments: Float32Array
     """(G, m, 4) unit direction and length, metres, of the segment to each point; 0 to the root."""
     frames: Float32Array
-    """(G, m, 4) rotation, x, y, z, w, of a frame carried from the first segment to each one."""
+    """(G, 4, m) rotation, x, y, z, w, of a frame carried from the first segment to each one."""
 
 
 def segments(rows: Float32Array) -> Float32Array:
@@ -72,7 +72,7 @@ def carry_frames(
             x, y, z, w = _multiply(tx, ty, tz, tw, x, y, z, w)
             over = _ONE / np.sqrt(x * x + y * y + z * z + w * w)
             x, y, z, w = x * over, y * over, z * over, w * over
-            frames[g, k, 0], frames[g, k, 1], frames[g, k, 2], frames[g, k, 3] = x, y, z, w
+            frames[g, 0, k], frames[g, 1, k], frames[g, 2, k], frames[g, 3, k] = x, y, z, w
             ax, ay, az = bx, by, bz
 
 
@@ -85,22 +85,19 @@ def turn_guides(
     now: Float32Array,
     turns: Float32Array,
 ) -> None:  # pragma: no cover - compiled
-    """Write rotation and stretch (G, m, 5) of the segments to the points of guides since rest.
+    """Write rotation and stretch (G, 5, m) of the segments to the points of guides since rest.
 
     `rest` and `rest_frames` are those of `RestGuides`, `now` (G, m, 3) are the guides' points.
     """
     carry_frames(first, last, rest, now, turns)
     for g in range(first, last):
         for k in range(1, now.shape[1]):
-            x, y, z, w = turns[g, k, 0], turns[g, k, 1], turns[g, k, 2], turns[g, k, 3]
-            a, b, c, d = (
-                rest_frames[g, k, 0], rest_frames[g, k, 1], rest_frames[g, k, 2],
-                rest_frames[g, k, 3],
-            )  # fmt: skip
-            x, y, z, w = _multiply(x, y, z, w, -a, -b, -c, d)
-            turns[g, k, 0], turns[g, k, 1], turns[g, k, 2], turns[g, k, 3] = x, y, z, w
+            x, y, z, w = turns[g, 0, k], turns[g, 1, k], turns[g, 2, k], turns[g, 3, k]
+            a, b, c = rest_frames[g, 0, k], rest_frames[g, 1, k], rest_frames[g, 2, k]
+            x, y, z, w = _multiply(x, y, z, w, -a, -b, -c, rest_frames[g, 3, k])
+            turns[g, 0, k], turns[g, 1, k], turns[g, 2, k], turns[g, 3, k] = x, y, z, w
             _, _, _, length = _segment(now, g, k)
-            turns[g, k, 4] = min(length / rest[g, k, 3], _MOST_STRETCH)
+            turns[g, 4, k] = min(length / rest[g, k, 3], _MOST_STRETCH)
 
 
 @inlined
@@ -180,13 +177,14 @@ def _behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no co
 @shared
 def place_hair(  # type: ignore[no-untyped-def]
     first_chunk, last_chunk, guides, turns, followed, weights, edges, widths, camera, slices,
-    wider, count, places, seen, filled, used, frame,
+    wider, count, way, places, seen, filled, used, frame,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Interpolate chunks of `count` strands, and splat their segments into the view cells.
 
     Each segment keeps its length at rest, times the stretch of the nearest guide, and turns as the
     three guides on the mean. Guides that turn apart from the nearest one lose their share: hair
-    between them goes with the nearest, as locks do, and is neither stretched nor folded.
+    between them goes with the nearest, as locks do, and is neither stretched nor folded. `edges`
+    are (S, 3, m), which vectorises, as `turns` (G, 5, m) does; `way` (chunks, 3, m) is scratch.
     Writes `places` (S, m, 3) in metres and `seen` (S, m, 4), the results of `project_point`. Each
     chunk also writes its part of `filled` (chunks, SLICES, tiles y, tiles x) and of `frame`
     (chunks, 4), the lowest and highest pixel. `used` are the tiles that the last picture left
@@ -198,30 +196,35 @@ def place_hair(  # type: ignore[no-untyped-def]
         frame[chunk, :2], frame[chunk, 2:] = _FAR, -_FAR
         _place_chunk(
             guides, turns, followed, weights, edges, widths, camera, slices, wider,
-            count * chunk // chunks, count * (chunk + 1) // chunks, places, seen, filled[chunk],
-            frame[chunk],
+            count * chunk // chunks, count * (chunk + 1) // chunks, way[chunk], places, seen,
+            filled[chunk], frame[chunk],
         )  # fmt: skip
 
 
 @shared
 def _place_chunk(  # type: ignore[no-untyped-def]
-    guides, turns, followed, weights, edges, widths, camera, slices, wider, first, last, places,
-    seen, filled, frame,
+    guides, turns, followed, weights, edges, widths, camera, slices, wider, first, last, way,
+    places, seen, filled, frame,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
+    points = edges.shape[2]
     low_x, low_y, high_x, high_y = frame[0], frame[1], frame[2], frame[3]
     for s in range(first, last):
-        x, y, z = _root(guides, followed, weights, edges, s)
-        for k in range(edges.shape[1]):
-            if k > 0:
-                along_x, along_y, along_z = _edge(turns, followed, weights, edges, s, k)
-                x, y, z = x + along_x, y + along_y, z + along_z
+        a, b, c = followed[s, 0], followed[s, 1], followed[s, 2]
+        u, v, w = weights[s, 0], weights[s, 1], weights[s, 2]
+        _turn_edges(turns[a], turns[b], turns[c], u, v, w, edges[s], way)
+        for d in range(3):
+            root = u * guides[a, 0, d] + v * guides[b, 0, d] + w * guides[c, 0, d]
+            way[d, 0] = root + edges[s, d, 0]
+        x = y = z = _ZERO
+        for k in range(points):
+            x, y, z = x + way[0, k], y + way[1, k], z + way[2, k]
             places[s, k, 0], places[s, k, 1], places[s, k, 2] = x, y, z
             px, py, pz, depth = project_point(camera, x, y, z)
             seen[s, k, 0], seen[s, k, 1], seen[s, k, 2], seen[s, k, 3] = px, py, pz, depth
             if depth > _ZERO:
                 low_x, low_y = min(low_x, px), min(low_y, py)
                 high_x, high_y = max(high_x, px), max(high_y, py)
-        for k in range(1, edges.shape[1]):
+        for k in range(1, points):
             depth = seen[s, k, 3]
             if depth > _ZERO and seen[s, k - 1, 3] > _ZERO:
                 width = widths[s, k] * wider * pixels_per_metre(camera, depth)
@@ -229,38 +232,28 @@ def _place_chunk(  # type: ignore[no-untyped-def]
     frame[0], frame[1], frame[2], frame[3] = low_x, low_y, high_x, high_y
 
 
-@inlined
-def _root(guides, followed, weights, edges, s):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the root of a strand, which keeps its offset from the mean of its guides' roots."""
-    a, b, c = followed[s, 0], followed[s, 1], followed[s, 2]
-    u, v, w = weights[s, 0], weights[s, 1], weights[s, 2]
-    x = u * guides[a, 0, 0] + v * guides[b, 0, 0] + w * guides[c, 0, 0]
-    y = u * guides[a, 0, 1] + v * guides[b, 0, 1] + w * guides[c, 0, 1]
-    z = u * guides[a, 0, 2] + v * guides[b, 0, 2] + w * guides[c, 0, 2]
-    return x + edges[s, 0, 0], y + edges[s, 0, 1], z + edges[s, 0, 2]
+@shared
+def _turn_edges(near, second, third, u, v, w, edges, way) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Write `way` (3, m), the segments to the points of a strand with `edges` (3, m) at rest.
 
-
-@inlined
-def _edge(turns, followed, weights, edges, s, k):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the segment to point k of a strand."""
-    a, b, c = followed[s, 0], followed[s, 1], followed[s, 2]
-    ax, ay, az, aw = turns[a, k, 0], turns[a, k, 1], turns[a, k, 2], turns[a, k, 3]
-    bx, by, bz, bw = turns[b, k, 0], turns[b, k, 1], turns[b, k, 2], turns[b, k, 3]
-    cx, cy, cz, cw = turns[c, k, 0], turns[c, k, 1], turns[c, k, 2], turns[c, k, 3]
-    u = weights[s, 0]
-    v = weights[s, 1] * _share(ax * bx + ay * by + az * bz + aw * bw)
-    w = weights[s, 2] * _share(ax * cx + ay * cy + az * cz + aw * cw)
-    x, y, z = u * ax + v * bx + w * cx, u * ay + v * by + w * cy, u * az + v * bz + w * cz
-    w = u * aw + v * bw + w * cw
-    ex, ey, ez = edges[s, k, 0], edges[s, k, 1], edges[s, k, 2]
-    ix, iy, iz = y * ez - z * ey + w * ex, z * ex - x * ez + w * ey, x * ey - y * ex + w * ez
-    stretch = turns[a, k, 4]
-    twice = _TWO * stretch / max(x * x + y * y + z * z + w * w, _TINY)
-    return (
-        stretch * ex + twice * (y * iz - z * iy),
-        stretch * ey + twice * (z * ix - x * iz),
-        stretch * ez + twice * (x * iy - y * ix),
-    )
+    From the turns (5, m) of its guides, of weights u, v and w.
+    """
+    for k in range(1, edges.shape[1]):
+        ax, ay, az, aw = near[0, k], near[1, k], near[2, k], near[3, k]
+        bx, by, bz, bw = second[0, k], second[1, k], second[2, k], second[3, k]
+        cx, cy, cz, cw = third[0, k], third[1, k], third[2, k], third[3, k]
+        b = v * _share(ax * bx + ay * by + az * bz + aw * bw)
+        c = w * _share(ax * cx + ay * cy + az * cz + aw * cw)
+        x, y, z = u * ax + b * bx + c * cx, u * ay + b * by + c * cy, u * az + b * bz + c * cz
+        turn = u * aw + b * bw + c * cw
+        ex, ey, ez = edges[0, k], edges[1, k], edges[2, k]
+        ix, iy = y * ez - z * ey + turn * ex, z * ex - x * ez + turn * ey
+        iz = x * ey - y * ex + turn * ez
+        stretch = near[4, k]
+        twice = _TWO * stretch / max(x * x + y * y + z * z + turn * turn, _TINY)
+        way[0, k] = stretch * ex + twice * (y * iz - z * iy)
+        way[1, k] = stretch * ey + twice * (z * ix - x * iz)
+        way[2, k] = stretch * ez + twice * (x * iy - y * ix)
 
 
 @inlined
