@@ -291,6 +291,8 @@ def draw_faces(
     for strip in range(first_strip, last_strip):
         left, right = strip * STRIP, min((strip + 1) * STRIP, depth.shape[0]) - 1
         for chunk in range(chunks):
+            if state.covered[chunk, 0] > right or state.covered[chunk, 2] <= left:
+                continue
             start = count * chunk // chunks
             for at in range(start, start + state.counts[chunk]):
                 if state.columns[at, 0] <= right and state.columns[at, 1] >= left:
@@ -371,8 +373,11 @@ def _mip_level(
     ux, vx = (du * cy - eu * by) * over, (dv * cy - ev * by) * over
     uy, vy = (eu * bx - du * cx) * over, (ev * bx - dv * cx) * over
     square = max(ux * ux + vx * vx, uy * uy + vy * vy)
-    level = np.int64(_HALF * np.log2(max(square, _ONE)) + _HALF)
-    return min(level, len(albedo.levels) - 1)
+    level, most = 0, len(albedo.levels) - 1
+    while square > _TWO and level < most:  # the next level holds a quarter of the texels
+        square *= np.float32(0.25)
+        level += 1
+    return level
 
 
 @inlined

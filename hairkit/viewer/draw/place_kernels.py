@@ -25,6 +25,8 @@ OPACITY_UNIT = np.float32(4096)
 PARTED, TOGETHER = np.cos(np.radians(45.0)), np.cos(np.radians(22.5))
 """Cosines of half the angle between the turns of two guides: from 90 degrees on they share no hair,
 up to 45 degrees they share it as at rest."""
+LANES = 8
+"""Points of a strand that are worked on together."""
 MOST_STRETCH = 4.0
 """Largest stretch of a segment that is drawn: places stay finite where a simulation diverges."""
 SHORTEST = 1e-9
@@ -36,6 +38,16 @@ _ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.flo
 _QUARTER, _TINY, _CLOSE = np.float32(0.25), np.float32(1e-8), np.float32(1e-4)
 _MIDDLE, _BESIDE = np.float32(0.4 / 4096), np.float32(0.15 / 4096)
 _NEAREST, _PER_TILE, _FAR = np.float32(0.01), np.float32(1 / TILE), np.float32(1e9)
+
+
+def in_lanes(values: Float32Array, fill: Float32Array) -> Float32Array:
+    """Return (N, C, M) of values (N, m, C): by component, with `fill` (C,) up to a multiple of
+    `LANES` points."""
+    count, points, components = values.shape
+    padded = np.empty((count, components, -(-points // LANES) * LANES), np.float32)
+    padded[:] = fill[:, None]
+    padded[:, :, :points] = values.transpose(0, 2, 1)
+    return padded
 
 
 class RestGuides(NamedTuple):
@@ -85,7 +97,7 @@ def turn_guides(
     now: Float32Array,
     turns: Float32Array,
 ) -> None:  # pragma: no cover - compiled
-    """Write rotation and stretch (G, 5, m) of the segments to the points of guides since rest.
+    """Write rotation and stretch (G, 5, M) of the segments to the points of guides since rest.
 
     `rest` and `rest_frames` are those of `RestGuides`, `now` (G, m, 3) are the guides' points.
     """
@@ -184,7 +196,7 @@ def place_hair(  # type: ignore[no-untyped-def]
     Each segment keeps its length at rest, times the stretch of the nearest guide, and turns as the
     three guides on the mean. Guides that turn apart from the nearest one lose their share: hair
     between them goes with the nearest, as locks do, and is neither stretched nor folded. `edges`
-    are (S, 3, m), which vectorises, as `turns` (G, 5, m) does; `way` (chunks, 3, m) is scratch.
+    are (S, 3, M) and `turns` (G, 5, M), see `in_lanes`; `way` (chunks, 3, M) is scratch.
     Writes `places` (S, m, 3) in metres and `seen` (S, m, 4), the results of `project_point`. Each
     chunk also writes its part of `filled` (chunks, SLICES, tiles y, tiles x) and of `frame`
     (chunks, 4), the lowest and highest pixel. `used` are the tiles that the last picture left
@@ -206,15 +218,14 @@ def _place_chunk(  # type: ignore[no-untyped-def]
     guides, turns, followed, weights, edges, widths, camera, slices, wider, first, last, way,
     places, seen, filled, frame,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    points = edges.shape[2]
+    points = guides.shape[1]
     low_x, low_y, high_x, high_y = frame[0], frame[1], frame[2], frame[3]
     for s in range(first, last):
         a, b, c = followed[s, 0], followed[s, 1], followed[s, 2]
         u, v, w = weights[s, 0], weights[s, 1], weights[s, 2]
         _turn_edges(turns[a], turns[b], turns[c], u, v, w, edges[s], way)
         for d in range(3):
-            root = u * guides[a, 0, d] + v * guides[b, 0, d] + w * guides[c, 0, d]
-            way[d, 0] = root + edges[s, d, 0]
+            way[d, 0] += u * guides[a, 0, d] + v * guides[b, 0, d] + w * guides[c, 0, d]
         x = y = z = _ZERO
         for k in range(points):
             x, y, z = x + way[0, k], y + way[1, k], z + way[2, k]
@@ -234,26 +245,29 @@ def _place_chunk(  # type: ignore[no-untyped-def]
 
 @shared
 def _turn_edges(near, second, third, u, v, w, edges, way) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Write `way` (3, m), the segments to the points of a strand with `edges` (3, m) at rest.
+    """Write `way` (3, M), the segments to the points of a strand with `edges` (3, M) at rest.
 
-    From the turns (5, m) of its guides, of weights u, v and w.
+    From the turns (5, M) of its guides, of weights u, v and w. M is a multiple of `LANES`, so that
+    all is vectorised.
     """
-    for k in range(1, edges.shape[1]):
-        ax, ay, az, aw = near[0, k], near[1, k], near[2, k], near[3, k]
-        bx, by, bz, bw = second[0, k], second[1, k], second[2, k], second[3, k]
-        cx, cy, cz, cw = third[0, k], third[1, k], third[2, k], third[3, k]
-        b = v * _share(ax * bx + ay * by + az * bz + aw * bw)
-        c = w * _share(ax * cx + ay * cy + az * cz + aw * cw)
-        x, y, z = u * ax + b * bx + c * cx, u * ay + b * by + c * cy, u * az + b * bz + c * cz
-        turn = u * aw + b * bw + c * cw
-        ex, ey, ez = edges[0, k], edges[1, k], edges[2, k]
-        ix, iy = y * ez - z * ey + turn * ex, z * ex - x * ez + turn * ey
-        iz = x * ey - y * ex + turn * ez
-        stretch = near[4, k]
-        twice = _TWO * stretch / max(x * x + y * y + z * z + turn * turn, _TINY)
-        way[0, k] = stretch * ex + twice * (y * iz - z * iy)
-        way[1, k] = stretch * ey + twice * (z * ix - x * iz)
-        way[2, k] = stretch * ez + twice * (x * iy - y * ix)
+    for start in range(0, edges.shape[1], LANES):
+        for lane in range(LANES):
+            k = start + lane
+            ax, ay, az, aw = near[0, k], near[1, k], near[2, k], near[3, k]
+            bx, by, bz, bw = second[0, k], second[1, k], second[2, k], second[3, k]
+            cx, cy, cz, cw = third[0, k], third[1, k], third[2, k], third[3, k]
+            b = v * _share(ax * bx + ay * by + az * bz + aw * bw)
+            c = w * _share(ax * cx + ay * cy + az * cz + aw * cw)
+            x, y, z = u * ax + b * bx + c * cx, u * ay + b * by + c * cy, u * az + b * bz + c * cz
+            turn = u * aw + b * bw + c * cw
+            ex, ey, ez = edges[0, k], edges[1, k], edges[2, k]
+            ix, iy = y * ez - z * ey + turn * ex, z * ex - x * ez + turn * ey
+            iz = x * ey - y * ex + turn * ez
+            stretch = near[4, k]
+            twice = _TWO * stretch / max(x * x + y * y + z * z + turn * turn, _TINY)
+            way[0, k] = stretch * ex + twice * (y * iz - z * iy)
+            way[1, k] = stretch * ey + twice * (z * ix - x * iz)
+            way[2, k] = stretch * ez + twice * (x * iy - y * ix)
 
 
 @inlined
