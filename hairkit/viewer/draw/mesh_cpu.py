@@ -17,7 +17,7 @@ from hairkit.parallel import parallel_for
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.head import Solid
 from hairkit.types.skin_look import SkinLook
-from hairkit.viewer.draw import mesh_kernels, shade_kernels
+from hairkit.viewer.draw import mesh_kernels, mesh_raster, shade_kernels
 from hairkit.viewer.draw.hair_cpu import pack_camera
 from hairkit.viewer.draw.interface import MeshScene
 from hairkit.viewer.draw.mesh_layer import MeshLayer
@@ -86,8 +86,8 @@ class SoftSolid(PlacedMesh):
         parallel_for(kernels.select_faces, CHUNKS, mesh, width, height, state)
         lit = mesh, shading, ambient, light, self._oil, state
         parallel_for(kernels.light_vertices, count, *lit, min_chunk=PIECE)
-        strips, drawn = -(-width // kernels.STRIP), (self._albedo, self._tones, depth, picture)
-        parallel_for(kernels.draw_faces, strips, mesh, state, *drawn)
+        strips, drawn = -(-width // mesh_raster.STRIP), (self._albedo, self._tones, depth, picture)
+        parallel_for(mesh_raster.draw_faces, strips, mesh, state, *drawn)
         low, high = state.covered[:, :2].min(axis=0), state.covered[:, 2:].max(axis=0)
         return Region(*low.tolist(), *high.tolist())
 
@@ -144,7 +144,7 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
         before, self._moved = self._moved, NOWHERE
         restored = self._scenery, self._scenery_depth, self.picture, self.depth
         columns, region = before.right - before.left, np.array(before)
-        parallel_for(mesh_kernels.restore, columns, region, *restored, min_chunk=32)
+        parallel_for(mesh_raster.restore, columns, region, *restored, min_chunk=32)
         if scene.inputs.fine_skin:
             self._read_fine_skin(scene, parts)
             self._moved = Region(0, 0, *self._size)
@@ -172,7 +172,7 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
             made.release()
 
 
-def mipmaps(pixels: UInt8Array | None) -> mesh_kernels.Albedo:
+def mipmaps(pixels: UInt8Array | None) -> mesh_raster.Albedo:
     """Return a picture (H, W, 3), lowest row first, and its halves down to one texel."""
     levels, sizes, start = [], [], 0
     while pixels is not None:
@@ -186,4 +186,4 @@ def mipmaps(pixels: UInt8Array | None) -> mesh_kernels.Albedo:
         smaller = cv2.resize(np.ascontiguousarray(pixels), half, interpolation=cv2.INTER_AREA)
         pixels = np.asarray(smaller, np.uint8)
     texels = np.concatenate(levels) if levels else np.empty((0, 3), np.uint8)
-    return mesh_kernels.Albedo(texels, np.array(sizes, np.int32).reshape(-1, 3))
+    return mesh_raster.Albedo(texels, np.array(sizes, np.int32).reshape(-1, 3))
