@@ -2,10 +2,12 @@
 
 python benchmarks/viewer.py --guides 600 --hairs 10000 --size 1280x720
 
-Each row is the median frame of a shaken head in wind: as wall time, and as CPU time of all threads
-over the number of cores, which is the wall time on an otherwise idle machine. `chosen` is what the
-frame budget settles on; a picture is 1/60 s. Hair is drawn by compute shaders, meant for a graphics
-card, or by compiled loops on the processor, which the viewer uses without one.
+Each row is the median frame of a shaken head in wind, the last one of each simulator that of a
+still head: as wall time, and as CPU time of all threads over the number of cores, which is the wall
+time on an otherwise idle machine. `chosen` is what the frame budget settles on, in 50 ms unless
+`--budget` says otherwise; `--level` measures one level of quality only. A picture is 1/60 s. Hair
+is drawn by compute shaders, meant for a graphics card, or by compiled loops on the processor, which
+the viewer uses without one.
 
 The last line is a still picture with all its samples, and the most memory that the program took
 until then; `--still` measures nothing else.
@@ -60,8 +62,10 @@ def main() -> int:
                 simulator=simulator,
                 hairs=args.hairs,
             )
-            for soft, level in ROWS:
+            rows = ROWS if args.level is None else ((None, args.level),)
+            for soft, level in rows:
                 _row(args, gl, session, level, soft)
+            _row(args, gl, session, rows[-1][1], None, shaken=False)
         _still(args, gl, path)
     return 0
 
@@ -85,16 +89,24 @@ def _still(args: argparse.Namespace, gl: Renderer, path: Path) -> None:
 
 
 def _row(
-    args: argparse.Namespace, gl: Renderer, session: Session, level: int | None, soft: bool | None
+    args: argparse.Namespace,
+    gl: Renderer,
+    session: Session,
+    level: int | None,
+    soft: bool | None,
+    *,
+    shaken: bool = True,
 ) -> None:
     """Print one line: a fixed level of quality, or the budget's choice."""
-    budget = Budget(1 / 20)
+    budget = Budget(1e-3 * args.budget)
+    session.reset()
     session.max_seconds = 0.4 * budget.seconds
     preview = Preview(gl, session, budget, soft)
     walls, processors = [], []
     for picture in range(WARM + args.pictures + (SETTLING if level is None else 0)):
         if picture % 60 == 0:
-            perform(session, "shake", {"seconds": 3.0})
+            if shaken:
+                perform(session, "shake", {"seconds": 3.0})
             perform(session, "wind", {"on": True})
         if level is not None:
             budget.level, budget._wait = level, 99
@@ -108,11 +120,12 @@ def _row(
     quality = LEVELS[budget.level]
     name = (
         f"{'chosen: ' if level is None else ''}scale {quality.scale}, {quality.share:.0%} of hairs"
+        f"{', soft' if quality.smooth else ''}{'' if shaken else ', still head'}"
     )
     drawn_by = "processor" if preview.frame_renderer.soft else "shaders"
     print(
         f"| {session.simulation.plugin} | {drawn_by}"
-        f" | {name}{', soft' if quality.smooth else ''} | {1e3 * wall:.0f}"
+        f" | {name} | {1e3 * wall:.0f}"
         f" | {1 / wall:.1f} | {1e3 * processor:.0f} | {1 / processor:.1f} |",
         flush=True,
     )
@@ -127,6 +140,8 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--hairs", type=int, default=10_000)
     parser.add_argument("--size", default="1280x720", metavar="WxH")
     parser.add_argument("--pictures", type=int, default=40)
+    parser.add_argument("--budget", type=float, default=50.0, help="milliseconds (default 50)")
+    parser.add_argument("--level", type=int, choices=range(len(LEVELS)), help="0 is the best")
     parser.add_argument("--still", action="store_true", help="measure a still picture only")
     return parser.parse_args()
 

@@ -1,13 +1,18 @@
 #version 430
-// Position of each guide point and rotation of the guide there since rest.
+// Root of each guide, and rotation and stretch of its segments since rest. The rotations are those of
+// a frame that is carried along the guide without twist (Bishop 1975, "There is more than one way to
+// frame a curve").
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Rest { float rest[]; };
 layout(std430, binding = 1) readonly buffer Now { float now[]; };
-layout(std430, binding = 2) writeonly buffer Guides { uint guides[]; };   // 5 words per point
+layout(std430, binding = 2) writeonly buffer Guides { uint guides[]; };
+// 3 words per point: the root, and for each segment to a later point two of its turn and its stretch
 
 uniform int u_points;
-uniform int u_count;    // of guide points
+uniform int u_count;    // of guides
+
+const float MOST_STRETCH = 4.0;     // as in place_kernels.py
 
 vec3 rest_at(int i) { return vec3(rest[3 * i], rest[3 * i + 1], rest[3 * i + 2]); }
 vec3 now_at(int i) { return vec3(now[3 * i], now[3 * i + 1], now[3 * i + 2]); }
@@ -17,23 +22,34 @@ vec4 quaternion_between(vec3 a, vec3 b) {
     return dot(q, q) > 1e-8 ? normalize(q) : vec4(0.0, 0.0, 1.0, 0.0);
 }
 
-void place_guide(int index) {
-    int k = index % u_points;
-    int before = k > 0 ? index - 1 : index;
-    int after = k < u_points - 1 ? index + 1 : index;
-    vec3 up = vec3(0.0, 1e-12, 0.0);
-    vec3 first = normalize(rest_at(after) - rest_at(before) + up);
-    vec3 second = normalize(now_at(after) - now_at(before) + up);
-    vec4 turn = quaternion_between(first, second);
-    vec3 place = now_at(index);
-    guides[5 * index] = floatBitsToUint(place.x);
-    guides[5 * index + 1] = floatBitsToUint(place.y);
-    guides[5 * index + 2] = floatBitsToUint(place.z);
-    guides[5 * index + 3] = packSnorm2x16(turn.xy);
-    guides[5 * index + 4] = packSnorm2x16(turn.zw);
+vec4 multiplied(vec4 a, vec4 b) {
+    return vec4(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));
 }
 
+void write_word(int index, int word, uint value) { guides[3 * index + word] = value; }
+
 void main() {
-    int index = int(gl_GlobalInvocationID.x);
-    if (index < u_count) place_guide(index);
+    int guide = int(gl_GlobalInvocationID.x);
+    if (guide >= u_count) return;
+    int first = guide * u_points;
+    vec3 root = now_at(first);
+    for (int c = 0; c < 3; c++) write_word(first, c, floatBitsToUint(root[c]));
+    vec4 was = vec4(0.0, 0.0, 0.0, 1.0), is = was;
+    vec3 before_was, before_is;
+    for (int k = 1; k < u_points; k++) {
+        vec3 edge_was = rest_at(first + k) - rest_at(first + k - 1);
+        vec3 edge_is = now_at(first + k) - now_at(first + k - 1);
+        vec3 way_was = normalize(edge_was + vec3(0.0, 1e-12, 0.0));
+        vec3 way_is = normalize(edge_is + vec3(0.0, 1e-12, 0.0));
+        if (k == 1) before_was = before_is = way_was;
+        was = multiplied(quaternion_between(before_was, way_was), was);
+        is = multiplied(quaternion_between(before_is, way_is), is);
+        vec4 turn = normalize(multiplied(is, vec4(-was.xyz, was.w)));
+        float stretch = min(length(edge_is) / max(length(edge_was), 1e-9), MOST_STRETCH);
+        write_word(first + k, 0, packSnorm2x16(turn.xy));
+        write_word(first + k, 1, packSnorm2x16(turn.zw));
+        write_word(first + k, 2, floatBitsToUint(stretch));
+        before_was = way_was;
+        before_is = way_is;
+    }
 }

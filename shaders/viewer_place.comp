@@ -1,23 +1,33 @@
 #version 430
-// Interpolates hair: each point keeps its offset from the mean of three guides, rotated with the nearest
-// one. Also splats the segments into view cells, which `viewer_opacity.comp` accumulates.
+// Interpolates hair: each segment keeps its length and is rotated as three guides are, see
+// place_kernels.py. Also splats the segments into view cells, which `viewer_opacity.comp` accumulates.
 #include "viewer_hair.glsl"
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer Guides { uint guides[]; };
 layout(std430, binding = 1) readonly buffer Hairs { uint hairs[]; };        // 3 words per strand
-layout(std430, binding = 2) readonly buffer Offsets { uint offsets[]; };    // 2 words per point
+layout(std430, binding = 2) readonly buffer Edges { uint edges[]; };        // 2 words per point
 layout(std430, binding = 3) writeonly buffer Places { float places[]; };    // 3 words per point
 layout(std430, binding = 4) buffer Filled { uint filled[]; };
 
-vec3 guide_place(uint guide, int k) {
-    int at = 5 * (int(guide) * u_points + k);
-    return vec3(uintBitsToFloat(guides[at]), uintBitsToFloat(guides[at + 1]), uintBitsToFloat(guides[at + 2]));
+const float PARTED = 0.7071068, TOGETHER = 0.9238795;     // as in place_kernels.py
+
+uint guide_word(uint guide, int k, int word) { return guides[3 * (int(guide) * u_points + k) + word]; }
+
+vec3 guide_root(uint guide) {
+    return vec3(uintBitsToFloat(guide_word(guide, 0, 0)), uintBitsToFloat(guide_word(guide, 0, 1)),
+                uintBitsToFloat(guide_word(guide, 0, 2)));
 }
 
 vec4 guide_turn(uint guide, int k) {
-    int at = 5 * (int(guide) * u_points + k);
-    return vec4(unpackSnorm2x16(guides[at + 3]), unpackSnorm2x16(guides[at + 4]));
+    return vec4(unpackSnorm2x16(guide_word(guide, k, 0)), unpackSnorm2x16(guide_word(guide, k, 1)));
+}
+
+float guide_stretch(uint guide, int k) { return uintBitsToFloat(guide_word(guide, k, 2)); }
+
+vec4 shared_turn(vec4 nearest, vec4 other) {
+    float along = dot(nearest, other);
+    return smoothstep(PARTED, TOGETHER, abs(along)) * sign(along) * other;
 }
 
 vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
@@ -37,13 +47,20 @@ void main() {
     uint a = first & 0xFFFFu, b = first >> 16, c = hairs[3 * strand + 1] & 0xFFFFu;
     vec2 weight = unpackUnorm2x16(hairs[3 * strand + 2]);
     Seen last;
+    vec3 place;
     for (int k = 0; k < u_points; k++) {
         int index = strand * u_points + k;
-        vec2 far = unpackHalf2x16(offsets[2 * index + 1]);
-        vec3 offset = vec3(unpackHalf2x16(offsets[2 * index]), far.x);
-        vec3 place = weight.x * guide_place(a, k) + weight.y * guide_place(b, k)
-                   + (1.0 - weight.x - weight.y) * guide_place(c, k)
-                   + 0.001 * turned(guide_turn(a, k), offset);
+        vec2 far = unpackHalf2x16(edges[2 * index + 1]);
+        vec3 edge = 0.001 * vec3(unpackHalf2x16(edges[2 * index]), far.x);
+        if (k == 0) {
+            place = weight.x * guide_root(a) + weight.y * guide_root(b)
+                  + (1.0 - weight.x - weight.y) * guide_root(c) + edge;
+        } else {
+            vec4 nearest = guide_turn(a, k);
+            vec4 turn = weight.x * nearest + weight.y * shared_turn(nearest, guide_turn(b, k))
+                      + (1.0 - weight.x - weight.y) * shared_turn(nearest, guide_turn(c, k));
+            place += guide_stretch(a, k) * turned(normalize(turn), edge);
+        }
         places[3 * index] = place.x;
         places[3 * index + 1] = place.y;
         places[3 * index + 2] = place.z;

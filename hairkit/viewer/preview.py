@@ -17,9 +17,9 @@ from hairkit.rendering.head import Solid, bust_solid, head_solid
 from hairkit.simulation.rigid_motion import follow_head
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw.colouring import point_values, ramp
-from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
+from hairkit.viewer.draw.frame import FrameRenderer
 from hairkit.viewer.draw.frame_budget import LEVELS, Budget, Quality
-from hairkit.viewer.draw.interface import HairLook
+from hairkit.viewer.draw.interface import FrameInputs, HairLook
 from hairkit.viewer.draw.lines import LineSet
 from hairkit.viewer.draw.still import Lens, Still, sample_camera
 from hairkit.viewer.layers import BILLBOARDS

@@ -48,7 +48,7 @@ def test_part_of_a_head_stays_a_part(kind: str) -> None:
     for roots in (
         densify(guides, 1000).roots,
         dense_groom(guides, 1000).strands.roots,
-        course + body.offsets[:, 0],
+        course + body.edges[:, 0],
     ):
         assert len(roots) == 1000
         assert tree.query(roots)[0].max() < 1.6 * spacing

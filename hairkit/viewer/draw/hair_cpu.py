@@ -6,17 +6,19 @@ loops draw the same hair about three times faster. Tests compare the result with
 
 from __future__ import annotations
 
-import moderngl
+from typing import Any
+
 import numpy as np
 
 from hairkit.arrays import Float32Array
 from hairkit.parallel import parallel_for, thread_count
-from hairkit.rendering.context import Renderer
-from hairkit.rendering.gl_camera import NEAREST, clip_from_camera, set_uniforms
+from hairkit.rendering.gl_camera import NEAREST, DepthRange, clip_from_camera
 from hairkit.rendering.hair import strand_numbers
+from hairkit.types.camera import Camera
 from hairkit.viewer.draw import place_kernels, raster_kernels, shade_kernels
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import HairLook, HairScene, HairView
+from hairkit.viewer.draw.region import NOWHERE, Region
 
 MOST_CHUNKS = 8
 """Each thread draws into sums of its own, which are added up for every picture."""
@@ -31,29 +33,35 @@ EDGE = 3
 class SoftHairPass:
     """The hair's arrays and the compiled passes that draw it; the CPU twin of `HairPass`."""
 
-    def __init__(self, gl: Renderer, body: HairBody) -> None:
-        self._gl = gl
+    def __init__(self, body: HairBody) -> None:
         self.body = body
         count, points = len(body), body.points_each
         self._places = np.empty((count, points, 3), np.float32)
         self._seen = np.empty((count, points, 4), np.float32)
         self._looks = np.zeros((count, points, 4), np.float32)
+        self._hidden = np.empty((count, points), np.int8)
         self._reach = np.empty((count, 2), np.float32)
         self._random = np.asarray(strand_numbers(count), np.float32)
-        self._rest = np.ascontiguousarray(body.guide_rest, np.float32)
+        rest = np.ascontiguousarray(body.guide_rest, np.float32)
+        guides = len(rest)
+        self._rest = place_kernels.RestGuides(
+            place_kernels.segments(rest), np.empty((guides, 4, points), np.float32)
+        )
+        place_kernels.carry_frames(0, guides, self._rest.segments, rest, self._rest.frames)
+        self._edges = place_kernels.in_lanes(body.edges, np.zeros(3, np.float32))
+        resting = np.array([0, 0, 0, 1, 1], np.float32)
+        self._turns = place_kernels.in_lanes(np.tile(resting, (guides, points, 1)), resting)
         self._tones = shade_kernels.tone_table()
         self._chunks = min(thread_count(), MOST_CHUNKS)
+        self._way = np.empty((self._chunks, *self._edges.shape[1:]), np.float32)
         self._sums = np.zeros((0, 4), np.float32)
+        self._picture = np.empty((0, 0, 4), np.uint8)
+        self._filled = np.empty((0, 0, 0, 0), np.uint32)
+        self._hair_region = NOWHERE
         self._colours: tuple[object, Float32Array] | None = None
-        self._texture: moderngl.Texture | None = None
-        lay = gl.program("viewer_screen", "viewer_composite")
-        self._composite_quad = gl.context.vertex_array(lay, [])
 
     def release(self) -> None:
-        """Free all GPU objects."""
-        self._composite_quad.release()
-        if self._texture is not None:
-            self._texture.release()
+        """Do nothing: there are no GPU objects."""
 
     def places(self) -> Float32Array:
         """Return the last positions (S, m, 3) of the hair, head frame, metres."""
@@ -64,55 +72,61 @@ class SoftHairPass:
         # compiled loops do not check bounds: replace NaN and infinity of a diverged simulation
         tame = np.nan_to_num(np.clip(rows, -FARTHEST, FARTHEST))
         self._now = np.ascontiguousarray(tame, np.float32)
-        self._turns = place_kernels.guide_turns(self._rest, self._now)
+        rest, turns = self._rest, self._turns
+        parallel_for(place_kernels.turn_guides, len(turns), *rest, self._now, turns, min_chunk=64)
         return self._now.reshape(-1, 3)
 
     def place(self, view: HairView, look: HairLook) -> None:
         """Interpolate the hair from the guides and accumulate its opacity by depth."""
         body, camera = self.body, view.camera
-        self._camera = pack_camera(view)
+        self._camera = pack_camera(camera, view.depth)
         near, far = view.hair_depth.near, view.hair_depth.far
         per_metre = place_kernels.SLICES / (far - near)
         self._slices = np.array([near, per_metre, look.dimming], np.float32)
         tiles = (-(-camera.height // place_kernels.TILE), -(-camera.width // place_kernels.TILE))
-        filled = np.empty((self._chunks, place_kernels.SLICES, *tiles), np.uint32)
+        if self._filled.shape[2:] != tiles:
+            self._filled = np.zeros((self._chunks, place_kernels.SLICES, *tiles), np.uint32)
+            self._opacity = np.empty((place_kernels.SLICES + 1, *tiles), np.float32)
+            self._used = np.zeros(4, np.int64)
         corners = np.empty((self._chunks, 4), np.float32)
-        chunks = self._chunks
         parallel_for(
             place_kernels.place_hair,
-            chunks,
+            self._chunks,
             self._now,
             self._turns,
             body.followed,
             body.weights,
-            body.offsets,
+            self._edges,
             body.widths,
             self._camera,
             self._slices,
             np.float32(look.times_wider),
             look.hairs,
+            self._way,
             self._places,
             self._seen,
-            filled,
+            self._filled,
+            self._used,
             corners,
         )
-        self._opacity = np.empty((place_kernels.SLICES + 1, *tiles), np.float32)
-        parallel_for(place_kernels.accumulate_opacity, tiles[0], filled, self._opacity, min_chunk=8)
         size = np.array([camera.width, camera.height])
-        low = np.clip(np.floor(corners[:, :2].min(axis=0)) - EDGE, 0, size - 1)
-        high = np.clip(np.ceil(corners[:, 2:].max(axis=0)) + EDGE, low + 1, size)
-        self._frame = low.astype(np.int64), (high - low).astype(np.int64)
+        low = np.clip(np.floor(corners[:, :2].min(axis=0)) - EDGE, 0, size - 1).astype(int)
+        high = np.clip(np.ceil(corners[:, 2:].max(axis=0)) + EDGE, low + 1, size).astype(int)
+        self._hair_before, self._hair_region = self._hair_region, Region(*low, *high)
+        tile = place_kernels.TILE  # shading interpolates between neighbours
+        self._used[:2] = np.maximum(low // tile - 1, 0)
+        self._used[2:] = np.minimum(high // tile + 2, tiles[::-1])
+        opacity, rows = (self._filled, self._used, self._opacity), self._used[3] - self._used[1]
+        parallel_for(place_kernels.accumulate_opacity, int(rows), *opacity, min_chunk=8)
 
     def draw(self, scene: HairScene) -> None:
-        """Draw the hair over the picture, behind nearer meshes."""
+        """Draw the meshes into the picture, and over them hair that is nearer."""
         view, look = scene.view, scene.look
-        (x, y), (width, height) = self._frame[0].tolist(), self._frame[1].tolist()
-        frame = (x, y, width, height)
-        depth = scene.solids.read(frame, components=1, attachment=-1, alignment=1, dtype="f4")
-        solid = np.ascontiguousarray(np.frombuffer(depth, np.float32).reshape(height, width).T)
-        corner = self._frame[0].astype(np.float32)
-        if len(self._sums) < width * height:
-            self._sums = np.zeros((view.camera.width * view.camera.height, 4), np.float32)
+        left, right = self._hair_region.left, self._hair_region.right
+        solid = scene.meshes.depth[left:right]
+        corner = np.array([left, 0], np.float32)
+        if len(self._sums) < solid.size:
+            self._sums = np.zeros((scene.meshes.depth.size, 4), np.float32)
         wider = np.float32(look.times_wider)
         shading = shade_kernels.pack_shading(
             view.camera, scene.lights, scene.light.grid, direction=look.by_direction
@@ -133,14 +147,16 @@ class SoftHairPass:
             corner,
             self._beside(view, float(wider)),
             self._looks,
+            self._hidden,
             self._reach,
             min_chunk=PIECE,
         )
         parallel_for(
             raster_kernels.draw_hair,
-            -(-width // raster_kernels.STRIP),
+            -(-(right - left) // raster_kernels.STRIP),
             self._seen,
             self._looks,
+            self._hidden,
             self._reach,
             self.body.widths,
             solid,
@@ -151,28 +167,19 @@ class SoftHairPass:
             corner,
             self._sums,
         )
-        picture = np.empty((height, width, 4), np.uint8)
-        parallel_for(raster_kernels.resolve, height, self._sums, picture, min_chunk=32)
-        self._composite(scene.target, picture, frame)
+        self._composite(scene.meshes)
+        target: Any = scene.target.color_attachments[0]
+        target.write(self._picture)
 
-    def _composite(
-        self, target: moderngl.Framebuffer, picture: object, frame: tuple[int, int, int, int]
-    ) -> None:
-        context, size = self._gl.context, target.size
-        if self._texture is None or self._texture.size != size:
-            if self._texture is not None:
-                self._texture.release()
-            self._texture = context.texture(size, 4)
-            self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._texture.write(picture, viewport=frame)
-        target.use()
-        target.scissor = frame
-        context.enable_only(moderngl.BLEND)
-        context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
-        self._texture.use(5)
-        set_uniforms(self._gl.program("viewer_screen", "viewer_composite"), u_hair=5)
-        self._composite_quad.render(moderngl.TRIANGLES, vertices=3)
-        target.scissor = (0, 0, *size)
+    def _composite(self, meshes: Any) -> None:
+        """Write the picture where hair or meshes are or were, and clear the sums."""
+        behind, hair = meshes.picture, self._hair_region
+        changed = self._hair_before.union(hair).union(meshes.take_changed())
+        if self._picture.shape != behind.shape:
+            self._picture, changed = np.empty_like(behind), Region(0, 0, *behind.shape[1::-1])
+        parts = self._sums, np.array(hair), np.array(changed), behind, self._picture
+        rows = changed.bottom - changed.top
+        parallel_for(raster_kernels.composite, rows, *parts, min_chunk=32)
 
     def _beside(self, view: HairView, wider: float) -> np.float32:
         """Return how far a stroke may reach beside its ends, pixels."""
@@ -190,10 +197,9 @@ class SoftHairPass:
         return self._colours[1]
 
 
-def pack_camera(view: HairView) -> Float32Array:
+def pack_camera(camera: Camera, depth: DepthRange) -> Float32Array:
     """Return (24,): clip_from_head by rows, forward and offset, size, focal length, perspective."""
-    camera = view.camera
-    matrix = clip_from_camera(camera, view.depth) @ camera.camera_from_head
+    matrix = clip_from_camera(camera, depth) @ camera.camera_from_head
     rest = [
         *camera.forward, camera.translation[2], camera.width, camera.height, camera.focal,
         float(camera.model == "perspective"),

@@ -35,7 +35,7 @@ MAX_GUIDES = 2_000
 
 @dataclass(frozen=True, eq=False)
 class HairBody:
-    """Hair at rest, each strand as an offset from its guides; all have equal point counts."""
+    """Hair at rest, and the guides that it follows; all strands have equal point counts."""
 
     guides: Strands
     """The guides, with their own points."""
@@ -47,8 +47,9 @@ class HairBody:
     """(S, 3) indices of each strand's guides; the first G strands are the guides themselves."""
     weights: Float32Array
     """(S, 3) weights of these guides, sum 1."""
-    offsets: Float32Array
-    """(S, m, 3) from the weighted mean of the guides to the strand, metres."""
+    edges: Float32Array
+    """(S, m, 3) from the weighted mean of the guides' roots to the root, and from each point to the
+    next one, metres."""
     widths: Float32Array
     """(S, m) diameters, metres."""
 
@@ -84,15 +85,15 @@ class HairBody:
         shares = choose_shares(guides) if shares is None else shares
         rest = sample_guides(guides, shares).points.reshape(len(guides), -1, 3)
         shape = _arrange_hair(groom, hairs, own, seed, shares)
+        shape[: len(guides)] = rest  # a guide is where it is
         points, count = shape.reshape(-1, 3), len(shape)
         marked = np.arange(count) < len(guides)
         mix = closest_guides(Strands(points, np.arange(count + 1) * len(shares), guide=marked))
-        for some in _blocks(count):
-            shape[some] -= np.einsum("sk,skmc->smc", mix.weights[some], rest[mix.guides[some]])
-        shape[: len(guides)] = 0  # a guide is where it is
+        roots = np.einsum("sk,skc->sc", mix.weights, rest[:, 0][mix.guides])
+        edges = np.diff(shape, axis=1, prepend=roots[:, None])
         taper = (1 - TAPER * shares**4).astype(np.float32)
         widths = np.tile(np.float32(groom.material.width) * taper, (count, 1))
-        return cls(guides, shares, rest, mix.guides, mix.weights, shape, widths)
+        return cls(guides, shares, rest, mix.guides, mix.weights, edges, widths)
 
 
 def sample_guides(guides: Strands, shares: Float64Array) -> Strands:

@@ -44,16 +44,16 @@ class HairPass:
         context = gl.context
         self._rest = context.buffer(np.ascontiguousarray(body.guide_rest, np.float32))
         self._now = context.buffer(np.ascontiguousarray(body.guide_rest, np.float32))
-        self._guides = context.buffer(reserve=20 * len(body.guides) * points)
+        self._guides = context.buffer(reserve=12 * len(body.guides) * points)
         self._hairs = context.buffer(_hair_records(body))
-        self._offsets = context.buffer(_offset_records(body))
+        self._edges = context.buffer(_edge_records(body))
         self._places = context.buffer(reserve=12 * count * points)
         self._view: _ViewBuffers | None = None
         self._resolve = context.vertex_array(gl.program("viewer_screen", "viewer_resolve"), [])
 
     def release(self) -> None:
         """Free the buffers."""
-        buffers = (self._rest, self._now, self._guides, self._hairs, self._offsets, self._places)
+        buffers = (self._rest, self._now, self._guides, self._hairs, self._edges, self._places)
         for buffer in buffers:
             buffer.release()
         self._resolve.release()
@@ -69,7 +69,7 @@ class HairPass:
         self._now.write(np.ascontiguousarray(rows, np.float32))
         for binding, buffer in enumerate((self._rest, self._now, self._guides)):
             buffer.bind_to_storage_buffer(binding)
-        self._run("viewer_guides", len(self.body.guides) * self.body.points_each)
+        self._run("viewer_guides", len(self.body.guides))
         self._cloud = np.asarray(rows, np.float32).reshape(-1, 3)
         return self._cloud
 
@@ -85,7 +85,7 @@ class HairPass:
         buffers.filled.clear()
         self._guides.bind_to_storage_buffer(0)
         self._hairs.bind_to_storage_buffer(1)
-        self._offsets.bind_to_storage_buffer(2)
+        self._edges.bind_to_storage_buffer(2)
         self._places.bind_to_storage_buffer(3)
         buffers.filled.bind_to_storage_buffer(4)
         self._run("viewer_place", look.hairs, view, **self._shared)
@@ -93,13 +93,14 @@ class HairPass:
         self._run("viewer_opacity", buffers.tiles[0] * buffers.tiles[1], **self._shared)
 
     def draw(self, scene: HairScene) -> None:
-        """Draw the hair over the picture, behind nearer meshes."""
+        """Draw the meshes into the picture, and over them hair that is nearer."""
+        scene.meshes.show(scene.target)
         view, look = scene.view, scene.look
         buffers = self._resize_buffers(view.camera)
-        scene.solid_depth.use(1)
+        scene.meshes.depth_texture().use(1)
         buffers.opacity.use(2)
         self._hairs.bind_to_storage_buffer(1)
-        self._offsets.bind_to_storage_buffer(2)
+        self._edges.bind_to_storage_buffer(2)
         self._places.bind_to_storage_buffer(3)
         buffers.sums.bind_to_storage_buffer(7)
         self._run(
@@ -213,7 +214,7 @@ def _hair_records(body: HairBody) -> bytes:
     return np.stack(words, axis=1).astype(np.uint32).tobytes()
 
 
-def _offset_records(body: HairBody) -> bytes:
-    """Pack two words for each point: offset and diameter in millimetres, as half floats."""
-    values = np.concatenate([body.offsets, body.widths[..., None]], axis=2) * 1e3
+def _edge_records(body: HairBody) -> bytes:
+    """Pack two words for each point: edge and diameter in millimetres, as half floats."""
+    values = np.concatenate([body.edges, body.widths[..., None]], axis=2) * 1e3
     return np.clip(values, -6e4, 6e4).astype(np.float16).tobytes()

@@ -1,13 +1,13 @@
-"""Inputs and interface of the hair renderers."""
+"""Inputs and interfaces of the renderers."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from hairkit.arrays import Float32Array
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.light import Lights
 from hairkit.types.camera import Camera
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import moderngl
 
     from hairkit.viewer.draw.hair_data import HairBody
+    from hairkit.viewer.draw.lines import LineSet
 
 FULL_LOOK = 50_000
 """Fewer strands are drawn wider, so that they cover the head as this many would."""
@@ -70,6 +71,57 @@ class HairView:
 
 
 @dataclass(frozen=True)
+class FrameInputs:
+    """The inputs of one frame, apart from what stays on the GPU."""
+
+    camera: Camera
+    """World frame, at the size of the frame."""
+    world_from_head: Float64Array
+    """(4, 4) pose of the head."""
+    guide_rows: Float32Array | None
+    """(G, m, 3) guides, head frame, metres; None: as before."""
+    hair: HairLook | None
+    """None: no hair."""
+    show_head: bool = True
+    floor: float = -0.4
+    """Height of the floor, world, metres."""
+    exposure: float = 0.75
+    light_turn: float = 0.0
+    """Angle by which the lights are turned round the head, radians."""
+    backdrop: str = "grey"
+    """One of `studio.BACKDROPS`."""
+    whole_light: bool = False
+    """True updates the whole light volume in this frame, for still pictures."""
+    same_light: bool = False
+    """True leaves the light volume as it is, for another sample of a still picture."""
+    fine_skin: bool = False
+    """True diffuses the light in skin and draws all its maps, for still pictures."""
+    lines: tuple[tuple[LineSet, bool], ...] = ()
+    """Line sets, and for each whether it moves with the head."""
+    billboards: tuple[str, ...] = ()
+    """Names of the billboards to draw."""
+    billboard_opacity: float = 1.0
+    solids: tuple[str, ...] = ()
+    """Names of the other meshes to draw."""
+    world_from_torso: Float64Array = field(default_factory=lambda: np.eye(4))
+    """(4, 4) motion since rest of meshes that do not move with the head."""
+
+
+@dataclass(frozen=True)
+class MeshScene:
+    """Inputs of a frame, and what meshes are lit by."""
+
+    inputs: FrameInputs
+    camera: Camera
+    """Head frame, at the size of the frame."""
+    depth: DepthRange
+    """Range of the depth buffer."""
+    lights: Lights
+    light: Any
+    """Light volume of the renderer's kind, bound as texture 0."""
+
+
+@dataclass(frozen=True)
 class HairScene:
     """Lights, occluders and target of the hair."""
 
@@ -78,12 +130,10 @@ class HairScene:
     lights: Lights
     light: Any
     """Light volume of the renderer's kind, bound as texture 0."""
-    solids: moderngl.Framebuffer
-    """Frame buffer whose depth occludes hair."""
-    solid_depth: moderngl.Texture
-    """Its depth texture."""
+    meshes: Any
+    """Layer of meshes of the renderer's kind, which hide hair behind them."""
     target: moderngl.Framebuffer
-    """The picture, with everything drawn that is behind hair."""
+    """The picture, of one texture."""
 
 
 class HairDrawer(Protocol):
@@ -104,4 +154,4 @@ class HairDrawer(Protocol):
         """Interpolate the hair from the guides and accumulate its opacity by depth."""
 
     def draw(self, scene: HairScene) -> None:
-        """Draw the hair over the picture, behind nearer meshes."""
+        """Draw the meshes into the picture, and over them hair that is nearer."""

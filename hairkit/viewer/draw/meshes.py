@@ -1,15 +1,16 @@
-"""Shaded meshes that stay on the GPU: head, hull, torso."""
+"""Shaded meshes: where they are, and how a GPU draws them."""
 
 from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import moderngl
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float64Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
 from hairkit.rendering.head import Solid, bind_maps, upload_maps
@@ -17,20 +18,48 @@ from hairkit.types.camera import Camera
 from hairkit.types.skin_look import SkinLook
 
 
-class SolidPass:
-    """A shaded mesh, lit at its pixels or, for software renderers, at its vertices."""
+class PlacedMesh:
+    """A mesh that follows a rigid motion as far as its vertices are held."""
 
-    def __init__(self, gl: Renderer, solid: Solid, *, by_vertex: bool = False) -> None:
+    def __init__(self, gl: Renderer, solid: Solid) -> None:
         self._gl = gl
         self.solid = solid
-        self._program = gl.program("viewer_skin" if by_vertex else "skin")
+        self.motion = np.eye(4)
+        """(4, 4) from the original pose."""
+        self._kept = contextlib.ExitStack()
+
+    @cached_property
+    def maps(self) -> dict[str, moderngl.Texture]:
+        """The mesh's pictures on the GPU, by kind."""
+        return self._kept.enter_context(upload_maps(self._gl, self.solid))
+
+    def place(self, motion: Float64Array) -> None:
+        """Move the mesh by a rigid motion (4, 4) from its original pose, as far as it is `held`."""
+        self.motion = motion
+
+    def placed(self) -> Solid:
+        """Return the mesh where it is now."""
+        solid = self.solid
+        share = np.float32(1) if solid.held is None else solid.held[:, None]
+        matrix = self.motion.astype(np.float32)
+        place, normal, turn = solid.vertices, solid.normals, matrix[:3, :3].T
+        place = place + share * (place @ turn + matrix[:3, 3] - place)
+        return replace(solid, vertices=place, normals=normal + share * (normal @ turn - normal))
+
+    def release(self) -> None:
+        """Free all GPU objects."""
+        self._kept.close()
+
+
+class SolidPass(PlacedMesh):
+    """A mesh on the GPU, lit at its pixels."""
+
+    def __init__(self, gl: Renderer, solid: Solid) -> None:
+        super().__init__(gl, solid)
+        self._program = gl.program("skin")
         uv = np.zeros((len(solid.vertices), 2)) if solid.uv is None else solid.uv
         values = np.concatenate([solid.vertices, solid.normals, solid.colours, uv], axis=1)
         self._values = np.ascontiguousarray(values, np.float32)
-        self._placed = np.eye(4)
-        held = np.ones(len(solid.vertices), np.float32) if solid.held is None else solid.held
-        self._held = np.flatnonzero(held)
-        self._share = held[self._held, None]
         self._vertices = gl.context.buffer(self._values)
         self._faces = gl.context.buffer(np.ascontiguousarray(solid.faces, np.uint32))
         self._array = gl.context.vertex_array(
@@ -38,34 +67,15 @@ class SolidPass:
             [(self._vertices, "3f 3f 3f 2f", "in_position", "in_normal", "in_colour", "in_uv")],
             index_buffer=self._faces,
         )
-        self._kept = contextlib.ExitStack()
-        self.maps = self._kept.enter_context(upload_maps(gl, solid))
-        for texture in self.maps.values() if by_vertex else ():
-            texture.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)  # half the work
-        """Its pictures on the GPU, by kind."""
 
-    def place(self, matrix: Float64Array) -> None:
+    def place(self, motion: Float64Array) -> None:
         """Move the mesh by a rigid motion (4, 4) from its original pose, as far as it is `held`."""
-        if np.array_equal(matrix, self._placed):
+        if np.array_equal(motion, self.motion):
             return
-        self._placed = matrix
-        moved = self._values.copy()
-        moved[self._held, :3], moved[self._held, 3:6] = self._motion()
+        super().place(motion)
+        moved, now = self._values.copy(), self.placed()
+        moved[:, :3], moved[:, 3:6] = now.vertices, now.normals
         self._vertices.write(moved)
-
-    def placed(self) -> Solid:
-        """Return the mesh where it is now."""
-        vertices, normals = self.solid.vertices.copy(), self.solid.normals.copy()
-        vertices[self._held], normals[self._held] = self._motion()
-        return replace(self.solid, vertices=vertices, normals=normals)
-
-    def _motion(self) -> tuple[Float32Array, Float32Array]:
-        """Return positions and normals of the vertices that `place` moves."""
-        matrix = self._placed.astype(np.float32)
-        place, normal = self.solid.vertices[self._held], self.solid.normals[self._held]
-        turn, share = matrix[:3, :3].T, self._share
-        place = place + share * (place @ turn + matrix[:3, 3] - place)
-        return place, normal + share * (normal @ turn - normal)
 
     def draw(
         self, camera: Camera, depth: DepthRange, push: float, lighting: dict[str, Any]
@@ -85,7 +95,7 @@ class SolidPass:
         self._array.render(moderngl.TRIANGLES)
 
     def release(self) -> None:
-        """Free the buffers."""
+        """Free all GPU objects."""
         for part in (self._array, self._vertices, self._faces):
             part.release()
-        self._kept.close()
+        super().release()

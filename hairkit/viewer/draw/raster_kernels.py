@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.viewer.draw.place_kernels import count_hidden, inlined, pixels_per_metre, shared
-from hairkit.viewer.draw.shade_kernels import HIDDEN
+from hairkit.viewer.draw.place_kernels import inlined, pixels_per_metre, shared
+from hairkit.viewer.draw.shade_kernels import ALL_HIDDEN, HIDDEN
 
 STRIP = 64
 """Columns of a strip: 0.5 MB of sums where hair is 500 pixels high, as much as a core's cache."""
@@ -26,47 +26,47 @@ _WHITE = np.float32(255)
 
 @shared
 def draw_hair(  # type: ignore[no-untyped-def]
-    first_strip, last_strip, seen, looks, reach, widths, solid, camera, wider, smooth, count,
-    frame, sums,
+    first_strip, last_strip, seen, looks, hidden, reach, widths, solid, camera, wider, smooth,
+    count, frame, sums,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Draw strips of `count` strands into `sums` (at least W H, 4).
 
-    `seen` comes from `place_hair`, `looks` and `reach` from `shade_hair`; `frame` holds the least x
-    and y of the drawn part of the picture, and `solid` (W, H) its depth buffer. Both are stored
-    column by column: most hair hangs, so that a stroke's pixels lie side by side in memory.
+    `seen` comes from `place_hair`, `looks`, `hidden` and `reach` from `shade_hair`; `frame` holds
+    the least x and y of the drawn part of the picture, and `solid` (W, H) its depth buffer. Both
+    are stored column by column: most hair hangs, so that a stroke's pixels lie side by side in
+    memory.
     """
     for strip in range(first_strip, last_strip):
         left, right = strip * STRIP, min((strip + 1) * STRIP, solid.shape[0])
         for s in range(count):
             if reach[s, 0] - frame[0] < right and reach[s, 1] - frame[0] >= left:
                 _draw_strand(
-                    seen, looks, widths, solid, camera, wider, smooth, s, frame, left, right, sums
-                )
+                    seen, looks, hidden, widths, solid, camera, wider, smooth, s, frame, left,
+                    right, sums,
+                )  # fmt: skip
 
 
 @shared
 def _draw_strand(  # type: ignore[no-untyped-def]
-    seen, looks, widths, solid, camera, wider, smooth, s, frame, left, right, sums
+    seen, looks, hidden, widths, solid, camera, wider, smooth, s, frame, left, right, sums
 ) -> None:  # pragma: no cover - compiled
     """Draw the strokes of a strand in the columns `left` to before `right`."""
     for k in range(1, seen.shape[1]):
-        if looks[s, k, 3] > HIDDEN and looks[s, k - 1, 3] > HIDDEN:
+        behind = hidden[s, k - 1]
+        if behind < ALL_HIDDEN and looks[s, k, 3] > HIDDEN and looks[s, k - 1, 3] > HIDDEN:
             width = widths[s, k] * wider * pixels_per_metre(camera, seen[s, k, 3])
             a, b, beside = seen[s, k - 1, 0] - frame[0], seen[s, k, 0] - frame[0], width + _ONE
             if min(a, b) - beside < right and max(a, b) + beside >= left:
-                _stroke(seen, looks, s, k, width, smooth, solid, frame, left, right, sums)
+                _stroke(seen, looks, behind, s, k, width, smooth, solid, frame, left, right, sums)
 
 
 @shared
 def _stroke(  # type: ignore[no-untyped-def]
-    seen, looks, s, k, width, smooth, solid, frame, left, right, sums
+    seen, looks, behind, s, k, width, smooth, solid, frame, left, right, sums
 ) -> None:  # pragma: no cover - compiled
     """Draw the segment from point k - 1 to k in some columns."""
     ax, ay, az = seen[s, k - 1, 0] - frame[0], seen[s, k - 1, 1] - frame[1], seen[s, k - 1, 2]
     bx, by, bz = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
-    hidden = count_hidden(ax, ay, az, bx, by, bz, solid)
-    if hidden == 3:
-        return
     steep = abs(by - ay) > abs(bx - ax)
     if steep:
         ax, ay, bx, by = ay, ax, by, bx
@@ -90,7 +90,7 @@ def _stroke(  # type: ignore[no-untyped-def]
     red, green, blue, weight = _weight_colour(looks, s, end, min(across, _ONE))
     dr, dg, db, dw = red - r, green - g, blue - b, weight - w
     half = _HALF * max(across, _ONE)
-    narrow, soft, free = across <= _ONE, smooth != 0, hidden == 0
+    narrow, soft, free = across <= _ONE, smooth != 0, behind == 0
     while x < last:
         red, green, blue, weight = r + t * dr, g + t * dg, b + t * db, w + t * dw
         depth = az + t * (bz - az)
@@ -136,17 +136,32 @@ def _add(sums, at, part, red, green, blue, weight):  # type: ignore[no-untyped-d
 
 
 @shared
-def resolve(first, last, sums, picture) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Convert the sums to rows of (H, W, 4) bytes, colour and opacity, and clear them."""
-    high, wide = picture.shape[:2]
-    for x in range(wide):
-        for y in range(first, last):
-            at = x * high + y
-            red, green, blue, weight = sums[at, 0], sums[at, 1], sums[at, 2], sums[at, 3]
+def composite(first, last, sums, hair, changed, behind, picture) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+    """Write rows of the `changed` region of `picture` (H, W, 4): hair over `behind`.
+
+    The sums are those of the columns of the region `hair`, in which they are cleared; regions are
+    arrays of the values of `region.Region`, and `hair` lies within `changed`.
+    """
+    high = picture.shape[0]
+    first, last = first + changed[1], last + changed[1]
+    for y in range(first, last):
+        for x in range(changed[0], changed[2]):
+            for c in range(4):
+                picture[y, x, c] = behind[y, x, c]
+    for x in range(hair[0], hair[2]):
+        for y in range(max(first, hair[1]), min(last, hair[3])):
+            at = (x - hair[0]) * high + y
+            weight = sums[at, 3]
+            if weight <= _ZERO:
+                continue
+            red, green, blue = sums[at, 0], sums[at, 1], sums[at, 2]
             sums[at, 0] = sums[at, 1] = sums[at, 2] = sums[at, 3] = _ZERO
-            share = _WHITE / max(weight, _TINY)
-            picture[y, x, 0] = np.uint8(min(red * share + _HALF, _WHITE))
-            picture[y, x, 1] = np.uint8(min(green * share + _HALF, _WHITE))
-            picture[y, x, 2] = np.uint8(min(blue * share + _HALF, _WHITE))
             opaque = min(weight * (_ONE + np.float32(0.8) * weight), _ONE)
-            picture[y, x, 3] = np.uint8(opaque * _WHITE + _HALF)
+            share = opaque * _WHITE / max(weight, _TINY)
+            through = _ONE - opaque
+            red = red * share + through * np.float32(behind[y, x, 0])
+            green = green * share + through * np.float32(behind[y, x, 1])
+            blue = blue * share + through * np.float32(behind[y, x, 2])
+            picture[y, x, 0] = np.uint8(min(red + _HALF, _WHITE))
+            picture[y, x, 1] = np.uint8(min(green + _HALF, _WHITE))
+            picture[y, x, 2] = np.uint8(min(blue + _HALF, _WHITE))

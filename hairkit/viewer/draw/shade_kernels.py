@@ -20,6 +20,8 @@ LANES, FIELDS = 64, 14
 """Points shaded together, and values of each."""
 DENSE = np.float32(0.4)
 """Share of a tile's mean optical depth that is applied: locks are denser than gaps."""
+ALL_HIDDEN = 3
+"""Of the places of a stroke that `count_hidden` looks at."""
 HIDDEN = np.float32(0.14)
 """Points with a lower transmittance towards the camera are not drawn."""
 
@@ -74,14 +76,15 @@ def fibre_colours(
 @compiled_with(fastmath=True)
 def shade_hair(  # type: ignore[no-untyped-def]
     first, last, seen, places, colours, random, opacity, slices, shading, light, tones, solid,
-    frame, beside, looks, reach,
+    frame, beside, looks, hidden, reach,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Write `looks` (S, m, 4) of some strands: colour, and transmittance towards the camera.
 
     `seen`, `places` and `opacity` come from `place_kernels`; `slices` are the nearest depth, slices
     per metre and `HairLook.dimming`; `light` (Z, Y, X, 4) is the light volume; `solid` and `frame`
     are those of `raster_kernels.draw_hair`. Points with a transmittance up to `HIDDEN` are not
-    shaded, and those of which both strokes are behind meshes get a transmittance of 0. The columns
+    shaded, and those of which both strokes are behind meshes get a transmittance of 0. `hidden`
+    (S, m) is `count_hidden` of the stroke from each point, 3 at the last point. The columns
     of the others and `beside` pixels on either side are in between `reach` (S, 2).
     """
     points = np.empty(FIELDS * LANES, np.float32)
@@ -89,14 +92,14 @@ def shade_hair(  # type: ignore[no-untyped-def]
     which = np.empty((LANES, 2), np.int64)
     _shade_chunk(
         seen, places, colours, random, opacity, slices, shading, light, tones, solid, frame,
-        beside, first, last, looks, reach, points, lit, which,
+        beside, first, last, looks, hidden, reach, points, lit, which,
     )  # fmt: skip
 
 
 @shared
 def _shade_chunk(  # type: ignore[no-untyped-def]
     seen, places, colours, random, opacity, slices, shading, light, tones, solid, frame,
-    beside, first, last, looks, reach, points, lit, which,
+    beside, first, last, looks, hidden, reach, points, lit, which,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Gather visible points, shade them in batches of `LANES`, and scatter the results."""
     waiting = 0
@@ -106,7 +109,8 @@ def _shade_chunk(  # type: ignore[no-untyped-def]
         covered = True
         reach[s, 0], reach[s, 1] = _FAR, -_FAR
         for k in range(looks.shape[1]):
-            before, covered = covered, _stroke_behind(seen, s, k, solid, frame)
+            hidden[s, k] = _stroke_hidden(seen, s, k, solid, frame)
+            before, covered = covered, hidden[s, k] == ALL_HIDDEN
             arriving = _ZERO
             if not (before and covered):
                 arriving = _visibility(seen, s, k, opacity, slices)
@@ -125,16 +129,16 @@ def _shade_chunk(  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _stroke_behind(seen, s, k, solid, frame):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return whether meshes are nearer than both ends and the middle of the stroke from point k.
+def _stroke_hidden(seen, s, k, solid, frame):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+    """Return to how many of both ends and the middle of the stroke from point k meshes are nearer.
 
     There is none from the last point.
     """
     if k == seen.shape[1] - 1:
-        return True
+        return ALL_HIDDEN
     ax, ay, az = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
     bx, by, bz = seen[s, k + 1, 0] - frame[0], seen[s, k + 1, 1] - frame[1], seen[s, k + 1, 2]
-    return count_hidden(ax, ay, az, bx, by, bz, solid) == 3
+    return count_hidden(ax, ay, az, bx, by, bz, solid)
 
 
 @shared

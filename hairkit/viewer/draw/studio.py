@@ -5,7 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from hairkit.arrays import Float64Array
+from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import set_uniforms
 from hairkit.rendering.picture import BACKDROP_BOTTOM, BACKDROP_TOP
@@ -39,6 +39,7 @@ class StudioPass:
         self._small = gl.context.framebuffer([self._texture])
         self._full: moderngl.Framebuffer | None = None
         self._made: object = None
+        self._read: UInt8Array | None = None
 
     def release(self) -> None:
         """Free all GPU objects."""
@@ -57,12 +58,25 @@ class StudioPass:
 
         What is the same as before is copied, which is much faster on software renderers.
         """
+        self._gl.context.copy_framebuffer(target, self._update(full, floor, backdrop))
+
+    def read(self, full: Camera, floor: float, backdrop: str) -> UInt8Array:
+        """Return the studio (H, W, 4) as a camera in the world sees it, RGBA."""
+        before = self._made
+        drawn = self._update(full, floor, backdrop)
+        if self._read is None or before != self._made:
+            pixels = np.frombuffer(drawn.read(components=4, alignment=1), np.uint8)
+            self._read = pixels.reshape(full.height, full.width, 4)
+        return self._read
+
+    def _update(self, full: Camera, floor: float, backdrop: str) -> moderngl.Framebuffer:
+        """Return the studio, drawn anew if camera or studio changed."""
         key = (full.camera_from_head.tobytes(), full.focal, full.centre.tobytes(), floor, backdrop)
         size = full.width, full.height
-        if self._full is None or self._full.size != size or key != self._made:
-            self._made = key
+        if self._full is None or (size, key) != self._made:
+            self._made = size, key
             self._full = self._draw_full(size, full.resized(*SIZE), floor, backdrop)
-        self._gl.context.copy_framebuffer(target, self._full)
+        return self._full
 
     def _draw_full(
         self, size: tuple[int, int], small: Camera, floor: float, backdrop: str

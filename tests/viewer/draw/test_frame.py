@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from hairkit.arrays import Float32Array, UInt8Array
 from hairkit.head_model.template import default_head
@@ -15,14 +16,16 @@ from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.head import head_solid
 from hairkit.testing import bristle_groom
 from hairkit.types.camera import Camera
-from hairkit.viewer.draw import frame
-from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
+from hairkit.viewer.draw import mesh_layer
+from hairkit.viewer.draw.frame import FrameRenderer
 from hairkit.viewer.draw.hair_cpu import SoftHairPass
 from hairkit.viewer.draw.hair_data import HairBody
-from hairkit.viewer.draw.interface import HairLook
+from hairkit.viewer.draw.interface import FrameInputs, HairLook
 from hairkit.viewer.draw.light_gpu import TURNS
 from hairkit.viewer.draw.lines import LineSet
+from hairkit.viewer.draw.mesh_cpu import SoftSolid
 from hairkit.viewer.draw.meshes import SolidPass
+from hairkit.viewer.draw.place_kernels import MOST_STRETCH, PARTED, TOGETHER
 from hairkit.viewer.head_motion import rotation_about
 
 GROOM = bristle_groom()
@@ -164,32 +167,98 @@ def test_thin_strands_are_calm(frame_renderer: FrameRenderer) -> None:
 
 
 def twin(body: HairBody, rows: Float32Array) -> Float32Array:
-    """Return where hair goes with guides (G, m, 3): the slow twin of `viewer_place.comp`."""
-    before = np.maximum(np.arange(rows.shape[1]) - 1, 0)
-    after = np.minimum(np.arange(rows.shape[1]) + 1, rows.shape[1] - 1)
-    was = body.guide_rest[:, after] - body.guide_rest[:, before]
-    now = rows[:, after] - rows[:, before]
-    was, now = (v / np.linalg.norm(v, axis=2, keepdims=True) for v in (was, now))
-    axis, cosine = np.cross(was, now), (was * now).sum(axis=2, keepdims=True)
-    course = np.einsum("sk,skmc->smc", body.weights, rows[body.followed])
-    nearest = body.followed[:, 0]
-    o, a, c = body.offsets, axis[nearest], cosine[nearest]
-    turned = c * o + np.cross(a, o) + a * (a * o).sum(axis=2, keepdims=True) / (1 + c)
-    return course + turned
+    """Return where hair goes with guides (G, m, 3): the slow twin of `place_kernels`."""
+    turns = np.empty((*rows.shape[:2], 4))
+    was, now = (np.diff(r.astype(float), axis=1) for r in (body.guide_rest, rows))
+    stretch = np.linalg.norm(now, axis=2) / np.linalg.norm(was, axis=2)
+    for g in range(len(rows)):
+        frames = [carried(was[g, 0], edges) for edges in (was[g], now[g])]
+        turns[g, 1:] = [(b * a.inv()).as_quat() for a, b in zip(*frames, strict=True)]
+    roots = np.einsum("sk,skc->sc", body.weights, rows[:, 0][body.followed])
+    hair = [roots + body.edges[:, 0]]
+    for k in range(1, rows.shape[1]):
+        q = turns[body.followed, k]
+        along = np.einsum("skc,sc->sk", q, q[:, 0])
+        t = np.clip((np.abs(along) - PARTED) / (TOGETHER - PARTED), 0, 1)
+        share = body.weights * np.sign(along) * t * t * (3 - 2 * t)
+        turn = Rotation.from_quat(np.einsum("sk,skc->sc", share, q))
+        length = np.minimum(stretch[body.followed[:, 0], k - 1], MOST_STRETCH)
+        hair.append(hair[-1] + length[:, None] * turn.apply(body.edges[:, k]))
+    return np.stack(hair, axis=1).astype(np.float32)
 
 
-def test_hair_is_placed_as_its_twin_says(frame_renderer: FrameRenderer) -> None:
-    """Hair keeps its offset from the guides' mix, turned as the nearest guide turns."""
-    t = np.linspace(0, 1, frame_renderer.body.points_each, dtype=np.float32)[None, :, None]
-    rows = frame_renderer.body.guide_rest + np.float32([0.02, -0.01, 0.0]) * t**2
+def carried(start: np.ndarray, edges: np.ndarray) -> list[Rotation]:
+    """Return a frame carried from a direction (3,) along segments (n, 3) by least rotations."""
+    frames, frame, before = [], Rotation.identity(), start / np.linalg.norm(start)
+    for edge in edges:
+        way = edge / np.linalg.norm(edge)
+        frame = Rotation.from_quat([*np.cross(before, way), 1 + before @ way]) * frame
+        frames.append(frame)
+        before = way
+    return frames
+
+
+def placed(frame_renderer: FrameRenderer, rows: Float32Array) -> Float32Array:
+    """Return where hair is drawn with guides (G, m, 3)."""
     with renderer():
         picture(frame_renderer, inputs(guide_rows=rows))
         places = frame_renderer.hair.places()
         if not frame_renderer.soft:
-            places = np.frombuffer(places.read(), np.float32).reshape(3000, -1, 3)
-        placed = places.copy()
+            places = np.frombuffer(places.read(), np.float32).reshape(LOOK.hairs, -1, 3)
+        result: Float32Array = places.copy()
         picture(frame_renderer, inputs())
-    np.testing.assert_allclose(placed, twin(frame_renderer.body, rows), atol=2e-5)
+    return result
+
+
+def parted(body: HairBody, seed: int) -> Float32Array:
+    """Return guides (G, m, 3) of the same lengths, each turned and bent in a way of its own."""
+    edges, random = np.diff(body.guide_rest.astype(float), axis=1), np.random.default_rng(seed)
+    for k in range(edges.shape[1]):
+        angles = random.normal(0.0, 0.5, (len(edges), 3)) * (k + 1) / edges.shape[1]
+        edges[:, k:] = np.einsum(
+            "gij,gkj->gki", Rotation.from_rotvec(angles).as_matrix(), edges[:, k:]
+        )
+    return np.cumsum(np.concatenate([body.guide_rest[:, :1], edges], axis=1), axis=1, dtype="f4")
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_hair_is_placed_as_its_twin_says(frame_renderer: FrameRenderer, seed: int) -> None:
+    """Segments turn as the guides' frames, of which those that part from the nearest are left."""
+    rows = parted(frame_renderer.body, seed)
+    off = np.abs(placed(frame_renderer, rows) - twin(frame_renderer.body, rows)).max(axis=(1, 2))
+    assert np.quantile(off, 0.99) < 1e-4
+    assert off.max() < 2e-3  # near a half turn roundings decide the way round
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_hair_keeps_its_lengths_where_guides_part(frame_renderer: FrameRenderer, seed: int) -> None:
+    """No segment is stretched or folded up, and guides are drawn where they are."""
+    body = frame_renderer.body
+    rows = parted(body, seed)
+    hair, rest = placed(frame_renderer, rows), placed(frame_renderer, body.guide_rest)
+    now, was = (np.linalg.norm(np.diff(h, axis=1), axis=2) for h in (hair, rest))
+    np.testing.assert_allclose(now, was, rtol=5e-3, atol=1e-6)
+    np.testing.assert_allclose(hair[: len(rows)], rows, atol=5e-5)
+
+
+def test_hair_shows_the_stretch_of_its_nearest_guide(frame_renderer: FrameRenderer) -> None:
+    """Guides drawn to another length take the hair along."""
+    body = frame_renderer.body
+    rows = body.guide_rest[:, :1] + 1.3 * (body.guide_rest - body.guide_rest[:, :1])
+    hair, rest = placed(frame_renderer, rows), placed(frame_renderer, body.guide_rest)
+    now, was = (np.linalg.norm(np.diff(h, axis=1), axis=2) for h in (hair, rest))
+    np.testing.assert_allclose(now, 1.3 * was, rtol=5e-3, atol=1e-6)
+
+
+def test_hair_turns_with_guides_that_stay_together(frame_renderer: FrameRenderer) -> None:
+    """Guides turned as one carry the hair between them along; only twist about them is unknown."""
+    body = frame_renderer.body
+    turn = Rotation.from_rotvec([0.1, -0.2, 0.15]).as_matrix()
+    rows = np.asarray(body.guide_rest @ turn.T, np.float32)
+    hair, rest = placed(frame_renderer, rows), placed(frame_renderer, body.guide_rest)
+    edges = np.diff(rest, axis=1) @ turn.T
+    off = np.linalg.norm(np.diff(hair, axis=1) - edges, axis=2)
+    assert np.quantile(off / np.linalg.norm(edges, axis=2), 0.99) < 0.05
 
 
 def test_lines_are_drawn_in_their_colour(frame_renderer: FrameRenderer) -> None:
@@ -216,25 +285,89 @@ def test_what_stays_is_drawn_again_with_new_light_only(
     frame_renderer: FrameRenderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The torso is drawn once in `TURNS` pictures of a head that turns, and is where it was."""
-    below = replace(GROOM.head, vertices=GROOM.head.vertices - np.float32([0.05, 0.1, 0.0]))
-    count, draw = [0], SolidPass.draw
+    count, kind = [0], SoftSolid if frame_renderer.soft else SolidPass
+    draw = kind.draw
     with renderer():
-        frame_renderer.upload_solid("torso", head_solid(below, GROOM.material))
+        upload_torso(frame_renderer)
 
-        def counted(part: SolidPass, *values: Any) -> None:
-            count[0] += part is frame_renderer._solids["torso"]
-            draw(part, *values)
+        def counted(part: Any, *values: Any) -> Any:
+            count[0] += part is frame_renderer._meshes._solids["torso"]
+            return draw(part, *values)
 
-        monkeypatch.setattr(SolidPass, "draw", counted)
+        monkeypatch.setattr(kind, "draw", counted)
         for turn in np.linspace(0.0, 0.3, 2 * TURNS):
             pose = rotation_about((0, 1, 0), turn, np.zeros(3))
             turned = inputs(whole_light=False, solids=("torso",), world_from_head=pose)
             kept = picture(frame_renderer, turned)
         assert 2 <= count[0] <= 3
-        frame_renderer._scenery_made = frame_renderer._backdrop_made = None
+        frame_renderer._meshes.forget()
         anew = picture(frame_renderer, replace(turned, same_light=True))
     assert count[0] >= 3
     assert changed(kept, anew).mean() < 0.01
+
+
+def upload_torso(frame_renderer: FrameRenderer) -> None:
+    """Upload a ball below the head as the torso."""
+    below = replace(GROOM.head, vertices=GROOM.head.vertices - np.float32([0.05, 0.1, 0.0]))
+    frame_renderer.upload_solid("torso", head_solid(below, GROOM.material))
+
+
+NODDED = rotation_about((1, 0, 0), 0.3, np.zeros(3))
+CHANGES: dict[str, dict[str, Any]] = {
+    "camera": {"camera": Camera.on_turn(60.0, distance=0.6, focal=260.0, width=160, height=120)},
+    "head": {"world_from_head": NODDED, "solids": ()},
+    "torso": {"world_from_torso": NODDED},
+    "no head": {"show_head": False},
+    "no torso": {"solids": ()},
+    "floor": {"floor": -0.2},
+    "exposure": {"exposure": 1.2},
+    "lights": {"light_turn": 1.0},
+    "backdrop": {"backdrop": "warm"},
+    "skin": {"fine_skin": True},
+    "no hair": {"hair": None},
+    "size": {"camera": CAMERA.resized(96, 72)},
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_a_kept_layer_is_a_fresh_one(frame_renderer: FrameRenderer, what: str) -> None:
+    """Whatever changes, and back again: pictures are those of which nothing was kept.
+
+    Only the torso keeps its light while the head moves, until the next light.
+    """
+    first = inputs(solids=("torso",))
+    with renderer():
+        upload_torso(frame_renderer)
+        frame_renderer.draw(replace(first, guide_rows=frame_renderer.body.guide_rest))
+        for wanted in (replace(first, **CHANGES[what]), first):
+            kept = picture(frame_renderer, replace(wanted, same_light=True, whole_light=False))
+            frame_renderer._meshes.forget()
+            anew = picture(frame_renderer, replace(wanted, same_light=True, whole_light=False))
+            np.testing.assert_array_equal(kept, anew)
+
+
+def test_processor_and_shaders_draw_the_same_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Depth is the same, and so are colours up to where light is computed: vertices or pixels."""
+    monkeypatch.setattr(mesh_layer, "EDGE_SAMPLES", 0)
+    head = default_head()
+    camera = Camera.on_turn(20.0, distance=0.6, focal=520.0, width=320, height=240)
+    wanted = inputs(camera=camera, hair=None, world_from_head=NODDED)
+    pictures, depths = [], []
+    with renderer() as gl:
+        for soft in (True, False):
+            body = HairBody.of(GROOM, 100)
+            stage = FrameRenderer(gl, head_solid(head, GROOM.material), body, soft)
+            pictures.append(picture(stage, wanted).astype(int))
+            depth = stage._meshes.depth_texture().read()
+            depths.append(np.frombuffer(depth, np.float32).reshape(240, 320))
+            stage.release()
+    skin = depths[1] < 1
+    assert 0.2 < skin.mean() < 0.8
+    assert ((depths[0] < 1) == skin).mean() > 0.9995
+    assert np.quantile(np.abs(depths[0] - depths[1])[skin], 0.999) < 1e-4
+    off = np.abs(pictures[0] - pictures[1]).max(axis=2)
+    assert off[~skin].max() <= 1
+    assert off[skin].mean() < 8
 
 
 def test_the_neck_ends_in_the_collar_of_a_head_that_nods() -> None:
@@ -267,8 +400,7 @@ def test_hair_behind_meshes_is_not_shaded() -> None:
         hair = frame_renderer.hair
         assert isinstance(hair, SoftHairPass)
         looks, seen = hair._looks[: LOOK.hairs, :, 3], hair._seen[: LOOK.hairs]
-        data = frame_renderer._backdrop.read(components=1, attachment=-1, dtype="f4")
-        mesh = np.frombuffer(data, np.float32).reshape(CAMERA.height, CAMERA.width)
+        mesh = frame_renderer._meshes.depth.T.copy()  # type: ignore[attr-defined]
         frame_renderer.release()
 
     def behind(places: Float32Array) -> np.ndarray:
@@ -303,7 +435,7 @@ def test_processor_and_shaders_draw_the_same(
     smooth: bool, direction: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Both ways to draw differ by roundings, and by how finely skin and shadows are sampled."""
-    monkeypatch.setattr(frame, "EDGE_SAMPLES", 0)  # as on the processor
+    monkeypatch.setattr(mesh_layer, "EDGE_SAMPLES", 0)  # as on the processor
     look = replace(LOOK, smooth=smooth, by_direction=direction, wider=2.0)
     wanted = inputs(hair=look)
     with renderer() as gl:

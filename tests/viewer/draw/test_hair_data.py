@@ -22,11 +22,11 @@ from hairkit.viewer.draw.hair_data import (
 
 
 def test_hair_lies_at_rest_where_it_was_made() -> None:
-    """The guides' mix with the offsets gives a hair of about the guides' length on the scalp."""
+    """The mean of the guides' roots with the edges gives a hair of about the guides' length."""
     groom = bristle_groom()
     body = HairBody.of(groom, 500)
-    course = np.einsum("sk,skmc->smc", body.weights, body.guide_rest[body.followed])
-    hair = course + body.offsets
+    roots = np.einsum("sk,skc->sc", body.weights, body.guide_rest[:, 0][body.followed])
+    hair = roots[:, None] + np.cumsum(body.edges, axis=1)
     radius = np.linalg.norm(hair[:, 0], axis=1)
     assert (np.abs(radius - 0.1) < 0.004).all()  # the roots, on the ball of 10 cm
     length = np.linalg.norm(np.diff(hair, axis=1), axis=2).sum(axis=1)
@@ -40,7 +40,8 @@ def test_the_guides_come_first_and_follow_themselves() -> None:
     count = len(groom.strands)
     assert (body.followed[:count, 0] == np.arange(count)).all()
     assert (body.weights[:count, 0] == 1).all()
-    assert not body.offsets[:count].any()
+    assert not body.edges[:count, 0].any()
+    np.testing.assert_allclose(body.edges[:count, 1:], np.diff(body.guide_rest, axis=1))
     assert len(body) == 400
 
 
@@ -49,7 +50,7 @@ def test_fewer_hairs_are_a_first_part_of_more_hairs_of_the_same_spread() -> None
     groom = bristle_groom()
     body = HairBody.of(groom, 3000)
     course = np.einsum("sk,skc->sc", body.weights, body.guide_rest[body.followed][:, :, 0])
-    roots = (course + body.offsets[:, 0])[len(groom.strands) :]
+    roots = (course + body.edges[:, 0])[len(groom.strands) :]
     some = roots[: len(roots) // 10]
     np.testing.assert_allclose(some.mean(axis=0), roots.mean(axis=0), atol=0.03)
     np.testing.assert_allclose(some.std(axis=0), roots.std(axis=0), atol=0.03)

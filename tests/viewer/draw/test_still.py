@@ -14,9 +14,9 @@ from hairkit.rendering.head import head_solid
 from hairkit.testing import bristle_groom
 from hairkit.types.camera import Camera
 from hairkit.viewer.actions.actions import perform
-from hairkit.viewer.draw.frame import FrameInputs, FrameRenderer
+from hairkit.viewer.draw.frame import FrameRenderer
 from hairkit.viewer.draw.hair_data import HairBody
-from hairkit.viewer.draw.interface import HairLook
+from hairkit.viewer.draw.interface import FrameInputs, HairLook
 from hairkit.viewer.draw.still import LENS_SAMPLES, SAMPLES, Lens, Still, sample_camera
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
@@ -99,9 +99,10 @@ def curtain(count: int) -> HairBody:
     hair = np.stack(np.broadcast_arrays(x[:, None], t, (-2 * x - thick)[:, None]), axis=2)
     first = np.zeros((count, 3), np.int32)
     weights = np.tile(np.float32([1, 0, 0]), (count, 1))
-    offsets = (hair - body.guide_rest[0]).astype(np.float32)
-    widths = np.full(offsets.shape[:2], GROOM.material.width, np.float32)
-    return replace(body, followed=first, weights=weights, offsets=offsets, widths=widths)
+    edges = np.diff(hair, axis=1, prepend=hair[:, :1]).astype(np.float32)
+    edges[:, 0] = hair[:, 0] - body.guide_rest[0, 0]
+    widths = np.full(edges.shape[:2], GROOM.material.width, np.float32)
+    return replace(body, followed=first, weights=weights, edges=edges, widths=widths)
 
 
 @pytest.mark.parametrize("soft", [True, False], ids=["processor", "shaders"])
