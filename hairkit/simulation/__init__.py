@@ -3,6 +3,7 @@
 The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)` returns a
 `Simulator`.
 
+* `guide_simulator`: guides, head, torso and drawn points of all simulators
 * `hair_cells`: mass and momentum of hair on a grid, compiled
 * `hair_grid`: contact between strands as changes of velocity
 * `motion`: motion of the head: keyframes and shakes

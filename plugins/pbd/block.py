@@ -7,7 +7,6 @@ shares of the rod's mean mass, so that stiffness is in 1/s^2.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,11 +14,10 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
-from hairkit.simulation.hair_cells import drift_rows
 
 from .linear_system import System
 from .rods import Rods
-from .state import Contact, Load, State, TorsoStep
+from .state import Contact, State
 
 Records = npt.NDArray[np.void]
 Floats = npt.NDArray[np.floating[Any]]
@@ -63,16 +61,6 @@ WORK = lanes_of({
 """Of a node: what a substep works out for it and its segment."""
 ACTING = lanes_of({"air": 3, "force": 3})
 """Of a node: velocity of the air, world; force over the rod's mean mass, head axes."""
-STEP: dict[Kind, np.dtype[Any]] = {
-    kind: np.dtype(
-        [(name, kind, (3, 4)) for name in ("head_step", "drift", "air")]
-        + [("turn", kind, (4,)), ("torso", kind, (3, 4)), ("torso_drift", kind, (3, 4))]
-    )
-    for kind in KINDS
-}
-"""Of a substep: motion of the head axes, rows; velocity of a point that rides on the head; turn
-from the world's axes, and gravity; the head's turn (w, x, y, z); head axes to the torso's; velocity
-of a point that rides on the torso. Shaders have the same."""
 
 
 class Packed(NamedTuple):
@@ -87,19 +75,22 @@ class Packed(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """Numbers of a run."""
+    """Numbers of a run, see `Contact` and `Rates`."""
 
     seconds: np.floating[Any]
     damping: np.floating[Any]
     friction: np.floating[Any]
     fastest: np.floating[Any]
     rounds: int
-    """Of friction; -1 without obstacles."""
 
 
-def constants(
-    rods: Rods, system: System, contact: Contact | None
-) -> tuple[Float64Array, Float64Array]:
+def settings_of(system: System, contact: Contact, kind: Kind) -> Settings:
+    """Return the numbers of a run."""
+    step, damping = kind(system.step), kind(system.rates.damping)
+    return Settings(step, damping, kind(contact.friction), kind(contact.fastest), contact.rounds)
+
+
+def constants(rods: Rods, system: System, contact: Contact) -> tuple[Float64Array, Float64Array]:
     """Return (S, n, 20) `CONSTANTS` and (S, n (n - 1) / 2) lower rows of the metric."""
     count, nodes = rods.mass.shape
     made = np.zeros((count, nodes, sum(CONSTANTS.values())))
@@ -108,7 +99,7 @@ def constants(
     pivot = lower.diagonal(axis1=1, axis2=2)
     made[..., :3], made[..., 3] = rods.points, rods.mass / mean
     made[..., 4], made[..., 5] = system.rates.drag, system.rates.shape
-    made[..., 6] = -1.0 if contact is None else contact.clearance
+    made[..., 6] = contact.clearance
     made[:, 1:, 7] = mean / rods.mass[:, 1:]
     for below in (1, 2):  # the factor's bands: made[:, :, 8] and made[:, :, 9]
         band = lower.diagonal(-below, axis1=1, axis2=2) / pivot[:, :-below]
@@ -121,30 +112,11 @@ def constants(
     return made, system.metric[:, row, column] * mean
 
 
-def steps_of(loads: Sequence[Load], seconds: float, kind: Kind) -> Records:
-    """Return (K,) `STEP` of substeps of so many seconds."""
-    steps = np.zeros(len(loads), STEP[kind])
-    for step, load in zip(steps, loads, strict=True):
-        torso = load.torso or TorsoStep(np.eye(4), load.head_step)
-        step["head_step"], step["torso"] = load.head_step[:3], torso.from_head[:3]
-        step["drift"] = drift_rows(load.head_step, seconds)
-        step["torso_drift"] = drift_rows(torso.step, seconds)
-        step["air"][:, :3], step["air"][:, 3] = load.turn, load.turn @ load.gravity
-        step["turn"] = quaternion.from_matrix(load.head_step[:3, :3])
-    return steps
-
-
-def acting(rods: Rods, load: Load, kind: Kind) -> Records:
-    """Return (B or 1, n or 1) `ACTING` of a load."""
-    force = np.zeros(3) if load.force is None else load.force / unit_mass(rods)
-    both = np.concatenate(np.broadcast_arrays(load.air, force), axis=-1)
-    return records(pack_lanes(both if both.ndim > 1 else both[None, None], kind), ACTING[kind])
-
-
-def unit_mass(rods: Rods) -> Float64Array:
-    """Return (S, 1, 1) the unit of masses and forces, kilograms."""
-    result: Float64Array = rods.mass.mean(axis=1)[:, None, None]
-    return result
+def acting(rods: Rods, air: Float64Array, force: Float64Array | None) -> Float64Array:
+    """Return (S or 1, n or 1, 6) `ACTING` of what `Engine.run` takes."""
+    share = np.zeros(3) if force is None else force / rods.mass.mean(axis=1)[:, None, None]
+    both = np.concatenate(np.broadcast_arrays(air, share), axis=-1)
+    return both if both.ndim > 1 else both[None, None]
 
 
 def state_rows(rods: Rods, state: State) -> Float64Array:

@@ -8,10 +8,10 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.simulation import Grab
+from hairkit.simulation.rigid_motion import transform_points
 
 from .embedding import Embedding
 from .rods import Rods
-from .state import transform_points
 
 FIRM = 4e5
 """1/s^2: squared frequency, of 100 Hz, of the pull to a hand: a strand's weight moves it 0.3 mm."""
@@ -43,14 +43,8 @@ class Hands:
             places[grab.point] = start + min(1.0, most / size) * way
         self._places = places
 
-    def pull(self, embedding: Embedding, shape: Float64Array) -> Float64Array:
-        """Return the squared frequencies (S, n) of pulls, `shape` where nothing is held."""
-        result = shape.copy()
-        np.add.at(result, _nodes(embedding, self.held), FIRM)
-        return result
-
     def force(self, rods: Rods, embedding: Embedding, back: Float64Array) -> Float64Array | None:
-        """Return the force (S, n, 3) that makes hands, not rest, the ends of these pulls, newtons.
+        """Return the force (S, n, 3) that makes hands, not rest, the ends of the pulls, newtons.
 
         `back` (4, 4) transforms the world to the head axes. A hand that the strand does not reach
         pulls to the nearest point that it does.
@@ -58,7 +52,7 @@ class Hands:
         if not self._places:
             return None
         force = np.zeros_like(rods.points)
-        rod, node = _nodes(embedding, self.held)
+        rod, node = held_nodes(embedding, self.held)
         root = rods.points[rod, 0]
         away = transform_points(back, np.array([*self._places.values()])) - root
         reach = TAUT * np.cumsum(rods.length, axis=1)[rod, node - 1]
@@ -68,7 +62,7 @@ class Hands:
         return force
 
 
-def _nodes(embedding: Embedding, held: tuple[int, ...]) -> tuple[Int64Array, Int64Array]:
+def held_nodes(embedding: Embedding, held: tuple[int, ...]) -> tuple[Int64Array, Int64Array]:
     """Return rod and node (G,) nearest to the held points; roots are not held."""
     index = np.array(held, np.int64)
     node = embedding.segment[index] + (embedding.share[index] >= 0.5)

@@ -33,7 +33,6 @@ from hairkit.simulation.vectors import (
 from .block import LANES, Packed, Records, Settings
 from .kernel_contact import resolve_contacts
 from .lanes import (
-    FIFTH,
     THIRD,
     four,
     half_way,
@@ -46,14 +45,15 @@ from .lanes import (
     twist_angle,
 )
 from .linear_system import IMPLICIT
-from .rods import SHARPEST as SHARPEST64
+from .state import Steps
 
 AHEAD, PASSED, DRIFT = (np.float32(c) for c in (1 / IMPLICIT, 1 - IMPLICIT, 0.5 - IMPLICIT**2))
 """Weights: of a change of place in the velocity, over the step; of the old acceleration in the
 velocity, and in the place, where that of the new one is `IMPLICIT` squared."""
-SHARPEST, SPIN = np.float32(SHARPEST64), np.float32(0.3)
-"""See there; largest rotation of a frame by torsion in a substep, radians: limits the Newton
-step."""
+SHARPEST = np.float32(0.3)
+"""Lower bound of 1 + cosine of a turn, which limits the twist coupling beyond 134 degrees."""
+SPIN = np.float32(0.3)
+"""Largest rotation of a frame by torsion in a substep, radians: limits the Newton step."""
 TURN = np.float32(1.0)
 """Largest rotation of a segment in a substep, radians: more than hair does, less than what linear
 solves cannot follow."""
@@ -70,12 +70,12 @@ def run_substeps(
     first: int,
     last: int,
     packed: Packed,
-    steps: Records,
+    steps: Steps,
     acting: Records,
     fields: Fields,
     settings: Settings,
 ) -> None:
-    """Advance blocks `first` to before `last` by as many substeps as there are `steps`, in place.
+    """Advance blocks `first` to before `last` by all substeps, in place.
 
     `acting` (B, n) of `ACTING` may have one block and node for all.
     """
@@ -84,17 +84,20 @@ def run_substeps(
     for block in range(first, last):
         s, metric = packed.nodes[block], packed.metric[block]
         act = acting[min(block, len(acting) - 1)]
-        for k in range(len(steps)):
-            predict_nodes(s, x, steps[k], settings, act)
-            lead_roots(s, x, steps[k], h)
-            transport_frames(s, x, steps[k])
+        for k in range(len(steps.turn)):
+            step = Steps(
+                steps.head_step[k], steps.drift[k], steps.air[k],
+                steps.turn[k], steps.torso[k], steps.torso_drift[k],
+            )  # fmt: skip
+            predict_nodes(s, x, step, settings, act)
+            lead_roots(s, x, step, h)
+            transport_frames(s, x, step)
             relax_twist(s, x)
             add_elastic(s, x)
             solve_banded(s, x)
             keep_linear_lengths(s, x, metric, matrix)
             move_nodes(s, x, h)
-            if settings.rounds >= 0:
-                resolve_contacts(s, x, steps[k], fields, settings)
+            resolve_contacts(s, x, step, fields, settings)
             keep_lengths(s, h)
 
 
@@ -178,7 +181,6 @@ def relax_twist(s: Any, x: Any) -> None:
             half, twist = HALF * node.bend[w], node.twist[w]
             torque = twist * (twist_angle(before, after) - node.natural[w])
             firm = HALF * half * max(dot(natural, turn), ZERO)
-            own.torque[w] = torque
             own.pivot[w] = twist + firm
             own.beside[w] = firm - twist
             own.value[w] = half * dot(here, plus(spun, aside)) - torque
@@ -186,18 +188,13 @@ def relax_twist(s: Any, x: Any) -> None:
             last.value[w] += half * dot(away, minus(spun, aside)) + torque
     solve_tridiagonal(x, len(s))
     for j in range(1, len(s)):
-        node, own, last = s[j], x[j], x[j - 1]
+        node, own = s[j], x[j]
         for w in range(LANES):
-            # half angles by a rational cosine and sine; the angle by the arc tangent's series
+            # half angles by a rational cosine and sine
             half = HALF * min(max(own.value[w], -SPIN), SPIN)
-            square = half * half
-            cosine = ONE / math.sqrt(ONE + square)
+            cosine = ONE / math.sqrt(ONE + half * half)
             axis = times(half * cosine, three(own.way, w))
             put_four(node.frame, w, product((cosine, *axis), four(node.frame, w)))
-            angle = (half + half) * (ONE - square * (THIRD - FIFTH * square))
-            own.value[w] = angle
-            # exact for frames rotated about their own segments
-            own.torque[w] += node.twist[w] * (angle - last.value[w])
 
 
 @stage
@@ -217,9 +214,6 @@ def solve_tridiagonal(x: Any, n: int) -> None:
         for w in range(LANES):
             known = next_.beside[w] * next_.value[w]
             own.value[w] = (own.value[w] - known) * own.pivot[w]
-    held = x[0]
-    for w in range(LANES):
-        held.value[w] = ZERO
 
 
 @stage
@@ -229,13 +223,14 @@ def add_elastic(s: Any, x: Any) -> None:
         node, own, last_node, last = s[j], x[j], s[j - 1], x[j - 1]
         for w in range(LANES):
             away, here = three(last.way, w), three(own.way, w)
-            frames = four(last_node.frame, w), four(node.frame, w)
-            natural, quarter = half_way(frames[0], frames[1], three(node.curve, w))
+            before, after = four(last_node.frame, w), four(node.frame, w)
+            natural, quarter = half_way(before, after, three(node.curve, w))
+            torque = node.twist[w] * (twist_angle(before, after) - node.natural[w])
             turn, bend = minus(three(own.reach, w), three(last.reach, w)), node.bend[w]
             spun = times(HALF * bend, cross(natural, turn))
             aside = cross(quarter, spun)
             cosine = max(ONE + dot(away, here), SHARPEST)
-            twisting = times(own.torque[w] / cosine, cross(away, here))
+            twisting = times(torque / cosine, cross(away, here))
             moment = times(bend, minus(natural, turn))
             put(own.pull, w, plus(minus(moment, twisting), cross(plus(spun, aside), here)))
             to_before = minus(cross(minus(spun, aside), away), plus(moment, twisting))

@@ -28,7 +28,7 @@ COMPLIANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """Drag, damping and shape stiffness of the nodes."""
+    """Drag, damping and pull to the captured shape."""
 
     drag: Float64Array
     """(S, n) rate of air drag, 1/s."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from hairkit_plugins.pbd.rods import Rods, make_rods
+from hairkit_plugins.pbd.rods import Rods
 from hairkit_plugins.pbd.state import rest_state
-from pbd_bench import DENSITY, DOWN, LENGTH, G, straight
+from pbd_bench import DENSITY, DOWN, LENGTH, G, rods_of, straight
 from pbd_modes import linearised
 from scipy.special import jn_zeros
 
@@ -24,7 +24,7 @@ def tones(rods: Rods, force: Float64Array | None, free: Float64Array | None = No
 
 def test_a_beam_has_three_tones() -> None:
     """omega = k^2 sqrt(EI / (rho A L^4)) with cos k cosh k = -1: to 0.1, 0.4 and 0.8 %."""
-    rods = make_rods(straight(1, NODES), DENSITY, 1e-8, straight=True)
+    rods = rods_of(straight(1, NODES), DENSITY, 1e-8, straight=True)
     k = np.array([1.87510407, 4.69409113, 7.85475744])
     error = tones(rods, None) / (k**2 * np.sqrt(1e-8 / DENSITY / LENGTH**4)) - 1
     assert (np.abs(error) < [0.001, 0.004, 0.008]).all()
@@ -35,7 +35,7 @@ def test_a_heavy_string_has_bessels_tones() -> None:
 
     Tension w x from the tip: (x u')' + omega^2 u / g = 0, u = J_0(2 omega sqrt(x / g)).
     """
-    rods = make_rods(straight(1, NODES, (0, -1, 0)), DENSITY, 1e-18, straight=True)
+    rods = rods_of(straight(1, NODES, (0, -1, 0)), DENSITY, 1e-18, straight=True)
     error = tones(rods, rods.mass[0][:, None] * DOWN) / (jn_zeros(0, 3) / 2 * np.sqrt(G / LENGTH))
     assert (np.abs(error - 1) < [0.0005, 0.003, 0.011]).all()
 
@@ -43,7 +43,7 @@ def test_a_heavy_string_has_bessels_tones() -> None:
 def test_a_taut_string_has_harmonic_tones() -> None:
     """omega = n pi / L sqrt(T / rho A), the tip led along the string: to 0.5 %."""
     tension = 1e-4
-    rods = make_rods(straight(1, NODES), DENSITY, 1e-16, straight=True)
+    rods = rods_of(straight(1, NODES), DENSITY, 1e-16, straight=True)
     force = np.zeros((NODES, 3))
     force[-1, 0] = tension
     law = np.arange(1, 4) * np.pi / LENGTH * np.sqrt(tension / DENSITY)
@@ -53,7 +53,7 @@ def test_a_taut_string_has_harmonic_tones() -> None:
 
 def test_a_rigid_rod_swings_on_a_hinge() -> None:
     """T = 2 pi sqrt(2 L / 3 g): weight at L / 2, inertia rho A L^3 / 3; to 0.1 %."""
-    rods = make_rods(straight(1, NODES, (0, -1, 0)), DENSITY, 1e-4, straight=True)
+    rods = rods_of(straight(1, NODES, (0, -1, 0)), DENSITY, 1e-4, straight=True)
     hinged = rods.bend.copy()
     hinged[:, 0] = 0.0
     rods = replace(rods, bend=hinged)
