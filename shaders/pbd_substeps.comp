@@ -26,7 +26,6 @@ uniform float u_fastest;       // m/s
 
 int rod;
 vec3 place[NODE_ROOM], speed[NODE_ROOM], gain[NODE_ROOM], force[NODE_ROOM], solved[NODE_ROOM];
-vec3 free[NODE_ROOM];          // the solution without lengths
 vec3 held_back;                // force of the root's acceleration on the next node
 float slack[NODE_ROOM];
 vec4 frame[SEGMENT_ROOM], root_frame;
@@ -184,17 +183,16 @@ void solve_banded() {
 // Solve for the forces, and for the tensions that keep the lengths; move the nodes.
 void go_on() {
     solve_banded();
-    for (int j = 0; j < EACH_NODE; j++) free[j] = solved[j];
     solve_lengths();
     vec3 before = vec3(0.0);
     for (int j = 0; j < EACH_NODE; j++) {
         vec3 after = j < SEGMENTS ? value[j] * direction[j] : vec3(0.0);
-        force[j] = before - after;
+        force[j] += after - before;
         before = after;
     }
     solve_banded();
     for (int j = 1; j < EACH_NODE; j++) {
-        vec3 change = free[j] - solved[j], added = change / (IMPLICIT * u_seconds);
+        vec3 change = solved[j], added = change / (IMPLICIT * u_seconds);
         place[j] += change;
         speed[j] += added;
         gain[j] += added / u_seconds;

@@ -56,7 +56,7 @@ def lanes_of(fields: dict[str, int]) -> dict[Kind, np.dtype[Any]]:
 NODE = lanes_of({**STATE, **CONSTANTS})
 WORK = lanes_of({
     "force": 3, "edge": 3, "way": 3, "reach": 3, "pull": 3, "torque": 1, "pivot": 1, "beside": 1,
-    "value": 1, "free": 3, "solved": 3, "normal": 3, "surface": 3, "depth": 1, "grip": 1,
+    "value": 1, "solved": 3, "normal": 3, "surface": 3, "depth": 1, "grip": 1,
 })  # fmt: skip
 """Of a node: what a substep works out for it and its segment."""
 ACTING = lanes_of({"air": 3, "force": 3})

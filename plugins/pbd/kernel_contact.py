@@ -22,7 +22,7 @@ from hairkit.simulation.vectors import (
 )
 
 from .block import LANES
-from .lanes import put, rows_of, stage, three
+from .lanes import put, stage, three
 
 FAR = 1.0
 """Metres up to which distances are exact: bounds would be looked up again sooner."""
@@ -41,20 +41,22 @@ HEAD = ((ONE, ZERO, ZERO, ZERO), (ZERO, ONE, ZERO, ZERO), (ZERO, ZERO, ONE, ZERO
 def resolve_contacts(s: Any, x: Any, step: Any, fields: Any, settings: Any) -> None:
     """Push nodes out of the obstacles, then rub and restore the lengths by turns."""
     touching, h, with_torso = False, settings.seconds, fields.torso.distance.shape[0] > 0
-    drift, pose, beside = rows_of(step.drift), rows_of(step.torso), rows_of(step.torso_drift)
+    drift, pose, beside = step.drift, step.torso, step.torso_drift
     clear_contact(x[0])
     for j in range(1, len(s)):
         node, own, near = s[j], x[j], False
         clear_contact(own)
-        if use_room(node, node.room, drift, h):
+        if use_room(node, own, node.room, drift, h):
             near = meets(node, own, node.room, node.wall, fields.head, HEAD, drift)
-        if with_torso and use_room(node, node.aside, beside, h):
+        if with_torso and use_room(node, own, node.aside, beside, h):
             near |= meets(node, own, node.aside, node.beside, fields.torso, pose, beside)
         if near:
             push_out(node, own, settings)
+            rub(node, own, h)
             touching = True
-    # without contact, two iterations are enough
-    for _ in range(1 + (settings.rounds if touching else min(settings.rounds, 1))):
+    restore_lengths(s, x, settings, False)
+    # without contact, one more iteration is enough
+    for _ in range(settings.rounds if touching else min(settings.rounds, 1)):
         restore_lengths(s, x, settings, touching)
 
 
@@ -63,21 +65,22 @@ def clear_contact(x: Any) -> None:
     """Forget the last contact of a node."""
     for w in range(LANES):
         put(x.normal, w, (ZERO, ZERO, ZERO))
-        put(x.surface, w, (ZERO, ZERO, ZERO))
         x.depth[w] = x.grip[w] = ZERO
 
 
 @inlined
-def use_room(s: Any, room: Any, drift: Rows, h: Any) -> bool:
+def use_room(s: Any, x: Any, room: Any, drift: Rows, h: Any) -> bool:
     """Take from the room left to a body what a node may have moved; return whether one may meet it.
 
     `drift` is the body's motion.
     """
-    near = 0
     for w in range(LANES):
         speed = minus(three(s.speed, w), times(HALF * h, three(s.gain, w)))
         by = minus(speed, moved(drift, three(s.place, w)))
-        room[w] -= FURTHER * h * math.sqrt(dot(by, by))
+        x.value[w] = FURTHER * h * math.sqrt(dot(by, by))
+    near = 0
+    for w in range(LANES):
+        room[w] -= x.value[w]
         near |= room[w] <= NEAR
     return near > 0
 
@@ -168,21 +171,17 @@ def restore_lengths(s: Any, x: Any, settings: Any, rubs: bool) -> None:
             own.beside[w] = beside
             own.pivot[w] = ONE / (firm - factor * beside)
             own.value[w] = square * size - here.length[w] - factor * last.value[w]
+    over, friction = ONE / settings.seconds, settings.friction
     for j in range(len(s) - 1, 0, -1):
-        pull_node(s[j], x[j], x[j + 1], ONE / settings.seconds, settings.friction)
-
-
-@inlined
-def pull_node(s: Any, x: Any, after: Any, over: Any, friction: Any) -> None:
-    """Move a node by the pulls of its segments, the one that ends there and the one after."""
-    for w in range(LANES):
-        value = (x.value[w] - after.beside[w] * after.value[w]) * x.pivot[w]
-        x.value[w] = value
-        pull = times(after.value[w], three(after.way, w))
-        pull = minus(pull, times(value, three(x.way, w)))
-        ease, normal = s.ease[w], three(x.normal, w)
-        away = dot(pull, normal)
-        change = times(ease, minus(pull, times(away, normal)))
-        put(s.place, w, plus(three(s.place, w), change))
-        put(s.speed, w, plus(three(s.speed, w), times(over, change)))
-        x.grip[w] -= friction * over * ease * away
+        here, own, after = s[j], x[j], x[j + 1]
+        for w in range(LANES):
+            value = (own.value[w] - after.beside[w] * after.value[w]) * own.pivot[w]
+            own.value[w] = value
+            pull = times(after.value[w], three(after.way, w))
+            pull = minus(pull, times(value, three(own.way, w)))
+            ease, normal = here.ease[w], three(own.normal, w)
+            away = dot(pull, normal)
+            change = times(ease, minus(pull, times(away, normal)))
+            put(here.place, w, plus(three(here.place, w), change))
+            put(here.speed, w, plus(three(here.speed, w), times(over, change)))
+            own.grip[w] -= friction * over * ease * away

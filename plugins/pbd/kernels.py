@@ -20,7 +20,6 @@ from hairkit.simulation.vectors import (
     ZERO,
     cross,
     dot,
-    inlined,
     minus,
     moved,
     plus,
@@ -85,10 +84,7 @@ def run_substeps(
         s, metric = packed.nodes[block], packed.metric[block]
         act = acting[min(block, len(acting) - 1)]
         for k in range(len(steps.turn)):
-            step = Steps(
-                steps.head_step[k], steps.drift[k], steps.air[k],
-                steps.turn[k], steps.torso[k], steps.torso_drift[k],
-            )  # fmt: skip
+            step = step_of(steps, k)
             predict_nodes(s, x, step, settings, act)
             lead_roots(s, x, step, h)
             transport_frames(s, x, step)
@@ -102,9 +98,22 @@ def run_substeps(
 
 
 @stage
+def step_of(steps: Any, k: int) -> Any:
+    """Return one substep, whose numbers stay in registers."""
+    return Steps(
+        rows_of(steps.head_step[k]),
+        rows_of(steps.drift[k]),
+        rows_of(steps.air[k]),
+        (steps.turn[k, 0], steps.turn[k, 1], steps.turn[k, 2], steps.turn[k, 3]),
+        rows_of(steps.torso[k]),
+        rows_of(steps.torso_drift[k]),
+    )
+
+
+@stage
 def predict_nodes(s: Any, x: Any, step: Any, settings: Any, act: Any) -> None:
     """Bring nodes to the new head axes, extrapolate them, and sum the forces on them."""
-    head, drift, air = rows_of(step.head_step), rows_of(step.drift), rows_of(step.air)
+    head, drift, air = step.head_step, step.drift, step.air
     gravity, h, damping = (air[0][3], air[1][3], air[2][3]), settings.seconds, settings.damping
     for j in range(1, len(s)):
         outer = act[min(j, len(act) - 1)]
@@ -131,7 +140,7 @@ def lead_roots(s: Any, x: Any, step: Any, h: Any) -> None:
 
     The inertia between them, a sixth of the segment's mass, is a third of the root's.
     """
-    head, over = rows_of(step.head_step), ONE / h
+    head, over = step.head_step, ONE / h
     node, own, first = s[0], x[0], x[1]
     for w in range(LANES):
         rest, place = three(node.rest, w), moved(head, three(node.place, w))
@@ -151,7 +160,6 @@ def lead_roots(s: Any, x: Any, step: Any, h: Any) -> None:
 @stage
 def transport_frames(s: Any, x: Any, step: Any) -> None:
     """Write the segments, and transport their frames to the new directions."""
-    turn = (step.turn[0], step.turn[1], step.turn[2], step.turn[3])
     for j in range(1, len(s)):
         node, own, last_node = s[j], x[j], s[j - 1]
         for w in range(LANES):
@@ -160,7 +168,7 @@ def transport_frames(s: Any, x: Any, step: Any) -> None:
             put(own.edge, w, edge)
             put(own.reach, w, times(node.over[w], edge))
             put(own.way, w, way)
-            put_four(node.frame, w, swing_frame(product(turn, four(node.frame, w)), way))
+            put_four(node.frame, w, swing_frame(product(step.turn, four(node.frame, w)), way))
 
 
 @stage
@@ -181,17 +189,23 @@ def relax_twist(s: Any, x: Any) -> None:
             half, twist = HALF * node.bend[w], node.twist[w]
             torque = twist * (twist_angle(before, after) - node.natural[w])
             firm = HALF * half * max(dot(natural, turn), ZERO)
+            own.torque[w] = torque
             own.pivot[w] = twist + firm
             own.beside[w] = firm - twist
             own.value[w] = half * dot(here, plus(spun, aside)) - torque
             last.pivot[w] += twist + firm
             last.value[w] += half * dot(away, minus(spun, aside)) + torque
     solve_tridiagonal(x, len(s))
+    for w in range(LANES):
+        held.value[w] = ZERO
     for j in range(1, len(s)):
-        node, own = s[j], x[j]
+        node, own, last = s[j], x[j], x[j - 1]
         for w in range(LANES):
+            angle = min(max(own.value[w], -SPIN), SPIN)
+            own.value[w] = angle
+            own.torque[w] += node.twist[w] * (angle - last.value[w])
             # half angles by a rational cosine and sine
-            half = HALF * min(max(own.value[w], -SPIN), SPIN)
+            half = HALF * angle
             cosine = ONE / math.sqrt(ONE + half * half)
             axis = times(half * cosine, three(own.way, w))
             put_four(node.frame, w, product((cosine, *axis), four(node.frame, w)))
@@ -225,12 +239,11 @@ def add_elastic(s: Any, x: Any) -> None:
             away, here = three(last.way, w), three(own.way, w)
             before, after = four(last_node.frame, w), four(node.frame, w)
             natural, quarter = half_way(before, after, three(node.curve, w))
-            torque = node.twist[w] * (twist_angle(before, after) - node.natural[w])
             turn, bend = minus(three(own.reach, w), three(last.reach, w)), node.bend[w]
             spun = times(HALF * bend, cross(natural, turn))
             aside = cross(quarter, spun)
             cosine = max(ONE + dot(away, here), SHARPEST)
-            twisting = times(torque / cosine, cross(away, here))
+            twisting = times(own.torque[w] / cosine, cross(away, here))
             moment = times(bend, minus(natural, turn))
             put(own.pull, w, plus(minus(moment, twisting), cross(plus(spun, aside), here)))
             to_before = minus(cross(minus(spun, aside), away), plus(moment, twisting))
@@ -248,40 +261,28 @@ def solve_banded(s: Any, x: Any) -> None:
     """Write `solved`, A^-1 `force` of the free nodes, by the factor L D L^T of two bands."""
     n = len(s)
     for j in range(1, n):
-        eliminate_node(s[j], x[j], x[j - 1], x[max(j - 2, 0)])
+        node, own, last, beyond = s[j], x[j], x[j - 1], x[max(j - 2, 0)]
+        for w in range(LANES):
+            known = times(node.first[w], three(last.solved, w))
+            known = plus(known, times(node.second[w], three(beyond.solved, w)))
+            put(own.solved, w, minus(three(own.force, w), known))
     for j in range(n - 1, 0, -1):
         # the entries below row j stand in the two rows after it
-        next_, further = s[min(j + 1, n - 1)], s[min(j + 2, n - 1)]
-        substitute_node(s[j], next_, further, x[j], x[j + 1], x[j + 2])
-
-
-@inlined
-def eliminate_node(s: Any, x: Any, before: Any, beyond: Any) -> None:
-    """Solve a row of L."""
-    for w in range(LANES):
-        known = times(s.first[w], three(before.solved, w))
-        known = plus(known, times(s.second[w], three(beyond.solved, w)))
-        put(x.solved, w, minus(three(x.force, w), known))
-
-
-@inlined
-def substitute_node(s: Any, next_: Any, further: Any, x: Any, after: Any, beyond: Any) -> None:
-    """Solve a row of D L^T."""
-    for w in range(LANES):
-        known = times(next_.first[w], three(after.solved, w))
-        known = plus(known, times(further.second[w], three(beyond.solved, w)))
-        put(x.solved, w, minus(times(s.pivot[w], three(x.solved, w)), known))
+        after, further = s[min(j + 1, n - 1)], s[min(j + 2, n - 1)]
+        node, own, next_, beyond = s[j], x[j], x[j + 1], x[j + 2]
+        for w in range(LANES):
+            known = times(after.first[w], three(next_.solved, w))
+            known = plus(known, times(further.second[w], three(beyond.solved, w)))
+            put(own.solved, w, minus(times(node.pivot[w], three(own.solved, w)), known))
 
 
 @stage
 def keep_linear_lengths(s: Any, x: Any, metric: Any, matrix: Any) -> None:
-    """Write `free` and `solved`, what tensions take from it so that segments keep their lengths."""
+    """Let tensions act, by which segments keep their lengths, and solve anew."""
     for j in range(1, len(s)):
         node, own, last = s[j], x[j], x[j - 1]
         for w in range(LANES):
-            here = three(own.solved, w)
-            put(own.free, w, here)
-            change = minus(here, three(last.solved, w))
+            change = minus(three(own.solved, w), three(last.solved, w))
             reach = dot(plus(three(own.edge, w), change), three(own.way, w))
             own.value[w] = reach - node.length[w]
     solve_lengths(x, metric, matrix, len(s))
@@ -290,7 +291,7 @@ def keep_linear_lengths(s: Any, x: Any, metric: Any, matrix: Any) -> None:
         for w in range(LANES):
             pull = times(own.value[w], three(own.way, w))
             after = times(next_.value[w], three(next_.way, w))
-            put(own.force, w, minus(pull, after))
+            put(own.force, w, plus(three(own.force, w), minus(after, pull)))
     solve_banded(s, x)
 
 
@@ -337,7 +338,7 @@ def move_nodes(s: Any, x: Any, h: Any) -> None:
     for j in range(1, len(s)):
         node, own = s[j], x[j]
         for w in range(LANES):
-            move = minus(three(own.free, w), three(own.solved, w))
+            move = three(own.solved, w)
             added = times(over * AHEAD, move)
             put(node.place, w, plus(three(node.place, w), move))
             put(node.speed, w, plus(three(node.speed, w), added))

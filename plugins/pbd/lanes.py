@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -26,16 +25,11 @@ from hairkit.simulation.vectors import (
     unit,
 )
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
-
 THIRD, THREE, FOUR, NINE_FIFTHS = (np.float32(c) for c in (1 / 3, 3, 4, 9 / 5))
 OPPOSITE = np.float32(1e-4)
 """Least 1 + cosine between an axis and where it is swung to."""
-
-
-def stage(function: _Function) -> _Function:
-    """Compile one step of the method for a block, by itself."""
-    return compiled_with(fastmath=True)(function)
+stage = compiled_with(fastmath=True)
+"""Compiles one step of the method for a block, by itself."""
 
 
 @inlined

@@ -66,6 +66,8 @@ KEPT_SYSTEMS = 4
 class PbdSimulator(GuideSimulator):
     """Simulated guides of a groom (see `hairkit.simulation.Simulator`)."""
 
+    rods: Rods
+    """Of the guides, at rest."""
     _options: Options
 
     def __init__(self, groom: Groom, options: Options) -> None:
@@ -74,11 +76,6 @@ class PbdSimulator(GuideSimulator):
         self._place(None)
         self._place_nodes(options.nodes)
         self._tune(options)
-
-    @property
-    def rods(self) -> Rods:
-        """The rods of the guides, at rest."""
-        return self._rods
 
     def advance(self, seconds: float, surroundings: Surroundings) -> None:
         """Advance by `seconds`, in pieces of at most `FRAME`, each in substeps."""
@@ -99,13 +96,13 @@ class PbdSimulator(GuideSimulator):
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
         """Reset the guides to rest on a head at `head_from_rest` (4, 4), with zero velocity."""
         self._place(head_from_rest)
-        self._engine.state = rest_state(self._rods)
+        self._engine.state = rest_state(self.rods)
         self._hands = Hands()
 
     def retune(self, options: Options) -> None:
         """Change the options; positions and velocities stay unless the number of nodes changes."""
         before = self._engine.state
-        if options.nodes != self._rods.nodes:
+        if options.nodes != self.rods.nodes:
             self._place_nodes(options.nodes)
         self._tune(options)
         if options.nodes == before.position.shape[1]:
@@ -114,7 +111,7 @@ class PbdSimulator(GuideSimulator):
 
     def measure(self) -> Measures:
         """Return the stretch of rods and points, and energies; potential energy is 0 at rest."""
-        rods, state = self._rods, self._engine.state
+        rods, state = self.rods, self._engine.state
         down = self._head[:3, :3].T @ self._rest_gravity
         kinetic = 0.5 * float((rods.mass[..., None] * state.velocity**2).sum())
         fallen = ((state.position - rods.points) * down).sum(axis=-1)
@@ -150,11 +147,11 @@ class PbdSimulator(GuideSimulator):
     def _tune(self, options: Options) -> None:
         """Set the options, and make what moves the nodes by them."""
         self._options = options.resolved(self._groom.physics)
-        self._rods = self._stiffen(self._options)
-        self._embedding = embed_points(self.strands, self._nodes, self._rods.frames)
-        self._hair_grid = make_hair_grid(self._nodes, self._rods.mass)
+        self.rods = self._stiffen(self._options)
+        self._embedding = embed_points(self.strands, self._nodes, self.rods.frames)
+        self._hair_grid = make_hair_grid(self._nodes, self.rods.mass)
         self._rates = self._rates_of(self._options)
-        rods = self._rods
+        rods = self.rods
         self._rest_energy = elastic_energy(rods, rods.points, rods.frames, self._rates.shape)
         self._system = lru_cache(KEPT_SYSTEMS)(self._assemble)
         self._engine = self._make_engine(self._contact_of(self._options))
@@ -165,8 +162,8 @@ class PbdSimulator(GuideSimulator):
         if name == "compute" or (name == "auto" and on_graphics_card()):
             from .gl_backend import ComputeEngine
 
-            return ComputeEngine(self._rods, contact)
-        return FastEngine(self._rods, contact, np.float64 if name == "reference" else np.float32)
+            return ComputeEngine(self.rods, contact)
+        return FastEngine(self.rods, contact, np.float64 if name == "reference" else np.float32)
 
     def _stiffen(self, options: Options) -> Rods:
         """Return the rods, whose natural shape balances gravity at the captured shape."""
@@ -182,7 +179,7 @@ class PbdSimulator(GuideSimulator):
 
     def _rates_of(self, options: Options) -> Rates:
         """Convert options to rates; drag goes as area over mass, which is 1 / width."""
-        rods, width = self._rods, self._width
+        rods, width = self.rods, self._width
         drag = options.drag * width.mean() / width
         arc = np.pad(np.cumsum(rods.length, axis=1), ((0, 0), (1, 0)))
         total = arc[:, -1:]
@@ -203,7 +200,7 @@ class PbdSimulator(GuideSimulator):
         """Return the system of substeps in which some points are held."""
         shape = self._rates.shape.copy()
         np.add.at(shape, held_nodes(self._embedding, held), FIRM)
-        return assemble(self._rods, replace(self._rates, shape=shape), step)
+        return assemble(self.rods, replace(self._rates, shape=shape), step)
 
     def _piece(
         self, seconds: float, around: Surroundings, start: Float64Array, end: Float64Array
@@ -212,7 +209,7 @@ class PbdSimulator(GuideSimulator):
         options, engine, back = self._options, self._engine, inverse_motion(end)
         check_grabs(around.grabs, len(self.strands.points))
         self._hands.move(around.grabs, lambda: self.points, options.grab_speed * seconds)
-        finer = finer_steps(start, end, self._rods.points[:, 0], self._segment)
+        finer = finer_steps(start, end, self.rods.points[:, 0], self._segment)
         torso = follow_head(self._torso, end, self._bodies.joint)
         if finer == 0:
             start, finer = end, 1  # hair and torso go with a head that is elsewhere at once
@@ -233,7 +230,7 @@ class PbdSimulator(GuideSimulator):
             self._system(round(seconds / count, 12), self._hands.held),
             steps,
             self._air(around, start),
-            self._hands.force(self._rods, self._embedding, back),
+            self._hands.force(self.rods, self._embedding, back),
         )
         self._torso = torso
         self._time += seconds
@@ -246,10 +243,10 @@ class PbdSimulator(GuideSimulator):
         wind = np.asarray(around.wind, np.float64)
         if around.turbulence == 0.0 or not wind.any():
             return wind
-        nodes = self._rods.nodes
+        nodes = self.rods.nodes
         some = np.unique(np.append(np.arange(0, nodes, APART), nodes - 1))
         share = np.stack([np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))], 1)
-        places, seed = self._rods.points[:, some].astype(np.float32), self._options.seed
+        places, seed = self.rods.points[:, some].astype(np.float32), self._options.seed
         air = air_velocity(places, self._time, wind, around.turbulence, seed, head)
         result: Float64Array = share @ air
         return result

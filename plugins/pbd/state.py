@@ -82,7 +82,7 @@ def make_steps(head: Course, torso: Course, gravity: Float64Array, seconds: floa
         head_steps[:, :3],
         drift_rows(head_steps, seconds),
         np.concatenate([turn, turn @ gravity[:, None]], axis=2),
-        quaternion.from_matrix(head_steps[:, :3, :3]),
+        np.tile(quaternion.from_matrix(head_steps[0, :3, :3]), (len(heads), 1)),
         from_head[:, :3],
         drift_rows(riding, seconds),
     )
