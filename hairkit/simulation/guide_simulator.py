@@ -12,10 +12,11 @@ from hairkit.arrays import Float32Array, Float64Array, frozen_array, read_only
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.parallel import parallel_for
+from hairkit.simulation.hands import Hands
 from hairkit.simulation.obstacle_kernels import Drawn, Points, draw_points
 from hairkit.simulation.obstacles import NO_BODIES, Bodies, groom_bodies
 from hairkit.simulation.rigid_motion import inverse_motion, transform_points
-from hairkit.simulation.simulator import Surroundings
+from hairkit.simulation.simulator import Surroundings, check_grabs
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -37,6 +38,7 @@ class GuideSimulator(ABC):
     """(4, 4) motion since rest, world."""
     _torso: Float64Array
     """(4, 4) motion since rest, world."""
+    _hands: Hands
     _points: Float32Array | None
     """Those last asked for; None after a motion."""
 
@@ -82,10 +84,15 @@ class GuideSimulator(ABC):
         """Return where the method's own curves carry the guides' points (P, 3), head axes."""
 
     def _place(self, head_from_rest: npt.ArrayLike | None) -> None:
-        """Set time to 0, and head and torso at a motion (4, 4) since rest; None: at rest."""
+        """Set time to 0, head and torso at a motion (4, 4) since rest; None: at rest; let go."""
         head = np.eye(4) if head_from_rest is None else head_from_rest
         self._head = self._torso = frozen_array(head, np.float64, (4, 4), "head_from_rest")
-        self._time, self._points = 0.0, None
+        self._time, self._points, self._hands = 0.0, None, Hands()
+
+    def _move_hands(self, around: Surroundings, most: float) -> None:
+        """Move the hands by up to `most` metres to the targets of grabs."""
+        check_grabs(around.grabs, len(self.strands.points))
+        self._hands.move(around.grabs, lambda: self.points, most)
 
     def _gravity(self, around: Surroundings) -> Float64Array:
         """Return gravity (3,), world."""

@@ -24,12 +24,11 @@ gravity. Despite the plugin's name this is not position-based dynamics.
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from hairkit.hookspecs import hookimpl
-from hairkit.options import option
+from hairkit.options import fill_options, option
 
 if TYPE_CHECKING:
     from hairkit.types.groom import Groom, HairPhysics
@@ -120,14 +119,13 @@ class Options:
 
     def resolved(self, physics: HairPhysics) -> Options:
         """Return the options with None replaced by the groom's value, clamped to its bounds."""
-        own: dict[str, Any] = {
-            "stiffness": min(max(physics.stiffness, 0.0), 1.0),
-            "bend": min(max(physics.bend_stiffness, 0.0), 1.0),
-            "damping": min(max(physics.damping, 0.0), 0.9),
-            "friction": min(max(physics.friction, 0.0), 2.0),
-        }
-        missing = {name: own[name] for name in own if getattr(self, name) is None}
-        return dataclasses.replace(self, **missing)
+        return fill_options(
+            self,
+            stiffness=physics.stiffness,
+            bend=physics.bend_stiffness,
+            damping=physics.damping,
+            friction=physics.friction,
+        )
 
     def pull(self) -> float:
         """Return the squared frequency of the pull to the captured shape at the root, 1/s^2."""

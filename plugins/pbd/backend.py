@@ -44,14 +44,8 @@ class Engine(ABC):
         self.rows = rows[:, None]
 
     @abstractmethod
-    def run(
-        self, system: System, steps: Steps, air: Float64Array, force: Float64Array | None = None
-    ) -> None:
-        """Do the substeps.
-
-        `air` (3,) or (S, n, 3) is its velocity, m/s, world; `force` (S, n, 3) a further one in
-        newtons, head axes.
-        """
+    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
+        """Do the substeps; `outer` is `block.acting`."""
 
 
 class FastEngine(Engine):
@@ -71,23 +65,20 @@ class FastEngine(Engine):
         self._planes[:, :, : block.CONSTANT] = 0.0
         self._planes[:, :, : rows.shape[2]] = block.pack_lanes(rows, self._kind)
 
-    def run(
-        self, system: System, steps: Steps, air: Float64Array, force: Float64Array | None = None
-    ) -> None:
-        """Do the substeps, see `Engine`."""
+    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
+        """Do the substeps; `outer` is `block.acting`."""
         contact, kind = self.contact, self._kind
         if self._system is not system:
             nodes, metric = block.constants(self.rods, system, contact)
             self._planes[:, :, block.CONSTANT :] = block.pack_lanes(nodes, kind)
             self._system, self._metric = system, block.pack_lanes(metric, kind)
-        acting = block.pack_lanes(block.acting(self.rods, air, force), kind)
         work = np.zeros(self.rods.nodes + 2, block.WORK[kind])
         parallel_for(
             run_substeps,
             len(self._planes),
             block.Packed(block.records(self._planes, block.NODE[kind]), self._metric, work),
             Steps(*(part.astype(kind) for part in steps)),
-            block.records(acting, block.ACTING[kind]),
+            block.records(block.pack_lanes(outer, kind), block.ACTING[kind]),
             contact.bodies.fields,
             block.settings_of(system, contact, kind),
         )

@@ -113,7 +113,10 @@ def constants(rods: Rods, system: System, contact: Contact) -> tuple[Float64Arra
 
 
 def acting(rods: Rods, air: Float64Array, force: Float64Array | None) -> Float64Array:
-    """Return (S or 1, n or 1, 6) `ACTING` of what `Engine.run` takes."""
+    """Return (S or 1, n or 1, 6) `ACTING`.
+
+    `air` (3,) or (S, n, 3) is its velocity, m/s, world; `force` (S, n, 3) in newtons, head axes.
+    """
     share = np.zeros(3) if force is None else force / rods.mass.mean(axis=1)[:, None, None]
     both = np.concatenate(np.broadcast_arrays(air, share), axis=-1)
     return both if both.ndim > 1 else both[None, None]

@@ -18,7 +18,7 @@ from hairkit.rendering.context import Renderer, on_graphics_card, renderer
 from hairkit.rendering.gl_camera import set_uniforms
 
 from .backend import Engine
-from .block import acting, constants, settings_of
+from .block import constants, settings_of
 from .linear_system import System
 from .rods import Rods
 from .state import Contact, Steps
@@ -59,12 +59,9 @@ class ComputeEngine(Engine):
     def _keep(self, rows: Float64Array) -> None:
         super()._keep(rows.astype(np.float32))
 
-    def run(
-        self, system: System, steps: Steps, air: Float64Array, force: Float64Array | None = None
-    ) -> None:
-        """Do the substeps, see `Engine`."""
+    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
+        """Do the substeps; `outer` is `block.acting`."""
         count, nodes = self.rods.mass.shape
-        outer = acting(self.rods, air, force)
         words = np.concatenate([part.reshape(len(part), -1) for part in steps], axis=1)
         settings = settings_of(system, self.contact, np.float32)._asdict()
         with renderer() as gl:

@@ -42,10 +42,11 @@ def resolve_contacts(s: Any, x: Any, step: Any, fields: Any, settings: Any) -> N
     """Push nodes out of the obstacles, then rub and restore the lengths by turns."""
     touching, h, with_torso = False, settings.seconds, fields.torso.distance.shape[0] > 0
     drift, pose, beside = step.drift, step.torso, step.torso_drift
-    clear_contact(x[0])
     for j in range(1, len(s)):
         node, own, near = s[j], x[j], False
-        clear_contact(own)
+        for w in range(LANES):
+            put(own.normal, w, (ZERO, ZERO, ZERO))
+            own.depth[w] = own.grip[w] = ZERO
         if use_room(node, own, node.room, drift, h):
             near = meets(node, own, node.room, node.wall, fields.head, HEAD, drift)
         if with_torso and use_room(node, own, node.aside, beside, h):
@@ -58,14 +59,6 @@ def resolve_contacts(s: Any, x: Any, step: Any, fields: Any, settings: Any) -> N
     # without contact, one more iteration is enough
     for _ in range(settings.rounds if touching else min(settings.rounds, 1)):
         restore_lengths(s, x, settings, touching)
-
-
-@inlined
-def clear_contact(x: Any) -> None:
-    """Forget the last contact of a node."""
-    for w in range(LANES):
-        put(x.normal, w, (ZERO, ZERO, ZERO))
-        x.depth[w] = x.grip[w] = ZERO
 
 
 @inlined

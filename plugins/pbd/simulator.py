@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,23 +14,19 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array
 from hairkit.parallel import parallel_for
 from hairkit.rendering.context import on_graphics_card
-from hairkit.simulation import Measures, Surroundings, check_grabs
+from hairkit.simulation import Measures, Surroundings
 from hairkit.simulation.guide_simulator import GuideSimulator
 from hairkit.simulation.hair_grid import make_hair_grid
 from hairkit.simulation.obstacle_kernels import WORTH
-from hairkit.simulation.rigid_motion import (
-    follow_head,
-    interpolate_motion,
-    inverse_motion,
-    motion_steps,
-)
+from hairkit.simulation.rigid_motion import follow_head, inverse_motion, motion_steps
 from hairkit.simulation.ties import held_lengths
 from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 
 from .backend import Engine, FastEngine
+from .block import acting
 from .embedding import carry_points, embed_points
-from .grab import FIRM, Hands, held_nodes
+from .grab import FIRM, held_nodes, hold_nodes
 from .linear_system import Rates, System, assemble
 from .resampling import finer_steps, max_stiffness, node_points, overhang
 from .rods import Rods, balance_load, clamp_roots, elastic_energy, make_rods
@@ -72,7 +69,6 @@ class PbdSimulator(GuideSimulator):
 
     def __init__(self, groom: Groom, options: Options) -> None:
         super().__init__(groom)
-        self._hands = Hands()
         self._place(None)
         self._place_nodes(options.nodes)
         self._tune(options)
@@ -83,13 +79,9 @@ class PbdSimulator(GuideSimulator):
             return
         start, end = self._head, surroundings.head_from_rest
         pieces = max(1, math.ceil(seconds / FRAME - 1e-6))
-        for piece in range(pieces):
-            self._piece(
-                seconds / pieces,
-                surroundings,
-                interpolate_motion(start, end, piece / pieces),
-                interpolate_motion(start, end, (piece + 1) / pieces),
-            )
+        heads = [start, *motion_steps(start, end, pieces)[0]]
+        for before, after in pairwise(heads):
+            self._piece(seconds / pieces, surroundings, before, after)
         self._head = end
         self._points = None
 
@@ -97,7 +89,6 @@ class PbdSimulator(GuideSimulator):
         """Reset the guides to rest on a head at `head_from_rest` (4, 4), with zero velocity."""
         self._place(head_from_rest)
         self._engine.state = rest_state(self.rods)
-        self._hands = Hands()
 
     def retune(self, options: Options) -> None:
         """Change the options; positions and velocities stay unless the number of nodes changes."""
@@ -207,8 +198,7 @@ class PbdSimulator(GuideSimulator):
     ) -> None:
         """Advance by up to `FRAME`: update wind and hair grid once, then do substeps."""
         options, engine, back = self._options, self._engine, inverse_motion(end)
-        check_grabs(around.grabs, len(self.strands.points))
-        self._hands.move(around.grabs, lambda: self.points, options.grab_speed * seconds)
+        self._move_hands(around, options.grab_speed * seconds)
         finer = finer_steps(start, end, self.rods.points[:, 0], self._segment)
         torso = follow_head(self._torso, end, self._bodies.joint)
         if finer == 0:
@@ -226,12 +216,10 @@ class PbdSimulator(GuideSimulator):
             self._gravity(around),
             seconds / count,
         )
-        engine.run(
-            self._system(round(seconds / count, 12), self._hands.held),
-            steps,
-            self._air(around, start),
-            self._hands.force(self.rods, self._embedding, back),
-        )
+        hands = self._hands.places
+        force = hold_nodes(self.rods, self._embedding, hands, back)
+        system = self._system(round(seconds / count, 12), tuple(hands))
+        engine.run(system, steps, acting(self.rods, self._air(around, start), force))
         self._torso = torso
         self._time += seconds
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,8 +9,9 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
+from hairkit.options import fill_options
 from hairkit.parallel import parallel_for
-from hairkit.simulation import Measures, Surroundings, check_grabs
+from hairkit.simulation import Measures, Surroundings
 from hairkit.simulation.guide_simulator import GuideSimulator
 from hairkit.simulation.rigid_motion import follow_head, interpolate_motion
 from hairkit.simulation.ties import held_lengths
@@ -35,6 +35,8 @@ SKIN = 0.0015
 """Hair is kept this far off the head, metres, where it was not nearer at rest."""
 PUSH_RATE, GRAB_RATE = 600.0, 150.0
 """Rates, per second, at which contact and a user's hand act on a point's or a strand's mass."""
+GRAB_SPEED = 5.0
+"""Highest speed of a user's hand, m/s: faster ones would whip the strand."""
 POISSON = 0.38
 """Poisson's ratio of hair."""
 KERATIN = 1300.0
@@ -56,10 +58,8 @@ class SuperHelices(GuideSimulator):
 
     def retune(self, options: Options) -> None:
         """Take other options from now on; positions and the number of elements stay."""
-        groom = self._groom
-        width = groom.material.width * 1e6 if options.diameter is None else options.diameter
-        grip = groom.physics.friction if options.friction is None else options.friction
-        options = self._options = replace(options, diameter=width, friction=grip)
+        width, grip = self._groom.material.width * 1e6, self._groom.physics.friction
+        options = self._options = fill_options(options, diameter=width, friction=grip)
         self._rods = rest_as_captured(self._with_material(options), self._rest_gravity)
 
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
@@ -122,6 +122,7 @@ class SuperHelices(GuideSimulator):
                 Body(np.array(torso), np.array(self._torso), fields.torso),
             ),
         )
+        self._move_hands(around, GRAB_SPEED * seconds)
         loads = self._loads(around, air)
         if options.solver == "recursion":
             parallel_for(step_strands, len(self._rods.roots), self._rods, self._motion, loads, step)
@@ -152,18 +153,15 @@ class SuperHelices(GuideSimulator):
                 self._head,
             )
         spring, anchor = np.zeros(shape), np.zeros_like(motion.points)
-        check_grabs(around.grabs, len(self._binding.arc))
         drawn = self.points if around.grabs else np.empty((0, 3))
-        for grab in around.grabs:
-            element = self._binding.element[grab.point]
-            node = int(
-                np.argmin(np.linalg.norm(motion.points[element] - drawn[grab.point], axis=1))
-            )
+        for point, place in self._hands.places.items():
+            element = self._binding.element[point]
+            node = int(np.argmin(np.linalg.norm(motion.points[element] - drawn[point], axis=1)))
             strand = np.searchsorted(self._rods.offsets, element, side="right") - 1
             own = slice(self._rods.offsets[strand], self._rods.offsets[strand + 1])
             spring[element, node] = GRAB_RATE**2 * masses[own].sum()
-            lever = motion.points[element, node] - drawn[grab.point]
-            anchor[element, node] = np.array(grab.target) + lever
+            lever = motion.points[element, node] - drawn[point]
+            anchor[element, node] = place + lever
         return Loads(drag, np.ascontiguousarray(air), spring, anchor, self._gap)
 
     def _with_material(self, options: Options) -> Rods:

@@ -62,7 +62,7 @@ class Load:
 
 
 def load_of_step(
-    steps: Steps, k: int, seconds: float, air: Float64Array, force: Float64Array | None
+    steps: Steps, k: int, seconds: float, air: Float64Array, force: Float64Array
 ) -> Load:
     """Return what acts in substep k of so many seconds."""
     turn, down = steps.air[k, :, :3], steps.air[k, :, 3]
@@ -80,10 +80,10 @@ def _motion(rows: Float64Array) -> Float64Array:
 class TwinEngine(Engine):
     """The twin as a backend."""
 
-    def run(
-        self, system: System, steps: Steps, air: Float64Array, force: Float64Array | None = None
-    ) -> None:
+    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
         """Do the substeps."""
+        air = outer[..., :3]
+        force = self.rods.mass.mean(axis=1)[:, None, None] * outer[..., 3:]
         for k in range(len(steps.turn)):
             load = load_of_step(steps, k, system.step, air, force)
             self.state = substep(self.rods, system, self.state, load, self.contact)

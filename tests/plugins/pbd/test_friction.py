@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd.backend import FastEngine
+from hairkit_plugins.pbd.block import acting
 from hairkit_plugins.pbd.state import Contact, rest_state
 from pbd_bench import DENSITY, LENGTH, NOTHING, G, load_of, rods_of, steps_of, straight, system_of
 from pbd_reference import TwinEngine, resolve_contacts, solve_substep, substep
@@ -71,7 +72,7 @@ def test_compiled_ropes_slip_as_those_of_the_reference(rounds: int) -> None:
     places = []
     for engine in (TwinEngine(rods, contact), FastEngine(rods, contact)):
         for _ in range(3):
-            engine.run(system, steps, NOTHING, force)
+            engine.run(system, steps, acting(rods, NOTHING, force))
         places.append(engine.state.position)
     assert np.abs(places[0] - rods.points).max() > 1e-3
     np.testing.assert_allclose(places[1], places[0], atol=1e-5)
