@@ -20,6 +20,10 @@ from hairkit.simulation.simulator import Surroundings, check_grabs
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
+FRAME = 1 / 60
+"""Seconds that the option `substeps` of simulators divides."""
+KERATIN = 1300.0
+"""Density of hair, kg/m^3."""
 DRAWN, ROUNDING = 0.001, 1e-5
 """Metres off the obstacles that drawn points keep, where they were not nearer at rest, and by which
 that is less than what grids say."""

@@ -7,19 +7,18 @@ with the metric of the implicit system). Stiffness depends neither on iterations
 rate. The natural shape comes from inverse statics, so that captured hair stays in place under
 gravity. Despite the plugin's name this is not position-based dynamics.
 
-* `backend`: what backends share, and the compiled ones
+* `backend`: what backends share, and the compiled one
 * `block`: strands side by side; constants and substeps of all backends
-* `embedding`: the guides' own points on the rods
+* `embedding`: the guides' own points on the rods, and held ones
 * `gl_backend`: substeps in compute shaders
-* `grab`: held points
 * `kernel_contact`: contact and friction, compiled
 * `kernels`: a substep, compiled
 * `lanes`: numbers, vectors and frames of the strands of a block
 * `linear_system`: the banded matrix of a substep
 * `resampling`: guides to rods, and what these can follow
-* `rods`: the discrete rod, its rest state, inverse statics
+* `rods`: the discrete rod, its rest state, inverse statics, energy
 * `simulator`: the simulator
-* `state`: the state of rods, what acts on them, energies
+* `state`: the state of rods, and what acts on them
 """
 
 from __future__ import annotations
@@ -67,10 +66,7 @@ class Options:
         2.0, low=0.0, high=100.0, unit="1/s", doc="Air drag rate of hair of mean width."
     )
     friction: float | None = option(
-        None,
-        low=0.0,
-        high=2.0,
-        doc="Coulomb friction coefficient of hair on the head; by default the groom's.",
+        None, low=0.0, high=2.0, doc="Coulomb friction of hair on the head; by default the groom's."
     )
     cohesion: float = option(
         2.0,

@@ -33,7 +33,8 @@ class Engine(ABC):
     @property
     def state(self) -> State:
         """The present state; setting it moves the rods."""
-        return block.state_of(self.rows.reshape(-1, *self.rows.shape[2:])[: len(self.rods.mass)])
+        rows = self.rows.reshape(-1, *self.rows.shape[2:])[: len(self.rods.mass)]
+        return block.state_of(rows.astype(np.float64))
 
     @state.setter
     def state(self, value: State) -> None:
@@ -72,11 +73,12 @@ class FastEngine(Engine):
             nodes, metric = block.constants(self.rods, system, contact)
             self._planes[:, :, block.CONSTANT :] = block.pack_lanes(nodes, kind)
             self._system, self._metric = system, block.pack_lanes(metric, kind)
-        work = np.zeros(self.rods.nodes + 2, block.WORK[kind])
         parallel_for(
             run_substeps,
             len(self._planes),
-            block.Packed(block.records(self._planes, block.NODE[kind]), self._metric, work),
+            block.records(self._planes, block.NODE[kind]),
+            self._metric,
+            np.zeros(self.rods.nodes + 2, block.WORK[kind]),
             Steps(*(part.astype(kind) for part in steps)),
             block.records(block.pack_lanes(outer, kind), block.ACTING[kind]),
             contact.bodies.fields,

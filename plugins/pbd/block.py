@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
-from hairkit.simulation import quaternion
 
 from .linear_system import System
 from .rods import Rods
@@ -61,17 +60,6 @@ WORK = lanes_of({
 """Of a node: what a substep works out for it and its segment."""
 ACTING = lanes_of({"air": 3, "force": 3})
 """Of a node: velocity of the air, world; force over the rod's mean mass, head axes."""
-
-
-class Packed(NamedTuple):
-    """Blocks of rods."""
-
-    nodes: Records
-    """(B, n) of `NODE`."""
-    metric: Floats
-    """(B, n (n - 1) / 2, LANES) lower rows."""
-    work: Records
-    """(n + 2,) of `WORK`, zeros."""
 
 
 class Settings(NamedTuple):
@@ -125,17 +113,15 @@ def acting(rods: Rods, air: Float64Array, force: Float64Array | None) -> Float64
 def state_rows(rods: Rods, state: State) -> Float64Array:
     """Return (S, n, 16) the fields of `STATE` before the planes."""
     rows = np.zeros((*rods.mass.shape, 16))
-    for first, values in ((0, state.position), (4, state.velocity), (8, state.acceleration)):
-        rows[..., first : first + 3] = values
-    rows[:, 0, 12:], rows[:, 1:, 12:] = rods.root_frame, state.frames
+    rows[:, 0, 12:] = rods.root_frame
+    for into, values in zip(vars(state_of(rows)).values(), vars(state).values(), strict=True):
+        into[...] = values
     return rows
 
 
-def state_of(rows: Floats) -> State:
-    """Return the state in rows as those of `state_rows`."""
-    some = rows.astype(np.float64)
-    frames = quaternion.normalize(some[:, 1:, 12:16])
-    return State(some[..., :3], some[..., 4:7], frames, some[..., 8:11])
+def state_of(rows: Any) -> State:
+    """Return the state in rows (..., n, 16 or more) of `STATE`: views of them."""
+    return State(rows[..., :3], rows[..., 4:7], rows[..., 1:, 12:16], rows[..., 8:11])
 
 
 def pack_lanes(values: Floats, kind: Kind) -> Floats:

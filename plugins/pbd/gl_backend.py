@@ -89,7 +89,9 @@ class ComputeEngine(Engine):
                 deep = -(-groups // MOST_GROUPS)
                 program.run(-(-groups // deep), deep)
                 gl.context.memory_barrier()
-            self.rows = self._read("u_state").reshape(self.rows.shape)
+            words = np.frombuffer(self._textures["u_state"].read(), np.float32)
+            rods = words.reshape(-1, 4 * nodes, self._width, 4).swapaxes(1, 2)
+            self.rows = rods.reshape(-1, *self.rows.shape[1:])[:count].copy()
 
     def _put(self, name: str, *parts: npt.NDArray[Any]) -> None:
         """Write values (S, ...) of rods to a texture (see `pbd_layout.glsl`)."""
@@ -99,14 +101,6 @@ class ComputeEngine(Engine):
         words = np.zeros((tall * self._width, high * 4), np.float32)
         words[: len(rows), : rows.shape[1]] = rows
         self._texture(name, words.reshape(tall, self._width, high, 4).swapaxes(1, 2), flat=True)
-
-    def _read(self, name: str) -> Float32Array:
-        """Read back values (S, R) that `_put` or the shader wrote."""
-        texture = self._textures[name]
-        tall = -(-len(self.rows) // self._width)
-        words = np.frombuffer(texture.read(), np.float32).reshape(tall, -1, self._width, 4)
-        result: Float32Array = words.swapaxes(1, 2).reshape(tall * self._width, -1)
-        return result[: len(self.rows)].copy()
 
     def _texture(self, name: str, values: Float32Array, flat: bool = False) -> None:
         """Write (Z, Y, X, 4) to a texture, with the first two axes in one where `flat`."""

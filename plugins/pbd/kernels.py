@@ -29,7 +29,7 @@ from hairkit.simulation.vectors import (
     turned,
 )
 
-from .block import LANES, Packed, Records, Settings
+from .block import LANES, Floats, Records, Settings
 from .kernel_contact import resolve_contacts
 from .lanes import (
     THIRD,
@@ -68,7 +68,9 @@ LEAST = np.float32(1e-6)
 def run_substeps(
     first: int,
     last: int,
-    packed: Packed,
+    blocks: Records,
+    metrics: Floats,
+    work: Records,
     steps: Steps,
     acting: Records,
     fields: Fields,
@@ -76,12 +78,13 @@ def run_substeps(
 ) -> None:
     """Advance blocks `first` to before `last` by all substeps, in place.
 
-    `acting` (B, n) of `ACTING` may have one block and node for all.
+    `blocks` (B, n) are of `NODE`, `metrics` (B, n (n - 1) / 2, LANES) their lower rows, `work`
+    (n + 2,) zeros of `WORK`; `acting` (B, n) of `ACTING` may have one block and node for all.
     """
-    n, h = packed.nodes.shape[1], settings.seconds
-    x, matrix = np.zeros_like(packed.work), np.empty((n, n, LANES), packed.metric.dtype)
+    n, h = blocks.shape[1], settings.seconds
+    x, matrix = np.zeros_like(work), np.empty((n, n, LANES), metrics.dtype)
     for block in range(first, last):
-        s, metric = packed.nodes[block], packed.metric[block]
+        s, metric = blocks[block], metrics[block]
         act = acting[min(block, len(acting) - 1)]
         for k in range(len(steps.turn)):
             step = step_of(steps, k)

@@ -56,16 +56,6 @@ class Rods:
         """Nodes of every rod."""
         return int(self.points.shape[1])
 
-    def inertia(self) -> Float64Array:
-        """Return (S, n, n) the mass matrix: a rigid bar has thirds and sixths of its mass."""
-        at = np.arange(self.nodes)
-        matrix = np.zeros((len(self.mass), self.nodes, self.nodes))
-        matrix[:, at, at] = self.mass
-        for ends in ((at[:-1], at[1:]), (at[1:], at[:-1])):
-            matrix[:, ends[0], ends[0]] -= self.bars / 6
-            matrix[:, ends[0], ends[1]] += self.bars / 6
-        return matrix
-
     def before(self, frames: Float64Array) -> Float64Array:
         """Return (S, n - 1, 4) the frame before each element: the root's, then the segments'."""
         return np.concatenate([self.root_frame[:, None], frames[:, :-1]], axis=1)

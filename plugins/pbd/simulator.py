@@ -15,7 +15,7 @@ from hairkit.arrays import Float64Array
 from hairkit.parallel import parallel_for
 from hairkit.rendering.context import on_graphics_card
 from hairkit.simulation import Measures, Surroundings
-from hairkit.simulation.guide_simulator import GuideSimulator
+from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
 from hairkit.simulation.hair_grid import make_hair_grid
 from hairkit.simulation.obstacle_kernels import WORTH
 from hairkit.simulation.rigid_motion import follow_head, inverse_motion, motion_steps
@@ -24,9 +24,8 @@ from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 
 from .backend import Engine, FastEngine
-from .block import acting
-from .embedding import carry_points, embed_points
-from .grab import FIRM, held_nodes, hold_nodes
+from .block import acting, state_of
+from .embedding import FIRM, carry_points, embed_points, held_nodes, hold_nodes
 from .linear_system import Rates, System, assemble
 from .resampling import finer_steps, max_stiffness, node_points, overhang
 from .rods import Rods, balance_load, clamp_roots, elastic_energy, make_rods
@@ -35,10 +34,6 @@ from .state import Contact, make_steps, rest_state
 if TYPE_CHECKING:
     from . import Options
 
-FRAME = 1 / 60
-"""Seconds of `substeps` substeps; wind and the hair grid are updated at this interval."""
-HAIR_DENSITY = 1300.0
-"""Density of keratin, kg/m^3."""
 SINGLE_HAIR = 1.2e-3
 """m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""
 HELD = 4e4
@@ -115,11 +110,10 @@ class PbdSimulator(GuideSimulator):
 
     def _carry(self) -> Any:
         """Return where the rods carry the guides' points (P, 3), head axes."""
-        rows = self._engine.rows
-        points = np.empty((len(self._embedding.rod), 3), rows.dtype)
-        place, frames = rows[..., :3], rows[..., 1:, 12:16]
+        on, now = self._embedding, state_of(self._engine.rows)
+        points = np.empty((len(on.rod), 3), now.position.dtype)
         parallel_for(
-            carry_points, len(points), self._embedding, place, frames, points, min_chunk=WORTH
+            carry_points, len(points), on, now.position, now.frames, points, min_chunk=WORTH
         )
         return points
 
@@ -145,7 +139,12 @@ class PbdSimulator(GuideSimulator):
         rods = self.rods
         self._rest_energy = elastic_energy(rods, rods.points, rods.frames, self._rates.shape)
         self._system = lru_cache(KEPT_SYSTEMS)(self._assemble)
-        self._engine = self._make_engine(self._contact_of(self._options))
+        # hair captured nearer keeps its own distance
+        clearance, friction = np.minimum(options.clearance, self._near), self._options.friction
+        bodies, speed = self._bodies, options.depenetration
+        self._engine = self._make_engine(
+            Contact(bodies, clearance, friction or 0.0, speed, options.rounds)
+        )
 
     def _make_engine(self, contact: Contact) -> Engine:
         """Return the backend of the options."""
@@ -158,7 +157,7 @@ class PbdSimulator(GuideSimulator):
 
     def _stiffen(self, options: Options) -> Rods:
         """Return the rods, whose natural shape balances gravity at the captured shape."""
-        density = HAIR_DENSITY * np.pi / 4 * self._width[:, None] ** 2
+        density = KERATIN * np.pi / 4 * self._width[:, None] ** 2
         most = max_stiffness(self._nodes, FRAME / options.substeps)[:, None]
         weight = abs(self._groom.physics.gravity) * overhang(self._nodes)[:, None]
         borne = weight / (UPRIGHT * np.sqrt(options.twist))
@@ -182,11 +181,6 @@ class PbdSimulator(GuideSimulator):
         damping = -math.log(1 - (options.damping or 0.0)) / FRAME
         return Rates(np.repeat(drag[:, None], rods.nodes, axis=1), damping, pull)
 
-    def _contact_of(self, options: Options) -> Contact:
-        """Return the contact; hair captured nearer keeps its own distance."""
-        clearance, friction = np.minimum(options.clearance, self._near), options.friction or 0.0
-        return Contact(self._bodies, clearance, friction, options.depenetration, options.rounds)
-
     def _assemble(self, step: float, held: tuple[int, ...]) -> System:
         """Return the system of substeps in which some points are held."""
         shape = self._rates.shape.copy()
@@ -208,8 +202,8 @@ class PbdSimulator(GuideSimulator):
         count = max(1, math.ceil(options.substeps * seconds / FRAME - 1e-6)) * finer
         if options.cohesion > 0 or options.pressure > 0:
             rates = (options.cohesion, options.pressure, seconds)
-            place, speed = engine.rows[..., :3], engine.rows[..., 4:7]
-            self._hair_grid.mix(place, speed, engine.mass, back @ start, rates)
+            now = state_of(engine.rows)
+            self._hair_grid.mix(now.position, now.velocity, engine.mass, back @ start, rates)
         steps = make_steps(
             motion_steps(start, end, count),
             motion_steps(self._torso, torso, count),

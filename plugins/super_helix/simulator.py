@@ -12,7 +12,7 @@ from hairkit.errors import InputError
 from hairkit.options import fill_options
 from hairkit.parallel import parallel_for
 from hairkit.simulation import Measures, Surroundings
-from hairkit.simulation.guide_simulator import GuideSimulator
+from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
 from hairkit.simulation.rigid_motion import follow_head, interpolate_motion
 from hairkit.simulation.ties import held_lengths
 from hairkit.simulation.wind import air_velocity
@@ -29,8 +29,6 @@ from .statics import rest_as_captured
 if TYPE_CHECKING:
     from . import Options
 
-FRAME = 1 / 60
-"""Seconds that the option `substeps` divides: one frame."""
 SKIN = 0.0015
 """Hair is kept this far off the head, metres, where it was not nearer at rest."""
 PUSH_RATE, GRAB_RATE = 600.0, 150.0
@@ -39,8 +37,6 @@ GRAB_SPEED = 5.0
 """Highest speed of a user's hand, m/s: faster ones would whip the strand."""
 POISSON = 0.38
 """Poisson's ratio of hair."""
-KERATIN = 1300.0
-"""Density of hair, kilograms per cubic metre."""
 HELD = 100.0
 """Times the stiffness of hair that hair before its tie has: it is stretched over the head."""
 MIDDLE = 0.6

@@ -47,6 +47,17 @@ def rods_of(
     return rods if straight else balance_load(rods, np.zeros_like(rods.points))
 
 
+def inertia_of(rods: Rods) -> Float64Array:
+    """Return (S, n, n) the mass matrix: a rigid bar has thirds and sixths of its mass."""
+    at = np.arange(rods.nodes)
+    matrix = np.zeros((len(rods.mass), rods.nodes, rods.nodes))
+    matrix[:, at, at] = rods.mass
+    for ends in ((at[:-1], at[1:]), (at[1:], at[:-1])):
+        matrix[:, ends[0], ends[0]] -= rods.bars / 6
+        matrix[:, ends[0], ends[1]] += rods.bars / 6
+    return matrix
+
+
 def untouched(rods: Rods) -> Contact:
     """Return contact with nothing."""
     return Contact(NO_BODIES, np.zeros_like(rods.mass), 0.0, 0.5)

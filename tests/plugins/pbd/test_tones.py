@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from hairkit_plugins.pbd.rods import Rods
 from hairkit_plugins.pbd.state import rest_state
-from pbd_bench import DENSITY, DOWN, LENGTH, G, rods_of, straight
+from pbd_bench import DENSITY, DOWN, LENGTH, G, inertia_of, rods_of, straight
 from pbd_modes import linearised
 from scipy.special import jn_zeros
 
@@ -19,7 +19,7 @@ NODES = 41
 def tones(rods: Rods, force: Float64Array | None, free: Float64Array | None = None) -> Float64Array:
     """Return the lowest three angular frequencies; each stands for two planes."""
     small = linearised(rods, rest_state(rods), force, free)
-    return np.sqrt(small.squares(rods.inertia()[0])[:6:2])
+    return np.sqrt(small.squares(inertia_of(rods)[0])[:6:2])
 
 
 def test_a_beam_has_three_tones() -> None:
