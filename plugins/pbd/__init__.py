@@ -8,7 +8,7 @@ rate. The natural shape comes from inverse statics, so that captured hair stays 
 gravity. Despite the plugin's name this is not position-based dynamics.
 
 * `backend`: what backends share, and the compiled one
-* `block`: strands side by side; constants and substeps of all backends
+* `block`: strands side by side; constants, contact and substeps of all backends
 * `embedding`: the guides' own points on the rods, and held ones
 * `gl_backend`: substeps in compute shaders
 * `kernel_contact`: contact and friction, compiled
@@ -16,9 +16,8 @@ gravity. Despite the plugin's name this is not position-based dynamics.
 * `lanes`: numbers, vectors and frames of the strands of a block
 * `linear_system`: the banded matrix of a substep
 * `resampling`: guides to rods, and what these can follow
-* `rods`: the discrete rod, its rest state, inverse statics, energy
+* `rods`: the discrete rod, its state and energy, inverse statics
 * `simulator`: the simulator
-* `state`: the state of rods, and what acts on them
 """
 
 from __future__ import annotations

@@ -11,10 +11,10 @@ from hairkit.arrays import Float64Array
 from hairkit.parallel import parallel_for
 
 from . import block
+from .block import Contact, Steps
 from .kernels import run_substeps
 from .linear_system import System
-from .rods import Rods
-from .state import Contact, State, Steps, rest_state
+from .rods import Rods, State, rest_state
 
 
 class Engine(ABC):

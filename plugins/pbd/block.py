@@ -1,4 +1,4 @@
-"""What the kernels work on: strands side by side, and the constants of all backends.
+"""What the kernels work on: strands side by side; constants, contact and substeps of all backends.
 
 A block is `LANES` strands; each field of a node holds that many numbers in a row. The same
 constants, strand by strand, are the textures of the shaders. Masses, stiffness and forces are
@@ -7,16 +7,20 @@ shares of the rod's mean mass, so that stiffness is in 1/s^2.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
+from hairkit.simulation import quaternion
+from hairkit.simulation.hair_cells import drift_rows
+from hairkit.simulation.obstacles import Bodies
+from hairkit.simulation.rigid_motion import inverse_motion
 
 from .linear_system import System
-from .rods import Rods
-from .state import Contact, State
+from .rods import Rods, State
 
 Records = npt.NDArray[np.void]
 Floats = npt.NDArray[np.floating[Any]]
@@ -60,6 +64,59 @@ WORK = lanes_of({
 """Of a node: what a substep works out for it and its segment."""
 ACTING = lanes_of({"air": 3, "force": 3})
 """Of a node: velocity of the air, world; force over the rod's mean mass, head axes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Parameters of contact between nodes and obstacles."""
+
+    bodies: Bodies
+    clearance: Float64Array
+    """(S, n) least distance of the nodes, metres; less where the captured hair is nearer."""
+    friction: float
+    """Coulomb's coefficient."""
+    fastest: float
+    """Highest speed at which a penetration is resolved, m/s."""
+    rounds: int = 0
+    """Friction iterations under the tension that restores the lengths. With 0 taut strands have too
+    little friction around bends; with 4 the Euler-Eytelwein equation holds."""
+
+
+class Steps(NamedTuple):
+    """Motion of head and torso in K substeps, in the head axes after each."""
+
+    head_step: Any
+    """(K, 3, 4) rows of the motion from the head axes before."""
+    drift: Any
+    """(K, 3, 4) rows of the velocity of a point that rides on the head."""
+    air: Any
+    """(K, 3, 4) turn from the world's axes, and gravity, m/s^2."""
+    turn: Any
+    """(K, 4) the head's turn (w, x, y, z)."""
+    torso: Any
+    """(K, 3, 4) rows from the head axes to the torso's."""
+    torso_drift: Any
+    """(K, 3, 4) rows of the velocity of a point that rides on the torso."""
+
+
+Course = tuple[Float64Array, Float64Array]
+"""Of `motion_steps`: (K, 4, 4) motions after each of K steps, and the changes of axes."""
+
+
+def make_steps(head: Course, torso: Course, gravity: Float64Array, seconds: float) -> Steps:
+    """Return the substeps, of so many seconds each, of head and torso under gravity (3,), world."""
+    (heads, head_steps), (torsos, torso_steps) = head, torso
+    turn = heads[:, :3, :3].swapaxes(1, 2)
+    from_head = inverse_motion(torsos) @ heads
+    riding = inverse_motion(from_head) @ torso_steps @ from_head
+    return Steps(
+        head_steps[:, :3],
+        drift_rows(head_steps, seconds),
+        np.concatenate([turn, turn @ gravity[:, None]], axis=2),
+        np.tile(quaternion.from_matrix(head_steps[0, :3, :3]), (len(heads), 1)),
+        from_head[:, :3],
+        drift_rows(riding, seconds),
+    )
 
 
 class Settings(NamedTuple):

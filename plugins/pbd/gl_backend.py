@@ -18,10 +18,9 @@ from hairkit.rendering.context import Renderer, on_graphics_card, renderer
 from hairkit.rendering.gl_camera import set_uniforms
 
 from .backend import Engine
-from .block import constants, settings_of
+from .block import Contact, Steps, constants, settings_of
 from .linear_system import System
 from .rods import Rods
-from .state import Contact, Steps
 
 WIDTH = 4096
 """Rods in a row of a texture; further rods go into further rows."""

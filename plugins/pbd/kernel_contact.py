@@ -164,17 +164,21 @@ def restore_lengths(s: Any, x: Any, settings: Any, rubs: bool) -> None:
             own.beside[w] = beside
             own.pivot[w] = ONE / (firm - factor * beside)
             own.value[w] = square * size - here.length[w] - factor * last.value[w]
-    over, friction = ONE / settings.seconds, settings.friction
     for j in range(len(s) - 1, 0, -1):
-        here, own, after = s[j], x[j], x[j + 1]
-        for w in range(LANES):
-            value = (own.value[w] - after.beside[w] * after.value[w]) * own.pivot[w]
-            own.value[w] = value
-            pull = times(after.value[w], three(after.way, w))
-            pull = minus(pull, times(value, three(own.way, w)))
-            ease, normal = here.ease[w], three(own.normal, w)
-            away = dot(pull, normal)
-            change = times(ease, minus(pull, times(away, normal)))
-            put(here.place, w, plus(three(here.place, w), change))
-            put(here.speed, w, plus(three(here.speed, w), times(over, change)))
-            own.grip[w] -= friction * over * ease * away
+        pull_node(s[j], x[j], x[j + 1], ONE / settings.seconds, settings.friction)
+
+
+@inlined
+def pull_node(s: Any, x: Any, after: Any, over: Any, friction: Any) -> None:
+    """Move a node by the pulls of its segments, the one that ends there and the one after."""
+    for w in range(LANES):
+        value = (x.value[w] - after.beside[w] * after.value[w]) * x.pivot[w]
+        x.value[w] = value
+        pull = times(after.value[w], three(after.way, w))
+        pull = minus(pull, times(value, three(x.way, w)))
+        ease, normal = s.ease[w], three(x.normal, w)
+        away = dot(pull, normal)
+        change = times(ease, minus(pull, times(away, normal)))
+        put(s.place, w, plus(three(s.place, w), change))
+        put(s.speed, w, plus(three(s.speed, w), times(over, change)))
+        x.grip[w] -= friction * over * ease * away

@@ -20,6 +20,7 @@ from hairkit.simulation.vectors import (
     ZERO,
     cross,
     dot,
+    inlined,
     minus,
     moved,
     plus,
@@ -29,7 +30,7 @@ from hairkit.simulation.vectors import (
     turned,
 )
 
-from .block import LANES, Floats, Records, Settings
+from .block import LANES, Floats, Records, Settings, Steps
 from .kernel_contact import resolve_contacts
 from .lanes import (
     THIRD,
@@ -44,7 +45,6 @@ from .lanes import (
     twist_angle,
 )
 from .linear_system import IMPLICIT
-from .state import Steps
 
 AHEAD, PASSED, DRIFT = (np.float32(c) for c in (1 / IMPLICIT, 1 - IMPLICIT, 0.5 - IMPLICIT**2))
 """Weights: of a change of place in the velocity, over the step; of the old acceleration in the
@@ -264,19 +264,29 @@ def solve_banded(s: Any, x: Any) -> None:
     """Write `solved`, A^-1 `force` of the free nodes, by the factor L D L^T of two bands."""
     n = len(s)
     for j in range(1, n):
-        node, own, last, beyond = s[j], x[j], x[j - 1], x[max(j - 2, 0)]
-        for w in range(LANES):
-            known = times(node.first[w], three(last.solved, w))
-            known = plus(known, times(node.second[w], three(beyond.solved, w)))
-            put(own.solved, w, minus(three(own.force, w), known))
+        eliminate_node(s[j], x[j], x[j - 1], x[max(j - 2, 0)])
     for j in range(n - 1, 0, -1):
         # the entries below row j stand in the two rows after it
-        after, further = s[min(j + 1, n - 1)], s[min(j + 2, n - 1)]
-        node, own, next_, beyond = s[j], x[j], x[j + 1], x[j + 2]
-        for w in range(LANES):
-            known = times(after.first[w], three(next_.solved, w))
-            known = plus(known, times(further.second[w], three(beyond.solved, w)))
-            put(own.solved, w, minus(times(node.pivot[w], three(own.solved, w)), known))
+        next_, further = s[min(j + 1, n - 1)], s[min(j + 2, n - 1)]
+        substitute_node(s[j], next_, further, x[j], x[j + 1], x[j + 2])
+
+
+@inlined
+def eliminate_node(s: Any, x: Any, before: Any, beyond: Any) -> None:
+    """Solve a row of L."""
+    for w in range(LANES):
+        known = times(s.first[w], three(before.solved, w))
+        known = plus(known, times(s.second[w], three(beyond.solved, w)))
+        put(x.solved, w, minus(three(x.force, w), known))
+
+
+@inlined
+def substitute_node(s: Any, next_: Any, further: Any, x: Any, after: Any, beyond: Any) -> None:
+    """Solve a row of D L^T."""
+    for w in range(LANES):
+        known = times(next_.first[w], three(after.solved, w))
+        known = plus(known, times(further.second[w], three(beyond.solved, w)))
+        put(x.solved, w, minus(times(s.pivot[w], three(x.solved, w)), known))
 
 
 @stage

@@ -1,4 +1,4 @@
-"""Discrete Cosserat rods: the model, its rest state, and inverse statics.
+"""Discrete Cosserat rods: the model, its state and energy, and inverse statics.
 
 A rod has n nodes and n - 1 segments; each segment carries a frame (a quaternion) whose third axis
 is its direction (Kugelstadt and Schoemer 2016; parallel transport in time after Bergou et al.
@@ -59,6 +59,24 @@ class Rods:
     def before(self, frames: Float64Array) -> Float64Array:
         """Return (S, n - 1, 4) the frame before each element: the root's, then the segments'."""
         return np.concatenate([self.root_frame[:, None], frames[:, :-1]], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Positions, velocities and frames of rods.
+
+    In the axes of the moving head: its surface, the roots and the captured shape are then constant,
+    and float32 keeps its precision wherever the head is.
+    """
+
+    position: Float64Array
+    """(S, n, 3) metres."""
+    velocity: Float64Array
+    """(S, n, 3) m/s in the world."""
+    frames: Float64Array
+    """(S, n - 1, 4) of the segments."""
+    acceleration: Float64Array
+    """(S, n, 3) of the last substep before contact, m/s^2 in the world; 0 in equilibrium."""
 
 
 def make_rods(
@@ -151,6 +169,12 @@ def balance_load(rods: Rods, force: Float64Array) -> Rods:
         curvature=quaternion.rotate(back, natural),
         natural_twist=twist_between(frames, rods.frames) - twisting,
     )
+
+
+def rest_state(rods: Rods) -> State:
+    """Return the captured state with zero velocity."""
+    still = np.zeros_like(rods.points)
+    return State(rods.points.copy(), still, rods.frames.copy(), still.copy())
 
 
 def transport_frames(frames: Float64Array, direction: Float64Array) -> Float64Array:

@@ -24,12 +24,11 @@ from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 
 from .backend import Engine, FastEngine
-from .block import acting, state_of
+from .block import Contact, acting, make_steps, state_of
 from .embedding import FIRM, carry_points, embed_points, held_nodes, hold_nodes
 from .linear_system import Rates, System, assemble
 from .resampling import finer_steps, max_stiffness, node_points, overhang
-from .rods import Rods, balance_load, clamp_roots, elastic_energy, make_rods
-from .state import Contact, make_steps, rest_state
+from .rods import Rods, balance_load, clamp_roots, elastic_energy, make_rods, rest_state
 
 if TYPE_CHECKING:
     from . import Options

@@ -7,9 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from hairkit_plugins.pbd.block import Contact, Steps
 from hairkit_plugins.pbd.linear_system import IMPLICIT, Rates, System, assemble
-from hairkit_plugins.pbd.rods import Rods, balance_load, make_rods, transport_frames
-from hairkit_plugins.pbd.state import Contact, State, Steps, rest_state
+from hairkit_plugins.pbd.rods import (
+    Rods,
+    State,
+    balance_load,
+    make_rods,
+    rest_state,
+    transport_frames,
+)
 from pbd_reference import ClampedRods, Load, relax_twist, solve_substep, substep
 
 from hairkit.arrays import Float64Array

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from hairkit_plugins.pbd import kernel_contact, kernels
 from hairkit_plugins.pbd.backend import Engine
+from hairkit_plugins.pbd.block import Contact, Steps
 from hairkit_plugins.pbd.linear_system import IMPLICIT, System
-from hairkit_plugins.pbd.rods import Rods, midpoint_frame, transport_frames, twist_between
+from hairkit_plugins.pbd.rods import Rods, State, midpoint_frame, transport_frames, twist_between
 from hairkit_plugins.pbd.simulator import PbdSimulator
-from hairkit_plugins.pbd.state import Contact, State, Steps
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion

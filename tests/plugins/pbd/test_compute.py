@@ -12,8 +12,8 @@ import pytest
 from hairkit_plugins.pbd import Options
 from hairkit_plugins.pbd.backend import FastEngine
 from hairkit_plugins.pbd.gl_backend import ComputeEngine
+from hairkit_plugins.pbd.rods import rest_state
 from hairkit_plugins.pbd.simulator import PbdSimulator
-from hairkit_plugins.pbd.state import rest_state
 from pbd_bench import untouched
 from shader_rods import AGREE, SHAKE, STILL_AIR, WIND, apart, bent_groom, both, skip_without_shaders
 

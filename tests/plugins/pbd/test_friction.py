@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd.backend import FastEngine
-from hairkit_plugins.pbd.block import acting
-from hairkit_plugins.pbd.state import Contact, rest_state
+from hairkit_plugins.pbd.block import Contact, acting
+from hairkit_plugins.pbd.rods import rest_state
 from pbd_bench import DENSITY, LENGTH, NOTHING, G, load_of, rods_of, steps_of, straight, system_of
 from pbd_reference import TwinEngine, resolve_contacts, solve_substep, substep
 

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd.linear_system import Rates, assemble
-from hairkit_plugins.pbd.rods import Rods, elastic_energy
-from hairkit_plugins.pbd.state import State, rest_state
+from hairkit_plugins.pbd.rods import Rods, State, elastic_energy, rest_state
 from pbd_bench import (
     DENSITY,
     DOWN,

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd import Options
-from hairkit_plugins.pbd.rods import Rods
+from hairkit_plugins.pbd.rods import Rods, State, rest_state
 from hairkit_plugins.pbd.simulator import PbdSimulator
-from hairkit_plugins.pbd.state import State, rest_state
 from pbd_bench import untouched
 from pbd_reference import TwinSimulator
 

@@ -14,11 +14,12 @@ import pytest
 from hairkit_plugins.pbd.linear_system import Rates, assemble
 from hairkit_plugins.pbd.rods import (
     Rods,
+    State,
     balance_load,
+    rest_state,
     transport_frames,
     twist_between,
 )
-from hairkit_plugins.pbd.state import State, rest_state
 from pbd_bench import (
     DENSITY,
     DOWN,

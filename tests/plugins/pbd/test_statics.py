@@ -13,11 +13,12 @@ from hairkit_plugins.pbd.block import acting
 from hairkit_plugins.pbd.resampling import max_stiffness
 from hairkit_plugins.pbd.rods import (
     Rods,
+    State,
     balance_load,
+    rest_state,
     transport_frames,
     twist_between,
 )
-from hairkit_plugins.pbd.state import State, rest_state
 from pbd_bench import (
     DENSITY,
     DOWN,

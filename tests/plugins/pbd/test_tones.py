@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from hairkit_plugins.pbd.rods import Rods
-from hairkit_plugins.pbd.state import rest_state
+from hairkit_plugins.pbd.rods import Rods, rest_state
 from pbd_bench import DENSITY, DOWN, LENGTH, G, inertia_of, rods_of, straight
 from pbd_modes import linearised
 from scipy.special import jn_zeros
