@@ -139,12 +139,9 @@ def rub(s: Any, x: Any, h: Any) -> None:
 def restore_lengths(s: Any, x: Any, settings: Any, rubs: bool) -> None:
     """Restore the lengths; a touching node moves only along the obstacle, and is pressed on it.
 
-    One tridiagonal solve, eliminated on the way to the tip; nodes that touch rub before where
-    `rubs`.
+    One tridiagonal solve, eliminated on the way to the tip; the root, which does not move, takes no
+    part. Nodes that touch rub before where `rubs`.
     """
-    first = x[0]
-    for w in range(LANES):
-        first.pivot[w] = first.value[w] = ZERO
     for j in range(1, len(s)):
         here, own, before, last = s[j], x[j], s[j - 1], x[j - 1]
         if rubs:

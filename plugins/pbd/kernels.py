@@ -177,9 +177,6 @@ def transport_frames(s: Any, x: Any, step: Any) -> None:
 @stage
 def relax_twist(s: Any, x: Any) -> None:
     """Rotate frames about their segments until torques balance: one Newton step, tridiagonal."""
-    held = x[0]
-    for w in range(LANES):
-        held.pivot[w] = held.value[w] = ZERO
     for j in range(1, len(s)):
         node, own, last_node, last = s[j], x[j], s[j - 1], x[j - 1]
         for w in range(LANES):
@@ -199,6 +196,7 @@ def relax_twist(s: Any, x: Any) -> None:
             last.pivot[w] += twist + firm
             last.value[w] += half * dot(away, minus(spun, aside)) + torque
     solve_tridiagonal(x, len(s))
+    held = x[0]
     for w in range(LANES):
         held.value[w] = ZERO
     for j in range(1, len(s)):

@@ -139,11 +139,9 @@ class PbdSimulator(GuideSimulator):
         self._rest_energy = elastic_energy(rods, rods.points, rods.frames, self._rates.shape)
         self._system = lru_cache(KEPT_SYSTEMS)(self._assemble)
         # hair captured nearer keeps its own distance
-        clearance, friction = np.minimum(options.clearance, self._near), self._options.friction
-        bodies, speed = self._bodies, options.depenetration
-        self._engine = self._make_engine(
-            Contact(bodies, clearance, friction or 0.0, speed, options.rounds)
-        )
+        near, friction = np.minimum(options.clearance, self._near), self._options.friction or 0.0
+        contact = Contact(self._bodies, near, friction, options.depenetration, options.rounds)
+        self._engine = self._make_engine(contact)
 
     def _make_engine(self, contact: Contact) -> Engine:
         """Return the backend of the options."""
@@ -209,9 +207,8 @@ class PbdSimulator(GuideSimulator):
             self._gravity(around),
             seconds / count,
         )
-        hands = self._hands.places
-        force = hold_nodes(self.rods, self._embedding, hands, back)
-        system = self._system(round(seconds / count, 12), tuple(hands))
+        force = hold_nodes(self.rods, self._embedding, self._hands.places, back)
+        system = self._system(round(seconds / count, 12), tuple(self._hands.places))
         engine.run(system, steps, acting(self.rods, self._air(around, start), force))
         self._torso = torso
         self._time += seconds
