@@ -149,6 +149,18 @@ def make_options(kind: type[_T], values: Mapping[str, object], where: str) -> _T
     return kind(**checked)
 
 
+def fill_options(options: _T, **values: float) -> _T:
+    """Return options with those that are None replaced by `values`, clamped to their bounds."""
+    known = {info.name: info for info in describe(type(options))}
+    filled = {}
+    for name, value in values.items():
+        if getattr(options, name) is None:
+            low, high = known[name].low, known[name].high
+            value = value if low is None else max(value, low)
+            filled[name] = value if high is None else min(value, high)
+    return dataclasses.replace(options, **filled)  # type: ignore[type-var]
+
+
 def split_setting(text: str) -> tuple[str, str, str]:
     """Return plugin, option and value of a `--set` text; the plugin is empty for a bare option.
 

@@ -36,17 +36,14 @@ void restore_lengths() {
     }
 }
 
-// Coulomb: the tangential change of velocity is at most the grip.
-vec3 friction_part(int j, vec3 slide) {
-    float size = length(slide), brake = clamp(grip[j], 0.0, size);
-    grip[j] -= brake;
-    return slide * (brake / max(size, 1e-12));
-}
-
+// Coulomb: friction takes from the speed along the obstacle at most the grip.
 void apply_friction() {
     for (int j = 1; j < EACH_NODE; j++) {
         vec3 relative = speed[j] - surface[j];
-        vec3 brake = friction_part(j, relative - dot(relative, normal[j]) * normal[j]);
+        vec3 slide = relative - dot(relative, normal[j]) * normal[j];
+        float size = length(slide), slowed = clamp(grip[j], 0.0, size);
+        vec3 brake = slide * (slowed / max(size, 1e-12));
+        grip[j] -= slowed;
         speed[j] -= brake;
         place[j] -= 0.5 * u_seconds * brake;
     }
@@ -63,15 +60,13 @@ vec3 contact_normal(int k, int j) {
         bool on_torso;
         left = obstacle_distance(p, steps[k].torso, clear, way, on_torso) - clear;
         surface[j] = on_torso ? torso : head;
-        vec3 relative = speed[j] - surface[j];
-        float across = dot(relative, way), inward = max(-across, 0.0);
+        float inward = max(-dot(speed[j] - surface[j], way), 0.0);
         // depth of this substep is removed at once, older depth at a limited speed
         float depth = min(-left, (inward + u_fastest) * u_seconds);
         if (left < 0.0) {
             grip[j] = u_friction * inward;
-            vec3 brake = friction_part(j, relative - across * way);
-            speed[j] += inward * way - brake;
-            place[j] += depth * way - 0.5 * u_seconds * brake;
+            speed[j] += inward * way;
+            place[j] += depth * way;
         } else {
             way = vec3(0.0);
         }
@@ -87,7 +82,7 @@ void resolve_contacts(int k) {
         normal[j] = j > 0 ? contact_normal(k, j) : vec3(0.0);
     }
     for (int round = 0; round <= u_rounds; round++) {
-        if (round > 0) apply_friction();
+        apply_friction();
         restore_lengths();
     }
 }

@@ -1,10 +1,8 @@
 // Signed distance to head and torso in the head's axes: trilinear between the values of two grids.
 uniform sampler3D u_head_distances, u_torso_distances; // along z, y, x
-uniform bool u_obstacles;      // false: there are none
-uniform bool u_torso;          // false: there is none
-uniform ivec3 u_cells[2];      // of the distances of head and torso
+uniform ivec3 u_cells[2];      // of the distances of head and torso; 0 where there is none
 uniform vec4 u_grid[2];        // place of the first distance, 1/spacing
-uniform float u_room;          // least distance outside a grid, m
+const float ROOM = 0.02;       // least distance outside a grid, m
 const float DIAGONAL = 1.8;    // bound of the change of distance within a cell, in cells
 
 // Trilinear distance and its direction in a body's axes; one lookup rejects most far nodes.
@@ -12,7 +10,7 @@ const float DIAGONAL = 1.8;    // bound of the change of distance within a cell,
 float body_distance(sampler3D distances, ivec3 cells, vec4 grid, vec3 p, float clear, out vec3 normal) {
     vec3 at = (p - grid.xyz) * grid.w;
     normal = vec3(0.0);
-    if (any(lessThan(at, vec3(0.0))) || any(greaterThan(at, vec3(cells - 1)))) return clear + u_room;
+    if (any(lessThan(at, vec3(0.0))) || any(greaterThan(at, vec3(cells - 1)))) return clear + ROOM;
     ivec3 low = min(ivec3(at), cells - 2);
     vec4 front = texelFetch(distances, low.zyx, 0);
     float least = front.x - DIAGONAL / grid.w;
@@ -31,7 +29,6 @@ float body_distance(sampler3D distances, ivec3 cells, vec4 grid, vec3 p, float c
 float obstacle_distance(vec3 p, vec4 pose[3], float clear, out vec3 normal, out bool on_torso) {
     float found = body_distance(u_head_distances, u_cells[0], u_grid[0], p, clear, normal);
     on_torso = false;
-    if (!u_torso) return found;
     vec4 place = vec4(p, 1.0);
     vec3 beside = vec3(dot(pose[0], place), dot(pose[1], place), dot(pose[2], place)), away;
     float other = body_distance(u_torso_distances, u_cells[1], u_grid[1], beside, clear, away);

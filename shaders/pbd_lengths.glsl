@@ -10,7 +10,7 @@ void solve_lengths() {
     int count = u_nodes - 1;
     for (int k = 0; k < FOURS(count); k++) scaled[k] = vec4(0.0);
     for (int i = 0; i < count; i++) {
-        vec3 way = direction[i], excess = edge[i] + free[i + 1] - free[i];
+        vec3 way = direction[i], excess = edge[i] + solved[i + 1] - solved[i];
         float right = dot(excess, way) - banded(i).w, last = 0.0;
         vec4 entries = vec4(0.0);
         for (int j = 0; j < i; j++) {

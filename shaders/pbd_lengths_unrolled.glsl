@@ -5,7 +5,7 @@ float factor[SEGMENTS * (SEGMENTS - 1) / 2], scaled[SEGMENTS];
 
 void solve_lengths() {
     for (int i = 0; i < SEGMENTS; i++) {
-        vec3 way = direction[i], excess = edge[i] + free[i + 1] - free[i];
+        vec3 way = direction[i], excess = edge[i] + solved[i + 1] - solved[i];
         float right = dot(excess, way) - banded(i).w, last = 0.0;
         for (int j = 0; j < SEGMENTS; j++)
             if (j < i) {

@@ -28,17 +28,12 @@ vec4 half_way(vec4 before, vec4 after, out vec3 quarter) {
     return normalize(before + sign_ * after);
 }
 
-// Twist about their direction between neighbouring frames: twice the angle of (w, z) of the turn.
-// The arc tangent's polynomial is off by 1e-5 (Abramowitz and Stegun 1964, 4.4.49), near 0 its
-// series by less.
+// Twist about their direction between neighbouring frames: twice the angle of (w, z) of the turn. Four
+// times the arc tangent of u, the tangent of a quarter of it, by a continued fraction.
 float twist_between(vec4 before, vec4 after) {
     float w = dot(before, after);
     float z = before.w * after.z - before.x * after.y + before.y * after.x - before.z * after.w;
-    float steep = abs(z) > abs(w) ? 1.0 : 0.0;
-    float t = min(abs(z), abs(w)) / max(abs(z), abs(w)), s = t * t;
-    float wide = t * (0.9998660 + s * (-0.3302995 + s * (0.1801410 + s * (-0.0851330 + s * 0.0208351))));
-    float small = t * (1.0 - s * (1.0 / 3.0 - s * (0.2 - s / 7.0)));
-    float angle = s < 0.04 ? small : wide;
-    angle = mix(angle, 0.5 * 3.14159265 - angle, steep);
-    return 2.0 * ((w < 0.0) == (z < 0.0) ? angle : -angle);
+    float size = sqrt(w * w + z * z);
+    float u = z / (w < 0.0 ? w - size : w + size);
+    return 4.0 * u * (1.0 - u * u / (3.0 + 1.8 * u * u));
 }

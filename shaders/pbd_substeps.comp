@@ -1,5 +1,5 @@
 #version 430
-// Substeps of rods, one rod per invocation: the steps of plugins/pbd/reference.py in their order. Masses
+// Substeps of rods, one rod per invocation: the steps of plugins/pbd/kernels.py in their order. Masses
 // are relative to the rod's mean, so that stiffness is in 1/s^2. Loops run over whole arrays with
 // conditions inside, so that compilers can unroll them.
 #include "pbd_layout.glsl"
@@ -13,21 +13,19 @@ const float FASTEST_TURN = 1.0, TINY = 1e-20, FASTEST_CHANGE = 500.0;
 const float IMPLICIT = 2.0 / 3.0, PASSED = 1.0 - IMPLICIT, DRIFT = 0.5 - IMPLICIT * IMPLICIT;
 
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
-uniform sampler2D u_wind;      // of each node, world, m/s
-uniform sampler2D u_force;     // on each node over the rod's mean mass, head axes
+// Six numbers of each node, in two rows: velocity of the air, world; a force over the rod's mean mass,
+// head axes.
+uniform sampler2D u_acting;
+uniform bool u_even;           // the same acts on all nodes
 uniform int u_substeps;         // in this dispatch
 uniform float u_seconds;       // of a substep
 uniform float u_damping;       // 1/s
-uniform vec3 u_air;            // m/s, world, where u_gusts is false
-uniform bool u_gusts;
-uniform bool u_forced;
 uniform float u_friction;
 uniform int u_rounds;             // friction iterations under the strands' tension
 uniform float u_fastest;       // m/s
 
 int rod;
 vec3 place[NODE_ROOM], speed[NODE_ROOM], gain[NODE_ROOM], force[NODE_ROOM], solved[NODE_ROOM];
-vec3 free[NODE_ROOM];          // the solution without lengths
 vec3 held_back;                // force of the root's acceleration on the next node
 float slack[NODE_ROOM];
 vec4 frame[SEGMENT_ROOM], root_frame;
@@ -71,12 +69,12 @@ void predict(int k, int j) {
     p += u_seconds * (u + DRIFT * u_seconds * a);
     a *= PASSED;
     u += u_seconds * a;
-    vec4 wind = vec4(u_gusts ? texelFetch(u_wind, texel(rod, j, NODES), 0).xyz : u_air, 0.0);
-    vec3 drawn = rows(steps[k].air[0], steps[k].air[1], steps[k].air[2], wind) - u;
+    ivec2 at = u_even ? ivec2(0) : texel(rod, 2 * j, 2 * NODES);
+    vec4 outer = texelFetch(u_acting, at, 0), more = texelFetch(u_acting, at + ivec2(0, 1), 0);
+    vec3 drawn = rows(steps[k].air[0], steps[k].air[1], steps[k].air[2], vec4(outer.xyz, 0.0)) - u;
     vec3 gravity = vec3(steps[k].air[0].w, steps[k].air[1].w, steps[k].air[2].w);
     force[j] = rest.w * (gravity + rate.x * drawn + u_damping * (drift(k, p) - u)
-                         + rate.y * (rest.xyz - p));
-    if (u_forced) force[j] += texelFetch(u_force, texel(rod, j, NODES), 0).xyz;
+                         + rate.y * (rest.xyz - p)) + vec3(outer.w, more.xy);
     if (j == 1) force[1] -= held_back;
     place[j] = p;
     speed[j] = u;
@@ -185,17 +183,16 @@ void solve_banded() {
 // Solve for the forces, and for the tensions that keep the lengths; move the nodes.
 void go_on() {
     solve_banded();
-    for (int j = 0; j < EACH_NODE; j++) free[j] = solved[j];
     solve_lengths();
     vec3 before = vec3(0.0);
     for (int j = 0; j < EACH_NODE; j++) {
         vec3 after = j < SEGMENTS ? value[j] * direction[j] : vec3(0.0);
-        force[j] = before - after;
+        force[j] += after - before;
         before = after;
     }
     solve_banded();
     for (int j = 1; j < EACH_NODE; j++) {
-        vec3 change = free[j] - solved[j], added = change / (IMPLICIT * u_seconds);
+        vec3 change = solved[j], added = change / (IMPLICIT * u_seconds);
         place[j] += change;
         speed[j] += added;
         gain[j] += added / u_seconds;
@@ -240,7 +237,7 @@ void main() {
         relax_twist();
         add_elastic();
         go_on();
-        if (u_obstacles) resolve_contacts(k);
+        resolve_contacts(k);
         keep_lengths();
     }
     for (int j = 0; j < EACH_NODE; j++) {

@@ -3,8 +3,10 @@
 The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)` returns a
 `Simulator`.
 
+* `guide_simulator`: guides, head, torso and drawn points of all simulators
 * `hair_cells`: mass and momentum of hair on a grid, compiled
 * `hair_grid`: contact between strands as changes of velocity
+* `hands`: hands that grab points
 * `motion`: motion of the head: keyframes and shakes
 * `obstacle_kernels`: distances to obstacles, and drawn points out of them, compiled
 * `obstacles`: head and torso as signed distances on grids

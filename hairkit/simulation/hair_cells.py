@@ -77,8 +77,11 @@ def relative_velocity(place: Floats, velocity: Floats, drift: Floats) -> Vector:
 
 
 def drift_rows(head_step: Float64Array, seconds: float) -> Float64Array:
-    """Return rows (3, 4) that map a point to the velocity of the head there, head axes, m/s."""
-    result: Float64Array = (np.eye(4) - head_step)[:3] / seconds
+    """Return rows (..., 3, 4) that map a point to the head's velocity there, head axes, m/s.
+
+    `head_step` (..., 4, 4) is the change of axes in so many seconds.
+    """
+    result: Float64Array = (np.eye(4) - head_step)[..., :3, :] / seconds
     return result
 
 

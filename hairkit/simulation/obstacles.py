@@ -128,6 +128,11 @@ class Bodies:
         return Fields(self.head.field(), torso)
 
 
+_NOWHERE = VoxelGrid(np.zeros(3), SPACING, (2, 2, 2))
+NO_BODIES = Bodies(Obstacles(_NOWHERE, np.ones(_NOWHERE.shape, np.float32)))
+"""Where there is nothing to touch: everything is 1 m away."""
+
+
 def groom_bodies(groom: Groom, spacing: float = SPACING) -> Bodies:
     """Return what a groom's hair touches.
 

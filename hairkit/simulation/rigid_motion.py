@@ -7,6 +7,7 @@ it. A head that is turned about the neck thus keeps its pivot.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -28,28 +29,35 @@ def interpolate_motion(start: Float64Array, end: Float64Array, share: float) -> 
 
 def motion_steps(
     start: Float64Array, end: Float64Array, count: int
-) -> list[tuple[Float64Array, Float64Array]]:
-    """Return the motion (4, 4) after each of `count` equal steps, and the change of axes of each.
+) -> tuple[Float64Array, Float64Array]:
+    """Return the motions (K, 4, 4) after each of `count` equal steps, and each's change of axes.
 
-    The latter transforms points from the axes before the step to those after it.
+    The latter (K, 4, 4) transform points from the axes before a step to those after it.
     """
+    changes = np.tile(_IDENTITY, (count, 1, 1))
     if (start == end).all():
-        return [(end, _IDENTITY)] * count
+        return np.tile(end, (count, 1, 1)), changes
     poses = _along_screw(start, end, np.arange(count + 1) / count)
     poses[0], poses[-1] = start, end
     back = poses[1:, :3, :3].swapaxes(1, 2)
-    changes = np.tile(_IDENTITY, (count, 1, 1))
     changes[:, :3, :3] = back @ poses[:-1, :3, :3]
     changes[:, :3, 3:] = back @ (poses[:-1] - poses[1:])[:, :3, 3:]
-    return list(zip(poses[1:], changes, strict=True))
+    return poses[1:], changes
 
 
 def inverse_motion(motion: Float64Array) -> Float64Array:
-    """Return the inverse of a rigid motion (4, 4)."""
-    result = np.eye(4)
-    result[:3, :3] = motion[:3, :3].T
-    result[:3, 3] = -motion[:3, :3].T @ motion[:3, 3]
+    """Return the inverses of rigid motions (..., 4, 4)."""
+    result = np.zeros_like(motion)
+    back = motion[..., :3, :3].swapaxes(-2, -1)
+    result[..., :3, :3] = back
+    result[..., :3, 3:] = -back @ motion[..., :3, 3:]
+    result[..., 3, 3] = 1.0
     return result
+
+
+def transform_points(motion: Any, points: Any) -> Any:
+    """Return points (..., 3) under a rigid motion (4, 4), in their precision."""
+    return points @ motion[:3, :3].T + motion[:3, 3]
 
 
 def follow_head(torso: Float64Array, head: Float64Array, joint: Float64Array) -> Float64Array:

@@ -7,6 +7,7 @@ takes bare literals for integers or float64, which would widen float32.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -83,6 +84,13 @@ def product(r: Frame, q: Frame) -> Frame:
         r[0] * q[2] - r[1] * q[3] + r[2] * q[0] + r[3] * q[1],
         r[0] * q[3] + r[1] * q[2] - r[2] * q[1] + r[3] * q[0],
     )
+
+
+@inlined
+def unit(q: Frame) -> Frame:
+    """Return a quaternion scaled to length 1."""
+    size = ONE / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    return size * q[0], size * q[1], size * q[2], size * q[3]
 
 
 @inlined

@@ -7,29 +7,26 @@ with the metric of the implicit system). Stiffness depends neither on iterations
 rate. The natural shape comes from inverse statics, so that captured hair stays in place under
 gravity. Despite the plugin's name this is not position-based dynamics.
 
-* `backend`: what backends share, and the compiled ones
-* `block`: strands side by side; constants and substeps of all backends
-* `embedding`: the guides' own points on the rods
+* `backend`: what backends share, and the compiled one
+* `block`: strands side by side; constants, contact and substeps of all backends
+* `embedding`: the guides' own points on the rods, and held ones
 * `gl_backend`: substeps in compute shaders
-* `grab`: held points
 * `kernel_contact`: contact and friction, compiled
 * `kernels`: a substep, compiled
 * `lanes`: numbers, vectors and frames of the strands of a block
 * `linear_system`: the banded matrix of a substep
 * `resampling`: guides to rods, and what these can follow
-* `rods`: the discrete rod, its rest state, inverse statics
+* `rods`: the discrete rod, its state and energy, inverse statics
 * `simulator`: the simulator
-* `state`: the state of rods, what acts on them, energies
 """
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from hairkit.hookspecs import hookimpl
-from hairkit.options import option
+from hairkit.options import fill_options, option
 
 if TYPE_CHECKING:
     from hairkit.types.groom import Groom, HairPhysics
@@ -68,10 +65,7 @@ class Options:
         2.0, low=0.0, high=100.0, unit="1/s", doc="Air drag rate of hair of mean width."
     )
     friction: float | None = option(
-        None,
-        low=0.0,
-        high=2.0,
-        doc="Coulomb friction coefficient of hair on the head; by default the groom's.",
+        None, low=0.0, high=2.0, doc="Coulomb friction of hair on the head; by default the groom's."
     )
     cohesion: float = option(
         2.0,
@@ -120,14 +114,13 @@ class Options:
 
     def resolved(self, physics: HairPhysics) -> Options:
         """Return the options with None replaced by the groom's value, clamped to its bounds."""
-        own: dict[str, Any] = {
-            "stiffness": min(max(physics.stiffness, 0.0), 1.0),
-            "bend": min(max(physics.bend_stiffness, 0.0), 1.0),
-            "damping": min(max(physics.damping, 0.0), 0.9),
-            "friction": min(max(physics.friction, 0.0), 2.0),
-        }
-        missing = {name: own[name] for name in own if getattr(self, name) is None}
-        return dataclasses.replace(self, **missing)
+        return fill_options(
+            self,
+            stiffness=physics.stiffness,
+            bend=physics.bend_stiffness,
+            damping=physics.damping,
+            friction=physics.friction,
+        )
 
     def pull(self) -> float:
         """Return the squared frequency of the pull to the captured shape at the root, 1/s^2."""

@@ -1,4 +1,4 @@
-"""What the kernels work on: strands side by side, and the constants of all backends.
+"""What the kernels work on: strands side by side; constants, contact and substeps of all backends.
 
 A block is `LANES` strands; each field of a node holds that many numbers in a row. The same
 constants, strand by strand, are the textures of the shaders. Masses, stiffness and forces are
@@ -7,7 +7,7 @@ shares of the rod's mean mass, so that stiffness is in 1/s^2.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,10 +16,11 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
 from hairkit.simulation.hair_cells import drift_rows
+from hairkit.simulation.obstacles import Bodies
+from hairkit.simulation.rigid_motion import inverse_motion
 
 from .linear_system import System
-from .rods import Rods
-from .state import Contact, Load, State, TorsoStep
+from .rods import Rods, State
 
 Records = npt.NDArray[np.void]
 Floats = npt.NDArray[np.floating[Any]]
@@ -58,48 +59,83 @@ def lanes_of(fields: dict[str, int]) -> dict[Kind, np.dtype[Any]]:
 NODE = lanes_of({**STATE, **CONSTANTS})
 WORK = lanes_of({
     "force": 3, "edge": 3, "way": 3, "reach": 3, "pull": 3, "torque": 1, "pivot": 1, "beside": 1,
-    "value": 1, "free": 3, "solved": 3, "normal": 3, "surface": 3, "depth": 1, "grip": 1,
+    "value": 1, "solved": 3, "normal": 3, "surface": 3, "depth": 1, "grip": 1,
 })  # fmt: skip
 """Of a node: what a substep works out for it and its segment."""
 ACTING = lanes_of({"air": 3, "force": 3})
 """Of a node: velocity of the air, world; force over the rod's mean mass, head axes."""
-STEP: dict[Kind, np.dtype[Any]] = {
-    kind: np.dtype(
-        [(name, kind, (3, 4)) for name in ("head_step", "drift", "air")]
-        + [("turn", kind, (4,)), ("torso", kind, (3, 4)), ("torso_drift", kind, (3, 4))]
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Parameters of contact between nodes and obstacles."""
+
+    bodies: Bodies
+    clearance: Float64Array
+    """(S, n) least distance of the nodes, metres; less where the captured hair is nearer."""
+    friction: float
+    """Coulomb's coefficient."""
+    fastest: float
+    """Highest speed at which a penetration is resolved, m/s."""
+    rounds: int = 0
+    """Friction iterations under the tension that restores the lengths. With 0 taut strands have too
+    little friction around bends; with 4 the Euler-Eytelwein equation holds."""
+
+
+class Steps(NamedTuple):
+    """Motion of head and torso in K substeps, in the head axes after each."""
+
+    head_step: Any
+    """(K, 3, 4) rows of the motion from the head axes before."""
+    drift: Any
+    """(K, 3, 4) rows of the velocity of a point that rides on the head."""
+    air: Any
+    """(K, 3, 4) turn from the world's axes, and gravity, m/s^2."""
+    turn: Any
+    """(K, 4) the head's turn (w, x, y, z)."""
+    torso: Any
+    """(K, 3, 4) rows from the head axes to the torso's."""
+    torso_drift: Any
+    """(K, 3, 4) rows of the velocity of a point that rides on the torso."""
+
+
+Course = tuple[Float64Array, Float64Array]
+"""Of `motion_steps`: (K, 4, 4) motions after each of K steps, and the changes of axes."""
+
+
+def make_steps(head: Course, torso: Course, gravity: Float64Array, seconds: float) -> Steps:
+    """Return the substeps, of so many seconds each, of head and torso under gravity (3,), world."""
+    (heads, head_steps), (torsos, torso_steps) = head, torso
+    turn = heads[:, :3, :3].swapaxes(1, 2)
+    from_head = inverse_motion(torsos) @ heads
+    riding = inverse_motion(from_head) @ torso_steps @ from_head
+    return Steps(
+        head_steps[:, :3],
+        drift_rows(head_steps, seconds),
+        np.concatenate([turn, turn @ gravity[:, None]], axis=2),
+        np.tile(quaternion.from_matrix(head_steps[0, :3, :3]), (len(heads), 1)),
+        from_head[:, :3],
+        drift_rows(riding, seconds),
     )
-    for kind in KINDS
-}
-"""Of a substep: motion of the head axes, rows; velocity of a point that rides on the head; turn
-from the world's axes, and gravity; the head's turn (w, x, y, z); head axes to the torso's; velocity
-of a point that rides on the torso. Shaders have the same."""
-
-
-class Packed(NamedTuple):
-    """Blocks of rods."""
-
-    nodes: Records
-    """(B, n) of `NODE`."""
-    metric: Floats
-    """(B, n (n - 1) / 2, LANES) lower rows."""
-    work: Records
-    """(n + 2,) of `WORK`, zeros."""
 
 
 class Settings(NamedTuple):
-    """Numbers of a run."""
+    """Numbers of a run, see `Contact` and `Rates`."""
 
     seconds: np.floating[Any]
     damping: np.floating[Any]
     friction: np.floating[Any]
     fastest: np.floating[Any]
     rounds: int
-    """Of friction; -1 without obstacles."""
 
 
-def constants(
-    rods: Rods, system: System, contact: Contact | None
-) -> tuple[Float64Array, Float64Array]:
+def settings_of(system: System, contact: Contact, kind: Kind) -> Settings:
+    """Return the numbers of a run."""
+    step, damping = kind(system.step), kind(system.rates.damping)
+    return Settings(step, damping, kind(contact.friction), kind(contact.fastest), contact.rounds)
+
+
+def constants(rods: Rods, system: System, contact: Contact) -> tuple[Float64Array, Float64Array]:
     """Return (S, n, 20) `CONSTANTS` and (S, n (n - 1) / 2) lower rows of the metric."""
     count, nodes = rods.mass.shape
     made = np.zeros((count, nodes, sum(CONSTANTS.values())))
@@ -108,7 +144,7 @@ def constants(
     pivot = lower.diagonal(axis1=1, axis2=2)
     made[..., :3], made[..., 3] = rods.points, rods.mass / mean
     made[..., 4], made[..., 5] = system.rates.drag, system.rates.shape
-    made[..., 6] = -1.0 if contact is None else contact.clearance
+    made[..., 6] = contact.clearance
     made[:, 1:, 7] = mean / rods.mass[:, 1:]
     for below in (1, 2):  # the factor's bands: made[:, :, 8] and made[:, :, 9]
         band = lower.diagonal(-below, axis1=1, axis2=2) / pivot[:, :-below]
@@ -121,46 +157,28 @@ def constants(
     return made, system.metric[:, row, column] * mean
 
 
-def steps_of(loads: Sequence[Load], seconds: float, kind: Kind) -> Records:
-    """Return (K,) `STEP` of substeps of so many seconds."""
-    steps = np.zeros(len(loads), STEP[kind])
-    for step, load in zip(steps, loads, strict=True):
-        torso = load.torso or TorsoStep(np.eye(4), load.head_step)
-        step["head_step"], step["torso"] = load.head_step[:3], torso.from_head[:3]
-        step["drift"] = drift_rows(load.head_step, seconds)
-        step["torso_drift"] = drift_rows(torso.step, seconds)
-        step["air"][:, :3], step["air"][:, 3] = load.turn, load.turn @ load.gravity
-        step["turn"] = quaternion.from_matrix(load.head_step[:3, :3])
-    return steps
+def acting(rods: Rods, air: Float64Array, force: Float64Array | None) -> Float64Array:
+    """Return (S or 1, n or 1, 6) `ACTING`.
 
-
-def acting(rods: Rods, load: Load, kind: Kind) -> Records:
-    """Return (B or 1, n or 1) `ACTING` of a load."""
-    force = np.zeros(3) if load.force is None else load.force / unit_mass(rods)
-    both = np.concatenate(np.broadcast_arrays(load.air, force), axis=-1)
-    return records(pack_lanes(both if both.ndim > 1 else both[None, None], kind), ACTING[kind])
-
-
-def unit_mass(rods: Rods) -> Float64Array:
-    """Return (S, 1, 1) the unit of masses and forces, kilograms."""
-    result: Float64Array = rods.mass.mean(axis=1)[:, None, None]
-    return result
+    `air` (3,) or (S, n, 3) is its velocity, m/s, world; `force` (S, n, 3) in newtons, head axes.
+    """
+    share = np.zeros(3) if force is None else force / rods.mass.mean(axis=1)[:, None, None]
+    both = np.concatenate(np.broadcast_arrays(air, share), axis=-1)
+    return both if both.ndim > 1 else both[None, None]
 
 
 def state_rows(rods: Rods, state: State) -> Float64Array:
     """Return (S, n, 16) the fields of `STATE` before the planes."""
     rows = np.zeros((*rods.mass.shape, 16))
-    for first, values in ((0, state.position), (4, state.velocity), (8, state.acceleration)):
-        rows[..., first : first + 3] = values
-    rows[:, 0, 12:], rows[:, 1:, 12:] = rods.root_frame, state.frames
+    rows[:, 0, 12:] = rods.root_frame
+    for into, values in zip(vars(state_of(rows)).values(), vars(state).values(), strict=True):
+        into[...] = values
     return rows
 
 
-def state_of(rows: Floats) -> State:
-    """Return the state in rows as those of `state_rows`."""
-    some = rows.astype(np.float64)
-    frames = quaternion.normalize(some[:, 1:, 12:16])
-    return State(some[..., :3], some[..., 4:7], frames, some[..., 8:11])
+def state_of(rows: Any) -> State:
+    """Return the state in rows (..., n, 16 or more) of `STATE`: views of them."""
+    return State(rows[..., :3], rows[..., 4:7], rows[..., 1:, 12:16], rows[..., 8:11])
 
 
 def pack_lanes(values: Floats, kind: Kind) -> Floats:

@@ -1,6 +1,7 @@
 """The guides' own points on the rods, so that curls finer than the nodes move and turn with them.
 
-Each point keeps its offset in the rod's frame at its arc length; it is exact at rest.
+Each point keeps its offset in the rod's frame at its arc length; it is exact at rest. A held point
+is pulled to its hand, at the nearest node, as hair is to its captured shape.
 """
 
 from __future__ import annotations
@@ -10,22 +11,22 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hairkit.arrays import Float64Array, Int64Array
-from hairkit.parallel import compiled, parallel_for
-from hairkit.simulation.obstacle_kernels import NO_FIELDS, Drawn, draw_points
-from hairkit.simulation.vectors import Frame, Vector, inlined, minus, plus, rotate, times
+from hairkit.parallel import compiled
+from hairkit.simulation.rigid_motion import transform_points
+from hairkit.simulation.vectors import Frame, Vector, inlined, minus, plus, rotate, times, unit
 from hairkit.types.strands import Strands
 
-from .state import Contact
+from .rods import Rods
 
-WORTH = 256
-"""Rods that are worth another thread's while."""
+FIRM = 4e5
+"""1/s^2: squared frequency, of 100 Hz, of the pull to a hand: a strand's weight moves it 0.3 mm."""
+TAUT = 0.999
+"""Largest distance of a hand from the root, as a share of the strand's length."""
 
 
 class Embedding(NamedTuple):
     """Guide points embedded in rods."""
 
-    starts: Int64Array
-    """(S + 1,) where the points of each rod begin."""
     rod: Int64Array
     """(P,) rod index."""
     segment: Int64Array
@@ -34,8 +35,6 @@ class Embedding(NamedTuple):
     """(P,) fraction along the segment."""
     offset: Float64Array
     """(P, 3) offset from the rod, in its frame there, metres."""
-    length: Float64Array
-    """(P,) distance to the point before, metres; 0 at roots."""
 
 
 def embed_points(strands: Strands, position: Float64Array, frames: Float64Array) -> Embedding:
@@ -48,48 +47,54 @@ def embed_points(strands: Strands, position: Float64Array, frames: Float64Array)
     along = arc / total * segments
     segment = np.minimum(along.astype(np.int64), segments - 1)
     own = strands.points.astype(np.float64)
-    size = np.linalg.norm(np.diff(own, axis=0, prepend=own[:1]), axis=1)
-    size[strands.offsets[:-1]] = 0.0
-    made = Embedding(strands.offsets, rod, segment, along - segment, np.zeros_like(own), size)
+    made = Embedding(rod, segment, along - segment, np.zeros_like(own))
     measure_offsets(made, position[:, None], frames[:, None], own)
     return made
 
 
-def drawn_points(
-    embedding: Embedding,
-    position: Any,
-    frames: Any,
-    contact: Contact | None,
-    torso_from_head: Float64Array,
-) -> Any:
-    """Return the guides' points (P, 3), head axes, of rods with segment frames.
+def hold_nodes(
+    rods: Rods, embedding: Embedding, hands: dict[int, Float64Array], back: Float64Array
+) -> Float64Array | None:
+    """Return the force (S, n, 3) that makes hands, not rest, the ends of pulls, newtons.
 
-    Rods stand in blocks, (B, L, n, 3) and (B, L, n - 1, 4).
-
-    Each follows the curve that the rods carry it on, out of the obstacles; see
-    `hairkit.simulation.obstacle_kernels.draw_points`.
+    `hands` are the places (3,) of those that hold points, world, and `back` (4, 4) transforms the
+    world to the head axes. A hand that the strand does not reach pulls to the nearest point that it
+    does.
     """
-    points = np.empty((len(embedding.rod), 3), position.dtype)
-    deepest = np.zeros(0) if contact is None or contact.deepest is None else contact.deepest
-    fields = NO_FIELDS if contact is None else contact.bodies.fields
-    drawn, rods = Drawn(embedding.starts, embedding.length, deepest), len(embedding.starts) - 1
-    parallel_for(carry_points, rods, embedding, position, frames, points, min_chunk=WORTH)
-    parallel_for(draw_points, rods, drawn, fields, torso_from_head, points, min_chunk=WORTH)
-    return points
+    if not hands:
+        return None
+    force = np.zeros_like(rods.points)
+    rod, node = held_nodes(embedding, tuple(hands))
+    root = rods.points[rod, 0]
+    away = transform_points(back, np.array([*hands.values()])) - root
+    reach = TAUT * np.cumsum(rods.length, axis=1)[rod, node - 1]
+    away *= np.minimum(1.0, reach / np.maximum(np.linalg.norm(away, axis=1), 1e-12))[:, None]
+    pull = FIRM * rods.mass[rod, node, None] * (root + away - rods.points[rod, node])
+    np.add.at(force, (rod, node), pull)
+    return force
+
+
+def held_nodes(embedding: Embedding, held: tuple[int, ...]) -> tuple[Int64Array, Int64Array]:
+    """Return rod and node (G,) nearest to the held points; roots are not held."""
+    index = np.array(held, np.int64)
+    node = embedding.segment[index] + (embedding.share[index] >= 0.5)
+    return embedding.rod[index], np.maximum(node, 1)
 
 
 @compiled
 def carry_points(
     first: int, last: int, on: Embedding, position: Any, frames: Any, points: Any
 ) -> None:
-    """Write where rods `first` to before `last` carry their points (P, 3) to."""
-    for rod in range(first, last):
-        nodes, axes = in_block(position, rod), in_block(frames, rod)
-        for i in range(on.starts[rod], on.starts[rod + 1]):
-            j, t = on.segment[i], on.share[i]
-            offset = (on.offset[i, 0], on.offset[i, 1], on.offset[i, 2])
-            a, b, c = plus(on_curve(nodes, j, t), rotate(frame_on(axes, j, t), offset))
-            points[i, 0], points[i, 1], points[i, 2] = a, b, c
+    """Write where rods carry points `first` to before `last` of (P, 3) to.
+
+    Rods stand in blocks, (B, L, n, 3) with segment frames (B, L, n - 1, 4).
+    """
+    for i in range(first, last):
+        rod, j, t = on.rod[i], on.segment[i], on.share[i]
+        offset = (on.offset[i, 0], on.offset[i, 1], on.offset[i, 2])
+        away = rotate(frame_on(in_block(frames, rod), j, t), offset)
+        a, b, c = plus(on_curve(in_block(position, rod), j, t), away)
+        points[i, 0], points[i, 1], points[i, 2] = a, b, c
 
 
 @compiled
@@ -97,9 +102,9 @@ def measure_offsets(on: Embedding, position: Any, frames: Any, points: Float64Ar
     """Write the offsets of points (P, 3) at rest."""
     for i in range(len(points)):
         rod, j, t = on.rod[i], on.segment[i], on.share[i]
-        a, b, c = on_curve(in_block(position, rod), j, t)
         w, x, y, z = frame_on(in_block(frames, rod), j, t)
-        away = (points[i, 0] - a, points[i, 1] - b, points[i, 2] - c)
+        place = (points[i, 0], points[i, 1], points[i, 2])
+        away = minus(place, on_curve(in_block(position, rod), j, t))
         on.offset[i, 0], on.offset[i, 1], on.offset[i, 2] = rotate((w, -x, -y, -z), away)
 
 
@@ -128,14 +133,11 @@ def frame_on(frames: Any, j: int, t: float) -> Frame:
     """Return the frame t along segment j, whose own frame is at its middle."""
     other = min(max(j - 1 if t < 0.5 else j + 1, 0), len(frames) - 1)
     part = abs(t - 0.5)
-    a, b = frames[j], frames[other]
+    a, b, own = frames[j], frames[other], 1 - part
     cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
     mix = -part if cosine < 0 else part
-    own = 1 - part
     w, x = own * a[0] + mix * b[0], own * a[1] + mix * b[1]
-    y, z = own * a[2] + mix * b[2], own * a[3] + mix * b[3]
-    size = 1 / np.sqrt(w * w + x * x + y * y + z * z)
-    return size * w, size * x, size * y, size * z
+    return unit((w, x, own * a[2] + mix * b[2], own * a[3] + mix * b[3]))
 
 
 @inlined

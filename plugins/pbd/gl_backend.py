@@ -7,7 +7,6 @@ and back in every run, so that neighbours and drawn points are the same code as 
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,67 +16,70 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import RenderError
 from hairkit.rendering.context import Renderer, on_graphics_card, renderer
 from hairkit.rendering.gl_camera import set_uniforms
-from hairkit.simulation.obstacles import Obstacles
 
 from .backend import Engine
-from .block import STEP, constants, steps_of, unit_mass
+from .block import Contact, Steps, constants, settings_of
 from .linear_system import System
 from .rods import Rods
-from .state import Contact, Load
 
 WIDTH = 4096
 """Rods in a row of a texture; further rods go into further rows."""
 GROUP, MOST_GROUPS = 64, 65535
 """Invocations of a work group; work groups along an axis that every OpenGL 4.3 supports."""
-MOST_STEPS = 64
-"""Most substeps in one dispatch of the shader."""
+MOST_STEPS, STEP = 64, 256
+"""Most substeps in one dispatch of the shader; bytes of one, see `pbd_substep_schedule.glsl`."""
 UNROLLED = 16
 """Nodes up to which compilers unroll the shader's loops, see `pbd_layout.glsl`."""
 MOST_TURNS = 64_000
 """Most loop iterations in one dispatch: Mesa's llvmpipe leaves all loops after 65536 in all."""
-ROOM = 0.02
-"""Least distance outside the grids of obstacles, metres."""
 
 
 class ComputeEngine(Engine):
     """Rods in textures of the process's OpenGL context."""
 
-    def __init__(self, rods: Rods, contact: Contact | None) -> None:
+    def __init__(self, rods: Rods, contact: Contact) -> None:
         super().__init__(rods, contact)
         self._system: System | None = None
         self._textures: dict[str, Any] = {}
-        count = len(rods.mass)
+        count, fields = len(rods.mass), contact.bodies.fields
         # a power of two, so that drivers compile few variants
         self._width = min(1 << (count - 1).bit_length(), WIDTH)
+        self._grids: dict[str, Any] = {
+            "u_cells": [field.distance.shape for field in fields],
+            "u_grid": [(*field.first, 1 / field.spacing) for field in fields],
+        }
         with renderer() as gl:
-            for name in ("head", "torso"):
-                body = None if contact is None else getattr(contact.bodies, name)
-                self._texture(f"u_{name}_distances", faces(body))
-            self._put("u_state", self.rows.reshape(count, -1))
-            self._words = gl.context.buffer(reserve=MOST_STEPS * STEP[np.float32].itemsize)
+            self._texture("u_head_distances", faces(fields.head.distance))
+            self._texture("u_torso_distances", faces(fields.torso.distance))
+            self._put("u_state", self.rows)
+            self._words = gl.context.buffer(reserve=MOST_STEPS * STEP)
         weakref.finalize(self, _release, gl, self._textures, self._words).atexit = False
 
     def _keep(self, rows: Float64Array) -> None:
         super()._keep(rows.astype(np.float32))
 
-    def run(self, system: System, loads: Sequence[Load]) -> None:
-        """Do one substep for each load."""
+    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
+        """Do the substeps; `outer` is `block.acting`."""
         count, nodes = self.rods.mass.shape
+        words = np.concatenate([part.reshape(len(part), -1) for part in steps], axis=1)
+        settings = settings_of(system, self.contact, np.float32)._asdict()
         with renderer() as gl:
             if self._system is not system:
-                made, metric = constants(self.rods, system, self.contact)
-                self._put("u_constants", made.reshape(count, -1), metric)
+                self._put("u_constants", *constants(self.rods, system, self.contact))
                 self._system = system
-            self._put("u_state", self.rows.reshape(count, -1))
+            self._put("u_state", self.rows)
+            self._put("u_acting", np.pad(outer, ((0, 0), (0, 0), (0, 2))))
             program = gl.compute("pbd_substeps", NODES=nodes)
-            set_uniforms(program, **self._settings(system, loads[0]))
+            set_uniforms(program, **{f"u_{name}": settings[name] for name in settings})
+            set_uniforms(program, u_rods=count, u_nodes=nodes, u_width=self._width, **self._grids)
+            set_uniforms(program, u_even=outer.shape[1] == 1)
             for unit, name in enumerate(n for n in self._textures if n in program):
                 program[name] = unit
                 self._textures[name].use(unit)
             self._textures["u_state"].bind_to_image(0, read=False, write=True)
             most = steps_at_once(nodes)
-            for first in range(0, len(loads), most):
-                some = steps_of(loads[first : first + most], system.step, np.float32)
+            for first in range(0, len(words), most):
+                some = words[first : first + most].astype(np.float32)
                 self._words.orphan()
                 self._words.write(some)
                 self._words.bind_to_uniform_block(0)
@@ -86,57 +88,18 @@ class ComputeEngine(Engine):
                 deep = -(-groups // MOST_GROUPS)
                 program.run(-(-groups // deep), deep)
                 gl.context.memory_barrier()
-            self.rows = self._read("u_state").reshape(self.rows.shape)
-
-    def _settings(self, system: System, load: Load) -> dict[str, Any]:
-        """Return the uniforms of substeps; upload the per-node values of the load."""
-        contact, (count, nodes) = self.contact, self.rods.mass.shape
-        everywhere = load.air.ndim == 1
-        force = np.zeros((1, 1, 3)) if load.force is None else load.force / unit_mass(self.rods)
-        for name, values in (("u_wind", load.air), ("u_force", force)):
-            if values.size > 3:
-                self._put(name, np.pad(values, ((0, 0), (0, 0), (0, 1))).reshape(count, -1))
-        result = {
-            "u_rods": count,
-            "u_nodes": nodes,
-            "u_width": self._width,
-            "u_seconds": system.step,
-            "u_damping": system.rates.damping,
-            "u_air": tuple(load.air) if everywhere else (0.0, 0.0, 0.0),
-            "u_gusts": not everywhere,
-            "u_forced": load.force is not None,
-            "u_obstacles": contact is not None,
-        }
-        if contact is not None:
-            torso = contact.bodies.torso
-            grids = [body.grid for body in (contact.bodies.head, torso or contact.bodies.head)]
-            result |= {
-                "u_torso": torso is not None,
-                "u_friction": contact.friction,
-                "u_fastest": contact.fastest,
-                "u_rounds": contact.rounds,
-                "u_cells": [grid.shape for grid in grids],
-                "u_grid": [(*(g.origin + 0.5 * g.spacing), 1 / g.spacing) for g in grids],
-                "u_room": ROOM,
-            }
-        return result
+            words = np.frombuffer(self._textures["u_state"].read(), np.float32)
+            rods = words.reshape(-1, 4 * nodes, self._width, 4).swapaxes(1, 2)
+            self.rows = rods.reshape(-1, *self.rows.shape[1:])[:count].copy()
 
     def _put(self, name: str, *parts: npt.NDArray[Any]) -> None:
-        """Write values (S, R) of rods to a texture (see `pbd_layout.glsl`)."""
-        rows = np.concatenate(parts, axis=1).astype(np.float32)
+        """Write values (S, ...) of rods to a texture (see `pbd_layout.glsl`)."""
+        rows = np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
         high = -(-rows.shape[1] // 4)
         tall = -(-len(rows) // self._width)
         words = np.zeros((tall * self._width, high * 4), np.float32)
         words[: len(rows), : rows.shape[1]] = rows
         self._texture(name, words.reshape(tall, self._width, high, 4).swapaxes(1, 2), flat=True)
-
-    def _read(self, name: str) -> Float32Array:
-        """Read back values (S, R) that `_put` or the shader wrote."""
-        texture = self._textures[name]
-        tall = -(-len(self.rows) // self._width)
-        words = np.frombuffer(texture.read(), np.float32).reshape(tall, -1, self._width, 4)
-        result: Float32Array = words.swapaxes(1, 2).reshape(tall * self._width, -1)
-        return result[: len(self.rows)].copy()
 
     def _texture(self, name: str, values: Float32Array, flat: bool = False) -> None:
         """Write (Z, Y, X, 4) to a texture, with the first two axes in one where `flat`."""
@@ -168,11 +131,11 @@ def steps_at_once(nodes: int) -> int:
     return min(max(MOST_TURNS // turns, 1), MOST_STEPS)
 
 
-def faces(body: Obstacles | None) -> Float32Array:
+def faces(distance: Float32Array) -> Float32Array:
     """Return (X, Y, Z, 4) distances of the corners (y, z), (y, z + 1), (y + 1, z), both + 1."""
-    if body is None:
+    if not distance.size:
         return np.zeros((1, 1, 1, 4), np.float32)
-    full = np.pad(body.distance, ((0, 0), (0, 1), (0, 1)), mode="edge")
+    full = np.pad(distance, ((0, 0), (0, 1), (0, 1)), mode="edge")
     parts = [full[:, :-1, :-1], full[:, :-1, 1:], full[:, 1:, :-1], full[:, 1:, 1:]]
     return np.stack(parts, axis=-1)
 

@@ -13,7 +13,6 @@ from hairkit.simulation.vectors import (
     ONE,
     ZERO,
     Rows,
-    Vector,
     dot,
     inlined,
     minus,
@@ -23,7 +22,7 @@ from hairkit.simulation.vectors import (
 )
 
 from .block import LANES
-from .lanes import put, rows_of, stage, three
+from .lanes import put, stage, three
 
 FAR = 1.0
 """Metres up to which distances are exact: bounds would be looked up again sooner."""
@@ -40,23 +39,21 @@ HEAD = ((ONE, ZERO, ZERO, ZERO), (ZERO, ONE, ZERO, ZERO), (ZERO, ZERO, ONE, ZERO
 
 @stage
 def resolve_contacts(s: Any, x: Any, step: Any, fields: Any, settings: Any) -> None:
-    """Push nodes out of the obstacles, with friction, and restore the lengths."""
+    """Push nodes out of the obstacles, then rub and restore the lengths by turns."""
     touching, h, with_torso = False, settings.seconds, fields.torso.distance.shape[0] > 0
-    drift, pose, beside = rows_of(step.drift), rows_of(step.torso), rows_of(step.torso_drift)
-    for j in range(len(s)):
-        clear_contact(x[j])
-        if j == 0:
-            continue
-        near = False
-        measure_way(s[j], x[j], drift, h)
-        if use_room(x[j].way[0], s[j].room):
-            near = meets(s[j], x[j], s[j].room, s[j].wall, fields.head, HEAD, drift)
-        if with_torso:
-            measure_way(s[j], x[j], beside, h)
-            if use_room(x[j].way[0], s[j].aside):
-                near |= meets(s[j], x[j], s[j].aside, s[j].beside, fields.torso, pose, beside)
+    drift, pose, beside = step.drift, step.torso, step.torso_drift
+    for j in range(1, len(s)):
+        node, own, near = s[j], x[j], False
+        for w in range(LANES):
+            put(own.normal, w, (ZERO, ZERO, ZERO))
+            own.depth[w] = own.grip[w] = ZERO
+        if use_room(node, own, node.room, drift, h):
+            near = meets(node, own, node.room, node.wall, fields.head, HEAD, drift)
+        if with_torso and use_room(node, own, node.aside, beside, h):
+            near |= meets(node, own, node.aside, node.beside, fields.torso, pose, beside)
         if near:
-            push_out(s[j], x[j], settings)
+            push_out(node, own, settings)
+            rub(node, own, h)
             touching = True
     restore_lengths(s, x, settings, False)
     # without contact, one more iteration is enough
@@ -65,29 +62,18 @@ def resolve_contacts(s: Any, x: Any, step: Any, fields: Any, settings: Any) -> N
 
 
 @inlined
-def clear_contact(x: Any) -> None:
-    """Forget the last contact of a node."""
-    for w in range(LANES):
-        put(x.normal, w, (ZERO, ZERO, ZERO))
-        put(x.surface, w, (ZERO, ZERO, ZERO))
-        x.depth[w] = x.grip[w] = ZERO
+def use_room(s: Any, x: Any, room: Any, drift: Rows, h: Any) -> bool:
+    """Take from the room left to a body what a node may have moved; return whether one may meet it.
 
-
-@inlined
-def measure_way(s: Any, x: Any, drift: Rows, h: Any) -> None:
-    """Write how far a node may have moved against a body to `way`; `drift` is the body's motion."""
+    `drift` is the body's motion.
+    """
     for w in range(LANES):
         speed = minus(three(s.speed, w), times(HALF * h, three(s.gain, w)))
         by = minus(speed, moved(drift, three(s.place, w)))
-        x.way[0, w] = FURTHER * h * math.sqrt(dot(by, by))
-
-
-@inlined
-def use_room(way: Any, room: Any) -> bool:
-    """Take ways from the room that is left to a body; return whether one may meet it."""
+        x.value[w] = FURTHER * h * math.sqrt(dot(by, by))
     near = 0
     for w in range(LANES):
-        room[w] -= way[w]
+        room[w] -= x.value[w]
         near |= room[w] <= NEAR
     return near > 0
 
@@ -122,40 +108,29 @@ def meets(s: Any, x: Any, room: Any, wall: Any, field: Any, pose: Rows, drift: R
 
 @stage
 def push_out(s: Any, x: Any, settings: Any) -> None:
-    """Push nodes out of the obstacles, with friction; nothing happens where normals are 0."""
-    h, fastest, friction = settings.seconds, settings.fastest, settings.friction
+    """Push nodes out of the obstacles, which grip them; nothing happens where normals are 0."""
+    h = settings.seconds
     for w in range(LANES):
         normal, speed = three(x.normal, w), three(s.speed, w)
-        relative = minus(speed, three(x.surface, w))
-        across = dot(relative, normal)
-        inward = max(-across, ZERO)
+        inward = max(-dot(minus(speed, three(x.surface, w)), normal), ZERO)
+        x.grip[w] = settings.friction * inward
+        put(s.speed, w, plus(speed, times(inward, normal)))
         # depth of this substep is removed at once, older depth at a limited speed
-        depth = min(x.depth[w], h * (inward + fastest))
-        slide = minus(relative, times(across, normal))
-        brake, grip = braked(slide, friction * inward)
-        x.grip[w] = grip
-        put(s.speed, w, plus(speed, minus(times(inward, normal), brake)))
-        out = minus(times(depth, normal), times(HALF * h, brake))
-        put(s.place, w, plus(three(s.place, w), out))
-
-
-@inlined
-def braked(slide: Vector, grip: Any) -> tuple[Vector, Any]:
-    """Return what friction takes of a speed along the obstacle, and what is left of the grip."""
-    size = math.sqrt(dot(slide, slide)) + STILL
-    slowed = min(max(grip, ZERO), size)
-    return times(slowed / size, slide), grip - slowed
+        depth = min(x.depth[w], h * (inward + settings.fastest))
+        put(s.place, w, plus(three(s.place, w), times(depth, normal)))
 
 
 @stage
 def rub(s: Any, x: Any, h: Any) -> None:
-    """Let nodes that touch rub once more, by what the strand's own tension adds to their grip."""
+    """Let friction take from the speed along the obstacle as much as the grip holds (Coulomb)."""
     for w in range(LANES):
         speed, normal = three(s.speed, w), three(x.normal, w)
         relative = minus(speed, three(x.surface, w))
         slide = minus(relative, times(dot(relative, normal), normal))
-        brake, grip = braked(slide, x.grip[w])
-        x.grip[w] = grip
+        size = math.sqrt(dot(slide, slide)) + STILL
+        slowed = min(max(x.grip[w], ZERO), size)
+        brake = times(slowed / size, slide)
+        x.grip[w] -= slowed
         put(s.speed, w, minus(speed, brake))
         put(s.place, w, minus(three(s.place, w), times(HALF * h, brake)))
 
@@ -164,12 +139,9 @@ def rub(s: Any, x: Any, h: Any) -> None:
 def restore_lengths(s: Any, x: Any, settings: Any, rubs: bool) -> None:
     """Restore the lengths; a touching node moves only along the obstacle, and is pressed on it.
 
-    One tridiagonal solve, eliminated on the way to the tip; nodes that touch rub before where
-    `rubs`.
+    One tridiagonal solve, eliminated on the way to the tip; the root, which does not move, takes no
+    part. Nodes that touch rub before where `rubs`.
     """
-    first = x[0]
-    for w in range(LANES):
-        first.pivot[w] = first.value[w] = ZERO
     for j in range(1, len(s)):
         here, own, before, last = s[j], x[j], s[j - 1], x[j - 1]
         if rubs:

@@ -30,10 +30,9 @@ from hairkit.simulation.vectors import (
     turned,
 )
 
-from .block import LANES, Packed, Records, Settings
+from .block import LANES, Floats, Records, Settings, Steps
 from .kernel_contact import resolve_contacts
 from .lanes import (
-    FIFTH,
     THIRD,
     four,
     half_way,
@@ -46,14 +45,14 @@ from .lanes import (
     twist_angle,
 )
 from .linear_system import IMPLICIT
-from .rods import SHARPEST as SHARPEST64
 
 AHEAD, PASSED, DRIFT = (np.float32(c) for c in (1 / IMPLICIT, 1 - IMPLICIT, 0.5 - IMPLICIT**2))
 """Weights: of a change of place in the velocity, over the step; of the old acceleration in the
 velocity, and in the place, where that of the new one is `IMPLICIT` squared."""
-SHARPEST, SPIN = np.float32(SHARPEST64), np.float32(0.3)
-"""See there; largest rotation of a frame by torsion in a substep, radians: limits the Newton
-step."""
+SHARPEST = np.float32(0.3)
+"""Lower bound of 1 + cosine of a turn, which limits the twist coupling beyond 134 degrees."""
+SPIN = np.float32(0.3)
+"""Largest rotation of a frame by torsion in a substep, radians: limits the Newton step."""
 TURN = np.float32(1.0)
 """Largest rotation of a segment in a substep, radians: more than hair does, less than what linear
 solves cannot follow."""
@@ -69,39 +68,55 @@ LEAST = np.float32(1e-6)
 def run_substeps(
     first: int,
     last: int,
-    packed: Packed,
-    steps: Records,
+    blocks: Records,
+    metrics: Floats,
+    work: Records,
+    steps: Steps,
     acting: Records,
     fields: Fields,
     settings: Settings,
 ) -> None:
-    """Advance blocks `first` to before `last` by as many substeps as there are `steps`, in place.
+    """Advance blocks `first` to before `last` by all substeps, in place.
 
-    `acting` (B, n) of `ACTING` may have one block and node for all.
+    `blocks` (B, n) are of `NODE`, `metrics` (B, n (n - 1) / 2, LANES) their lower rows, `work`
+    (n + 2,) zeros of `WORK`; `acting` (B, n) of `ACTING` may have one block and node for all.
     """
-    n, h = packed.nodes.shape[1], settings.seconds
-    x, matrix = np.zeros_like(packed.work), np.empty((n, n, LANES), packed.metric.dtype)
+    n, h = blocks.shape[1], settings.seconds
+    x, matrix = np.zeros_like(work), np.empty((n, n, LANES), metrics.dtype)
     for block in range(first, last):
-        s, metric = packed.nodes[block], packed.metric[block]
+        s, metric = blocks[block], metrics[block]
         act = acting[min(block, len(acting) - 1)]
-        for k in range(len(steps)):
-            predict_nodes(s, x, steps[k], settings, act)
-            lead_roots(s, x, steps[k], h)
-            transport_frames(s, x, steps[k])
+        for k in range(len(steps.turn)):
+            step = step_of(steps, k)
+            predict_nodes(s, x, step, settings, act)
+            lead_roots(s, x, step, h)
+            transport_frames(s, x, step)
             relax_twist(s, x)
             add_elastic(s, x)
             solve_banded(s, x)
             keep_linear_lengths(s, x, metric, matrix)
             move_nodes(s, x, h)
-            if settings.rounds >= 0:
-                resolve_contacts(s, x, steps[k], fields, settings)
+            resolve_contacts(s, x, step, fields, settings)
             keep_lengths(s, h)
+
+
+@stage
+def step_of(steps: Any, k: int) -> Any:
+    """Return one substep, whose numbers stay in registers."""
+    return Steps(
+        rows_of(steps.head_step[k]),
+        rows_of(steps.drift[k]),
+        rows_of(steps.air[k]),
+        (steps.turn[k, 0], steps.turn[k, 1], steps.turn[k, 2], steps.turn[k, 3]),
+        rows_of(steps.torso[k]),
+        rows_of(steps.torso_drift[k]),
+    )
 
 
 @stage
 def predict_nodes(s: Any, x: Any, step: Any, settings: Any, act: Any) -> None:
     """Bring nodes to the new head axes, extrapolate them, and sum the forces on them."""
-    head, drift, air = rows_of(step.head_step), rows_of(step.drift), rows_of(step.air)
+    head, drift, air = step.head_step, step.drift, step.air
     gravity, h, damping = (air[0][3], air[1][3], air[2][3]), settings.seconds, settings.damping
     for j in range(1, len(s)):
         outer = act[min(j, len(act) - 1)]
@@ -128,7 +143,7 @@ def lead_roots(s: Any, x: Any, step: Any, h: Any) -> None:
 
     The inertia between them, a sixth of the segment's mass, is a third of the root's.
     """
-    head, over = rows_of(step.head_step), ONE / h
+    head, over = step.head_step, ONE / h
     node, own, first = s[0], x[0], x[1]
     for w in range(LANES):
         rest, place = three(node.rest, w), moved(head, three(node.place, w))
@@ -148,7 +163,6 @@ def lead_roots(s: Any, x: Any, step: Any, h: Any) -> None:
 @stage
 def transport_frames(s: Any, x: Any, step: Any) -> None:
     """Write the segments, and transport their frames to the new directions."""
-    turn = (step.turn[0], step.turn[1], step.turn[2], step.turn[3])
     for j in range(1, len(s)):
         node, own, last_node = s[j], x[j], s[j - 1]
         for w in range(LANES):
@@ -157,15 +171,12 @@ def transport_frames(s: Any, x: Any, step: Any) -> None:
             put(own.edge, w, edge)
             put(own.reach, w, times(node.over[w], edge))
             put(own.way, w, way)
-            put_four(node.frame, w, swing_frame(product(turn, four(node.frame, w)), way))
+            put_four(node.frame, w, swing_frame(product(step.turn, four(node.frame, w)), way))
 
 
 @stage
 def relax_twist(s: Any, x: Any) -> None:
     """Rotate frames about their segments until torques balance: one Newton step, tridiagonal."""
-    held = x[0]
-    for w in range(LANES):
-        held.pivot[w] = held.value[w] = ZERO
     for j in range(1, len(s)):
         node, own, last_node, last = s[j], x[j], s[j - 1], x[j - 1]
         for w in range(LANES):
@@ -185,19 +196,20 @@ def relax_twist(s: Any, x: Any) -> None:
             last.pivot[w] += twist + firm
             last.value[w] += half * dot(away, minus(spun, aside)) + torque
     solve_tridiagonal(x, len(s))
+    held = x[0]
+    for w in range(LANES):
+        held.value[w] = ZERO
     for j in range(1, len(s)):
         node, own, last = s[j], x[j], x[j - 1]
         for w in range(LANES):
-            # half angles by a rational cosine and sine; the angle by the arc tangent's series
-            half = HALF * min(max(own.value[w], -SPIN), SPIN)
-            square = half * half
-            cosine = ONE / math.sqrt(ONE + square)
+            angle = min(max(own.value[w], -SPIN), SPIN)
+            own.value[w] = angle
+            own.torque[w] += node.twist[w] * (angle - last.value[w])
+            # half angles by a rational cosine and sine
+            half = HALF * angle
+            cosine = ONE / math.sqrt(ONE + half * half)
             axis = times(half * cosine, three(own.way, w))
             put_four(node.frame, w, product((cosine, *axis), four(node.frame, w)))
-            angle = (half + half) * (ONE - square * (THIRD - FIFTH * square))
-            own.value[w] = angle
-            # exact for frames rotated about their own segments
-            own.torque[w] += node.twist[w] * (angle - last.value[w])
 
 
 @stage
@@ -217,9 +229,6 @@ def solve_tridiagonal(x: Any, n: int) -> None:
         for w in range(LANES):
             known = next_.beside[w] * next_.value[w]
             own.value[w] = (own.value[w] - known) * own.pivot[w]
-    held = x[0]
-    for w in range(LANES):
-        held.value[w] = ZERO
 
 
 @stage
@@ -229,8 +238,8 @@ def add_elastic(s: Any, x: Any) -> None:
         node, own, last_node, last = s[j], x[j], s[j - 1], x[j - 1]
         for w in range(LANES):
             away, here = three(last.way, w), three(own.way, w)
-            frames = four(last_node.frame, w), four(node.frame, w)
-            natural, quarter = half_way(frames[0], frames[1], three(node.curve, w))
+            before, after = four(last_node.frame, w), four(node.frame, w)
+            natural, quarter = half_way(before, after, three(node.curve, w))
             turn, bend = minus(three(own.reach, w), three(last.reach, w)), node.bend[w]
             spun = times(HALF * bend, cross(natural, turn))
             aside = cross(quarter, spun)
@@ -280,13 +289,11 @@ def substitute_node(s: Any, next_: Any, further: Any, x: Any, after: Any, beyond
 
 @stage
 def keep_linear_lengths(s: Any, x: Any, metric: Any, matrix: Any) -> None:
-    """Write `free` and `solved`, what tensions take from it so that segments keep their lengths."""
+    """Let tensions act, by which segments keep their lengths, and solve anew."""
     for j in range(1, len(s)):
         node, own, last = s[j], x[j], x[j - 1]
         for w in range(LANES):
-            here = three(own.solved, w)
-            put(own.free, w, here)
-            change = minus(here, three(last.solved, w))
+            change = minus(three(own.solved, w), three(last.solved, w))
             reach = dot(plus(three(own.edge, w), change), three(own.way, w))
             own.value[w] = reach - node.length[w]
     solve_lengths(x, metric, matrix, len(s))
@@ -295,7 +302,7 @@ def keep_linear_lengths(s: Any, x: Any, metric: Any, matrix: Any) -> None:
         for w in range(LANES):
             pull = times(own.value[w], three(own.way, w))
             after = times(next_.value[w], three(next_.way, w))
-            put(own.force, w, minus(pull, after))
+            put(own.force, w, plus(three(own.force, w), minus(after, pull)))
     solve_banded(s, x)
 
 
@@ -342,7 +349,7 @@ def move_nodes(s: Any, x: Any, h: Any) -> None:
     for j in range(1, len(s)):
         node, own = s[j], x[j]
         for w in range(LANES):
-            move = minus(three(own.free, w), three(own.solved, w))
+            move = three(own.solved, w)
             added = times(over * AHEAD, move)
             put(node.place, w, plus(three(node.place, w), move))
             put(node.speed, w, plus(three(node.speed, w), added))

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from hairkit.parallel import compiled_with
 from hairkit.simulation.vectors import (
     ONE,
-    TWO,
     ZERO,
     Frame,
     Rows,
@@ -24,22 +22,14 @@ from hairkit.simulation.vectors import (
     product,
     third_axis,
     times,
+    unit,
 )
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
-
-THIRD, FIFTH, SEVENTH = np.float32(1 / 3), np.float32(1 / 5), np.float32(1 / 7)
+THIRD, THREE, FOUR, NINE_FIFTHS = (np.float32(c) for c in (1 / 3, 3, 4, 9 / 5))
 OPPOSITE = np.float32(1e-4)
 """Least 1 + cosine between an axis and where it is swung to."""
-_A, _B, _C, _D, _E = (
-    np.float32(c) for c in (0.9998660, -0.3302995, 0.1801410, -0.0851330, 0.0208351)
-)
-_HALF_PI, _SMALL = np.float32(np.pi / 2), np.float32(0.04)
-
-
-def stage(function: _Function) -> _Function:
-    """Compile one step of the method for a block, by itself."""
-    return compiled_with(fastmath=True)(function)
+stage = compiled_with(fastmath=True)
+"""Compiles one step of the method for a block, by itself."""
 
 
 @inlined
@@ -81,9 +71,7 @@ def swing_frame(q: Frame, way: Vector) -> Frame:
     """Rotate a frame by the shortest arc that brings its third axis to `way`; normalise it."""
     axis = third_axis(q)
     about = cross(axis, way)
-    q = product((max(ONE + dot(axis, way), OPPOSITE), about[0], about[1], about[2]), q)
-    size = ONE / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-    return size * q[0], size * q[1], size * q[2], size * q[3]
+    return unit(product((max(ONE + dot(axis, way), OPPOSITE), *about), q))
 
 
 @inlined
@@ -108,17 +96,11 @@ def half_way(a: Frame, b: Frame, v: Vector) -> tuple[Vector, Vector]:
 def twist_angle(a: Frame, b: Frame) -> Any:
     """Return twice the angle of (w, z) of a^-1 b: the twist between frames, radians.
 
-    The arc tangent's polynomial is off by at most 1e-5 (Abramowitz and Stegun 1964, 4.4.49); for
-    small twists it would be off by a share of 1.3e-4, so that there its series is taken.
+    Four times the arc tangent of u, the tangent of a quarter of it, by the continued fraction
+    u (1 - u^2 / (3 + 9 u^2 / 5)): off by 5e-5 of it up to a quarter turn, 0.8 % at half a turn.
     """
     w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
     z = a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0]
-    z, w = (-z if w < ZERO else z), abs(w)
-    size = abs(z)
-    t = min(size, w) / max(size, w)
-    s = t * t
-    wide = t * (_A + s * (_B + s * (_C + s * (_D + s * _E))))
-    small = t * (ONE - s * (THIRD - s * (FIFTH - s * SEVENTH)))
-    angle = small if s < _SMALL else wide
-    angle = TWO * (_HALF_PI - angle if w < size else angle)
-    return -angle if z < ZERO else angle
+    size = math.sqrt(w * w + z * z)
+    u = z / (w - size if w < ZERO else w + size)
+    return FOUR * u * (ONE - u * u / (THREE + NINE_FIFTHS * u * u))

@@ -28,7 +28,7 @@ COMPLIANCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """Drag, damping and shape stiffness of the nodes."""
+    """Drag, damping and pull to the captured shape."""
 
     drag: Float64Array
     """(S, n) rate of air drag, 1/s."""
@@ -57,9 +57,11 @@ def assemble(rods: Rods, rates: Rates, step: float) -> System:
     difference = np.eye(count) - np.eye(count, k=-1)
     bending = (difference / rods.length[:, None, :]) @ difference
     inner = IMPLICIT * step
-    diagonal = rods.mass[:, 1:] * ((rates.drag[:, 1:] + rates.damping) / inner + rates.shape[:, 1:])
+    firm = 1 / inner**2 + (rates.drag + rates.damping) / inner + rates.shape
+    diagonal = (rods.mass * firm)[:, 1:]
     matrix = np.einsum("sij,si,sik->sjk", bending, rods.bend, bending)
-    matrix += rods.inertia()[:, 1:, 1:] / inner**2
+    # a rigid bar has thirds and sixths of its mass
+    matrix -= difference.T @ (rods.bars[..., None] / (6 * inner**2) * difference)
     matrix[:, np.arange(count), np.arange(count)] += diagonal
     metric = difference @ np.linalg.inv(matrix) @ difference.T
     metric[:, np.arange(count), np.arange(count)] *= 1 + COMPLIANCE

@@ -16,9 +16,13 @@ less than a millimetre apart, what a head moves in a substep is more than a segm
 LARGEST_TURN = 0.7
 """Largest angle between segments at rest, radians; beyond, the coupling to twist is stiff."""
 _ROUNDS = 60
+FIRMEST = 6e3
+"""Largest bending stiffness, as EI / (rho A) h^2 / l^4 of segments of length l in substeps of h:
+more has tones above 50 Hz, and float32 loses the lengths. Hair cut short is stiffer than that."""
 FOLLOWED = 10.0
 """Bending of curled rods is stable in steps of h up to EI / (rho A) h^2 c^3 / l^4 of 10 to 20; here
-l is a segment's length and c the turn from one to the next: measured on coils of 0.1 to 0.7."""
+l is a segment's length and c the turn from one to the next: measured on coils of 0.1 to 0.7. Their
+natural turns follow the frames of the step before."""
 FARTHEST, WIDEST = 0.12, 1.2
 """Way of a root in a frame, metres, and turn, radians, from which the head is cut to its new place:
 more than 7 m/s, 4,100 degrees a second."""
@@ -59,12 +63,12 @@ def node_points(strands: Strands, nodes: int) -> Float64Array:
 def max_stiffness(points: Float64Array, step: float) -> Float64Array:
     """Return the largest stable EI over mass per length (S,), m^4/s^2, for a time step.
 
-    Natural curvature uses the frames of the previous step, which limits short, stiff and sharply
-    curled rods only; their lowest mode is far above visible motion of hair.
+    It limits short, stiff and sharply curled rods only; their lowest mode is far above visible
+    motion of hair.
     """
-    length = np.linalg.norm(np.diff(points, axis=1), axis=-1).mean(axis=1)
+    length = np.linalg.norm(np.diff(points, axis=1), axis=-1).min(axis=1)
     curl = np.maximum(_largest_turn(points), 1e-3)
-    result: Float64Array = FOLLOWED * length**4 / (step**2 * curl**3)
+    result: Float64Array = np.minimum(FIRMEST, FOLLOWED / curl**3) * length**4 / step**2
     return result
 
 

@@ -1,4 +1,4 @@
-"""Discrete Cosserat rods: the model, its rest state, and inverse statics.
+"""Discrete Cosserat rods: the model, its state and energy, and inverse statics.
 
 A rod has n nodes and n - 1 segments; each segment carries a frame (a quaternion) whose third axis
 is its direction (Kugelstadt and Schoemer 2016; parallel transport in time after Bergou et al.
@@ -17,17 +17,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
-from hairkit.errors import InputError
 from hairkit.simulation import quaternion
 
-SHARPEST = 0.3
-"""Lower bound of 1 + cosine of a turn, which limits the twist coupling beyond 134 degrees."""
 TINY = 1e-30
-"""Added to what divides."""
-_ROUNDS = 20
+"""Least divisor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,83 +56,65 @@ class Rods:
         """Nodes of every rod."""
         return int(self.points.shape[1])
 
-    def inertia(self) -> Float64Array:
-        """Return (S, n, n) the mass matrix: a rigid bar has thirds and sixths of its mass."""
-        at = np.arange(self.nodes)
-        matrix = np.zeros((len(self.mass), self.nodes, self.nodes))
-        matrix[:, at, at] = self.mass
-        for ends in ((at[:-1], at[1:]), (at[1:], at[:-1])):
-            matrix[:, ends[0], ends[0]] -= self.bars / 6
-            matrix[:, ends[0], ends[1]] += self.bars / 6
-        return matrix
-
     def before(self, frames: Float64Array) -> Float64Array:
         """Return (S, n - 1, 4) the frame before each element: the root's, then the segments'."""
         return np.concatenate([self.root_frame[:, None], frames[:, :-1]], axis=1)
 
 
+@dataclass(frozen=True, eq=False)
+class State:
+    """Positions, velocities and frames of rods.
+
+    In the axes of the moving head: its surface, the roots and the captured shape are then constant,
+    and float32 keeps its precision wherever the head is.
+    """
+
+    position: Float64Array
+    """(S, n, 3) metres."""
+    velocity: Float64Array
+    """(S, n, 3) m/s in the world."""
+    frames: Float64Array
+    """(S, n - 1, 4) of the segments."""
+    acceleration: Float64Array
+    """(S, n, 3) of the last substep before contact, m/s^2 in the world; 0 in equilibrium."""
+
+
 def make_rods(
-    points: npt.ArrayLike,
-    density: npt.ArrayLike,
-    bending: npt.ArrayLike,
-    torsion: npt.ArrayLike | None = None,
-    *,
-    root_direction: npt.ArrayLike | None = None,
-    straight: bool = False,
+    points: Float64Array, density: Float64Array, bending: Float64Array, torsion: Float64Array
 ) -> Rods:
-    """Return unloaded rods with nodes at `points`.
+    """Return naturally straight rods with nodes at `points`, whose roots hold their directions.
 
     Parameters
     ----------
     points
-        (S, n, 3) metres, root first.
+        (S, n, 3) metres, root first, no two neighbours equal.
     density
-        Mass per length, kg/m: a number or (S, n - 1) of the segments.
+        (S, 1) mass per length, kg/m.
     bending, torsion
-        EI and GJ, N m^2: numbers or (S, n - 1) of the elements; GJ is EI / 1.3 where None (a round
-        fibre of Poisson's ratio 0.3).
-    root_direction
-        (3,) or (S, 3) direction that the root holds; None: that of the first segment.
-    straight
-        True: the natural shape is straight; False: it is `points`.
+        (S, 1) EI and GJ, N m^2.
     """
-    nodes = np.array(points, np.float64)
-    edge = np.diff(nodes, axis=1)
+    edge = np.diff(points, axis=1)
     length = np.linalg.norm(edge, axis=-1)
-    if nodes.ndim != 3 or nodes.shape[1] < 3 or not (length > 0).all():
-        raise InputError(
-            f"rods need (S, n, 3) points, n >= 3, no two neighbours equal; got {nodes.shape}"
-        )
-    segments = np.broadcast_to(np.asarray(density, np.float64), length.shape) * length
-    mass = np.zeros(nodes.shape[:2])
+    segments = density * length
+    mass = np.zeros(points.shape[:2])
     mass[:, :-1] += segments / 2
     mass[:, 1:] += segments / 2
     # an element's length: from middle to middle, the first from the root to its middle
     span = length / 2
     span[:, 1:] += length[:, :-1] / 2
-    ei = np.broadcast_to(np.asarray(bending, np.float64), length.shape)
-    gj = ei / 1.3 if torsion is None else np.broadcast_to(torsion, length.shape)
-    direction = edge / length[..., None]
-    held = direction[:, 0] if root_direction is None else np.asarray(root_direction, np.float64)
-    frames = parallel_frames(
-        np.broadcast_to(quaternion.normalize(held), direction[:, 0].shape), direction
-    )
-    rods = Rods(
-        nodes, mass, segments, length, ei / span, gj / span, frames[:, 0], frames[:, 1:],
-        np.zeros_like(nodes[:, 1:]), np.zeros_like(length),
+    frames = parallel_frames(edge / length[..., None])
+    straight, untwisted = np.zeros_like(edge), np.zeros_like(length)
+    return Rods(
+        points, mass, segments, length, bending / span, torsion / span, frames[:, 0], frames,
+        straight, untwisted,
     )  # fmt: skip
-    return rods if straight else _with_moments(rods, np.zeros_like(direction), 0 * length)
 
 
-def parallel_frames(held: Float64Array, direction: Float64Array) -> Float64Array:
-    """Return twist-free frames (S, n, 4) of the root and the segments (Bishop 1975)."""
-    first = np.broadcast_to([0.0, 0.0, 1.0], held.shape)
-    frames = [quaternion.shortest_arc(first, held)]
-    before = held
-    for j in range(direction.shape[1]):
-        turn = quaternion.shortest_arc(before, direction[:, j])
-        frames.append(quaternion.normalize(quaternion.product(turn, frames[-1])))
-        before = direction[:, j]
+def parallel_frames(direction: Float64Array) -> Float64Array:
+    """Return twist-free frames (S, n - 1, 4) of segments (Bishop 1975)."""
+    frames = [transport_frames(np.array([1.0, 0.0, 0.0, 0.0]), direction[:, 0])]
+    for j in range(1, direction.shape[1]):
+        frames.append(transport_frames(frames[-1], direction[:, j]))
     return np.stack(frames, axis=1)
 
 
@@ -157,76 +134,53 @@ def clamp_roots(rods: Rods, force: Float64Array) -> Rods:
     return replace(rods, bend=bend)
 
 
-def balance_load(rods: Rods, force: npt.ArrayLike) -> Rods:
+def balance_load(rods: Rods, force: Float64Array) -> Rods:
     """Return rods in equilibrium at their present shape under node forces (S, n, 3), newtons.
 
-    Inverse statics: from the tip to the root, each element's moment balances the load beyond it;
-    the natural shape gives this moment at the present shape. Tension carries the load along the
-    rod, so that moments are perpendicular to it.
+    Inverse statics: each element holds the torque G about it of all forces beyond; tension carries
+    the rest. Turning what is beyond by a small angle w changes the element's energy by w times
+
+        b x m - P (b - a) x m + t (a + b) / (1 + a b),
+
+    with the directions a, b before and after it, its bending moment m, its torque t, and the part P
+    w of the turn that its midpoint frame takes. That is G where, with c and M the length and the
+    direction of (a + b) / 2,
+
+        m = G x M + G (a x b) (b - a) / 4 c^2 (1 + c),  t = c G M.
+
+    The natural turn and twist differ from the present ones by what gives these moments.
     """
-    weight = np.broadcast_to(np.asarray(force, np.float64), rods.points.shape)
-    beyond = np.cumsum(weight[:, ::-1], axis=1)[:, ::-1][:, 1:]
-    load = rods.length[..., None] * beyond
-    before = rods.before(rods.frames)
-    direction = quaternion.third_axis(rods.frames)
-    turn = direction - quaternion.third_axis(before)
-    middle = quaternion.third_axis(before) + direction
-    along = (direction * middle).sum(axis=-1, keepdims=True)
-    along = np.where(along > 1e-9, along, np.inf)  # a fold straight back has no middle
-    binormal = half_binormal(before, rods.frames)
-    moment, torque = np.zeros_like(direction), np.zeros_like(rods.length)
-    for _ in range(_ROUNDS * rods.nodes):
-        first, second = split_torque(before, rods.frames, np.cross(turn, moment))
-        turning = second + next_element(first)
-        twisting = torque[..., None] * binormal
-        total = load + np.cross(turning, direction) - twisting - next_element(twisting)
-        new = total
-        for j in range(direction.shape[1] - 1, -1, -1):
-            if j + 1 < direction.shape[1]:
-                new[:, j] += new[:, j + 1]
-            pull = (new[:, j] * middle[:, j]).sum(axis=-1, keepdims=True) / along[:, j]
-            new[:, j] -= pull * direction[:, j]
-        torsion = np.cumsum((direction * turning).sum(axis=-1)[:, ::-1], axis=1)[:, ::-1]
-        change = np.abs(new - moment).max(initial=0.0) + np.abs(torsion - torque).max(initial=0.0)
-        moment, torque = new, torsion
-        if change <= 1e-15 * np.abs(moment).max(initial=0.0):
-            break
-    return _with_moments(rods, moment, torque)
-
-
-def _with_moments(rods: Rods, moment: Float64Array, torque: Float64Array) -> Rods:
-    """Return rods whose elements have these moments at the present shape."""
-    direction = quaternion.third_axis(rods.frames)
-    before = rods.before(rods.frames)
-    turn = direction - quaternion.third_axis(before)
-    soft = np.where(rods.bend > 0, rods.bend, np.inf)[..., None]
-    natural = turn - moment / soft
-    middle = midpoint_frame(before, rods.frames)
-    twisting = np.where(rods.twist > 0, rods.twist, np.inf)
+    beyond = np.cumsum(force[:, ::-1], axis=1)[:, ::-1][:, 1:]
+    after = quaternion.third_axis(rods.frames)
+    torques = np.cross(after * rods.length[..., None], beyond)
+    torque = np.cumsum(torques[:, ::-1], axis=1)[:, ::-1]
+    frames = rods.before(rods.frames)
+    before = quaternion.third_axis(frames)
+    turn, middle = after - before, (after + before) / 2
+    half_cosine = np.maximum(np.linalg.norm(middle, axis=-1, keepdims=True), TINY)
+    aside = (torque * np.cross(before, after)).sum(axis=-1, keepdims=True)
+    moment = np.cross(torque, middle) / half_cosine
+    moment += aside / (4 * half_cosine**2 * (1 + half_cosine)) * turn
+    natural = turn - moment / np.maximum(rods.bend, TINY)[..., None]
+    twisting = (torque * middle).sum(axis=-1) / np.maximum(rods.twist, TINY)
+    back = quaternion.inverse(midpoint_frame(frames, rods.frames))
     return replace(
         rods,
-        curvature=quaternion.rotate(quaternion.inverse(middle), natural),
-        natural_twist=twist_between(before, rods.frames) - torque / twisting,
+        curvature=quaternion.rotate(back, natural),
+        natural_twist=twist_between(frames, rods.frames) - twisting,
     )
 
 
+def rest_state(rods: Rods) -> State:
+    """Return the captured state with zero velocity."""
+    still = np.zeros_like(rods.points)
+    return State(rods.points.copy(), still, rods.frames.copy(), still.copy())
+
+
 def transport_frames(frames: Float64Array, direction: Float64Array) -> Float64Array:
-    """Return frames parallel-transported in time to new directions."""
+    """Return frames (..., 4) turned by the shortest arcs that bring third axes to directions."""
     turn = quaternion.shortest_arc(quaternion.third_axis(frames), direction)
     return quaternion.normalize(quaternion.product(turn, frames))
-
-
-def elements(
-    rods: Rods, frames: Float64Array, way: Float64Array
-) -> tuple[Float64Array, Float64Array, Float64Array]:
-    """Return the elements' turns and natural turns (S, n - 1, 3), and torques (S, n - 1).
-
-    The turns are those between the segments `way` (S, n - 1, 3), over their lengths.
-    """
-    before, held = rods.before(frames), quaternion.third_axis(rods.root_frame)[:, None]
-    turn = way - np.concatenate([held, way[:, :-1]], axis=1)
-    natural = quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
-    return turn, natural, rods.twist * (twist_between(before, frames) - rods.natural_twist)
 
 
 def midpoint_frame(before: Float64Array, after: Float64Array) -> Float64Array:
@@ -243,29 +197,22 @@ def twist_between(before: Float64Array, after: Float64Array) -> Float64Array:
     return result
 
 
-def half_binormal(before: Float64Array, after: Float64Array) -> Float64Array:
-    """Return a x b / (1 + a.b) of directions a, b: the gradient of twist with respect to either."""
-    first, second = quaternion.third_axis(before), quaternion.third_axis(after)
-    cosine = (first * second).sum(axis=-1, keepdims=True)
-    result: Float64Array = np.cross(first, second) / np.maximum(1.0 + cosine, SHARPEST)
-    return result
+def elastic_energy(
+    rods: Rods, position: Float64Array, frames: Float64Array, pull: Float64Array
+) -> float:
+    """Return the energy of bending, twist and the pull to the captured shape, joules.
 
-
-def split_torque(
-    before: Float64Array, after: Float64Array, torque: Float64Array
-) -> tuple[Float64Array, Float64Array]:
-    """Split a torque on the midpoint frames into torques on the frames before and after.
-
-    The midpoint frame rotates by half the sum of both rotations, plus the tangent of a quarter of
-    the angle between them times their difference.
+    `position` (S, n, 3) and `frames` (S, n - 1, 4), which may have other directions; `pull` (S, n)
+    has the squared frequencies of that pull, 1/s^2.
     """
-    step = quaternion.product(after, quaternion.inverse(before))
-    sign = np.where(step[..., :1] < 0, -1.0, 1.0)
-    quarter = sign * step[..., 1:] / (1.0 + sign * step[..., :1])
-    aside = np.cross(quarter, torque)
-    return 0.5 * (torque - aside), 0.5 * (torque + aside)
-
-
-def next_element(values: Float64Array) -> Float64Array:
-    """Return the values of the next element, 0 beyond the tip."""
-    return np.concatenate([values[:, 1:], np.zeros_like(values[:, :1])], axis=1)
+    edge = np.diff(position, axis=1)
+    frames = transport_frames(frames, quaternion.normalize(edge))
+    before = rods.before(frames)
+    held = quaternion.third_axis(rods.root_frame)[:, None]
+    turn = np.diff(edge / rods.length[..., None], axis=1, prepend=held)
+    natural = quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
+    bent = ((turn - natural) ** 2).sum(axis=-1)
+    twisted = twist_between(before, frames) - rods.natural_twist
+    moved = ((position - rods.points) ** 2).sum(axis=-1)
+    energy = (rods.bend * bent).sum() + (rods.twist * twisted**2).sum()
+    return 0.5 * float(energy + (rods.mass * pull * moved).sum())

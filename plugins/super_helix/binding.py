@@ -34,8 +34,6 @@ class Binding(NamedTuple):
     """(P, 3) from there to the point, in the frame there."""
     bounds: Int64Array
     """(S + 1,) of the points, as the strands'."""
-    step: Float64Array
-    """(P,) metres from each point's predecessor to it."""
 
 
 def bind_rods(strands: Strands, elements: int) -> tuple[Rods, Binding]:
@@ -72,8 +70,7 @@ def bind_rods(strands: Strands, elements: int) -> tuple[Rods, Binding]:
     rank = np.minimum(place.astype(np.int64), counts[strand] - 1)
     element = arcs.offsets[:-1][strand] + rank
     arc = (place - rank) * arcs.lengths[element]
-    step = np.linalg.norm(np.diff(wanted, axis=0, prepend=0.0), axis=1)
-    binding = Binding(element, arc, np.zeros((len(arc), 3)), strands.offsets, step)
+    binding = Binding(element, arc, np.zeros((len(arc), 3)), strands.offsets)
     return rods, binding._replace(offset=_offsets(rods, binding, wanted))
 
 

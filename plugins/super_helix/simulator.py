@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
-from hairkit.grooming.guide_weights import guide_mask
-from hairkit.grooming.prepare_export import select_strands
+from hairkit.options import fill_options
 from hairkit.parallel import parallel_for
-from hairkit.simulation import Measures, Surroundings, check_grabs
-from hairkit.simulation.obstacle_kernels import NO_FIELDS, Drawn, draw_points
-from hairkit.simulation.obstacles import Bodies, groom_bodies
-from hairkit.simulation.rigid_motion import follow_head, interpolate_motion, inverse_motion
+from hairkit.simulation import Measures, Surroundings
+from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
+from hairkit.simulation.rigid_motion import follow_head, interpolate_motion
 from hairkit.simulation.ties import held_lengths
 from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
-from hairkit.types.strands import Strands
 
 from .binding import bind_rods, carry_points
 from .hair_contact import Neighbours
@@ -33,78 +29,39 @@ from .statics import rest_as_captured
 if TYPE_CHECKING:
     from . import Options
 
-FRAME = 1 / 60
-"""Seconds that the option `substeps` divides: one frame."""
-DRAWN, ROUNDING = 0.001, 1e-5
-"""Metres off the head that drawn points keep, where they were not nearer at rest, and by which
-that is less than what grids say."""
 SKIN = 0.0015
 """Hair is kept this far off the head, metres, where it was not nearer at rest."""
 PUSH_RATE, GRAB_RATE = 600.0, 150.0
 """Rates, per second, at which contact and a user's hand act on a point's or a strand's mass."""
+GRAB_SPEED = 5.0
+"""Highest speed of a user's hand, m/s: faster ones would whip the strand."""
 POISSON = 0.38
 """Poisson's ratio of hair."""
-KERATIN = 1300.0
-"""Density of hair, kilograms per cubic metre."""
 HELD = 100.0
 """Times the stiffness of hair that hair before its tie has: it is stretched over the head."""
 MIDDLE = 0.6
 """`bend_stiffness` of a groom at which the stiffness is that of the options."""
 
 
-class SuperHelices:
+class SuperHelices(GuideSimulator):
     """Guides whose elements keep their length: two curvatures and a twist each."""
 
     def __init__(self, groom: Groom, options: Options) -> None:
-        self._bodies: Bodies | None = None
-        if options.contact and len(groom.strands):
-            self._bodies = groom_bodies(groom)
-        self._fields = NO_FIELDS if self._bodies is None else self._bodies.fields
-        self._groom = groom = select_strands(groom, guide_mask(groom.strands))
-        self._shape, self._binding = bind_rods(groom.strands, options.elements)
-        self._rest_gravity = np.array([0.0, -groom.physics.gravity, 0.0])
-        self._deepest = np.zeros(0)
-        if self._bodies is not None:
-            away = self._bodies.at(groom.strands.points)[0]
-            self._deepest = np.minimum(away, DRAWN) - ROUNDING
+        super().__init__(groom, options.contact)
+        self._shape, self._binding = bind_rods(self.strands, options.elements)
         self.retune(options)
         self.reset()
 
-    @property
-    def strands(self) -> Strands:
-        """The guides at rest, head frame."""
-        return self._groom.strands
-
-    @property
-    def options(self) -> Options:
-        """The options in force: those that were None come from the groom."""
-        return self._options
-
-    @property
-    def time(self) -> float:
-        """Seconds since the start or the last reset."""
-        return self._time
-
-    @property
-    def points(self) -> Float32Array:
-        """(P, 3) present positions in the world, metres."""
-        return self._drawn().astype(np.float32)
-
     def retune(self, options: Options) -> None:
         """Take other options from now on; positions and the number of elements stay."""
-        groom = self._groom
-        width = groom.material.width * 1e6 if options.diameter is None else options.diameter
-        grip = groom.physics.friction if options.friction is None else options.friction
-        options = self._options = replace(options, diameter=width, friction=grip)
+        width, grip = self._groom.material.width * 1e6, self._groom.physics.friction
+        options = self._options = fill_options(options, diameter=width, friction=grip)
         self._rods = rest_as_captured(self._with_material(options), self._rest_gravity)
 
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
         """Put the guides at rest on a head at `head_from_rest` (4, 4), without velocity."""
-        head = np.eye(4) if head_from_rest is None else np.array(head_from_rest, np.float64)
-        if head.shape != (4, 4):
-            raise InputError(f"head_from_rest has shape {head.shape}, expected (4, 4)")
-        self._head = self._torso = head
-        self._time = self._before = 0.0
+        self._place(head_from_rest)
+        head, self._before = self._head, 0.0
         shape = (len(self._rods.lengths), NODES)
         rest = np.empty((*shape, 3))
         parallel_for(
@@ -113,9 +70,7 @@ class SuperHelices:
         q, still = self._rods.captured, np.zeros((*shape, 3))
         self._motion = Motion(q.copy(), q.copy(), rest, rest.copy(), still, still.copy())
         own = (rest - head[:3, 3]) @ head[:3, :3]
-        self._gap = np.full(shape, SKIN)
-        if self._bodies is not None:
-            self._gap = np.minimum(self._gap, self._bodies.at(own)[0])
+        self._gap = np.minimum(SKIN, self._bodies.at(own)[0])
         self._neighbours = Neighbours(own, self._rods.masses)
         self._rest_energy = self._potential(own, q, self._rest_gravity)
 
@@ -135,50 +90,42 @@ class SuperHelices:
         speed = (self._motion.velocity**2).sum(-1)
         own = (self._motion.points - self._head[:3, 3]) @ self._head[:3, :3]
         gravity = self._rest_gravity @ self._head[:3, :3]
+        stretch, depth = self._measure_drawn()
         return Measures(
-            self._stretch(),
+            stretch,
             float(0.5 * (self._rods.masses * speed).sum()),
             self._potential(own, self._motion.q, gravity) - self._rest_energy,
-            self._depth(),
+            depth,
         )
-
-    def _depth(self) -> float:
-        """Return by how much a drawn point is deeper in head or torso than at rest."""
-        if self._bodies is None:
-            return 0.0
-        own = (self._drawn() - self._head[:3, 3]) @ self._head[:3, :3]
-        torso = inverse_motion(self._torso) @ self._head
-        return self._bodies.deepest(own, torso, self._deepest)
 
     def _substep(
         self, seconds: float, head: Float64Array, around: Surroundings, air: Float64Array
     ) -> None:
         options = self._options
-        gravity = self._rest_gravity if around.gravity is None else around.gravity
         two_step = options.second_order and abs(self._before - seconds) < 1e-9
-        torso = self._torso
-        if self._bodies is not None:
-            torso = follow_head(torso, head, self._bodies.joint)
+        torso, fields = follow_head(self._torso, head, self._bodies.joint), self._bodies.fields
         step = Step(
             seconds,
             two_step,
             options.internal_friction,
             options.iterations,
-            np.array(gravity, np.float64),
+            np.array(self._gravity(around), np.float64),
             np.array(head, np.float64),
             PUSH_RATE**2,
             float(options.friction or 0.0),
             (
-                Body(np.array(head), np.array(self._head), self._fields.head),
-                Body(np.array(torso), np.array(self._torso), self._fields.torso),
+                Body(np.array(head), np.array(self._head), fields.head),
+                Body(np.array(torso), np.array(self._torso), fields.torso),
             ),
         )
+        self._move_hands(around, GRAB_SPEED * seconds)
         loads = self._loads(around, air)
         if options.solver == "recursion":
             parallel_for(step_strands, len(self._rods.roots), self._rods, self._motion, loads, step)
         else:
             step_densely(self._rods, self._motion, loads, step)
         self._head, self._torso, self._before = step.head, torso, seconds
+        self._points = None
         self._time += seconds
 
     def _air(self, around: Surroundings) -> Float64Array:
@@ -202,18 +149,15 @@ class SuperHelices:
                 self._head,
             )
         spring, anchor = np.zeros(shape), np.zeros_like(motion.points)
-        check_grabs(around.grabs, len(self._binding.arc))
-        drawn = self._drawn() if around.grabs else np.empty((0, 3))
-        for grab in around.grabs:
-            element = self._binding.element[grab.point]
-            node = int(
-                np.argmin(np.linalg.norm(motion.points[element] - drawn[grab.point], axis=1))
-            )
+        drawn = self.points if around.grabs else np.empty((0, 3))
+        for point, place in self._hands.places.items():
+            element = self._binding.element[point]
+            node = int(np.argmin(np.linalg.norm(motion.points[element] - drawn[point], axis=1)))
             strand = np.searchsorted(self._rods.offsets, element, side="right") - 1
             own = slice(self._rods.offsets[strand], self._rods.offsets[strand + 1])
             spring[element, node] = GRAB_RATE**2 * masses[own].sum()
-            lever = motion.points[element, node] - drawn[grab.point]
-            anchor[element, node] = np.array(grab.target) + lever
+            lever = motion.points[element, node] - drawn[point]
+            anchor[element, node] = place + lever
         return Loads(drag, np.ascontiguousarray(air), spring, anchor, self._gap)
 
     def _with_material(self, options: Options) -> Rods:
@@ -231,7 +175,8 @@ class SuperHelices:
         stiffness = np.where(held, HELD, 1.0)[:, None] * one
         return shape._replace(stiffness=stiffness, density=density)
 
-    def _drawn(self) -> Float64Array:
+    def _carry(self) -> Float64Array:
+        """Return where the elements carry the guides' points (P, 3), head axes."""
         total = len(self._binding.arc)
         points, frames = np.empty((total, 3)), np.empty((total, 3, 3))
         parallel_for(
@@ -243,21 +188,9 @@ class SuperHelices:
             points,
             frames,
         )
-        drawn = Drawn(self._binding.bounds, self._binding.step, self._deepest)
-        torso = inverse_motion(self._torso) @ self._head
-        parallel_for(draw_points, len(self._rods.roots), drawn, self._fields, torso, points)
-        world: Float64Array = points @ self._head[:3, :3].T + self._head[:3, 3]
-        return world
+        return points
 
     def _potential(self, points: Float64Array, q: Float64Array, gravity: Float64Array) -> float:
         rods = self._rods
         elastic = 0.5 * (rods.lengths[:, None] * rods.stiffness * (q - rods.natural) ** 2).sum()
         return float(elastic - (rods.masses[..., None] * points * gravity).sum())
-
-    def _stretch(self) -> float:
-        rest, first = self.strands.segments()
-        now = self._drawn()
-        before = np.linalg.norm(rest.astype(np.float64), axis=1)
-        after = np.linalg.norm(now[first + 1] - now[first], axis=1)
-        change: Any = np.abs(after - before) / np.maximum(before, 1e-9)
-        return float(change.max(initial=0.0))

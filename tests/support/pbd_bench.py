@@ -6,13 +6,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
+from hairkit_plugins.pbd.block import Contact, Steps
 from hairkit_plugins.pbd.linear_system import IMPLICIT, Rates, System, assemble
-from hairkit_plugins.pbd.rods import Rods, balance_load, make_rods, transport_frames
-from hairkit_plugins.pbd.state import Load, State, rest_state
-from pbd_reference import ClampedRods, relax_twist, solve_substep, substep
+from hairkit_plugins.pbd.rods import (
+    Rods,
+    State,
+    balance_load,
+    make_rods,
+    rest_state,
+    transport_frames,
+)
+from pbd_reference import ClampedRods, Load, relax_twist, solve_substep, substep
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
+from hairkit.simulation.hair_cells import drift_rows
+from hairkit.simulation.obstacles import NO_BODIES
 
 LENGTH, DENSITY, G = 0.15, 6.5e-6, 9.81
 WEIGHT = DENSITY * G
@@ -26,10 +36,53 @@ def straight(count: int, nodes: int, direction: Sequence[float] = (1, 0, 0)) -> 
     return np.repeat(along * np.array(direction, float), count, axis=0)
 
 
+def rods_of(
+    points: npt.ArrayLike,
+    density: npt.ArrayLike,
+    bending: npt.ArrayLike,
+    torsion: npt.ArrayLike | None = None,
+    *,
+    straight: bool = False,
+) -> Rods:
+    """Return unloaded rods whose natural shape is `points` (S, n, 3), or straight.
+
+    Mass per length in kg/m, EI and GJ in N m^2: numbers or (S, 1); GJ is EI / 1.3 where None (a
+    round fibre of Poisson's ratio 0.3).
+    """
+    ei, gj = np.array(bending), np.array(bending) / 1.3 if torsion is None else np.array(torsion)
+    rods = make_rods(np.array(points, np.float64), np.array(density), ei, gj)
+    return rods if straight else balance_load(rods, np.zeros_like(rods.points))
+
+
+def inertia_of(rods: Rods) -> Float64Array:
+    """Return (S, n, n) the mass matrix: a rigid bar has thirds and sixths of its mass."""
+    at = np.arange(rods.nodes)
+    matrix = np.zeros((len(rods.mass), rods.nodes, rods.nodes))
+    matrix[:, at, at] = rods.mass
+    for ends in ((at[:-1], at[1:]), (at[1:], at[:-1])):
+        matrix[:, ends[0], ends[0]] -= rods.bars / 6
+        matrix[:, ends[0], ends[1]] += rods.bars / 6
+    return matrix
+
+
+def untouched(rods: Rods) -> Contact:
+    """Return contact with nothing."""
+    return Contact(NO_BODIES, np.zeros_like(rods.mass), 0.0, 0.5)
+
+
+def steps_of(load: Load, count: int, seconds: float) -> Steps:
+    """Return that many substeps of one load; the torso goes with the head."""
+    head, turn = load.head_step, load.turn
+    air = np.concatenate([turn, (turn @ load.gravity)[:, None]], axis=1)
+    drift, rotation = drift_rows(head, seconds), quaternion.from_matrix(head[:3, :3])
+    one = Steps(head[:3], drift, air, rotation, np.eye(4)[:3], drift)
+    return Steps(*(np.repeat(part[None], count, axis=0) for part in one))
+
+
 def cantilevers(gamma: Float64Array, nodes: int) -> Rods:
     """Return horizontal rods of these Gamma = weight per length L^3 / EI."""
     bending = WEIGHT * LENGTH**3 / gamma[:, None]
-    return make_rods(straight(len(gamma), nodes), DENSITY, bending, straight=True)
+    return rods_of(straight(len(gamma), nodes), DENSITY, bending, straight=True)
 
 
 def system_of(rods: Rods, step: float, drag: float = 0.0, pinned_tip: bool = False) -> System:
@@ -92,7 +145,7 @@ def tangled(rng: np.random.Generator) -> tuple[Rods, State]:
     """Return a curled rod that carries its weight, and a disturbed state of it."""
     s = np.linspace(0, 1, 12)
     points = 0.2 * np.stack([s, 0.3 * np.sin(5 * s), 0.3 * np.cos(4 * s)], axis=-1)[None]
-    rods = make_rods(points, DENSITY, DENSITY * 0.05)
+    rods = rods_of(points, DENSITY, DENSITY * 0.05)
     rods = balance_load(rods, rods.mass[..., None] * DOWN)
     way = quaternion.normalize(np.diff(points, axis=1) + 0.003 * rng.normal(size=(1, 11, 3)))
     moved = points[:, :1] + np.cumsum(way * rods.length[..., None], axis=1)
@@ -132,7 +185,7 @@ def naturally_bent(rods: Rods, angle: Float64Array) -> Rods:
 
 def chain(beads: int) -> Rods:
     """Return a chain without stiffness that hangs: beads alike, the first node is the hook."""
-    rods = make_rods(straight(1, beads + 1, (0, -1, 0)), DENSITY, 1e-18, straight=True)
+    rods = rods_of(straight(1, beads + 1, (0, -1, 0)), DENSITY, 1e-18, straight=True)
     mass = np.full_like(rods.mass, DENSITY * LENGTH / beads)
     return replace(rods, mass=mass, bars=np.zeros_like(rods.bars))
 

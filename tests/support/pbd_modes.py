@@ -10,8 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from hairkit_plugins.pbd.rods import Rods, transport_frames
-from hairkit_plugins.pbd.state import State
+from hairkit_plugins.pbd.rods import Rods, State, transport_frames
 from pbd_bench import balanced
 from pbd_reference import elastic_force
 from scipy.linalg import eigh, null_space

@@ -5,32 +5,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from hairkit_plugins.pbd import kernel_contact, kernels
 from hairkit_plugins.pbd.backend import Engine
+from hairkit_plugins.pbd.block import Contact, Steps
 from hairkit_plugins.pbd.linear_system import IMPLICIT, System
-from hairkit_plugins.pbd.rods import (
-    Rods,
-    elements,
-    half_binormal,
-    next_element,
-    split_torque,
-    transport_frames,
-)
+from hairkit_plugins.pbd.rods import Rods, State, midpoint_frame, transport_frames, twist_between
 from hairkit_plugins.pbd.simulator import PbdSimulator
-from hairkit_plugins.pbd.state import Contact, Load, State, transform_points
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
+from hairkit.simulation.rigid_motion import transform_points
 
 DRIFT = 0.5 - IMPLICIT**2
 """Weight of the old acceleration in the place; that of the new one is `IMPLICIT` squared."""
 SOFTEST = float(kernel_contact.SOFTEST) - 1
 """Compliance added to the lengths of nodes in contact, as a share of a free one's."""
 SPIN, TURN, CHANGE, TINY = map(float, (kernels.SPIN, kernels.TURN, kernels.CHANGE, kernels.TINY))
+SHARPEST = float(kernels.SHARPEST)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +33,59 @@ class ClampedRods(Rods):
     """Rods whose last frames are fixed; the caller holds their last two nodes."""
 
 
+class TorsoStep(NamedTuple):
+    """The torso in one substep."""
+
+    from_head: Float64Array
+    """(4, 4) from the head axes after it to the torso's axes."""
+    step: Float64Array
+    """(4, 4) the torso's motion in it as `Load.head_step`: where its points were, head axes after
+    it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """Head motion and external forces of one substep."""
+
+    head_step: Float64Array
+    """(4, 4) from the head axes before the substep to those after it."""
+    turn: Float64Array
+    """(3, 3) from the world's axes to the head's after it."""
+    gravity: Float64Array
+    """(3,) m/s^2, world."""
+    air: Float64Array
+    """(S, n, 3) or (3,) velocity of the air, m/s, world."""
+    force: Float64Array | None = None
+    """(S, n, 3) further force, newtons, head axes after the substep."""
+    torso: TorsoStep | None = None
+    """Where the torso is; None: it goes with the head, as at rest."""
+
+
+def load_of_step(
+    steps: Steps, k: int, seconds: float, air: Float64Array, force: Float64Array
+) -> Load:
+    """Return what acts in substep k of so many seconds."""
+    turn, down = steps.air[k, :, :3], steps.air[k, :, 3]
+    torso_step = np.eye(4)
+    torso_step[:3] -= seconds * steps.torso_drift[k]
+    torso = TorsoStep(_motion(steps.torso[k]), torso_step)
+    return Load(_motion(steps.head_step[k]), turn, turn.T @ down, air, force, torso)
+
+
+def _motion(rows: Float64Array) -> Float64Array:
+    """Return a motion (4, 4) of its upper rows."""
+    return np.concatenate([rows, [[0.0, 0.0, 0.0, 1.0]]])
+
+
 class TwinEngine(Engine):
     """The twin as a backend."""
 
-    def run(self, system: System, loads: Sequence[Load]) -> None:
-        """Do one substep for each load."""
-        for load in loads:
+    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
+        """Do the substeps."""
+        air = outer[..., :3]
+        force = self.rods.mass.mean(axis=1)[:, None, None] * outer[..., 3:]
+        for k in range(len(steps.turn)):
+            load = load_of_step(steps, k, system.step, air, force)
             self.state = substep(self.rods, system, self.state, load, self.contact)
 
 
@@ -138,6 +180,47 @@ def to_new_head_axes(
     root = (led - velocity[:, :1]) / step
     velocity[:, :1] = led
     return State(position, velocity, frames, acceleration), root
+
+
+def elements(
+    rods: Rods, frames: Float64Array, way: Float64Array
+) -> tuple[Float64Array, Float64Array, Float64Array]:
+    """Return the elements' turns and natural turns (S, n - 1, 3), and torques (S, n - 1).
+
+    The turns are those between the segments `way` (S, n - 1, 3), over their lengths.
+    """
+    before, held = rods.before(frames), quaternion.third_axis(rods.root_frame)[:, None]
+    turn = way - np.concatenate([held, way[:, :-1]], axis=1)
+    natural = quaternion.rotate(midpoint_frame(before, frames), rods.curvature)
+    return turn, natural, rods.twist * (twist_between(before, frames) - rods.natural_twist)
+
+
+def half_binormal(before: Float64Array, after: Float64Array) -> Float64Array:
+    """Return a x b / (1 + a.b) of directions a, b: the gradient of twist with respect to either."""
+    first, second = quaternion.third_axis(before), quaternion.third_axis(after)
+    cosine = (first * second).sum(axis=-1, keepdims=True)
+    result: Float64Array = np.cross(first, second) / np.maximum(1.0 + cosine, SHARPEST)
+    return result
+
+
+def split_torque(
+    before: Float64Array, after: Float64Array, torque: Float64Array
+) -> tuple[Float64Array, Float64Array]:
+    """Split a torque on the midpoint frames into torques on the frames before and after.
+
+    The midpoint frame rotates by half the sum of both rotations, plus the tangent of a quarter of
+    the angle between them times their difference.
+    """
+    step = quaternion.product(after, quaternion.inverse(before))
+    sign = np.where(step[..., :1] < 0, -1.0, 1.0)
+    quarter = sign * step[..., 1:] / (1.0 + sign * step[..., :1])
+    aside = np.cross(quarter, torque)
+    return 0.5 * (torque - aside), 0.5 * (torque + aside)
+
+
+def next_element(values: Float64Array) -> Float64Array:
+    """Return the values of the next element, 0 beyond the tip."""
+    return np.concatenate([values[:, 1:], np.zeros_like(values[:, :1])], axis=1)
 
 
 def frame_torques(rods: Rods, frames: Float64Array, spun: Float64Array) -> Float64Array:

@@ -12,8 +12,9 @@ import pytest
 from hairkit_plugins.pbd import Options
 from hairkit_plugins.pbd.backend import FastEngine
 from hairkit_plugins.pbd.gl_backend import ComputeEngine
+from hairkit_plugins.pbd.rods import rest_state
 from hairkit_plugins.pbd.simulator import PbdSimulator
-from hairkit_plugins.pbd.state import rest_state
+from pbd_bench import untouched
 from shader_rods import AGREE, SHAKE, STILL_AIR, WIND, apart, bent_groom, both, skip_without_shaders
 
 from hairkit.errors import HairkitError, RenderError
@@ -158,8 +159,8 @@ def test_a_state_comes_back_as_it_was_given(groom: Groom) -> None:
     rods = PbdSimulator(groom, Options(backend="reference", nodes=8)).rods
     many = np.arange(5000) % len(rods.points)
     fields = {name: value[many] for name, value in vars(rods).items()}
-    engine = ComputeEngine(replace(rods, **fields), None)
-    wanted = rest_state(replace(rods, **fields))
+    rods = replace(rods, **fields)
+    engine, wanted = ComputeEngine(rods, untouched(rods)), rest_state(rods)
     wanted.position[:, 1:] += np.linspace(0, 1, 5000)[:, None, None]
     engine.state = wanted
     np.testing.assert_allclose(engine.state.position, wanted.position, atol=1e-7)

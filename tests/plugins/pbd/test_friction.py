@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.pbd.backend import FastEngine
-from hairkit_plugins.pbd.rods import make_rods
-from hairkit_plugins.pbd.state import Contact, rest_state
-from pbd_bench import DENSITY, LENGTH, G, load_of, straight, system_of
+from hairkit_plugins.pbd.block import Contact, acting
+from hairkit_plugins.pbd.rods import rest_state
+from pbd_bench import DENSITY, LENGTH, NOTHING, G, load_of, rods_of, steps_of, straight, system_of
 from pbd_reference import TwinEngine, resolve_contacts, solve_substep, substep
 
 from hairkit.arrays import Float64Array
@@ -28,10 +28,10 @@ def test_hair_on_a_slope_slides_when_the_slope_beats_friction(rounds: int) -> No
     gravity = G * np.array([0.0, -np.cos(alpha), -np.sin(alpha)])
     grid = VoxelGrid.around(np.full(3, -0.2), np.full(3, 0.2), 0.02)
     plane = Obstacles(grid, grid.centres()[..., 1])
-    rods = make_rods(straight(1, 12), DENSITY, 1e-16, straight=True)
+    rods = rods_of(straight(1, 12), DENSITY, 1e-16, straight=True)
     for share in (1.1, 0.9):
         contact = Contact(
-            Bodies(plane), np.zeros_like(rods.mass), share * np.tan(alpha), 0.5, None, rounds
+            Bodies(plane), np.zeros_like(rods.mass), share * np.tan(alpha), 0.5, rounds
         )
         system, state = system_of(rods, 1 / 240), rest_state(rods)
         for _ in range(48):
@@ -64,15 +64,15 @@ def test_compiled_ropes_slip_as_those_of_the_reference(rounds: int) -> None:
     """The same pull on the same bollard, half a tenth of a second: the same places to 0.01 mm."""
     wrap = np.linspace(0.3, 2.0, 9)
     points = around(wrap, np.linspace(0, LENGTH, 16))
-    rods = make_rods(points, DENSITY, 1e-12, straight=True)
+    rods = rods_of(points, DENSITY, 1e-12, straight=True)
     force = np.zeros_like(points)
     force[:, -1] = 1e-5 * np.stack([np.cos(wrap), -np.sin(wrap), 0.3 + 0 * wrap], axis=1)
-    contact = Contact(Bodies(bollard()), np.zeros_like(rods.mass), 0.3, 0.5, None, rounds)
-    system, load = system_of(rods, 1 / 240), load_of(force=force)
+    contact = Contact(Bodies(bollard()), np.zeros_like(rods.mass), 0.3, 0.5, rounds)
+    system, steps = system_of(rods, 1 / 240), steps_of(load_of(), 4, 1 / 240)
     places = []
     for engine in (TwinEngine(rods, contact), FastEngine(rods, contact)):
         for _ in range(3):
-            engine.run(system, [load] * 4)
+            engine.run(system, steps, acting(rods, NOTHING, force))
         places.append(engine.state.position)
     assert np.abs(places[0] - rods.points).max() > 1e-3
     np.testing.assert_allclose(places[1], places[0], atol=1e-5)
@@ -85,13 +85,13 @@ def slipping(wrap: Float64Array, speed: Float64Array, friction: float, rounds: i
     """
     nodes, step, pull = 31, 1e-3, 1e-5
     points = around(wrap, np.linspace(0, LENGTH, nodes))
-    rods = make_rods(points, DENSITY, 1e-16, straight=True)
+    rods = rods_of(points, DENSITY, 1e-16, straight=True)
     along = quaternion.normalize(np.gradient(points, axis=1))
     state = replace(rest_state(rods), velocity=-speed[:, None, None] * along)
     force = np.zeros_like(points)
     force[:, -1] = pull * np.stack([np.cos(wrap), -np.sin(wrap), 0 * wrap], axis=1)
     system, load, found = system_of(rods, step), load_of(force=force), []
-    contact = Contact(Bodies(bollard()), np.zeros_like(rods.mass), friction, 0.5, None, rounds)
+    contact = Contact(Bodies(bollard()), np.zeros_like(rods.mass), friction, 0.5, rounds)
     for _ in range(100):
         points[:, 0, 0] -= speed * step
         state, before = solve_substep(replace(rods, points=points), system, state, load)

@@ -14,12 +14,12 @@ import pytest
 from hairkit_plugins.pbd.linear_system import Rates, assemble
 from hairkit_plugins.pbd.rods import (
     Rods,
+    State,
     balance_load,
-    make_rods,
+    rest_state,
     transport_frames,
     twist_between,
 )
-from hairkit_plugins.pbd.state import State, rest_state
 from pbd_bench import (
     DENSITY,
     DOWN,
@@ -32,6 +32,7 @@ from pbd_bench import (
     displaced,
     load_of,
     naturally_bent,
+    rods_of,
     settled,
     spun,
     straight,
@@ -57,7 +58,7 @@ def test_upright_hair_falls_over_beyond_the_critical_length() -> None:
     """Gamma_c = 7.8373: at 7.5 a small lean heals, at 8.2 it grows."""
     gamma = np.array([7.5, 8.2])
     bending = WEIGHT * LENGTH**3 / gamma[:, None]
-    rods = make_rods(straight(2, 33, (0, 1, 0)), DENSITY, bending, straight=True)
+    rods = rods_of(straight(2, 33, (0, 1, 0)), DENSITY, bending, straight=True)
     lean = 1e-3 * LENGTH * np.linspace(0, 1, 33)[:, None] ** 2 * np.array([1.0, 0, 0])
     tip = settled(rods, DOWN, start=displaced(rods, lean), drag=1.0, step=0.02, steps=300).position[
         :, -1, 0
@@ -70,7 +71,7 @@ def test_a_column_buckles_under_eulers_load() -> None:
     """P_c = pi^2 EI / 4 L^2 on the free end of a column: to 0.2 %."""
 
     def lowest(load: float) -> float:
-        rods = make_rods(straight(1, 25, (0, 1, 0)), DENSITY, EI, straight=True)
+        rods = rods_of(straight(1, 25, (0, 1, 0)), DENSITY, EI, straight=True)
         force = np.zeros((25, 3))
         force[-1, 1] = -load * EI / LENGTH**2
         return linearised(rods, rest_state(rods), force).lowest()
@@ -118,7 +119,7 @@ def test_a_twisted_taut_rod_coils_up_as_greenhill_says(taut: float) -> None:
     nodes = 33
 
     def lowest(torque: float) -> float:
-        rods = clamped(make_rods(straight(1, nodes), DENSITY, EI, GJ, straight=True))
+        rods = clamped(rods_of(straight(1, nodes), DENSITY, EI, GJ, straight=True))
         free_length = LENGTH * (nodes - 2) / (nodes - 1)
         turn = torque * EI / free_length / GJ * rods.length[0, 0]
         frames = balanced(rods, spun(rods.frames, turn * np.arange(nodes - 1.0)[None]))
@@ -205,7 +206,7 @@ def test_a_curved_strand_leaves_its_plane_where_its_linear_theory_says() -> None
     shares = np.array([0.94, 1.0, 1.06])
     weights = np.outer(laws, shares).ravel() * EI / LENGTH**3
     torsion = np.repeat(ratio, 3)[:, None] * EI
-    rods = make_rods(straight(6, 33), weights[:, None] / G, EI, torsion, straight=True)
+    rods = rods_of(straight(6, 33), weights[:, None] / G, EI, torsion, straight=True)
     rods = naturally_bent(rods, np.full(6, 4.0))
     state = settled(rods, DOWN, drag=10.0, step=1 / 100, steps=300)
     frames = transport_frames(state.frames, quaternion.normalize(np.diff(state.position, axis=1)))
@@ -253,7 +254,7 @@ def leaving(gamma: float, natural: float, ratio: float) -> float:
 
 def borne_straight(load: Float64Array, at_tip: bool, nodes: int) -> tuple[Rods, Float64Array]:
     """Return level strands that carry loads (S,) straight, and the forces (S, n, 3), newtons."""
-    rods = make_rods(straight(len(load), nodes), DENSITY, EI, GJ)
+    rods = rods_of(straight(len(load), nodes), DENSITY, EI, GJ)
     share = np.where(np.arange(nodes) == nodes - 1, 1.0, 0.0) if at_tip else rods.mass[0]
     total = load[:, None, None] * np.sqrt(EI * GJ) / LENGTH**2
     force = total * share[:, None] / share.sum() * DOWN / G
@@ -264,7 +265,7 @@ def ring(segments: int, twist: float) -> tuple[Rods, State]:
     """Return a naturally straight rod closed to a ring, its last segment on the first, twisted."""
     turn = 2 * np.pi * (np.arange(segments + 2) - 0.5) / segments
     points = LENGTH / (2 * np.pi) * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1)
-    rods = clamped(make_rods(points[None], DENSITY, EI, GJ, straight=True))
+    rods = clamped(rods_of(points[None], DENSITY, EI, GJ, straight=True))
     even = spun(rods.frames, twist * np.arange(segments + 1.0)[None] / segments)
     return rods, replace(rest_state(rods), frames=balanced(rods, even))
 

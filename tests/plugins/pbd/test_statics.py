@@ -9,15 +9,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hairkit_plugins.pbd.backend import FastEngine
+from hairkit_plugins.pbd.block import acting
 from hairkit_plugins.pbd.resampling import max_stiffness
 from hairkit_plugins.pbd.rods import (
     Rods,
+    State,
     balance_load,
-    make_rods,
+    rest_state,
     transport_frames,
     twist_between,
 )
-from hairkit_plugins.pbd.state import State, rest_state
 from pbd_bench import (
     DENSITY,
     DOWN,
@@ -29,11 +30,14 @@ from pbd_bench import (
     clamped,
     load_of,
     naturally_bent,
+    rods_of,
     settled,
     spun,
+    steps_of,
     straight,
     system_of,
     tangled,
+    untouched,
 )
 from pbd_modes import linearised
 from pbd_reference import solve_substep, substep
@@ -60,7 +64,7 @@ def test_small_loads_bend_a_beam_as_its_linear_law() -> None:
     The first from a moment P (L - s), the second from w (L - s)^2 / 2, integrated twice over EI.
     """
     bending, nodes = 1e-8, 25
-    rods = make_rods(straight(2, nodes), DENSITY, bending, straight=True)
+    rods = rods_of(straight(2, nodes), DENSITY, bending, straight=True)
     force = np.zeros_like(rods.points)
     force[0, -1, 1] = -0.02 * bending / LENGTH**2
     force[1, :, 1] = -0.02 * bending / LENGTH**2 * rods.mass[1] / rods.mass[1].sum()
@@ -82,7 +86,7 @@ def test_loaded_tips_bend_as_the_elastica() -> None:
     """A weightless rod with a tip load: 0.2 % of the length with 33 nodes."""
     loads = np.array(list(TIP_LOAD))
     bending = 1e-8
-    rods = make_rods(straight(len(loads), 33), DENSITY, bending, straight=True)
+    rods = rods_of(straight(len(loads), 33), DENSITY, bending, straight=True)
     force = np.zeros_like(rods.points)
     force[:, -1, 1] = -loads * bending / LENGTH**2
     state = settled(rods, NOTHING, force=force, step=1 / 50, steps=200)
@@ -123,14 +127,14 @@ def test_a_cable_hangs_as_a_catenary() -> None:
     points = np.zeros((4, nodes, 3))
     points[..., 0] = spans[:, None] * s * LENGTH
     points[..., 1] = (np.abs(s) - 0.5) * np.sqrt(1 - spans**2)[:, None] * LENGTH
-    rods = make_rods(points, DENSITY, 1e-14, straight=True)
+    rods = rods_of(points, DENSITY, 1e-14, straight=True)
     state = settled(rods, DOWN, pinned_tip=True, step=1 / 400, drag=12.0, steps=400)
     np.testing.assert_allclose(-state.position[..., 1].min(axis=1) / LENGTH, sags, atol=0.005)
 
 
 def test_a_hanging_strand_carries_the_weight_below() -> None:
     """Tension w (L - s) at the middles of the segments, to 3e-4 of the weight."""
-    rods = make_rods(straight(1, 16, (0, -1, 0)), DENSITY, 1e-10, straight=True)
+    rods = rods_of(straight(1, 16, (0, -1, 0)), DENSITY, 1e-10, straight=True)
     _, tension = solve_substep(rods, system_of(rods, 1 / 240), rest_state(rods), load_of(DOWN))
     below = LENGTH - (np.arange(15) + 0.5) * LENGTH / 15
     np.testing.assert_allclose(tension[0], WEIGHT * below, atol=3e-4 * WEIGHT * LENGTH)
@@ -144,7 +148,7 @@ def arcs(angle: Float64Array) -> Float64Array:
 def test_constant_natural_curvature_makes_an_arc() -> None:
     """A straight rod of natural curvature pi / L or 2 pi / L becomes that arc: tip to 0.5 %."""
     angle = np.array([np.pi, 2 * np.pi])
-    rods = make_rods(straight(2, 33), DENSITY, 1e-8, straight=True)
+    rods = rods_of(straight(2, 33), DENSITY, 1e-8, straight=True)
     state = settled(naturally_bent(rods, angle), NOTHING, drag=10.0, step=1 / 150, steps=400)
     np.testing.assert_allclose(state.position[:, -1] / LENGTH, arcs(angle), atol=0.005)
 
@@ -152,7 +156,7 @@ def test_constant_natural_curvature_makes_an_arc() -> None:
 def test_an_end_moment_makes_an_arc() -> None:
     """A pure moment M at the tip: curvature M / EI everywhere, the tip to 0.3 % of the length."""
     bending, angle = 1e-8, np.array([np.pi / 2, np.pi])
-    rods = make_rods(straight(2, 33), DENSITY, bending, straight=True)
+    rods = rods_of(straight(2, 33), DENSITY, bending, straight=True)
     system, state, force = (
         system_of(rods, 1 / 200, 8.0),
         rest_state(rods),
@@ -171,7 +175,7 @@ def test_an_end_moment_makes_an_arc() -> None:
 def test_a_turned_tip_twists_the_rod_evenly() -> None:
     """Tip held turned by phi: every element has its share and the torque GJ phi / L, to 1e-6."""
     nodes, torsion, angle = 21, 5e-9, 7.0
-    rods = clamped(make_rods(straight(1, nodes), DENSITY, 1e-8, torsion, straight=True))
+    rods = clamped(rods_of(straight(1, nodes), DENSITY, 1e-8, torsion, straight=True))
     uneven = angle * np.linspace(0, 1, nodes - 1)[None] ** 1.5
     frames = balanced(rods, spun(rods.frames, uneven))
     twist = twist_between(rods.before(frames), frames)[0, 1:]
@@ -198,7 +202,7 @@ def test_a_coil_is_a_helical_spring() -> None:
         place = (np.arange(per_turn * turns + 2) - 0.5) / per_turn
         round_ = 2 * np.pi * place
         helix = [radius * np.cos(round_), radius * np.sin(round_), rise * place]
-        rods = clamped(make_rods(np.stack(helix, axis=-1)[None], DENSITY, bending, torsion))
+        rods = clamped(rods_of(np.stack(helix, axis=-1)[None], DENSITY, bending, torsion))
         held, along_axis = np.eye(3 * rods.nodes)[:, 6:], np.zeros((3 * rods.nodes, 1))
         along_axis[[-4, -1]] = 1.0
         pull = np.zeros((rods.nodes, 3))
@@ -212,7 +216,7 @@ def test_a_coil_is_a_helical_spring() -> None:
 
 def test_a_soft_strand_points_along_all_body_forces() -> None:
     """Gravity with wind through drag: the strand lies along g + drag * wind, to 0.2 degrees."""
-    rods = make_rods(straight(1, 16, (0, -1, 0)), DENSITY, 1e-16, straight=True)
+    rods = rods_of(straight(1, 16, (0, -1, 0)), DENSITY, 1e-16, straight=True)
     wind, drag = np.array([1.0, 0.0, 0.4]), 12.0
     state = settled(rods, DOWN, air=wind, drag=drag, step=1 / 240, steps=400)
     way = quaternion.normalize(state.position[0, -1] - state.position[0, 1])
@@ -224,7 +228,7 @@ def test_natural_curls_come_back() -> None:
     """A rod with the natural shape of a helix, drawn almost straight, winds itself up again."""
     t = np.linspace(0, 2.5, 20)
     helix = np.stack([0.02 * np.cos(t) - 0.02, 0.02 * np.sin(t), 0.008 * t], axis=-1)[None]
-    rods = make_rods(helix, DENSITY, 1e-8)
+    rods = rods_of(helix, DENSITY, 1e-8)
     edge = np.diff(helix, axis=1)
     flat = quaternion.normalize(0.3 * edge + 0.7 * edge[:, :1]) * rods.length[..., None]
     position = np.concatenate([helix[:, :1], helix[:, :1] + np.cumsum(flat, axis=1)], axis=1)
@@ -236,7 +240,7 @@ def test_natural_curls_come_back() -> None:
 
 def test_the_natural_shape_rests_to_rounding(rng: np.random.Generator) -> None:
     """Without load a curled rod stays as it is made: 1e-12 m in a quarter of a second."""
-    rods = make_rods(tangled(rng)[0].points, DENSITY, DENSITY * 0.05)
+    rods = rods_of(tangled(rng)[0].points, DENSITY, DENSITY * 0.05)
     state, system = rest_state(rods), system_of(rods, 1 / 240)
     for _ in range(60):
         state = substep(rods, system, state, load_of())
@@ -259,9 +263,9 @@ def test_short_stiff_coils_stay_at_rest(curl: float, spacing: float) -> None:
     angle = curl * np.arange(15)
     edges = spacing * np.stack([np.sin(angle), -np.cos(angle), 0.2 + 0 * angle], axis=1)
     points = np.concatenate([np.zeros((1, 3)), np.cumsum(edges, axis=0)])[None]
-    bending = max_stiffness(points, 1 / 240)[:, None] * np.ones((1, 15))
-    plain = make_rods(points, 1.0, bending)
+    bending = max_stiffness(points, 1 / 240)[:, None]
+    plain = rods_of(points, 1.0, bending)
     rods = balance_load(plain, plain.mass[..., None] * DOWN)
-    engine = FastEngine(rods, None)
-    engine.run(system_of(rods, 1 / 240), [load_of(DOWN)] * 240)
+    engine, still = FastEngine(rods, untouched(rods)), acting(rods, NOTHING, None)
+    engine.run(system_of(rods, 1 / 240), steps_of(load_of(DOWN), 240, 1 / 240), still)
     assert np.abs(engine.state.position - points).max() < 1e-3 * spacing

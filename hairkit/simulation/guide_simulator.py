@@ -1,0 +1,128 @@
+"""What simulators of a groom's guides share: the guides, head and torso, and the points drawn."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hairkit.arrays import Float32Array, Float64Array, frozen_array, read_only
+from hairkit.grooming.guide_weights import guide_mask
+from hairkit.grooming.prepare_export import select_strands
+from hairkit.parallel import parallel_for
+from hairkit.simulation.hands import Hands
+from hairkit.simulation.obstacle_kernels import Drawn, Points, draw_points
+from hairkit.simulation.obstacles import NO_BODIES, Bodies, groom_bodies
+from hairkit.simulation.rigid_motion import inverse_motion, transform_points
+from hairkit.simulation.simulator import Surroundings, check_grabs
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
+
+FRAME = 1 / 60
+"""Seconds that the option `substeps` of simulators divides."""
+KERATIN = 1300.0
+"""Density of hair, kg/m^3."""
+DRAWN, ROUNDING = 0.001, 1e-5
+"""Metres off the obstacles that drawn points keep, where they were not nearer at rest, and by which
+that is less than what grids say."""
+SMALLEST = 2e-5
+"""Metres between points of which float32 has digits enough for a stretch of 1 %."""
+WORTH = 256
+"""Strands that are worth another thread's while."""
+
+
+class GuideSimulator(ABC):
+    """Guides on a head and a torso; a subclass moves them (see `Simulator`)."""
+
+    _options: Any
+    _time: float
+    _head: Float64Array
+    """(4, 4) motion since rest, world."""
+    _torso: Float64Array
+    """(4, 4) motion since rest, world."""
+    _hands: Hands
+    _points: Float32Array | None
+    """Those last asked for; None after a motion."""
+
+    def __init__(self, groom: Groom, contact: bool = True) -> None:
+        touching = contact and len(groom.strands) > 0
+        self._bodies: Bodies = groom_bodies(groom) if touching else NO_BODIES
+        self._groom = select_strands(groom, guide_mask(groom.strands))
+        strands = self._groom.strands
+        points = strands.points.astype(np.float64)
+        length = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1)
+        length[strands.offsets[:-1]] = 0.0
+        # points between nodes outside the head may still cut through it
+        deepest = np.minimum(self._bodies.at(strands.points)[0], DRAWN) - ROUNDING
+        self._drawn = Drawn(strands.offsets, length, deepest)
+        self._rest_gravity = np.array([0.0, -groom.physics.gravity, 0.0])
+
+    @property
+    def strands(self) -> Strands:
+        """The guides at rest, head frame."""
+        return self._groom.strands
+
+    @property
+    def options(self) -> Any:
+        """The options in force; None is replaced by the groom's value."""
+        return self._options
+
+    @property
+    def time(self) -> float:
+        """Seconds since the start or the last reset."""
+        return self._time
+
+    @property
+    def points(self) -> Float32Array:
+        """(P, 3) present positions in the world, metres, in the order of `strands`."""
+        if self._points is None:
+            own = self._draw()
+            world = transform_points(self._head.astype(own.dtype), own)
+            self._points = read_only(world.astype(np.float32))
+        return self._points
+
+    @abstractmethod
+    def _carry(self) -> Points:
+        """Return where the method's own curves carry the guides' points (P, 3), head axes."""
+
+    def _place(self, head_from_rest: npt.ArrayLike | None) -> None:
+        """Set time to 0, head and torso at a motion (4, 4) since rest; None: at rest; let go."""
+        head = np.eye(4) if head_from_rest is None else head_from_rest
+        self._head = self._torso = frozen_array(head, np.float64, (4, 4), "head_from_rest")
+        self._time, self._points, self._hands = 0.0, None, Hands()
+
+    def _move_hands(self, around: Surroundings, most: float) -> None:
+        """Move the hands by up to `most` metres to the targets of grabs."""
+        check_grabs(around.grabs, len(self.strands.points))
+        self._hands.move(around.grabs, lambda: self.points, most)
+
+    def _gravity(self, around: Surroundings) -> Float64Array:
+        """Return gravity (3,), world."""
+        return self._rest_gravity if around.gravity is None else around.gravity
+
+    def _torso_from_head(self) -> Float64Array:
+        """Return the motion (4, 4) from the head axes to the torso's."""
+        return inverse_motion(self._torso) @ self._head
+
+    def _draw(self) -> Points:
+        """Return the guides' points (P, 3), head axes, each out of the obstacles."""
+        points, pose = self._carry(), self._torso_from_head()
+        strands = len(self._drawn.starts) - 1
+        parallel_for(
+            draw_points, strands, self._drawn, self._bodies.fields, pose, points, min_chunk=WORTH
+        )
+        return points
+
+    def _measure_drawn(self) -> tuple[float, float]:
+        """Return the largest stretch between drawn points, and how much deeper one is than at rest.
+
+        In head axes, since float32 is coarse far away.
+        """
+        points, length = self._draw().astype(np.float64), self._drawn.length
+        now = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1)
+        long = length > SMALLEST
+        stretch = float(np.abs(now[long] / length[long] - 1).max(initial=0.0))
+        depth = self._bodies.deepest(points, self._torso_from_head(), self._drawn.deepest)
+        return stretch, depth
