@@ -194,6 +194,7 @@ def _distance_to(on: BoolArray, around: BoolArray, far: float) -> Float32Array:
         [cv2.distanceTransform(plane, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for plane in off[box]]
     )
     square *= square
+    np.rint(square, out=square)  # whole numbers, whatever the rounding of the roots
     nearest = square.copy()
     for k in range(1, min(math.ceil(far) + 1, len(square))):
         np.minimum(nearest[k:], square[:-k] + np.float32(k * k), out=nearest[k:])
