@@ -117,7 +117,7 @@ def outward(lines: Float32Array, head: Head) -> Float32Array:
     some = np.unique(np.append(np.arange(0, count, _EVERY), count - 1))
     found = _normals_near(lines[:, some], head)
     share = np.stack([np.interp(np.arange(count), some, row) for row in np.eye(len(some))], axis=1)
-    return _unit(share.astype(np.float32) @ found).astype(np.float32)
+    return _unit(share @ found.astype(np.float64)).astype(np.float32)
 
 
 def _normals_near(points: Float32Array, head: Head) -> Float32Array:
