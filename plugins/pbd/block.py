@@ -17,7 +17,7 @@ from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
 from hairkit.simulation.hair_cells import drift_rows
 from hairkit.simulation.obstacles import Bodies
-from hairkit.simulation.rigid_motion import inverse_motion
+from hairkit.simulation.rigid_motion import inverse_motion, motion_steps
 
 from .linear_system import System
 from .rods import Rods, State
@@ -100,12 +100,15 @@ class Steps(NamedTuple):
 
 
 Course = tuple[Float64Array, Float64Array]
-"""Of `motion_steps`: (K, 4, 4) motions after each of K steps, and the changes of axes."""
+"""Motions (4, 4) since rest, world, from which and to which a body goes."""
 
 
-def make_steps(head: Course, torso: Course, gravity: Float64Array, seconds: float) -> Steps:
-    """Return the substeps, of so many seconds each, of head and torso under gravity (3,), world."""
-    (heads, head_steps), (torsos, torso_steps) = head, torso
+def make_steps(
+    head: Course, torso: Course, count: int, gravity: Float64Array, seconds: float
+) -> Steps:
+    """Return substeps, of so many seconds each, of head and torso under gravity (3,), world."""
+    heads, head_steps = motion_steps(*head, count)
+    torsos, torso_steps = motion_steps(*torso, count)
     turn = heads[:, :3, :3].swapaxes(1, 2)
     from_head = inverse_motion(torsos) @ heads
     riding = inverse_motion(from_head) @ torso_steps @ from_head

@@ -18,7 +18,7 @@ from hairkit.simulation import Measures, Surroundings
 from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
 from hairkit.simulation.hair_grid import make_hair_grid
 from hairkit.simulation.obstacle_kernels import WORTH
-from hairkit.simulation.rigid_motion import follow_head, inverse_motion, motion_steps
+from hairkit.simulation.rigid_motion import follow_head, interpolate_motion, inverse_motion
 from hairkit.simulation.ties import held_lengths
 from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
@@ -73,7 +73,7 @@ class PbdSimulator(GuideSimulator):
             return
         start, end = self._head, surroundings.head_from_rest
         pieces = max(1, math.ceil(seconds / FRAME - 1e-6))
-        heads = [start, *motion_steps(start, end, pieces)[0]]
+        heads = [interpolate_motion(start, end, piece / pieces) for piece in range(pieces + 1)]
         for before, after in pairwise(heads):
             self._piece(seconds / pieces, surroundings, before, after)
         self._head = end
@@ -201,12 +201,8 @@ class PbdSimulator(GuideSimulator):
             rates = (options.cohesion, options.pressure, seconds)
             now = state_of(engine.rows)
             self._hair_grid.mix(now.position, now.velocity, engine.mass, back @ start, rates)
-        steps = make_steps(
-            motion_steps(start, end, count),
-            motion_steps(self._torso, torso, count),
-            self._gravity(around),
-            seconds / count,
-        )
+        head, bust = (start, end), (self._torso, torso)
+        steps = make_steps(head, bust, count, self._gravity(around), seconds / count)
         force = hold_nodes(self.rods, self._embedding, self._hands.places, back)
         system = self._system(round(seconds / count, 12), tuple(self._hands.places))
         engine.run(system, steps, acting(self.rods, self._air(around, start), force))
