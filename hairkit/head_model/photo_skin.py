@@ -31,6 +31,7 @@ from hairkit.head_model.exposures import FLOOR, even_exposures
 from hairkit.head_model.eye_colours import find_eye_colours, mark_beside_eyes
 from hairkit.head_model.eyes import has_default_eyes, paint_over
 from hairkit.head_model.gradient_blend import join_gradients, smallest_window
+from hairkit.head_model.skin_tones import LEAST, extend_tones, like_skin
 from hairkit.parallel import thread_count
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
@@ -69,20 +70,12 @@ LARGEST_FACE = 0.1
 """Share of the texture's edge over which a face may reach."""
 MIRRORED = 0.01
 """Metres that mirrored texels may be apart on heads whose texture coordinates are symmetric."""
-TONE_REACH, TONE_REACHES = 1.0, 6
-"""Sigma of the least of the convolutions that extend tones, texels, and how many there are."""
-TONE_TRUST = 1e-3
-"""Weight of a convolution's result beside that of the next larger one."""
 FEATURE = 0.014
 """Metres from landmarks of brows, nose, eyes and mouth within which colours may be any."""
-SKIN_SPREAD = (0.35, 0.12, 0.12)
-"""Spread of skin in one photo: logarithms of green, and of red and blue over green."""
 SURE_SKIN = 4
 """Power of the likeness to skin from which tones are extended: half the spread of one photo's."""
-LEAST = 1e-6
-"""Least weight that colours are divided by."""
 STEP = 4
-"""Texels between those at which exposures and the tone of skin are measured."""
+"""Texels between those at which exposures are measured."""
 
 
 class _Surface(NamedTuple):
@@ -139,7 +132,7 @@ def _skin_alone(views: Sequence[_Seen], head: Head, surface: _Surface) -> list[_
     features = _features(head, surface)
     kept = []
     for view in views:
-        skin = np.where(features, 1, _like_skin(view.coarse, view.weight))
+        skin = np.where(features, 1, like_skin(view.coarse, view.weight))
         kept.append(view._replace(weight=(view.weight * skin).astype(np.float32)))
     return kept
 
@@ -161,7 +154,7 @@ def _features(head: Head, surface: _Surface) -> BoolArray:
 def _delight(blended: Float32Array, seen: Float32Array, surface: _Surface) -> Float32Array:
     """Return the colours (S, S, 3), in their place, without the light of the photos."""
     coarse = _shrink(blended, COARSE)
-    shading = find_shading(coarse, seen * _like_skin(coarse, seen), surface.normals)
+    shading = find_shading(coarse, seen * like_skin(coarse, seen), surface.normals)
     for rows in _strips():
         blended[rows] /= _enlarge_rows(shading, rows)[..., None]
     return blended
@@ -260,7 +253,7 @@ def _blend(
         part = smallest_window(view.weight)
         mean[part] += low[part] * view.weight[part][..., None]
         taken[part] += low[part] * share[part][..., None]
-    mean = extend(mean / np.maximum(total, LEAST)[..., None], (total > 0).astype(np.float32))
+    mean = extend_tones(mean / np.maximum(total, LEAST)[..., None], (total > 0).astype(np.float32))
     details = np.zeros((SIZE, SIZE, 3), np.float32)
     for view, photo, factor, share in zip(views, photos, factors, shares, strict=True):
         _add_photo(details, view, photo, factor, share)
@@ -376,7 +369,7 @@ def _fill(
     small /= np.maximum(weight, LEAST)[..., None]
     own_tone = np.concatenate([_shrink(own[rows].astype(np.float32), TONE) for rows in _strips()])
     ratio = np.log(np.maximum(small, 0) + FLOOR) - np.log(own_tone + FLOOR)
-    tone = np.exp(extend(ratio, weight * _like_skin(small, weight) ** SURE_SKIN))
+    tone = np.exp(extend_tones(ratio, weight * like_skin(small, weight) ** SURE_SKIN))
     share = 1 - _fade(~taken)
     filled = np.empty_like(own)
     for rows in _strips():
@@ -386,44 +379,3 @@ def _fill(
         skin += (blended[rows] - skin) * _enlarge_rows(share, rows)[..., None]
         filled[rows] = np.rint(skin).clip(0, 255)
     return filled
-
-
-def _like_skin(colours: Float32Array | UInt8Array, weight: Float32Array) -> Float32Array:
-    """Return (T, T) how much colours are like most of the seen ones, 0 where none is seen.
-
-    Collars are not skin.
-    """
-    seen = weight > 0
-    red, green, blue = np.log(np.maximum(colours[seen], 0).T + np.float32(FLOOR))
-    tones = [green, red - green, blue - green]
-    sure = [tone[weight[seen] > 0.5][::STEP] for tone in tones]
-    away = [
-        (tone - (np.median(known) if len(known) else np.float32(0))) / np.float32(spread)
-        for tone, known, spread in zip(tones, sure, SKIN_SPREAD, strict=True)
-    ]
-    likeness = np.zeros(weight.shape, np.float32)
-    likeness[seen] = np.exp(-0.5 * (away[0] ** 2 + away[1] ** 2 + away[2] ** 2))
-    return likeness
-
-
-def extend(values: Float32Array, weight: Float32Array) -> Float32Array:
-    """Return values (H, W, C) smoothed by their weights (H, W), and extended to where those are 0.
-
-    Normalised convolution (Knutsson and Westin 1993) with Gaussians of doubled reach, on maps of
-    halved edge: each gives its result where the smaller ones have found nothing.
-    """
-    level = np.concatenate([values * weight[..., None], weight[..., None]], axis=-1)
-    sums = level.sum(axis=(0, 1))
-    size, mixed = weight.shape[::-1], np.zeros_like(level)
-    trust, further = 1.0, TONE_REACH
-    for number in range(TONE_REACHES):
-        level = cv2.GaussianBlur(level, (0, 0), further)
-        larger = cv2.resize(level, size, interpolation=cv2.INTER_LINEAR)
-        mixed = cv2.scaleAdd(larger, trust, mixed)
-        trust *= TONE_TRUST
-        further = 3**0.5 * TONE_REACH  # squares of sigmas add up: 1 + 3 is that of twice the reach
-        if number:
-            half = [(count + 1) // 2 for count in level.shape[1::-1]]
-            level = cv2.resize(level, half, interpolation=cv2.INTER_AREA)
-    mean, floor = sums[:-1] / max(sums[-1], LEAST), trust * TONE_TRUST
-    return np.asarray((mixed[..., :-1] + floor * mean) / (mixed[..., -1:] + floor), np.float32)

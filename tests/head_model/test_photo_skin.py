@@ -12,7 +12,8 @@ from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.cameras.depth_raster import head_depth
 from hairkit.head_model import photo_skin
 from hairkit.head_model.exposures import even_exposures
-from hairkit.head_model.photo_skin import extend, photograph_skin
+from hairkit.head_model.photo_skin import photograph_skin
+from hairkit.head_model.skin_tones import extend_tones
 from hairkit.head_model.template import default_head
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
@@ -134,12 +135,12 @@ def test_extended_values_stay_and_reach_everywhere() -> None:
     """A constant stays a constant; values far from all weights are those of the nearest side."""
     weight = np.zeros((64, 64), np.float32)
     weight[10:20, 10:20] = 1
-    constant = extend(np.full((64, 64, 3), 0.7, np.float32), weight)
+    constant = extend_tones(np.full((64, 64, 3), 0.7, np.float32), weight)
     np.testing.assert_allclose(constant, 0.7, atol=1e-4)
     weight[50:60, 50:60] = 1
     values = np.zeros((64, 64, 3), np.float32)
     values[40:, 40:] = 1
-    found = extend(values, weight)[..., 0]
+    found = extend_tones(values, weight)[..., 0]
     assert found[15, 15] < 0.01
     assert found[55, 55] > 0.99
     assert found[2, 2] < 0.1
