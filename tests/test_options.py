@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hairkit.errors import OptionError
-from hairkit.options import describe, make_options, option
+from hairkit.options import describe, fill_options, make_options, option
 
 
 @dataclasses.dataclass(frozen=True)
@@ -120,3 +120,16 @@ def test_an_unknown_name_lists_the_valid_ones_and_the_closest() -> None:
 def test_relative_paths_stay_as_written() -> None:
     """A path option is a path, not resolved."""
     assert make_options(Options, {"file": "a/b.toml"}, "x").file == Path("a/b.toml")
+
+
+def test_missing_options_are_filled_within_their_bounds() -> None:
+    """None takes the given value, clamped; what is set stays."""
+
+    @dataclasses.dataclass(frozen=True)
+    class Some:
+        unset: float | None = option(None, low=0.0, high=1.0, doc="Clamped.")
+        kept: float | None = option(None, low=0.0, high=1.0, doc="Set.")
+        free: float | None = option(None, doc="Without bounds.")
+
+    filled = fill_options(Some(kept=0.5), unset=3.0, kept=0.1, free=-7.0)
+    assert filled == Some(1.0, 0.5, -7.0)
