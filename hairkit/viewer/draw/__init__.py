@@ -1,7 +1,7 @@
 """Drawing of the viewer: render passes for hair, light, meshes and lines.
 
-Hair, its light volume and meshes exist twice, as compute shaders (`*_gpu`) and as compiled loops
-for machines without a graphics card (`*_cpu`); tests compare both.
+Hair, its light volume and meshes exist twice, as shaders and as compiled loops for machines without
+a graphics card (`*_cpu`); tests compare both.
 
 * `colouring`: colour maps of guides: length, stretch, curvature or confidence
 * `frame`: one frame of a session
