@@ -21,6 +21,7 @@ Geometry of the head mesh on which hair grows; the mesh type itself is `hairkit.
 * `register_head`: a head brought onto another of any mesh
 * `scalp`: roots: sampling, binding to faces, growth mesh
 * `signed_distance`: signed distance to a head, on a grid or at points
+* `skin_tones`: smooth colours of the skin, extended to where none are seen
 * `skinning`: skin weights of the three joints
 * `spread_vertices`: vertices chosen evenly over a part of a head
 * `template`: the default head
