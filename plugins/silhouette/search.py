@@ -82,19 +82,19 @@ class Search:
 
     def find(self, start: Fit, restarted: Iterable[int]) -> Fit:
         """Return the best solution; `restarted` are the views that may be anywhere."""
-        fit = start
+        fit, seen = start, None
         for noise in COARSE_TO_FINE:
             fit, _ = self.descend(fit, noise, self.iterations)
-            fit = self._with_care(fit, self.evidence(fit, 1.0))
-        fit = self.settle(fit)
+            seen = self.evidence(fit, 1.0)
+            fit = self._with_care(fit, seen)
+        fit = self.settle(fit, seen=seen)
         views = (len(self.spread) - SHARED) // PER_VIEW
         if fit.precision < CARELESS and views <= MOST_RESTARTED:
             fit = self.settle(self._restart(fit, restarted), 1)
         return fit
 
-    def settle(self, fit: Fit, updates: int = CARE_ROUNDS) -> Fit:
-        """Return the solution with the precision that its deviations tell."""
-        seen = None
+    def settle(self, fit: Fit, updates: int = CARE_ROUNDS, seen: Evidence | None = None) -> Fit:
+        """Return the solution with the precision that its deviations tell; see `descend`."""
         for _ in range(updates):
             fit, seen = self.descend(fit, 1.0, self.iterations, seen)
             fit = self._with_care(fit, seen)

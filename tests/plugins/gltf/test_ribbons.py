@@ -48,6 +48,16 @@ def test_triangles_face_their_normals(rng: np.random.Generator) -> None:
     np.testing.assert_allclose((found.normals * tangents).sum(axis=1), 0, atol=1e-6)
 
 
+def test_directions_out_of_the_head_are_those_at_every_point() -> None:
+    """Between the points that are looked up, normals are interpolated to 9 degrees on this coarse ball."""
+    head = ball_head()
+    angle = np.linspace(0.2, 1.8, 16)
+    arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    lines = (0.1 * np.stack([arc, arc[:, [2, 1, 0]]])).astype(np.float32)
+    each = np.stack([outward(lines[:, k : k + 1], head)[:, 0] for k in range(16)], axis=1)
+    assert (outward(lines, head) * each).sum(axis=-1).min() > np.cos(np.radians(9))
+
+
 def test_strips_lie_on_the_head() -> None:
     """Hair combed down the side of a ball shows its flat side outward, u to the right."""
     angle = np.linspace(0.6, 1.5, 12)

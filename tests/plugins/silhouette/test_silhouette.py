@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.silhouette import Options, _Problem, estimate_scene
-from hairkit_plugins.silhouette.search import Fit, Search
+from hairkit_plugins.silhouette.search import Evidence, Fit, Search
 from turntable import Turntable, azimuth_errors, turntable
 
 from hairkit import Camera, Capture, Face, Mask, Scene, View
@@ -107,6 +107,22 @@ def test_a_poor_fit_is_searched_again_from_farther(
     assert tried == starts
     distance = np.linalg.norm(scene.cameras[0].position)
     assert distance == pytest.approx(starts[-1], rel=0.15)
+
+
+def test_nothing_is_evaluated_twice(bust: Turntable, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A place where the evidence is known is not looked at again with another precision."""
+    asked: list[tuple[bytes, bytes, float]] = []
+    evidence = _Problem.evidence
+
+    def ask(self: _Problem, fit: Fit, coarseness: float) -> Evidence:
+        asked.append((fit.vector.tobytes(), fit.offset.tobytes(), coarseness))
+        return evidence(self, fit, coarseness)
+
+    monkeypatch.setattr(_Problem, "evidence", ask)
+    options = replace(FAST, model="perspective", carries=0)
+    estimate_scene(bust.capture, bust.masks, bust.head, None, options)
+    assert len(asked) > 10
+    assert len(asked) - len(set(asked)) <= 1  # a step may be too small to move anything
 
 
 def test_options_say_how_sure_landmarks_of_files_are(bust: Turntable) -> None:

@@ -2,69 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+from frame_pictures import CAMERA, GROOM, LOOK, changed, inputs, make_frame_renderer, picture, twin
 
-from hairkit.arrays import Float32Array, UInt8Array
+from hairkit.arrays import Float32Array
 from hairkit.head_model.template import default_head
-from hairkit.rendering.context import Renderer, renderer
+from hairkit.rendering.context import renderer
 from hairkit.rendering.head import head_solid
-from hairkit.testing import bristle_groom
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw import mesh_layer
 from hairkit.viewer.draw.frame import FrameRenderer
 from hairkit.viewer.draw.hair_cpu import SoftHairPass
 from hairkit.viewer.draw.hair_data import HairBody
-from hairkit.viewer.draw.interface import FrameInputs, HairLook
 from hairkit.viewer.draw.light_gpu import TURNS
 from hairkit.viewer.draw.lines import LineSet
 from hairkit.viewer.draw.mesh_cpu import SoftSolid
 from hairkit.viewer.draw.meshes import SolidPass
-from hairkit.viewer.draw.place_kernels import MOST_STRETCH, PARTED, TOGETHER
 from hairkit.viewer.head_motion import rotation_about
-
-GROOM = bristle_groom()
-CAMERA = Camera.on_turn(20.0, distance=0.6, focal=260.0, width=160, height=120)
-LOOK = HairLook(3000, True, (0.4, 0.05, 0.05), (0.4, 0.05, 0.05))
-
-
-@pytest.fixture(scope="module", params=[True, False], ids=["processor", "shaders"])
-def frame_renderer(request: pytest.FixtureRequest) -> Iterator[FrameRenderer]:
-    """A frame renderer with the ball head and 3000 bristles, drawn either way."""
-    with renderer() as gl:
-        frame_renderer = make_frame_renderer(gl, soft=request.param)
-        yield frame_renderer
-        frame_renderer.release()
-
-
-def make_frame_renderer(gl: Renderer, *, soft: bool) -> FrameRenderer:
-    """Return a frame renderer with the ball head and 3000 bristles."""
-    body = HairBody.of(GROOM, 3000)
-    return FrameRenderer(gl, head_solid(GROOM.head, GROOM.material), body, soft)
-
-
-def inputs(**changes: object) -> FrameInputs:
-    """Return a still inputs of the groom at rest."""
-    plain = FrameInputs(CAMERA, np.eye(4), None, LOOK, whole_light=True)
-    return replace(plain, **changes)  # type: ignore[arg-type]
-
-
-def picture(frame_renderer: FrameRenderer, wanted: FrameInputs) -> UInt8Array:
-    """Return the picture of a inputs."""
-    rows = frame_renderer.body.guide_rest if wanted.guide_rows is None else wanted.guide_rows
-    frame_renderer.draw(replace(wanted, guide_rows=rows))
-    return frame_renderer.read().copy()
-
-
-def changed(first: UInt8Array, second: UInt8Array) -> np.ndarray:
-    """Return (H, W) where two pictures differ visibly."""
-    result: np.ndarray = np.abs(first.astype(int) - second).max(axis=2) > 12
-    return result
 
 
 def test_hair_is_drawn_where_the_camera_sees_it_and_nowhere_else(
@@ -164,101 +122,6 @@ def test_thin_strands_are_calm(frame_renderer: FrameRenderer) -> None:
                 np.abs(picture(frame_renderer, inputs(camera=camera, hair=few)) - bare).sum()
             )
     assert np.ptp(sums) < 0.05 * np.mean(sums)
-
-
-def twin(body: HairBody, rows: Float32Array) -> Float32Array:
-    """Return where hair goes with guides (G, m, 3): the slow twin of `place_kernels`."""
-    turns = np.empty((*rows.shape[:2], 4))
-    was, now = (np.diff(r.astype(float), axis=1) for r in (body.guide_rest, rows))
-    stretch = np.linalg.norm(now, axis=2) / np.linalg.norm(was, axis=2)
-    for g in range(len(rows)):
-        frames = [carried(was[g, 0], edges) for edges in (was[g], now[g])]
-        turns[g, 1:] = [(b * a.inv()).as_quat() for a, b in zip(*frames, strict=True)]
-    roots = np.einsum("sk,skc->sc", body.weights, rows[:, 0][body.followed])
-    hair = [roots + body.edges[:, 0]]
-    for k in range(1, rows.shape[1]):
-        q = turns[body.followed, k]
-        along = np.einsum("skc,sc->sk", q, q[:, 0])
-        t = np.clip((np.abs(along) - PARTED) / (TOGETHER - PARTED), 0, 1)
-        share = body.weights * np.sign(along) * t * t * (3 - 2 * t)
-        turn = Rotation.from_quat(np.einsum("sk,skc->sc", share, q))
-        length = np.minimum(stretch[body.followed[:, 0], k - 1], MOST_STRETCH)
-        hair.append(hair[-1] + length[:, None] * turn.apply(body.edges[:, k]))
-    return np.stack(hair, axis=1).astype(np.float32)
-
-
-def carried(start: np.ndarray, edges: np.ndarray) -> list[Rotation]:
-    """Return a frame carried from a direction (3,) along segments (n, 3) by least rotations."""
-    frames, frame, before = [], Rotation.identity(), start / np.linalg.norm(start)
-    for edge in edges:
-        way = edge / np.linalg.norm(edge)
-        frame = Rotation.from_quat([*np.cross(before, way), 1 + before @ way]) * frame
-        frames.append(frame)
-        before = way
-    return frames
-
-
-def placed(frame_renderer: FrameRenderer, rows: Float32Array) -> Float32Array:
-    """Return where hair is drawn with guides (G, m, 3)."""
-    with renderer():
-        picture(frame_renderer, inputs(guide_rows=rows))
-        places = frame_renderer.hair.places()
-        if not frame_renderer.soft:
-            places = np.frombuffer(places.read(), np.float32).reshape(LOOK.hairs, -1, 3)
-        result: Float32Array = places.copy()
-        picture(frame_renderer, inputs())
-    return result
-
-
-def parted(body: HairBody, seed: int) -> Float32Array:
-    """Return guides (G, m, 3) of the same lengths, each turned and bent in a way of its own."""
-    edges, random = np.diff(body.guide_rest.astype(float), axis=1), np.random.default_rng(seed)
-    for k in range(edges.shape[1]):
-        angles = random.normal(0.0, 0.5, (len(edges), 3)) * (k + 1) / edges.shape[1]
-        edges[:, k:] = np.einsum(
-            "gij,gkj->gki", Rotation.from_rotvec(angles).as_matrix(), edges[:, k:]
-        )
-    return np.cumsum(np.concatenate([body.guide_rest[:, :1], edges], axis=1), axis=1, dtype="f4")
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_hair_is_placed_as_its_twin_says(frame_renderer: FrameRenderer, seed: int) -> None:
-    """Segments turn as the guides' frames, of which those that part from the nearest are left."""
-    rows = parted(frame_renderer.body, seed)
-    off = np.abs(placed(frame_renderer, rows) - twin(frame_renderer.body, rows)).max(axis=(1, 2))
-    assert np.quantile(off, 0.99) < 1e-4
-    assert off.max() < 2e-3  # near a half turn roundings decide the way round
-
-
-@pytest.mark.parametrize("seed", [3, 4])
-def test_hair_keeps_its_lengths_where_guides_part(frame_renderer: FrameRenderer, seed: int) -> None:
-    """No segment is stretched or folded up, and guides are drawn where they are."""
-    body = frame_renderer.body
-    rows = parted(body, seed)
-    hair, rest = placed(frame_renderer, rows), placed(frame_renderer, body.guide_rest)
-    now, was = (np.linalg.norm(np.diff(h, axis=1), axis=2) for h in (hair, rest))
-    np.testing.assert_allclose(now, was, rtol=5e-3, atol=1e-6)
-    np.testing.assert_allclose(hair[: len(rows)], rows, atol=5e-5)
-
-
-def test_hair_shows_the_stretch_of_its_nearest_guide(frame_renderer: FrameRenderer) -> None:
-    """Guides drawn to another length take the hair along."""
-    body = frame_renderer.body
-    rows = body.guide_rest[:, :1] + 1.3 * (body.guide_rest - body.guide_rest[:, :1])
-    hair, rest = placed(frame_renderer, rows), placed(frame_renderer, body.guide_rest)
-    now, was = (np.linalg.norm(np.diff(h, axis=1), axis=2) for h in (hair, rest))
-    np.testing.assert_allclose(now, 1.3 * was, rtol=5e-3, atol=1e-6)
-
-
-def test_hair_turns_with_guides_that_stay_together(frame_renderer: FrameRenderer) -> None:
-    """Guides turned as one carry the hair between them along; only twist about them is unknown."""
-    body = frame_renderer.body
-    turn = Rotation.from_rotvec([0.1, -0.2, 0.15]).as_matrix()
-    rows = np.asarray(body.guide_rest @ turn.T, np.float32)
-    hair, rest = placed(frame_renderer, rows), placed(frame_renderer, body.guide_rest)
-    edges = np.diff(rest, axis=1) @ turn.T
-    off = np.linalg.norm(np.diff(hair, axis=1) - edges, axis=2)
-    assert np.quantile(off / np.linalg.norm(edges, axis=2), 0.99) < 0.05
 
 
 def test_lines_are_drawn_in_their_colour(frame_renderer: FrameRenderer) -> None:
