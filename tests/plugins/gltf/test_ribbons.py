@@ -49,7 +49,7 @@ def test_triangles_face_their_normals(rng: np.random.Generator) -> None:
 
 
 def test_directions_out_of_the_head_are_those_at_every_point() -> None:
-    """Between the points that are looked up, normals are interpolated to 9 degrees on this coarse ball."""
+    """Between points that are looked up normals are off by 9 degrees at most, on a coarse ball."""
     head = ball_head()
     angle = np.linspace(0.2, 1.8, 16)
     arc = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
