@@ -66,3 +66,30 @@ def test_dragged_thumbnails_change_the_order(browser: Any, server: Any, photos: 
     kept = json.loads((server.folder / "studio.json").read_text())["photos"]
     assert [photo["id"] for photo in kept] == [2, 3, 1, 4]
     page.close()
+
+
+def test_a_photo_under_the_pointer_stays(browser: Any, server: Any, photos: list[Path]) -> None:
+    """What another page does while a photo is dragged neither drops the photo nor gets lost."""
+    for photo in photos[:4]:
+        server.ask("POST", "/api/photos", photo.read_bytes())
+    link = server.ask("POST", "/api/pairing", {}).json["link"]
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    page, other = context.new_page(), context.new_page()
+    page.goto(link)
+    page.goto(f"{server.origin}/#pose")
+    other.goto(f"{server.origin}/#pose")
+    page.bring_to_front()
+    cards = page.locator("li.card")
+    cards.nth(3).wait_for()
+    held = cards.nth(0).element_handle()
+    cards.nth(0).hover()
+    page.mouse.down()
+    server.ask("PUT", "/api/order", {"order": [1, 2, 4, 3]})
+    other.locator("[data-order='1,2,4,3']").wait_for(state="attached")
+    assert held.evaluate("card => card.isConnected")
+    cards.nth(1).hover()
+    page.locator("li.dragged").wait_for()
+    cards.nth(3).hover()
+    page.mouse.up()
+    page.locator("[data-order='2,4,3,1']").wait_for(state="attached")
+    context.close()

@@ -15,7 +15,7 @@ const STILL = { shift: [0, 0], turn_deg: [0, 0, 0], factor: 1 };
 
 export function show(main, argument) {
   let pose = null, shown = null, points = null, facts = null, image = null, dragged = -1, chosen = 30, had = "";
-  let moving = "points", held = null, move = STILL, waiting = null, sending = false;
+  let moving = "points", held = null, move = STILL, waiting = null, sending = false, pressed = false, late = false;
   const canvas = make("canvas", { tabindex: "0", role: "img", "aria-label": "Photo with the fitted head. Arrow keys move the chosen landmark, N chooses the next; with the head chosen they move the head, Q and E turn it, R and F nod it, T and G turn its face, plus and minus change its size." });
   const stage = make("section", { class: "stage", "aria-label": "Photo" }, canvas);
   const list = make("ul", { class: "grid", "aria-label": "Order of the turn" });
@@ -113,7 +113,12 @@ export function show(main, argument) {
     draw();
   }
 
+  // Fills the strip of thumbnails. Under a pressed pointer it stays as it is until the pointer lets
+  // go: a thumbnail that is replaced can be neither clicked nor dragged.
   function order() {
+    late = pressed;
+    if (pressed) return;
+    list.dataset.order = numbers();
     refill(list, ...state.photos.map((photo, index) => {
       const view = viewOf(photo);
       const item = make("li", { class: "card", draggable: "true" },
@@ -138,6 +143,8 @@ export function show(main, argument) {
     }));
   }
 
+  function numbers() { return state.photos.map((photo) => photo.id).join(); }
+
   async function reorder(id, to) {
     const ids = state.photos.map((photo) => photo.id).filter((other) => other !== id);
     ids.splice(Math.max(0, Math.min(ids.length, to)), 0, id);
@@ -151,6 +158,7 @@ export function show(main, argument) {
   async function open(photo) {
     shown = photo;
     points = null; image = null; facts = null;
+    for (const button of list.querySelectorAll(".frame")) button.setAttribute("aria-pressed", String(button.dataset.key === `open ${photo.id}`));
     const picture = new Image();
     picture.onload = () => { if (shown === photo) { image = picture; draw(); } };
     picture.src = `/api/photos/${photo.id}/large?v=${photo.version}`;
@@ -164,7 +172,6 @@ export function show(main, argument) {
       keep.disabled = !points;
       tell();
     } catch (error) { say(error.message); }
-    order();
     draw();
   }
 
@@ -310,16 +317,26 @@ export function show(main, argument) {
     } catch (error) { say(error.message); }
   }
 
+  function release(event) {
+    if (!pressed || (event.type === "pointercancel" && list.querySelector(".dragged"))) return;
+    setTimeout(() => { pressed = false; if (late) order(); });
+  }
+
+  list.addEventListener("pointerdown", () => { pressed = true; });
+  for (const end of ["pointerup", "pointercancel", "dragend"]) window.addEventListener(end, release);
   const sized = new ResizeObserver(draw);
   sized.observe(canvas);
   const stop = onChange(() => {
     if (state.result !== had) load();
     if (!shown && state.photos.length) open(state.photos.find((p) => String(p.id) === argument) ?? state.photos[0]);
-    const now = state.photos.map((p) => p.id).join();
-    if (list.dataset.order !== now) { list.dataset.order = now; order(); }
+    if (list.dataset.order !== numbers()) order();
   });
   load();
   if (state.photos.length) open(state.photos.find((p) => String(p.id) === argument) ?? state.photos[0]);
   else main.replaceChildren(make("div", { class: "empty" }, make("h2", {}, "No photos yet"), make("a", { class: "button primary", href: "#photos" }, "Add photos")));
-  return () => { stop(); sized.disconnect(); };
+  return () => {
+    stop();
+    sized.disconnect();
+    for (const end of ["pointerup", "pointercancel", "dragend"]) window.removeEventListener(end, release);
+  };
 }
