@@ -128,6 +128,7 @@ class SoftHairPass:
         if len(self._sums) < solid.size:
             self._sums = np.zeros((scene.meshes.depth.size, 4), np.float32)
         wider = np.float32(look.times_wider)
+        beside = self._beside(view, float(wider))
         shading = shade_kernels.pack_shading(
             view.camera, scene.lights, scene.light.grid, direction=look.by_direction
         )
@@ -145,7 +146,7 @@ class SoftHairPass:
             self._tones,
             solid,
             corner,
-            self._beside(view, float(wider)),
+            beside,
             self._looks,
             self._hidden,
             self._reach,
@@ -165,6 +166,7 @@ class SoftHairPass:
             int(look.smooth),
             look.hairs,
             corner,
+            beside,
             self._sums,
         )
         self._composite(scene.meshes)

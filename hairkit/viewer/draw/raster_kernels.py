@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hairkit.viewer.draw.place_kernels import inlined, pixels_per_metre, shared
-from hairkit.viewer.draw.shade_kernels import ALL_HIDDEN, HIDDEN
+from hairkit.viewer.draw.shade_kernels import ALL_HIDDEN
 
 STRIP = 64
 """Columns of a strip: 0.5 MB of sums where hair is 500 pixels high, as much as a core's cache."""
@@ -27,36 +27,36 @@ _WHITE = np.float32(255)
 @shared
 def draw_hair(  # type: ignore[no-untyped-def]
     first_strip, last_strip, seen, looks, hidden, reach, widths, solid, camera, wider, smooth,
-    count, frame, sums,
+    count, frame, beside, sums,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Draw strips of `count` strands into `sums` (at least W H, 4).
 
     `seen` comes from `place_hair`, `looks`, `hidden` and `reach` from `shade_hair`; `frame` holds
     the least x and y of the drawn part of the picture, and `solid` (W, H) its depth buffer. Both
     are stored column by column: most hair hangs, so that a stroke's pixels lie side by side in
-    memory.
+    memory. No stroke is wider than `beside`, pixels on either side.
     """
     for strip in range(first_strip, last_strip):
         left, right = strip * STRIP, min((strip + 1) * STRIP, solid.shape[0])
         for s in range(count):
             if reach[s, 0] - frame[0] < right and reach[s, 1] - frame[0] >= left:
                 _draw_strand(
-                    seen, looks, hidden, widths, solid, camera, wider, smooth, s, frame, left,
-                    right, sums,
+                    seen, looks, hidden, widths, solid, camera, wider, smooth, s, frame, beside,
+                    left, right, sums,
                 )  # fmt: skip
 
 
 @shared
 def _draw_strand(  # type: ignore[no-untyped-def]
-    seen, looks, hidden, widths, solid, camera, wider, smooth, s, frame, left, right, sums
+    seen, looks, hidden, widths, solid, camera, wider, smooth, s, frame, beside, left, right, sums
 ) -> None:  # pragma: no cover - compiled
     """Draw the strokes of a strand in the columns `left` to before `right`."""
     for k in range(1, seen.shape[1]):
         behind = hidden[s, k - 1]
-        if behind < ALL_HIDDEN and looks[s, k, 3] > HIDDEN and looks[s, k - 1, 3] > HIDDEN:
-            width = widths[s, k] * wider * pixels_per_metre(camera, seen[s, k, 3])
-            a, b, beside = seen[s, k - 1, 0] - frame[0], seen[s, k, 0] - frame[0], width + _ONE
+        if behind < ALL_HIDDEN:
+            a, b = seen[s, k - 1, 0] - frame[0], seen[s, k, 0] - frame[0]
             if min(a, b) - beside < right and max(a, b) + beside >= left:
+                width = widths[s, k] * wider * pixels_per_metre(camera, seen[s, k, 3])
                 _stroke(seen, looks, behind, s, k, width, smooth, solid, frame, left, right, sums)
 
 
@@ -80,8 +80,8 @@ def _stroke(  # type: ignore[no-untyped-def]
     least_x, limit_x = (0, high) if steep else (left, right)
     least_y, limit_y = (left, right) if steep else (0, high)
     along, slope = bx - ax, by - ay
-    across = min(width * np.sqrt(along * along + slope * slope) / max(along, _TINY), _WIDEST)
     pace = _ONE / max(along, _TINY)
+    across = min(width * np.sqrt(along * along + slope * slope) * pace, _WIDEST)
     x: Any = max(np.int64(np.ceil(ax - _HALF)), least_x)
     last = min(np.int64(np.ceil(bx - _HALF)), limit_x)
     t = (np.float32(x) + _HALF - ax) * pace

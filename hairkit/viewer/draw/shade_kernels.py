@@ -84,8 +84,9 @@ def shade_hair(  # type: ignore[no-untyped-def]
     per metre and `HairLook.dimming`; `light` (Z, Y, X, 4) is the light volume; `solid` and `frame`
     are those of `raster_kernels.draw_hair`. Points with a transmittance up to `HIDDEN` are not
     shaded, and those of which both strokes are behind meshes get a transmittance of 0. `hidden`
-    (S, m) is `count_hidden` of the stroke from each point, 3 at the last point. The columns
-    of the others and `beside` pixels on either side are in between `reach` (S, 2).
+    (S, m) is `count_hidden` of the stroke from each point, 3 at the last point and where an end
+    is not shaded. The columns of the others and `beside` pixels on either side are in between
+    `reach` (S, 2).
     """
     points = np.empty(FIELDS * LANES, np.float32)
     lit = np.empty(3 * LANES, np.float32)
@@ -115,6 +116,8 @@ def _shade_chunk(  # type: ignore[no-untyped-def]
             if not (before and covered):
                 arriving = _visibility(seen, s, k, opacity, slices)
             looks[s, k, 3] = arriving
+            if k > 0 and min(arriving, looks[s, k - 1, 3]) <= HIDDEN:
+                hidden[s, k - 1] = ALL_HIDDEN
             if arriving <= HIDDEN:
                 continue
             reach[s, 0] = min(reach[s, 0], seen[s, k, 0] - beside)
