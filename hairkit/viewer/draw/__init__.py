@@ -14,6 +14,7 @@ a graphics card (`*_cpu`); tests compare both.
 * `light_gpu`: the light volume on the GPU
 * `lines`: coloured polylines and billboards
 * `mesh_cpu`: studio and meshes drawn by compiled loops
+* `mesh_edges`: smooth outlines of meshes that compiled loops drew
 * `mesh_kernels`: compiled placing and lighting of meshes
 * `mesh_layer`: studio and meshes behind the hair, kept while they stay, and drawn on the GPU
 * `mesh_raster`: compiled rasteriser of meshes

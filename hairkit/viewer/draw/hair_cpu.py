@@ -174,14 +174,19 @@ class SoftHairPass:
         target.write(self._picture)
 
     def _composite(self, meshes: Any) -> None:
-        """Write the picture where hair or meshes are or were, and clear the sums."""
+        """Write the picture where hair or meshes are or were, and clear the sums.
+
+        Outlines of meshes are smoothed last, so that hair behind them shows through.
+        """
         behind, hair = meshes.picture, self._hair_region
         changed = self._hair_before.union(hair).union(meshes.take_changed())
         if self._picture.shape != behind.shape:
             self._picture, changed = np.empty_like(behind), Region(0, 0, *behind.shape[1::-1])
         parts = self._sums, np.array(hair), np.array(changed), behind, self._picture
         rows = changed.bottom - changed.top
+        meshes.put_back(self._picture)
         parallel_for(raster_kernels.composite, rows, *parts, min_chunk=32)
+        meshes.smooth(self._picture)
 
     def _beside(self, view: HairView, wider: float) -> np.float32:
         """Return how far a stroke may reach beside its ends, pixels."""

@@ -17,7 +17,7 @@ from hairkit.parallel import parallel_for
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.head import Solid
 from hairkit.types.skin_look import SkinLook
-from hairkit.viewer.draw import mesh_kernels, mesh_raster, shade_kernels
+from hairkit.viewer.draw import mesh_edges, mesh_kernels, mesh_raster, shade_kernels
 from hairkit.viewer.draw.hair_cpu import pack_camera
 from hairkit.viewer.draw.interface import MeshScene
 from hairkit.viewer.draw.mesh_layer import MeshLayer
@@ -26,6 +26,8 @@ from hairkit.viewer.draw.region import NOWHERE, Region
 
 CHUNKS = 8
 """Parts of a mesh whose seen faces are listed apart."""
+MOST_SMOOTHED = 16
+"""Pixels of outlines that are smoothed, over the larger edge of the picture."""
 PIECE = 512
 """Vertices that are worth a call on another thread."""
 
@@ -56,6 +58,8 @@ class SoftSolid(PlacedMesh):
             np.empty(CHUNKS, np.int32),
             np.empty((CHUNKS, 4), np.int32),
         )
+        self._edges = mesh_edges.list_edges(self._mesh.vertices, self._mesh.faces)
+        self._outlines = np.empty((len(self._edges), 3), np.int32)
         look = SkinLook()
         self._oil = mesh_kernels.Oil(
             np.float32(solid.scatter), np.float32(look.roughness**2), np.float32(look.f0)
@@ -88,8 +92,20 @@ class SoftSolid(PlacedMesh):
         parallel_for(kernels.light_vertices, count, *lit, min_chunk=PIECE)
         strips, drawn = -(-width // mesh_raster.STRIP), (self._albedo, self._tones, depth, picture)
         parallel_for(mesh_raster.draw_faces, strips, mesh, state, *drawn)
+        self._outline_count = mesh_edges.select_outlines(self._edges, state.seen, self._outlines)
         low, high = state.covered[:, :2].min(axis=0), state.covered[:, 2:].max(axis=0)
         return Region(*low.tolist(), *high.tolist())
+
+    def smooth(
+        self,
+        meshes: UInt8Array,
+        depth: Float32Array,
+        picture: UInt8Array,
+        replaced: mesh_edges.Replaced,
+    ) -> None:
+        """Smooth the outlines of the mesh as it was drawn last; see `smooth_outlines`."""
+        outlines, seen = self._outlines[: self._outline_count], self._state.seen
+        mesh_edges.smooth_outlines(outlines, seen, meshes, depth, picture, replaced)
 
 
 class SoftMeshLayer(MeshLayer[SoftSolid]):
@@ -102,16 +118,32 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
     _changed = NOWHERE
     _moved = NOWHERE
     """Region of the meshes that move."""
+    _fixed: tuple[SoftSolid, ...] = ()
+    """Meshes of the scenery."""
+    _outlined: tuple[SoftSolid, ...] = ()
+    """Meshes of which outlines are to be smoothed."""
 
     def take_changed(self) -> Region:
         """Return the region that has changed since the last call."""
         changed, self._changed = self._changed, NOWHERE
         return changed
 
+    def smooth(self, picture: UInt8Array) -> None:
+        """Smooth the outlines of meshes in a picture (H, W, 4) of them and what is before them."""
+        for part in self._outlined:
+            part.smooth(self.picture, self.depth, picture, self._replaced)
+
+    def put_back(self, picture: UInt8Array) -> None:
+        """Undo the last `smooth`, of the same picture."""
+        mesh_edges.put_back(picture, self._replaced)
+
     def show(self, target: moderngl.Framebuffer) -> None:
         """Copy the layer to a picture of one texture."""
         texture: Any = target.color_attachments[0]
-        texture.write(self.picture)
+        shown = self.picture.copy()
+        self.smooth(shown)
+        texture.write(shown)
+        self.put_back(shown)
 
     def depth_texture(self) -> moderngl.Texture:
         """Return the depth of the meshes."""
@@ -125,6 +157,10 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
         width, height = size
         self.picture, self._scenery = (np.empty((height, width, 4), np.uint8) for _ in range(2))
         self.depth, self._scenery_depth = (np.empty(size, np.float32) for _ in range(2))
+        pixels = max(size) * MOST_SMOOTHED
+        self._replaced = mesh_edges.Replaced(
+            np.empty((pixels, 2), np.int32), np.empty((pixels, 3), np.uint8), np.zeros(1, np.int64)
+        )
         self._depth_texture = self._gl.context.depth_texture(size)
         self._depth_texture.compare_func = ""
 
@@ -138,7 +174,7 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
         self._scenery_depth[:] = 1.0
         for part in parts:
             part.draw(scene, self._push(part), self._scenery, self._scenery_depth)
-        self._moved = Region(0, 0, *self._size)
+        self._moved, self._fixed = Region(0, 0, *self._size), tuple(parts)
 
     def _draw_moving(self, scene: MeshScene, parts: list[SoftSolid]) -> None:
         before, self._moved = self._moved, NOWHERE
@@ -147,11 +183,13 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
         parallel_for(mesh_raster.restore, columns, region, *restored, min_chunk=32)
         if scene.inputs.fine_skin:
             self._read_fine_skin(scene, parts)
+            self._outlined = ()  # samples of a still picture are smooth together
             self._moved = Region(0, 0, *self._size)
         else:
             for part in parts:
                 covered = part.draw(scene, self._push(part), self.picture, self.depth)
                 self._moved = self._moved.union(covered)
+            self._outlined = (*self._fixed, *parts)
         self._changed = self._changed.union(before).union(self._moved)
 
     def _read_fine_skin(self, scene: MeshScene, parts: list[SoftSolid]) -> None:

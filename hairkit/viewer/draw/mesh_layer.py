@@ -26,7 +26,7 @@ from hairkit.viewer.draw.studio import StudioPass
 
 EDGE_SAMPLES = 4
 """Samples of a pixel at the edges of meshes on graphics cards. Software renderers take longer for
-them than for the picture; there edges are smooth once the picture is refined."""
+them than for the picture; there `mesh_edges` smooths outlines."""
 FIXED_SOLIDS = ("torso",)
 """Meshes that do not move with the head."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from frame_pictures import CAMERA, GROOM, LOOK, changed, inputs, make_frame_renderer, picture, twin
@@ -209,6 +210,13 @@ def test_a_kept_layer_is_a_fresh_one(frame_renderer: FrameRenderer, what: str) -
             np.testing.assert_array_equal(kept, anew)
 
 
+def beside(mask: np.ndarray) -> np.ndarray:
+    """Return which pixels are next to the edge of a mask (H, W)."""
+    box, pixels = np.ones((3, 3)), mask.astype(np.uint8)
+    result: np.ndarray = cv2.dilate(pixels, box) != cv2.erode(pixels, box)
+    return result
+
+
 def test_processor_and_shaders_draw_the_same_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Depth is the same, and so are colours up to where light is computed: vertices or pixels."""
     monkeypatch.setattr(mesh_layer, "EDGE_SAMPLES", 0)
@@ -225,12 +233,13 @@ def test_processor_and_shaders_draw_the_same_meshes(monkeypatch: pytest.MonkeyPa
             depths.append(np.frombuffer(depth, np.float32).reshape(240, 320))
             stage.release()
     skin = depths[1] < 1
+    outlines = beside(skin)  # smooth on the processor
     assert 0.2 < skin.mean() < 0.8
     assert ((depths[0] < 1) == skin).mean() > 0.9995
     assert np.quantile(np.abs(depths[0] - depths[1])[skin], 0.999) < 1e-4
     off = np.abs(pictures[0] - pictures[1]).max(axis=2)
-    assert off[~skin].max() <= 1
-    assert off[skin].mean() < 8
+    assert off[~skin & ~outlines].max() <= 1
+    assert off[skin & ~outlines].mean() < 8
 
 
 def test_the_neck_ends_in_the_collar_of_a_head_that_nods() -> None:
@@ -297,18 +306,22 @@ def test_hair_that_is_nowhere_harms_nothing(place: float) -> None:
 def test_processor_and_shaders_draw_the_same(
     smooth: bool, direction: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both ways to draw differ by roundings, and by how finely skin and shadows are sampled."""
-    monkeypatch.setattr(mesh_layer, "EDGE_SAMPLES", 0)  # as on the processor
+    """Both ways to draw differ by roundings, and by how finely skin and shadows are sampled.
+
+    Outlines of the head, which are smooth on the processor, are left out.
+    """
+    monkeypatch.setattr(mesh_layer, "EDGE_SAMPLES", 0)
     look = replace(LOOK, smooth=smooth, by_direction=direction, wider=2.0)
     wanted = inputs(hair=look)
     with renderer() as gl:
         stages = [make_frame_renderer(gl, soft=soft) for soft in (True, False)]
         first, second = (picture(frame_renderer, wanted).astype(int) for frame_renderer in stages)
         bare = picture(stages[0], inputs(hair=None))
+        outlines = beside(stages[0]._meshes.depth.T < 1)  # type: ignore[attr-defined]
         for frame_renderer in stages:
             frame_renderer.release()
     off = np.abs(first - second)
-    hair = changed(first, bare)
+    hair = changed(first, bare) & ~outlines
     assert hair.sum() > 1000
     assert off[hair].mean() < 3.5
     assert np.quantile(off[hair], 0.99) < 16
