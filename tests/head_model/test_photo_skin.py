@@ -164,3 +164,20 @@ def test_rows_enlarged_by_strips_are_those_enlarged_at_once(edge: int) -> None:
     times = photo_skin.SIZE // edge
     whole = cv2.resize(picture, None, fx=times, fy=times, interpolation=cv2.INTER_LINEAR)
     np.testing.assert_allclose(np.concatenate(strips), whole, atol=1e-6)
+
+
+def test_a_photo_with_gaps_adds_its_pixels_once_each() -> None:
+    """Skin above and below hair: what lies in between stays, each pixel has its share."""
+    edge, times = photo_skin.COARSE, photo_skin.SIZE // photo_skin.COARSE
+    share = np.zeros((edge, edge), np.float32)
+    share[10:14, 20:40] = 0.5
+    share[-30:-20, 60:90] = 1.0
+    zeros = np.zeros((edge, edge), np.float32)
+    view = photo_skin._Seen(share, zeros, zeros, np.zeros((edge, edge, 3), np.uint8))
+    colours = np.zeros((photo_skin.SIZE, photo_skin.SIZE, 3), np.float32)
+    gain = np.array([1.0, 0.5, 2.0], np.float32)
+    photo_skin._add_photo(colours, view, np.full((8, 8, 3), 100, np.uint8), gain, share)
+    size = (photo_skin.SIZE, photo_skin.SIZE)
+    whole = cv2.resize(share, size, interpolation=cv2.INTER_LINEAR)
+    np.testing.assert_allclose(colours, 100 * whole[..., None] * gain, atol=1e-3)
+    assert photo_skin.STRIP < (edge - 44) * times  # the gap holds a whole strip
