@@ -179,5 +179,8 @@ def test_a_photo_with_gaps_adds_its_pixels_once_each() -> None:
     photo_skin._add_photo(colours, view, np.full((8, 8, 3), 100, np.uint8), gain, share)
     size = (photo_skin.SIZE, photo_skin.SIZE)
     whole = cv2.resize(share, size, interpolation=cv2.INTER_LINEAR)
-    np.testing.assert_allclose(colours, 100 * whole[..., None] * gain, atol=1e-3)
+    rows = slice(10 * times, -20 * times)  # those with a share, and what is between
+    expected = 100 * whole[rows, :, None] * gain
+    np.testing.assert_allclose(colours[rows], expected, atol=1e-3)
+    assert colours[: 8 * times].max() == colours[-18 * times :].max() == 0
     assert photo_skin.STRIP < (edge - 44) * times  # the gap holds a whole strip
