@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -31,7 +30,16 @@ from hairkit.manager import Manager
 from hairkit.types.mask import HAIR
 
 MASKS = "hair mask IoU"
-_COMMAND = "import sys; from hairkit.cli import main; sys.exit(main())"
+_COMMAND = """\
+import sys
+from hairkit.cli import main
+code = main()
+if code == 0:
+    print(open("/proc/self/status").read().partition("VmHWM:")[2].split()[0], file=sys.stderr)
+sys.exit(code)
+"""
+"""Prints the process's peak of memory, KiB, last. `wait4` would count what this one had when it
+started the process; that is what Linux takes over."""
 
 
 @dataclass(frozen=True)
@@ -127,16 +135,15 @@ def _reconstruct(folder: Path, out: Path, recipe: str, args: argparse.Namespace)
         tempfile.TemporaryFile() as said,
         subprocess.Popen(command, stdout=printed, stderr=said) as process,
     ):
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
+        process.wait()
         seconds = time.perf_counter() - began
         printed.seek(0)
         said.seek(0)
+        last = said.read().decode(errors="replace").strip().splitlines()[-1:]
         if process.returncode:
-            last = said.read().decode(errors="replace").strip().splitlines()[-1:]
             raise HairkitError(" ".join(last) or f"exit code {process.returncode}")
         summary = json.loads(printed.read())
-    return Run(summary["strands"], summary["roots"], seconds, usage.ru_maxrss / 2**20)
+    return Run(summary["strands"], summary["roots"], seconds, int(last[0]) / 2**20)
 
 
 def _evaluate(out: Path, truth: Truth, *, keep_report: bool) -> Evaluation:
