@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -77,10 +77,6 @@ class Outlines:
             np.concatenate(views).astype(np.int64),
             whole,
         )
-
-    def thinned(self, every: int) -> Outlines:
-        """Return the outlines with every `every`-th contour point."""
-        return replace(self, points=self.points[::every], views=self.views[::every])
 
     def crowns(self, ratio: float) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return each silhouette's top row, and middle column and width `ratio` widths below it.

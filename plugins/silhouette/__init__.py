@@ -87,9 +87,6 @@ ABOVE, LOOSE_ABOVE = np.radians(35), 4.0
 azimuth and elevation are: such photos belong to no turn, and show no face."""
 PLACE_ROUNDS = 4
 """Rounds of the first place and depths: the magnification settles to 0.1 %."""
-COARSE_RAYS = 3
-"""Rounds with more noise than the outlines' take every so many-th contour point: the mean error of
-azimuths over seven captures is 0.68 degrees, with every point 0.71 (`benchmarks/cameras.py`)."""
 ALL_RAYS_OF = 8
 """Turns of more views than this share the contour points that so many views would have: time grows
 with the number of views, not with its square."""
@@ -170,8 +167,6 @@ class _Problem:
 
     turn: Turn
     outlines: Outlines
-    coarse: Outlines
-    """The same with every `COARSE_RAYS`-th contour point, for rounds with more noise."""
     head: Head
     landmarks: LandmarkFit | None
     noise: float
@@ -209,8 +204,7 @@ class _Problem:
         noise = options.silhouette_px * pixel
         focals = [view.focal_px for view in capture.views]
         focal = None if None in focals else focals[0]
-        coarse = outlines.thinned(COARSE_RAYS)
-        problem = cls(turn, outlines, coarse, head, landmarks, noise, spread, focal)
+        problem = cls(turn, outlines, head, landmarks, noise, spread, focal)
         if landmarks is None or not outlines.whole:
             return problem
         start = problem.cameras(problem.start(flat=False).vector)
@@ -301,10 +295,10 @@ class _Problem:
         """Return the evidence at a solution, with the outlines' noise times a number."""
         vector = fit.vector
         cameras, tangents = self.cameras(vector), self.turn.tangents(vector)
-        rows, residual, missed = self._coherence_rows(vector, cameras, tangents, coarseness)
-        rays = COARSE_RAYS if coarseness > 1 else 1
-        normal, right = rays * rows.T @ rows, rays * rows.T @ residual
-        cost = rays * soft_l1_cost(missed)
+        noise = coarseness * self.noise
+        rows, residual, missed = self._coherence_rows(vector, cameras, tangents, noise)
+        normal, right = rows.T @ rows, rows.T @ residual
+        cost = soft_l1_cost(missed)
         if self.focal is not None and not fit.flat:
             row, off = self._focal_row(vector, self.focal)
             normal, right = normal + np.outer(row, row), right + row * off
@@ -327,15 +321,13 @@ class _Problem:
         vector: Float64Array,
         cameras: CameraArrays,
         tangents: Float64Array,
-        coarseness: float,
+        noise: float,
     ) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return rows that bring contour rays into the silhouettes they miss, or nearly miss.
 
         Then their right sides, and by how much they miss, in standard deviations.
         """
-        noise = coarseness * self.noise
-        outlines = self.outlines if coarseness == 1 else self.coarse
-        value, slope = self._coherence(outlines, vector, cameras, noise)
+        value, slope = self._coherence(vector, cameras, noise)
         near = np.nonzero(value < NEAR * noise)[0]
         soft = SOFT * noise
         missed = np.logaddexp(0, -value[near] / soft) * soft / noise
@@ -345,18 +337,18 @@ class _Problem:
         return rows * (share * weight / noise)[:, None], missed * weight, missed
 
     def _coherence(
-        self, outlines: Outlines, vector: Float64Array, cameras: CameraArrays, noise: float
+        self, vector: Float64Array, cameras: CameraArrays, noise: float
     ) -> tuple[Float64Array, Float64Array]:
         rotation, translation, *_ = cameras
         middle = np.full(len(rotation), 1 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE))
         if vector[PERSPECTIVE] <= MIN_PERSPECTIVE:  # there distances are zooms, metres apart
             middle = (rotation @ vector[CENTRE] + translation)[:, 2]
-        return coherence(outlines, *cameras, middle, SOFT_MIN * noise)
+        return coherence(self.outlines, *cameras, middle, SOFT_MIN * noise)
 
     def residual_px(self, fit: Fit) -> float:
         """Return the root mean square misfit of landmarks and missed contour rays, pixels."""
         cameras = self.cameras(fit.vector)
-        value, _ = self._coherence(self.outlines, fit.vector, cameras, self.noise)
+        value, _ = self._coherence(fit.vector, cameras, self.noise)
         misfit = value[value < 0]
         if self.landmarks is not None:
             misfit = np.append(misfit, self.landmarks.misfit(fit.offset, cameras))
