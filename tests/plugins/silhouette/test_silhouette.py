@@ -193,7 +193,7 @@ def test_equal_input_gives_equal_cameras(bust: Turntable) -> None:
 def test_a_start_is_searched_from_and_keeps_its_kind(bust: Turntable) -> None:
     """Orthographic cameras stay so, near, and fit no worse, where a search from nothing ends with
     perspective ones."""
-    given, few = (bust.capture, bust.masks, bust.head), replace(FAST, iterations=5, carries=0)
+    given, few = (bust.capture, bust.masks, bust.head), replace(FAST, iterations=15, carries=0)
     start = estimate_scene(*given, None, replace(few, model="orthographic"))
     again = estimate_scene(*given, start, replace(few, iterations=1))
     assert {camera.model for camera in again.cameras} == {"orthographic"}
