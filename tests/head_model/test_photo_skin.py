@@ -183,4 +183,4 @@ def test_a_photo_with_gaps_adds_its_pixels_once_each() -> None:
     expected = 100 * whole[rows, :, None] * gain
     np.testing.assert_allclose(colours[rows], expected, atol=1e-3)
     assert colours[: 8 * times].max() == colours[-18 * times :].max() == 0
-    assert photo_skin.STRIP < (edge - 44) * times  # the gap holds a whole strip
+    assert (edge - 44) * times > photo_skin.STRIP  # the gap holds a whole strip
