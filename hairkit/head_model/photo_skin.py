@@ -273,7 +273,7 @@ def _add_photo(
     for rows in _strips(times * seen.start, times * seen.stop):
         near = slice(max(rows.start // times - 1, 0), rows.stop // times + 1)
         part = smallest_window(share[near], margin=1)[1]
-        if part.start == part.stop:  # a gap between what hair leaves
+        if part.start == part.stop:  # hair leaves no skin in these rows
             continue
         column, row, fine = (
             _enlarge_rows(each[:, part], rows) for each in (view.column, view.row, shares)

@@ -15,7 +15,7 @@ from hairkit.parallel import parallel_for, thread_count
 from hairkit.rendering.gl_camera import NEAREST, DepthRange, clip_from_camera
 from hairkit.rendering.hair import strand_numbers
 from hairkit.types.camera import Camera
-from hairkit.viewer.draw import place_kernels, raster_kernels, shade_kernels
+from hairkit.viewer.draw import mesh_edges, place_kernels, raster_kernels, shade_kernels
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import HairLook, HairScene, HairView
 from hairkit.viewer.draw.region import NOWHERE, Region
@@ -182,11 +182,12 @@ class SoftHairPass:
         changed = self._hair_before.union(hair).union(meshes.take_changed())
         if self._picture.shape != behind.shape:
             self._picture, changed = np.empty_like(behind), Region(0, 0, *behind.shape[1::-1])
+            self._replaced = mesh_edges.Replaced.for_picture(behind)
         parts = self._sums, np.array(hair), np.array(changed), behind, self._picture
         rows = changed.bottom - changed.top
-        meshes.put_back(self._picture)
+        mesh_edges.put_back(self._picture, self._replaced)
         parallel_for(raster_kernels.composite, rows, *parts, min_chunk=32)
-        meshes.smooth(self._picture)
+        meshes.smooth(self._picture, self._replaced)
 
     def _beside(self, view: HairView, wider: float) -> np.float32:
         """Return how far a stroke may reach beside its ends, pixels."""

@@ -26,8 +26,6 @@ from hairkit.viewer.draw.region import NOWHERE, Region
 
 CHUNKS = 8
 """Parts of a mesh whose seen faces are listed apart."""
-MOST_SMOOTHED = 16
-"""Pixels of outlines that are smoothed, over the larger edge of the picture."""
 PIECE = 512
 """Vertices that are worth a call on another thread."""
 
@@ -128,22 +126,17 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
         changed, self._changed = self._changed, NOWHERE
         return changed
 
-    def smooth(self, picture: UInt8Array) -> None:
+    def smooth(self, picture: UInt8Array, replaced: mesh_edges.Replaced) -> None:
         """Smooth the outlines of meshes in a picture (H, W, 4) of them and what is before them."""
         for part in self._outlined:
-            part.smooth(self.picture, self.depth, picture, self._replaced)
-
-    def put_back(self, picture: UInt8Array) -> None:
-        """Undo the last `smooth`, of the same picture."""
-        mesh_edges.put_back(picture, self._replaced)
+            part.smooth(self.picture, self.depth, picture, replaced)
 
     def show(self, target: moderngl.Framebuffer) -> None:
         """Copy the layer to a picture of one texture."""
         texture: Any = target.color_attachments[0]
         shown = self.picture.copy()
-        self.smooth(shown)
+        self.smooth(shown, mesh_edges.Replaced.for_picture(shown))
         texture.write(shown)
-        self.put_back(shown)
 
     def depth_texture(self) -> moderngl.Texture:
         """Return the depth of the meshes."""
@@ -157,10 +150,6 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
         width, height = size
         self.picture, self._scenery = (np.empty((height, width, 4), np.uint8) for _ in range(2))
         self.depth, self._scenery_depth = (np.empty(size, np.float32) for _ in range(2))
-        pixels = max(size) * MOST_SMOOTHED
-        self._replaced = mesh_edges.Replaced(
-            np.empty((pixels, 2), np.int32), np.empty((pixels, 3), np.uint8), np.zeros(1, np.int64)
-        )
         self._depth_texture = self._gl.context.depth_texture(size)
         self._depth_texture.compare_func = ""
 

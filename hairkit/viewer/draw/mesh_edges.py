@@ -12,12 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array, Int64Array, UInt8Array
+from hairkit.viewer.draw.mesh_kernels import area
 from hairkit.viewer.draw.place_kernels import inlined, shared
 
 _ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
 _TINY = np.float32(1e-6)
+MOST_SMOOTHED = 16
+"""Pixels of outlines that are smoothed, over the larger edge of the picture."""
 _STEEP = np.float32(8)
-"""A mesh before the outline is nearer than its face by so many times the face's own depth."""
+"""Where the picture beside an outline is nearer than it by more than so many times the depth of the
+outline's face, another mesh is before it."""
 
 
 class Replaced(NamedTuple):
@@ -29,6 +33,12 @@ class Replaced(NamedTuple):
     """(N, 3)."""
     used: Int64Array
     """(1,) how many."""
+
+    @classmethod
+    def for_picture(cls, picture: UInt8Array) -> Replaced:
+        """Return an empty list for outlines in a picture (H, W, 4)."""
+        most = MOST_SMOOTHED * max(picture.shape)
+        return cls(np.empty((most, 2), np.int32), np.empty((most, 3), np.uint8), np.zeros(1, int))
 
 
 def list_edges(vertices: Float32Array, faces: Int32Array) -> Int32Array:
@@ -91,9 +101,7 @@ def smooth_outlines(
 
 @inlined
 def _faces_camera(seen: Float32Array, a: Any, b: Any, c: Any) -> Any:  # pragma: no cover - compiled
-    x, y = seen[a, 0], seen[a, 1]
-    area = (seen[b, 0] - x) * (seen[c, 1] - y) - (seen[c, 0] - x) * (seen[b, 1] - y)
-    return area < _ZERO and seen[c, 3] > _ZERO
+    return seen[c, 3] > _ZERO and area(seen, a, b, c) < _ZERO
 
 
 @shared
@@ -121,17 +129,17 @@ def _smooth(
     side = 1 if seen[c, v] > ay + (seen[c, u] - ax) * pace * dy else -1  # of the mesh
     behind = _STEEP * abs(seen[c, 2] - az) + _TINY
     wide, high = (depth.shape[1], depth.shape[0]) if steep else depth.shape
-    first: Any = max(np.int64(np.ceil(ax - _HALF)), 0)
-    last: Any = min(np.int64(np.ceil(seen[b, u] - _HALF)), wide)
+    first = np.int64(np.ceil(_within(ax - _HALF, wide)))
+    last = np.int64(np.ceil(_within(seen[b, u] - _HALF, wide)))
     for x in range(first, last):
         t = (np.float32(x) + _HALF - ax) * pace
         y = ay + t * dy
-        line: Any = np.int64(np.floor(y))
+        line: Any = np.int64(np.floor(_within(y, high)))
         covered = np.float32(line + 1) - y if side > 0 else y - np.float32(line)
         inner, outer = line, line - side  # the two pixels next to the outline, by their middles
         if covered < _HALF:
             inner, outer = line + side, line
-        if min(inner, outer) < 0 or max(inner, outer) >= high:
+        if y < _ZERO or min(inner, outer) < 0 or max(inner, outer) >= high:
             continue
         i, j, u, v = (inner, x, outer, x) if steep else (x, inner, x, outer)
         z = az + t * dz
@@ -143,6 +151,11 @@ def _smooth(
             _blend(picture, i, j, u, v, _ONE - covered, replaced)
         else:
             _blend(picture, u, v, i, j, covered, replaced)
+
+
+@inlined
+def _within(x: Any, size: Any) -> Any:  # pragma: no cover - compiled
+    return min(max(x, _ZERO), np.float32(size))
 
 
 @inlined

@@ -123,7 +123,7 @@ def select_faces(
         least_x, least_y, most_x, most_y = wide, high, 0, 0
         for f in range(start, count * (chunk + 1) // chunks):
             a, b, c = mesh.faces[f, 0], mesh.faces[f, 1], mesh.faces[f, 2]
-            if min(seen[a, 3], seen[b, 3], seen[c, 3]) <= _ZERO or _area(seen, a, b, c) >= _ZERO:
+            if min(seen[a, 3], seen[b, 3], seen[c, 3]) <= _ZERO or area(seen, a, b, c) >= _ZERO:
                 continue
             left, right = pixel_middles(seen[a, 0], seen[b, 0], seen[c, 0], wide)
             top, bottom = pixel_middles(seen[a, 1], seen[b, 1], seen[c, 1], high)
@@ -139,7 +139,7 @@ def select_faces(
 
 
 @inlined
-def _area(seen: Float32Array, a: int, b: int, c: int) -> Any:  # pragma: no cover - compiled
+def area(seen: Float32Array, a: int, b: int, c: int) -> Any:  # pragma: no cover - compiled
     """Return twice the area of a face in the picture, below 0 if it faces the camera."""
     x, y = seen[a, 0], seen[a, 1]
     return (seen[b, 0] - x) * (seen[c, 1] - y) - (seen[c, 0] - x) * (seen[b, 1] - y)

@@ -210,6 +210,17 @@ def test_a_kept_layer_is_a_fresh_one(frame_renderer: FrameRenderer, what: str) -
             np.testing.assert_array_equal(kept, anew)
 
 
+def test_a_picture_without_hair_in_between_changes_nothing(frame_renderer: FrameRenderer) -> None:
+    """Guides may be shown alone for a while: outlines are not smoothed twice after that."""
+    wanted = inputs(solids=("torso",), same_light=True, whole_light=False)
+    with renderer():
+        upload_torso(frame_renderer)
+        picture(frame_renderer, inputs(solids=("torso",)))
+        before = picture(frame_renderer, wanted)
+        picture(frame_renderer, replace(wanted, hair=None))
+        np.testing.assert_array_equal(picture(frame_renderer, wanted), before)
+
+
 def beside(mask: np.ndarray) -> np.ndarray:
     """Return which pixels are next to the edge of a mask (H, W)."""
     box, pixels = np.ones((3, 3)), mask.astype(np.uint8)

@@ -35,9 +35,7 @@ class Scene:
         self.depth = np.where(inside, 0.5, 1.0).astype(np.float32)
         self.meshes = np.zeros((SIZE, SIZE, 4), np.uint8)
         self.meshes[inside.T] = BRIGHT
-        self.replaced = Replaced(
-            np.empty((1000, 2), np.int32), np.empty((1000, 3), np.uint8), np.zeros(1, np.int64)
-        )
+        self.replaced = Replaced.for_picture(self.meshes)
 
     def smooth(self, picture: UInt8Array) -> None:
         """Smooth the square's outlines in the picture."""
@@ -64,7 +62,8 @@ def test_edges_of_a_seam_are_one() -> None:
 
 @pytest.mark.parametrize("angle", [0.0, 0.1, 0.4, np.pi / 4, 1.3, 2.0, 3.5])
 def test_pixels_are_as_bright_as_they_are_covered(angle: float) -> None:
-    """Beside the corners, a pixel is off by less than a sample of it was; so is the area."""
+    """Nine of ten pixels on outlines are within an eighth of their coverage, and the mean error and
+    that of the area are small."""
     scene = Scene(angle)
     picture = scene.meshes.copy()
     scene.smooth(picture)
@@ -106,6 +105,24 @@ def test_outlines_that_nobody_sees_stay() -> None:
     scene.depth[:] = 0.2
     picture = scene.meshes.copy()
     scene.smooth(picture)
+    np.testing.assert_array_equal(picture, scene.meshes)
+
+
+def test_a_mesh_without_faces_has_no_edges() -> None:
+    """Nothing is smoothed, and nothing fails."""
+    for count in (0, 3):
+        vertices = np.zeros((count, 3), np.float32)
+        assert list_edges(vertices, np.empty((0, 3), np.int32)).shape == (0, 4)
+
+
+@pytest.mark.parametrize("place", [1e5, -1e5, 1e30, -1e30])
+def test_corners_far_outside_the_picture_are_no_harm(place: float) -> None:
+    """Outlines end at the picture's edges, and can be put back."""
+    scene = Scene(0.3)
+    scene.seen[1, :2] = place
+    picture = scene.meshes.copy()
+    scene.smooth(picture)
+    put_back(picture, scene.replaced)
     np.testing.assert_array_equal(picture, scene.meshes)
 
 
