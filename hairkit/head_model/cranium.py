@@ -83,9 +83,8 @@ class Cranium:
 def _far_from_hair(mask: Mask, size: tuple[int, int]) -> Float32Array:
     """Return 1 where no hair is near, in a smaller picture."""
     reach = max(1, round(HAIR_GAP * mask.labels.shape[0]))
-    away = cv2.distanceTransform(
-        (mask.labels != HAIR).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE
-    )
+    other = (mask.labels != HAIR).astype(np.uint8)
+    away = cv2.distanceTransform(other, cv2.DIST_L2, cv2.DIST_MASK_5)
     far = (away > reach).astype(np.float32)
     result = np.zeros(size[::-1], np.float32)
     share = min(1.0, size[1] / mask.labels.shape[0])

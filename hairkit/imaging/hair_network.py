@@ -59,7 +59,7 @@ def find_hair(view: View) -> Float32Array:
 
 
 def _digest(parts: Sequence[npt.NDArray[Any] | None]) -> bytes:
-    state = hashlib.blake2b()
+    state = hashlib.sha256()
     for part in parts:
         state.update(repr(None if part is None else (part.shape, part.dtype.str)).encode())
         state.update(b"" if part is None else np.ascontiguousarray(part).data)

@@ -161,8 +161,9 @@ def _run(
         _sweep(folder, run)
         tell_missing(recipe, manager, log)
         try:
+            loaded = run.beside(_head, head)  # while networks look at the photos
             capture, turn = find_views(run, given, log)
-            marked = mark_head(_head(head), recipe, manager, log.message)
+            marked = mark_head(loaded.result(), recipe, manager, log.message)
             made = _grow(run, capture, marked, record.guides, record.seed, turn)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
