@@ -27,14 +27,22 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
 def compiled(function: _Function) -> _Function:
-    """Compile a function that releases Python's lock and divides as NumPy does."""
+    """Compile a function that releases Python's lock and divides as NumPy does.
+
+    It makes no array of its own, and arrays that it is given are its caller's: nothing counts
+    references to them, which threads would do by turns at every call of another function.
+    """
     return compiled_with()(function)
 
 
-def compiled_with(**options: Any) -> Callable[[_Function], _Function]:
-    """Return the same decorator with more of Numba's options: `fastmath=True`."""
+def compiled_with(*, allocates: bool = False, **options: Any) -> Callable[[_Function], _Function]:
+    """Return the same decorator with more of Numba's options: `fastmath=True`.
+
+    `allocates` is for functions that make or return arrays.
+    """
 
     def decorate(function: _Function) -> _Function:
+        options["_nrt"] = allocates  # Numba's runtime, which counts references
         made: Any = njit(nogil=True, error_model="numpy", **options)(function)
         made._cache = KernelCache(function)
         return cast(_Function, made)

@@ -18,7 +18,7 @@ from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.field.sampling_kernels import make_unit, principal_direction, sample_at
 from hairkit.grooming.head_collision import push_out_of_head
 from hairkit.options import option
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 
 ROOT_STEPS = 4
 """Steps from the root on which `root_inertia` acts."""
@@ -161,7 +161,7 @@ def track_strands(
         counts[s] = track_strand(volumes, rules, starts[s], directions[s], points[s])
 
 
-@compiled
+@compiled_with(allocates=True)
 def track_strand(
     volumes: Volumes,
     rules: Rules,
@@ -198,7 +198,7 @@ def track_strand(
     return len(points)
 
 
-@compiled
+@compiled_with(allocates=True)
 def in_hull(volumes: Volumes, p: Float64Array) -> bool:
     """Return whether p (3,) lies in a cell of the hull."""
     cell = np.empty(3, np.int64)

@@ -39,7 +39,7 @@ from hairkit.grooming.cover_hair import find_bare_cells, lead_to_roots
 from hairkit.grooming.postprocess import FinishOptions, finish
 from hairkit.head_model.torso import Torso
 from hairkit.options import option
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.volume import cell_slopes, symmetric_matrices
 
 BLOCK = 4
@@ -279,7 +279,7 @@ class Rules(NamedTuple):
     """1 to grow along the field, -1 against it."""
 
 
-@compiled
+@compiled_with(allocates=True)
 def _grow_strands(
     first: int,
     last: int,
@@ -312,7 +312,7 @@ def _resample(path: Float64Array, points: Float32Array) -> None:
             points[m, axis] = first + (path[before + 1, axis] - first) * (at - before)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _grow_strand(
     volume: SignedVolume,
     rules: Rules,
@@ -357,7 +357,7 @@ def _grow_strand(
     return count
 
 
-@compiled
+@compiled_with(allocates=True)
 def _slide(
     volume: SignedVolume, rules: Rules, back: float, p: Float64Array, d: Float64Array
 ) -> None:
@@ -374,7 +374,7 @@ def _slide(
         _turn(volume, rules, back, p, normal, d)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _turn(
     volume: SignedVolume,
     rules: Rules,

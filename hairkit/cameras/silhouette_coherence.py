@@ -14,7 +14,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.cameras.outlines import Outlines
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 
 REACH = 0.28
 """Rays are searched this far before and behind the turn's centre, metres: heads are smaller."""
@@ -112,7 +112,7 @@ class _Views(NamedTuple):
     """Of the minimum over silhouettes, pixels."""
 
 
-@compiled
+@compiled_with(allocates=True)
 def _search_rays(
     first: int,
     last: int,

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array, UInt8Array
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 
 FIRST_HIT_NONE = 255
 """Marks a sample that has a partner at no threshold."""
@@ -126,7 +126,7 @@ def _cell_of(value: float, cell: float) -> int:
     return math.floor(value / cell)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _keys(points: Float32Array, cell: float, mask: int) -> Int64Array:
     """Return the bucket (N,) of each point."""
     keys = np.empty(len(points), np.int64)
@@ -206,7 +206,7 @@ def _cells_about(value: float, distance: float, cell: float) -> tuple[int, int]:
     return _cell_of(centre - distance, cell), _cell_of(centre + distance, cell)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _follow_strands(
     first: int,
     last: int,

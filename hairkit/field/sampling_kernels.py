@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled, compiled_with
 from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
 
 BORDER_CELLS = 1.001
@@ -64,7 +64,7 @@ def copy_point(point: npt.NDArray[np.floating[Any]], target: npt.NDArray[np.floa
         target[axis] = point[axis]
 
 
-@compiled
+@compiled_with(allocates=True)
 def gradient_at(
     origin: Float64Array,
     spacing: float,

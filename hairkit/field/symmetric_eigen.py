@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
 
 ROUND_OFF = 1e-24
@@ -62,7 +62,7 @@ def _two_eigenvalues(t: Float64Array) -> tuple[float, float]:
     return low, 3 * mean - high - low
 
 
-@compiled
+@compiled_with(allocates=True)
 def _null_vector(t: Float64Array, value: float, result: Float64Array) -> None:
     """Write the unit vector that T - value I maps nearest to zero into result (3,)."""
     rows = np.empty((3, 3))

@@ -9,7 +9,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.field.sampling_kernels import copy_point, gradient_at, sample_at
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled_with, parallel_for
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
 
@@ -45,7 +45,7 @@ class _HeadDistance(NamedTuple):
     """(X, Y, Z, 1) metres, negative inside."""
 
 
-@compiled
+@compiled_with(allocates=True)
 def _push_points(
     first: int,
     last: int,

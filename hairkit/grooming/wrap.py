@@ -21,7 +21,7 @@ from hairkit.head_model.register_head import HeadMap, Surface, register_head
 from hairkit.head_model.scalp import evaluate, roots_at
 from hairkit.head_model.signed_distance import signed_distance
 from hairkit.io.head_reader import BareHead
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.groom import Groom
 from hairkit.types.head import Capsules, Head
 from hairkit.types.strands import Strands
@@ -181,7 +181,7 @@ def _grid_around(points: Float64Array, head: Head) -> VoxelGrid:
     return VoxelGrid.around(low, high, spacing)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _lay_strands(
     first: int, last: int, laying: _Laying, mapped: Float64Array, laid: Float64Array
 ) -> None:
@@ -211,7 +211,7 @@ def _step(start: Float64Array, aim: Float64Array, length: float, p: Float64Array
         p[axis] = start[axis] + share * aim[axis]
 
 
-@compiled
+@compiled_with(allocates=True)
 def _slide(
     laying: _Laying, before: Float64Array, length: float, clearance: float, p: Float64Array
 ) -> None:

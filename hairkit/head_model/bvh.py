@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, Int32Array, Int64Array
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled, compiled_with
 
 _LEAF = 4
 """Triangles of a leaf."""
@@ -90,7 +90,7 @@ def inside_surface(tree: TriangleTree, points: npt.ArrayLike) -> npt.NDArray[np.
     return result
 
 
-@compiled
+@compiled_with(allocates=True)
 def _nearest(
     tree: TriangleTree, points: Float64Array
 ) -> tuple[Int64Array, Float64Array, Float64Array]:
@@ -109,7 +109,7 @@ def _nearest(
     return slots, weights, distances
 
 
-@compiled
+@compiled_with(allocates=True)
 def nearest_slot(tree: TriangleTree, point: Float64Array, guess: int) -> tuple[int, float]:
     """Return the slot of the nearest triangle and the squared distance, starting from a guess."""
     lower, upper, corners = tree.lower, tree.upper, tree.corners
@@ -191,7 +191,7 @@ def triangle_distance(
     return g0 * g0 + g1 * g1 + g2 * g2, 1 - s - t, s, t
 
 
-@compiled
+@compiled_with(allocates=True)
 def _crossings(tree: TriangleTree, points: Float64Array, axis: int) -> Int64Array:
     """Return (N,) the sums of signed crossings of the rays from points (N, 3) along +axis."""
     lower, upper, corners = tree.lower, tree.upper, tree.corners

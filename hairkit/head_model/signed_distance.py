@@ -27,7 +27,7 @@ from hairkit.head_model.bvh import (
     nearest_on_surface,
     triangle_distance,
 )
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled, compiled_with
 from hairkit.types.head import Head
 from hairkit.types.volume import VoxelGrid
 
@@ -163,7 +163,7 @@ def _far_from_surface(head: Surface, grid: VoxelGrid) -> Float32Array:
     return _distances(tree, centres).reshape(grid.shape).astype(np.float32)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _nearest_faces(corners: Float64Array, cells: Cells) -> Int32Array:
     """Return (X, Y, Z) the nearest face if it is at most a cell away from the centre, else -1."""
     centre0, spacing, shape = cells.first, cells.spacing, cells.shape
@@ -200,7 +200,7 @@ def _find_feet(corners: Float64Array, cells: Cells, face: Int32Array) -> Feet:
     return Feet(points, owner, label)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _foot_points(corners: Float64Array, points: Float64Array, owner: Int32Array) -> Float64Array:
     """Return (S, 3) the point of each owner's triangle that is nearest to points (S, 3)."""
     feet = np.empty((len(points), 3))
@@ -222,7 +222,7 @@ def _nearest_along(label: Int32Array, feet: Float64Array, cells: Cells, axis: in
     return lines.transpose(np.argsort([b, c, axis]))
 
 
-@compiled
+@compiled_with(allocates=True)
 def _sweep(lines: Int32Array, feet: Float64Array, cells: Cells) -> None:
     """Relabel each line (B, C, A) by the lower envelope of its parabolas (x - apex)^2 + rest.
 
@@ -301,7 +301,7 @@ def _envelope(
     return top
 
 
-@compiled
+@compiled_with(allocates=True)
 def _measure(
     label: Int32Array, feet: Feet, corners: Float64Array, cells: Cells, reach: float
 ) -> Float32Array:
@@ -358,7 +358,7 @@ def _nearer_feet(at: Float64Array, which: int, feet: Feet, cells: Cells) -> tupl
     return best, second
 
 
-@compiled
+@compiled_with(allocates=True)
 def _winding(corners: Float64Array, cells: Cells, axis: int) -> npt.NDArray[np.int8]:
     """Return (X, Y, Z) the signed crossings of `axis` between each centre and the one before it."""
     centre0, spacing, shape = cells.first, cells.spacing, cells.shape

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array, UInt8Array
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.strands import Strands
 
 from .packing import Places
@@ -101,7 +101,7 @@ def paint(
     parallel_for(_paint_cards, len(cards), sheet, atlas, min_chunk=MIN_CARDS)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _paint_cards(begin: int, end: int, sheet: _Sheet, atlas: Atlas) -> None:
     """Draw the strands of cards `begin` to `end`; every card has texels of its own."""
     before, here = np.empty(4), np.empty(4)

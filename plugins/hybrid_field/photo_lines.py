@@ -14,7 +14,7 @@ from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.cameras.projection_kernels import PackedCamera, pack_camera, perspective_divisor
 from hairkit.field.sampling_kernels import copy_point, sample_at
 from hairkit.field.view_fusion import DEPTH_SHRINK, FusedViews
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
 
 PIXELS = 2.0
@@ -144,7 +144,7 @@ class Photo(NamedTuple):
     """(h, w) axial depth of the hull's front, metres, infinite beyond it."""
 
 
-@compiled
+@compiled_with(allocates=True)
 def _follow_photo(
     first: int,
     last: int,
@@ -221,7 +221,7 @@ def _follow_line(photo: Photo, x: float, y: float, sign: float, line: Float32Arr
     return len(line)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _lift(
     first: int,
     last: int,
@@ -327,7 +327,7 @@ def _space_evenly(
                 resampled[k, axis] = points[i - 1, axis] * (1 - share) + points[i, axis] * share
 
 
-@compiled
+@compiled_with(allocates=True)
 def _share_along(
     first: int,
     last: int,

@@ -11,7 +11,7 @@ from hairkit import Hull, Strands
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.field.sampling_kernels import make_unit, sample_at
 from hairkit.field.smooth_volume import smooth_volume
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled, compiled_with
 from hairkit.types.volume import cell_slopes
 
 SURFACE = 2.0
@@ -74,7 +74,7 @@ class Profile(NamedTuple):
     """(K,) of the tangents there."""
 
 
-@compiled
+@compiled_with(allocates=True)
 def _draw(
     points: Float32Array, offsets: Int64Array, cells: Cells, profile: Profile, sums: Float64Array
 ) -> None:

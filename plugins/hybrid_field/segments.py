@@ -17,7 +17,7 @@ from hairkit.field.parting import crown_share
 from hairkit.field.relaxed_signs import relaxed_signs
 from hairkit.field.sampling_kernels import copy_point, make_unit, principal_direction, sample_at
 from hairkit.field.view_fusion import FusedViews
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled_with, parallel_for
 
 from .photo_lines import (
     CONFIDENT,
@@ -123,7 +123,7 @@ def lines_through_cells(
     return Strands(lines[long][real].astype(np.float32), offsets)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _follow_cells(
     first: int,
     last: int,
@@ -149,7 +149,7 @@ def _follow_cells(
         counts[s] = join(back, before, ahead, after, lines[s])
 
 
-@compiled
+@compiled_with(allocates=True)
 def _follow_tensors(
     tensors: TensorVolume,
     inside: Float32Array,

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array, Int64Array
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled, compiled_with
 
 from .features import Pair, gather_feature
 
@@ -123,7 +123,7 @@ def _split(
     return np.concatenate(axes), np.concatenate(splits), order
 
 
-@compiled
+@compiled_with(allocates=True)
 def search_tree(
     tree: Tree, heap: Heap, feature: Float32Array, leaves: int, limit: float, place: Int32Array
 ) -> bool:

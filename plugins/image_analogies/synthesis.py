@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array, Int32Array
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled, compiled_with
 
 from .features import (
     Pair,
@@ -147,7 +147,7 @@ def _run_level(
     return places
 
 
-@compiled
+@compiled_with(allocates=True)
 def fill_level(
     example: Pair,
     made: Pair,

@@ -89,29 +89,25 @@ def carry_points(
 
     Rods stand in blocks, (B, L, n, 3) with segment frames (B, L, n - 1, 4).
     """
+    lanes = position.shape[1]
     for i in range(first, last):
         rod, j, t = on.rod[i], on.segment[i], on.share[i]
         offset = (on.offset[i, 0], on.offset[i, 1], on.offset[i, 2])
-        away = rotate(frame_on(in_block(frames, rod), j, t), offset)
-        a, b, c = plus(on_curve(in_block(position, rod), j, t), away)
+        away = rotate(frame_on(frames[rod // lanes, rod % lanes], j, t), offset)
+        a, b, c = plus(on_curve(position[rod // lanes, rod % lanes], j, t), away)
         points[i, 0], points[i, 1], points[i, 2] = a, b, c
 
 
 @compiled
 def measure_offsets(on: Embedding, position: Any, frames: Any, points: Float64Array) -> None:
     """Write the offsets of points (P, 3) at rest."""
+    lanes = position.shape[1]
     for i in range(len(points)):
         rod, j, t = on.rod[i], on.segment[i], on.share[i]
-        w, x, y, z = frame_on(in_block(frames, rod), j, t)
+        w, x, y, z = frame_on(frames[rod // lanes, rod % lanes], j, t)
         place = (points[i, 0], points[i, 1], points[i, 2])
-        away = minus(place, on_curve(in_block(position, rod), j, t))
+        away = minus(place, on_curve(position[rod // lanes, rod % lanes], j, t))
         on.offset[i, 0], on.offset[i, 1], on.offset[i, 2] = rotate((w, -x, -y, -z), away)
-
-
-@inlined
-def in_block(values: Any, rod: int) -> Any:
-    """Return a rod's values of (B, L, n, k)."""
-    return values[rod // values.shape[1], rod % values.shape[1]]
 
 
 @inlined

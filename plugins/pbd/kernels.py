@@ -64,7 +64,7 @@ LEAST = np.float32(1e-6)
 """Least pivot of the lengths, as a share of the metric's diagonal."""
 
 
-@compiled_with(fastmath=True)
+@compiled_with(allocates=True, fastmath=True)
 def run_substeps(
     first: int,
     last: int,

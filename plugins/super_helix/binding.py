@@ -11,7 +11,7 @@ from hairkit.arrays import Float64Array, Int64Array
 from hairkit.helices import adaptive_counts, fit_arcs
 from hairkit.helices.arc_length import Path
 from hairkit.helices.helix_strands import travelling
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled_with
 from hairkit.types.strands import Strands
 
 from .element_kernels import advance_frame, node, times, turns
@@ -90,7 +90,7 @@ def _offsets(rods: Rods, binding: Binding, wanted: Float64Array) -> Float64Array
     return np.ascontiguousarray(np.einsum("pji,pj->pi", frames, wanted - bare))
 
 
-@compiled
+@compiled_with(allocates=True)
 def carry_points(
     begin: int,
     stop: int,

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled, compiled_with
 
 _TERMS = 10
 """Terms of the series below x = 1: the next is below rounding."""
@@ -113,7 +113,7 @@ def product(a: Float64Array, b: Float64Array, result: Float64Array) -> None:
             result[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@compiled
+@compiled_with(allocates=True)
 def advance_frame(
     q: Float64Array,
     length: float,

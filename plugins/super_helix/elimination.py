@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled, compiled_with
 
 TWIST = 6
 """Coordinates of a twist (turn, move); those of the element's own change dq follow them."""
 
 
-@compiled
+@compiled_with(allocates=True)
 def eliminate(
     form: Float64Array,
     gradient: Float64Array,

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled, compiled_with
 
 from .contact import touch
 from .element_kernels import advance_frame, node, place_clamped_end, product, times, turns
@@ -27,7 +27,7 @@ POINTS, ARMS, TOUCH, SCRATCH = 3, 4, 5, 6
 """Rows of the scratch space that hold points, levers and what contact needs, and their number."""
 
 
-@compiled
+@compiled_with(allocates=True)
 def step_strands(
     begin: int, stop: int, rods: Rods, motion: Motion, loads: Loads, step: Step
 ) -> None:
@@ -50,7 +50,7 @@ def step_strands(
         _update_motion(rods, motion, step, two_step, first, last, root, frame)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _solve_step(
     rods: Rods,
     motion: Motion,
@@ -79,7 +79,7 @@ def _solve_step(
     return turn < FAR
 
 
-@compiled
+@compiled_with(allocates=True)
 def newton(
     rods: Rods,
     motion: Motion,
@@ -185,7 +185,7 @@ def _element(
             _add_isotropic_point(form, gradient, arm, by_change, total, pull)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _add_point(
     form: Float64Array,
     gradient: Float64Array,
@@ -268,7 +268,7 @@ def _advance_element(
     product(frames[k], slope, shift[k])
 
 
-@compiled
+@compiled_with(allocates=True)
 def _update_motion(
     rods: Rods,
     motion: Motion,
@@ -299,7 +299,7 @@ def _update_motion(
         frame[:], root[:] = next_frame, next_root
 
 
-@compiled
+@compiled_with(allocates=True)
 def place_points(
     begin: int, stop: int, rods: Rods, q: Float64Array, head: Float64Array, points: Float64Array
 ) -> None:

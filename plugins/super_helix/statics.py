@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from hairkit.arrays import Float64Array
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 
 from .element_kernels import advance_frame, node, times, turns
 from .rods import NODES, SHARES, WEIGHTS, Rods
@@ -83,7 +83,7 @@ def _forces_of_all(
         _forces(rods, strand, q[first:last], gravity, result[first:last])
 
 
-@compiled
+@compiled_with(allocates=True)
 def _slopes_of_all(
     begin: int, stop: int, rods: Rods, q: Float64Array, gravity: Float64Array, result: Float64Array
 ) -> None:
@@ -106,7 +106,7 @@ def _slopes_of_all(
                         result[first + k, i, e, j] = (ahead[k, i] - back[k, i]) / (2 * step)
 
 
-@compiled
+@compiled_with(allocates=True)
 def _forces(
     rods: Rods, strand: int, q: Float64Array, gravity: Float64Array, result: Float64Array
 ) -> None:

@@ -109,6 +109,22 @@ def test_numba_is_used_by_its_public_names(project: Path) -> None:
     }
 
 
+def test_arrays_are_returned_to_python_alone(project: Path) -> None:
+    """Kernels count no references: an array that one got from another would never be freed."""
+    found = all_kernels(project)
+    makers = {
+        kernel.name for _, kernel in found if "Array" in ast.unparse(kernel.returns or kernel)
+    }
+    callers = [
+        (name, called)
+        for name, kernel in found
+        for node in ast.walk(kernel)
+        if isinstance(node, ast.Call) and (called := _last_name(node)) in makers
+    ]
+    assert makers
+    assert callers == []
+
+
 def test_faults_of_kernels_are_found() -> None:
     """Untyped parameters and results, and columns of numbers; points and slices are left alone."""
     [kernel] = kernels("@numba.njit(cache=True)\ndef f(p, i: int):\n    return p[i, 12] + p[15]")

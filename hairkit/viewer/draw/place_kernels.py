@@ -15,8 +15,8 @@ from numba import njit
 from hairkit.arrays import Float32Array
 from hairkit.parallel import compiled_with
 
-shared: Callable[[Any], Any] = compiled_with(fastmath=True, _nrt=False)
-"""Compiles a function that allocates nothing, so that array views are not reference-counted."""
+shared: Callable[[Any], Any] = compiled_with(fastmath=True)
+"""Compiles a function that threads share."""
 inlined: Callable[[Any], Any] = njit(fastmath=True, error_model="numpy", inline="always")
 """Inlines a function, so that the compiler can vectorise loops around it."""
 SLICES, TILE = 32, 8

@@ -73,7 +73,7 @@ def fibre_colours(
     return np.asarray(colours * bright[:, None, None], np.float32)
 
 
-@compiled_with(fastmath=True)
+@compiled_with(allocates=True, fastmath=True)
 def shade_hair(  # type: ignore[no-untyped-def]
     first, last, seen, places, colours, random, opacity, slices, shading, light, tones, solid,
     frame, beside, looks, hidden, reach,
