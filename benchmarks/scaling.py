@@ -5,8 +5,9 @@ python benchmarks/scaling.py turn/ -o docs/images/growth.png
 
 All runs are of one capture, and those of fewer photos take every second, third or fourth of it, so
 that nothing else changes. Each is a process of its own, with compiled kernels, by turns. Seconds
-are the processor's, the least of all rounds; memory is the peak of the process. A row's exponent p
-is that of the best c + b n^p through the seconds, c at least 0: p of the part that grows.
+are the processor's, the least of all rounds; memory is the peak of the process. The exponent of all
+is the slope between the two largest sizes in logarithms; that of what grows is p of the best
+c + b n^p through all seconds, c at least 0.
 """
 
 from __future__ import annotations
@@ -64,8 +65,8 @@ class Run(NamedTuple):
 def main() -> int:
     """Print a table of each kind of size, and draw their curves."""
     args = _arguments()
-    print("| what grows | size | processor s | memory, MB | exponent of what grows |")
-    print("|---|---|---|---|---|")
+    print("| what grows | size | processor s | memory, MB | exponent of all | of what grows |")
+    print("|---|---|---|---|---|---|")
     curves: dict[str, list[Run]] = {}
     for kind in args.only:
         found: list[list[Run]] = [[] for _ in STEPS[kind]]
@@ -74,16 +75,21 @@ def main() -> int:
         ):
             runs.append(measure(args.capture, kind, step))
         curves[kind] = [min(runs, key=lambda run: run.seconds) for runs in found]
-        power = exponent(curves[kind])
-        for k, run in enumerate(curves[kind]):
-            last = f"{power:.2f}" if k + 1 == len(curves[kind]) else ""
-            print(
-                f"| {kind} | {run.size:,.0f} | {run.seconds:.1f} | {run.megabytes:.0f} | {last} |"
-            )
+        *smaller, largest = curves[kind]
+        for run in smaller:
+            print(_row(kind, run) + "  |  |")
+        slope = np.log(largest.seconds / smaller[-1].seconds) / np.log(
+            largest.size / smaller[-1].size
+        )
+        print(_row(kind, largest) + f" {slope:.2f} | {exponent(curves[kind]):.2f} |")
         sys.stdout.flush()
     if args.output is not None:
         cv2.imwrite(str(args.output), draw(curves))
     return 0
+
+
+def _row(kind: str, run: Run) -> str:
+    return f"| {kind} | {run.size:,.0f} | {run.seconds:.1f} | {run.megabytes:.0f} |"
 
 
 def measure(capture: Path, kind: str, step: float) -> Run:
