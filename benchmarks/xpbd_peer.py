@@ -12,9 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from hairkit.parallel import parallel_for
+from hairkit.parallel import compiled_with, parallel_for
 from hairkit.simulation.obstacles import Obstacles
 
 Array = npt.NDArray[Any]
@@ -99,7 +98,7 @@ def _side_by_side(values: Array) -> Array:
     return np.moveaxis(values[which].reshape(blocks, LANES, *values.shape[1:]), 1, -1)
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy", cache=True)
+@compiled_with(allocates=True, fastmath=True)
 def move(  # type: ignore[no-untyped-def]
     first, last, x, v, slack, scene, heads, ways, iterations
 ) -> None:  # pragma: no cover - compiled
@@ -124,7 +123,7 @@ def move(  # type: ignore[no-untyped-def]
                         speed[j, c, w] = (p[j, c, w] - old[j, c, w]) / h
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy")
+@compiled_with(fastmath=True)
 def _predict(p, old, speed, rest, head, h, fall) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Move nodes by their velocity, and the first two with the head."""
     for j in range(p.shape[0]):
@@ -142,7 +141,7 @@ def _predict(p, old, speed, rest, head, h, fall) -> None:  # type: ignore[no-unt
                 )  # fmt: skip
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy")
+@compiled_with(fastmath=True)
 def _join(p, near, pull, soft, j, apart) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Move both ends of constraints (equations 17 and 18 of XPBD); rigid where `soft` is 0."""
     one = 0 * soft + 1
@@ -163,7 +162,7 @@ def _join(p, near, pull, soft, j, apart) -> None:  # type: ignore[no-untyped-def
         end[2, w] -= share * d2
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy")
+@compiled_with(fastmath=True)
 def _touch(p, old, slack, clear, values, place, head, way) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
     """Push nodes out that may have moved by their distance since it was last read."""
     for j in range(2, p.shape[0]):
@@ -179,7 +178,7 @@ def _touch(p, old, slack, clear, values, place, head, way) -> None:  # type: ign
                 slack[j, w] = _push_out(p, j, w, clear[j, w], values, place, head)
 
 
-@njit(nogil=True, fastmath=True, error_model="numpy")
+@compiled_with(fastmath=True)
 def _push_out(p, n, t, clear, values, place, head):  # type: ignore[no-untyped-def] # pragma: no cover
     """Push a node out of the head along the slope of the distance; return how far off it is."""
     d0, d1, d2 = p[n, 0, t] - head[0, 3], p[n, 1, t] - head[1, 3], p[n, 2, t] - head[2, 3]
