@@ -19,7 +19,7 @@ ENGINES := xvfb xauth godot3
 # A worker has one core: threads of matrix products would wait for each other.
 test test-clients: export OPENBLAS_NUM_THREADS := 1
 
-test: $(VENV)/.tests $(VENV)/.models
+test: $(VENV)/.tests $(VENV)/.kernels
 	@sh .ci/libraries $(DISPLAYS)
 	@sh .ci/validator $(CLIENTS)
 	$(BIN)/python -m pytest -n auto --dist worksteal --ignore tests/clients
@@ -77,10 +77,13 @@ $(VENV)/.models: $(VENV)/.hairkit hairkit/nets/known_models.py
 	  echo "the networks could not be installed: faces and persons are not found, and tests that" >&2; \
 	  echo "need networks are skipped; get them by hand: $(BIN)/hairkit models --help" >&2; fi
 
-# A part of the installation: the first reconstruction is then as fast as any other.
+# A part of the installation: the first reconstruction, simulation and view are then as fast as any
+# other, and no two tests compile the same. Without OpenGL the viewer compiles when it is started.
 $(VENV)/.kernels: $(VENV)/.models
-	@echo "compiling the kernels of a reconstruction, once on this machine"
+	@echo "compiling the kernels of reconstruction, simulation and viewer, once on this machine"
 	@$(BIN)/hairkit reconstruct hairkit/sample -o $(VENV)/first --guides 50 --quiet >/dev/null
+	-@$(BIN)/hairkit view $(VENV)/first/groom.npz --headless --script .ci/look.toml \
+	  --out $(VENV)/first >/dev/null
 	@rm -rf $(VENV)/first
 	@touch $@
 

@@ -36,18 +36,6 @@ NOT_SHIPPED = frozenset(
     }
 )
 """Modules of strokes and of textures by example, whose kernels are compiled on first use."""
-STEPS = """
-[[steps]]
-do = "wind"
-on = true
-[[steps]]
-do = "run"
-seconds = 0.1
-[[steps]]
-do = "screenshot"
-file = "view.png"
-"""
-"""What the viewer does."""
 SHIP = """
 import sys
 from hairkit import kernel_cache, parallel
@@ -113,7 +101,7 @@ def modules_with_kernels() -> set[str]:
 
 def commands(place: Path, out: Path) -> list[list[str]]:
     """Return the commands that a newcomer tries."""
-    script, photos = str(place / "steps.toml"), str(place / "photos")
+    script, photos = str(HOUSE / ".ci" / "look.toml"), str(place / "photos")
     groom, short = str(out / "masks" / "groom.npz"), ["--frames", "3"]
     few, synth = ["--guides", "200", "--no-sheet"], str(out / "synth")
     recipes = [
@@ -138,7 +126,6 @@ def commands(place: Path, out: Path) -> list[list[str]]:
 
 def _compile(place: Path) -> None:
     shutil.copytree(SAMPLE / "photos", place / "photos")
-    (place / "steps.toml").write_text(STEPS)
     portable = {
         "NUMBA_CPU_NAME": PORTABLE_PROCESSOR,
         "NUMBA_CPU_FEATURES": PORTABLE_FEATURES,
