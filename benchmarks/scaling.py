@@ -189,9 +189,15 @@ def _draw_field(kind: str, runs: Sequence[Run], number: int) -> UInt8Array:
     for row, run in zip(values, runs, strict=True):
         cv2.circle(picture, place(row[0], row[2]), 3, COLOURS[number], -1, cv2.LINE_AA)
         x, _ = place(row[0], 0.0)
-        _write(picture, f"{run.size:.3g}", (x - 14, MARGIN + height + 14), 0.32)
-    _write(picture, f"{kind}: exponent {exponent(runs):.2f}", (MARGIN, MARGIN - 14), 0.45)
+        _write(picture, _short(run.size), (x - 14, MARGIN + height + 14), 0.32)
+    _write(picture, kind, (MARGIN, MARGIN - 14), 0.45)
     return picture
+
+
+def _short(size: float) -> str:
+    """Return a size in thousands or millions: `97.2k`, `1.56M`."""
+    unit, name = (1e6, "M") if size >= 1e6 else (1e3, "k") if size >= 1e3 else (1.0, "")
+    return f"{size / unit:.3g}{name}"
 
 
 def _write(picture: UInt8Array, text: str, at: tuple[int, int], size: float) -> None:
