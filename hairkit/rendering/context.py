@@ -124,6 +124,11 @@ def renderer() -> Iterator[Renderer]:
             raise RenderError(f"drawing failed with OpenGL error {error} ({_renderer.backend})")
 
 
+def is_current(gl: Renderer) -> bool:
+    """Return whether a renderer is still that of this process; after a fork it is the parent's."""
+    return gl is _renderer and _owner == os.getpid()
+
+
 def on_graphics_card() -> bool:
     """Return whether this process draws, or would draw, with a graphics card."""
     made = _renderer is not None and _owner == os.getpid()

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import RenderError
-from hairkit.rendering.context import Renderer, on_graphics_card, renderer
+from hairkit.rendering.context import Renderer, is_current, on_graphics_card, renderer
 from hairkit.rendering.gl_camera import set_uniforms
 
 from .backend import Engine
@@ -142,7 +142,7 @@ def faces(distance: Float32Array) -> Float32Array:
 
 def _release(owner: Renderer, textures: dict[str, Any], words: Any) -> None:
     """Free the textures, if their context is still that of the process."""
-    with renderer() as gl:
-        if gl is owner:
+    if is_current(owner):
+        with renderer():
             for one in (*textures.values(), words):
                 one.release()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -194,6 +195,19 @@ def test_no_renderer_is_told_in_one_line(
     assert "\n" not in str(caught.value)
     made = manager.call("make_simulator", "pbd", {"nodes": 8}, groom=groom)
     assert isinstance(made._engine, FastEngine)
+
+
+def test_textures_of_a_lost_context_are_let_go(
+    groom: Groom, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The end of a simulator opens no context in which to free what belonged to another one."""
+    opened: list[str] = []
+    made = PbdSimulator(groom, Options(backend="compute", nodes=8))
+    monkeypatch.setattr(context, "_renderer", None)
+    monkeypatch.setattr(context, "_create", lambda: opened.append("a context"))
+    del made
+    gc.collect()
+    assert opened == []
 
 
 def test_more_rods_than_a_texture_holds_are_told_in_one_line(
