@@ -78,7 +78,7 @@ $(VENV)/.models: $(VENV)/.hairkit hairkit/nets/known_models.py
 	  echo "need networks are skipped; get them by hand: $(BIN)/hairkit models --help" >&2; fi
 
 # A part of the installation: the first reconstruction, simulation and view are then as fast as any
-# other, and no two tests compile the same. Without OpenGL the viewer compiles when it is started.
+# other, and tests find most kernels compiled. Without OpenGL the viewer compiles when it starts.
 $(VENV)/.kernels: $(VENV)/.models
 	@echo "compiling the kernels of reconstruction, simulation and viewer, once on this machine"
 	@$(BIN)/hairkit reconstruct hairkit/sample -o $(VENV)/first --guides 50 --quiet >/dev/null

@@ -38,7 +38,8 @@ def compiled(function: _Function) -> _Function:
 def compiled_with(*, allocates: bool = False, **options: Any) -> Callable[[_Function], _Function]:
     """Return the same decorator with more of Numba's options: `fastmath=True`.
 
-    `allocates` is for functions that make or return arrays.
+    `allocates` is for functions that make or return arrays. Those that return one are called by
+    Python alone: another compiled function would never free it.
     """
 
     def decorate(function: _Function) -> _Function:
