@@ -40,6 +40,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `remote`: files and folders at URLs
 * `storage`: safe files, frozen types as `.npz`
 * `testing`: a small head with hair for tests of plugins
+* `version`: the version of this package
 * `worker`: the other side of plugins in environments of their own
 """
 
@@ -50,6 +51,8 @@ import os
 import stat
 import tempfile
 from typing import TYPE_CHECKING, Any
+
+from hairkit.version import __version__
 
 if TYPE_CHECKING:
     from hairkit.api import (
@@ -89,8 +92,6 @@ if TYPE_CHECKING:
     from hairkit.types.volume import Hull, OrientationField, ScalpDistance, VoxelGrid
     from hairkit.types.waves import Waves
 
-__version__ = "0.2.0"
-
 __all__ = [
     "Camera",
     "Capsules",
@@ -123,6 +124,7 @@ __all__ = [
     "View",
     "VoxelGrid",
     "Waves",
+    "__version__",
     "batch",
     "evaluate",
     "export",

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 from llvmlite import binding
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-from hairkit import __version__
+from hairkit.version import __version__
 
 SHIPPED = Path(__file__).with_name("shipped_kernels")
 """Folder of compiled functions, one folder a module; wheels alone have it."""

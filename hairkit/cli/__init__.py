@@ -182,7 +182,7 @@ class _UsageError(HairkitError):
 
 def _build(verb: str | None) -> tuple[Parser, Parser | None, Any]:
     """Make the parser; only the module of `verb` is imported."""
-    from hairkit import __version__
+    from hairkit.version import __version__
 
     parser = Parser(prog="hairkit", description=_EXAMPLE)
     parser.add_argument("--version", action="version", version=f"hairkit {__version__}")

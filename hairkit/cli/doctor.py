@@ -18,11 +18,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
 
-from hairkit import __version__
 from hairkit.manager import Manager
 from hairkit.nets.install import is_intact
 from hairkit.nets.known_models import KNOWN_MODELS
 from hairkit.nets.model_folder import model_folder
+from hairkit.version import __version__
 
 _DESCRIPTION = """\
 Example: hairkit doctor

@@ -173,7 +173,7 @@ def _capture(args: argparse.Namespace) -> dict[str, Any]:
     from hairkit.pipeline.take_capture import take_capture
 
     recipe = load_recipe(args.recipe or "default").alone("capture")
-    needed = [choice.plugin for stage in recipe.stages for choice in stage.choices]
+    needed = [choice.plugin for choice in recipe.choices]
     capture = take_capture(args.file, recipe, Manager.loaded(args.plugin, only=needed))
     views = {
         view.name: {

@@ -50,7 +50,9 @@ def run(args: argparse.Namespace) -> int:
         from hairkit.pipeline.plugin_lock import lock_of
         from hairkit.pipeline.recipe import load_recipe
 
-        lock = lock_of(load_recipe(args.lock), manager)
+        recipe = load_recipe(args.lock)
+        recipe.check(manager)
+        lock = lock_of((choice.plugin for choice in recipe.choices), manager)
         print(json.dumps(tomllib.loads(lock)) if args.json else lock)
         return 0
     if args.check and (args.name is None or args.name in STAGES):

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from hairkit import Head, Mask
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.head_model.spread_vertices import spread_vertices
-from hairkit.types.mask import HAIR
+from hairkit.types.head import Head
+from hairkit.types.mask import HAIR, Mask
 
 POINTS = 120
 """Points of the cranium: 20 mm apart."""

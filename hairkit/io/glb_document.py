@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import hairkit
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.glb_file import BINARY_CHUNK, JSON_CHUNK
 from hairkit.io.strand_blocks import bounds as bounds_of
 from hairkit.io.streamed import Streamed
 from hairkit.storage import write_pieces
 from hairkit.types.skin import PNG
+from hairkit.version import __version__
 
 _COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 _SHAPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
@@ -31,7 +31,7 @@ class Document:
 
     def __init__(self) -> None:
         self.json: dict[str, Any] = {
-            "asset": {"version": "2.0", "generator": f"hairkit {hairkit.__version__}"}
+            "asset": {"version": "2.0", "generator": f"hairkit {__version__}"}
         }
         self._arrays: list[npt.NDArray[Any] | Streamed] = []
         self._pictures: dict[bytes, int] = {}

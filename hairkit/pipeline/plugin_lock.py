@@ -11,15 +11,11 @@ name are not looked at.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
 
 from hairkit.errors import InputError, PluginError
 from hairkit.manager import Manager, PluginInfo
 from hairkit.pipeline.module_digest import module_digest
-
-if TYPE_CHECKING:
-    from hairkit.pipeline.recipe import Recipe
 
 DIGEST_LETTERS = 12
 """Letters of a digest that stand in a lock, as many as git shows of a commit."""
@@ -36,10 +32,9 @@ def locked_version(info: PluginInfo) -> str:
     return f"{info.version} code {code[:DIGEST_LETTERS]}".strip()
 
 
-def lock_of(recipe: Recipe, manager: Manager) -> str:
-    """Return the table `[lock]` for a recipe, to be put at its end."""
-    recipe.check(manager)
-    names = sorted({choice.plugin for stage in recipe.stages for choice in stage.choices})
+def lock_of(plugins: Iterable[str], manager: Manager) -> str:
+    """Return the table `[lock]` for the plugins of a recipe, to be put at its end."""
+    names = sorted(set(plugins))
     lines = [f"{name} = {json.dumps(locked_version(manager.info(name)))}" for name in names]
     return "\n".join(["[lock]", *lines])
 

@@ -99,6 +99,11 @@ class Recipe:
     lock: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """Versions of plugins with which it may be run; others are not checked."""
 
+    @property
+    def choices(self) -> tuple[Choice, ...]:
+        """The plugins of all stages, in the order in which they run."""
+        return tuple(choice for stage in self.stages for choice in stage.choices)
+
     def stage(self, table: str) -> Stage | None:
         """Return the stage of a table, or None when the recipe leaves it out."""
         return next((stage for stage in self.stages if stage.table == table), None)
@@ -150,7 +155,7 @@ class Recipe:
         check_lock(self.lock, manager, self.source)
 
     def _with_option(self, plugin: str, name: str, value: str, text: str) -> Recipe:
-        used = [choice.plugin for stage in self.stages for choice in stage.choices]
+        used = [choice.plugin for choice in self.choices]
         if plugin not in used:
             reason = unknown_name("plugin", plugin, used)
             raise OptionError(f"--set {text}: recipe {self.name} uses {reason}")
@@ -296,8 +301,7 @@ def _files_of(value: Any) -> list[Path]:
 
 def missing_networks(recipe: Recipe, manager: Manager) -> dict[str, tuple[str, ...]]:
     """Return the networks that plugins of a recipe would use but that are not installed."""
-    choices = [choice for stage in recipe.stages for choice in stage.choices]
-    missing = {c.plugin: missing_models(manager.info(c.plugin).models) for c in choices}
+    missing = {c.plugin: missing_models(manager.info(c.plugin).models) for c in recipe.choices}
     return {plugin: names for plugin, names in missing.items() if names}
 
 

@@ -16,6 +16,7 @@ from hairkit.progress import Progress
 from hairkit.remote import exists
 from hairkit.types.groom import Groom
 from hairkit.types.parting import Parting
+from hairkit.version import __version__
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -90,7 +91,7 @@ def compare_outputs(old: RunRecord, new: RunRecord) -> tuple[tuple[str, ...], tu
 
 def changed_versions(old: RunRecord, manager: Manager) -> list[str]:
     """Return a line for each version that is not that of the record: results may differ."""
-    now = {"hairkit": _own_version(), **library_versions()}
+    now = {"hairkit": __version__, **library_versions()}
     then = {"hairkit": old.hairkit, **old.libraries}
     for record in old.plugins:
         info = manager.info(record.plugin)
@@ -101,12 +102,6 @@ def changed_versions(old: RunRecord, manager: Manager) -> list[str]:
         for name, wanted in then.items()
         if now.get(name) != wanted
     ]
-
-
-def _own_version() -> str:
-    import hairkit
-
-    return hairkit.__version__
 
 
 def _check_inputs(record: RunRecord, path: Path, force: bool) -> None:

@@ -13,11 +13,11 @@ import cv2
 import numpy as np
 import scipy
 
-import hairkit
 from hairkit.manager import Manager
 from hairkit.pipeline.recipe import Recipe
 from hairkit.progress import Progress
 from hairkit.storage import write_text
+from hairkit.version import __version__
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def _versions() -> list[str]:
     libraries = {"numpy": np, "scipy": scipy, "opencv": cv2}
     versions = [f"{name} {library.__version__}" for name, library in libraries.items()]
     return [
-        f"hairkit {hairkit.__version__}, Python {platform.python_version()}, {', '.join(versions)}",
+        f"hairkit {__version__}, Python {platform.python_version()}, {', '.join(versions)}",
         f"{platform.platform()}, {os.cpu_count()} cores",
     ]
 

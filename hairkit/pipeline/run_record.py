@@ -14,7 +14,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, get_args
 
-import hairkit
 from hairkit.errors import FormatError
 from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
@@ -26,6 +25,7 @@ from hairkit.remote import is_url, join, read_bytes
 from hairkit.storage import read_text, write_text
 from hairkit.types.capture import Capture
 from hairkit.types.parting import Parting, PartingWord
+from hairkit.version import __version__
 
 RECORD = "run.json"
 """Name of the record beside the groom."""
@@ -142,7 +142,7 @@ def describe_run(
     plugins = _plugins(recipe, manager)
     files = [*input_files(capture), *(head_file.files() if head_file else ()), *_named(plugins)]
     return RunRecord(
-        hairkit=hairkit.__version__,
+        hairkit=__version__,
         platform=platform.platform(),
         libraries=library_versions(),
         photos=_photos(capture),

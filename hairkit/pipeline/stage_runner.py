@@ -16,7 +16,6 @@ import numba
 import numpy as np
 import scipy
 
-import hairkit
 from hairkit.errors import PluginError
 from hairkit.manager import Manager
 from hairkit.memory import give_back_memory
@@ -27,6 +26,7 @@ from hairkit.pipeline.work_folder import WorkFolder, digest_of
 from hairkit.storage import Stored, from_arrays, to_arrays
 from hairkit.types.capture import View
 from hairkit.types.groom import Groom
+from hairkit.version import __version__
 
 _Value = TypeVar("_Value")
 _Result = TypeVar("_Result", bound=Stored)
@@ -244,4 +244,4 @@ def _ready(argument: Argument) -> Given[Any]:
 def _own_digest() -> str:
     """Return a digest of the versions of hairkit and of the libraries that compute results."""
     libraries = (np, scipy, numba, cv2)
-    return digest_of(hairkit.__version__, *(library.__version__ for library in libraries))
+    return digest_of(__version__, *(library.__version__ for library in libraries))

@@ -12,13 +12,13 @@ from collections.abc import Awaitable, Callable, Collection
 from pathlib import Path
 from typing import Any
 
-import hairkit
 from hairkit.errors import HairkitError
 from hairkit.nets.model_folder import model_folder
 from hairkit.pipeline.work_folder import AHEAD
 from hairkit.studio.events import Events
 from hairkit.studio.project import Project, Shot
 from hairkit.studio.task_process import TaskError, TaskProcess
+from hairkit.version import __version__
 
 QUIET_S = 0.6
 """Seconds without a change before the hair is made again; the strands of a photo that was drawn on
@@ -162,7 +162,7 @@ class Studio:
         project = self.project
         facts = self.facts.setdefault(shot.id, {})
         files = [project.photo(shot), project.strokes(shot), project.mask(shot) or Path()]
-        key = "/".join([hairkit.__version__, *map(_version, files), *_models()])
+        key = "/".join([__version__, *map(_version, files), *_models()])
         if facts.get("outline_of") != key:
             found = project.outline(shot, key)
             if found is None:

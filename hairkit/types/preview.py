@@ -9,7 +9,7 @@ import base64
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +18,6 @@ from hairkit.arrays import Float64Array, UInt8Array
 
 if TYPE_CHECKING:
     from hairkit.types.camera import Camera
-    from hairkit.types.head import Head
-    from hairkit.types.strands import Strands
 
 WIDTH, HEIGHT = 240, 320
 """Pixels of one view of a preview."""
@@ -44,6 +42,27 @@ _FAR = 1e5
 """Pixels beyond which nothing is drawn, so that fixed-point coordinates cannot overflow."""
 _FIXED_BITS = 4
 """OpenCV draws at coordinates with so many bits below the pixel."""
+
+
+class Surface(Protocol):
+    """What a preview needs of a head: vertices (V, 3), metres, and faces (F, 3)."""
+
+    @property
+    def vertices(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def faces(self) -> npt.NDArray[np.int32]: ...
+
+
+class Lines(Protocol):
+    """What a preview needs of strands, see `Strands`."""
+
+    @property
+    def points(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def strand_of_point(self) -> npt.NDArray[np.int64]: ...
+    def __len__(self) -> int: ...
+    def select(self, indices: npt.NDArray[np.int64]) -> Self: ...
+    def segments(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int64]]: ...
 
 
 class Previewed:
@@ -83,7 +102,7 @@ def row(pictures: Sequence[UInt8Array], height: int = HEIGHT) -> UInt8Array:
     return np.concatenate([np.asarray(p, np.uint8) for p in scaled], axis=1)
 
 
-def draw_turn(head: Head | None, strands: Strands | None) -> UInt8Array | None:
+def draw_turn(head: Surface | None, strands: Lines | None) -> UInt8Array | None:
     """Return front, left and back of a head, of strands or of both, in one scale."""
     clouds = [] if head is None else [head.vertices]
     clouds += [] if strands is None or not len(strands) else [strands.points]
@@ -93,7 +112,7 @@ def draw_turn(head: Head | None, strands: Strands | None) -> UInt8Array | None:
 
 
 def draw_view(
-    camera: Camera | _TurnView, head: Head | None, strands: Strands | None = None
+    camera: Camera | _TurnView, head: Surface | None, strands: Lines | None = None
 ) -> UInt8Array:
     """Return a picture (H, W, 3) of a head and strands as a camera sees them."""
     parts = [_faces(camera, head)] if head is not None else []
@@ -151,7 +170,7 @@ _Primitives = tuple[npt.NDArray[np.int32], Float64Array, Float64Array]
 """Corners (N, K, 2) in fixed-point pixels, depths (N,) and sRGB colours (N, 3)."""
 
 
-def _faces(camera: Camera | _TurnView, head: Head) -> _Primitives:
+def _faces(camera: Camera | _TurnView, head: Surface) -> _Primitives:
     """Return the faces that look at the camera, brighter the more they do."""
     corners = head.vertices.astype(np.float64)[head.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -163,7 +182,7 @@ def _faces(camera: Camera | _TurnView, head: Head) -> _Primitives:
     return _to_fixed_point(camera.project(corners[seen])), camera.depth(middle[seen]), colours
 
 
-def _segments(camera: Camera | _TurnView, strands: Strands) -> _Primitives:
+def _segments(camera: Camera | _TurnView, strands: Lines) -> _Primitives:
     """Return the segments of strands, darker along the view than across it."""
     if len(strands) > MOST_STRANDS:
         strands = strands.select(np.linspace(0, len(strands) - 1, MOST_STRANDS).astype(np.int64))

@@ -13,9 +13,9 @@ import imath
 import numpy as np
 from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
-import hairkit
 from hairkit.errors import InputError
 from hairkit.storage import replace_file, utf8_name
+from hairkit.version import __version__
 
 from .curves import GroomCurves
 from .ogawa import is_complete
@@ -96,7 +96,7 @@ def _write_groom_properties(groom: Any, curves: GroomCurves) -> None:
     major, minor = GROOM_VERSION
     Abc.OInt16Property(properties, "groom_version_major").setValue(major)
     Abc.OInt16Property(properties, "groom_version_minor").setValue(minor)
-    tool = f"hairkit {hairkit.__version__}"
+    tool = f"hairkit {__version__}"
     Abc.OStringProperty(properties, "groom_tool").setValue(tool)
     if curves.curl is not None:
         for name, length in zip(("radius", "pitch"), curves.curl, strict=True):

@@ -11,9 +11,9 @@ from hairkit.head_model.bust import CLOTH, Bust
 from hairkit.head_model.skinning import JOINT_NAMES, head_weights
 from hairkit.types.head import Head
 
+from .builder import SCENE, Scene, one
 from .look import add_material, add_shapes, add_skin_material
 from .records import Record, array, number, record, text
-from .scene import SCENE, Scene, one
 
 DEFORM_ACCURACY = 50.0
 """`Link_DeformAcuracy` (so spelled in the format), per cent, as other exporters write it."""

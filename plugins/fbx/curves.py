@@ -9,8 +9,8 @@ import numpy as np
 from hairkit.arrays import Float64Array
 from hairkit.types.strands import Strands
 
+from .builder import SCENE, Scene
 from .records import Record, array, number, record, text
-from .scene import SCENE, Scene
 
 ORDER = 2
 

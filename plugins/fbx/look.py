@@ -7,8 +7,8 @@ import numpy as np
 from hairkit.types.head import Head
 from hairkit.types.skin import SkinMaps, Texture
 
+from .builder import Scene, one, properties70
 from .records import array, number, raw, record, text
-from .scene import Scene, one, properties70
 
 SKIN = (0.5, 0.36, 0.29)
 """Linear RGB of a head without an albedo map."""

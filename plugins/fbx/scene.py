@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cache
 
 from hairkit.head_model.bust import Bust
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
 
+from .body import add_body, add_bust
+from .builder import SCENE, Scene, one, properties70
+from .curves import add_curves
 from .records import (
     CREATION_TIME,
     FILE_ID,
@@ -19,56 +20,20 @@ from .records import (
     Record,
     file_pieces,
     number,
-    object_name,
     raw,
     record,
     text,
 )
 
 CREATOR = "hairkit"
-SCENE = 0
-"""The id of the scene's root, which is no object."""
-_FIRST_ID = 1_000_000
 _AXES = {"y_up": (1, 1, 2, 1, 0, 1), "z_up": (2, 1, 1, -1, 0, 1)}
 _AXIS_NAMES = ("UpAxis", "UpAxisSign", "FrontAxis", "FrontAxisSign", "CoordAxis", "CoordAxisSign")
-_VALUES = {"int": "I", "enum": "I", "double": "D"}
-
-
-@dataclass
-class Scene:
-    """Objects and connections while they are put together."""
-
-    space: FileSpace
-    objects: list[Record] = field(default_factory=list)
-    connections: list[tuple[int, int, str]] = field(default_factory=list)
-
-    def add(self, kind: str, name: str, subkind: str, *children: Record, label: str = "") -> int:
-        """Add an object and return its id; `label` is the class in its name, if not `kind`."""
-        number_ = _FIRST_ID + len(self.objects)
-        values = (number("L", number_), object_name(name, label or kind), text(subkind))
-        self.objects.append(record(kind, *values, children=children))
-        return number_
-
-    def add_model(self, name: str, subkind: str, parent: int, *properties: Record) -> int:
-        """Add a node of the hierarchy below `parent` and return its id."""
-        version, always, *drawn = _of_models()
-        own = properties70(*properties, *always.children) if properties else always
-        model = self.add("Model", name, subkind, version, own, *drawn)
-        self.connect(model, parent)
-        return model
-
-    def connect(self, child: int, parent: int, drives: str = "") -> None:
-        """Say that an object belongs to another, or drives that property of it."""
-        self.connections.append((child, parent, drives))
 
 
 def scene_pieces(
     head: Head, strands: Strands | None, space: FileSpace, bust: Bust | None = None
 ) -> list[bytes]:
     """Return the file, in pieces, of a head, and of strands and a bust where there are some."""
-    from .body import add_body, add_bust
-    from .curves import add_curves
-
     scene = Scene(space)
     add_body(scene, head)
     if bust is not None:
@@ -76,32 +41,6 @@ def scene_pieces(
     if strands is not None:
         add_curves(scene, strands)
     return file_pieces(_document(scene))
-
-
-def properties70(*properties: Record) -> Record:
-    """Return an object's block of properties."""
-    return record("Properties70", children=properties)
-
-
-def one(name: str, kind: str, label: str, flags: str, *values: float) -> Record:
-    """Return one property; its values are doubles unless its kind is a whole number."""
-    code = _VALUES.get(kind, "D")
-    numbers = [number(code, value) for value in values]
-    return record("P", text(name), text(kind), text(label), text(flags), *numbers)
-
-
-@cache
-def _of_models() -> tuple[Record, ...]:
-    """Return what all models have: version, properties, and how they are drawn."""
-    return (
-        record("Version", number("I", 232)),
-        properties70(
-            one("DefaultAttributeIndex", "int", "Integer", "", 0),
-            one("InheritType", "enum", "", "", 1),
-        ),
-        record("Shading", number("C", True)),
-        record("Culling", text("CullingOff")),
-    )
 
 
 def _document(scene: Scene) -> list[Record]:

@@ -7,13 +7,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-import hairkit
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.colour import srgb_from_linear
 from hairkit.head_model.scalp import growth_mesh, roots_at
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import Strands
+from hairkit.version import __version__
 
 from . import schema
 from .asset import ApxAsset, Material, MaterialValue
@@ -83,7 +83,7 @@ def groom_to_asset(groom: Groom, layout: Layout) -> ApxAsset:
         up_axis=layout.up_axis,
         handedness=layout.handedness,
         materials=_materials(groom, strands, len(faces), len(capsules) > 0, layout),
-        info=("1.1", f"hairkit {hairkit.__version__}", "", layout.author, layout.last_modified),
+        info=("1.1", f"hairkit {__version__}", "", layout.author, layout.last_modified),
     )
 
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,11 +27,9 @@ from .backend import Engine, FastEngine
 from .block import Contact, acting, make_steps, state_of
 from .embedding import FIRM, carry_points, embed_points, held_nodes, hold_nodes
 from .linear_system import Rates, System, assemble
+from .options import Options
 from .resampling import finer_steps, max_stiffness, node_points, overhang
 from .rods import Rods, balance_load, clamp_roots, elastic_energy, make_rods, rest_state
-
-if TYPE_CHECKING:
-    from . import Options
 
 SINGLE_HAIR = 1.2e-3
 """m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""

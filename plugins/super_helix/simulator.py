@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import numpy.typing as npt
 
@@ -21,13 +19,11 @@ from hairkit.types.groom import Groom
 from .binding import bind_rods, carry_points
 from .hair_contact import Neighbours
 from .linear_time_step import place_points, step_strands
+from .options import Options
 from .reference import step_densely
 from .rods import NODES, Rods
 from .state import Body, Loads, Motion, Step
 from .statics import rest_as_captured
-
-if TYPE_CHECKING:
-    from . import Options
 
 SKIN = 0.0015
 """Hair is kept this far off the head, metres, where it was not nearer at rest."""

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins"
 
 FLOORS = (
     (
+        "version",
         "errors",
         "arrays",
         "colour",
@@ -50,15 +53,46 @@ FLOORS = (
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 
 
-def imported(path: Path) -> list[str]:
-    """Return the full names of everything a file imports, inside functions too."""
+def module_name(path: Path) -> str:
+    """Return the module in a file: `hairkit_plugins.pbd` for plugins/pbd/__init__.py."""
+    top, *inner = path.relative_to(PROJECT).with_suffix("").parts
+    name = ".".join([{"plugins": "hairkit_plugins"}.get(top, top), *inner])
+    return name.removesuffix(".__init__")
+
+
+def imported(path: Path, source: str | None = None) -> list[str]:
+    """Return the full names of everything a file imports, inside functions too.
+
+    Names of the front door stand for the modules that define them, and the bare front door for the
+    highest of these. `source` is looked at in the place of the file's own.
+    """
+    module = module_name(path).split(".")
+    package = module if path.name == "__init__.py" else module[:-1]
     names = []
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text() if source is None else source)):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            names += [f"{node.module}.{alias.name}" for alias in node.names]
-    return names
+            around = package[: len(package) + 1 - node.level] if node.level else []
+            base = ".".join([*around, *([node.module] if node.module else [])])
+            names += [f"{base}.{alias.name}" for alias in node.names]
+    return [_behind_the_front_door(name) for name in names]
+
+
+def _behind_the_front_door(name: str) -> str:
+    """Return `hairkit.types.mask.Mask` for `hairkit.Mask`, and `hairkit.api` for `hairkit`."""
+    import hairkit
+
+    first, _, rest = name.partition(".")
+    if first != "hairkit" or rest in FLOOR_OF:
+        return name
+    return (
+        f"{hairkit._HOME_OF[rest]}.{rest}"
+        if rest in hairkit._HOME_OF
+        else name
+        if rest
+        else "hairkit.api"
+    )
 
 
 def pyproject() -> dict[str, Any]:
@@ -82,13 +116,57 @@ def test_every_room_has_its_floor() -> None:
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PROJECT)))
 def test_no_room_uses_a_floor_above(path: Path) -> None:
     """A room imports from its own floor and the floors below."""
-    module = ".".join(path.relative_to(PROJECT).with_suffix("").parts)
-    if module == "hairkit.__init__":
+    module = module_name(path)
+    if module == "hairkit":
         return  # the front door shows names of several floors
     own = FLOOR_OF[room(module)]
     used = {name for name in imported(path) if room(name) in FLOOR_OF}
     above = sorted(name for name in used if FLOOR_OF[room(name)] > own)
     assert not above, f"{module} on floor {own} uses {above}"
+
+
+def circles(uses: Mapping[str, Iterable[str]]) -> list[str]:
+    """Return the modules that import each other, directly or not, one of each circle's names."""
+    try:
+        graphlib.TopologicalSorter(uses).prepare()
+    except graphlib.CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def module_uses(paths: Iterable[Path]) -> dict[str, set[str]]:
+    """Return the modules that each module imports; the front door imports none."""
+    modules = {module_name(path): path for path in paths}
+    uses = {}
+    for module, path in modules.items():
+        names = imported(path) if module != "hairkit" else []
+        homes = {name if name in modules else name.rpartition(".")[0] for name in names}
+        uses[module] = homes & modules.keys() - {module}
+    return uses
+
+
+def test_no_two_modules_import_each_other() -> None:
+    """Imports form no circle, those inside functions and for type checkers counted."""
+    assert circles(module_uses(SOURCES + PLUGINS)) == []
+
+
+def test_faults_of_imports_are_found() -> None:
+    """Circles of two and of three; names that come through the front door."""
+    assert circles({"a": ["b"], "b": ["c"], "c": ["a"]})
+    assert circles({"a": ["b"], "b": ["a"]})
+    assert not circles({"a": ["b", "c"], "b": ["c"]})
+    plugin = PROJECT / "plugins" / "pbd" / "rods.py"
+    source = "from hairkit import Manager, storage\nimport hairkit\nfrom . import Options\n"
+    source += "from .block import f"
+    found = imported(plugin, source)
+    assert found == [
+        "hairkit.manager.Manager",
+        "hairkit.storage",
+        "hairkit.api",
+        "hairkit_plugins.pbd.Options",
+        "hairkit_plugins.pbd.block.f",
+    ]
+    assert FLOOR_OF[room(found[0])] == FLOOR_OF["manager"]
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PROJECT)))
@@ -102,10 +180,10 @@ def test_a_plugin_stands_alone_on_public_names(path: Path) -> None:
     """A plugin uses no other plugin, nothing private, and nothing of the floors that run it."""
     folder = path.relative_to(PROJECT / "plugins").parts[0]
     for name in imported(path):
-        own = name.startswith(f"hairkit_plugins.{folder}.")
+        own = name.startswith(f"hairkit_plugins.{Path(folder).stem}.")
         assert own or not name.startswith("hairkit_plugins"), f"{path.name} uses {name}"
         if name.startswith("hairkit."):
-            assert not any(part.startswith("_") for part in name.split(".")), name
+            assert not re.search(r"\._(?!_)", name), name
             assert FLOOR_OF.get(room(name), 0) < FLOOR_OF["manager"], name
 
 
