@@ -24,6 +24,8 @@ FIXED = 1e3
 """Weight of a cell's data against a smoothness of 1 that fixes its value (Dirichlet)."""
 UNIT = 0.01
 """Metres in one unit of the internal distance: a centimetre; the patent names no unit."""
+NOWHERE = 1e6
+"""Distance in cells in a plane without marked cells, of which OpenCV 5 says the largest float."""
 COARSE = 2
 """The internal distance is solved on cells this many times as large, then interpolated."""
 NEGLIGIBLE = 6.0
@@ -193,6 +195,7 @@ def _distance_to(on: BoolArray, around: BoolArray, far: float) -> Float32Array:
     square = np.stack(
         [cv2.distanceTransform(plane, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for plane in off[box]]
     )
+    np.minimum(square, NOWHERE, out=square)
     square *= square
     np.rint(square, out=square)  # whole numbers, whatever the rounding of the roots
     nearest = square.copy()
