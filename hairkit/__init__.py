@@ -38,6 +38,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `parallel`: compiled loops on threads
 * `progress`: progress reporting
 * `remote`: files and folders at URLs
+* `stages`: the graph of stages as data
 * `storage`: safe files, frozen types as `.npz`
 * `testing`: a small head with hair for tests of plugins
 * `version`: the version of this package

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 from hairkit.errors import InputError
 from hairkit.evaluation.truth import Truth
-from hairkit.storage import Stored, from_arrays, read_npz
+from hairkit.pipeline.work_folder import WORK, LastRun
+from hairkit.stages import ORIENTED
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
-from hairkit.types.mask import Mask, Masks
+from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import read_cameras
 
-GROOM, SCENE, WORK = "groom.npz", "scene.json", "work"
+GROOM, SCENE = "groom.npz", "scene.json"
 """Names in the folder that `hairkit reconstruct` writes."""
-
-_Kind = TypeVar("_Kind", bound=Stored)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,33 +79,11 @@ def read_prediction(
             "name them with --scene"
         )
     names, cameras = read_cameras(scene_path)
-    folder = groom_path.parent
+    last = LastRun(groom_path.parent / WORK)
     return Prediction(
         Groom.load(groom_path),
         names,
         cameras,
-        _stage_results(folder, "orient", names, OrientationMap),
-        _masks(folder, names),
+        last.every(ORIENTED, names),
+        last.masks(names),
     )
-
-
-def _masks(folder: Path, names: Sequence[str]) -> tuple[Mask, ...] | None:
-    """Return the masks that the groom was made with: refined ones where there are any."""
-    path = folder / WORK / "refine.npz"
-    if path.is_file():
-        return from_arrays(Masks, read_npz(path), str(path)).views
-    return _stage_results(folder, "segment", names, Mask)
-
-
-def _stage_results(
-    folder: Path, stage: str, names: Sequence[str], kind: type[_Kind]
-) -> tuple[_Kind, ...] | None:
-    """Read what a stage found in every view, or None where a view is not there."""
-    paths = [folder / WORK / f"{stage}-{_file_name(name)}.npz" for name in names]
-    if not all(path.is_file() for path in paths):
-        return None
-    return tuple(from_arrays(kind, read_npz(path), str(path)) for path in paths)
-
-
-def _file_name(view: str) -> str:
-    return "".join(c if c.isalnum() or c in "-_" else "_" for c in view)

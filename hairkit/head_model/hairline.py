@@ -9,17 +9,15 @@ level views do not show the top of a head, but what grows around it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float32Array, Float64Array, frozen_array
+from hairkit.arrays import Float64Array
 from hairkit.cameras.depth_raster import HEAD_TOLERANCE, depth_behind, head_depth
-from hairkit.errors import DataError
-from hairkit.storage import Stored
 from hairkit.types.camera import Camera
+from hairkit.types.hairline import Hairline
 from hairkit.types.mask import Mask
 from hairkit.types.scene import Scene
 
@@ -39,20 +37,6 @@ FULL, BARE = 0.25, 0.5
 """Share of the votes against hair up to which hair is full, and from which nothing grows: on three
 captures with a bald crown drawn into their masks these leave 0.27 to 0.41 of the hair there and
 keep 0.97 to 0.99 of the rest; (0.35, 0.65) leave 0.37 to 0.5, (0.2, 0.4) keep 0.96 to 0.98."""
-
-
-@dataclass(frozen=True, eq=False)
-class Hairline(Stored):
-    """Density of the hair on a head."""
-
-    density: Float32Array
-    """(V,) at each vertex, of that of full hair: 0 where nothing grows, up to 1."""
-
-    def __post_init__(self) -> None:
-        density = frozen_array(self.density, np.float32, (None,), "hair density")
-        if density.size and (density.min() < 0 or density.max() > 1):
-            raise DataError("hair density lies outside [0, 1]")
-        object.__setattr__(self, "density", density)
 
 
 def measure_hairline(scene: Scene, masks: Sequence[Mask]) -> Hairline:

@@ -25,17 +25,18 @@ from hairkit.errors import InputError
 from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.field.ties import measure_ties
 from hairkit.grooming.assemble import assemble_groom
-from hairkit.head_model.hairline import Hairline
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.recipe import Recipe
 from hairkit.pipeline.single_photo import see_photo
-from hairkit.pipeline.work_folder import read_latest, stage_file
+from hairkit.pipeline.work_folder import LastRun, stage_file
+from hairkit.stages import LABELS, OF_NAME, ORIENTED
 from hairkit.storage import Stored
 from hairkit.types.capture import Capture
 from hairkit.types.groom import Groom
+from hairkit.types.hairline import Hairline
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
@@ -177,7 +178,8 @@ def _time(work: Path, stage: str, view: str = "") -> int:
 
 @lru_cache(MOST_KEPT)
 def _read_once(time: int, kind: type[Stored], work: Path, stage: str, view: str) -> Stored:
-    return read_latest(kind, work, stage, view)
+    found: Any = LastRun(work).latest(OF_NAME[stage], view)
+    return cast(Stored, found)
 
 
 @lru_cache(MOST_KEPT)
@@ -187,7 +189,7 @@ def _small_refined(time: int, work: Path, index: int, size: tuple[int, int]) -> 
 
 @lru_cache(MOST_KEPT)
 def _small_mask(time: int, work: Path, view: str, size: tuple[int, int]) -> Mask:
-    return _small(read_latest(Mask, work, "segment", view), size)
+    return _small(LastRun(work).latest(LABELS, view), size)
 
 
 def _small(mask: Mask, size: tuple[int, int]) -> Mask:
@@ -197,7 +199,7 @@ def _small(mask: Mask, size: tuple[int, int]) -> Mask:
 
 @lru_cache(MOST_KEPT)
 def _small_orientation(time: int, work: Path, view: str, size: tuple[int, int]) -> OrientationMap:
-    found = read_latest(OrientationMap, work, "orient", view)
+    found = LastRun(work).latest(ORIENTED, view)
     return OrientationMap(_every_few(found.angle, size), _every_few(found.confidence, size))
 
 

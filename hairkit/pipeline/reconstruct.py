@@ -18,7 +18,7 @@ from hairkit.field.find_parting import measure_parting
 from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.field.ties import measure_ties
 from hairkit.grooming.assemble import assemble_groom
-from hairkit.head_model.hairline import Hairline, measure_hairline
+from hairkit.head_model.hairline import measure_hairline
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
 from hairkit.imaging.waves import measure_waves
@@ -42,6 +42,7 @@ from hairkit.progress import Progress, Silent
 from hairkit.types.capture import Capture
 from hairkit.types.chosen import ChosenHair
 from hairkit.types.groom import Groom
+from hairkit.types.hairline import Hairline
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap

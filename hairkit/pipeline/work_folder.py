@@ -1,8 +1,8 @@
 """The work folder: the result of every stage, stored with a digest of its inputs.
 
-A stage file is `STAGE.npz` or `STAGE-VIEW.npz`. It is reused only if its digest matches, so an
-interrupted run continues where it stopped, with the same result. What was made before the run of
-single photos lies in folders below `ahead/`, and is taken from there.
+A stage file is `STAGE.npz` or `STAGE-VIEW.npz` (`hairkit.stages`). It is reused only if its digest
+matches, so an interrupted run continues where it stopped, with the same result. What was made of
+single photos before the run lies in folders below `ahead/`, and is taken from there.
 """
 
 from __future__ import annotations
@@ -11,12 +11,14 @@ import contextlib
 import dataclasses
 import hashlib
 import os
+import re
 import shutil
 import threading
 import time
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
@@ -24,7 +26,10 @@ from typing import Any, Self, TypeVar
 import numpy as np
 
 from hairkit.errors import HairkitError, InputError
+from hairkit.stages import FITTED, LABELS, REFINED, SCENE, Stage
 from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
+from hairkit.types.mask import Mask
+from hairkit.types.scene import Scene
 
 _Result = TypeVar("_Result", bound=Stored)
 AHEAD = "ahead"
@@ -34,6 +39,8 @@ WORK = "work"
 _LOCK = ".lock"
 _DIGEST = "work_digest"
 _LOCK_POLL_S = 0.2
+_NAME_KEPT, _NAME_DIGITS = 60, 8
+"""Letters of a view's name, and digits of its digest, in the names of its files."""
 _ALL_READ_AND_WRITE = 0o666
 """Permissions of the lock file, less the user's umask."""
 
@@ -178,20 +185,63 @@ def drop_work(out: str | os.PathLike[str]) -> None:
         work.clear()
 
 
-def read_latest(kind: type[_Result], work: Path, stage: str, view: str = "") -> _Result:
-    """Return what a stage of the last run made, whatever it was made from; `InputError` if none."""
-    path = stage_file(work, stage, view)
-    if not path.is_file():
-        raise InputError(f"{path}: no result of this stage; run all stages first")
-    arrays = read_npz(path)
-    arrays.pop(_DIGEST, None)
-    return from_arrays(kind, arrays, str(path))
+@dataclass(frozen=True)
+class LastRun:
+    """What the last run left in a work folder, whatever it was made from."""
+
+    work: Path | None
+    """None where nothing was left."""
+
+    def has(self, stage: Stage[Any], view: str = "") -> bool:
+        """Return whether there is a result of a stage, of a view where it has one for each."""
+        return self.work is not None and stage_file(self.work, stage.name, view).is_file()
+
+    def latest(self, stage: Stage[_Result], view: str = "") -> _Result:
+        """Return the result of a stage.
+
+        Raises `InputError` where there is none, `FormatError` where it is damaged or that of
+        another version.
+        """
+        path = stage_file(self.work or Path(WORK), stage.name, view)
+        if not self.has(stage, view):
+            raise InputError(f"{path}: no result of this stage; run all stages first")
+        arrays = read_npz(path)
+        arrays.pop(_DIGEST, None)
+        return from_arrays(stage.makes, arrays, str(path))
+
+    def every(self, stage: Stage[_Result], views: Sequence[str]) -> tuple[_Result, ...] | None:
+        """Return the results of a stage for views, by their names; None unless all are there."""
+        if not all(self.has(stage, view) for view in views):
+            return None
+        return tuple(self.latest(stage, view) for view in views)
+
+    @property
+    def scene(self) -> Stage[Scene]:
+        """The stage that found cameras and head last."""
+        return FITTED if self.has(FITTED) else SCENE
+
+    def masks(self, views: Sequence[str]) -> tuple[Mask, ...] | None:
+        """Return the masks of views, mended where the recipe does so; None if any is missing."""
+        if not self.has(REFINED):
+            return self.every(LABELS, views)
+        refined = self.latest(REFINED).views
+        return refined if len(refined) == len(views) else None
 
 
 def stage_file(folder: Path, stage: str, view: str = "") -> Path:
     """Return the path of a stage's result, which need not exist."""
-    name = "".join(c if c.isalnum() or c in "-_" else "_" for c in view)
-    return folder / (f"{stage}-{name}.npz" if view else f"{stage}.npz")
+    return folder / (f"{stage}-{_file_name(view)}.npz" if view else f"{stage}.npz")
+
+
+def _file_name(view: str) -> str:
+    """Return a name for files of a view that no other view has, on any system.
+
+    Small letters, digits, `-` and `_` stay; other names are told apart by a digest of them.
+    """
+    plain = re.sub(r"[^A-Za-z0-9_-]", "_", view)[:_NAME_KEPT]
+    if plain == view.lower():
+        return view
+    return f"{plain}-{hashlib.sha256(view.encode()).hexdigest()[:_NAME_DIGITS]}"
 
 
 def _write(path: Path, value: Stored, digest: str) -> None:

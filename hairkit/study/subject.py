@@ -12,7 +12,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, UInt8Array
 from hairkit.errors import InputError
-from hairkit.evaluation.prediction import WORK, Prediction, read_prediction
+from hairkit.evaluation.prediction import Prediction, read_prediction
 from hairkit.grooming.densify import densify
 from hairkit.head_model.template import default_head
 from hairkit.imaging.masked_filters import double_angle
@@ -20,11 +20,12 @@ from hairkit.io.capture_reader import WORKING_EDGE
 from hairkit.manager import Manager
 from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.pipeline.take_capture import take_capture
+from hairkit.pipeline.work_folder import WORK, LastRun
 from hairkit.rendering import draw_views
 from hairkit.rendering.measurement import draw_measurements
 from hairkit.simulation import run, static_motion
 from hairkit.simulation.posing import pose_groom
-from hairkit.storage import from_arrays, read_npz
+from hairkit.stages import TURN
 from hairkit.study.frame import BACKDROP, HEIGHT, WIDTH, cut_out, frame_camera
 from hairkit.synth import STYLES, grow
 from hairkit.types.camera import Camera
@@ -32,7 +33,6 @@ from hairkit.types.capture import Capture
 from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR
 from hairkit.types.strands import Strands
-from hairkit.types.turnaround import Turnaround
 
 HAIRS, POINTS = 20_000, 48
 """Strands drawn of a groom, and points of each."""
@@ -200,10 +200,8 @@ def _read_photos(folder: Path, manager: Manager) -> Capture:
         raise InputError(f"{folder}: its photos were given as objects, not as files")
     edge = record.max_edge or WORKING_EDGE
     capture = take_capture(record.photos, record.as_recipe(), manager, edge)
-    path = folder / WORK / "turn.npz"
-    if not path.is_file():
-        return capture
-    return capture.arranged(from_arrays(Turnaround, read_npz(path), str(path)))
+    last = LastRun(folder / WORK)
+    return capture.arranged(last.latest(TURN)) if last.has(TURN) else capture
 
 
 def _shot(prediction: Prediction, view: int, photo: UInt8Array) -> Shot:

@@ -10,6 +10,7 @@ the packages named after the subject.
 * `face`: landmarks and direction of a face
 * `finding`: what a check of a file found
 * `groom`: strands on a head with material and physics
+* `hairline`: density of the hair on a head
 * `head`: the head mesh, roots, capsules
 * `mask`: labels: hair, person, background
 * `orientation`: 2D strand angle and confidence

@@ -19,15 +19,15 @@ from hairkit.manager import Manager
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.run_record import RECORD, RunRecord, read_record
 from hairkit.pipeline.take_capture import take_capture
+from hairkit.pipeline.work_folder import WORK, LastRun
 from hairkit.rendering.head import Solid
-from hairkit.storage import Stored, from_arrays, read_npz
+from hairkit.stages import FIELD, HULL, LABELS, ORIENTED, REFINED, TURN, Stage
+from hairkit.storage import Stored
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
-from hairkit.types.mask import HAIR, PERSON, Mask, Masks
+from hairkit.types.mask import HAIR, PERSON
 from hairkit.types.orientation import OrientationMap
-from hairkit.types.scene import Scene
-from hairkit.types.turnaround import Turnaround
-from hairkit.types.volume import Hull, OrientationField, VoxelGrid, symmetric_matrices
+from hairkit.types.volume import VoxelGrid, symmetric_matrices
 from hairkit.viewer.draw.lines import Billboard, LineSet
 
 BILLBOARDS = ("photos", "masks", "orientation")
@@ -53,7 +53,7 @@ class Layers:
 
     def __init__(self, manager: Manager, results: Path | None, capture: str | None = None) -> None:
         self._manager = manager
-        self._work = None if results is None else results / "work"
+        self._last = LastRun(None if results is None else results / WORK)
         record = _find_record(results)
         self._recipe = load_recipe("default") if record is None else record.as_recipe()
         self.capture = _find_capture(record) if capture is None else capture
@@ -63,13 +63,16 @@ class Layers:
     @property
     def available(self) -> tuple[str, ...]:
         """Names of the layers whose data exists."""
-        photos = self.capture is not None and bool(self.cameras)
-        have = {"head": True, "torso": True, "photos": photos}
-        files = {"masks": "segment-*", "orientation": "orient-*", "cameras": "scene"}
-        files |= {"hull": "hull", "field": "field"}
-        for name, pattern in files.items():
-            have[name] = self._work is not None and any(self._work.glob(f"{pattern}.npz"))
-        return tuple(name for name in NAMES if have[name])
+        last, cameras = self._last, self.cameras
+        have = {
+            "photos": self.capture is not None and bool(cameras),
+            "masks": any(last.has(LABELS, view) for view in cameras),
+            "orientation": any(last.has(ORIENTED, view) for view in cameras),
+            "cameras": bool(cameras),
+            "hull": last.has(HULL),
+            "field": last.has(FIELD),
+        }
+        return tuple(name for name in NAMES if have.get(name, True))
 
     def check(self, name: str) -> None:
         """Raise `InputError` if a layer does not exist or its data is missing."""
@@ -92,7 +95,7 @@ class Layers:
     @cached_property
     def cameras(self) -> dict[str, Camera]:
         """Cameras of the photos by view name, head frame, working size; empty without a scene."""
-        scene = self._read(Scene, "head") or self._read(Scene, "scene")
+        scene = self._read(self._last.scene)
         return {} if scene is None else dict(zip(scene.names, scene.cameras, strict=True))
 
     def billboards(
@@ -119,7 +122,7 @@ class Layers:
 
     def hull(self) -> Solid | None:
         """Return the surface of the dense part of the hull; None without a hull."""
-        hull = self._read(Hull, "hull")
+        hull = self._read(HULL)
         if hull is None:
             return None
         vertices, faces, normals = volume_surface(hull.grid, hull.dense)
@@ -128,7 +131,7 @@ class Layers:
 
     def field_lines(self) -> LineSet | None:
         """Return short lines along the field, coloured by direction; None without a field."""
-        field, hull = self._read(OrientationField, "field"), self._read(Hull, "hull")
+        field, hull = self._read(FIELD), self._read(HULL)
         if field is None or hull is None:
             return None
         cells = np.argwhere(hull.dense & (field.confidence > 0))
@@ -153,7 +156,7 @@ class Layers:
     @cached_property
     def _confidence(self) -> tuple[VoxelGrid, Float32Array] | None:
         """Grid and confidence of the field, cached: each frame reads them."""
-        field = self._read(OrientationField, "field")
+        field = self._read(FIELD)
         return None if field is None else (field.grid, field.confidence)
 
     @property
@@ -172,18 +175,18 @@ class Layers:
     def _images(self, edge: int) -> dict[str, UInt8Array]:
         if self.capture is None:
             return {}
-        capture, turn = self.take_capture(edge), self._read(Turnaround, "turn")
+        capture, turn = self.take_capture(edge), self._read(TURN)
         if turn is not None and len(turn.names) == len(capture.views):
             capture = capture.arranged(turn)
         return {view.name: view.image for view in capture.views}
 
     def _masks(self) -> dict[str, UInt8Array]:
         pictures = {}
-        refined = self._read(Masks, "refine")
-        segmented = self._every(Mask, "segment")
+        refined = self._read(REFINED)
+        masks = self._every(LABELS)
         if refined is not None and len(refined.views) == len(self.cameras):
-            segmented = dict(zip(self.cameras, refined.views, strict=True))
-        for name, mask in segmented.items():
+            masks = dict(zip(self.cameras, refined.views, strict=True))
+        for name, mask in masks.items():
             image = np.zeros((*mask.labels.shape, 4), np.uint8)
             image[mask.labels == HAIR] = (232, 60, 132, 230)
             image[mask.labels == PERSON] = (70, 130, 235, 150)
@@ -191,23 +194,16 @@ class Layers:
         return pictures
 
     def _angles(self) -> dict[str, UInt8Array]:
-        return {
-            name: _hsv_picture(found)
-            for name, found in self._every(OrientationMap, "orient").items()
-        }
+        return {name: _hsv_picture(found) for name, found in self._every(ORIENTED).items()}
 
-    def _every(self, kind: type[_Found], stage: str) -> dict[str, _Found]:
-        found = {name: self._read(kind, f"{stage}-{name}") for name in self.cameras}
-        return {name: value for name, value in found.items() if value is not None}
+    def _every(self, stage: Stage[_Found]) -> dict[str, _Found]:
+        found = {view: self._read(stage, view) for view in self.cameras}
+        return {view: value for view, value in found.items() if value is not None}
 
-    def _read(self, kind: type[_Found], stem: str) -> _Found | None:
+    def _read(self, stage: Stage[_Found], view: str = "") -> _Found | None:
         """Return the stored result of a stage; None if missing or of another version."""
-        if self._work is None or not (path := self._work / f"{stem}.npz").is_file():
-            return None
         try:
-            arrays = read_npz(path)
-            arrays.pop("work_digest", None)
-            return from_arrays(kind, arrays, str(path))
+            return self._last.latest(stage, view)
         except HairkitError:
             return None
 

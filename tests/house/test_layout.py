@@ -42,7 +42,7 @@ FLOORS = (
     ("types",),
     ("cameras", "imaging", "helices", "head_model", "rendering"),
     ("field", "io", "nets"),
-    ("simulation", "grooming", "synth", "hookspecs"),
+    ("simulation", "grooming", "synth", "hookspecs", "stages"),
     ("manager", "testing"),
     ("pipeline", "evaluation"),
     ("viewer", "studio", "study", "batches", "api"),

@@ -14,9 +14,10 @@ import pytest
 
 import hairkit.pipeline.work_folder
 from hairkit.errors import InputError
-from hairkit.pipeline.work_folder import WorkFolder, digest_of
+from hairkit.pipeline.work_folder import LastRun, WorkFolder, digest_of, stage_file
+from hairkit.stages import LABELS, REFINED
 from hairkit.testing import ball_mask, striped_view, turn_scene
-from hairkit.types.mask import Mask
+from hairkit.types.mask import Mask, Masks
 
 MASK = ball_mask(turn_scene().cameras[0])
 
@@ -33,6 +34,42 @@ def test_kept_is_found_again(tmp_path: Path) -> None:
         assert work.get(Mask, "d1", "segment", "left") is None
     with WorkFolder(tmp_path / "work", reuse=False) as work:
         assert work.get(Mask, "d1", "segment", "front") is None
+
+
+NAMES = ("one a", "one_a", "one/a", "One_a", "X", "x", "à", "å", "a" * 300, "a" * 299, "..", "con")
+
+
+def test_views_share_no_file(tmp_path: Path) -> None:
+    """Views of any names have files of their own, where capitals do not count, too; plain names
+    stay as they are."""
+    files = [stage_file(tmp_path, "segment", name).name for name in NAMES]
+    assert len({file.lower() for file in files}) == len(NAMES)
+    for name, file in zip(NAMES, files, strict=True):
+        (tmp_path / file).write_text(name)
+    assert stage_file(tmp_path, "segment", "front-left").name == "segment-front-left.npz"
+
+
+def test_the_last_run_is_read_whatever_it_was_made_from(tmp_path: Path) -> None:
+    """A view called `left side` has its result; masks are the mended ones where there are any."""
+    views = ("left side", "front")
+    last = LastRun(tmp_path)
+    assert last.masks(views) is None
+    with pytest.raises(InputError, match="run all stages first"):
+        last.latest(LABELS, "left side")
+    with WorkFolder(tmp_path) as work:
+        for view in views:
+            work.put(MASK, "d", "segment", view)
+    found = last.masks(views)
+    assert found is not None
+    assert np.array_equal(found[0].labels, MASK.labels)
+    assert last.every(LABELS, (*views, "back")) is None
+    mended = Mask(MASK.labels, person_known=False)
+    with WorkFolder(tmp_path) as work:
+        work.put(Masks((mended, mended)), "d", REFINED.name)
+    found = last.masks(views)
+    assert found is not None
+    assert not found[0].person_known
+    assert not LastRun(None).has(LABELS, "front")
 
 
 @pytest.mark.parametrize("size", [0, 10, 1000])
