@@ -8,11 +8,13 @@ signature of its hook (`hairkit.hookspecs`); how results become arguments is in
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Any, Generic, TypeVar
 
+from hairkit import hookspecs
 from hairkit.types.capture import Capture
 from hairkit.types.face import Face
 from hairkit.types.groom import Groom
@@ -72,6 +74,12 @@ class Stage(Generic[_Result]):
     """False for hooks that no reconstruction calls."""
     command: bool = True
     """False when no npz holds the result, so that its plugin cannot be a process of its own."""
+
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """Names of the arguments of its hook, without `options`."""
+        names = inspect.signature(getattr(hookspecs, self.hook)).parameters
+        return tuple(name for name in names if name != "options")
 
     @property
     def table(self) -> str:

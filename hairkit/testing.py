@@ -15,6 +15,7 @@ import numpy as np
 from hairkit.arrays import BoolArray, Float32Array
 from hairkit.field.growth_prior import measure_scalp_distance
 from hairkit.io.capture_reader import TURN
+from hairkit.stages import OF_HOOK
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.face import Face
@@ -98,22 +99,7 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
         "tied": TiedHair(),
         "roots": scalp_roots(scene.head),
     }
-    seen = ("scene", "masks", "orientations")
-    derived = ("waves", "scalp_distance", "parting", "tied")
-    wanted = {
-        "detect_landmarks": ("view",),
-        "segment_person": ("view",),
-        "find_turn": ("capture", "faces", "persons"),
-        "segment": ("view",),
-        "estimate_scene": ("capture", "masks", "head", "start"),
-        "refine_masks": ("capture", "masks", "scene"),
-        "fit_head": ("capture", "masks", "scene"),
-        "orient": ("view", "mask"),
-        "build_hull": ("scene", "masks"),
-        "solve_field": (*seen, "hull", *derived),
-        "track": (*seen, "hull", "field", "roots", *derived),
-    }
-    return {name: every[name] for name in wanted[stage]}
+    return {name: every[name] for name in OF_HOOK[stage].takes}
 
 
 def striped_view(angle_deg: float, *, name: str = "front", azimuth_deg: float = 0.0) -> View:

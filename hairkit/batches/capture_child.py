@@ -72,17 +72,13 @@ def explain(error: BaseException) -> str:
 
 def _reconstruct(job: Job, settings: Settings, tell: Callable[[Any], None]) -> dict[str, Any]:
     from hairkit.io.capture_reader import WORKING_EDGE
-    from hairkit.pipeline.recipe import load_recipe
-    from hairkit.pipeline.take_capture import take_capture
+    from hairkit.pipeline.take_capture import take_with_choices
     from hairkit.pipeline.work_folder import WORK
     from hairkit.remote import forget, is_url, send
 
     _use_few_threads()
-    manager, recipe = _manager(settings.plugin_files), load_recipe(settings.recipe)
-    asked = recipe.with_set(settings.settings)
-    asked.check(manager)
-    given = take_capture(job.photos, asked, manager, settings.max_edge or WORKING_EDGE)
-    recipe = recipe.with_set([*given.chosen.settings, *settings.settings])
+    manager, edge = _manager(settings.plugin_files), settings.max_edge or WORKING_EDGE
+    given, recipe = take_with_choices(job.photos, settings.recipe, manager, settings.settings, edge)
     folder = _near(job)
     made = _results(folder, given, recipe, manager, settings, _Told(tell))
     if is_url(job.out):

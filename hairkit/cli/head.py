@@ -36,15 +36,15 @@ def run(args: argparse.Namespace) -> int:
     """Fit, write, and print the file's name."""
     from hairkit.manager import Manager
     from hairkit.pipeline.head_alone import ENDINGS, photograph_head, write_head
-    from hairkit.pipeline.recipe import load_recipe
+    from hairkit.pipeline.take_capture import take_with_choices
     from hairkit.progress import progress_for
 
     if args.output.suffix.lower() not in ENDINGS:
         raise InputError(f"{args.output}: a head is written as {', '.join(ENDINGS)}")
     manager = Manager.loaded(args.plugin)
-    recipe = load_recipe(args.recipe).with_set(args.set)
+    photos, recipe = take_with_choices(args.photos, args.recipe, manager, args.set)
     with progress_for(sys.stderr, quiet=args.quiet or args.json) as shown:
-        scene = photograph_head(args.photos, recipe, manager, progress=shown)
+        scene = photograph_head(photos, recipe, manager, progress=shown)
     write_head(args.output, scene.head, manager)
     print_written(args, args.output)
     return 0

@@ -171,8 +171,9 @@ def _capture(args: argparse.Namespace) -> dict[str, Any]:
     from hairkit.manager import Manager
     from hairkit.pipeline.recipe import load_recipe
     from hairkit.pipeline.take_capture import take_capture
+    from hairkit.stages import CAPTURE
 
-    recipe = load_recipe(args.recipe or "default").alone("capture")
+    recipe = load_recipe(args.recipe or "default").only(CAPTURE)
     needed = [choice.plugin for choice in recipe.choices]
     capture = take_capture(args.file, recipe, Manager.loaded(args.plugin, only=needed))
     views = {

@@ -7,8 +7,7 @@ from typing import Any
 
 from hairkit.cli.scaffold import new_plugin
 from hairkit.cli.written import add_json, print_written
-from hairkit.manager import STAGES
-from hairkit.pipeline.recipe import HOOKS
+from hairkit.stages import OF_HOOK, OF_TABLE
 
 _DESCRIPTION = """\
 Example: hairkit new-plugin orient my_method
@@ -22,8 +21,8 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "new-plugin", help="start a plugin of your own", description=_DESCRIPTION
     )
-    others = [stage for stage in STAGES if stage not in HOOKS.values()]
-    stages = f"a stage of the recipe ({', '.join(HOOKS)}) or a hook ({', '.join(others)})"
+    others = [hook for hook, stage in OF_HOOK.items() if not stage.in_runs]
+    stages = f"a stage of the recipe ({', '.join(OF_TABLE)}) or a hook ({', '.join(others)})"
     parser.add_argument("stage", metavar="STAGE", help=stages)
     parser.add_argument("name", metavar="NAME", help="the plugin's name: lower_case_words")
     parser.add_argument("-o", "--output", metavar="FOLDER", help="default: hairkit-NAME")

@@ -11,8 +11,9 @@ from typing import Any
 from hairkit.cli.format_table import format_table
 from hairkit.errors import InputError
 from hairkit.io.file_format import Feature
-from hairkit.manager import STAGES, Manager, PluginInfo
+from hairkit.manager import Manager, PluginInfo
 from hairkit.options import OptionInfo
+from hairkit.stages import OF_HOOK
 
 _DESCRIPTION = """\
 Example: hairkit plugins gabor
@@ -55,9 +56,9 @@ def run(args: argparse.Namespace) -> int:
         lock = lock_of((choice.plugin for choice in recipe.choices), manager)
         print(json.dumps(tomllib.loads(lock)) if args.json else lock)
         return 0
-    if args.check and (args.name is None or args.name in STAGES):
+    if args.check and (args.name is None or args.name in OF_HOOK):
         raise InputError("--check tries one plugin; name it: hairkit plugins gabor --check")
-    if args.name is None or args.name in STAGES:
+    if args.name is None or args.name in OF_HOOK:
         wanted = [i for i in manager.plugins() if args.name is None or args.name in i.stages]
         print(_as_json(wanted) if args.json else _listing(wanted))
         return 0
@@ -83,7 +84,7 @@ def _check(manager: Manager, name: str, source: str | None, *, as_json: bool) ->
 
 def _listing(infos: list[PluginInfo]) -> str:
     lines = []
-    for stage in STAGES:
+    for stage in OF_HOOK:
         members = [info for info in infos if stage in info.stages]
         if members:
             lines += [stage, *(f"  {_row(info)}" for info in members)]

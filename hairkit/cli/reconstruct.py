@@ -73,22 +73,17 @@ def run(args: argparse.Namespace) -> int:
     from hairkit.io.capture_reader import WORKING_EDGE
     from hairkit.manager import Manager
     from hairkit.pipeline.health import summarise
-    from hairkit.pipeline.recipe import load_recipe
     from hairkit.pipeline.reconstruct import SHEET, export_paths, reconstruct
     from hairkit.pipeline.run_record import RECORD, read_record
-    from hairkit.pipeline.take_capture import take_capture
+    from hairkit.pipeline.take_capture import take_with_choices
     from hairkit.progress import Recorder, progress_for
     from hairkit.types.parting import Parting
 
     began = time.perf_counter()
     manager = Manager.loaded(args.plugin)
     head = _head(args)
-    recipe = load_recipe(args.recipe)
-    asked = recipe.with_set(args.set)
-    asked.check(manager)  # before minutes of reading photos or a video
-    capture = take_capture(_photos(args), asked, manager, _max_edge(args, WORKING_EDGE))
-    recipe = recipe.with_set([*capture.chosen.settings, *args.set])
-    recipe.check(manager)
+    edge = _max_edge(args, WORKING_EDGE)
+    capture, recipe = take_with_choices(_photos(args), args.recipe, manager, args.set, edge)
     if args.parting is not None:
         capture = replace(capture, parting=Parting.named(args.parting))
     quiet = args.quiet or args.json

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import keyword
 import os
+import re
 import tempfile
 import textwrap
 from pathlib import Path
 
-from hairkit.cli.scaffold_sketches import ALWAYS, SKETCHES, STANDARD
+from hairkit import hookspecs
+from hairkit.cli.scaffold_sketches import SKETCHES, Sketch
 from hairkit.errors import InputError
-from hairkit.manager import STAGES
 from hairkit.options import unknown_name
-from hairkit.pipeline.recipe import HOOKS
+from hairkit.stages import OF_HOOK, OF_TABLE
 
 
 def new_plugin(stage: str, name: str, folder: str | os.PathLike[str] | None = None) -> Path:
@@ -32,9 +35,9 @@ def new_plugin(stage: str, name: str, folder: str | os.PathLike[str] | None = No
     InputError
         There is no such stage, the name is no plugin's name, or the folder exists.
     """
-    hook = HOOKS.get(stage, stage)
-    if hook not in STAGES:
-        raise InputError(unknown_name("stage", stage, [*HOOKS, *STAGES]))
+    hook = OF_TABLE[stage].hook if stage in OF_TABLE else stage
+    if hook not in OF_HOOK:
+        raise InputError(unknown_name("stage", stage, [*OF_TABLE, *OF_HOOK]))
     if not name.isidentifier() or keyword.iskeyword(name) or name != name.lower():
         raise InputError(
             f"plugin name is {name!r}, expected lower-case letters, digits and underscores"
@@ -57,7 +60,7 @@ def _files(hook: str, name: str) -> dict[str, str]:
     distribution, module = f"hairkit-{name.replace('_', '-')}", f"hairkit_{name}"
     words = {"NAME": name, "DISTRIBUTION": distribution, "MODULE": module, "HOOK": hook}
     use = _COMMANDS.get(hook, "hairkit reconstruct photos/ -o out/ --set TABLE=NAME")
-    use = use.replace("TABLE", next((t for t, stage in HOOKS.items() if stage == hook), ""))
+    use = use.replace("TABLE", OF_HOOK[hook].name)
     texts = {
         "pyproject.toml": _PYPROJECT,
         f"{module}.py": _module(hook),
@@ -71,16 +74,12 @@ def _files(hook: str, name: str) -> dict[str, str]:
 
 def _module(hook: str) -> str:
     sketch = SKETCHES[hook]
-    standard = sorted(line for line in sketch.imports if line.startswith(STANDARD))
-    if not any("dataclasses" in line for line in standard):
-        standard.insert(0, "from dataclasses import dataclass")
-    others = {*sketch.imports, *ALWAYS} - set(standard)
-    ordered = sorted(others, key=lambda line: (line.startswith("from"), line))
+    signature = _signature(hook, sketch.body)
     words = {
         "SUMMARY": sketch.summary,
-        "IMPORTS": "\n".join([*standard, "", *ordered]),
+        "IMPORTS": _imports(sketch, signature),
         "OPTION": sketch.option,
-        "SIGNATURE": sketch.signature,
+        "SIGNATURE": signature,
         "BODY": textwrap.indent(sketch.body.strip(), "    "),
         "BEFORE": sketch.before,
     }
@@ -90,6 +89,41 @@ def _module(hook: str) -> str:
     return text
 
 
+def _signature(hook: str, body: str) -> str:
+    """Return the parameters of a hook that a body uses, and its result, as they are written."""
+    types = getattr(hookspecs, hook).__annotations__
+    used = [name for name in OF_HOOK[hook].takes if re.search(rf"\b{name}\b", body)]
+    parameters = [*(f"{name}: {types[name]}" for name in used), "options: Options"]
+    return f"({', '.join(parameters)}) -> {types['return']}"
+
+
+def _imports(sketch: Sketch, signature: str) -> str:
+    """Return the imports of a module: of its method, and of the types that the contract names."""
+    code = "\n".join([*ALWAYS, *sketch.imports])
+    contract = _taken(inspect.getsource(hookspecs))
+    words = {*re.findall(r"\w+", signature + sketch.body + sketch.before)}
+    taken = _taken(code) | {name: contract[name] for name in words & contract.keys()}
+    modules = []
+    for module in sorted({*taken.values()}):
+        names = sorted(name for name, home in taken.items() if home == module)
+        modules.append(f"from {module} import {', '.join(names)}")
+    standard = [line for line in modules if not line.startswith(("from hairkit", "from scipy"))]
+    plain = [line for line in code.splitlines() if line.startswith("import")]
+    others = [line for line in modules if line not in standard]
+    return "\n".join([*standard, "", *plain, *others])
+
+
+def _taken(code: str) -> dict[str, str]:
+    """Return the names that a source takes out of modules, and these modules."""
+    found = [node for node in ast.walk(ast.parse(code)) if isinstance(node, ast.ImportFrom)]
+    return {alias.name: str(node.module) for node in found for alias in node.names}
+
+
+ALWAYS = (
+    "from dataclasses import dataclass",
+    "from hairkit.hookspecs import hookimpl",
+    "from hairkit.options import option",
+)
 _COMMANDS = {
     "make_simulator": "hairkit simulate out/groom.npz -o cache.npz --using NAME",
     "export_groom": "hairkit export out/groom.npz -o hair.NAME",
@@ -164,7 +198,7 @@ class Options:
 
 
 @hookimpl
-def HOOK(SIGNATURE:
+def HOOKSIGNATURE:
     """Replace this body by your method; what comes in and goes out is in docs/plugins.md."""
 BODY
 '''

@@ -11,28 +11,20 @@ class Sketch:
 
     summary: str
     imports: tuple[str, ...]
+    """Besides those of the types in the hook's signature."""
     option: str
-    signature: str
     body: str
     before: str = ""
     """Code between the imports and the options."""
 
 
-STANDARD = ("from dataclasses", "from pathlib")
-"""Prefixes of imports from the standard library."""
-ALWAYS = ("from hairkit.hookspecs import hookimpl", "from hairkit.options import option")
 _NUMPY = "import numpy as np"
 
 SKETCHES = {
     "capture": Sketch(
         "Captures of an archive, by the names of their folders.",
-        (
-            "from pathlib import Path",
-            "from hairkit.io.capture_reader import read_folder",
-            "from hairkit.types.capture import Capture",
-        ),
+        ("from hairkit.io.capture_reader import read_folder",),
         'archive: str = option("", doc="Folder of the archive.")',
-        "source: str, max_edge: int, options: Options) -> Capture | None",
         """
 folder = Path(options.archive) / source
 return read_folder(folder, max_edge) if folder.is_dir() else None""",
@@ -41,38 +33,25 @@ return read_folder(folder, max_edge) if folder.is_dir() else None""",
         "A face in the middle of the photo, seen from in front.",
         (
             _NUMPY,
-            "from hairkit.types.capture import View",
-            "from hairkit.types.face import Face",
             "from hairkit.types.head import LANDMARKS",
         ),
         'noise: float = option(50.0, low=1.0, high=500.0, doc="Of each landmark.", unit="px")',
-        "view: View, options: Options) -> Face | None",
         """
 middle = np.tile([view.width / 2, view.height / 2], (LANDMARKS, 1))
 return Face(0.5, middle, np.full(LANDMARKS, options.noise), 0.0, 0.0, 0.0)""",
     ),
     "segment_person": Sketch(
         "All that differs from the picture's upper corner is the person.",
-        (
-            _NUMPY,
-            "from hairkit.types.capture import View",
-            "from hairkit.types.person import Person",
-        ),
+        (_NUMPY,),
         'gain: float = option(4.0, low=0.1, high=100.0, doc="Opacity for a grey level.")',
-        "view: View, options: Options) -> Person",
         """
 difference = np.abs(view.image.astype(np.float32) - view.image[0, 0]).mean(axis=-1)
 return Person(np.clip(options.gain * difference, 0, 255).astype(np.uint8))""",
     ),
     "find_turn": Sketch(
         "Photos in file order, evenly around the head.",
-        (
-            _NUMPY,
-            "from hairkit.types.capture import Capture",
-            "from hairkit.types.turnaround import Turnaround",
-        ),
+        (_NUMPY,),
         'step: float = option(45.0, low=-180.0, high=180.0, doc="To the next.", unit="deg")',
-        "capture: Capture, options: Options) -> Turnaround",
         """
 index = np.arange(len(capture.views))
 names = tuple(view.name for view in capture.views)
@@ -84,11 +63,9 @@ return Turnaround(index, azimuth, level, upright, names, np.inf, "turn as number
         "Everything dark is hair.",
         (
             _NUMPY,
-            "from hairkit.types.capture import View",
-            "from hairkit.types.mask import HAIR, Mask",
+            "from hairkit.types.mask import HAIR",
         ),
         'threshold: int = option(90, low=1, high=254, doc="Darker pixels are hair.")',
-        "view: View, options: Options) -> Mask | None",
         """
 dark = view.image.mean(axis=-1) < options.threshold
 labels = np.where(dark, HAIR, 0).astype(np.uint8)
@@ -96,14 +73,8 @@ return Mask(labels, person_known=False) if dark.any() else None""",
     ),
     "estimate_scene": Sketch(
         "The nominal turn: every camera where the capture says, all at one distance.",
-        (
-            "from hairkit.types.camera import Camera",
-            "from hairkit.types.capture import Capture",
-            "from hairkit.types.head import Head",
-            "from hairkit.types.scene import Scene",
-        ),
+        ("from hairkit.types.camera import Camera",),
         'distance: float = option(0.8, low=0.3, high=5.0, doc="From the head.", unit="m")',
-        "capture: Capture, head: Head, options: Options) -> Scene",
         """
 cameras = tuple(
     Camera.on_turn(
@@ -122,10 +93,9 @@ return Scene(tuple(view.name for view in capture.views), cameras, head)""",
         (
             "import cv2",
             _NUMPY,
-            "from hairkit.types.mask import HAIR, PERSON, Mask, Masks",
+            "from hairkit.types.mask import HAIR, PERSON",
         ),
         'radius: int = option(1, low=0, high=50, doc="Of the specks.", unit="px")',
-        "masks: tuple[Mask, ...], options: Options) -> Masks",
         """
 refined = []
 for mask in masks:
@@ -137,24 +107,16 @@ return Masks(tuple(refined))""",
     ),
     "fit_head": Sketch(
         "Scale the head about its centre.",
-        (
-            "from dataclasses import dataclass, replace",
-            "from hairkit.types.scene import Scene",
-        ),
+        ("from dataclasses import dataclass, replace",),
         'scale: float = option(1.0, low=0.5, high=2.0, doc="Factor on the head\'s size.")',
-        "scene: Scene, options: Options) -> Scene",
         """
 head = replace(scene.head, vertices=scene.head.vertices * options.scale)
 return replace(scene, head=head)""",
     ),
     "enhance_texture": Sketch(
         "More contrast.",
-        (
-            _NUMPY,
-            "from hairkit.types.skin import Texture",
-        ),
+        (_NUMPY,),
         'gain: float = option(1.2, low=0.1, high=10.0, doc="Of the contrast.")',
-        "texture: Texture, options: Options) -> Texture",
         """
 pixels = texture.pixels.astype(np.float32)
 mean = pixels.mean(axis=(0, 1))
@@ -166,12 +128,9 @@ return Texture.encode(np.rint(stronger).astype(np.uint8))""",
         (
             "import cv2",
             _NUMPY,
-            "from hairkit.types.capture import View",
-            "from hairkit.types.mask import Mask",
-            "from hairkit.types.orientation import OrientationMap, wrap_angle",
+            "from hairkit.types.orientation import wrap_angle",
         ),
         'sigma: float = option(2.0, low=0.5, high=20.0, doc="Blur before.", unit="px")',
-        "view: View, mask: Mask, options: Options) -> OrientationMap",
         """
 grey = cv2.cvtColor(view.image, cv2.COLOR_RGB2GRAY).astype(np.float32)
 grey = cv2.GaussianBlur(grey, (0, 0), options.sigma)
@@ -185,12 +144,9 @@ return OrientationMap(wrap_angle(angle), strength / max(float(strength.max()), 1
         (
             _NUMPY,
             "from scipy.spatial import cKDTree",
-            "from hairkit.types.mask import Mask",
-            "from hairkit.types.scene import Scene",
-            "from hairkit.types.volume import Hull, VoxelGrid",
+            "from hairkit.types.volume import VoxelGrid",
         ),
         'votes: int = option(4, low=1, high=8, doc="Views that must see hair.")',
-        "scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull",
         """
 head = scene.head
 grid = VoxelGrid.around(head.vertices.min(axis=0) - 0.1, head.vertices.max(axis=0) + 0.1, 0.01)
@@ -208,12 +164,8 @@ return Hull(grid, hair, hair, distance)""",
     ),
     "solve_field": Sketch(
         "All hair hangs straight down.",
-        (
-            _NUMPY,
-            "from hairkit.types.volume import Hull, OrientationField",
-        ),
+        (_NUMPY,),
         'confidence: float = option(1.0, low=0.0, high=1.0, doc="Given to every cell.")',
-        "hull: Hull, options: Options) -> OrientationField",
         """
 tensor = np.zeros((*hull.grid.shape, 6), np.float32)
 tensor[..., 1] = hull.loose  # yy: along the vertical
@@ -222,13 +174,8 @@ return OrientationField(hull.grid, tensor, confidence, np.maximum(hull.head_dist
     ),
     "track": Sketch(
         "Straight bristles along the scalp's normals.",
-        (
-            _NUMPY,
-            "from hairkit.types.head import Roots",
-            "from hairkit.types.strands import Strands",
-        ),
+        (_NUMPY,),
         'length: float = option(0.05, low=0.001, high=1.0, doc="Of a strand.", unit="m")',
-        "roots: Roots, options: Options) -> Strands",
         """
 along = np.linspace(0.0, options.length, 10, dtype=np.float32)[None, :, None]
 points = roots.positions[:, None] + along * roots.normals[:, None]
@@ -240,10 +187,8 @@ return Strands(points.reshape(-1, 3), offsets, root_uv=roots.uv)""",
         (
             _NUMPY,
             "from hairkit.simulation import Measures, Surroundings",
-            "from hairkit.types.groom import Groom",
         ),
         'sink: float = option(0.0, low=0.0, high=1.0, doc="Speed of falling.", unit="m/s")',
-        "groom: Groom, options: Options) -> Rigid",
         "return Rigid(groom, options)",
         before='''
 
@@ -282,14 +227,11 @@ class Rigid:
     "export_groom": Sketch(
         "One text line a point: strand, x, y, z.",
         (
-            "from pathlib import Path",
             _NUMPY,
-            "from hairkit.types.groom import Groom",
             "from hairkit.io.file_format import Feature, FileFormat",
             "from hairkit.storage import write_text",
         ),
         'digits: int = option(6, low=1, high=9, doc="Decimals of a coordinate in metres.")',
-        "groom: Groom, path: Path, options: Options) -> bool",
         """
 strand = np.repeat(np.arange(len(groom.strands)), groom.strands.counts)
 rows = zip(strand, groom.strands.points.tolist(), strict=True)
@@ -308,12 +250,9 @@ FORMAT = FileFormat(
         "Read the native form and thin it out.",
         (
             "from dataclasses import dataclass, replace",
-            "from pathlib import Path",
             "from hairkit.io.file_format import Feature, FileFormat",
-            "from hairkit.types.groom import Groom",
         ),
         'every: int = option(1, low=1, high=1000, doc="Keep one strand of so many.")',
-        "path: Path, options: Options) -> Groom",
         """
 groom = Groom.load(path)
 keep = range(0, len(groom.strands), options.every)

@@ -2,7 +2,7 @@
 
 * `manager`: `Manager`, the plugins of this process, by name.
 * `loading`: installed plugins and plugin files, and what they must look like.
-* `results`: what each stage must return; the one table of checks.
+* `results`: checks of what plugins return
 * `command_plugin`: a plugin in an environment of its own
 * `manifest`: plugins on shared drives, described by files that are read without running them
 * `plugin_check`: a plugin tried on the made-up head
@@ -13,6 +13,5 @@ from __future__ import annotations
 
 from hairkit.manager.loading import DISABLE_AUTOLOAD, PluginInfo
 from hairkit.manager.manager import Manager
-from hairkit.manager.results import RESULTS, STAGES
 
-__all__ = ["DISABLE_AUTOLOAD", "RESULTS", "STAGES", "Manager", "PluginInfo"]
+__all__ = ["DISABLE_AUTOLOAD", "Manager", "PluginInfo"]

@@ -28,12 +28,10 @@ from hairkit import hookspecs, worker
 from hairkit.child_process import ChildError, ChildProcess, Limits, shortened
 from hairkit.errors import DataError, HairkitError, OptionError, PluginError
 from hairkit.manager.guard import subject
-from hairkit.manager.results import RESULTS
 from hairkit.options import option, unknown_name
+from hairkit.stages import OF_HOOK
 from hairkit.storage import Stored, from_arrays, open_file, parsing, read_text
 
-IN_PROCESS_ONLY = ("capture", "make_simulator")
-"""Hooks that return what no npz can hold: paths of photos, a live object."""
 KINDS: dict[str, type] = {"bool": bool, "int": int, "float": float, "str": str, "path": Path}
 """Types of options by the names that `hairkit.worker.option` gives them."""
 CLEARED = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "__PYVENV_LAUNCHER__")
@@ -135,7 +133,7 @@ class CommandPlugin:
         """Digest of its sources and of the files that it names."""
         if told["options"]:
             self.Options = options_of(told["options"])
-        possible = [hook for hook in RESULTS if hook not in IN_PROCESS_ONLY]
+        possible = [hook for hook, stage in OF_HOOK.items() if stage.command]
         for hook, parameters in told["hooks"].items():
             if hook not in possible:
                 raise PluginError(unknown_name("hook of commands", shortened(hook), possible))
@@ -171,7 +169,7 @@ class CommandPlugin:
             except PluginError as error:
                 who = f"plugin {self._command.name!r}, {self._command.line}"
                 raise PluginError(f"{who}, {hook!r}{subject(arguments)}: {error}") from error
-            return read_result(RESULTS[hook][0], folder)
+            return read_result(OF_HOOK[hook].makes, folder)
 
     def _ask(self, question: Mapping[str, Any], limits: Limits) -> dict[str, Any]:
         """Return an answer; a process that somebody killed is replaced, once."""

@@ -22,9 +22,9 @@ from hairkit.errors import PluginError
 from hairkit.io.file_format import FileFormat
 from hairkit.manager.command_plugin import PluginCommand
 from hairkit.manager.manifest import check_hookspec
-from hairkit.manager.results import STAGES
 from hairkit.nets.known_models import known_model
 from hairkit.options import OptionInfo, describe, make_options, unknown_name
+from hairkit.stages import OF_HOOK
 
 ENTRY_POINT_GROUP = "hairkit"
 DISABLE_AUTOLOAD = "HAIRKIT_DISABLE_PLUGIN_AUTOLOAD"
@@ -127,8 +127,8 @@ def inspect_plugin(plugin: object, name: str, distribution: str, version: str) -
         distribution,
         version,
         summary=" ".join((inspect.getdoc(plugin) or "").partition("\n\n")[0].split()),
-        stages=tuple(stage for stage in STAGES if stage in hooks),
-        notifications=tuple(sorted(set(hooks) - set(STAGES))),
+        stages=tuple(stage for stage in OF_HOOK if stage in hooks),
+        notifications=tuple(sorted(set(hooks) - set(OF_HOOK))),
         options=_check_options(getattr(plugin, "Options", None)),
         source=Path(file) if file else None,
         module=getattr(plugin, "__module__", getattr(plugin, "__name__", "")),

@@ -30,8 +30,8 @@ from hairkit.child_process import shortened
 from hairkit.errors import HairkitError, PluginError
 from hairkit.hookspecs import HOOKSPEC_VERSION
 from hairkit.manager.command_plugin import PluginCommand, options_of, read_command
-from hairkit.manager.results import STAGES
 from hairkit.options import OptionInfo, describe, unknown_name
+from hairkit.stages import OF_HOOK
 from hairkit.storage import read_bytes
 
 PLUGIN_PATH = "HAIRKIT_PLUGIN_PATH"
@@ -113,8 +113,8 @@ def _manifest(path: Path, document: Mapping[str, Any]) -> Manifest:
     check_hookspec(document["hookspec"])
     hooks = document["hooks"]
     for hook in hooks if isinstance(hooks, list) else [hooks]:
-        if hook not in STAGES:
-            raise PluginError(unknown_name("hook", str(hook), STAGES))
+        if hook not in OF_HOOK:
+            raise PluginError(unknown_name("hook", str(hook), OF_HOOK))
     if ("module" in document) == ("command" in document):
         raise PluginError("has a module or a command, expected one of both")
     name = document["name"]
@@ -129,7 +129,7 @@ def _manifest(path: Path, document: Mapping[str, Any]) -> Manifest:
         path,
         str(document.get("version", "")),
         str(document.get("summary", "")),
-        tuple(stage for stage in STAGES if stage in hooks),
+        tuple(stage for stage in OF_HOOK if stage in hooks),
         describe(options_of(described)) if described else (),
         module,
         command,

@@ -1,4 +1,4 @@
-"""Checks of the results of plugins, in one table of what each stage must return.
+"""Checks of the results of plugins: each has the type of its stage, and fits the arguments.
 
 The types check their own arrays when they are made (shapes, ranges, finiteness). Here is what only
 the stage knows: that a mask has its photo's size, that strand s starts at root s.
@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 
 from hairkit.errors import DataError
+from hairkit.stages import OF_HOOK
 from hairkit.types.capture import Capture
-from hairkit.types.face import Face
-from hairkit.types.groom import Groom
 from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.person import Person
@@ -25,7 +24,7 @@ from hairkit.types.scene import Scene
 from hairkit.types.skin import Texture
 from hairkit.types.strands import Strands
 from hairkit.types.turnaround import Turnaround
-from hairkit.types.volume import Hull, OrientationField, VoxelGrid
+from hairkit.types.volume import OrientationField, VoxelGrid
 
 ROOT_TOLERANCE = 1e-3
 """Metres that a strand may start from its root."""
@@ -53,10 +52,10 @@ class Call:
 
 def check_result(hook: str, result: object, call: Call) -> None:
     """Raise `DataError` when a plugin's result is not what the stage asks for."""
-    kind, checks = RESULTS[hook]
+    kind = OF_HOOK[hook].makes
     if not isinstance(result, kind):
         raise DataError(f"returned {type(result).__name__}, expected {kind.__name__}")
-    for check in checks:
+    for check in CHECKS.get(hook, ()):
         check(result, call)
 
 
@@ -223,25 +222,19 @@ def _file_state(path: Path) -> tuple[int, int, int] | None:
 
 Check = Callable[[Any, Call], None]
 
-RESULTS: dict[str, tuple[type, tuple[Check, ...]]] = {
-    "capture": (Capture, (_photos_are_scaled, _views_have_names_of_their_own)),
-    "detect_landmarks": (Face, ()),
-    "segment_person": (Person, (_person_has_photo_size,)),
-    "find_turn": (Turnaround, (_turn_has_each_photo,)),
-    "segment": (Mask, (_mask_has_photo_size,)),
-    "estimate_scene": (Scene, (_scene_has_a_camera_per_photo,)),
-    "refine_masks": (Masks, (_masks_have_photo_sizes,)),
-    "fit_head": (Scene, (_scene_has_a_camera_per_photo, _head_keeps_its_mesh)),
-    "enhance_texture": (Texture, (_texture_keeps_its_shape,)),
-    "orient": (OrientationMap, (_angles_have_photo_size,)),
-    "build_hull": (Hull, ()),
-    "solve_field": (OrientationField, (_field_is_on_the_hull,)),
-    "track": (Strands, (_a_strand_starts_at_each_root,)),
-    "make_simulator": (object, (_is_a_simulator,)),
-    "export_groom": (bool, (_wrote_the_file,)),
-    "import_groom": (Groom, ()),
+CHECKS: dict[str, tuple[Check, ...]] = {
+    "capture": (_photos_are_scaled, _views_have_names_of_their_own),
+    "segment_person": (_person_has_photo_size,),
+    "find_turn": (_turn_has_each_photo,),
+    "segment": (_mask_has_photo_size,),
+    "estimate_scene": (_scene_has_a_camera_per_photo,),
+    "refine_masks": (_masks_have_photo_sizes,),
+    "fit_head": (_scene_has_a_camera_per_photo, _head_keeps_its_mesh),
+    "enhance_texture": (_texture_keeps_its_shape,),
+    "orient": (_angles_have_photo_size,),
+    "solve_field": (_field_is_on_the_hull,),
+    "track": (_a_strand_starts_at_each_root,),
+    "make_simulator": (_is_a_simulator,),
+    "export_groom": (_wrote_the_file,),
 }
-"""Stage hook -> the type that it returns, and what holds besides."""
-
-STAGES = tuple(RESULTS)
-"""The stage hooks; each runs on the one plugin that a recipe or command names."""
+"""What holds of the result of a stage hook besides its type."""

@@ -5,11 +5,10 @@ plugins.
 
 * `contact_sheet`: one picture of all stages
 * `draft`: a quick groom after a change by hand
-* `find_skin`: the skin of the head, from the photos and after an example
 * `find_views`: faces, persons, and from where each photo was taken
+* `findings`: the walk through the stages
 * `head_alone`: the head with its skin, without hair
 * `health`: figures that tell how good a run is
-* `masks_and_scene`: masks and cameras, each found by the other
 * `module_digest`: digests of the code that made a cached result
 * `open_groom`: grooms by any name that a user may give
 * `own_head`: landmarks for a head that has none

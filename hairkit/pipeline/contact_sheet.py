@@ -20,10 +20,10 @@ from hairkit.rendering import Lights, Solid, draw_views
 from hairkit.storage import write_bytes
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
+from hairkit.types.evidence import Evidence
 from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR, PERSON, Mask
 from hairkit.types.orientation import OrientationMap
-from hairkit.types.scene import Scene
 from hairkit.types.skin_look import SkinLook
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
@@ -67,18 +67,15 @@ _ROWS = ("photo", "mask", "orientation", "hull", "guides", "hair")
 def write_contact_sheet(
     path: str | os.PathLike[str],
     capture: Capture,
-    masks: Sequence[Mask],
-    orientations: Sequence[OrientationMap],
-    hull: Hull,
+    evidence: Evidence,
     groom: Groom,
-    scene: Scene,
     health: Sequence[Figure] = (),
 ) -> None:
     """Write the sheet to `path` (PNG): one column a view, one row a stage, health below.
 
     Masks and orientation maps may have any size; they are shown over the photos of `capture`.
     """
-    sheet = contact_sheet(capture, masks, orientations, hull, groom, scene, health)
+    sheet = contact_sheet(capture, evidence, groom, health)
     done, data = cv2.imencode(".png", sheet[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
     if not done:
         raise InputError(f"{path}: the contact sheet of {sheet.shape[:2]} pixels cannot be encoded")
@@ -87,23 +84,20 @@ def write_contact_sheet(
 
 def contact_sheet(
     capture: Capture,
-    masks: Sequence[Mask],
-    orientations: Sequence[OrientationMap],
-    hull: Hull,
+    evidence: Evidence,
     groom: Groom,
-    scene: Scene,
     health: Sequence[Figure] = (),
 ) -> UInt8Array:
     """Return the sheet (H, W, 3) RGB that `write_contact_sheet` writes."""
-    size = _tile_size(scene.cameras)
+    size = _tile_size(evidence.scene.cameras)
     photos = [_fit(view.image, size) for view in capture.views]
-    cameras = [camera.resized(*size) for camera in scene.cameras]
+    cameras = [camera.resized(*size) for camera in evidence.scene.cameras]
     groom = _with_small_maps(_with_few_guides(groom))
     rows = (
         photos,
-        [_mask_picture(photo, mask) for photo, mask in zip(photos, masks, strict=True)],
-        [_hsv_picture(map_, size) for map_ in orientations],
-        _hull_pictures(hull, cameras),
+        [_mask_picture(photo, mask) for photo, mask in zip(photos, evidence.masks, strict=True)],
+        [_hsv_picture(map_, size) for map_ in evidence.orientations],
+        _hull_pictures(evidence.hull, cameras),
         _guide_pictures(groom, cameras),
         _hair_pictures(groom, cameras),
     )

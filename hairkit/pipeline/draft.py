@@ -1,16 +1,17 @@
 """A quick groom after a change by hand: what the last run found is kept but for what was touched.
 
 A stroke changes one mask. A whole run then solves the cameras again, because they follow from all
-masks; a draft keeps cameras, fitted head, waves, parting and hairline, and looks again at photos
-that were drawn on alone, where `see_photo` has not done so already. Hull, field and strands are
-made anew, on a coarser grid where the recipe says so and from smaller pictures where the capture
-was read so. What a process has once read of a run it keeps, so that only the first of its drafts
-waits for the disk. What a draft shows is replaced by the run that follows it.
+masks; a draft reads what `hairkit.stages` says that it keeps, and looks again at photos that were
+drawn on alone, where `see_photo` has not done so already. Hull, field and strands are made anew, on
+a coarser grid where the recipe says so and from smaller pictures where the capture was read so.
+What a process has once read of a run it keeps, so that only the first of its drafts waits for the
+disk. The next full run replaces what a draft shows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -20,32 +21,26 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.cameras.similarity import move_head
 from hairkit.errors import InputError
-from hairkit.field.growth_prior import measure_scalp_distance
-from hairkit.field.ties import measure_ties
-from hairkit.grooming.assemble import assemble_groom
-from hairkit.head_model.scalp import sample_roots
-from hairkit.head_model.template import default_head
+from hairkit.io.strokes import read_view_strokes
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
+from hairkit.pipeline.findings import Findings, found
 from hairkit.pipeline.recipe import Recipe
-from hairkit.pipeline.single_photo import see_photo
+from hairkit.pipeline.run_log import RunLog
+from hairkit.pipeline.single_photo import SeenPhoto, see_photo
+from hairkit.pipeline.stage_runner import Given, StageRunner, Views, completed
 from hairkit.pipeline.work_folder import LastRun, stage_file
-from hairkit.stages import LABELS, OF_NAME, ORIENTED
+from hairkit.progress import Progress, Silent
+from hairkit.stages import DRAWN, KEPT, LABELS, ORIENTED, PARTING, REFINED, TURN, Stage
 from hairkit.storage import Stored
-from hairkit.types.capture import Capture
+from hairkit.types.capture import Capture, View
 from hairkit.types.groom import Groom
-from hairkit.types.hairline import Hairline
-from hairkit.types.head import Head
-from hairkit.types.mask import Mask, Masks
+from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
-from hairkit.types.skin import SkinMaps
 from hairkit.types.turnaround import Turnaround
-from hairkit.types.volume import Hull
-from hairkit.types.waves import Waves
 
 _Result = TypeVar("_Result", bound=Stored)
 MOST_KEPT = 64
@@ -60,7 +55,7 @@ def draft(
     recipe: Recipe,
     manager: Manager,
     guides: int,
-    check: Callable[[], None] = lambda: None,
+    progress: Progress | None = None,
 ) -> Groom:
     """Return a groom from a capture and what a whole run left in its work folder.
 
@@ -79,112 +74,143 @@ def draft(
         The plugins.
     guides
         Number of roots.
-    check
-        Called before each step; what it raises ends the draft.
+    progress
+        Hears of each stage that is run; what it raises ends the draft.
 
     Raises
     ------
     InputError
         The last run found other views, or was not ended.
     """
-    capture = _arranged(capture, work, recipe)
-    masks, orientations = _seen(capture, work, touched, recipe, manager)
-    scene = _read(Scene, work, "head" if recipe.stage("head") else "scene")
-    if capture.chosen.head is not None:
-        scene = move_head(scene, capture.chosen.head)
-    scene = _reduced(scene, capture)
-    check()
-    hull = _call(manager, recipe, "hull", scene=scene, masks=masks)
-    distance = measure_scalp_distance(scene.head, hull)
-    tied = measure_ties(
-        orientations=orientations, head=scene.head, hull=hull, scalp_distance=distance,
-        masks=masks, cameras=scene.cameras,
-    )  # fmt: skip
-    waves = capture.chosen.hair.waves(_read(Waves, work, "waves"))
-    seen = {
-        "scene": scene, "masks": masks, "orientations": orientations, "hull": hull, "waves": waves,
-        "scalp_distance": distance, "parting": _read(Parting, work, "parting"), "tied": tied,
-    }  # fmt: skip
-    check()
-    field = _call(manager, recipe, "field", **seen)
-    check()
-    head = _complete_head(scene.head, hull, work)
-    roots = sample_roots(head, guides, 0, rest=default_head())
-    strands = _call(manager, recipe, "track", **seen, field=field, roots=roots)
-    hair = capture.chosen.hair
-    return assemble_groom(capture.views, masks, head, roots, strands, waves, tied, hair)
+    with ThreadPoolExecutor(1, thread_name_prefix="hairkit") as pool:
+        run = StageRunner(recipe, manager, _Nowhere(), RunLog(progress or Silent()), pool)
+        return Drafted(run, capture, work, touched, guides).groom
 
 
-def _complete_head(head: Head, hull: Hull, work: Path) -> Head:
-    """Return the head with the hairline and skin of the last run and the torso of a hull."""
-    density, skin = _read(Hairline, work, "hairline").density, _read(SkinMaps, work, "skin")
-    return replace(head, density=density, maps=skin, torso=hull.torso)
+class Drafted(Findings):
+    """What is found in a capture of which a whole run has found the most."""
+
+    def __init__(
+        self,
+        run: StageRunner,
+        photos: Capture,
+        work: Path,
+        touched: Mapping[str, Path],
+        guides: int,
+    ) -> None:
+        super().__init__(run, photos, guides=guides)
+        self._work, self._touched = work, touched
+
+    def kept(self, stage: Stage[Any]) -> Given[Any] | None:
+        """Return the result of the last run, if a draft keeps it and the recipe has the stage."""
+        if stage.hook and not self.run.recipe.has(stage):
+            return None
+        # of the stages that see all views the parting alone follows what was drawn
+        if stage.draft is KEPT or (stage.draft is DRAWN and not self._parting_is_new):
+            return Given(_read(stage, self._work), "")
+        return None
+
+    @property
+    def _parting_is_new(self) -> bool:
+        """Whether one is said or drawn, or was before; in small pictures a measured one is lost."""
+        views = [view for view in self.capture.views if self._folder(view) is not None]
+        strokes = [read_view_strokes(view, view.width, view.height) for view in views]
+        drawn = any(each is not None and each.labelled("parting") for each in strokes)
+        last: Parting = _read(PARTING, self._work)
+        return drawn or self.capture.parting is not None or last.source != Parting().source
+
+    @found
+    def views(self) -> tuple[Capture, Turnaround | None]:
+        """The views in the order of the turn, without faces and persons."""
+        if not self.run.recipe.has(TURN):
+            return self.photos, None
+        turn, count = _read(TURN, self._work), len(self.photos.views)
+        if len(turn.order) != count:
+            raise InputError(
+                f"{self._work}: the last run had {len(turn.order)} photos, now {count}"
+            )
+        return self.photos.arranged(turn), turn
+
+    @found
+    def scene(self) -> Given[Scene]:
+        """The scene of the last run for pictures of the views' sizes, its head where it is now."""
+        scene, views = super().scene.value, self.capture.views
+        factor = views[0].height / scene.cameras[0].height
+        misfit = None if scene.residual_px is None else factor * scene.residual_px
+        sizes = [(view.width, view.height) for view in views]
+        return Given.of(replace(scene.resized(sizes), residual_px=misfit))
+
+    @found
+    def masks(self) -> Views[Mask]:
+        """Masks of the last run, found again where a photo was touched."""
+        return [completed(Given(self._mask(k), "")) for k in range(len(self.capture.views))]
+
+    @found
+    def orientations(self) -> Views[OrientationMap]:
+        """Directions of the last run, found again where a photo was touched."""
+        return [completed(Given(self._angles(view), "")) for view in self.capture.views]
+
+    def _folder(self, view: View) -> Path | None:
+        """Return where what is found in a photo that was touched is kept; None for other photos."""
+        return None if view.photo_path is None else self._touched.get(view.photo_path.name)
+
+    @found
+    def _seen(self) -> dict[str, SeenPhoto]:
+        """What is found in the photos that were touched, by view."""
+        recipe, manager = self.run.recipe, self.run.manager
+        folders = {view.name: self._folder(view) for view in self.capture.views}
+        return {
+            view.name: see_photo(view, folder, recipe, manager)
+            for view in self.capture.views
+            if (folder := folders[view.name]) is not None
+        }
+
+    def _mask(self, index: int) -> Mask:
+        view = self.capture.views[index]
+        if view.name in self._seen:
+            return self._seen[view.name].mask
+        size, last = (view.width, view.height), LastRun(self._work)
+        if view.mask_path is None and last.has(REFINED):
+            return _small_refined(_time(REFINED, self._work), self._work, index, size)
+        return _small_mask(_time(LABELS, self._work, view.name), self._work, view.name, size)
+
+    def _angles(self, view: View) -> OrientationMap:
+        if view.name in self._seen:
+            return cast(OrientationMap, self._seen[view.name].orientation)
+        time = _time(ORIENTED, self._work, view.name)
+        return _small_orientation(time, self._work, view.name, (view.width, view.height))
 
 
-def _arranged(capture: Capture, work: Path, recipe: Recipe) -> Capture:
-    """Return the views in the order of the turn."""
-    if recipe.stage("turn") is None:
-        return capture
-    turn = _read(Turnaround, work, "turn")
-    if len(turn.order) != len(capture.views):
-        count = len(capture.views)
-        raise InputError(f"{work}: the last run had {len(turn.order)} photos, now {count}")
-    return capture.arranged(turn)
+class _Nowhere:
+    """Keeps no result: the next draft is made of other masks."""
+
+    def get(self, stage: Stage[Any], digest: str, view: str = "") -> None:
+        """Return None."""
+
+    def put(self, stage: Stage[Any], value: Any, digest: str, view: str = "") -> None:
+        """Do nothing."""
 
 
-def _reduced(scene: Scene, capture: Capture) -> Scene:
-    """Return the scene for pictures of the views' sizes."""
-    factor = capture.views[0].height / scene.cameras[0].height
-    misfit = None if scene.residual_px is None else factor * scene.residual_px
-    sizes = [(view.width, view.height) for view in capture.views]
-    return replace(scene.resized(sizes), residual_px=misfit)
-
-
-def _seen(
-    capture: Capture, work: Path, touched: Mapping[str, Path], recipe: Recipe, manager: Manager
-) -> tuple[tuple[Mask, ...], tuple[OrientationMap, ...]]:
-    """Return masks and orientations of all views, made again where a photo was touched."""
-    is_refined = (work / "refine.npz").is_file()
-    masks, orientations = [], []
-    for index, view in enumerate(capture.views):
-        size = (view.width, view.height)
-        folder = None if view.photo_path is None else touched.get(view.photo_path.name)
-        if folder is not None:
-            seen = see_photo(view, folder, recipe, manager)
-            mask, orientation = seen.mask, cast(OrientationMap, seen.orientation)
-        else:
-            if is_refined and view.mask_path is None:
-                mask = _small_refined(_time(work, "refine"), work, index, size)
-            else:
-                mask = _small_mask(_time(work, "segment", view.name), work, view.name, size)
-            time = _time(work, "orient", view.name)
-            orientation = _small_orientation(time, work, view.name, size)
-        masks.append(mask)
-        orientations.append(orientation)
-    return tuple(masks), tuple(orientations)
-
-
-def _read(kind: type[_Result], work: Path, stage: str, view: str = "") -> _Result:
+def _read(stage: Stage[_Result], work: Path, view: str = "") -> _Result:
     """Return what a stage of the last run made; read once."""
     read: Any = _read_once  # of every kind
-    return cast(_Result, read(_time(work, stage, view), kind, work, stage, view))
+    return cast(_Result, read(_time(stage, work, view), stage, work, view))
 
 
-def _time(work: Path, stage: str, view: str = "") -> int:
+def _time(stage: Stage[Any], work: Path, view: str = "") -> int:
     """Return when a stage's file was written."""
     path = stage_file(work, stage, view)
     return path.stat().st_mtime_ns if path.is_file() else 0
 
 
 @lru_cache(MOST_KEPT)
-def _read_once(time: int, kind: type[Stored], work: Path, stage: str, view: str) -> Stored:
-    found: Any = LastRun(work).latest(OF_NAME[stage], view)
-    return cast(Stored, found)
+def _read_once(time: int, stage: Stage[Any], work: Path, view: str) -> Any:
+    return LastRun(work).latest(stage, view)
 
 
 @lru_cache(MOST_KEPT)
 def _small_refined(time: int, work: Path, index: int, size: tuple[int, int]) -> Mask:
-    return _small(_read(Masks, work, "refine").views[index], size)
+    return _small(_read(REFINED, work).views[index], size)
 
 
 @lru_cache(MOST_KEPT)
@@ -206,12 +232,3 @@ def _small_orientation(time: int, work: Path, view: str, size: tuple[int, int]) 
 def _every_few(picture: npt.NDArray[Any], size: tuple[int, int]) -> Any:
     """Return a picture reduced to a size (width, height) by leaving pixels out."""
     return cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST)
-
-
-def _call(manager: Manager, recipe: Recipe, table: str, **values: Any) -> Any:
-    """Return what the first plugin of a stage that has an answer makes."""
-    stage = recipe.stage(table)
-    if stage is None:
-        raise InputError(f"recipe {recipe.name} has no stage {table!r}")
-    choices = [(choice.plugin, choice.options) for choice in stage.choices]
-    return manager.call_first(stage.hook, choices, **values)[1]

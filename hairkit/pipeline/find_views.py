@@ -10,61 +10,60 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hairkit.pipeline.run_log import RunLog
-from hairkit.pipeline.single_photo import given_bare_photo
-from hairkit.pipeline.stage_runner import Given, StageRunner
-from hairkit.types.capture import Capture
-from hairkit.types.face import Face
-from hairkit.types.person import Person
+from hairkit.pipeline.stage_runner import Given, StageRunner, gather, given_photo
+from hairkit.stages import FACES, PERSONS, TURN, UPRIGHT_TURN, Stage
+from hairkit.types.capture import Capture, View
 from hairkit.types.turnaround import Turnaround
 
 UPRIGHT = "upright-"
 """Begins the names of the results for photos that were turned upright."""
 
 
-def find_views(
-    run: StageRunner, capture: Capture, log: RunLog
-) -> tuple[Capture, Turnaround | None]:
+def find_views(run: StageRunner, capture: Capture) -> tuple[Capture, Turnaround | None]:
     """Find faces, persons and the turn; return the views upright, in its order, and the turn.
 
     The turn tells order and quarter turns of the photos as they were read; None where the recipe
     looks for no turn.
     """
-    seen, found = _find_turn(run, capture, "")
+    seen, found = _find_turn(run, capture, TURN)
     if found is None:
         return seen, None
     turn, lying = found.value, found.value.quarter_turns
     if lying.any():
         views = tuple(view.turned(int(n)) for view, n in zip(capture.views, lying, strict=True))
-        seen, again = _find_turn(run, replace(capture, views=views), UPRIGHT)
+        seen, again = _find_turn(run, replace(capture, views=views), UPRIGHT_TURN, UPRIGHT)
         assert again is not None  # the recipe has the stage
-        turn = run.derive("turn", Turnaround, of_lying_photos, lying=found, upright=again).value
+        turn = run.derive(TURN, turn_as_read, lying=found, upright=again).value
         found = again
-    log.message(turn.summary)
+    run.log.message(turn.summary)
     return seen.arranged(found.value), turn
 
 
-def of_lying_photos(lying: Turnaround, upright: Turnaround) -> Turnaround:
+def turn_as_read(lying: Turnaround, upright: Turnaround) -> Turnaround:
     """Return the turn of upright photos as that of the photos as they were read."""
     return replace(upright, quarter_turns=(lying.quarter_turns + upright.quarter_turns) % 4)
 
 
 def _find_turn(
-    run: StageRunner, capture: Capture, kind: str
+    run: StageRunner, capture: Capture, stage: Stage[Turnaround], prefix: str = ""
 ) -> tuple[Capture, Given[Turnaround] | None]:
-    """Return the capture with what is in its views, and its turn; `kind` begins results' names."""
+    """Return the capture with what is in its views, and its turn; `prefix` begins views' names."""
     plain = capture.plain()
-    views = [given_bare_photo(view, kind + view.name) for view in plain.views]
-    faces = run.every_view("landmarks", Face, views, absent=Face.absent)
-    persons = run.every_view("person", Person, views, absent=Person.absent)
+    views = [given_bare_photo(view, prefix + view.name) for view in plain.views]
+    faces, persons = run.every_view(FACES, views), run.every_view(PERSONS, views)
     found = zip(capture.views, faces, persons, strict=True)
     seen = replace(
         capture,
         views=tuple(v.with_findings(f.result().value, p.result().value) for v, f, p in found),
     )
-    if not run.has("turn"):
+    if not run.recipe.has(TURN):
         return seen, None
     bare = (replace(view, mask_path=None, strokes_path=None) for view in plain.views)
     photos = Given.of(replace(plain, views=tuple(bare)))
-    turn = run.once("turn", Turnaround, f"{kind}turn", capture=photos, faces=faces, persons=persons)
+    turn = run.once(stage, capture=photos, faces=gather(faces), persons=gather(persons))
     return seen, turn
+
+
+def given_bare_photo(view: View, name: str) -> Given[View]:
+    """Return a photo as networks see it: without what was drawn on it."""
+    return given_photo(replace(view.plain(), mask_path=None, strokes_path=None, name=name))

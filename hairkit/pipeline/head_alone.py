@@ -12,19 +12,15 @@ import numpy as np
 
 from hairkit.errors import InputError
 from hairkit.head_model.scalp import sample_roots
-from hairkit.head_model.template import default_head
 from hairkit.io.head_reader import write_head_obj
 from hairkit.manager import Manager
-from hairkit.parallel import one_blas_thread
-from hairkit.pipeline.find_skin import find_skin
-from hairkit.pipeline.find_views import find_views
-from hairkit.pipeline.masks_and_scene import fit_scene, label_views
-from hairkit.pipeline.own_head import mark_head
-from hairkit.pipeline.recipe import Recipe, load_recipe
+from hairkit.parallel import one_blas_thread, thread_count
+from hairkit.pipeline.findings import Findings
+from hairkit.pipeline.recipe import Recipe
 from hairkit.pipeline.reconstruct import tell_missing
 from hairkit.pipeline.run_log import RunLog
-from hairkit.pipeline.stage_runner import Given, StageRunner
-from hairkit.pipeline.take_capture import take_capture
+from hairkit.pipeline.stage_runner import StageRunner
+from hairkit.pipeline.take_capture import take_with_choices
 from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Progress, Silent
 from hairkit.types.capture import Capture
@@ -58,7 +54,8 @@ def photograph_head(
     photos
         The folder of a capture, or a capture that was read before.
     recipe
-        Its stages up to `head` are run.
+        The name of a recipe, to which the options of the capture are added, or a recipe; its stages
+        up to `head` and `texture` are run.
     manager
         The plugins; the installed ones when None.
     head
@@ -72,25 +69,17 @@ def photograph_head(
         The recipe, the photos or a plugin is at fault; the message is one line.
     """
     manager = manager or Manager.loaded()
-    recipe = recipe if isinstance(recipe, Recipe) else load_recipe(recipe)
-    recipe.check(manager)
-    given = photos if isinstance(photos, Capture) else take_capture(photos, recipe, manager)
+    given, chosen = take_with_choices(photos, recipe, manager)
     log = RunLog(progress or Silent())
     with (
         tempfile.TemporaryDirectory(prefix="hairkit-head-") as folder,
-        WorkFolder(Path(folder) / "work") as work,
-        ThreadPoolExecutor(os.cpu_count() or 2, thread_name_prefix="hairkit") as pool,
+        WorkFolder(folder) as work,
+        ThreadPoolExecutor(thread_count(), thread_name_prefix="hairkit") as pool,
     ):
-        run = StageRunner(recipe, manager, work, log, pool)
-        tell_missing(recipe, manager, log)
-        capture, _ = find_views(run, given, log)
-        start = mark_head(head or default_head(), recipe, manager, log.message)
-        views = Given.of(capture)
-        masks, first = label_views(run, views, start)
-        scene = fit_scene(run, views, masks, start, first)
-        skin = find_skin(run, views, masks, scene)
-        work.flush()
-        return replace(scene.value, head=replace(scene.value.head, maps=skin))
+        tell_missing(chosen, manager, log)
+        findings = Findings(StageRunner(chosen, manager, work, log, pool), given, head)
+        scene = findings.scene.value
+        return replace(scene, head=replace(scene.head, maps=findings.skin))
 
 
 def write_head(path: str | os.PathLike[str], head: Head, manager: Manager | None = None) -> None:

@@ -18,6 +18,7 @@ from hairkit.cameras.depth_raster import HEAD_TOLERANCE, SPLAT_CELLS, head_depth
 from hairkit.field.growth_prior import PARTED_HAIR
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
+from hairkit.types.evidence import Evidence
 from hairkit.types.groom import Groom
 from hairkit.types.head import JAW_LANDMARKS, Head
 from hairkit.types.mask import HAIR, PERSON, Mask
@@ -122,44 +123,33 @@ CURL_MM = Limits(15.0, 30.0)
 
 
 def assess(
-    capture: Capture,
-    masks: Sequence[Mask],
-    scene: Scene,
-    hull: Hull,
-    groom: Groom,
-    roots: int,
-    hair_length: float,
-    turn: Turnaround | None = None,
-    parting: Parting | None = None,
-    tied: TiedHair | None = None,
+    capture: Capture, evidence: Evidence, groom: Groom, roots: int, turn: Turnaround | None = None
 ) -> tuple[Figure, ...]:
     """Return the figures of a run, in the order of its stages.
 
     Parameters
     ----------
-    capture, masks, scene, hull, groom
-        Results of the stages; masks and cameras in the order of the views.
+    capture
+        The views, in the order of the turn.
+    evidence, groom
+        Results of the stages. How the crown is combed counts for nothing in short hair and in hair
+        that is combed to a tie.
     roots
         Number of roots that strands were to grow from.
-    hair_length
-        Longest way through the hair, metres, see `ScalpDistance`.
     turn
         How the photos were arranged; None when their names were believed.
-    parting
-        How the crown is combed, which counts for nothing in short hair and in hair that is combed
-        to a tie; None when nothing was measured.
-    tied
-        The ties that were found; None of loose hair.
     """
-    short, tails = hair_length < PARTED_HAIR, tied is not None and len(tied.tails)
+    masks, scene, hull = evidence.masks, evidence.scene, evidence.hull
+    hair_length = evidence.scalp_distance.hair_length
+    level = hair_length < PARTED_HAIR or evidence.tied.tails
     return (
         *assess_turn(turn),
         *assess_landmarks(capture, scene),
         *assess_cameras(scene),
         *assess_masks(masks, scene),
         *assess_hull(hull, masks, scene),
-        *(() if short or tails else assess_parting(parting)),
-        *assess_ties(tied, scene.head),
+        *(() if level else assess_parting(evidence.parting)),
+        *assess_ties(evidence.tied, scene.head),
         *assess_strands(groom, roots, hair_length),
     )
 
@@ -294,13 +284,11 @@ def compare_hull(hull: Hull, mask: Mask, camera: Camera, scene: Scene) -> tuple[
     return _share(drawn, hair), int((shown & hair).sum()) / max(int((shown | hair).sum()), 1)
 
 
-def assess_parting(parting: Parting | None) -> tuple[Figure, ...]:
+def assess_parting(parting: Parting) -> tuple[Figure, ...]:
     """Return how sure it is how the crown is combed, and how wide the skin is that shows it.
 
-    Nothing where the user says it, or where nothing is known.
+    Nothing where the user says it.
     """
-    if parting is None:
-        return ()
     note = "add a photo from above, draw a stroke `parting` or give --parting"
     figures = []
     if parting.sureness < 1:
@@ -313,7 +301,7 @@ def assess_parting(parting: Parting | None) -> tuple[Figure, ...]:
     return tuple(figures)
 
 
-def assess_ties(tied: TiedHair | None, head: Head) -> tuple[Figure, ...]:
+def assess_ties(tied: TiedHair, head: Head) -> tuple[Figure, ...]:
     """Return where each tie is and how sure it is; nothing of loose hair."""
     note = "hull and directions show a tie weakly; look for it on the contact sheet"
     return tuple(
@@ -321,7 +309,7 @@ def assess_ties(tied: TiedHair | None, head: Head) -> tuple[Figure, ...]:
             "ties", f"{describe_tie(tail.tie, head)}, sureness", tail.sureness, "",
             TIE.light(tail.sureness), note,
         )
-        for tail in (() if tied is None else tied.tails)
+        for tail in tied.tails
     )  # fmt: skip
 
 

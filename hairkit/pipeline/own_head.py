@@ -17,6 +17,7 @@ from hairkit.cameras.similarity import triangulate
 from hairkit.errors import RenderError
 from hairkit.manager import Manager
 from hairkit.pipeline.recipe import Recipe
+from hairkit.stages import FACES
 from hairkit.types.camera import Camera
 from hairkit.types.capture import View
 from hairkit.types.face import Face
@@ -38,17 +39,10 @@ def mark_head(head: Head, recipe: Recipe, manager: Manager, tell: Callable[[str]
 
     `tell` receives one line when they are missing and when they have been found.
     """
-    stage = recipe.stage("landmarks")
-    if head.landmark_vertices is not None or stage is None:
+    if head.landmark_vertices is not None or not recipe.has(FACES):
         return head
-    choices = [(choice.plugin, choice.options) for choice in stage.choices]
-
-    def find(view: View) -> Face | None:
-        found = manager.find_first(stage.hook, choices, view=view)
-        return None if found is None else found[1]
-
     try:
-        marked = find_landmarks(head, find)
+        marked = find_landmarks(head, lambda view: recipe.ask(manager, FACES, view=view))
     except RenderError as error:
         tell(f"no landmarks for the head: {error}")
         return head

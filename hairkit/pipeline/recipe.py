@@ -27,7 +27,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from hairkit.errors import HairkitError, InputError, OptionError, PluginError
 from hairkit.manager import Manager, PluginInfo
@@ -37,29 +37,9 @@ from hairkit.options import split_setting, unknown_name
 from hairkit.pipeline.module_digest import module_digest
 from hairkit.pipeline.plugin_lock import check_lock, read_lock
 from hairkit.remote import is_url, read_bytes
+from hairkit.stages import OF_TABLE, Stage
 
-HOOKS = {
-    "capture": "capture",
-    "landmarks": "detect_landmarks",
-    "person": "segment_person",
-    "turn": "find_turn",
-    "segment": "segment",
-    "scene": "estimate_scene",
-    "refine": "refine_masks",
-    "head": "fit_head",
-    "texture": "enhance_texture",
-    "orient": "orient",
-    "hull": "build_hull",
-    "field": "solve_field",
-    "track": "track",
-    "export": "export_groom",
-}
-"""Table of the recipe -> stage hook, in the order in which they run."""
-
-SEVERAL = ("capture", "landmarks", "person", "segment", "export")
-"""Tables that may name several plugins."""
-
-NEEDED = ("segment", "scene", "orient", "hull", "field", "track")
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -71,18 +51,18 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Stage:
-    """One stage of a recipe."""
+class Selection:
+    """The plugins that a recipe names for one stage."""
 
     table: str
     """Name of the recipe's table: `scene`."""
     choices: tuple[Choice, ...]
-    """One plugin; for the tables of `SEVERAL` any number, in order."""
+    """One plugin, or several in order where the stage takes several."""
 
     @property
     def hook(self) -> str:
         """Name of the stage hook: `estimate_scene`."""
-        return HOOKS[self.table]
+        return OF_TABLE[self.table].hook
 
 
 @dataclass(frozen=True)
@@ -93,7 +73,7 @@ class Recipe:
     source: str
     """Origin of the recipe, for error messages."""
     description: str
-    stages: tuple[Stage, ...]
+    stages: tuple[Selection, ...]
     commands: tuple[PluginCommand, ...] = ()
     """Plugins that run in environments of their own."""
     lock: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -104,13 +84,53 @@ class Recipe:
         """The plugins of all stages, in the order in which they run."""
         return tuple(choice for stage in self.stages for choice in stage.choices)
 
-    def stage(self, table: str) -> Stage | None:
-        """Return the stage of a table, or None when the recipe leaves it out."""
+    def stage(self, table: str) -> Selection | None:
+        """Return the plugins of a table, or None when the recipe leaves the stage out."""
         return next((stage for stage in self.stages if stage.table == table), None)
 
-    def alone(self, table: str) -> Recipe:
-        """Return the recipe with one stage, for those who need none of the others' plugins."""
-        stages = tuple(stage for stage in self.stages if stage.table == table)
+    def has(self, stage: Stage[Any]) -> bool:
+        """Return whether plugins are named for a stage."""
+        return self.stage(stage.table) is not None
+
+    def ask(self, manager: Manager, stage: Stage[_Result], **arguments: Any) -> _Result:
+        """Return what the first plugin of a stage that has an answer makes.
+
+        Parameters
+        ----------
+        manager
+            The plugins.
+        stage
+            A stage with a hook.
+        arguments
+            Those of the hook but `options`.
+
+        Raises
+        ------
+        InputError
+            The recipe leaves out a stage that has no `absent` result.
+        PluginError
+            A plugin fails, or none has an answer.
+        """
+        selection = self.stage(stage.table)
+        if selection is None and stage.absent is not None:
+            return stage.absent()
+        if selection is None:
+            raise InputError(f"recipe {self.name} has no stage {stage.table!r}")
+        choices = [(choice.plugin, choice.options) for choice in selection.choices]
+        found: Any
+        if stage.absent is not None:
+            found = manager.find_first(stage.hook, choices, **arguments)
+            return cast(_Result, found[1]) if found is not None else stage.absent()
+        if stage.several:
+            found = manager.call_first(stage.hook, choices, **arguments)[1]
+        else:
+            found = manager.call(stage.hook, *choices[0], **arguments)
+        return cast(_Result, found)
+
+    def only(self, *kept: Stage[Any]) -> Recipe:
+        """Return the recipe with some stages, for those who need none of the others' plugins."""
+        tables = {stage.table for stage in kept}
+        stages = tuple(stage for stage in self.stages if stage.table in tables)
         names = {choice.plugin for stage in stages for choice in stage.choices}
         commands = tuple(command for command in self.commands if command.name in names)
         lock = {name: version for name, version in self.lock.items() if name in names}
@@ -168,18 +188,18 @@ class Recipe:
         )
 
     def _with_plugins(self, table: str, value: str, text: str) -> Recipe:
-        if table not in HOOKS:
-            reason = unknown_name("stage", table, HOOKS)
+        if table not in OF_TABLE:
+            reason = unknown_name("stage", table, OF_TABLE)
             raise OptionError(
                 f"--set {text}: expected plugin.option=value or stage=plugin; {reason}"
             )
         names = [name.strip() for name in value.split(",") if name.strip()]
         kept = {stage.table: stage for stage in self.stages}
-        if names == ["none"] and table not in NEEDED:
+        if names == ["none"] and not OF_TABLE[table].needed:
             kept.pop(table, None)
         else:
             kept[table] = _stage(table, {"plugin": names}, f"--set {text}")
-        return replace(self, stages=tuple(kept[name] for name in HOOKS if name in kept))
+        return replace(self, stages=tuple(kept[name] for name in OF_TABLE if name in kept))
 
     def _map(self, change: Any) -> Recipe:
         stages = tuple(
@@ -220,15 +240,15 @@ def parse_recipe(data: bytes, name: str, source: str, folder: Path | None = None
     lock = read_lock(document.pop("lock", {}), source)
     description = document.pop("description", "")
     for key in document:
-        if key not in HOOKS:
-            raise InputError(f"{source}: {key}: {unknown_name('stage', key, HOOKS)}")
+        if key not in OF_TABLE:
+            raise InputError(f"{source}: {key}: {unknown_name('stage', key, OF_TABLE)}")
     tables = {**_default_tables(), **document}
     for key, content in document.items():
-        if content is False and key not in NEEDED:
+        if content is False and not OF_TABLE[key].needed:
             del tables[key]
         elif isinstance(content, dict) and "plugin" not in content:
             tables[key] = {**_default_tables().get(key, {}), **content}
-    stages = tuple(_stage(key, tables[key], source) for key in HOOKS if key in tables)
+    stages = tuple(_stage(key, tables[key], source) for key in OF_TABLE if key in tables)
     return Recipe(name, source, str(description), stages, commands, lock)
 
 
@@ -256,14 +276,14 @@ def _document(data: bytes, source: str) -> dict[str, Any]:
 def _default_tables() -> Mapping[str, Any]:
     """Return the tables of the recipe that others differ from."""
     document = _document(_read_shipped("default"), "recipe default")
-    return {key: content for key, content in document.items() if key in HOOKS}
+    return {key: content for key, content in document.items() if key in OF_TABLE}
 
 
 def _read_shipped(name: str) -> bytes:
     return (importlib.resources.files("hairkit") / "recipes" / f"{name}.toml").read_bytes()
 
 
-def stage_digest(manager: Manager, stage: Stage) -> str:
+def stage_digest(manager: Manager, stage: Selection) -> str:
     """Return a hex digest of plugins, versions and options: equal digests, equal behaviour.
 
     Options are taken with their defaults filled in; files that an option names, and those in a
@@ -305,9 +325,9 @@ def missing_networks(recipe: Recipe, manager: Manager) -> dict[str, tuple[str, .
     return {plugin: names for plugin, names in missing.items() if names}
 
 
-def _stage(table: str, content: object, source: str) -> Stage:
+def _stage(table: str, content: object, source: str) -> Selection:
     if not isinstance(content, dict):
-        also = "" if table in NEEDED else f", or {table} = false to leave the stage out"
+        also = "" if OF_TABLE[table].needed else f", or {table} = false to leave the stage out"
         raise InputError(f"{source}: {table} is {content!r}, expected a table [{table}]{also}")
     named = content.get("plugin")
     names = [named] if isinstance(named, str) else named
@@ -315,7 +335,7 @@ def _stage(table: str, content: object, source: str) -> Stage:
         raise InputError(f"{source}: {table}.plugin is {named!r}, expected a plugin's name")
     if len(set(names)) != len(names):
         raise InputError(f"{source}: {table}.plugin names a plugin twice")
-    if not names or (len(names) > 1 and table not in SEVERAL):
+    if not names or (len(names) > 1 and not OF_TABLE[table].several):
         raise InputError(f"{source}: {table}.plugin names {len(names)} plugins, expected one")
     options = {key: value for key, value in content.items() if key != "plugin"}
     choices = tuple(_choice(name, options, len(names) == 1) for name in names)
@@ -323,7 +343,7 @@ def _stage(table: str, content: object, source: str) -> Stage:
         key = next(iter(options))
         reason = f"options of several plugins stand in [{table}.PLUGIN]; PLUGIN is one of"
         raise InputError(f"{source}: {table}.{key}: {reason}: {', '.join(names)}")
-    return Stage(table, choices)
+    return Selection(table, choices)
 
 
 def _choice(name: str, options: dict[str, Any], alone: bool) -> Choice:

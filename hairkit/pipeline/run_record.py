@@ -19,9 +19,10 @@ from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.manager.command_plugin import PluginCommand
 from hairkit.pipeline.health import Figure
-from hairkit.pipeline.recipe import HOOKS, Choice, Recipe, Stage, load_recipe, plugin_code
+from hairkit.pipeline.recipe import Choice, Recipe, Selection, load_recipe, plugin_code
 from hairkit.pipeline.run_log import StageTime
 from hairkit.remote import is_url, join, read_bytes
+from hairkit.stages import OF_TABLE
 from hairkit.storage import read_text, write_text
 from hairkit.types.capture import Capture
 from hairkit.types.parting import Parting, PartingWord
@@ -100,11 +101,11 @@ class RunRecord:
     def as_recipe(self) -> Recipe:
         """Return the recipe that was run, every option with its value."""
         stages = []
-        for table in HOOKS:
+        for table in OF_TABLE:
             own = [record for record in self.plugins if record.stage == table]
             choices = tuple(Choice(p.plugin, MappingProxyType(dict(p.options))) for p in own)
             if choices:
-                stages.append(Stage(table, choices))
+                stages.append(Selection(table, choices))
         if not stages or stages[0].table != "capture":  # a record from before that stage
             stages[:0] = load_recipe("default").stages[:1]
         source = f"{RECORD} of {self.recipe_source}"

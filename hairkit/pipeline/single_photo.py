@@ -12,16 +12,16 @@ from pathlib import Path
 
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
+from hairkit.pipeline.findings import Findings
 from hairkit.pipeline.recipe import Recipe
 from hairkit.pipeline.run_log import RunLog
-from hairkit.pipeline.stage_runner import Given, StageRunner
-from hairkit.pipeline.work_folder import WorkFolder, digest_of
+from hairkit.pipeline.stage_runner import StageRunner
+from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.progress import Silent
-from hairkit.types.capture import View
-from hairkit.types.face import Face
+from hairkit.stages import FACES, LABELS, ORIENTED, PERSONS
+from hairkit.types.capture import Capture, View
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
-from hairkit.types.person import Person
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,18 +33,6 @@ class SeenPhoto:
     mask: Mask
     orientation: OrientationMap | None
     """None where nobody asked for it."""
-
-
-def given_photo(view: View) -> Given[View]:
-    """Return a photo without its place in the turn; its name does not count in the digest."""
-    alone = view.alone()
-    return Given(alone, digest_of(replace(alone, name="")))
-
-
-def given_bare_photo(view: View, name: str = "") -> Given[View]:
-    """Return a photo as networks see it: as `given_photo`, and without what was drawn on it."""
-    bare = replace(view.plain(), mask_path=None, strokes_path=None)
-    return given_photo(replace(bare, name=name or view.name))
 
 
 @one_blas_thread()
@@ -74,16 +62,9 @@ def see_photo(
     """
     if view.photo_path is not None:
         view = replace(view, name=view.photo_path.stem)  # whatever the turn calls it
+    recipe = recipe.only(FACES, PERSONS, LABELS, ORIENTED)
     with WorkFolder(folder) as work, ThreadPoolExecutor(1) as pool:
         run = StageRunner(recipe, manager, work, RunLog(Silent()), pool)
-        bare = [given_bare_photo(view)]
-        [face] = run.every_view("landmarks", Face, bare, absent=Face.absent)
-        [person] = run.every_view("person", Person, bare, absent=Person.absent)
-        seen = view.with_findings(face.result().value, person.result().value)
-        masks = run.every_view("segment", Mask, [given_photo(seen.plain())])
-        orientation = None
-        if strands:
-            toned = [given_photo(seen.toned())]
-            [found] = run.every_view("orient", OrientationMap, toned, mask=masks)
-            orientation = found.result().value
-        return SeenPhoto(seen, masks[0].result().value, orientation)
+        found = Findings(run, Capture((view,)))
+        orientation = found.all_orientations.value[0] if strands else None
+        return SeenPhoto(found.capture.views[0], found.all_masks.value[0], orientation)

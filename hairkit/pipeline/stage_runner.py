@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, Self, TypeVar
+from typing import Any, Generic, Protocol, Self, TypeVar
 
 import cv2
 import numba
 import numpy as np
 import scipy
 
-from hairkit.errors import PluginError
 from hairkit.manager import Manager
 from hairkit.memory import give_back_memory
 from hairkit.pipeline.module_digest import module_digest
-from hairkit.pipeline.recipe import Recipe, Stage, stage_digest
+from hairkit.pipeline.recipe import Recipe, stage_digest
 from hairkit.pipeline.run_log import RunLog
-from hairkit.pipeline.work_folder import WorkFolder, digest_of
+from hairkit.pipeline.work_folder import digest_of
+from hairkit.stages import EXPORT, Stage
 from hairkit.storage import Stored, from_arrays, to_arrays
 from hairkit.types.capture import View
 from hairkit.types.groom import Groom
@@ -45,74 +45,88 @@ class Given(Generic[_Value]):
         return cls(value, digest_of(value))
 
 
-Argument = Given[Any] | Sequence[Future[Given[Any]]]
-"""One value, or one per view that may still be computed."""
+Views = Sequence[Future[Given[_Value]]]
+"""A result for each view, which may still be computed."""
+
+
+def given_photo(view: View) -> Given[View]:
+    """Return a photo without its place in the turn; its name does not count in the digest."""
+    alone = view.alone()
+    return Given(alone, digest_of(replace(alone, name="")))
+
+
+def gather(views: Views[_Value]) -> Given[tuple[_Value, ...]]:
+    """Return the results of all views as one, after waiting for those that are not done."""
+    parts = [future.result() for future in views]
+    return Given(tuple(part.value for part in parts), digest_of([part.digest for part in parts]))
+
+
+class Keeper(Protocol):
+    """Where results of stages are kept: a `WorkFolder`, or nowhere."""
+
+    def get(self, stage: Stage[_Result], digest: str, view: str = "") -> _Result | None:
+        """Return the kept result of a stage with a digest; None if there is none."""
+
+    def put(self, stage: Stage[_Result], value: _Result, digest: str, view: str = "") -> None:
+        """Keep a result."""
 
 
 class StageRunner:
     """Calls the recipe's plugins; results that are valid in the work folder are read from there."""
 
     def __init__(
-        self,
-        recipe: Recipe,
-        manager: Manager,
-        work: WorkFolder,
-        log: RunLog,
-        pool: Executor,
+        self, recipe: Recipe, manager: Manager, work: Keeper, log: RunLog, pool: Executor
     ) -> None:
-        self._recipe = recipe
-        self._manager = manager
-        self._work = work
-        self._log = log
+        self.recipe = recipe
+        self.manager = manager
+        self.log = log
+        self.work = work
         self._pool = pool
 
-    def has(self, table: str) -> bool:
-        """Return whether the recipe has the stage."""
-        return self._recipe.stage(table) is not None
-
     def once(
-        self, table: str, kind: type[_Result], name: str = "", /, **arguments: Argument
+        self, stage: Stage[_Result], evidence: Given[Any] | None = None, /, **arguments: Given[Any]
     ) -> Given[_Result]:
-        """Return the result of a stage that sees all views; waits for its arguments.
+        """Return the result of a stage that sees all views.
 
-        `name` is that of the result where a stage runs a second time.
+        The fields of `evidence`, a dataclass, are arguments, too.
         """
-        ready, stage = _all_ready(arguments), self._stage(table)
-        steps = self._steps_of(stage, 1, name or table)
-        result = steps.run(0, kind, self._code(stage), "", ready)
+        fields = {} if evidence is None else vars(evidence.value)
+        digest = "" if evidence is None else evidence.digest
+        selection = self.recipe.stage(stage.table)
+        code = "" if selection is None else stage_digest(self.manager, selection)
+        steps = _Steps(self, stage, 1, code + digest)
+
+        def ask(values: dict[str, Any]) -> _Result:
+            return self.recipe.ask(self.manager, stage, **fields, **values)
+
+        result = steps.run(ask, 0, "", arguments)
         give_back_memory()
         return result
 
     def derive(
-        self, name: str, kind: type[_Result], make: Callable[..., _Result], **arguments: Argument
+        self, stage: Stage[_Result], make: Callable[..., _Result], **arguments: Given[Any]
     ) -> Given[_Result]:
         """Return what a function of hairkit makes of other results, kept as a stage's result is."""
-        ready, code = _all_ready(arguments), module_digest(make.__module__)
-        steps = _Steps(self, name, 1, lambda values: make(**values))
-        return steps.run(0, kind, code, "", ready)
+        steps = _Steps(self, stage, 1, module_digest(make.__module__))
+        return steps.run(lambda values: make(**values), 0, "", arguments)
 
     def every_view(
-        self,
-        table: str,
-        kind: type[_Result],
-        views: Sequence[Given[View]],
-        absent: Callable[[], _Result] | None = None,
-        **arguments: Sequence[Future[Given[Any]]],
-    ) -> list[Future[Given[_Result]]]:
-        """Start a stage on every view; a view's step waits only for that view's arguments.
+        self, stage: Stage[_Result], views: Sequence[Given[View]], **arguments: Views[Any]
+    ) -> Views[_Result]:
+        """Start a stage on every view; a view's step waits only for that view's arguments."""
+        selection = self.recipe.stage(stage.table)
+        if selection is None and stage.absent is not None:
+            return [completed(Given.of(stage.absent())) for _ in views]
+        code = "" if selection is None else stage_digest(self.manager, selection)
+        steps = _Steps(self, stage, len(views), code)
 
-        `absent` makes the result where the recipe leaves the stage out or no plugin has an answer.
-        """
-        if absent is not None and not self.has(table):
-            return [completed(Given.of(absent())) for _ in views]
-        stage = self._stage(table)
-        steps = self._steps_of(stage, len(views), table, absent)
-        code = self._code(stage)
+        def ask(values: dict[str, Any]) -> _Result:
+            return self.recipe.ask(self.manager, stage, **values)
 
         def run(index: int, view: Given[View]) -> Given[_Result]:
             # tasks start in the order of submission, so what is waited for is already running
             own = {name: futures[index].result() for name, futures in arguments.items()}
-            return steps.run(index, kind, code, view.value.name, {"view": view} | own)
+            return steps.run(ask, index, view.value.name, {"view": view} | own)
 
         return [self._pool.submit(run, index, view) for index, view in enumerate(views)]
 
@@ -122,84 +136,50 @@ class StageRunner:
 
     def export(self, plugin: str, groom: Groom, path: Path) -> None:
         """Write one of the recipe's files."""
-        stage = self._stage("export")
-        options = next(choice.options for choice in stage.choices if choice.plugin == plugin)
+        selection = self.recipe.stage(EXPORT.table)
+        choices = () if selection is None else selection.choices
+        options = next(choice.options for choice in choices if choice.plugin == plugin)
         started = time.perf_counter()
-        self._log.started(plugin, 1)
-        self._manager.call("export_groom", plugin, options, groom=groom, path=path)
-        self._log.finished(plugin, time.perf_counter() - started, False)
-
-    def call(
-        self, stage: Stage, values: dict[str, Any], absent: Callable[[], Any] | None = None
-    ) -> Any:
-        """Call the plugin of a stage, the first of several that has an answer."""
-        choices = [(choice.plugin, choice.options) for choice in stage.choices]
-        if absent is not None:
-            found = self._manager.find_first(stage.hook, choices, **values)
-            return absent() if found is None else found[1]
-        if len(choices) == 1:
-            return self._manager.call(stage.hook, *choices[0], **values)
-        return self._manager.call_first(stage.hook, choices, **values)[1]
-
-    def _stage(self, table: str) -> Stage:
-        stage = self._recipe.stage(table)
-        if stage is None:
-            raise PluginError(f"recipe {self._recipe.name} has no stage {table!r}")
-        return stage
-
-    def _steps_of(
-        self, stage: Stage, count: int, name: str, absent: Callable[[], Any] | None = None
-    ) -> _Steps:
-        return _Steps(
-            self, name, count, lambda values: self.call(stage, values, absent), stage.hook
-        )
-
-    def _code(self, stage: Stage) -> str:
-        return stage_digest(self._manager, stage)
+        self.log.started(plugin, 1)
+        self.manager.call(EXPORT.hook, plugin, options, groom=groom, path=path)
+        self.log.finished(plugin, time.perf_counter() - started, False)
 
 
 class _Steps:
     """The steps of one stage: runs them, counts them, and reports the end of the last."""
 
-    def __init__(
-        self,
-        runner: StageRunner,
-        table: str,
-        count: int,
-        call: Callable[[dict[str, Any]], Any],
-        hook: str | None = None,
-    ) -> None:
+    def __init__(self, runner: StageRunner, stage: Stage[Any], count: int, code: str) -> None:
         self._runner = runner
-        self._table = table
-        self._call = call
-        self._hook = hook
+        self._stage = stage
+        self._code = code
+        """Digest of what makes the results."""
         self._results: list[Any] = [None] * count
         self._left = count
         self._reused = True
         self._began: float | None = None
         self._guard = threading.Lock()
-        runner._log.started(table, count)
+        runner.log.started(stage.name, count)
 
     def run(
         self,
+        make: Callable[[dict[str, Any]], Any],
         index: int,
-        kind: type[_Result],
-        code: str,
         view: str,
-        arguments: dict[str, Given[Any]],
-    ) -> Given[_Result]:
-        """Return the step's result, from the work folder or newly made by `code`, a digest."""
-        runner, table = self._runner, self._table
-        digest = digest_of(_own_digest(), code, [given.digest for given in arguments.values()])
+        arguments: Mapping[str, Given[Any]],
+    ) -> Given[Any]:
+        """Return the step's result, from the work folder or newly made of the arguments' values."""
+        work, stage = self._runner.work, self._stage
+        inputs = [(name, arguments[name].digest) for name in sorted(arguments)]
+        digest = digest_of(_own_digest(), self._code, inputs)
         with self._guard:
             self._began = self._began or time.perf_counter()
-        result = runner._work.get(kind, digest, table, view)
+        result = work.get(stage, digest, view)
         reused = result is not None
         if result is None:
-            made: _Result = self._call({name: given.value for name, given in arguments.items()})
+            made = make({name: given.value for name, given in arguments.items()})
             # as a run that was interrupted reads it: a float of NumPy's counts in another precision
-            result = from_arrays(kind, to_arrays(made), table)
-            runner._work.put(result, digest, table, view)
+            result = from_arrays(stage.makes, to_arrays(made), stage.name)
+            work.put(stage, result, digest, view)
         self._ended(index, result, reused)
         return Given(result, digest)
 
@@ -209,15 +189,15 @@ class _Steps:
             self._reused &= reused
             self._left -= 1
             last = not self._left
-        runner, table = self._runner, self._table
-        runner._log.stepped(table)
+        runner, stage = self._runner, self._stage
+        runner.log.stepped(stage.name)
         if last:
             seconds = time.perf_counter() - (self._began or 0.0)
-            runner._log.finished(table, seconds, self._reused)
+            runner.log.finished(stage.name, seconds, self._reused)
             whole = tuple(self._results) if len(self._results) > 1 else self._results[0]
-            if self._hook is not None:
-                runner._manager.notify(
-                    "stage_finished", stage=self._hook, seconds=seconds, result=whole
+            if stage.hook:
+                runner.manager.notify(
+                    "stage_finished", stage=stage.hook, seconds=seconds, result=whole
                 )
 
 
@@ -226,18 +206,6 @@ def completed(value: Given[_Value]) -> Future[Given[_Value]]:
     future: Future[Given[_Value]] = Future()
     future.set_result(value)
     return future
-
-
-def _all_ready(arguments: dict[str, Argument]) -> dict[str, Given[Any]]:
-    return {name: _ready(argument) for name, argument in arguments.items()}
-
-
-def _ready(argument: Argument) -> Given[Any]:
-    """Return the argument as one value, after waiting for views that are not done."""
-    if isinstance(argument, Given):
-        return argument
-    parts = [future.result() for future in argument]
-    return Given(tuple(part.value for part in parts), digest_of([part.digest for part in parts]))
 
 
 @cache

@@ -132,9 +132,9 @@ class WorkFolder:
         if kind is None:
             self.flush()
 
-    def get(self, kind: type[_Result], digest: str, stage: str, view: str = "") -> _Result | None:
+    def get(self, stage: Stage[_Result], digest: str, view: str = "") -> _Result | None:
         """Return the stored result with this digest; None if there is none or it is damaged."""
-        path = self._file(stage, view)
+        path = stage_file(self.path, stage, view)
         if not self._reuse:
             return None
         if _stored_digest(path) != digest and not self._take(digest, path):
@@ -142,7 +142,7 @@ class WorkFolder:
         try:
             arrays = read_npz(path)
             del arrays[_DIGEST]
-            return from_arrays(kind, arrays, str(path))
+            return from_arrays(stage.makes, arrays, str(path))
         except HairkitError:
             return None
 
@@ -153,9 +153,9 @@ class WorkFolder:
             return True
         return False
 
-    def put(self, value: Stored, digest: str, stage: str, view: str = "") -> None:
+    def put(self, stage: Stage[_Result], value: _Result, digest: str, view: str = "") -> None:
         """Store a stage's result; it is written in the background, `flush` waits for it."""
-        path = self._file(stage, view)
+        path = stage_file(self.path, stage, view)
         with self._guard:
             self._writes.append(self._writer.submit(_write, path, value, digest))
 
@@ -175,8 +175,10 @@ class WorkFolder:
             elif path.name != _LOCK:
                 path.unlink()
 
-    def _file(self, stage: str, view: str) -> Path:
-        return stage_file(self.path, stage, view)
+    def drop(self, stage: Stage[Any]) -> None:
+        """Remove the results of a stage."""
+        for path in self.path.glob(f"{stage.name}-*.npz" if stage.each else f"{stage.name}.npz"):
+            path.unlink()
 
 
 def drop_work(out: str | os.PathLike[str]) -> None:
@@ -194,7 +196,7 @@ class LastRun:
 
     def has(self, stage: Stage[Any], view: str = "") -> bool:
         """Return whether there is a result of a stage, of a view where it has one for each."""
-        return self.work is not None and stage_file(self.work, stage.name, view).is_file()
+        return self.work is not None and stage_file(self.work, stage, view).is_file()
 
     def latest(self, stage: Stage[_Result], view: str = "") -> _Result:
         """Return the result of a stage.
@@ -202,7 +204,7 @@ class LastRun:
         Raises `InputError` where there is none, `FormatError` where it is damaged or that of
         another version.
         """
-        path = stage_file(self.work or Path(WORK), stage.name, view)
+        path = stage_file(self.work or Path(WORK), stage, view)
         if not self.has(stage, view):
             raise InputError(f"{path}: no result of this stage; run all stages first")
         arrays = read_npz(path)
@@ -228,9 +230,9 @@ class LastRun:
         return refined if len(refined) == len(views) else None
 
 
-def stage_file(folder: Path, stage: str, view: str = "") -> Path:
+def stage_file(folder: Path, stage: Stage[Any], view: str = "") -> Path:
     """Return the path of a stage's result, which need not exist."""
-    return folder / (f"{stage}-{_file_name(view)}.npz" if view else f"{stage}.npz")
+    return folder / (f"{stage.name}-{_file_name(view)}.npz" if view else f"{stage.name}.npz")
 
 
 def _file_name(view: str) -> str:

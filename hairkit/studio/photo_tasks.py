@@ -21,14 +21,13 @@ from hairkit.manager import Manager
 from hairkit.options import make_options
 from hairkit.pipeline.recipe import Choice, Recipe, load_recipe
 from hairkit.pipeline.single_photo import SeenPhoto, see_photo
+from hairkit.stages import FACES, PERSONS
 from hairkit.storage import write_bytes
 from hairkit.studio.feedback import judge_view
 from hairkit.types.capture import View
 from hairkit.types.chosen import ChosenHair
-from hairkit.types.face import Face
 from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR
-from hairkit.types.person import Person
 
 OUTLINE_EDGE = 600
 """Long edge in pixels of photos whose outlines are found while somebody draws."""
@@ -201,11 +200,5 @@ _read_small = lru_cache(MOST)(_read)
 
 def _find(view: View) -> View:
     """Return the view with face and person, where the recipe finds them."""
-    found: dict[str, Any] = {"landmarks": Face.absent(), "person": Person.absent()}
-    for table in found:
-        stage = recipe().stage(table)
-        if stage is not None:
-            choices = [(choice.plugin, choice.options) for choice in stage.choices]
-            answer = manager().find_first(stage.hook, choices, view=view)
-            found[table] = answer[1] if answer is not None else found[table]
-    return view.with_findings(found["landmarks"], found["person"])
+    face = recipe().ask(manager(), FACES, view=view)
+    return view.with_findings(face, recipe().ask(manager(), PERSONS, view=view))

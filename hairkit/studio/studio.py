@@ -15,6 +15,7 @@ from typing import Any
 from hairkit.errors import HairkitError
 from hairkit.nets.model_folder import model_folder
 from hairkit.pipeline.work_folder import AHEAD
+from hairkit.stages import EXPORT, OF_NAME, ROWS
 from hairkit.studio.events import Events
 from hairkit.studio.project import Project, Shot
 from hairkit.studio.task_process import TaskError, TaskProcess
@@ -29,12 +30,6 @@ MEANWHILE = 6
 """Photos from which the hair is made unasked: fewer are a turn that is still being taken."""
 PHOTO_S, BUILD_S, EXPORT_S = 120.0, 3600.0, 900.0
 """Longest times for a photo or an outline, a groom, and a file."""
-STAGES = {
-    "landmarks": 6, "person": 3, "turn": 2, "segment": 10, "scene": 12, "refine": 8, "head": 3,
-    "orient": 12, "waves": 3, "hull": 6, "distance": 3, "parting": 1, "field": 14, "hairline": 2,
-    "track": 10, "sheet": 5,
-}  # fmt: skip
-"""Usual share of each stage in the time of a whole run, percent, from `run.json` of the sample."""
 
 
 class Studio:
@@ -283,7 +278,7 @@ class Studio:
 
     async def _draft(self, touched: list[str]) -> None:
         """Make a quick groom of what a hand changed, unless the next change comes before."""
-        self._set_build(state="running", share=0.0, stage="draft")
+        self._set_build(state="running", share=0.0, words="a quick preview")
         change = asyncio.create_task(self._stop_on_change())
         try:
             await self._call_drafter(touched, self.project.draft)
@@ -322,7 +317,7 @@ class Studio:
         project, inputs = self.project, self.project.inputs()
         touched, self._touched = self._touched, set()
         self._shares = {}
-        self._set_build(state="running", share=0.0, stage="starting")
+        self._set_build(state="running", share=0.0)
         project.result.mkdir(exist_ok=True)
         try:
             done = await self.builder.call(
@@ -361,10 +356,10 @@ class Studio:
         else:
             self._set_build(**self.build | {"message": event["text"]})
             return
-        done = sum(STAGES.get(name, 1) * a / b for name, (a, b) in shares.items() if b)
-        self._set_build(
-            **self.build | {"share": round(done / sum(STAGES.values()), 3), "stage": stage}
-        )
+        rows = {name: OF_NAME.get(name, EXPORT) for name in shares}  # exports go by plugin
+        done = sum(rows[name].share * a / b for name, (a, b) in shares.items() if b)
+        share = round(min(done / sum(row.share for row in ROWS), 1), 3)
+        self._set_build(**self.build | {"share": share, "words": rows[stage].words})
 
     def _set_build(self, **values: Any) -> None:
         self.build = values

@@ -25,7 +25,7 @@ from hairkit.options import make_options
 from hairkit.pipeline.draft import draft
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.run_record import RECORD, read_record
-from hairkit.pipeline.take_capture import take_capture
+from hairkit.pipeline.take_capture import take_with_choices
 from hairkit.pipeline.work_folder import digest_of
 from hairkit.storage import read_bytes, write_bytes
 from hairkit.studio.clean_photo import clean_photo
@@ -41,7 +41,6 @@ from hairkit.studio.photo_tasks import (
     look,
     manager,
     prepare_photo,
-    recipe,
 )
 from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
@@ -51,8 +50,9 @@ SMALL_EDGE, LARGE_EDGE = 360, 1440
 PICTURE_QUALITY, KEPT_QUALITY = 85, 97
 """JPEG qualities of pictures for pages, and of photos that have to be encoded again."""
 DRAFT_SETTINGS = ("visual_hull.voxel_size=0.006",)
-"""Options of a quick groom: cells of 6 mm, not 3. With 5 mm, or with whole photos instead of those
-of `OUTLINE_EDGE`, F 4/40 of the sample's preview (59) changes by a point, and it takes longer."""
+"""Options of a quick groom: cells of 6 mm, not 3.5. With 5 mm, or with whole photos instead of
+those of `OUTLINE_EDGE`, F 4/40 of the sample's preview (59) changes by a point, and it takes
+longer."""
 VIDEO_EDGE = 1440
 """Long edge in pixels of a video's frames."""
 
@@ -105,11 +105,11 @@ def pick_frames(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]
 def build_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
     """Reconstruct the project in `folder` into its `result`, as `hairkit reconstruct` does."""
     out = Path(request["result"])
-    capture = take_capture(request["folder"], recipe(), manager())
+    capture, chosen = take_with_choices(request["folder"], "default", manager())
     groom = reconstruct(
         capture,
         out,
-        recipe().with_set(capture.chosen.settings),
+        chosen,
         manager(),
         guides=request["guides"],
         progress=_Told(tell, stopped),
@@ -130,15 +130,14 @@ def draft_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]
     These are their names, each with the folder in which what is found in it is kept.
     """
 
-    def check() -> None:
-        if stopped():
-            raise StoppedError("stopped; another change came")
-
-    capture = take_capture(request["folder"], recipe(), manager(), OUTLINE_EDGE)
-    coarse = recipe().with_set([*capture.chosen.settings, *DRAFT_SETTINGS])
+    capture, coarse = take_with_choices(
+        request["folder"], "default", manager(), DRAFT_SETTINGS, OUTLINE_EDGE
+    )
     work = Path(request["folder"]) / "result" / "work"
     drawn = {name: Path(folder) for name, folder in request["touched"].items()}
-    _hair_packet(draft(capture, work, drawn, coarse, manager(), request["guides"], check), request)
+    told = _Told(tell, stopped)
+    groom = draft(capture, work, drawn, coarse, manager(), request["guides"], told)
+    _hair_packet(groom, request)
     return {}
 
 

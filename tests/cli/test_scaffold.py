@@ -16,8 +16,8 @@ from ball import PLUGIN_FILE, RECIPE, write_capture
 from hairkit.cli import main
 from hairkit.cli.scaffold import new_plugin
 from hairkit.errors import InputError
-from hairkit.manager import STAGES, Manager
-from hairkit.pipeline.recipe import HOOKS
+from hairkit.manager import Manager
+from hairkit.stages import OF_HOOK, OF_TABLE
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache
@@ -25,7 +25,7 @@ from hairkit.types.point_cache import PointCache
 
 def test_every_stage_gives_a_package_whose_test_passes(tmp_path: Path) -> None:
     """The written module obeys the contract as it is, without a warning."""
-    folders = [new_plugin(stage, f"my_{stage}", tmp_path / stage) for stage in STAGES]
+    folders = [new_plugin(stage, f"my_{stage}", tmp_path / stage) for stage in OF_HOOK]
     paths = os.pathsep.join(str(folder) for folder in folders)
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-W", "error", "-p", "no:cacheprovider", "."],
@@ -36,7 +36,7 @@ def test_every_stage_gives_a_package_whose_test_passes(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stdout
-    assert f"{len(STAGES)} passed" in done.stdout
+    assert f"{len(OF_HOOK)} passed" in done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -52,12 +52,12 @@ def module_of(hook: str, folder: Path) -> Path:
     return new_plugin(hook, f"my_{hook}", folder / hook) / f"hairkit_my_{hook}.py"
 
 
-@pytest.mark.parametrize("table", HOOKS)
+@pytest.mark.parametrize("table", OF_TABLE)
 def test_the_plugin_of_a_stage_runs_in_a_reconstruction(
     table: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """`reconstruct --plugin FILE --set STAGE=NAME` makes a groom with it, and its export."""
-    module = module_of(HOOKS[table], tmp_path)
+    module = module_of(OF_TABLE[table].hook, tmp_path)
     recipe = tmp_path / "ball.toml"
     recipe.write_text(RECIPE)
     capture, out = write_capture(tmp_path / "capture", masks=True), tmp_path / "out"
@@ -113,17 +113,17 @@ def test_the_simulator_moves_the_groom(tmp_path: Path, groom_file: Path) -> None
     assert not np.allclose(frames.points[0], frames.points[-1], atol=1e-4)
 
 
-@pytest.mark.parametrize(("table", "hook"), HOOKS.items())
-def test_stages_may_be_named_as_in_a_recipe(table: str, hook: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("table", OF_TABLE)
+def test_stages_may_be_named_as_in_a_recipe(table: str, tmp_path: Path) -> None:
     """`hull` and `build_hull` write the same package; its entry point leads to its module."""
     first = new_plugin(table, "mine", tmp_path / "a")
-    second = new_plugin(hook, "mine", tmp_path / "b")
+    second = new_plugin(OF_TABLE[table].hook, "mine", tmp_path / "b")
     for path in sorted(first.rglob("*.*")):
         assert path.read_text() == (second / path.relative_to(first)).read_text()
     entries = tomllib.loads((first / "pyproject.toml").read_text())["project"]["entry-points"]
     assert entries == {"hairkit": {"mine": "hairkit_mine"}}
     manager = Manager.loaded([first / "hairkit_mine.py"], autoload=False)
-    assert manager.info("hairkit_mine").stages == (hook,)
+    assert manager.info("hairkit_mine").stages == (OF_TABLE[table].hook,)
     assert len(manager.info("hairkit_mine").options) == 1
 
 

@@ -14,8 +14,8 @@ from answering_plugin import manager_answering
 
 from hairkit.cli import main
 from hairkit.errors import InputError, PluginError
-from hairkit.manager import STAGES
 from hairkit.manager.guard import results_on_stdout
+from hairkit.stages import OF_HOOK
 from hairkit.testing import bristle_groom, stage_arguments
 
 
@@ -41,7 +41,7 @@ def raising(error: BaseException) -> Any:
     return answer
 
 
-@pytest.mark.parametrize("hook", STAGES)
+@pytest.mark.parametrize("hook", OF_HOOK)
 @pytest.mark.parametrize("error", EXITS, ids=lambda e: type(e).__name__)
 def test_whatever_a_plugin_raises_is_one_line_with_its_place(
     hook: str, error: BaseException, tmp_path: Path
@@ -58,7 +58,7 @@ def test_whatever_a_plugin_raises_is_one_line_with_its_place(
     assert caught.value.__cause__ is error
 
 
-@pytest.mark.parametrize("hook", STAGES)
+@pytest.mark.parametrize("hook", OF_HOOK)
 @pytest.mark.parametrize("error", [InputError("the photo is black"), KeyboardInterrupt()])
 def test_messages_to_the_user_and_ctrl_c_pass(
     hook: str, error: BaseException, tmp_path: Path
@@ -94,7 +94,7 @@ def arrays_in(value: Any) -> Iterator[np.ndarray]:
             yield from arrays_in(getattr(value, field.name))
 
 
-@pytest.mark.parametrize("hook", STAGES)
+@pytest.mark.parametrize("hook", OF_HOOK)
 def test_a_plugin_cannot_change_what_it_is_given(hook: str, tmp_path: Path) -> None:
     """Every array of every argument is read-only, and the error names who tried to write."""
     arguments = stage_arguments(hook, tmp_path)
@@ -109,7 +109,7 @@ def test_a_plugin_cannot_change_what_it_is_given(hook: str, tmp_path: Path) -> N
             manager_answering(hook, write).call(hook, "odd", **arguments)
 
 
-@pytest.mark.parametrize("hook", STAGES)
+@pytest.mark.parametrize("hook", OF_HOOK)
 def test_what_a_plugin_prints_is_no_result(
     hook: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -16,8 +16,9 @@ import hairkit
 from hairkit import hookspecs
 from hairkit.errors import HairkitError, InputError, OptionError, PluginError
 from hairkit.hookspecs import hookimpl
-from hairkit.manager import DISABLE_AUTOLOAD, RESULTS, STAGES, Manager
+from hairkit.manager import DISABLE_AUTOLOAD, Manager
 from hairkit.options import option
+from hairkit.stages import OF_HOOK
 from hairkit.testing import combed_orientation, stage_arguments
 from hairkit.types.orientation import OrientationMap
 
@@ -85,8 +86,9 @@ def entry(name: str, plugin: object, distribution: str = "studio-hair") -> Any:
 def test_the_result_types_are_those_of_the_contract() -> None:
     """What the manager accepts from each stage is what the hook's annotation says."""
     specs = {n: f for n, f in vars(hookspecs).items() if hasattr(f, "hairkit_spec")}
-    assert [name for name in specs if specs[name].hairkit_spec["firstresult"]] == list(STAGES)
-    for stage, (kind, _) in RESULTS.items():
+    assert [name for name in specs if specs[name].hairkit_spec["firstresult"]] == list(OF_HOOK)
+    for stage, row in OF_HOOK.items():
+        kind = row.makes
         said = typing.cast(str, specs[stage].__annotations__["return"]).removesuffix(" | None")
         assert said == kind.__name__ or (said, kind) == (
             "Simulator",

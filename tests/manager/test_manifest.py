@@ -11,8 +11,9 @@ import pytest
 from hairkit.cli import main
 from hairkit.errors import PluginError
 from hairkit.hookspecs import HOOKSPEC_VERSION
-from hairkit.manager import STAGES, Manager
+from hairkit.manager import Manager
 from hairkit.manager.manifest import PLUGIN_PATH
+from hairkit.stages import OF_HOOK
 from hairkit.testing import stage_arguments
 
 OWN = ".".join(map(str, HOOKSPEC_VERSION))
@@ -195,4 +196,4 @@ def test_check_finds_what_is_wrong(drive: Path, capsys: pytest.CaptureFixture[st
 def test_shipped_plugins_pass(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Plugins of a stage, of one that has no answer, and of files keep the contract."""
     assert main(["plugins", name, "--check"]) == 0, capsys.readouterr().out
-    assert set(STAGES)
+    assert set(OF_HOOK)

@@ -20,7 +20,7 @@ from swaying import Options as SwayingOptions
 from swaying import Swaying
 
 from hairkit.errors import InputError, PluginError, ResultError
-from hairkit.manager import RESULTS, STAGES
+from hairkit.stages import OF_HOOK
 from hairkit.testing import stage_arguments
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
@@ -270,10 +270,10 @@ CASES = [(hook, reason) for hook, rows in WRONG.items() for reason in rows]
 
 def test_every_stage_has_wrong_results_here() -> None:
     """A stage that is added to the contract is tested, too."""
-    assert list(WRONG) == list(RESULTS)
+    assert list(WRONG) == list(OF_HOOK)
 
 
-@pytest.mark.parametrize("hook", STAGES)
+@pytest.mark.parametrize("hook", OF_HOOK)
 def test_a_right_result_passes(hook: str, tmp_path: Path) -> None:
     """The checks refuse nothing that a correct plugin returns."""
     manager = manager_answering(hook, lambda given: right(hook, given))
@@ -295,7 +295,7 @@ def test_a_wrong_result_names_plugin_stage_and_view(hook: str, reason: str, tmp_
     assert isinstance(caught.value, InputError)
 
 
-@pytest.mark.parametrize("hook", STAGES)
+@pytest.mark.parametrize("hook", OF_HOOK)
 @pytest.mark.parametrize("answer", [3, "x", np.zeros(3), [], object])
 def test_a_result_of_another_type_is_refused(hook: str, answer: object, tmp_path: Path) -> None:
     """Nothing but the stage's own type passes, whatever it is."""
@@ -305,7 +305,7 @@ def test_a_result_of_another_type_is_refused(hook: str, answer: object, tmp_path
         )
 
 
-@pytest.mark.parametrize("hook", STAGES)
+@pytest.mark.parametrize("hook", OF_HOOK)
 def test_nothing_is_no_result(hook: str, tmp_path: Path) -> None:
     """None is refused where no other plugin is left to ask."""
     with pytest.raises(

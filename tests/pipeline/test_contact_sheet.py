@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from ball import ball_evidence
 
 from hairkit.pipeline import contact_sheet as sheets
 from hairkit.pipeline.contact_sheet import (
@@ -16,14 +17,7 @@ from hairkit.pipeline.contact_sheet import (
     contact_sheet,
     write_contact_sheet,
 )
-from hairkit.testing import (
-    ball_mask,
-    bristle_groom,
-    combed_orientation,
-    shell_hull,
-    turn_capture,
-    turn_scene,
-)
+from hairkit.testing import bristle_groom, turn_capture, turn_scene
 from hairkit.types.orientation import OrientationMap
 
 
@@ -31,10 +25,8 @@ def test_the_sheet_shows_every_stage_of_every_view(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Eight columns and six rows, none of them blank; the file holds the same picture."""
-    scene, capture = turn_scene(), turn_capture()
-    masks = [ball_mask(camera) for camera in scene.cameras]
-    maps = [combed_orientation(mask) for mask in masks]
-    sheet = contact_sheet(capture, masks, maps, shell_hull(), bristle_groom(), scene)
+    scene, capture, evidence = turn_scene(), turn_capture(), ball_evidence()
+    sheet = contact_sheet(capture, evidence, bristle_groom())
     height = round(TILE_WIDTH * scene.cameras[0].height / scene.cameras[0].width)
     assert sheet.shape == (HEADER + 6 * (height + GAP), 8 * (TILE_WIDTH + GAP) + GAP, 3)
     for row in range(6):
@@ -44,7 +36,7 @@ def test_the_sheet_shows_every_stage_of_every_view(
             assert tile.std() > 3, (row, column)
     path = tmp_path / "sheet.png"
     monkeypatch.setattr("hairkit.pipeline.contact_sheet.contact_sheet", lambda *_: sheet)
-    write_contact_sheet(path, capture, masks, maps, shell_hull(), bristle_groom(), scene)
+    write_contact_sheet(path, capture, evidence, bristle_groom())
     stored = cv2.imread(str(path))
     assert stored is not None
     assert (np.asarray(stored)[..., ::-1] == sheet).all()
@@ -52,13 +44,11 @@ def test_the_sheet_shows_every_stage_of_every_view(
 
 def test_the_hue_tells_the_angle() -> None:
     """Strands at a right angle to each other have opposite hues, uncertain ones are dark."""
-    scene, capture = turn_scene(), turn_capture()
-    masks = [ball_mask(camera) for camera in scene.cameras]
-    shape = masks[0].labels.shape
-
+    camera = turn_scene().cameras[0]
+    shape = (camera.height, camera.width)
     shown = [(0.0, 1.0), (np.pi / 2, 1.0), *[(0.0, 0.0)] * 6]
-    maps = [OrientationMap(np.full(shape, a), np.full(shape, sure)) for a, sure in shown]
-    sheet = contact_sheet(capture, masks, maps, shell_hull(), bristle_groom(), scene)
+    maps = tuple(OrientationMap(np.full(shape, a), np.full(shape, sure)) for a, sure in shown)
+    sheet = contact_sheet(turn_capture(), ball_evidence(orientations=maps), bristle_groom())
     tall = (sheet.shape[0] - HEADER) // 6
     middles = GAP + TILE_WIDTH // 2 + np.arange(3) * (TILE_WIDTH + GAP)
     level, upright, unsure = sheet[HEADER + 2 * tall + tall // 2, middles]

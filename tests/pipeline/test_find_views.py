@@ -78,7 +78,7 @@ def find(capture: Capture, folder: Path) -> tuple[Capture, Turnaround | None]:
     recipe = parse_recipe(RECIPE.encode(), "mine", "mine")
     with WorkFolder(folder) as work, ThreadPoolExecutor(1) as pool:
         run = StageRunner(recipe, manager, work, RunLog(Silent()), pool)
-        return find_views(run, capture, RunLog(Silent()))
+        return find_views(run, capture)
 
 
 @pytest.mark.parametrize("lying", [(1, 1, 1), (0, 3, 0)])

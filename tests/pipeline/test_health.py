@@ -9,6 +9,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from ball import ball_evidence
 
 from hairkit.arrays import Float64Array
 from hairkit.cameras.depth_raster import mesh_depth
@@ -31,6 +32,7 @@ HAIR_SIZE = 1.25
 """Size of the surface of the hair over that of the scalp."""
 ROOTS = 60
 HAIR_LENGTH = 0.095
+DISTANCE = ball_evidence().scalp_distance
 SHUFFLED = [3, 6, 0, 5, 1, 7, 2, 4]
 
 
@@ -79,10 +81,15 @@ class Run:
 
     def figures(self) -> dict[str, Figure]:
         """Return the figures by stage and name."""
-        every = assess(
-            self.capture, self.masks, self.scene, self.hull, self.groom, self.roots,
-            self.hair_length, self.turn, self.parting, self.tied,
-        )  # fmt: skip
+        evidence = ball_evidence(
+            masks=self.masks,
+            scene=self.scene,
+            hull=self.hull,
+            scalp_distance=replace(DISTANCE, hair_length=self.hair_length),
+            parting=self.parting,
+            tied=self.tied,
+        )
+        every = assess(self.capture, evidence, self.groom, self.roots, self.turn)
         return {f"{figure.stage}: {figure.name}": figure for figure in every}
 
 

@@ -178,7 +178,7 @@ def test_a_draft_may_see_smaller_pictures(tmp_path: Path, monkeypatch: pytest.Mo
         seen.update(values)
         return measure_ties(**values)
 
-    monkeypatch.setattr("hairkit.pipeline.draft.measure_ties", look)
+    monkeypatch.setattr("hairkit.pipeline.findings.measure_ties", look)
     capture = replace(turn_capture(), views=tuple(views))
     assert len(draft(capture, tmp_path / "work", {}, recipe, manager, 30).strands) == 30
     size = views[0].image.shape[:2]

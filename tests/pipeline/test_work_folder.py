@@ -25,15 +25,15 @@ MASK = ball_mask(turn_scene().cameras[0])
 def test_kept_is_found_again(tmp_path: Path) -> None:
     """What one run puts another gets, equal in every bit, if the digest is the same."""
     with WorkFolder(tmp_path / "work") as work:
-        work.put(MASK, "d1", "segment", "front")
+        work.put(LABELS, MASK, "d1", "front")
     with WorkFolder(tmp_path / "work") as work:
-        found = work.get(Mask, "d1", "segment", "front")
+        found = work.get(LABELS, "d1", "front")
         assert np.array_equal(found.labels, MASK.labels)
         assert found.person_known == MASK.person_known
-        assert work.get(Mask, "d2", "segment", "front") is None
-        assert work.get(Mask, "d1", "segment", "left") is None
+        assert work.get(LABELS, "d2", "front") is None
+        assert work.get(LABELS, "d1", "left") is None
     with WorkFolder(tmp_path / "work", reuse=False) as work:
-        assert work.get(Mask, "d1", "segment", "front") is None
+        assert work.get(LABELS, "d1", "front") is None
 
 
 NAMES = ("one a", "one_a", "one/a", "One_a", "X", "x", "à", "å", "a" * 300, "a" * 299, "..", "con")
@@ -42,11 +42,11 @@ NAMES = ("one a", "one_a", "one/a", "One_a", "X", "x", "à", "å", "a" * 300, "a
 def test_views_share_no_file(tmp_path: Path) -> None:
     """Views of any names have files of their own, where capitals do not count, too; plain names
     stay as they are."""
-    files = [stage_file(tmp_path, "segment", name).name for name in NAMES]
+    files = [stage_file(tmp_path, LABELS, name).name for name in NAMES]
     assert len({file.lower() for file in files}) == len(NAMES)
     for name, file in zip(NAMES, files, strict=True):
         (tmp_path / file).write_text(name)
-    assert stage_file(tmp_path, "segment", "front-left").name == "segment-front-left.npz"
+    assert stage_file(tmp_path, LABELS, "front-left").name == "segment-front-left.npz"
 
 
 def test_the_last_run_is_read_whatever_it_was_made_from(tmp_path: Path) -> None:
@@ -58,14 +58,14 @@ def test_the_last_run_is_read_whatever_it_was_made_from(tmp_path: Path) -> None:
         last.latest(LABELS, "left side")
     with WorkFolder(tmp_path) as work:
         for view in views:
-            work.put(MASK, "d", "segment", view)
+            work.put(LABELS, MASK, "d", view)
     found = last.masks(views)
     assert found is not None
     assert np.array_equal(found[0].labels, MASK.labels)
     assert last.every(LABELS, (*views, "back")) is None
     mended = Mask(MASK.labels, person_known=False)
     with WorkFolder(tmp_path) as work:
-        work.put(Masks((mended, mended)), "d", REFINED.name)
+        work.put(REFINED, Masks((mended, mended)), "d")
     found = last.masks(views)
     assert found is not None
     assert not found[0].person_known
@@ -76,31 +76,31 @@ def test_the_last_run_is_read_whatever_it_was_made_from(tmp_path: Path) -> None:
 def test_a_damaged_file_counts_as_none(tmp_path: Path, size: int) -> None:
     """A stage file cut short is not used."""
     with WorkFolder(tmp_path) as work:
-        work.put(MASK, "d", "segment")
+        work.put(LABELS, MASK, "d")
         work.flush()
         file = tmp_path / "segment.npz"
         file.write_bytes(file.read_bytes()[:size])
-        assert work.get(Mask, "d", "segment") is None
+        assert work.get(LABELS, "d") is None
 
 
 def test_a_flipped_bit_is_noticed(tmp_path: Path) -> None:
     """Every stage file carries checksums."""
     with WorkFolder(tmp_path) as work:
-        work.put(MASK, "d", "segment")
+        work.put(LABELS, MASK, "d")
         work.flush()
         file = tmp_path / "segment.npz"
         data = bytearray(file.read_bytes())
         data[2000] ^= 1
         file.write_bytes(data)
-        assert work.get(Mask, "d", "segment") is None
+        assert work.get(LABELS, "d") is None
 
 
 def test_another_kind_of_content_counts_as_none(tmp_path: Path) -> None:
     """A file of another type under the right digest is not used."""
     with WorkFolder(tmp_path) as work:
-        work.put(turn_scene().cameras[0], "d", "segment")
+        work.put(LABELS, turn_scene().cameras[0], "d")  # type: ignore[misc]
         work.flush()
-        assert work.get(Mask, "d", "segment") is None
+        assert work.get(LABELS, "d") is None
 
 
 def test_leftovers_of_a_killed_run_are_swept(tmp_path: Path) -> None:
@@ -118,7 +118,7 @@ def test_a_full_disk_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(hairkit.pipeline.work_folder, "write_npz", full)
     with pytest.raises(OSError, match="No space left"), WorkFolder(tmp_path) as work:
-        work.put(MASK, "d", "segment")
+        work.put(LABELS, MASK, "d")
 
 
 def test_one_run_at_a_time(tmp_path: Path) -> None:

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
-from hairkit.testing import VIEW_NAMES, ball_mask, bristle_groom, turn_capture, turn_scene
+from hairkit.testing import (
+    VIEW_NAMES,
+    ball_mask,
+    bristle_groom,
+    stage_arguments,
+    turn_capture,
+    turn_scene,
+)
+from hairkit.types.evidence import Evidence
 
 PLUGIN_FILE = Path(__file__).with_name("ball_plugin.py")
 TABLES = ("capture", "segment", "scene", "head", "orient", "hull", "field", "track", "export")
@@ -27,6 +37,12 @@ def write_capture(folder: Path, *, masks: bool = False) -> Path:
         for index, (name, camera) in enumerate(zip(VIEW_NAMES, turn_scene().cameras, strict=True)):
             write_grey(folder / "masks" / f"{index}_{name}.png", ball_mask(camera).labels)
     return folder
+
+
+def ball_evidence(**changes: Any) -> Evidence:
+    """Return what field and strands of the made-up head are made from, some of it changed."""
+    given = stage_arguments("track")
+    return Evidence(**{each.name: given[each.name] for each in fields(Evidence)} | changes)
 
 
 def write_groom_file(path: Path) -> Path:

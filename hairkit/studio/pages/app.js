@@ -8,14 +8,6 @@ import * as strands from "./strands.js";
 import * as hair from "./hair.js";
 
 const pages = { photos, capture, annotate, pose, strands, hair };
-const stageNames = {
-  draft: "a quick preview",
-  landmarks: "looking for faces", person: "looking for the person", turn: "ordering the photos",
-  segment: "finding hair", scene: "placing cameras", refine: "comparing masks", head: "fitting the head",
-  orient: "following strands in photos", waves: "measuring waves", hull: "carving the volume",
-  distance: "measuring thickness", parting: "finding the parting", field: "spreading directions",
-  hairline: "finding the hairline", track: "growing strands", sheet: "drawing the overview",
-};
 let leave = () => {};
 let current = "";
 
@@ -36,9 +28,9 @@ function show() {
 
 function showBuild(state) {
   document.getElementById("name").textContent = state.name || "hairkit studio";
-  const { state: phase, stage, share, reason } = state.build;
+  const { state: phase, words, share, reason } = state.build;
   const text = {
-    running: stageNames[stage] ? `Making hair: ${stageNames[stage]}` : "Making hair",
+    running: words ? `Making hair: ${words}` : "Making hair",
     waiting: "Changed: the hair is made again", done: "Hair is ready", failed: reason,
   }[phase] ?? "";
   const place = document.getElementById("build-text");
