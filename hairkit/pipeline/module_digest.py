@@ -1,10 +1,11 @@
 """Digests of source code: a cached result is valid as long as the code that made it.
 
 The digest of a module covers its own source and every module that it imports, directly or not,
-as far as they belong to hairkit or to the module's own top-level package. Imports are read from
-the source by their form, without running or parsing it. Modules named only in strings
-(`importlib.import_module`) and files that a module loads at run time, such as shaders, are not
-covered.
+as far as they belong to hairkit or to the module's own top-level package. It also covers the files
+beside these modules that they name: weights, tables, pictures. Imports and names are read from the
+source by their form, without running or parsing it. Modules named only in strings
+(`importlib.import_module`) are not covered, and neither are the shaders of hairkit: no result that
+is kept is drawn.
 """
 
 from __future__ import annotations
@@ -28,8 +29,10 @@ _STATEMENT = re.compile(
     r"|import[ \t]+([^#;\n]+))",
     re.MULTILINE,
 )
-"""An import: leading dots, module and names, or modules alone. A line of a docstring that reads
-like one only makes the digest cover more."""
+"""An import: leading dots, module and names, or modules alone. Docstring lines that look like
+imports are followed too; that is harmless."""
+_FILE_NAME = re.compile(r"""["']([\w-][\w.-]*\.(?!py["'])\w+)["']""")
+"""A name with an ending in quotes: that of a file, if there is one beside the module."""
 _FOR_TYPES = re.compile(
     r"^([ \t]*)if (?:typing\.)?TYPE_CHECKING:.*\n((?:\1[ \t]+.*(?:\n|$)|[ \t]*\n)*)", re.MULTILINE
 )
@@ -69,11 +72,14 @@ def module_digest(module: str, roots: Roots | None = None) -> str:
     if known is not None and known.states == _states(known.files):
         return known.digest
     found = sorted(imported_modules(module, roots).items())
-    files = tuple(path for _, path in found)
+    data = [file for _, path in found for file in _data_beside(path)]
+    files = (*(path for _, path in found), *data)
     states = _states(files)
     digest = hashlib.sha256()
     for name, path in found:
         digest.update(f"{name} {_read(path).digest}\n".encode())
+    for file in data:
+        digest.update(f"{file.name} {_content_digest(file, *_state(file))}\n".encode())
     known = _DIGESTS[key] = _Known(files, states, digest.hexdigest())
     return known.digest
 
@@ -115,6 +121,17 @@ def imported_modules(module: str, roots: Roots | None = None) -> dict[str, Path]
         if path is not None:
             waiting += _direct_imports(name, path, known)
     return {name: path for name, path in found.items() if path is not None}
+
+
+def _data_beside(path: Path) -> list[Path]:
+    """Return the files beside a module that it names, sorted."""
+    return sorted(file for name in _read(path).names if (file := path.with_name(name)).is_file())
+
+
+@functools.cache
+def _content_digest(path: Path, modified: int, size: int) -> str:
+    """Read a file once; `modified` and `size` are there to read it again after a change."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _direct_imports(name: str, path: Path, roots: Roots) -> Iterator[str]:
@@ -190,10 +207,11 @@ def _source(module: str, roots: Roots) -> Path | None:
 
 @dataclass(frozen=True)
 class _Source:
-    """Content digest and imports of one file."""
+    """Content digest and imports of one file, and what may be names of files in it."""
 
     digest: str
     imports: tuple[_Import, ...]
+    names: frozenset[str]
 
 
 def _read(path: Path) -> _Source:
@@ -211,7 +229,8 @@ def _parse(path: Path, modified: int, size: int) -> _Source:
     if any(item.module == FRONT_DOOR and not item.names for item in imports):
         used = re.findall(rf"\b{FRONT_DOOR}\.([A-Za-z]\w*)", text)
         imports.append(_Import(FRONT_DOOR, tuple(dict.fromkeys(used))))
-    return _Source(hashlib.sha256(data).hexdigest(), tuple(imports))
+    names = frozenset(_FILE_NAME.findall(text))
+    return _Source(hashlib.sha256(data).hexdigest(), tuple(imports), names)
 
 
 def _imports(text: str, for_types: bool) -> Iterator[_Import]:

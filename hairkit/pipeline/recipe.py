@@ -121,10 +121,10 @@ class Recipe:
         if stage.absent is not None:
             found = manager.find_first(stage.hook, choices, **arguments)
             return cast(_Result, found[1]) if found is not None else stage.absent()
-        if stage.several:
-            found = manager.call_first(stage.hook, choices, **arguments)[1]
-        else:
+        if len(choices) == 1:
             found = manager.call(stage.hook, *choices[0], **arguments)
+        else:
+            found = manager.call_first(stage.hook, choices, **arguments)[1]
         return cast(_Result, found)
 
     def only(self, *kept: Stage[Any]) -> Recipe:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from hairkit.cli import main
 from hairkit.errors import InputError
 from hairkit.head_model import photo_skin
 from hairkit.head_model.template import default_head
+from hairkit.io.capture_reader import read_capture, sample_folder
 from hairkit.io.head_reader import read_head
 from hairkit.pipeline.head_alone import ENDINGS, photograph_head, write_head
 from hairkit.types.head import Head
@@ -40,6 +42,34 @@ def test_other_endings_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixtur
         write_head(tmp_path / "head.abc", default_head())
     assert main(["head", str(tmp_path), "-o", str(tmp_path / "head.abc")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_choices_of_a_capture_hold_for_the_head(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Options in capture.toml are used, wrong ones refused as by `reconstruct`; a head that was
+    moved by hand has the skin of its place."""
+    folder = tmp_path / "sample"
+    shutil.copytree(sample_folder(), folder)
+    said = []
+    for verb in ("head", "reconstruct"):
+        (folder / "capture.toml").write_text("[options]\nthin_plate.nonsense = 3\n")
+        out = tmp_path / ("head.npz" if verb == "head" else "out")
+        assert main([verb, str(folder), "-o", str(out)]) == 2
+        said.append(capsys.readouterr().err)
+    assert said[0] == said[1]
+    assert "no option 'nonsense'" in said[0]
+    plain = photograph_head(read_capture(sample_folder(), 300))
+    (folder / "capture.toml").write_text("[fitted_head]\nscale = 1.1\n")
+    moved = photograph_head(read_capture(folder, 300))
+    assert plain.head.maps is not None
+    assert plain.head.maps.albedo is not None
+    assert moved.head.maps is not None
+    assert moved.head.maps.albedo is not None
+    colours = [maps.albedo.pixels.astype(int) for maps in (plain.head.maps, moved.head.maps)]
+    assert np.abs(colours[0] - colours[1]).mean() > 1
+    first, second = (scene.cameras[0].project(scene.head.vertices) for scene in (plain, moved))
+    assert np.abs(first - second).max() > 2
 
 
 def test_photos_give_cameras_and_a_skin(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from hairkit.manager.loading import import_file
 from hairkit.pipeline import recipe as recipe_module
 from hairkit.pipeline.module_digest import Roots, imported_modules, module_digest
 from hairkit.pipeline.recipe import load_recipe, stage_digest
+from hairkit.stages import EXPORT, OF_TABLE
 
 PROJECT = Path(__file__).parents[2]
 
@@ -68,6 +69,9 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
         ("plugins/thin_plate.py", "head"),
         ("plugins/silhouette/landmark_transfer.py", "scene"),
         ("plugins/tensor_diffusion.py", ""),
+        ("hairkit/imaging/hair_network.npz", "segment"),
+        ("hairkit/head_model/template_skin.jpg", ""),
+        ("hairkit/recipes/thesis.toml", ""),
     ],
 )
 def test_a_changed_file_runs_again_the_stages_that_import_it(
@@ -76,11 +80,57 @@ def test_a_changed_file_runs_again_the_stages_that_import_it(
     """Of the default recipe exactly the stages whose plugins import a file depend on it."""
     before = stage_digests(tree, monkeypatch)
     path = tree["hairkit"].parent / changed
-    text = path.read_text()
-    path.write_text(f"{text}\n# changed\n")
+    text = path.read_bytes()
+    path.write_bytes(text + b"\n# changed\n")
     after = stage_digests(tree, monkeypatch)
-    path.write_text(text)
+    path.write_bytes(text)
     assert {table for table in CACHED if before[table] != after[table]} == set(again.split())
+
+
+@pytest.mark.parametrize(
+    ("module", "changed"),
+    [
+        ("hairkit_plugins.face_mesh", "plugins/face_mesh/landmark_table.csv"),
+        ("hairkit_plugins.auto_matte", "hairkit/imaging/hair_network.npz"),
+        ("hairkit.head_model.template_skin", "hairkit/head_model/template_skin.jpg"),
+    ],
+)
+def test_a_file_that_a_module_names_counts_as_its_source(
+    module: str, changed: str, tree: Roots
+) -> None:
+    """Weights, tables and pictures beside a module change its digest, and that of no other."""
+    others = ("hairkit.field.diffusion", "hairkit_plugins.structure_tensor")
+    before = [module_digest(name, tree) for name in (module, *others)]
+    path = tree["hairkit"].parent / changed
+    data = path.read_bytes()
+    path.write_bytes(data + b"\0")
+    after = [module_digest(name, tree) for name in (module, *others)]
+    path.write_bytes(data)
+    assert after[0] != before[0]
+    assert after[1:] == before[1:]
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        "head_model.photo_skin",
+        "head_model.hairline",
+        "imaging.waves",
+        "field.ties",
+        "field.find_parting",
+        "field.growth_prior",
+    ],
+)
+def test_no_measured_result_is_drawn(module: str) -> None:
+    """Digests do not cover shaders, so what is kept may not depend on them."""
+    assert "hairkit.rendering.context" not in imported_modules(f"hairkit.{module}")
+
+
+def test_no_stage_of_a_run_draws(manager: Manager) -> None:
+    """Of the plugins for stages whose results are kept none uses the shaders."""
+    for stage in OF_TABLE.values():
+        for name in manager.names(stage.hook) if stage is not EXPORT else ():
+            assert "hairkit.rendering.context" not in imported_modules(manager.info(name).module)
 
 
 def test_what_is_read_is_what_python_imports() -> None:

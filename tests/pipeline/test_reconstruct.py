@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,12 +22,24 @@ from hairkit.pipeline.recipe import parse_recipe
 from hairkit.pipeline.reconstruct import export_paths, reconstruct
 from hairkit.pipeline.run_record import RECORD
 from hairkit.progress import Recorder, Silent
+from hairkit.stages import NEW, ROWS
 from hairkit.storage import to_arrays
 from hairkit.testing import ball_head, turn_capture, turn_scene
 from hairkit.types.chosen import Chosen, ChosenHair
 from hairkit.types.scene import read_cameras
 
 STAGES = ["segment", "scene", "head", "orient", "hull", "field", "track"]
+
+
+class Heard(Silent):
+    """Remembers which stages ended."""
+
+    def __init__(self) -> None:
+        self.ended: list[str] = []
+
+    def finished(self, stage: str, seconds: float, reused: bool) -> None:
+        """Remember it."""
+        self.ended.append(stage)
 
 
 def run(out: Path, *settings: str, extra: dict[str, object] | None = None, **choices: Any) -> Groom:
@@ -159,6 +172,29 @@ def test_a_draft_follows_a_change_without_the_cameras(tmp_path: Path) -> None:
     assert quick.head.vertices.shape == whole.head.vertices.shape
     with pytest.raises(InputError, match="run all stages first"):
         draft(capture, tmp_path / "nothing", {}, recipe, manager, 30)
+
+
+def test_a_draft_reads_what_the_table_of_stages_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without a touched photo only new stages run; a parting is measured where one was drawn."""
+    run(tmp_path, guides=50)
+    manager = Manager()
+    manager.register(ball_plugin, "ball_plugin")
+    recipe = parse_recipe(RECIPE.encode(), "ball", "test")
+    views = [replace(v, photo_path=Path(f"{v.name}.jpg")) for v in turn_capture().views]
+    heard = Heard()
+    draft(Capture(tuple(views)), tmp_path / "work", {}, recipe, manager, 30, heard)
+    ended = set(heard.ended)
+    assert ended == {"hull", "distance", "ties", "field", "track"}
+    assert ended <= {row.name for row in ROWS if row.draft is NEW}
+    strokes = tmp_path / "front.json"
+    line = {"label": "parting", "shape_type": "linestrip", "points": [[30, 40], [60, 42]]}
+    strokes.write_text(json.dumps({"shapes": [line], "imageWidth": 96, "imageHeight": 128}))
+    views[0] = replace(views[0], strokes_path=strokes)
+    drawn, heard = {"front.jpg": tmp_path / "seen"}, Heard()
+    draft(Capture(tuple(views)), tmp_path / "work", drawn, recipe, manager, 30, heard)
+    assert set(heard.ended) == ended | {"parting"}
 
 
 def test_a_draft_may_see_smaller_pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

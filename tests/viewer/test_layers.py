@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hairkit import stages
 from hairkit.errors import InputError
 from hairkit.manager import Manager
+from hairkit.pipeline.work_folder import WorkFolder
 from hairkit.rendering.context import renderer
-from hairkit.storage import Stored, to_arrays, write_npz
 from hairkit.testing import (
     ball_mask,
     bristle_groom,
@@ -27,22 +30,21 @@ from hairkit.viewer.session import Session
 SCENE = turn_scene()
 
 
-def keep(folder: Path, name: str, value: Stored) -> None:
-    """Write a stage's result as the work folder does."""
-    write_npz(folder / f"{name}.npz", to_arrays(value) | {"work_digest": np.asarray("x")})
+def keep_views(work: WorkFolder, names: Sequence[str]) -> None:
+    """Keep masks and orientation maps of the views, and the scene, by these names."""
+    work.put(stages.SCENE, replace(SCENE, names=tuple(names)), "x")
+    for name, camera in zip(names, SCENE.cameras, strict=True):
+        work.put(stages.LABELS, ball_mask(camera), "x", name)
+        work.put(stages.ORIENTED, combed_orientation(ball_mask(camera)), "x", name)
 
 
 @pytest.fixture
 def results(tmp_path: Path) -> Path:
     """A folder of results, as `reconstruct` leaves it."""
-    work = tmp_path / "work"
-    work.mkdir()
-    keep(work, "scene", SCENE)
-    keep(work, "hull", shell_hull())
-    keep(work, "field", combed_field(shell_hull().grid))
-    for name, camera in zip(SCENE.names, SCENE.cameras, strict=True):
-        keep(work, f"segment-{name}", ball_mask(camera))
-        keep(work, f"orient-{name}", combed_orientation(ball_mask(camera)))
+    with WorkFolder(tmp_path / "work") as work:
+        keep_views(work, SCENE.names)
+        work.put(stages.HULL, shell_hull(), "x")
+        work.put(stages.FIELD, combed_field(shell_hull().grid), "x")
     bristle_groom().save(tmp_path / "groom.npz")
     return tmp_path
 
@@ -57,6 +59,17 @@ def test_a_picture_in_space_covers_what_its_camera_sees(results: Path) -> None:
             corners = camera.project(billboards[name].corners)
             size = np.array([camera.width, camera.height])
             np.testing.assert_allclose(corners, [[0, 0], [1, 0], [0, 1], [1, 1]] * size, atol=1e-3)
+
+
+def test_a_view_may_have_any_name(tmp_path: Path) -> None:
+    """A view called `left side` has its mask and its directions like all others."""
+    names = ("left side", *SCENE.names[1:])
+    with WorkFolder(tmp_path / "work") as work:
+        keep_views(work, names)
+    layers = Layers(Manager(), tmp_path)
+    assert {"masks", "orientation", "cameras"} <= {*layers.available}
+    assert sorted(layers.billboards("masks")) == sorted(names)
+    assert sorted(layers.billboards("orientation")) == sorted(names)
 
 
 def test_masks_show_hair_and_orientation_shows_upright_strands_in_one_hue(results: Path) -> None:
