@@ -7,7 +7,7 @@ Eight cameras see it, 45 degrees apart. Nothing here is random.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import cv2
 import numpy as np
@@ -18,20 +18,18 @@ from hairkit.io.capture_reader import TURN
 from hairkit.stages import OF_HOOK
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
+from hairkit.types.evidence import Evidence
 from hairkit.types.face import Face
 from hairkit.types.groom import Groom
 from hairkit.types.head import Capsules, Head, Roots
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
-from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.scene import Scene
 from hairkit.types.skin import Texture
 from hairkit.types.strands import Strands
 from hairkit.types.texture_example import TextureExample
-from hairkit.types.tie import TiedHair
 from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_products
-from hairkit.types.waves import Waves
 
 VIEW_NAMES = tuple(TURN)
 """Views of the nominal turn, 45 degrees apart, towards the subject's left."""
@@ -93,13 +91,11 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
         "orientations": tuple(combed_orientation(mask) for mask in masks),
         "hull": hull,
         "field": combed_field(hull.grid),
-        "waves": Waves(),
         "scalp_distance": measure_scalp_distance(scene.head, hull),
-        "parting": Parting(),
-        "tied": TiedHair(),
         "roots": scalp_roots(scene.head),
     }
-    return {name: every[name] for name in OF_HOOK[stage].takes}
+    kinds = get_type_hints(Evidence)
+    return {name: every[name] if name in every else kinds[name]() for name in OF_HOOK[stage].takes}
 
 
 def striped_view(angle_deg: float, *, name: str = "front", azimuth_deg: float = 0.0) -> View:

@@ -141,12 +141,12 @@ class Drafted(Findings):
         return Given.of(replace(scene.resized(sizes), residual_px=misfit))
 
     @found
-    def masks(self) -> Views[Mask]:
+    def view_masks(self) -> Views[Mask]:
         """Masks of the last run, found again where a photo was touched."""
         return [completed(Given(self._mask(k), "")) for k in range(len(self.capture.views))]
 
     @found
-    def orientations(self) -> Views[OrientationMap]:
+    def view_orientations(self) -> Views[OrientationMap]:
         """Directions of the last run, found again where a photo was touched."""
         return [completed(Given(self._angles(view), "")) for view in self.capture.views]
 

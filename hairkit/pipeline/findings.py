@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, Generic, TypeVar
 
 from hairkit.cameras.similarity import move_head
@@ -170,7 +170,7 @@ class Findings:
         return Given.of(self.capture.plain())
 
     @found
-    def labels(self) -> Views[Mask]:
+    def view_labels(self) -> Views[Mask]:
         """Masks of single photos."""
         return self.run.every_view(LABELS, [given_photo(view) for view in self.plain.value.views])
 
@@ -180,50 +180,52 @@ class Findings:
         given = all(view.mask_path for view in self.plain.value.views)
         if given or not self.run.recipe.has(REFINED):
             return None
-        return self._solve(FIRST_SCENE, gather(self.labels))
+        return self._solve(FIRST_SCENE, gather(self.view_labels))
 
     @result_of(REFINED)
     def refined(self) -> Given[Masks]:
         """Masks that all views mended together, those that were given, too."""
         assert self.first_scene is not None  # else nobody asks
-        masks = gather(self.labels)
+        masks = gather(self.view_labels)
         return self.run.once(REFINED, capture=self.plain, masks=masks, scene=self.first_scene)
 
     @found
-    def masks(self) -> Views[Mask]:
+    def view_masks(self) -> Views[Mask]:
         """Masks that hold: those given, and the others mended by where the head is."""
         if self.first_scene is None:
-            return self.labels
-        triples = zip(self.plain.value.views, self.labels, self.refined.value.views, strict=True)
+            return self.view_labels
+        triples = zip(
+            self.plain.value.views, self.view_labels, self.refined.value.views, strict=True
+        )
         return [old if view.mask_path else _changed(old, new) for view, old, new in triples]
 
     @found
-    def all_masks(self) -> Given[tuple[Mask, ...]]:
+    def masks(self) -> Given[tuple[Mask, ...]]:
         """Masks that hold, of all views."""
-        return gather(self.masks)
+        return gather(self.view_masks)
 
     @found
-    def orientations(self) -> Views[OrientationMap]:
+    def view_orientations(self) -> Views[OrientationMap]:
         """Directions of the strands in each photo, as the user toned it."""
         toned = [given_photo(view.toned()) for view in self.capture.views]
-        return self.run.every_view(ORIENTED, toned, mask=self.masks)
+        return self.run.every_view(ORIENTED, toned, mask=self.view_masks)
 
     @found
-    def all_orientations(self) -> Given[tuple[OrientationMap, ...]]:
+    def orientations(self) -> Given[tuple[OrientationMap, ...]]:
         """Directions of the strands in all photos."""
-        return gather(self.orientations)
+        return gather(self.view_orientations)
 
     @result_of(SCENE)
     def solved(self) -> Given[Scene]:
         """The cameras, and the head's size and pose."""
-        return self._solve(SCENE, self.all_masks, self.first_scene)
+        return self._solve(SCENE, self.masks, self.first_scene)
 
     @result_of(FITTED)
     def fitted(self) -> Given[Scene]:
         """The cameras and the head with the person's shape."""
         if not self.run.recipe.has(FITTED):
             return self.solved
-        return self.run.once(FITTED, capture=self.plain, masks=self.all_masks, scene=self.solved)
+        return self.run.once(FITTED, capture=self.plain, masks=self.masks, scene=self.solved)
 
     @found
     def scene(self) -> Given[Scene]:
@@ -245,7 +247,7 @@ class Findings:
     def photographed(self) -> Given[SkinMaps]:
         """The skin that the photos show."""
         return self.run.derive(
-            SKIN, photograph_skin, capture=self.plain, scene=self.scene, masks=self.all_masks
+            SKIN, photograph_skin, capture=self.plain, scene=self.scene, masks=self.masks
         )
 
     @result_of(TEXTURE)
@@ -266,7 +268,7 @@ class Findings:
     @result_of(HULL)
     def hull(self) -> Given[Hull]:
         """The volume that hair fills."""
-        return self.run.once(HULL, scene=self.scene, masks=self.all_masks)
+        return self.run.once(HULL, scene=self.scene, masks=self.masks)
 
     @result_of(DISTANCE)
     def scalp_distance(self) -> Given[ScalpDistance]:
@@ -277,8 +279,8 @@ class Findings:
     def measured_waves(self) -> Given[Waves]:
         """The waves that the photos show."""
         return self.run.derive(
-            WAVES, measure_waves, capture=self.plain, orientations=self.all_orientations,
-            scalp_distance=self.scalp_distance, masks=self.all_masks, cameras=self.cameras,
+            WAVES, measure_waves, capture=self.plain, orientations=self.orientations,
+            scalp_distance=self.scalp_distance, masks=self.masks, cameras=self.cameras,
         )  # fmt: skip
 
     @found
@@ -291,8 +293,8 @@ class Findings:
     def tied(self) -> Given[TiedHair]:
         """The ties, and the tails that hang from them."""
         return self.run.derive(
-            TIES, measure_ties, orientations=self.all_orientations, head=self.head,
-            hull=self.hull, scalp_distance=self.scalp_distance, masks=self.all_masks,
+            TIES, measure_ties, orientations=self.orientations, head=self.head,
+            hull=self.hull, scalp_distance=self.scalp_distance, masks=self.masks,
             cameras=self.cameras,
         )  # fmt: skip
 
@@ -300,23 +302,16 @@ class Findings:
     def parting(self) -> Given[Parting]:
         """How the crown is combed."""
         return self.run.derive(
-            PARTING, measure_parting, capture=self.plain, orientations=self.all_orientations,
+            PARTING, measure_parting, capture=self.plain, orientations=self.orientations,
             head=self.head, tied=self.tied, hull=self.hull, scalp_distance=self.scalp_distance,
-            masks=self.all_masks, cameras=self.cameras,
+            masks=self.masks, cameras=self.cameras,
         )  # fmt: skip
 
     @found
     def evidence(self) -> Given[Evidence]:
-        """All that field and strands are made from."""
+        """All that field and strands are made from: the results by these names."""
         parts: dict[str, Given[Any]] = {
-            "scene": self.scene,
-            "masks": self.all_masks,
-            "orientations": self.all_orientations,
-            "hull": self.hull,
-            "waves": self.waves,
-            "scalp_distance": self.scalp_distance,
-            "parting": self.parting,
-            "tied": self.tied,
+            each.name: getattr(self, each.name) for each in fields(Evidence)
         }
         digest = digest_of([part.digest for part in parts.values()])
         return Given(Evidence(**{name: part.value for name, part in parts.items()}), digest)
@@ -329,7 +324,7 @@ class Findings:
     @result_of(HAIRLINE)
     def hairline(self) -> Given[Hairline]:
         """Where on the head hair grows."""
-        return self.run.derive(HAIRLINE, measure_hairline, scene=self.scene, masks=self.all_masks)
+        return self.run.derive(HAIRLINE, measure_hairline, scene=self.scene, masks=self.masks)
 
     @found
     def grown_head(self) -> Head:
@@ -351,7 +346,7 @@ class Findings:
     @found
     def groom(self) -> Groom:
         """The strands on the head with its skin, their colours from the photos."""
-        _ = self.orientations, self.scene  # what runs beside waits for no task behind it
+        _ = self.view_orientations, self.scene  # what runs beside waits for no task behind it
         skin = self.run.beside(lambda: self.skin)  # strands need none of it
         evidence, strands = self.evidence.value, self.strands.value
         return assemble_groom(

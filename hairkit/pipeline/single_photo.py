@@ -66,5 +66,5 @@ def see_photo(
     with WorkFolder(folder) as work, ThreadPoolExecutor(1) as pool:
         run = StageRunner(recipe, manager, work, RunLog(Silent()), pool)
         found = Findings(run, Capture((view,)))
-        orientation = found.all_orientations.value[0] if strands else None
-        return SeenPhoto(found.capture.views[0], found.all_masks.value[0], orientation)
+        orientation = found.orientations.value[0] if strands else None
+        return SeenPhoto(found.capture.views[0], found.masks.value[0], orientation)

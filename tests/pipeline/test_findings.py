@@ -108,7 +108,7 @@ def test_the_order_of_questions_changes_no_byte(
     """Whether skin or strands are asked for first, the groom is the same in every bit."""
     read, recipe = CASES[name]
     with findings_of(read(), load_recipe(recipe), manager, tmp_path) as findings:
-        _ = findings.skin, findings.hairline, findings.parting, findings.orientations
+        _ = findings.skin, findings.hairline, findings.parting, findings.view_orientations
         assert digest(findings.groom) == first[1][name]
 
 
