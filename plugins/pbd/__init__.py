@@ -108,8 +108,8 @@ class Options:
     backend: str = option(
         "auto",
         choices=("auto", "reference", "fast", "compute"),
-        doc="fast: compiled, float32; reference: the same in float64; compute: shaders; auto:"
-        " compute on a graphics card, else fast.",
+        doc="fast: compiled, float32; reference: the same in float64; compute: shaders; auto: fast,"
+        " on graphics cards too, where compute has not been timed.",
     )
 
     def resolved(self, physics: HairPhysics) -> Options:
