@@ -33,6 +33,11 @@ if TYPE_CHECKING:
 
 __all__ = ["Options"]
 
+MIDDLE_PULL = 40.0
+"""1/s: angular frequency of the pull to the captured shape at a stiffness of 0.5, 6 Hz."""
+UNREACHED = 1.001
+"""Stiffness at which that pull would be infinite: just above the largest, 1."""
+
 
 @dataclass(frozen=True)
 class Options:
@@ -125,7 +130,7 @@ class Options:
     def pull(self) -> float:
         """Return the squared frequency of the pull to the captured shape at the root, 1/s^2."""
         share = self.stiffness or 0.0
-        return (40.0 * share / (1.001 - share)) ** 2
+        return (MIDDLE_PULL * share / (UNREACHED - share)) ** 2
 
 
 @hookimpl

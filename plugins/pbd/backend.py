@@ -11,7 +11,7 @@ from hairkit.arrays import Float64Array
 from hairkit.parallel import parallel_for
 
 from . import block
-from .block import Contact, Steps
+from .block import Blocks, Contact, StepArrays, Steps
 from .kernels import run_substeps
 from .linear_system import System
 from .rods import Rods, State, rest_state
@@ -21,7 +21,7 @@ class Engine(ABC):
     """A backend: how the state is kept; subclasses advance it."""
 
     rows: Any
-    """(B, L, n, 16 or more) `block.STATE` of B times L rods, of which the last ones may be void."""
+    """(B, L, n, 16 or more) `block.NodeState` of B times L rods; the last ones may be void."""
     mass: Any
     """(B, L, n) kilograms; 0 of void rods."""
 
@@ -45,7 +45,7 @@ class Engine(ABC):
         self.rows = rows[:, None]
 
     @abstractmethod
-    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
+    def run(self, system: System, steps: StepArrays, outer: Float64Array) -> None:
         """Do the substeps; `outer` is `block.acting`."""
 
 
@@ -66,7 +66,7 @@ class FastEngine(Engine):
         self._planes[:, :, : block.CONSTANT] = 0.0
         self._planes[:, :, : rows.shape[2]] = block.pack_lanes(rows, self._kind)
 
-    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
+    def run(self, system: System, steps: StepArrays, outer: Float64Array) -> None:
         """Do the substeps; `outer` is `block.acting`."""
         contact, kind = self.contact, self._kind
         if self._system is not system:
@@ -76,11 +76,13 @@ class FastEngine(Engine):
         parallel_for(
             run_substeps,
             len(self._planes),
-            block.records(self._planes, block.NODE[kind]),
-            self._metric,
-            np.zeros(self.rods.nodes + 2, block.WORK[kind]),
+            Blocks(
+                block.records(self._planes, block.NODE[kind]),
+                self._metric,
+                block.records(block.pack_lanes(outer, kind), block.ACTING[kind]),
+            ),
+            np.zeros((1, self.rods.nodes + 2), block.WORK[kind]),
             Steps(*(part.astype(kind) for part in steps)),
-            block.records(block.pack_lanes(outer, kind), block.ACTING[kind]),
             contact.bodies.fields,
             block.settings_of(system, contact, kind),
         )

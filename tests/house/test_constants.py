@@ -23,8 +23,8 @@ FORMATS = (
     ),
 )
 """Readers and writers of files: integers in them are given by the format."""
-LEFT_OUT = ("plugins/pbd/", "hairkit/viewer/draw/")
-"""The rod solver and the loops that draw the viewer's hair."""
+LEFT_OUT = ("hairkit/viewer/draw/",)
+"""The loops that draw the viewer's hair."""
 
 
 def unnamed_literals(source: str, *, integers: bool = True) -> Iterator[tuple[int, str]]:

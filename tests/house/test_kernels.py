@@ -6,18 +6,50 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-REBUILT = ("plugins/pbd/", "hairkit/viewer/draw/")
-"""Kernels of the dynamics and of the viewer's hair, which keep their own layout of arrays."""
+REBUILT = ("hairkit/viewer/draw/",)
+"""Kernels of the viewer's hair, which keep their own layout of arrays."""
 LARGEST_COMPONENT = 3
 """Subscripts up to this are coordinates: of points, colours, and of rigid motions (4, 4)."""
-COMPILERS = {"njit", "jit", "vectorize", "guvectorize", "compiled", "compiled_with"}
+NUMBA = {"njit", "jit", "vectorize", "guvectorize"}
+"""Numba's decorators, of which those of the house are made."""
 
 
-def kernels(source: str) -> Iterator[ast.FunctionDef]:
-    """Yield the compiled functions of a module."""
+def decorators(sources: list[str]) -> set[str]:
+    """Return the names of decorators that compile: Numba's, and those that modules make of them.
+
+    `stage = compiled_with(fastmath=True)`, or a function that calls one of them in its body.
+    """
+    modules = [ast.parse(source) for source in sources]
+    used = {name for module in modules for one in ast.walk(module) for name in _decorated(one)}
+    made = [pair for module in modules for pair in _made_of(module) if pair[0] in used]
+    found = set(NUMBA)
+    while more := {name for name, called in made if called & found} - found:
+        found |= more
+    return found
+
+
+def _decorated(node: ast.AST) -> set[str]:
+    """Return the names of a function's decorators."""
+    return {*map(_last_name, node.decorator_list)} if isinstance(node, ast.FunctionDef) else set()
+
+
+def _made_of(module: ast.Module) -> Iterator[tuple[str, set[str]]]:
+    """Yield the names that a module defines, and what is called to make each or in its body."""
+    for node in module.body:
+        called = {_last_name(call) for call in ast.walk(node) if isinstance(call, ast.Call)}
+        if isinstance(node, ast.FunctionDef):
+            yield node.name, called - _decorated(node)
+        elif isinstance(node, ast.AnnAssign):
+            yield _last_name(node.target), called
+        elif isinstance(node, ast.Assign):
+            yield from ((_last_name(target), called) for target in node.targets)
+
+
+def kernels(source: str, compilers: set[str] = NUMBA) -> Iterator[ast.FunctionDef]:
+    """Yield the functions of a module that one of the `decorators` compiles."""
     for function in ast.walk(ast.parse(source)):
         if isinstance(function, ast.FunctionDef) and any(
-            _last_name(decorator) in COMPILERS for decorator in function.decorator_list
+            _last_name(decorator) in compilers for decorator in function.decorator_list
         ):
             yield function
 
@@ -70,13 +102,15 @@ def _last_name(node: ast.expr) -> str:
 
 def all_kernels(project: Path) -> list[tuple[str, ast.FunctionDef]]:
     """Return name and tree of all kernels but those of `REBUILT`."""
-    found = []
-    for folder in ("hairkit", "plugins"):
-        for file in sorted((project / folder).rglob("*.py")):
-            name = file.relative_to(project).as_posix()
-            if not name.startswith(REBUILT):
-                found += [(f"{name}:{k.name}", k) for k in kernels(file.read_text())]
-    return found
+    files = [file for folder in ("hairkit", "plugins") for file in (project / folder).rglob("*.py")]
+    sources = {file.relative_to(project).as_posix(): file.read_text() for file in sorted(files)}
+    compilers = decorators([*sources.values()])
+    return [
+        (f"{name}:{kernel.name}", kernel)
+        for name, source in sources.items()
+        if not name.startswith(REBUILT)
+        for kernel in kernels(source, compilers)
+    ]
 
 
 def test_kernels_are_typed(project: Path) -> None:
@@ -135,14 +169,22 @@ def test_arrays_are_returned_to_python_alone(project: Path) -> None:
 def test_faults_of_kernels_are_found() -> None:
     """Untyped parameters and results, columns of numbers, and arrays that kernels get from others;
     points and slices are left alone."""
-    made = "@compiled\ndef f(n: int) -> Float64Array: ...\n"
-    assert array_callers([*kernels(made + "@compiled\ndef g() -> float:\n    return f(3)[0]")]) == [
-        ("g", "f")
-    ]
+    made = "@jit\ndef f(n: int) -> Float64Array: ...\n@jit\ndef g() -> float:\n    return f(3)[0]"
+    assert array_callers([*kernels(made)]) == [("g", "f")]
     [kernel] = kernels("@numba.njit(cache=True)\ndef f(p, i: int):\n    return p[i, 12] + p[15]")
     assert untyped_arguments(kernel) == ["p", "return"]
     assert column_numbers(kernel) == ["p[i, 12]", "p[15]"]
-    [kernel] = kernels("@compiled\ndef f(p: A) -> float:\n    return p[0, 2] + p[-1] + p[3:6]")
+    [kernel] = kernels("@njit\ndef f(p: A) -> float:\n    return p[0, 2] + p[-1] + p[3:6]")
     assert untyped_arguments(kernel) == []
     assert column_numbers(kernel) == []
     assert list(kernels("def plain(p):\n    return p[12]")) == []
+
+
+def test_decorators_of_the_house_are_found() -> None:
+    """A name counts that is made of one that counts, in whatever module; others do not."""
+    first = "def compiled(f):\n    def inner():\n        return njit(f)\n    return inner"
+    second = "stage = compiled(fast=True)\ninlined: Any = stage(1)\ncached = cache()\n"
+    use = "".join(f"@{n}\ndef {n}_f(p): ...\n" for n in ("compiled", "stage", "inlined", "cached"))
+    found = decorators([use, second, first])
+    assert found == NUMBA | {"compiled", "stage", "inlined"}
+    assert [kernel.name for kernel in kernels(use, found)] == ["compiled_f", "stage_f", "inlined_f"]
