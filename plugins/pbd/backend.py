@@ -9,6 +9,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import parallel_for
+from hairkit.simulation.lanes import LANES, Kind
 
 from . import block
 from .block import Blocks, Contact, StepArrays, Steps
@@ -52,15 +53,15 @@ class Engine(ABC):
 class FastEngine(Engine):
     """Rods in blocks of lanes."""
 
-    def __init__(self, rods: Rods, contact: Contact, kind: block.Kind = np.float32) -> None:
-        blocks = -(-len(rods.mass) // block.LANES)
+    def __init__(self, rods: Rods, contact: Contact, kind: Kind = np.float32) -> None:
+        blocks = -(-len(rods.mass) // LANES)
         self._kind = kind
-        self._planes = np.zeros((blocks, rods.nodes, block.PLANES, block.LANES), kind)
+        self._planes = np.zeros((blocks, rods.nodes, block.PLANES, LANES), kind)
         self.rows = np.moveaxis(self._planes[:, :, : block.CONSTANT], -1, 1)
         super().__init__(rods, contact)
         self._system: System | None = None
         self.mass = np.moveaxis(block.pack_lanes(rods.mass, kind), -1, 1)
-        self.mass[-1, (len(rods.mass) - 1) % block.LANES + 1 :] = 0.0  # only fills the block
+        self.mass[-1, (len(rods.mass) - 1) % LANES + 1 :] = 0.0  # only fills the block
 
     def _keep(self, rows: Float64Array) -> None:
         self._planes[:, :, : block.CONSTANT] = 0.0

@@ -8,7 +8,7 @@ shares of the rod's mean mass, so that stiffness is in 1/s^2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Generic, NamedTuple, Protocol, TypeVar, get_type_hints
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
 from hairkit.simulation.hair_cells import drift_rows
+from hairkit.simulation.lanes import LANES, Four, Kind, One, Three, lanes_of, sizes_of
 from hairkit.simulation.obstacles import Bodies
 from hairkit.simulation.rigid_motion import inverse_motion, motion_steps
 from hairkit.simulation.vectors import Floats, Frame, Rows
@@ -24,19 +25,6 @@ from .linear_system import System
 from .rods import Rods, State
 
 Records = npt.NDArray[np.void]
-Kind = type[np.float32] | type[np.float64]
-"""Precision of a backend."""
-KINDS: tuple[Kind, ...] = (np.float32, np.float64)
-LANES = 64
-"""Strands in a block. Compilers make vector instructions of loops over so many; shorter ones they
-unroll into instructions for single numbers."""
-
-One = Annotated[Floats, 1]
-"""(LANES,) numbers of the strands."""
-Three = Annotated[Floats, 3]
-"""(3, LANES) vectors."""
-Four = Annotated[Floats, 4]
-"""(4, LANES) quaternions or planes."""
 
 
 class NodeState(Protocol):
@@ -138,19 +126,6 @@ class Outer(Protocol):
     """Velocity of the air, m/s, world."""
     force: Three
     """m/s^2, head axes."""
-
-
-def sizes_of(record: type) -> dict[str, int]:
-    """Return how many numbers of a strand each field of a record holds."""
-    hints = get_type_hints(record, include_extras=True)
-    return {name: hint.__metadata__[0] for name, hint in hints.items()}
-
-
-def lanes_of(record: type) -> dict[Kind, np.dtype[Any]]:
-    """Return the types of records whose fields hold `LANES` numbers, or as many vectors."""
-    fields = sizes_of(record).items()
-    shapes = [(name, (size, LANES) if size > 1 else (LANES,)) for name, size in fields]
-    return {kind: np.dtype([(name, kind, shape) for name, shape in shapes]) for kind in KINDS}
 
 
 NODE, WORK, ACTING = lanes_of(Node), lanes_of(Work), lanes_of(Outer)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hairkit.simulation.lanes import LANES, put, stage, three
 from hairkit.simulation.obstacle_kernels import Field, Fields, distance_at
 from hairkit.simulation.vectors import (
     HALF,
@@ -23,8 +24,7 @@ from hairkit.simulation.vectors import (
     times,
 )
 
-from .block import LANES, Node, Settings, Step, Work
-from .lanes import put, stage, three
+from .block import Node, Settings, Step, Work
 
 FAR = 1.0
 """Metres up to which distances are exact: bounds would be looked up again sooner."""

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hairkit.parallel import compiled_with
+from hairkit.simulation.lanes import LANES, four, put, put_four, stage, three
 from hairkit.simulation.obstacle_kernels import Fields
 from hairkit.simulation.vectors import (
     HALF,
@@ -33,7 +34,6 @@ from hairkit.simulation.vectors import (
 )
 
 from .block import (
-    LANES,
     Blocks,
     Node,
     Outer,
@@ -44,19 +44,8 @@ from .block import (
     Steps,
     Work,
 )
+from .frames import THIRD, half_way, rows_of, swing_frame, twist_angle
 from .kernel_contact import resolve_contacts
-from .lanes import (
-    THIRD,
-    four,
-    half_way,
-    put,
-    put_four,
-    rows_of,
-    stage,
-    swing_frame,
-    three,
-    twist_angle,
-)
 from .linear_system import IMPLICIT
 
 Nodes = Sequence[Node]

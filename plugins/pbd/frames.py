@@ -1,4 +1,4 @@
-"""Numbers, vectors and quaternions of the strands of a block, and turns of frames, for kernels."""
+"""Turns of frames, for kernels."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from hairkit.parallel import compiled_with
 from hairkit.simulation.vectors import (
     ONE,
     ZERO,
@@ -29,32 +28,6 @@ from hairkit.simulation.vectors import (
 THIRD, THREE, FOUR, NINE_FIFTHS = (np.float32(c) for c in (1 / 3, 3, 4, 9 / 5))
 OPPOSITE = np.float32(1e-4)
 """Least 1 + cosine between an axis and where it is swung to."""
-stage = compiled_with(fastmath=True)
-"""Compiles one step of the method for a block, by itself."""
-
-
-@inlined
-def three(field: Floats, w: int) -> Vector:
-    """Return the vector of strand w in a field (3, LANES)."""
-    return field[0, w], field[1, w], field[2, w]
-
-
-@inlined
-def four(field: Floats, w: int) -> Frame:
-    """Return the quaternion of strand w in a field (4, LANES)."""
-    return field[0, w], field[1, w], field[2, w], field[3, w]
-
-
-@inlined
-def put(field: Floats, w: int, value: Vector) -> None:
-    """Store a vector of strand w."""
-    field[0, w], field[1, w], field[2, w] = value[0], value[1], value[2]
-
-
-@inlined
-def put_four(field: Floats, w: int, value: Frame) -> None:
-    """Store a quaternion of strand w."""
-    field[0, w], field[1, w], field[2, w], field[3, w] = value
 
 
 @inlined
