@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
+MOST_PARAMETERS = 8
 LARGEST_COMPONENT = 3
 """Subscripts up to this are coordinates: of points, colours, and of rigid motions (4, 4)."""
 NUMBA = {"njit", "jit", "vectorize", "guvectorize"}
@@ -59,6 +61,13 @@ def untyped_arguments(kernel: ast.FunctionDef) -> list[str]:
     return [name for name, type_ in types if type_ is None or ast.unparse(type_) == "Any"]
 
 
+def parameters(kernel: ast.FunctionDef) -> list[str]:
+    """Return the names of all parameters."""
+    own = kernel.args
+    named = [one.arg for one in (*own.posonlyargs, *own.args, *own.kwonlyargs)]
+    return named + [one.arg for one in (own.vararg, own.kwarg) if one is not None]
+
+
 def column_numbers(kernel: ast.FunctionDef) -> list[str]:
     """Return the subscripts that pick a column of packed numbers by a literal: `row[12]`.
 
@@ -98,6 +107,7 @@ def _last_name(node: ast.expr) -> str:
     return node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
 
 
+@cache
 def all_kernels(project: Path) -> list[tuple[str, ast.FunctionDef]]:
     """Return name and tree of all kernels."""
     files = [file for folder in ("hairkit", "plugins") for file in (project / folder).rglob("*.py")]
@@ -115,6 +125,12 @@ def test_kernels_are_typed(project: Path) -> None:
     found = all_kernels(project)
     assert len(found) > 250
     assert [(name, left) for name, kernel in found if (left := untyped_arguments(kernel))] == []
+
+
+def test_kernels_have_few_parameters(project: Path) -> None:
+    """What belongs together is a record: no kernel has more than `MOST_PARAMETERS`."""
+    many = [(name, len(parameters(kernel))) for name, kernel in all_kernels(project)]
+    assert [(name, count) for name, count in many if count > MOST_PARAMETERS] == []
 
 
 def test_kernels_pick_no_columns_by_number(project: Path) -> None:
@@ -164,13 +180,16 @@ def test_arrays_are_returned_to_python_alone(project: Path) -> None:
 
 
 def test_faults_of_kernels_are_found() -> None:
-    """Untyped parameters and results, columns of numbers, and arrays that kernels get from others;
-    points and slices are left alone."""
+    """Untyped and many parameters, columns by number, arrays that kernels get from others; points
+    and slices are left alone."""
     made = "@jit\ndef f(n: int) -> Float64Array: ...\n@jit\ndef g() -> float:\n    return f(3)[0]"
     assert array_callers([*kernels(made)]) == [("g", "f")]
     [kernel] = kernels("@numba.njit(cache=True)\ndef f(p, i: int):\n    return p[i, 12] + p[15]")
     assert untyped_arguments(kernel) == ["p", "return"]
+    assert parameters(kernel) == ["p", "i"]
     assert column_numbers(kernel) == ["p[i, 12]", "p[15]"]
+    [kernel] = kernels("@njit\ndef f(a, /, b=1, *c, d: int, **e): ...")
+    assert parameters(kernel) == ["a", "b", "d", "c", "e"]
     [kernel] = kernels("@njit\ndef f(p: A) -> float:\n    return p[0, 2] + p[-1] + p[3:6]")
     assert untyped_arguments(kernel) == []
     assert column_numbers(kernel) == []
