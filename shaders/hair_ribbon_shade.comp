@@ -10,7 +10,7 @@ uniform vec3 u_root_colour;
 uniform vec3 u_tip_colour;
 uniform float u_show_direction; // 1: red runs left and right, green front and back, blue up and down
 
-const float BOUNCED = 0.1;      // share of the sky's light that scatters through hair
+const float BOUNCED = 0.35;     // share of the sky's light that scatters through hair
 
 vec3 seen_colour(StrandPoint point, vec3 tangent) {
     vec3 position = point.position.xyz;
