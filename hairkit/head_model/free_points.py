@@ -97,11 +97,7 @@ def _link(n: int, cell: tuple[int, int, int], chains: Chains) -> None:
 
 @compiled
 def _distance_to_taken(
-    points: Float64Array,
-    i: int,
-    cell: tuple[int, int, int],
-    chains: Chains,
-    taken: Int64Array,
+    points: Float64Array, i: int, cell: tuple[int, int, int], chains: Chains, taken: Int64Array
 ) -> float:
     """Return the distance of point i to the nearest taken one of the 27 cells around it."""
     x, y, z = points[i, 0], points[i, 1], points[i, 2]

@@ -51,10 +51,7 @@ class LineOptions(Protocol):
 
 
 def lift_photo_lines(
-    cameras: Sequence[Camera],
-    masks: Sequence[Mask],
-    fused: FusedViews,
-    options: LineOptions,
+    cameras: Sequence[Camera], masks: Sequence[Mask], fused: FusedViews, options: LineOptions
 ) -> Strands:
     """Return lines that follow the 2D orientation in each photo, lifted to the hull's front."""
     found = []

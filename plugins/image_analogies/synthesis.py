@@ -34,19 +34,8 @@ from .features import (
     source_size,
     squared_distance,
 )
-from .pyramid import (
-    RADIUS,
-    build_pyramid,
-    count_levels,
-    enlarge,
-)
-from .search_tree import (
-    Heap,
-    Tree,
-    build_tree,
-    new_heap,
-    search_tree,
-)
+from .pyramid import RADIUS, build_pyramid, count_levels, enlarge
+from .search_tree import Heap, Tree, build_tree, new_heap, search_tree
 
 NOWHERE = -1
 """Row and column of the match of a pixel that has none."""

@@ -33,17 +33,7 @@ from hairkit.simulation.vectors import (
     turned,
 )
 
-from .block import (
-    Blocks,
-    Node,
-    Outer,
-    Records,
-    Settings,
-    Step,
-    StepArrays,
-    Steps,
-    Work,
-)
+from .block import Blocks, Node, Outer, Records, Settings, Step, StepArrays, Steps, Work
 from .frames import THIRD, half_way, rows_of, swing_frame, twist_angle
 from .kernel_contact import resolve_contacts
 from .linear_system import IMPLICIT

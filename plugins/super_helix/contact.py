@@ -34,13 +34,7 @@ class Point(NamedTuple):
 
 @compiled
 def touch(
-    step: Step,
-    body: Body,
-    mass: float,
-    h: float,
-    gap: float,
-    point: Point,
-    scratch: Float64Array,
+    step: Step, body: Body, mass: float, h: float, gap: float, point: Point, scratch: Float64Array
 ) -> bool:
     """Add to a point's weight and gradient what a body does to it; return whether it does.
 

@@ -113,12 +113,7 @@ def _solve_step(
 
 @compiled_with(allocates=True)
 def newton(
-    rods: Rods,
-    motion: Motion,
-    loads: Loads,
-    step: Step,
-    strand: Strand,
-    start: Float64Array,
+    rods: Rods, motion: Motion, loads: Loads, step: Step, strand: Strand, start: Float64Array
 ) -> float:
     """Change `motion.q` of one strand by one Newton iteration of the implicit step.
 
