@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array, UInt8Array
+from hairkit.rendering.skin_lobe import LIFT, WRAP
 from hairkit.simulation.lanes import stage
 from hairkit.simulation.vectors import (
     HALF,
@@ -28,10 +29,6 @@ from hairkit.viewer.draw.place_kernels import project_point
 from hairkit.viewer.draw.records import Lamp, Projection, Shading
 from hairkit.viewer.draw.shade_kernels import BRIGHTEST, light_at, to_eye
 
-LIFT = np.float32(0.007)
-"""Metres above the skin where light is looked up: its own cells of the coarse volume are dark."""
-WRAP = (np.float32(0.28), np.float32(0.18), np.float32(0.14))
-"""How far red, green and blue light reach past the terminator, as a cosine."""
 _FOUR, _TINY = np.float32(4), np.float32(1e-9)
 
 
@@ -170,12 +167,7 @@ def pixel_middles(a: Number, b: Number, c: Number, size: int) -> tuple[int, int]
 
 @stage
 def light_vertices(
-    first: int,
-    last: int,
-    mesh: MeshData,
-    light: Shading,
-    oil: Oil,
-    state: MeshState,
+    first: int, last: int, mesh: MeshData, light: Shading, oil: Oil, state: MeshState
 ) -> None:
     """Light the wanted vertices: skin in two layers, as in skin.glsl."""
     bright = light.exposure / BRIGHTEST
