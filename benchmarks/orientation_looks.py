@@ -23,7 +23,7 @@ from hairkit_plugins import gabor, structure_tensor
 from orientation import Sample, plugin, read_samples, score
 
 from hairkit.head_model.template import default_head
-from hairkit.rendering import context
+from hairkit.rendering import fibre
 from hairkit.synth import StyleName, grow, photograph
 
 COLOURS = {
@@ -41,8 +41,6 @@ GLOSS = {"matt": (0.0, 1.0), "usual": (1.0, 1.0), "greasy": (3.0, 0.6)}
 STYLES: tuple[StyleName, ...] = ("straight", "wavy")
 STRANDS, SIZE, VIEWS = 8000, (540, 720), 3
 METHODS = {"structure_tensor": plugin(structure_tensor), "gabor": plugin(gabor)}
-STRENGTH, WIDTH = "FRESNEL = 0.0465", "ROUGHNESS_R = 0.14"
-"""The constants of the shader, as they stand in it."""
 
 
 def main() -> int:
@@ -83,15 +81,7 @@ def _photograph(
     folder: str,
 ) -> None:
     """Write photos of the style, with the shader's surface reflection scaled."""
-    plain = context.shader_source
-
-    def scaled(name: str) -> str:
-        text = plain(name)
-        strength, width = gloss[0] * 0.0465, gloss[1] * 0.14
-        text = text.replace(STRENGTH, f"FRESNEL = {strength:.5f}")
-        return text.replace(WIDTH, f"ROUGHNESS_R = {width:.4f}")
-
-    context.shader_source = scaled
+    fibre.FRESNEL, fibre.ROUGHNESS = gloss[0] * fibre.FRESNEL, gloss[1] * fibre.ROUGHNESS
     groom = grow(style, default_head(), strands)
     root = np.array(colour)
     material = replace(groom.material, root_colour=root, tip_colour=np.minimum(TIP * root, 1))

@@ -1,6 +1,6 @@
 // Contact: penetration, Coulomb friction, restoring the lengths. Part of pbd_substeps.comp.
 #include "pbd_distance.glsl"
-const float FURTHER = 1.05;       // safety factor on the distance that a node has moved
+#constants hairkit_plugins.pbd.kernel_contact FURTHER SOFTEST STILL
 
 vec3 normal[NODE_ROOM];           // contact normal, 0 for free nodes
 vec3 surface[NODE_ROOM];          // velocity of the obstacle where it is touched, m/s
@@ -18,7 +18,7 @@ void restore_lengths() {
         float ease = rates(j).w, ease_after = rates(j + 1).w;
         vec3 start = ease * (direction[j] - a * normal[j]);
         vec3 end = ease_after * (direction[j] - b * normal[j + 1]);
-        pivot[j] = dot(direction[j], start + end) + SOFTEST * (ease + ease_after);
+        pivot[j] = ease * (SOFTEST - a * a) + ease_after * (SOFTEST - b * b);
         beside[j] = -dot(end_before, direction[j]);
         value[j] = reach - banded(j).w;
         end_before = end;
@@ -42,7 +42,7 @@ void apply_friction() {
         vec3 relative = speed[j] - surface[j];
         vec3 slide = relative - dot(relative, normal[j]) * normal[j];
         float size = length(slide), slowed = clamp(grip[j], 0.0, size);
-        vec3 brake = slide * (slowed / max(size, 1e-12));
+        vec3 brake = slide * (slowed / max(size, STILL));
         grip[j] -= slowed;
         speed[j] -= brake;
         place[j] -= 0.5 * u_seconds * brake;

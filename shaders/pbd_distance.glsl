@@ -2,15 +2,15 @@
 uniform sampler3D u_head_distances, u_torso_distances; // along z, y, x
 uniform ivec3 u_cells[2];      // of the distances of head and torso; 0 where there is none
 uniform vec4 u_grid[2];        // place of the first distance, 1/spacing
-const float ROOM = 0.02;       // least distance outside a grid, m
-const float DIAGONAL = 1.8;    // bound of the change of distance within a cell, in cells
+const float OFF_GRID = 0.02;   // least distance outside a grid, m
+#constants hairkit.simulation.obstacle_kernels DIAGONAL
 
 // Trilinear distance and its direction in a body's axes; one lookup rejects most far nodes.
 // A texel holds the distances at the four corners of a cell's face across x, along (z, y).
 float body_distance(sampler3D distances, ivec3 cells, vec4 grid, vec3 p, float clear, out vec3 normal) {
     vec3 at = (p - grid.xyz) * grid.w;
     normal = vec3(0.0);
-    if (any(lessThan(at, vec3(0.0))) || any(greaterThan(at, vec3(cells - 1)))) return clear + ROOM;
+    if (any(lessThan(at, vec3(0.0))) || any(greaterThan(at, vec3(cells - 1)))) return clear + OFF_GRID;
     ivec3 low = min(ivec3(at), cells - 2);
     vec4 front = texelFetch(distances, low.zyx, 0);
     float least = front.x - DIAGONAL / grid.w;

@@ -1,10 +1,11 @@
 // Layout of rods in RGBA float textures: one column per rod, its values row by row; rods beyond u_width
 // follow below. NODES is a #define of the host program.
 // Software renderers read textures many times faster than buffers.
+#constants hairkit_plugins.pbd.gl_backend UNROLLED GROUP
 const int SEGMENTS = NODES - 1;
 // Of each node: place and slack, velocity, acceleration, frame (w, x, y, z) of the segment that ends there.
 const int STATE_ROWS = 4 * NODES;
-layout(local_size_x = 64) in;
+layout(local_size_x = GROUP) in;
 
 // Global index of this invocation; work groups beyond the limit of x continue along y.
 int invocation() {
@@ -14,7 +15,7 @@ int invocation() {
 // Loops over few nodes have constant bounds, so that compilers unroll them and keep arrays in
 // registers. For many nodes that takes minutes, so the bounds are uniforms.
 uniform int u_nodes;
-#if NODES <= 16
+#if NODES <= UNROLLED
 #define EACH_NODE NODES
 #define EACH_SEGMENT SEGMENTS
 const int NODE_ROOM = NODES;

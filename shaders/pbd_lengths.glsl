@@ -1,6 +1,7 @@
 // The tension that restores the segments' lengths, written to `value`: the factor
 // L D L^T of metric * (d d^T), row by row, with its forward substitution. Part of pbd_substeps.comp.
 // For loops that are not unrolled: four entries at a time.
+#constants hairkit_plugins.pbd.kernels LEAST
 vec4 factor[FOURS(SEGMENTS) * (SEGMENTS + 4) / 2], scaled[FOURS(SEGMENT_ROOM)];
 
 // Where row i of the factor begins, in fours; it has i entries and zeros up to the next four.
@@ -26,7 +27,7 @@ void solve_lengths() {
             right -= low * value[j];
         }
         float own = next_metric(i * (i + 1) / 2 + i);
-        pivot[i] = 1.0 / max(last + own * dot(way, way), SINGULAR * own);
+        pivot[i] = 1.0 / max(last + own * dot(way, way), LEAST * own);
         value[i] = right;
     }
     for (int i = 0; i < count; i++) value[i] *= pivot[i];

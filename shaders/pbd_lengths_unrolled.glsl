@@ -1,6 +1,7 @@
 // The tension that restores the segments' lengths, written to `value`: the factor
 // L D L^T of metric * (d d^T), row by row, with its forward substitution. Part of pbd_substeps.comp.
 // For loops that are unrolled: entries stay in registers.
+#constants hairkit_plugins.pbd.kernels LEAST
 float factor[SEGMENTS * (SEGMENTS - 1) / 2], scaled[SEGMENTS];
 
 void solve_lengths() {
@@ -19,7 +20,7 @@ void solve_lengths() {
                 right -= low * value[j];
             }
         float own = next_metric(i * (i + 1) / 2 + i);
-        pivot[i] = 1.0 / max(last + own * dot(way, way), SINGULAR * own);
+        pivot[i] = 1.0 / max(last + own * dot(way, way), LEAST * own);
         value[i] = right;
     }
     for (int i = SEGMENTS - 1; i >= 0; i--) {

@@ -1,5 +1,5 @@
 // Unit quaternions (x, y, z, w) of frames whose third axis is a segment's direction.
-const float LEAST = 1e-4;  // 1 + cosine of a half turn, which has no shortest way
+#constants hairkit_plugins.pbd.frames OPPOSITE
 
 vec4 product(vec4 a, vec4 b) {
     return vec4(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));
@@ -15,7 +15,7 @@ vec3 third_axis(vec4 q) {
 // Rotate a frame by the shortest arc that brings its third axis to `direction`.
 vec4 transport_frame(vec4 q, vec3 direction) {
     vec3 axis = third_axis(q);
-    vec4 turn = vec4(cross(axis, direction), max(1.0 + dot(axis, direction), LEAST));
+    vec4 turn = vec4(cross(axis, direction), max(1.0 + dot(axis, direction), OPPOSITE));
     return normalize(product(turn, q));
 }
 

@@ -1,4 +1,4 @@
-const int MOST_STEPS = 64;
+#constants hairkit_plugins.pbd.gl_backend MOST_STEPS
 
 // Head motion and gravity of one substep, head axes after it.
 struct Step {

@@ -7,10 +7,8 @@
 #include "pbd_constants.glsl"
 #include "pbd_substep_schedule.glsl"
 
-const float SHARPEST = 0.3, LARGEST_SPIN = 0.3, SOFTEST = 1e-3, SINGULAR = 1e-6;
-const float FASTEST_TURN = 1.0, TINY = 1e-20, FASTEST_CHANGE = 500.0;
-// Weights of the new acceleration in the velocity, and of the old one in velocity and place.
-const float IMPLICIT = 2.0 / 3.0, PASSED = 1.0 - IMPLICIT, DRIFT = 0.5 - IMPLICIT * IMPLICIT;
+#constants hairkit_plugins.pbd.kernels SHARPEST SPIN TURN CHANGE TINY PASSED DRIFT
+#constants hairkit_plugins.pbd.linear_system IMPLICIT
 
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
 // Six numbers of each node, in two rows: velocity of the air, world; a force over the rod's mean mass,
@@ -120,7 +118,7 @@ void relax_twist() {
     solve_tridiagonal();
     for (int j = 0; j < EACH_SEGMENT; j++) {
         // half angles by a rational cosine and sine, as in the reference
-        float angle = 0.5 * clamp(value[j], -LARGEST_SPIN, LARGEST_SPIN);
+        float angle = 0.5 * clamp(value[j], -SPIN, SPIN);
         frame[j] = product(vec4(angle * direction[j], 1.0) / sqrt(1.0 + angle * angle), frame[j]);
     }
 }
@@ -174,7 +172,7 @@ void solve_banded() {
     }
 }
 
-#if NODES <= 16
+#if NODES <= UNROLLED
 #include "pbd_lengths_unrolled.glsl"
 #else
 #include "pbd_lengths.glsl"
@@ -196,7 +194,7 @@ void go_on() {
         place[j] += change;
         speed[j] += added;
         gain[j] += added / u_seconds;
-        gain[j] *= min(FASTEST_CHANGE / sqrt(dot(gain[j], gain[j]) + TINY), 1.0);
+        gain[j] *= min(CHANGE / sqrt(dot(gain[j], gain[j]) + TINY), 1.0);
     }
 }
 
@@ -210,7 +208,7 @@ void keep_lengths() {
         vec3 way = (size / sqrt(dot(now, now) + TINY) - 1.0) * now;
         place[j + 1] += way;
         vec3 apart = speed[j + 1] + way / u_seconds - speed[j];
-        float share = FASTEST_TURN * size / (u_seconds * sqrt(dot(apart, apart) + TINY));
+        float share = TURN * size / (u_seconds * sqrt(dot(apart, apart) + TINY));
         speed[j + 1] = speed[j] + min(share, 1.0) * apart;
     }
 }

@@ -12,8 +12,7 @@ uniform int u_lobe;
 uniform float u_roughness; // square root of alpha, as in glTF
 uniform float u_f0;        // reflectance at normal incidence
 
-const vec3 WRAP = vec3(0.28, 0.18, 0.14);   // how far red, green and blue reach past the terminator
-const float LIFT = 0.007;   // metres above the skin, to avoid self-shadowing in the coarse volume
+#constants hairkit.rendering.skin_lobe WRAP LIFT
 const float SMOOTHEST = 0.1;
 
 struct Layers {

@@ -1,7 +1,7 @@
 #version 430
 // One of the two passes of the separable kernel (Jimenez et al. 2015), in metres on the surface.
 
-const int TAPS = 17;
+#constants hairkit.rendering.skin_lobe TAPS
 
 uniform sampler2D u_diffuse;    // light, and the depth in metres
 uniform sampler2D u_surface;    // in alpha whether it scatters

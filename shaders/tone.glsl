@@ -2,8 +2,10 @@
 
 uniform float u_exposure;
 
+#constants hairkit.rendering.fibre FILM
+
 vec3 tone(vec3 linear_rgb) {
     vec3 x = linear_rgb * u_exposure;
-    vec3 film = clamp(x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14), 0.0, 1.0);
+    vec3 film = clamp(x * (FILM[0] * x + FILM[1]) / (x * (FILM[2] * x + FILM[3]) + FILM[4]), 0.0, 1.0);
     return mix(12.92 * film, 1.055 * pow(film, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, film));
 }

@@ -12,7 +12,7 @@ layout(std430, binding = 2) writeonly buffer Guides { uint guides[]; };
 uniform int u_points;
 uniform int u_count;    // of guides
 
-const float MOST_STRETCH = 4.0;     // as in place_kernels.py
+#constants hairkit.viewer.draw.place_kernels MOST_STRETCH SHORTEST
 
 vec3 rest_at(int i) { return vec3(rest[3 * i], rest[3 * i + 1], rest[3 * i + 2]); }
 vec3 now_at(int i) { return vec3(now[3 * i], now[3 * i + 1], now[3 * i + 2]); }
@@ -45,7 +45,7 @@ void main() {
         was = multiplied(quaternion_between(before_was, way_was), was);
         is = multiplied(quaternion_between(before_is, way_is), is);
         vec4 turn = normalize(multiplied(is, vec4(-was.xyz, was.w)));
-        float stretch = min(length(edge_is) / max(length(edge_was), 1e-9), MOST_STRETCH);
+        float stretch = min(length(edge_is) / max(length(edge_was), SHORTEST), MOST_STRETCH);
         write_word(first + k, 0, packSnorm2x16(turn.xy));
         write_word(first + k, 1, packSnorm2x16(turn.zw));
         write_word(first + k, 2, floatBitsToUint(stretch));

@@ -1,9 +1,8 @@
 // Hair with `u_points` points per strand, head frame; one invocation per strand. Buffers are packed,
 // since software renderers fetch them word by word.
 
-const int SLICES = 32;          // depth slices of the view cells
-const int TILE = 8;             // edge of a view cell, pixels
-const float OPACITY_UNIT = 4096.0;
+#constants hairkit.viewer.draw.place_kernels SLICES TILE OPACITY_UNIT CLOSE
+#constants hairkit.rendering.gl_camera NEAREST
 
 uniform mat4 u_clip_from_head;
 uniform vec3 u_forward;
@@ -27,9 +26,9 @@ struct Seen {
 Seen seen_from(vec3 place) {
     vec4 clip = u_clip_from_head * vec4(place, 1.0);
     float depth = dot(u_forward, place) + u_depth_offset;
-    vec3 ndc = clip.xyz / max(clip.w, 1e-4);
-    bool behind = u_perspective > 0.5 && depth < 0.01;
-    float scale = u_focal_px / mix(1.0, max(depth, 1e-4), u_perspective);
+    vec3 ndc = clip.xyz / max(clip.w, CLOSE);
+    bool behind = u_perspective > 0.5 && depth < NEAREST;
+    float scale = u_focal_px / mix(1.0, max(depth, CLOSE), u_perspective);
     return Seen(place, vec3((ndc.xy * 0.5 + 0.5) * u_size_px, ndc.z * 0.5 + 0.5),
                 behind ? -1.0 : depth, scale);
 }

@@ -13,15 +13,12 @@ uniform vec3 u_rim_direction;
 uniform int u_turn;
 uniform int u_turns;
 
-const int STEPS = 9;
-const float GROWTH = 1.35;
-const int SKY_STEPS = 5;
-const float SKY_GROWTH = 1.7;
+#constants hairkit.viewer.draw.light_cpu STEPS GROWTH SKY_STEPS SKY_GROWTH START
 
 float extinction(vec3 cell) { return textureLod(u_extinction, (cell + 0.5) / vec3(u_cells), 0.0).r; }
 
 float towards(vec3 cell, vec3 direction, float growth, int steps) {
-    float near = 0.8, length = 1.0, depth = 0.0;
+    float near = START, length = 1.0, depth = 0.0;
     for (int i = 0; i < steps; i++) {
         depth += extinction(cell + (near + 0.5 * length) * direction) * length;
         near += length;

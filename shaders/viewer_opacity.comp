@@ -2,6 +2,7 @@
 // Optical depth of the hair in front of every slice of the view, a coarse form of deep opacity maps
 // (Yuksel and Keyser 2008) along the line of sight. Each tile is smoothed with its neighbours.
 #include "viewer_hair.glsl"
+#constants hairkit.viewer.draw.place_kernels MIDDLE BESIDE
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 4) readonly buffer Filled { uint filled[]; };
@@ -19,8 +20,8 @@ void main() {
     float sum = 0.0;
     for (int slice = 0; slice < SLICES; slice++) {
         imageStore(u_opacity, ivec3(tile, slice), vec4(sum));
-        sum += 0.4 * filled_at(tile, slice)
-             + 0.15 * (filled_at(tile + ivec2(1, 0), slice) + filled_at(tile - ivec2(1, 0), slice)
+        sum += MIDDLE * filled_at(tile, slice)
+             + BESIDE * (filled_at(tile + ivec2(1, 0), slice) + filled_at(tile - ivec2(1, 0), slice)
                      + filled_at(tile + ivec2(0, 1), slice) + filled_at(tile - ivec2(0, 1), slice));
     }
     imageStore(u_opacity, ivec3(tile, SLICES), vec4(sum));

@@ -10,7 +10,7 @@ layout(std430, binding = 2) readonly buffer Edges { uint edges[]; };        // 2
 layout(std430, binding = 3) writeonly buffer Places { float places[]; };    // 3 words per point
 layout(std430, binding = 4) buffer Filled { uint filled[]; };
 
-const float PARTED = 0.7071068, TOGETHER = 0.9238795;     // as in place_kernels.py
+#constants hairkit.viewer.draw.place_kernels PARTED TOGETHER
 
 uint guide_word(uint guide, int k, int word) { return guides[3 * (int(guide) * u_points + k) + word]; }
 

@@ -4,9 +4,9 @@
 // the hair before it. Software renderers run compute shaders on all cores, triangle set-up on one.
 #include "viewer_hair.glsl"
 #include "viewer_accumulation.glsl"
-#include "lighting.glsl"
-#include "marschner.glsl"
-#include "tone.glsl"
+#include "hair_colour.glsl"
+#constants hairkit.viewer.draw.shade_kernels HIDDEN ALL_HIDDEN DENSE
+#constants hairkit.viewer.draw.raster_kernels WIDEST
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 1) readonly buffer Hairs { uint hairs[]; };
@@ -14,19 +14,10 @@ layout(std430, binding = 2) readonly buffer Offsets { uint offsets[]; };
 layout(std430, binding = 3) readonly buffer Places { float places[]; };
 layout(std430, binding = 7) buffer Sums { uint sums[]; };   // two per pixel, two 16-bit numbers each
 
-uniform vec3 u_eye;
-uniform vec3 u_root_colour;
-uniform vec3 u_tip_colour;
-uniform float u_show_direction;
 uniform sampler2D u_solid_depth;
 uniform sampler3D u_opacity;
 uniform ivec2 u_picture;
 uniform float u_smooth;         // 1: partial coverage across the stroke; 0: whole pixels, faster
-
-const float BOUNCED = 0.35;      // share of the sky's light that scatters through hair
-const float HIDDEN = 0.14;      // segments with a lower transmittance are not drawn
-const float DENSE = 0.4;       // share of a tile's mean optical depth: locks are denser than gaps
-const float WIDEST = 64.0;      // pixels
 
 vec3 place_at(int index) { return vec3(places[3 * index], places[3 * index + 1], places[3 * index + 2]); }
 
@@ -35,20 +26,6 @@ float arriving(Seen s) {
     float slice = clamp((s.depth - u_slice_range.x) * u_slice_range.y, 0.0, float(SLICES));
     vec3 at = vec3(s.pixel.xy / (float(TILE) * vec2(u_tiles)), (slice + 0.5) / float(SLICES + 1));
     return exp(-DENSE * u_dimming * textureLod(u_opacity, at, 0.0).r);
-}
-
-vec3 seen_colour(vec3 position, vec3 tangent, float share, float random) {
-    vec3 to_eye = u_perspective > 0.5 ? normalize(u_eye - position) : -u_forward;
-    float other = fract(random * 61.8034);
-    vec3 colour = mix(u_root_colour, u_tip_colour, share);
-    colour = pow(colour, vec3(0.85 + 0.3 * random)) * (0.8 + 0.4 * other);
-    vec3 reached = light_at(position);
-    if (u_show_direction > 0.5)
-        return (0.2 + 0.8 * abs(tangent.xzy)) * (0.5 + 0.5 * reached.b) * (0.8 + 0.2 * other);
-    vec3 key = fibre(tangent, u_key_direction, to_eye, colour, random) * u_key_colour * reached.r;
-    vec3 rim = fibre(tangent, u_rim_direction, to_eye, colour, other) * u_rim_colour * reached.g;
-    vec3 sky = colour * ambient(0.3) * mix(BOUNCED, 1.0, reached.b);
-    return tone(key + rim + sky);
 }
 
 bool hidden_by_solid(vec3 pixel) {
@@ -66,7 +43,7 @@ void add(ivec2 pixel, vec4 colour_weight, float dither) {
 void stroke(vec3 a, vec3 b, vec4 from, vec4 to, float width, float dither) {
     vec3 middle = mix(a, b, 0.5);
     int hidden = int(hidden_by_solid(a)) + int(hidden_by_solid(middle)) + int(hidden_by_solid(b));
-    if (hidden == 3) return;
+    if (hidden == ALL_HIDDEN) return;
     bool test = hidden > 0;     // depth test each pixel only across a mesh's outline
 
     vec2 along = b.xy - a.xy;

@@ -1,5 +1,6 @@
 #version 430
 #include "viewer_accumulation.glsl"
+#constants hairkit.viewer.draw.raster_kernels CROWDED
 // Hair over the picture; clears the sums for the next frame.
 
 layout(std430, binding = 7) buffer Sums { uint sums[]; };
@@ -19,5 +20,5 @@ void main() {
     float weight = float(blue_weight & 0xFFFFu);
     vec3 total = vec3(red_green >> 16, red_green & 0xFFFFu, blue_weight >> 16);
     float cover = weight / sum_unit();
-    out_colour = vec4(total / max(weight, 1.0), min(cover * (1.0 + 0.8 * cover), 1.0));
+    out_colour = vec4(total / max(weight, 1.0), min(cover * (1.0 + CROWDED * cover), 1.0));
 }

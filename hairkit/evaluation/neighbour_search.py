@@ -100,8 +100,8 @@ def most_followed(
     """
     shares = np.zeros(len(bounds) - 1)
     parallel_for(
-        _follow_strands, len(shares), grid, owner, _Queries(points, directions), bounds, distance,
-        cosine, shares,
+        _follow_strands, len(shares), grid, owner, _Queries(points, directions), bounds,
+        _Match(distance, cosine), shares,
     )  # fmt: skip
     return shares
 
@@ -113,6 +113,15 @@ class _Queries(NamedTuple):
     """(Q, 3) metres."""
     directions: Float32Array
     """(Q, 3) unit."""
+
+
+class _Match(NamedTuple):
+    """When a sample matches a query."""
+
+    distance: float
+    """Up to this, metres."""
+    cosine: float
+    """From this on, of the angle between the directions, sign-free."""
 
 
 @compiled
@@ -214,8 +223,7 @@ def _follow_strands(
     owner: Int64Array,
     queries: _Queries,
     bounds: Int64Array,
-    distance: float,
-    cosine: float,
+    match: _Match,
     shares: Float64Array,
 ) -> None:
     """Write the shares (S,) of `most_followed` for the strands `first` to `last`."""
@@ -224,7 +232,7 @@ def _follow_strands(
     for s in range(first, last):
         followed[:] = 0
         for q in range(bounds[s], bounds[s + 1]):
-            _count_owners(grid, owner, queries, q, distance, cosine, followed, seen)
+            _count_owners(grid, owner, queries, q, match, followed, seen)
         shares[s] = followed.max() / (bounds[s + 1] - bounds[s])
 
 
@@ -234,17 +242,16 @@ def _count_owners(
     owner: Int64Array,
     queries: _Queries,
     q: int,
-    distance: float,
-    cosine: float,
+    match: _Match,
     followed: Int64Array,
     seen: Int64Array,
 ) -> None:
     """Add 1 to `followed` (O,) of each owner that matches a query; `seen` holds its last query."""
     mask = len(grid.start) - 2
     x, y, z = queries.points[q, 0], queries.points[q, 1], queries.points[q, 2]
-    x_first, x_last = _cells_about(x, distance, grid.cell)
-    y_first, y_last = _cells_about(y, distance, grid.cell)
-    z_first, z_last = _cells_about(z, distance, grid.cell)
+    x_first, x_last = _cells_about(x, match.distance, grid.cell)
+    y_first, y_last = _cells_about(y, match.distance, grid.cell)
+    z_first, z_last = _cells_about(z, match.distance, grid.cell)
     for iy in range(y_first, y_last + 1):
         for iz in range(z_first, z_last + 1):
             for ix in range(x_first, x_last + 1):
@@ -252,6 +259,6 @@ def _count_owners(
                 for i in range(grid.start[key], grid.start[key + 1]):
                     if seen[owner[i]] == q:
                         continue
-                    if abs(_cosine_within(grid, i, queries, q, distance)) >= cosine:
+                    if abs(_cosine_within(grid, i, queries, q, match.distance)) >= match.cosine:
                         seen[owner[i]] = q
                         followed[owner[i]] += 1

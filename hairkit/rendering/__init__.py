@@ -4,6 +4,7 @@ The viewer shares its OpenGL context, cameras and lights.
 
 * `cards`: textured cards, as engines draw them
 * `context`: OpenGL contexts: EGL, else OSMesa
+* `fibre`: constants of the look of hair
 * `framebuffer`: frame buffers, supersampling, read-back
 * `framing`: cameras that show a whole groom
 * `gl_camera`: OpenGL matrices of a camera

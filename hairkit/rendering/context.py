@@ -6,11 +6,13 @@ import contextlib
 import os
 import threading
 from collections.abc import Callable, Iterator
-from importlib import resources
+from importlib import import_module, resources
 from pathlib import Path
 from typing import Any, TypeVar
 
 import moderngl
+import numpy as np
+import numpy.typing as npt
 
 from hairkit.errors import RenderError
 from hairkit.rendering.osmesa import OSMesaContext
@@ -157,13 +159,32 @@ def install(context: moderngl.Context, backend: str) -> Renderer:
 
 
 def shader_source(name: str) -> str:
-    """Return the source of a shader with each `#include "other.glsl"` expanded."""
+    """Return the source of a shader with what some of its lines stand for.
+
+    `#include "other.glsl"` stands for that source, `#constants hairkit.rendering.fibre TILT` for
+    constants of a Python module, where their values have units and reasons.
+    """
     text = resources.files("hairkit.shaders").joinpath(name).read_text()
-    lines = [
-        shader_source(line.split('"')[1]) if line.startswith("#include") else line
-        for line in text.splitlines()
-    ]
-    return "\n".join(lines)
+    return "\n".join(map(_expand, text.splitlines()))
+
+
+def _expand(line: str) -> str:
+    if line.startswith("#include"):
+        return shader_source(line.split('"')[1])
+    if not line.startswith("#constants"):
+        return line
+    _, module, *names = line.split()
+    values = vars(import_module(module))
+    return "\n".join(f"#define {name} {_literal(values[name])}" for name in names)
+
+
+def _literal(value: npt.ArrayLike) -> str:
+    """Return a number, a vector of three, or an array as GLSL writes it."""
+    numbers = np.asarray(value)
+    if numbers.ndim == 0:
+        return repr(numbers.item())
+    parts = ", ".join(map(repr, numbers.tolist()))
+    return f"vec3({parts})" if len(numbers) == 3 else f"float[]({parts})"
 
 
 def _compile(name: str, compile_: Callable[[], Compiled]) -> Compiled:

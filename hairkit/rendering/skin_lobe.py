@@ -16,6 +16,10 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array
 from hairkit.types.skin_look import SkinLook
 
+LIFT = np.float32(0.007)
+"""Metres above the skin where light is looked up: its own cells of the coarse volume are dark."""
+WRAP = (np.float32(0.28), np.float32(0.18), np.float32(0.14))
+"""How far red, green and blue light reach past the terminator, as a cosine."""
 TAPS = 17
 """Samples of the kernel: the middle, and as many to either side."""
 REACH = 4.0

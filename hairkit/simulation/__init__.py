@@ -7,6 +7,7 @@ The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)`
 * `hair_cells`: mass and momentum of hair on a grid, compiled
 * `hair_grid`: contact between strands as changes of velocity
 * `hands`: hands that grab points
+* `lanes`: records of many strands side by side, for compiled code
 * `motion`: motion of the head: keyframes and shakes
 * `obstacle_kernels`: distances to obstacles, and drawn points out of them, compiled
 * `obstacles`: head and torso as signed distances on grids

@@ -9,14 +9,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled_with
-from hairkit.simulation.vectors import ONE, ZERO, Vector, inlined
+from hairkit.simulation.vectors import ONE, ZERO, Floats, Vector, inlined
 
-Floats = npt.NDArray[np.floating[Any]]
-"""float32 or float64."""
 INSIDE = np.float32(1.001)
 """Cells between the last corner and the farthest node that is spread on it."""
 

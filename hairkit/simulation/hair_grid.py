@@ -19,14 +19,13 @@ from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled_with, parallel_for
 from hairkit.simulation.hair_cells import (
     Cells,
-    Floats,
     around,
     cell_of,
     drift_rows,
     relative_velocity,
     spread_nodes,
 )
-from hairkit.simulation.vectors import ONE, ZERO
+from hairkit.simulation.vectors import ONE, ZERO, Floats
 
 SPACING = 0.02
 """Edge of a cell, metres: several distances between guides."""

@@ -12,9 +12,12 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from hairkit.parallel import compiled_with
 
+Floats = npt.NDArray[np.floating[Any]]
+"""float32 or float64."""
 Number = float | np.floating[Any]
 Vector = tuple[Any, Any, Any]
 """x, y, z."""

@@ -51,10 +51,7 @@ class LineOptions(Protocol):
 
 
 def lift_photo_lines(
-    cameras: Sequence[Camera],
-    masks: Sequence[Mask],
-    fused: FusedViews,
-    options: LineOptions,
+    cameras: Sequence[Camera], masks: Sequence[Mask], fused: FusedViews, options: LineOptions
 ) -> Strands:
     """Return lines that follow the 2D orientation in each photo, lifted to the hull's front."""
     found = []
@@ -83,13 +80,12 @@ def lift_lines(
     """
     long = np.flatnonzero(counts >= FEWEST)
     offsets = np.concatenate([[0], np.cumsum(counts[long])])
-    points, lengths = np.empty((offsets[-1], 3), np.float32), np.empty(len(long))
+    lifted = Lifted(offsets, np.empty((offsets[-1], 3), np.float32), np.empty(len(long)))
     shift = np.arange(int(KERNEL_SIGMAS * SMOOTHING) + 1)
     weights = np.exp(-0.5 * (shift / SMOOTHING) ** 2)
     view = pack_camera(camera)
-    lift = (view, lines, long, offsets, weights, points, lengths)
-    parallel_for(_lift, len(long), *lift, min_chunk=MIN_LINES)
-    return points, counts[long], lengths
+    parallel_for(_lift, len(long), view, lines, long, weights, lifted, min_chunk=MIN_LINES)
+    return lifted.points, counts[long], lifted.lengths
 
 
 def agreeing(lines: Strands, hull: Hull, volume: Float32Array, angle_deg: float) -> Strands:
@@ -131,6 +127,17 @@ class TensorVolume(NamedTuple):
     """Edge of a cell, metres."""
     values: Float32Array
     """(X, Y, Z, 6) in the order xx yy zz xy xz yz, each times its certainty."""
+
+
+class Lifted(NamedTuple):
+    """Lines in the head frame, one after the other."""
+
+    offsets: Int64Array
+    """(K + 1,) first point of each."""
+    points: Float32Array
+    """(P, 3) metres."""
+    lengths: Float64Array
+    """(K,) metres."""
 
 
 class Photo(NamedTuple):
@@ -228,15 +235,11 @@ def _lift(
     camera: PackedCamera,
     lines: Float32Array,
     chosen: Int64Array,
-    offsets: Int64Array,
     weights: Float64Array,
-    points: Float32Array,
-    lengths: Float64Array,
+    lifted: Lifted,
 ) -> None:
-    """Write the chosen lines (K,) of u, v, depth (N, M, 3) smoothed into points (P, 3).
-
-    And their lengths (K,), metres.
-    """
+    """Write the chosen lines (K,) of u, v, depth (N, M, 3), smoothed, and their lengths."""
+    offsets, points, lengths = lifted
     for k in range(first, last):
         rough = np.empty((offsets[k + 1] - offsets[k], 3))
         for i in range(len(rough)):

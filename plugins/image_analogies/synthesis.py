@@ -18,6 +18,7 @@ candidates is taken, and kappa is 0.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,24 +34,26 @@ from .features import (
     source_size,
     squared_distance,
 )
-from .pyramid import (
-    RADIUS,
-    build_pyramid,
-    count_levels,
-    enlarge,
-)
-from .search_tree import (
-    Heap,
-    Tree,
-    build_tree,
-    new_heap,
-    search_tree,
-)
+from .pyramid import RADIUS, build_pyramid, count_levels, enlarge
+from .search_tree import Heap, Tree, build_tree, new_heap, search_tree
 
 NOWHERE = -1
 """Row and column of the match of a pixel that has none."""
 _ROW, _COLUMN = 0, 1
 """Columns of places."""
+
+
+class Search(NamedTuple):
+    """How matches are looked for."""
+
+    trees: tuple[Tree, ...]
+    """Of the example's features."""
+    heap: Heap
+    """Working memory."""
+    leaves: int
+    """Leaves of a tree that are looked at, at most."""
+    weaker: float
+    """Factor by which a coherent match may be worse, in squared distance."""
 
 
 @dataclass(frozen=True)
@@ -141,9 +144,8 @@ def _run_level(
     trees = tuple(build_tree(example, where, roots, *part) for part in parts)
     places = np.full((*wanted.shape, 2), NOWHERE, np.int32)
     heap = new_heap(settings.leaves, trees)
-    fill_level(
-        example, made, trees, heap, roots, allowed, wanted, weaker, settings.leaves, places
-    )  # fmt: skip
+    search = Search(trees, heap, settings.leaves, weaker)
+    fill_level(example, made, search, roots, allowed, wanted, places)
     return places
 
 
@@ -151,13 +153,10 @@ def _run_level(
 def fill_level(
     example: Pair,
     made: Pair,
-    trees: tuple[Tree, ...],
-    heap: Heap,
+    search: Search,
     roots: Float32Array,
     allowed: BoolArray,
     wanted: BoolArray,
-    weaker: float,
-    leaves: int,
     places: Int32Array,
 ) -> None:
     """Synthesise one level, in scan order.
@@ -168,16 +167,10 @@ def fill_level(
         A and A'.
     made
         B and B', whose pixels are written.
-    trees, heap
-        Of the example's features, and working memory of their searches.
     roots
         (D,) square roots of the weights.
     allowed, wanted
         (H, W) and (h, w) masks of the example and the target.
-    weaker
-        Factor by which a coherent match may be worse, in squared distance.
-    leaves
-        Leaves of a tree that are looked at, at most.
     places
         (h, w, 2) matches; written.
     """
@@ -190,11 +183,11 @@ def fill_level(
                 continue
             gather_feature(made, row, column, roots, feature)
             coherent = find_coherent(
-                example, roots, feature, scratch, allowed, places, row, column, place
+                example, roots, feature, scratch, allowed, places, (row, column), place
             )
-            limit = coherent / weaker
-            for tree in trees:
-                if search_tree(tree, heap, feature, leaves, limit, found):
+            limit = coherent / search.weaker
+            for tree in search.trees:
+                if search_tree(tree, search.heap, feature, search.leaves, limit, found):
                     gather_feature(example, found[_ROW], found[_COLUMN], roots, scratch)
                     distance = squared_distance(scratch, feature)
                     if distance < limit:
@@ -215,16 +208,15 @@ def find_coherent(
     scratch: Float32Array,
     allowed: BoolArray,
     places: Int32Array,
-    row: int,
-    column: int,
+    pixel: tuple[int, int],
     place: Int32Array,
 ) -> float:
     """Write the best place (2,) that neighbours propose; return its squared distance or inf.
 
-    `feature` (D,) is that of the pixel, `scratch` (D,) working memory, `places` (h, w, 2) the
-    matches so far, `allowed` (H, W) the pixels of the example that may be used.
+    `feature` (D,) is that of the `pixel`, a row and column, `scratch` (D,) working memory, `places`
+    (h, w, 2) the matches so far, `allowed` (H, W) the pixels of the example that may be used.
     """
-    best, last_y, last_x = np.inf, NOWHERE, NOWHERE
+    (row, column), best, last_y, last_x = pixel, np.inf, NOWHERE, NOWHERE
     place[:] = NOWHERE
     for v in range(-RADIUS, 1):
         for u in range(-RADIUS, RADIUS + 1 if v < 0 else 0):

@@ -10,10 +10,10 @@ gravity. Despite the plugin's name this is not position-based dynamics.
 * `backend`: what backends share, and the compiled one
 * `block`: strands side by side; constants, contact and substeps of all backends
 * `embedding`: the guides' own points on the rods, and held ones
+* `frames`: turns of frames, compiled
 * `gl_backend`: substeps in compute shaders
 * `kernel_contact`: contact and friction, compiled
 * `kernels`: a substep, compiled
-* `lanes`: numbers, vectors and frames of the strands of a block
 * `linear_system`: the banded matrix of a substep
 * `options`: settings
 * `resampling`: guides to rods, and what these can follow

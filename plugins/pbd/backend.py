@@ -9,9 +9,10 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import parallel_for
+from hairkit.simulation.lanes import LANES, Kind
 
 from . import block
-from .block import Contact, Steps
+from .block import Blocks, Contact, StepArrays, Steps
 from .kernels import run_substeps
 from .linear_system import System
 from .rods import Rods, State, rest_state
@@ -21,7 +22,7 @@ class Engine(ABC):
     """A backend: how the state is kept; subclasses advance it."""
 
     rows: Any
-    """(B, L, n, 16 or more) `block.STATE` of B times L rods, of which the last ones may be void."""
+    """(B, L, n, 16 or more) `block.NodeState` of B times L rods; the last ones may be void."""
     mass: Any
     """(B, L, n) kilograms; 0 of void rods."""
 
@@ -45,28 +46,28 @@ class Engine(ABC):
         self.rows = rows[:, None]
 
     @abstractmethod
-    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
+    def run(self, system: System, steps: StepArrays, outer: Float64Array) -> None:
         """Do the substeps; `outer` is `block.acting`."""
 
 
 class FastEngine(Engine):
     """Rods in blocks of lanes."""
 
-    def __init__(self, rods: Rods, contact: Contact, kind: block.Kind = np.float32) -> None:
-        blocks = -(-len(rods.mass) // block.LANES)
+    def __init__(self, rods: Rods, contact: Contact, kind: Kind = np.float32) -> None:
+        blocks = -(-len(rods.mass) // LANES)
         self._kind = kind
-        self._planes = np.zeros((blocks, rods.nodes, block.PLANES, block.LANES), kind)
+        self._planes = np.zeros((blocks, rods.nodes, block.PLANES, LANES), kind)
         self.rows = np.moveaxis(self._planes[:, :, : block.CONSTANT], -1, 1)
         super().__init__(rods, contact)
         self._system: System | None = None
         self.mass = np.moveaxis(block.pack_lanes(rods.mass, kind), -1, 1)
-        self.mass[-1, (len(rods.mass) - 1) % block.LANES + 1 :] = 0.0  # only fills the block
+        self.mass[-1, (len(rods.mass) - 1) % LANES + 1 :] = 0.0  # only fills the block
 
     def _keep(self, rows: Float64Array) -> None:
         self._planes[:, :, : block.CONSTANT] = 0.0
         self._planes[:, :, : rows.shape[2]] = block.pack_lanes(rows, self._kind)
 
-    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
+    def run(self, system: System, steps: StepArrays, outer: Float64Array) -> None:
         """Do the substeps; `outer` is `block.acting`."""
         contact, kind = self.contact, self._kind
         if self._system is not system:
@@ -76,11 +77,13 @@ class FastEngine(Engine):
         parallel_for(
             run_substeps,
             len(self._planes),
-            block.records(self._planes, block.NODE[kind]),
-            self._metric,
-            np.zeros(self.rods.nodes + 2, block.WORK[kind]),
+            Blocks(
+                block.records(self._planes, block.NODE[kind]),
+                self._metric,
+                block.records(block.pack_lanes(outer, kind), block.ACTING[kind]),
+            ),
+            np.zeros((1, self.rods.nodes + 2), block.WORK[kind]),
             Steps(*(part.astype(kind) for part in steps)),
-            block.records(block.pack_lanes(outer, kind), block.ACTING[kind]),
             contact.bodies.fields,
             block.settings_of(system, contact, kind),
         )

@@ -8,7 +8,7 @@ shares of the rod's mean mass, so that stiffness is in 1/s^2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -16,54 +16,133 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
 from hairkit.simulation.hair_cells import drift_rows
+from hairkit.simulation.lanes import LANES, Four, Kind, One, Three, lanes_of, sizes_of
 from hairkit.simulation.obstacles import Bodies
 from hairkit.simulation.rigid_motion import inverse_motion, motion_steps
+from hairkit.simulation.vectors import Floats, Frame, Rows
 
 from .linear_system import System
 from .rods import Rods, State
 
 Records = npt.NDArray[np.void]
-Floats = npt.NDArray[np.floating[Any]]
-Kind = type[np.float32] | type[np.float64]
-"""Precision of a backend."""
-KINDS: tuple[Kind, ...] = (np.float32, np.float64)
-LANES = 64
-"""Strands in a block. Compilers make vector instructions of loops over so many; shorter ones they
-unroll into instructions for single numbers."""
-
-STATE = {
-    "place": 3, "room": 1, "speed": 3, "aside": 1, "gain": 3, "spare": 1, "frame": 4,
-    "wall": 4, "beside": 4,
-}  # fmt: skip
-"""Of a node: place; how far it may move before the next lookup of the head, metres; velocity; the
-same of the torso; acceleration; frame (w, x, y, z) of the segment that ends there, of the root that
-which the head holds; planes (normal and offset, the body's axes) of head and torso. Shaders have no
-planes."""
-CONSTANTS = {
-    "rest": 3, "mass": 1, "drag": 1, "shape": 1, "clear": 1, "ease": 1, "first": 1, "second": 1,
-    "pivot": 1, "length": 1, "bend": 1, "twist": 1, "natural": 1, "over": 1, "curve": 3, "unit": 1,
-}  # fmt: skip
-"""Of a node: rest place, mass, rates of drag and of the pull to rest, clearance, 1 / mass (0 at the
-root); of the segment that ends there, at its bend before: the banded factor's two lower entries and
-reciprocal pivot, length, stiffnesses, natural twist, 1 / length, natural turn, mean mass in kg."""
-CONSTANT, PLANES = sum(STATE.values()), sum(STATE.values()) + sum(CONSTANTS.values())
-"""Numbers of a node before those of `CONSTANTS`, and all."""
 
 
-def lanes_of(fields: dict[str, int]) -> dict[Kind, np.dtype[Any]]:
-    """Return the types of records whose fields hold `LANES` numbers, or as many vectors."""
-    sizes = {name: (size, LANES) if size > 1 else (LANES,) for name, size in fields.items()}
-    return {kind: np.dtype([(name, kind, sizes[name]) for name in fields]) for kind in KINDS}
+class NodeState(Protocol):
+    """State of a node, in head axes; shaders have no planes."""
+
+    place: Three
+    """Metres."""
+    room: One
+    """How far the node may move before the next lookup of the head, metres."""
+    speed: Three
+    """m/s."""
+    aside: One
+    """As `room`, of the torso."""
+    gain: Three
+    """Acceleration, m/s^2."""
+    spare: One
+    """Fills a row of the shaders' texture."""
+    frame: Four
+    """(w, x, y, z) of the segment that ends there; of the root that which the head holds."""
+    wall: Four
+    """Plane (unit normal and offset, metres) that stands for the head, its axes."""
+    beside: Four
+    """As `wall`, of the torso."""
 
 
-NODE = lanes_of({**STATE, **CONSTANTS})
-WORK = lanes_of({
-    "force": 3, "edge": 3, "way": 3, "reach": 3, "pull": 3, "torque": 1, "pivot": 1, "beside": 1,
-    "value": 1, "solved": 3, "normal": 3, "surface": 3, "depth": 1, "grip": 1,
-})  # fmt: skip
-"""Of a node: what a substep works out for it and its segment."""
-ACTING = lanes_of({"air": 3, "force": 3})
-"""Of a node: velocity of the air, world; force over the rod's mean mass, head axes."""
+class Node(NodeState, Protocol):
+    """A record of a node: its state, and constants of it and of the segment that ends there."""
+
+    rest: Three
+    """Captured place, metres."""
+    mass: One
+    drag: One
+    """Rate of air drag, 1/s."""
+    shape: One
+    """Squared frequency of the pull to rest, 1/s^2."""
+    clear: One
+    """Least distance from obstacles, metres."""
+    ease: One
+    """1 / mass; 0 at the root."""
+    first: One
+    """Entry of the banded factor beside its diagonal."""
+    second: One
+    """The entry beside `first`."""
+    pivot: One
+    """Reciprocal pivot of the banded factor, s^2."""
+    length: One
+    """Metres."""
+    bend: One
+    """Bending stiffness of the element before, m^2/s^2."""
+    twist: One
+    """Its torsional stiffness, m^2/s^2."""
+    natural: One
+    """Its natural twist, radians."""
+    over: One
+    """1 / length, 1/m."""
+    curve: Three
+    """Its natural turn, in its midpoint frame."""
+    unit: One
+    """Mean mass of the rod's nodes, kg."""
+
+
+class Work(Protocol):
+    """A record of what a substep works out for a node and the segment that ends there."""
+
+    force: Three
+    """m/s^2."""
+    edge: Three
+    """The segment, metres."""
+    way: Three
+    """Its direction."""
+    reach: Three
+    """`edge` over the length at rest."""
+    pull: Three
+    """Force of the energy on `reach`, m^2/s^2."""
+    torque: One
+    """Of torsion, m^2/s^2."""
+    pivot: One
+    """Diagonal of the system at hand, then its reciprocal pivot."""
+    beside: One
+    """Entry beside the diagonal."""
+    value: One
+    """Right-hand side, then solution."""
+    solved: Three
+    """Solution of the banded system, metres."""
+    normal: Three
+    """Of the obstacle that is met; 0 without one."""
+    surface: Three
+    """Velocity of that obstacle, m/s."""
+    depth: One
+    """In that obstacle, metres."""
+    grip: One
+    """Change of velocity that friction may bring, m/s."""
+
+
+class Outer(Protocol):
+    """A record of what acts on a node from outside."""
+
+    air: Three
+    """Velocity of the air, m/s, world."""
+    force: Three
+    """m/s^2, head axes."""
+
+
+NODE, WORK, ACTING = lanes_of(Node), lanes_of(Work), lanes_of(Outer)
+PLANES = sum(sizes_of(Node).values())
+CONSTANT = sum(sizes_of(NodeState).values())
+"""Numbers of a node before its constants; `PLANES` are all."""
+
+
+class Blocks(NamedTuple):
+    """B blocks of rods of n nodes, and what acts on them."""
+
+    nodes: Records
+    """(B, n) of `Node`."""
+    metric: Floats
+    """(B, n (n - 1) / 2, LANES) lower rows of the metric of the lengths, s^2."""
+    acting: Records
+    """(B, n) of `Outer`; one block and one node may stand for all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,30 +161,39 @@ class Contact:
     little friction around bends; with 4 the Euler-Eytelwein equation holds."""
 
 
-class Steps(NamedTuple):
-    """Motion of head and torso in K substeps, in the head axes after each."""
+Motion = TypeVar("Motion")
+Turn = TypeVar("Turn")
 
-    head_step: Any
+
+class Steps(NamedTuple, Generic[Motion, Turn]):
+    """Motion of head and torso in K substeps, in the head axes after each: arrays.
+
+    In kernels, of one substep: tuples, without the first axis.
+    """
+
+    head_step: Motion
     """(K, 3, 4) rows of the motion from the head axes before."""
-    drift: Any
+    drift: Motion
     """(K, 3, 4) rows of the velocity of a point that rides on the head."""
-    air: Any
+    air: Motion
     """(K, 3, 4) turn from the world's axes, and gravity, m/s^2."""
-    turn: Any
+    turn: Turn
     """(K, 4) the head's turn (w, x, y, z)."""
-    torso: Any
+    torso: Motion
     """(K, 3, 4) rows from the head axes to the torso's."""
-    torso_drift: Any
+    torso_drift: Motion
     """(K, 3, 4) rows of the velocity of a point that rides on the torso."""
 
 
+StepArrays = Steps[Floats, Floats]
+Step = Steps[Rows, Frame]
 Course = tuple[Float64Array, Float64Array]
 """Motions (4, 4) since rest, world, from which and to which a body goes."""
 
 
 def make_steps(
     head: Course, torso: Course, count: int, gravity: Float64Array, seconds: float
-) -> Steps:
+) -> StepArrays:
     """Return substeps, of so many seconds each, of head and torso under gravity (3,), world."""
     heads, head_steps = motion_steps(*head, count)
     torsos, torso_steps = motion_steps(*torso, count)
@@ -139,9 +227,9 @@ def settings_of(system: System, contact: Contact, kind: Kind) -> Settings:
 
 
 def constants(rods: Rods, system: System, contact: Contact) -> tuple[Float64Array, Float64Array]:
-    """Return (S, n, 20) `CONSTANTS` and (S, n (n - 1) / 2) lower rows of the metric."""
+    """Return (S, n, 20) the constants of `Node` and (S, n (n - 1) / 2) lower rows of the metric."""
     count, nodes = rods.mass.shape
-    made = np.zeros((count, nodes, sum(CONSTANTS.values())))
+    made = np.zeros((count, nodes, PLANES - CONSTANT))
     mean = rods.mass.mean(axis=1, keepdims=True)
     lower = np.linalg.cholesky(system.matrix / mean[..., None])
     pivot = lower.diagonal(axis1=1, axis2=2)
@@ -161,7 +249,7 @@ def constants(rods: Rods, system: System, contact: Contact) -> tuple[Float64Arra
 
 
 def acting(rods: Rods, air: Float64Array, force: Float64Array | None) -> Float64Array:
-    """Return (S or 1, n or 1, 6) `ACTING`.
+    """Return (S or 1, n or 1, 6) the fields of `Outer`.
 
     `air` (3,) or (S, n, 3) is its velocity, m/s, world; `force` (S, n, 3) in newtons, head axes.
     """
@@ -171,7 +259,7 @@ def acting(rods: Rods, air: Float64Array, force: Float64Array | None) -> Float64
 
 
 def state_rows(rods: Rods, state: State) -> Float64Array:
-    """Return (S, n, 16) the fields of `STATE` before the planes."""
+    """Return (S, n, 16) the fields of `NodeState` before the planes."""
     rows = np.zeros((*rods.mass.shape, 16))
     rows[:, 0, 12:] = rods.root_frame
     for into, values in zip(vars(state_of(rows)).values(), vars(state).values(), strict=True):
@@ -180,7 +268,7 @@ def state_rows(rods: Rods, state: State) -> Float64Array:
 
 
 def state_of(rows: Any) -> State:
-    """Return the state in rows (..., n, 16 or more) of `STATE`: views of them."""
+    """Return the state in rows (..., n, 16 or more) of `NodeState`: views of them."""
     return State(rows[..., :3], rows[..., 4:7], rows[..., 1:, 12:16], rows[..., 8:11])
 
 

@@ -6,14 +6,24 @@ is pulled to its hand, at the nearest node, as hair is to its captured shape.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.parallel import compiled
 from hairkit.simulation.rigid_motion import transform_points
-from hairkit.simulation.vectors import Frame, Vector, inlined, minus, plus, rotate, times, unit
+from hairkit.simulation.vectors import (
+    Floats,
+    Frame,
+    Vector,
+    inlined,
+    minus,
+    plus,
+    rotate,
+    times,
+    unit,
+)
 from hairkit.types.strands import Strands
 
 from .rods import Rods
@@ -83,7 +93,7 @@ def held_nodes(embedding: Embedding, held: tuple[int, ...]) -> tuple[Int64Array,
 
 @compiled
 def carry_points(
-    first: int, last: int, on: Embedding, position: Any, frames: Any, points: Any
+    first: int, last: int, on: Embedding, position: Floats, frames: Floats, points: Floats
 ) -> None:
     """Write where rods carry points `first` to before `last` of (P, 3) to.
 
@@ -99,7 +109,7 @@ def carry_points(
 
 
 @compiled
-def measure_offsets(on: Embedding, position: Any, frames: Any, points: Float64Array) -> None:
+def measure_offsets(on: Embedding, position: Floats, frames: Floats, points: Float64Array) -> None:
     """Write the offsets of points (P, 3) at rest."""
     lanes = position.shape[1]
     for i in range(len(points)):
@@ -111,7 +121,7 @@ def measure_offsets(on: Embedding, position: Any, frames: Any, points: Float64Ar
 
 
 @inlined
-def on_curve(nodes: Any, j: int, t: float) -> Vector:
+def on_curve(nodes: Floats, j: int, t: float) -> Vector:
     """Return the place on the smooth curve through the nodes, t along segment j (Catmull-Rom)."""
     a, b = _row(nodes, j), _row(nodes, j + 1)
     way = minus(b, a)
@@ -125,7 +135,7 @@ def on_curve(nodes: Any, j: int, t: float) -> Vector:
 
 
 @inlined
-def frame_on(frames: Any, j: int, t: float) -> Frame:
+def frame_on(frames: Floats, j: int, t: float) -> Frame:
     """Return the frame t along segment j, whose own frame is at its middle."""
     other = min(max(j - 1 if t < 0.5 else j + 1, 0), len(frames) - 1)
     part = abs(t - 0.5)
@@ -137,6 +147,6 @@ def frame_on(frames: Any, j: int, t: float) -> Frame:
 
 
 @inlined
-def _row(nodes: Any, j: int) -> Vector:
+def _row(nodes: Floats, j: int) -> Vector:
     """Return a place in float64."""
     return 1.0 * nodes[j, 0], 1.0 * nodes[j, 1], 1.0 * nodes[j, 2]

@@ -18,7 +18,7 @@ from hairkit.rendering.context import Renderer, is_current, on_graphics_card, re
 from hairkit.rendering.gl_camera import set_uniforms
 
 from .backend import Engine
-from .block import Contact, Steps, constants, settings_of
+from .block import Contact, StepArrays, constants, settings_of
 from .linear_system import System
 from .rods import Rods
 
@@ -30,6 +30,8 @@ MOST_STEPS, STEP = 64, 256
 """Most substeps in one dispatch of the shader; bytes of one, see `pbd_substep_schedule.glsl`."""
 UNROLLED = 16
 """Nodes up to which compilers unroll the shader's loops, see `pbd_layout.glsl`."""
+LOOPS = 20
+"""Loops over the nodes in a substep of the shader, at most."""
 MOST_TURNS = 64_000
 """Most loop iterations in one dispatch: Mesa's llvmpipe leaves all loops after 65536 in all."""
 
@@ -58,7 +60,7 @@ class ComputeEngine(Engine):
     def _keep(self, rows: Float64Array) -> None:
         super()._keep(rows.astype(np.float32))
 
-    def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
+    def run(self, system: System, steps: StepArrays, outer: Float64Array) -> None:
         """Do the substeps; `outer` is `block.acting`."""
         count, nodes = self.rods.mass.shape
         words = np.concatenate([part.reshape(len(part), -1) for part in steps], axis=1)
@@ -127,7 +129,7 @@ def steps_at_once(nodes: int) -> int:
         return MOST_STEPS
     segments = nodes - 1
     # the factor of the lengths takes four entries in a turn, a row for each segment before
-    turns = segments**3 // 24 + segments**2 + 5 * segments + 20 * nodes
+    turns = segments**3 // 6 // 4 + segments**2 + 5 * segments + LOOPS * nodes
     return min(max(MOST_TURNS // turns, 1), MOST_STEPS)
 
 

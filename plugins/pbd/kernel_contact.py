@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from hairkit.simulation.obstacle_kernels import distance_at
+from hairkit.simulation.lanes import LANES, put, stage, three
+from hairkit.simulation.obstacle_kernels import Field, Fields, distance_at
 from hairkit.simulation.vectors import (
     HALF,
     ONE,
     ZERO,
+    Floats,
+    Number,
     Rows,
     dot,
     inlined,
@@ -21,8 +24,7 @@ from hairkit.simulation.vectors import (
     times,
 )
 
-from .block import LANES
-from .lanes import put, stage, three
+from .block import Node, Settings, Step, Work
 
 FAR = 1.0
 """Metres up to which distances are exact: bounds would be looked up again sooner."""
@@ -38,7 +40,9 @@ HEAD = ((ONE, ZERO, ZERO, ZERO), (ZERO, ONE, ZERO, ZERO), (ZERO, ZERO, ONE, ZERO
 
 
 @stage
-def resolve_contacts(s: Any, x: Any, step: Any, fields: Any, settings: Any) -> None:
+def resolve_contacts(
+    s: Sequence[Node], x: Sequence[Work], step: Step, fields: Fields, settings: Settings
+) -> None:
     """Push nodes out of the obstacles, then rub and restore the lengths by turns."""
     touching, h, with_torso = False, settings.seconds, fields.torso.distance.shape[0] > 0
     drift, pose, beside = step.drift, step.torso, step.torso_drift
@@ -62,7 +66,7 @@ def resolve_contacts(s: Any, x: Any, step: Any, fields: Any, settings: Any) -> N
 
 
 @inlined
-def use_room(s: Any, x: Any, room: Any, drift: Rows, h: Any) -> bool:
+def use_room(s: Node, x: Work, room: Floats, drift: Rows, h: Number) -> bool:
     """Take from the room left to a body what a node may have moved; return whether one may meet it.
 
     `drift` is the body's motion.
@@ -79,7 +83,9 @@ def use_room(s: Any, x: Any, room: Any, drift: Rows, h: Any) -> bool:
 
 
 @inlined
-def meets(s: Any, x: Any, room: Any, wall: Any, field: Any, pose: Rows, drift: Rows) -> bool:
+def meets(
+    s: Node, x: Work, room: Floats, wall: Floats, field: Field, pose: Rows, drift: Rows
+) -> bool:
     """Note depth, normal and velocity of a body where it is the deepest yet; return if it is.
 
     The body is the plane `wall` (normal and offset, its own axes), which is looked up again where
@@ -107,7 +113,7 @@ def meets(s: Any, x: Any, room: Any, wall: Any, field: Any, pose: Rows, drift: R
 
 
 @stage
-def push_out(s: Any, x: Any, settings: Any) -> None:
+def push_out(s: Node, x: Work, settings: Settings) -> None:
     """Push nodes out of the obstacles, which grip them; nothing happens where normals are 0."""
     h = settings.seconds
     for w in range(LANES):
@@ -121,7 +127,7 @@ def push_out(s: Any, x: Any, settings: Any) -> None:
 
 
 @stage
-def rub(s: Any, x: Any, h: Any) -> None:
+def rub(s: Node, x: Work, h: Number) -> None:
     """Let friction take from the speed along the obstacle as much as the grip holds (Coulomb)."""
     for w in range(LANES):
         speed, normal = three(s.speed, w), three(x.normal, w)
@@ -136,7 +142,7 @@ def rub(s: Any, x: Any, h: Any) -> None:
 
 
 @stage
-def restore_lengths(s: Any, x: Any, settings: Any, rubs: bool) -> None:
+def restore_lengths(s: Sequence[Node], x: Sequence[Work], settings: Settings, rubs: bool) -> None:
     """Restore the lengths; a touching node moves only along the obstacle, and is pressed on it.
 
     One tridiagonal solve, eliminated on the way to the tip; the root, which does not move, takes no
@@ -166,7 +172,7 @@ def restore_lengths(s: Any, x: Any, settings: Any, rubs: bool) -> None:
 
 
 @inlined
-def pull_node(s: Any, x: Any, after: Any, over: Any, friction: Any) -> None:
+def pull_node(s: Node, x: Work, after: Work, over: Number, friction: Number) -> None:
     """Move a node by the pulls of its segments, the one that ends there and the one after."""
     for w in range(LANES):
         value = (x.value[w] - after.beside[w] * after.value[w]) * x.pivot[w]

@@ -2,22 +2,25 @@
 
 Each step of the method goes along the rods, and at each node over the `LANES` strands of a block.
 Compilers make vector instructions of the loops over strands, whose bodies have no branches. `s` are
-the nodes' records of state and constants, `x` those of work, of which two of zeros follow the tip.
+the nodes' records, `x` those of work, of which two of zeros follow the tip.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from hairkit.parallel import compiled_with
+from hairkit.simulation.lanes import LANES, four, put, put_four, stage, three
 from hairkit.simulation.obstacle_kernels import Fields
 from hairkit.simulation.vectors import (
     HALF,
     ONE,
     ZERO,
+    Floats,
+    Number,
     cross,
     dot,
     inlined,
@@ -30,22 +33,13 @@ from hairkit.simulation.vectors import (
     turned,
 )
 
-from .block import LANES, Floats, Records, Settings, Steps
+from .block import Blocks, Node, Outer, Records, Settings, Step, StepArrays, Steps, Work
+from .frames import THIRD, half_way, rows_of, swing_frame, twist_angle
 from .kernel_contact import resolve_contacts
-from .lanes import (
-    THIRD,
-    four,
-    half_way,
-    put,
-    put_four,
-    rows_of,
-    stage,
-    swing_frame,
-    three,
-    twist_angle,
-)
 from .linear_system import IMPLICIT
 
+Nodes = Sequence[Node]
+Works = Sequence[Work]
 AHEAD, PASSED, DRIFT = (np.float32(c) for c in (1 / IMPLICIT, 1 - IMPLICIT, 0.5 - IMPLICIT**2))
 """Weights: of a change of place in the velocity, over the step; of the old acceleration in the
 velocity, and in the place, where that of the new one is `IMPLICIT` squared."""
@@ -68,24 +62,21 @@ LEAST = np.float32(1e-6)
 def run_substeps(
     first: int,
     last: int,
-    blocks: Records,
-    metrics: Floats,
+    blocks: Blocks,
     work: Records,
-    steps: Steps,
-    acting: Records,
+    steps: StepArrays,
     fields: Fields,
     settings: Settings,
 ) -> None:
     """Advance blocks `first` to before `last` by all substeps, in place.
 
-    `blocks` (B, n) are of `NODE`, `metrics` (B, n (n - 1) / 2, LANES) their lower rows, `work`
-    (n + 2,) zeros of `WORK`; `acting` (B, n) of `ACTING` may have one block and node for all.
+    `work` (1, n + 2) are zeros of `Work`.
     """
-    n, h = blocks.shape[1], settings.seconds
-    x, matrix = np.zeros_like(work), np.empty((n, n, LANES), metrics.dtype)
+    n, h = blocks.nodes.shape[1], settings.seconds
+    x, matrix = np.zeros_like(work)[0], np.empty((n, n, LANES), blocks.metric.dtype)
     for block in range(first, last):
-        s, metric = blocks[block], metrics[block]
-        act = acting[min(block, len(acting) - 1)]
+        s, metric = blocks.nodes[block], blocks.metric[block]
+        act = blocks.acting[min(block, len(blocks.acting) - 1)]
         for k in range(len(steps.turn)):
             step = step_of(steps, k)
             predict_nodes(s, x, step, settings, act)
@@ -101,7 +92,7 @@ def run_substeps(
 
 
 @stage
-def step_of(steps: Any, k: int) -> Any:
+def step_of(steps: StepArrays, k: int) -> Step:
     """Return one substep, whose numbers stay in registers."""
     return Steps(
         rows_of(steps.head_step[k]),
@@ -114,7 +105,7 @@ def step_of(steps: Any, k: int) -> Any:
 
 
 @stage
-def predict_nodes(s: Any, x: Any, step: Any, settings: Any, act: Any) -> None:
+def predict_nodes(s: Nodes, x: Works, step: Step, settings: Settings, act: Sequence[Outer]) -> None:
     """Bring nodes to the new head axes, extrapolate them, and sum the forces on them."""
     head, drift, air = step.head_step, step.drift, step.air
     gravity, h, damping = (air[0][3], air[1][3], air[2][3]), settings.seconds, settings.damping
@@ -138,7 +129,7 @@ def predict_nodes(s: Any, x: Any, step: Any, settings: Any, act: Any) -> None:
 
 
 @stage
-def lead_roots(s: Any, x: Any, step: Any, h: Any) -> None:
+def lead_roots(s: Nodes, x: Works, step: Step, h: Number) -> None:
     """Move the roots with the head, and let them hold the next nodes back.
 
     The inertia between them, a sixth of the segment's mass, is a third of the root's.
@@ -161,7 +152,7 @@ def lead_roots(s: Any, x: Any, step: Any, h: Any) -> None:
 
 
 @stage
-def transport_frames(s: Any, x: Any, step: Any) -> None:
+def transport_frames(s: Nodes, x: Works, step: Step) -> None:
     """Write the segments, and transport their frames to the new directions."""
     for j in range(1, len(s)):
         node, own, last_node = s[j], x[j], s[j - 1]
@@ -175,7 +166,7 @@ def transport_frames(s: Any, x: Any, step: Any) -> None:
 
 
 @stage
-def relax_twist(s: Any, x: Any) -> None:
+def relax_twist(s: Nodes, x: Works) -> None:
     """Rotate frames about their segments until torques balance: one Newton step, tridiagonal."""
     for j in range(1, len(s)):
         node, own, last_node, last = s[j], x[j], s[j - 1], x[j - 1]
@@ -213,7 +204,7 @@ def relax_twist(s: Any, x: Any) -> None:
 
 
 @stage
-def solve_tridiagonal(x: Any, n: int) -> None:
+def solve_tridiagonal(x: Works, n: int) -> None:
     """Solve the system of `pivot`, `beside` (this row and the one before) and `value`, in place."""
     first = x[1]
     for w in range(LANES):
@@ -232,7 +223,7 @@ def solve_tridiagonal(x: Any, n: int) -> None:
 
 
 @stage
-def add_elastic(s: Any, x: Any) -> None:
+def add_elastic(s: Nodes, x: Works) -> None:
     """Add the node forces of bending and twist: minus the energy's gradient."""
     for j in range(1, len(s)):
         node, own, last_node, last = s[j], x[j], s[j - 1], x[j - 1]
@@ -258,7 +249,7 @@ def add_elastic(s: Any, x: Any) -> None:
 
 
 @stage
-def solve_banded(s: Any, x: Any) -> None:
+def solve_banded(s: Nodes, x: Works) -> None:
     """Write `solved`, A^-1 `force` of the free nodes, by the factor L D L^T of two bands."""
     n = len(s)
     for j in range(1, n):
@@ -270,7 +261,7 @@ def solve_banded(s: Any, x: Any) -> None:
 
 
 @inlined
-def eliminate_node(s: Any, x: Any, before: Any, beyond: Any) -> None:
+def eliminate_node(s: Node, x: Work, before: Work, beyond: Work) -> None:
     """Solve a row of L."""
     for w in range(LANES):
         known = times(s.first[w], three(before.solved, w))
@@ -279,7 +270,9 @@ def eliminate_node(s: Any, x: Any, before: Any, beyond: Any) -> None:
 
 
 @inlined
-def substitute_node(s: Any, next_: Any, further: Any, x: Any, after: Any, beyond: Any) -> None:
+def substitute_node(
+    s: Node, next_: Node, further: Node, x: Work, after: Work, beyond: Work
+) -> None:
     """Solve a row of D L^T."""
     for w in range(LANES):
         known = times(next_.first[w], three(after.solved, w))
@@ -288,7 +281,7 @@ def substitute_node(s: Any, next_: Any, further: Any, x: Any, after: Any, beyond
 
 
 @stage
-def keep_linear_lengths(s: Any, x: Any, metric: Any, matrix: Any) -> None:
+def keep_linear_lengths(s: Nodes, x: Works, metric: Floats, matrix: Floats) -> None:
     """Let tensions act, by which segments keep their lengths, and solve anew."""
     for j in range(1, len(s)):
         node, own, last = s[j], x[j], x[j - 1]
@@ -307,7 +300,7 @@ def keep_linear_lengths(s: Any, x: Any, metric: Any, matrix: Any) -> None:
 
 
 @stage
-def solve_lengths(x: Any, metric: Any, matrix: Any, n: int) -> None:
+def solve_lengths(x: Works, metric: Floats, matrix: Floats, n: int) -> None:
     """Solve metric * (d d^T) for `value`, in place, by elimination; `matrix` (n, n) is work.
 
     Rows of its upper triangle are eliminated from those below; what stays is D L^T.
@@ -343,7 +336,7 @@ def solve_lengths(x: Any, metric: Any, matrix: Any, n: int) -> None:
 
 
 @stage
-def move_nodes(s: Any, x: Any, h: Any) -> None:
+def move_nodes(s: Nodes, x: Works, h: Number) -> None:
     """Move nodes by the solution, which adds to their velocity and acceleration."""
     over = ONE / h
     for j in range(1, len(s)):
@@ -359,7 +352,7 @@ def move_nodes(s: Any, x: Any, h: Any) -> None:
 
 
 @stage
-def keep_lengths(s: Any, h: Any) -> None:
+def keep_lengths(s: Nodes, h: Number) -> None:
     """Give segments their exact lengths, from the root to the tip; bound how fast they turn."""
     over = ONE / h
     for j in range(1, len(s)):

@@ -7,6 +7,11 @@ from dataclasses import dataclass
 from hairkit.options import fill_options, option
 from hairkit.types.groom import HairPhysics
 
+MIDDLE_PULL = 40.0
+"""1/s: angular frequency of the pull to the captured shape at a stiffness of 0.5, 6 Hz."""
+UNREACHED = 1.001
+"""Stiffness at which that pull would be infinite: just above the largest, 1."""
+
 
 @dataclass(frozen=True)
 class Options:
@@ -82,8 +87,8 @@ class Options:
     backend: str = option(
         "auto",
         choices=("auto", "reference", "fast", "compute"),
-        doc="fast: compiled, float32; reference: the same in float64; compute: shaders; auto:"
-        " compute on a graphics card, else fast.",
+        doc="fast: compiled, float32; reference: the same in float64; compute: shaders; auto: fast,"
+        " on graphics cards too, where compute has not been timed.",
     )
 
     def resolved(self, physics: HairPhysics) -> Options:
@@ -99,4 +104,4 @@ class Options:
     def pull(self) -> float:
         """Return the squared frequency of the pull to the captured shape at the root, 1/s^2."""
         share = self.stiffness or 0.0
-        return (40.0 * share / (1.001 - share)) ** 2
+        return (MIDDLE_PULL * share / (UNREACHED - share)) ** 2

@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import parallel_for
-from hairkit.rendering.context import on_graphics_card
 from hairkit.simulation import Measures, Surroundings
 from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
 from hairkit.simulation.hair_grid import make_hair_grid
@@ -144,7 +143,7 @@ class PbdSimulator(GuideSimulator):
     def _make_engine(self, contact: Contact) -> Engine:
         """Return the backend of the options."""
         name = self._options.backend
-        if name == "compute" or (name == "auto" and on_graphics_card()):
+        if name == "compute":
             from .gl_backend import ComputeEngine
 
             return ComputeEngine(self.rods, contact)

@@ -7,6 +7,7 @@ cannot make it unstable; friction takes the normal force and the sliding speed o
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled
@@ -18,18 +19,22 @@ _SLOW = 1e-3
 """Sliding speeds below this, metres per second, are held by friction without slipping."""
 
 
+class Point(NamedTuple):
+    """A Gauss point during an iteration."""
+
+    place: Float64Array
+    """(3,) metres, world."""
+    before: Float64Array
+    """(3,) where from it has come in the step's effective seconds."""
+    weight: Float64Array
+    """(3, 3) of its displacement in the implicit step, kilograms."""
+    pull: Float64Array
+    """(3,) its part of the gradient, kilogram metres."""
+
+
 @compiled
 def touch(
-    step: Step,
-    body: Body,
-    mass: float,
-    h: float,
-    gap: float,
-    point: Float64Array,
-    before: Float64Array,
-    weight: Float64Array,
-    pull: Float64Array,
-    scratch: Float64Array,
+    step: Step, body: Body, mass: float, h: float, gap: float, point: Point, scratch: Float64Array
 ) -> bool:
     """Add to a point's weight and gradient what a body does to it; return whether it does.
 
@@ -41,19 +46,18 @@ def touch(
         The point's mass, kilograms; the step's effective seconds.
     gap
         Distance from the surface below which it pushes, metres.
-    point, before
-        (3,) where the point is, and where from it has come in `h`, world.
-    weight, pull
-        (3, 3) and (3,) changed in place.
+    point
+        The point, whose weight and pull are changed in place.
     scratch
         (3, 3) anything.
     """
     local, n, slide = scratch[0], scratch[1], scratch[2]
+    place, before, weight, pull = point
     pose, before_pose = body.pose, body.pose_before
     for i in range(3):
         local[i] = 0.0
         for j in range(3):
-            local[i] += pose[j, i] * (point[j] - pose[j, 3])
+            local[i] += pose[j, i] * (place[j] - pose[j, 3])
     distance, a, b, c = distance_at(body.field, local[0], local[1], local[2], gap)
     depth = gap - distance
     if depth <= 0:
@@ -65,8 +69,8 @@ def touch(
         for j in range(3):
             surface += before_pose[i, j] * local[j]
         # the surface's own motion over the whole step, as a velocity
-        moved = point[i] - surface - before_pose[i, 3]
-        slide[i] = (point[i] - before[i]) - h * moved / step.seconds
+        moved = place[i] - surface - before_pose[i, 3]
+        slide[i] = (place[i] - before[i]) - h * moved / step.seconds
     along = slide[0] * n[0] + slide[1] * n[1] + slide[2] * n[2]
     for i in range(3):
         slide[i] -= along * n[i]

@@ -24,13 +24,13 @@ def eliminate(
     """Eliminate from tip to root, then substitute back; leaves -dq in `gradient[:, 6:]`."""
     count = len(form)
     tip, pull, d = np.zeros((6, 6)), np.zeros(6), np.empty(3)
-    moved, carried = np.empty((3, 3)), np.empty((6, 3))
+    scratch = np.empty((9, 3))
     for k in range(count - 1, -1, -1):
         a, b = form[k], gradient[k]
         if k < count - 1:
             for i in range(3):
                 d[i] = ends[k + 1, i] - ends[k, i]
-            _join(a, b, tip, pull, d, spin[k], shift[k], moved, carried)
+            _join(a, b, tip, pull, d, spin[k], shift[k], scratch)
         for i in range(9):
             for j in range(i):
                 a[i, j] = a[j, i]
@@ -66,14 +66,14 @@ def _join(
     d: Float64Array,
     spin: Float64Array,
     shift: Float64Array,
-    moved: Float64Array,
-    carried: Float64Array,
+    scratch: Float64Array,
 ) -> None:
     """Add the form of the chain behind an element's end to the upper triangle of its own.
 
     The end's twist is X (turn, move) + S dq, X = [[1, 0], [-[d]x, 1]] and S = [spin; shift]; the
-    form of the end is [[A, B], [B', C]].
+    form of the end is [[A, B], [B', C]]. `scratch` is (9, 3).
     """
+    moved, carried = scratch[:3], scratch[3:]
     for i in range(3):
         p, q = (i + 1) % 3, (i + 2) % 3  # row i of [d]x M is d_p M_q - d_q M_p
         for j in range(3):

@@ -11,13 +11,14 @@ super-helices", Eurographics 2009. `reference.py` forms and solves the same syst
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled, compiled_with
 
-from .contact import touch
+from .contact import Point, touch
 from .element_kernels import advance_frame, node, place_clamped_end, product, times, turns
 from .elimination import TWIST, eliminate
 from .rods import NODES, SHARES, WEIGHTS, Rods
@@ -25,6 +26,44 @@ from .state import CLOSE, FAR, Loads, Motion, Step
 
 POINTS, ARMS, TOUCH, SCRATCH = 3, 4, 5, 6
 """Rows of the scratch space that hold points, levers and what contact needs, and their number."""
+
+
+class Strand(NamedTuple):
+    """A strand during a try of a step."""
+
+    first: int
+    """Its first element."""
+    last: int
+    """The first element after it."""
+    root: Float64Array
+    """(3,) where the head holds it at the step's end, metres."""
+    frame: Float64Array
+    """(3, 3) how."""
+    two_step: bool
+    """As in `Step`, of this try."""
+
+
+class Chain(NamedTuple):
+    """The elements of a strand in an iteration, from the root on."""
+
+    frames: Float64Array
+    """(n + 1, 3, 3) at the elements' ends."""
+    ends: Float64Array
+    """(n + 1, 3) metres, world."""
+    spin: Float64Array
+    """(n, 3, 3) turn of the end after an element by its dq."""
+    shift: Float64Array
+    """(n, 3, 3) move of that end by its dq."""
+    form: Float64Array
+    """(n, 9, 9) quadratic form of each in (turn, move, dq)."""
+    gradient: Float64Array
+    """(n, 9) and the gradient."""
+
+
+@compiled
+def _effective_seconds(step: Step, strand: Strand) -> float:
+    """Return the time by which an acceleration changes the velocity in the step's formula."""
+    return step.seconds * 2 / 3 if strand.two_step else step.seconds
 
 
 @compiled_with(allocates=True)
@@ -36,18 +75,14 @@ def step_strands(
         first, last = rods.offsets[strand], rods.offsets[strand + 1]
         root, frame = np.empty(3), np.empty((3, 3))
         place_clamped_end(step.head, rods.roots[strand], rods.frames[strand], root, frame)
-        now, two_step = motion.q[first:last].copy(), step.two_step
-        converged = _solve_step(
-            rods, motion, loads, step, two_step, step.iterations, first, last, root, frame, now
-        )
-        if not converged:
+        now, own = motion.q[first:last].copy(), Strand(first, last, root, frame, step.two_step)
+        if not _solve_step(rods, motion, loads, step, own, step.iterations, now):
             # not converged: redo with backward Euler, which dissipates energy
-            two_step = False
+            own = Strand(first, last, root, frame, False)
             motion.q_before[first:last] = now
-            more = 2 * step.iterations
-            _solve_step(rods, motion, loads, step, two_step, more, first, last, root, frame, now)
+            _solve_step(rods, motion, loads, step, own, 2 * step.iterations, now)
         motion.q_before[first:last] = now
-        _update_motion(rods, motion, step, two_step, first, last, root, frame)
+        _update_motion(rods, motion, step, own)
 
 
 @compiled_with(allocates=True)
@@ -56,24 +91,21 @@ def _solve_step(
     motion: Motion,
     loads: Loads,
     step: Step,
-    two_step: bool,
+    strand: Strand,
     iterations: int,
-    first: int,
-    last: int,
-    root: Float64Array,
-    frame: Float64Array,
     now: Float64Array,
 ) -> bool:
     """Extrapolate one strand's coordinates, iterate, and return whether the step converged."""
-    start = np.empty((last - first, 3))
-    for k in range(last - first):
+    first, count = strand.first, strand.last - strand.first
+    start = np.empty((count, 3))
+    for k in range(count):
         for j in range(3):
             before = motion.q_before[first + k, j]
-            start[k, j] = (4 * now[k, j] - before) / 3 if two_step else now[k, j]
+            start[k, j] = (4 * now[k, j] - before) / 3 if strand.two_step else now[k, j]
             motion.q[first + k, j] = 2 * now[k, j] - before
     turn = 0.0
     for _ in range(iterations):
-        turn = newton(rods, motion, loads, step, two_step, first, last, root, frame, start)
+        turn = newton(rods, motion, loads, step, strand, start)
         if turn < CLOSE:
             break
     return turn < FAR
@@ -81,33 +113,28 @@ def _solve_step(
 
 @compiled_with(allocates=True)
 def newton(
-    rods: Rods,
-    motion: Motion,
-    loads: Loads,
-    step: Step,
-    two_step: bool,
-    first: int,
-    last: int,
-    root: Float64Array,
-    frame: Float64Array,
-    start: Float64Array,
+    rods: Rods, motion: Motion, loads: Loads, step: Step, strand: Strand, start: Float64Array
 ) -> float:
     """Change `motion.q` of one strand by one Newton iteration of the implicit step.
 
     Return the largest rotation of an element in it, radians.
     """
-    count = last - first
-    h = step.seconds * 2 / 3 if two_step else step.seconds
-    frames, ends = np.empty((count + 1, 3, 3)), np.empty((count + 1, 3))
-    spin, shift = np.empty((count, 3, 3)), np.empty((count, 3, 3))
-    form, gradient = np.zeros((count, 9, 9)), np.zeros((count, 9))
-    scratch = np.empty((SCRATCH, 3, 3))
-    frames[0], ends[0] = frame, root
+    first, count = strand.first, strand.last - strand.first
+    h = _effective_seconds(step, strand)
+    chain = Chain(
+        np.empty((count + 1, 3, 3)),
+        np.empty((count + 1, 3)),
+        np.empty((count, 3, 3)),
+        np.empty((count, 3, 3)),
+        np.zeros((count, 9, 9)),
+        np.zeros((count, 9)),
+    )
+    form, gradient, scratch = chain.form, chain.gradient, np.empty((SCRATCH, 3, 3))
+    chain.frames[0], chain.ends[0] = strand.frame, strand.root
     for k in range(count):
         e = first + k
-        own = (frames[k], ends[k], form[k], gradient[k])
-        _element(rods, motion, loads, step, two_step, h, e, *own, scratch)
-        _advance_element(motion.q[e], rods.lengths[e], frames, ends, spin, shift, k, scratch)
+        _element(rods, motion, loads, step, strand, chain, k, scratch)
+        _advance_element(motion.q[e], rods.lengths[e], chain, k, scratch)
         for j in range(3):
             stiff = rods.lengths[e] * rods.stiffness[e, j]
             form[k, 6 + j, 6 + j] += h * (h + step.friction) * stiff
@@ -119,7 +146,7 @@ def newton(
                     + step.friction * (motion.q[e, j] - start[k, j])
                 )
             )
-    eliminate(form, gradient, ends, spin, shift)
+    eliminate(form, gradient, chain.ends, chain.spin, chain.shift)
     most = 0.0
     for k in range(count):
         # no element turns by more than a radian in one iteration
@@ -138,19 +165,18 @@ def _element(
     motion: Motion,
     loads: Loads,
     step: Step,
-    two_step: bool,
-    h: float,
-    e: int,
-    frame: Float64Array,
-    end: Float64Array,
-    form: Float64Array,
-    gradient: Float64Array,
+    strand: Strand,
+    chain: Chain,
+    k: int,
     scratch: Float64Array,
 ) -> None:
-    """Add the Gauss points of element e to its form in (turn, move, dq) and its gradient."""
+    """Add the Gauss points of element k to its form in (turn, move, dq) and its gradient."""
+    e, h, two_step = strand.first + k, _effective_seconds(step, strand), strand.two_step
+    frame, end, form, gradient = chain.frames[k], chain.ends[k], chain.form[k], chain.gradient[k]
     slope, by_change, weight = scratch[0], scratch[1], scratch[2]
     local, pull, point = scratch[POINTS, 0], scratch[POINTS, 1], scratch[POINTS, 2]
     before, arm = scratch[ARMS, 0], scratch[ARMS, 1]
+    own = Point(point, before, weight, pull)
     for g in range(NODES):
         node(motion.q[e], rods.lengths[e] * SHARES[g], local, slope)
         mass = rods.density[e] * rods.lengths[e] * WEIGHTS[g]
@@ -172,13 +198,12 @@ def _element(
         product(frame, slope, by_change)
         total = mass + drag + spring
         for i in range(3):
-            for k in range(3):
-                weight[i, k] = total if i == k else 0.0
+            for j in range(3):
+                weight[i, j] = total if i == j else 0.0
         touched = False
         for body in step.bodies:
             if len(body.field.distance):
-                gap, room = loads.gap[e, g], scratch[TOUCH]
-                touched |= touch(step, body, mass, h, gap, point, before, weight, pull, room)
+                touched |= touch(step, body, mass, h, loads.gap[e, g], own, scratch[TOUCH])
         if touched:
             _add_point(form, gradient, arm, by_change, weight, pull)
         else:
@@ -247,16 +272,10 @@ def _add_isotropic_point(
 
 @compiled
 def _advance_element(
-    q: Float64Array,
-    length: float,
-    frames: Float64Array,
-    ends: Float64Array,
-    spin: Float64Array,
-    shift: Float64Array,
-    k: int,
-    scratch: Float64Array,
+    q: Float64Array, length: float, chain: Chain, k: int, scratch: Float64Array
 ) -> None:
     """Write the frame and end after element k, and their derivatives by its dq."""
+    frames, ends = chain.frames, chain.ends
     slope, turn, mean, local = scratch[0], scratch[1], scratch[2], scratch[POINTS, 0]
     node(q, length, local, slope)
     turns(q, length, turn, mean)
@@ -264,26 +283,18 @@ def _advance_element(
     times(frames[k], local, ends[k + 1])
     for i in range(3):
         ends[k + 1, i] += ends[k, i]
-    product(frames[k], mean, spin[k])
-    product(frames[k], slope, shift[k])
+    product(frames[k], mean, chain.spin[k])
+    product(frames[k], slope, chain.shift[k])
 
 
 @compiled_with(allocates=True)
-def _update_motion(
-    rods: Rods,
-    motion: Motion,
-    step: Step,
-    two_step: bool,
-    first: int,
-    last: int,
-    root: Float64Array,
-    frame: Float64Array,
-) -> None:
+def _update_motion(rods: Rods, motion: Motion, step: Step, strand: Strand) -> None:
     """Write the Gauss points of the new coordinates, and keep those of the step before."""
-    h = step.seconds * 2 / 3 if two_step else step.seconds
+    h, two_step = _effective_seconds(step, strand), strand.two_step
+    root, frame = strand.root, strand.frame
     local, slope, arm = np.empty(3), np.empty((3, 3)), np.empty(3)
     next_frame, next_root = np.empty((3, 3)), np.empty(3)
-    for e in range(first, last):
+    for e in range(strand.first, strand.last):
         for g in range(NODES):
             node(motion.q[e], rods.lengths[e] * SHARES[g], local, slope)
             times(frame, local, arm)

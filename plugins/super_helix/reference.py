@@ -13,7 +13,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from hairkit.arrays import Float64Array
 
-from .contact import touch
+from .contact import Point, touch
 from .kinematics import Placed, place
 from .rods import NODES, Rods
 from .state import CLOSE, FAR, Loads, Motion, Step
@@ -162,10 +162,7 @@ def _point_loads(
                 float(mass[e, g, 0]),
                 h,
                 float(loads.gap[e, g]),
-                points[e, g],
-                back[e, g],
-                weight[e, g],
-                pull[e, g],
+                Point(points[e, g], back[e, g], weight[e, g], pull[e, g]),
                 np.empty((3, 3)),
             )
     return weight, pull

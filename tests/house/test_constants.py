@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import ast
+import importlib
+import re
 from collections.abc import Iterator
 from pathlib import Path
-
-MOST_UNNAMED = 0
-"""Unnamed literals that are left."""
 
 TRIVIAL = {0, 1, 2, 3, 4, 0.5, 0.25, 1.5}
 """Identities, halves, pairs, and the dimensions of space, of homogeneous vectors and of colours."""
@@ -23,8 +22,6 @@ FORMATS = (
     ),
 )
 """Readers and writers of files: integers in them are given by the format."""
-LEFT_OUT = ("plugins/pbd/", "hairkit/viewer/draw/")
-"""The rod solver and the loops that draw the viewer's hair."""
 
 
 def unnamed_literals(source: str, *, integers: bool = True) -> Iterator[tuple[int, str]]:
@@ -136,16 +133,15 @@ def all_unnamed(project: Path) -> list[tuple[str, int, str]]:
         [*(project / "hairkit").rglob("*.py"), *(project / "plugins").rglob("*.py")]
     ):
         name = file.relative_to(project).as_posix()
-        if not name.startswith(LEFT_OUT):
-            literals = unnamed_literals(file.read_text(), integers=not name.startswith(FORMATS))
-            found += [(name, *hit) for hit in literals]
+        literals = unnamed_literals(file.read_text(), integers=not name.startswith(FORMATS))
+        found += [(name, *hit) for hit in literals]
     return found
 
 
 def test_tuned_numbers_have_names(project: Path) -> None:
-    """At most `MOST_UNNAMED` literals that may be tuned are left in the bodies of functions."""
+    """No literal that may be tuned stands in the body of a function."""
     found = all_unnamed(project)
-    assert len(found) <= MOST_UNNAMED, "\n".join(f"{n}:{line}: {text}" for n, line, text in found)
+    assert not found, "\n".join(f"{n}:{line}: {text}" for n, line, text in found)
 
 
 def test_the_counter_sees_tuned_numbers_and_leaves_formulas_alone() -> None:
@@ -163,6 +159,70 @@ def f(x, tolerance=1e-4, shape=(7, 8)):
     assert list(unnamed_literals(source.format(tuned="LIMIT"))) == []
     assert [text for _, text in unnamed_literals(source.format(tuned=7))] == ["7", "7"]
     assert list(unnamed_literals(source.format(tuned=7), integers=False)) == []
+
+
+DRAWING = ("hairkit/rendering", "hairkit/viewer", "hairkit/simulation", "plugins/pbd")
+"""Whose shaders there are: a name means the same in these folders and in their shaders."""
+
+
+def typed_in_shader(source: str) -> set[str]:
+    """Return the names of constants whose values a shader has itself: literals, not formulas."""
+    names = r"(\w+) *= *(?:vec[234]\()?[-+.\de, /*]+\)?(?=[,;])"
+    lines = re.findall(r"\bconst \w+ ([^;]*;)", source)
+    defined = re.findall(r"#define (\w+) +[-.\d]", source)
+    return {name for line in lines for name in re.findall(names, line)} | {*defined}
+
+
+def typed_in_python(source: str) -> set[str]:
+    """Return the names of constants of a module, without leading underscores."""
+    found = set()
+    for node in ast.parse(source).body:
+        targets = node.targets if isinstance(node, ast.Assign) else []
+        names = [name for target in targets for name in ast.walk(target)]
+        found |= {n.id.lstrip("_") for n in names if isinstance(n, ast.Name) and n.id.isupper()}
+    return found
+
+
+def test_no_constant_is_typed_in_python_and_in_shaders(project: Path) -> None:
+    """A constant of both has its value in Python; `#constants` writes it into the shader."""
+    shaders = [path for path in (project / "shaders").iterdir() if path.suffix not in ("", ".py")]
+    modules = [path for folder in DRAWING for path in (project / folder).rglob("*.py")]
+    assert len(shaders) > 40
+    assert len(modules) > 80
+    python = {name for path in modules for name in typed_in_python(path.read_text())}
+    both = {path.name: typed_in_shader(path.read_text()) & python for path in shaders}
+    assert {name: found for name, found in both.items() if found} == {}
+
+
+def test_constants_of_shaders_are_there_and_used(project: Path) -> None:
+    """What `#constants` names is in the module, and the shader or one that includes it uses it."""
+    texts = {path.name: path.read_text() for path in (project / "shaders").glob("*.*")}
+    asked = [
+        (name, module, constant)
+        for name, text in texts.items()
+        for module, constants in re.findall(r"^#constants (\S+) (.*)$", text, re.MULTILINE)
+        for constant in constants.split()
+    ]
+    assert len(asked) > 40
+    for name, module, constant in asked:
+        users = [text for text in texts.values() if f'"{name}"' in text] + [texts[name]]
+        assert hasattr(importlib.import_module(module), constant), (name, module, constant)
+        uses = sum(len(re.findall(rf"\b{constant}\b", text)) for text in users)
+        assert uses > 1, (name, constant)
+
+
+def test_constants_typed_twice_are_found() -> None:
+    """Numbers and vectors count, whatever their value; formulas and other names do not."""
+    shader = """
+#define UNROLLED 16
+#constants hairkit.rendering.fibre TILT
+const float BOUNCED = 0.1, TILTED = 2.0 * TILT;     // share
+const vec3 WRAP = vec3(0.2, 0.1, 0.1);
+const int NODES_ = NODES;
+"""
+    assert typed_in_shader(shader) == {"UNROLLED", "BOUNCED", "WRAP"}
+    module = "_BOUNCED, TILT = np.float32(0.35), 3\nWRAP = [1]\nName = 2\ndef f(LIFT=3): NODES = 4"
+    assert typed_in_python(module) == {"BOUNCED", "TILT", "WRAP"}
 
 
 if __name__ == "__main__":

@@ -4,20 +4,52 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
-REBUILT = ("plugins/pbd/", "hairkit/viewer/draw/")
-"""Kernels of the dynamics and of the viewer's hair, which keep their own layout of arrays."""
+MOST_PARAMETERS = 8
 LARGEST_COMPONENT = 3
 """Subscripts up to this are coordinates: of points, colours, and of rigid motions (4, 4)."""
-COMPILERS = {"njit", "jit", "vectorize", "guvectorize", "compiled", "compiled_with"}
+NUMBA = {"njit", "jit", "vectorize", "guvectorize"}
+"""Numba's decorators, of which those of the house are made."""
 
 
-def kernels(source: str) -> Iterator[ast.FunctionDef]:
-    """Yield the compiled functions of a module."""
+def decorators(sources: list[str]) -> set[str]:
+    """Return the names of decorators that compile: Numba's, and those that modules make of them.
+
+    `stage = compiled_with(fastmath=True)`, or a function that calls one of them in its body.
+    """
+    modules = [ast.parse(source) for source in sources]
+    used = {name for module in modules for one in ast.walk(module) for name in _decorated(one)}
+    made = [pair for module in modules for pair in _made_of(module) if pair[0] in used]
+    found = set(NUMBA)
+    while more := {name for name, called in made if called & found} - found:
+        found |= more
+    return found
+
+
+def _decorated(node: ast.AST) -> set[str]:
+    """Return the names of a function's decorators."""
+    return {*map(_last_name, node.decorator_list)} if isinstance(node, ast.FunctionDef) else set()
+
+
+def _made_of(module: ast.Module) -> Iterator[tuple[str, set[str]]]:
+    """Yield the names that a module defines, and what is called to make each or in its body."""
+    for node in module.body:
+        called = {_last_name(call) for call in ast.walk(node) if isinstance(call, ast.Call)}
+        if isinstance(node, ast.FunctionDef):
+            yield node.name, called - _decorated(node)
+        elif isinstance(node, ast.AnnAssign):
+            yield _last_name(node.target), called
+        elif isinstance(node, ast.Assign):
+            yield from ((_last_name(target), called) for target in node.targets)
+
+
+def kernels(source: str, compilers: set[str] = NUMBA) -> Iterator[ast.FunctionDef]:
+    """Yield the functions of a module that one of the `decorators` compiles."""
     for function in ast.walk(ast.parse(source)):
         if isinstance(function, ast.FunctionDef) and any(
-            _last_name(decorator) in COMPILERS for decorator in function.decorator_list
+            _last_name(decorator) in compilers for decorator in function.decorator_list
         ):
             yield function
 
@@ -27,6 +59,13 @@ def untyped_arguments(kernel: ast.FunctionDef) -> list[str]:
     arguments = [*kernel.args.posonlyargs, *kernel.args.args, *kernel.args.kwonlyargs]
     types = [(one.arg, one.annotation) for one in arguments] + [("return", kernel.returns)]
     return [name for name, type_ in types if type_ is None or ast.unparse(type_) == "Any"]
+
+
+def parameters(kernel: ast.FunctionDef) -> list[str]:
+    """Return the names of all parameters."""
+    own = kernel.args
+    named = [one.arg for one in (*own.posonlyargs, *own.args, *own.kwonlyargs)]
+    return named + [one.arg for one in (own.vararg, own.kwarg) if one is not None]
 
 
 def column_numbers(kernel: ast.FunctionDef) -> list[str]:
@@ -68,22 +107,30 @@ def _last_name(node: ast.expr) -> str:
     return node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
 
 
+@cache
 def all_kernels(project: Path) -> list[tuple[str, ast.FunctionDef]]:
-    """Return name and tree of all kernels but those of `REBUILT`."""
-    found = []
-    for folder in ("hairkit", "plugins"):
-        for file in sorted((project / folder).rglob("*.py")):
-            name = file.relative_to(project).as_posix()
-            if not name.startswith(REBUILT):
-                found += [(f"{name}:{k.name}", k) for k in kernels(file.read_text())]
-    return found
+    """Return name and tree of all kernels."""
+    files = [file for folder in ("hairkit", "plugins") for file in (project / folder).rglob("*.py")]
+    sources = {file.relative_to(project).as_posix(): file.read_text() for file in sorted(files)}
+    compilers = decorators([*sources.values()])
+    return [
+        (f"{name}:{kernel.name}", kernel)
+        for name, source in sources.items()
+        for kernel in kernels(source, compilers)
+    ]
 
 
 def test_kernels_are_typed(project: Path) -> None:
     """Every parameter and result of a compiled function has a type."""
     found = all_kernels(project)
-    assert len(found) > 100
+    assert len(found) > 250
     assert [(name, left) for name, kernel in found if (left := untyped_arguments(kernel))] == []
+
+
+def test_kernels_have_few_parameters(project: Path) -> None:
+    """What belongs together is a record: no kernel has more than `MOST_PARAMETERS`."""
+    many = [(name, len(parameters(kernel))) for name, kernel in all_kernels(project)]
+    assert [(name, count) for name, count in many if count > MOST_PARAMETERS] == []
 
 
 def test_kernels_pick_no_columns_by_number(project: Path) -> None:
@@ -133,16 +180,27 @@ def test_arrays_are_returned_to_python_alone(project: Path) -> None:
 
 
 def test_faults_of_kernels_are_found() -> None:
-    """Untyped parameters and results, columns of numbers, and arrays that kernels get from others;
-    points and slices are left alone."""
-    made = "@compiled\ndef f(n: int) -> Float64Array: ...\n"
-    assert array_callers([*kernels(made + "@compiled\ndef g() -> float:\n    return f(3)[0]")]) == [
-        ("g", "f")
-    ]
+    """Untyped and many parameters, columns by number, arrays that kernels get from others; points
+    and slices are left alone."""
+    made = "@jit\ndef f(n: int) -> Float64Array: ...\n@jit\ndef g() -> float:\n    return f(3)[0]"
+    assert array_callers([*kernels(made)]) == [("g", "f")]
     [kernel] = kernels("@numba.njit(cache=True)\ndef f(p, i: int):\n    return p[i, 12] + p[15]")
     assert untyped_arguments(kernel) == ["p", "return"]
+    assert parameters(kernel) == ["p", "i"]
     assert column_numbers(kernel) == ["p[i, 12]", "p[15]"]
-    [kernel] = kernels("@compiled\ndef f(p: A) -> float:\n    return p[0, 2] + p[-1] + p[3:6]")
+    [kernel] = kernels("@njit\ndef f(a, /, b=1, *c, d: int, **e): ...")
+    assert parameters(kernel) == ["a", "b", "d", "c", "e"]
+    [kernel] = kernels("@njit\ndef f(p: A) -> float:\n    return p[0, 2] + p[-1] + p[3:6]")
     assert untyped_arguments(kernel) == []
     assert column_numbers(kernel) == []
     assert list(kernels("def plain(p):\n    return p[12]")) == []
+
+
+def test_decorators_of_the_house_are_found() -> None:
+    """A name counts that is made of one that counts, in whatever module; others do not."""
+    first = "def compiled(f):\n    def inner():\n        return njit(f)\n    return inner"
+    second = "stage = compiled(fast=True)\ninlined: Any = stage(1)\ncached = cache()\n"
+    use = "".join(f"@{n}\ndef {n}_f(p): ...\n" for n in ("compiled", "stage", "inlined", "cached"))
+    found = decorators([use, second, first])
+    assert found == NUMBA | {"compiled", "stage", "inlined"}
+    assert [kernel.name for kernel in kernels(use, found)] == ["compiled_f", "stage_f", "inlined_f"]

@@ -21,6 +21,7 @@ a graphics card (`*_cpu`); tests compare both.
 * `meshes`: shaded meshes: where they are, and on the GPU
 * `place_kernels`: compiled interpolation of hair from guides
 * `raster_kernels`: compiled rasteriser of hair
+* `records`: what the compiled loops share: camera, lights and hair
 * `region`: a part of a picture that has changed
 * `shade_kernels`: compiled fibre shading
 * `still`: samples of a still picture: antialiasing and depth of field

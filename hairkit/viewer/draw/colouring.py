@@ -11,6 +11,8 @@ COLOURINGS = ("hair", "direction", "length", "stretch", "curvature", "confidence
 """`hair` and `direction` apply to all hair, the others to guides."""
 FULL_STRETCH = 0.02
 """Relative change of length shown in full red (longer) or blue (shorter)."""
+FULL_CURVATURE = 0.98
+"""Share of the points whose curvature is below what is shown in full red."""
 _RAMP = np.array(
     [
         [0.16, 0.22, 0.60],
@@ -78,8 +80,8 @@ def _curvatures(rows: Float32Array) -> Float32Array:
 
 
 def _curvature_scale(bent: Float32Array) -> float:
-    """Return the curvature shown in full red: the 98 % quantile."""
-    return max(float(np.quantile(bent, 0.98)), 1e-9) if bent.size else 1e-9
+    """Return the curvature shown in full red."""
+    return max(float(np.quantile(bent, FULL_CURVATURE)), 1e-9) if bent.size else 1e-9
 
 
 def _at_points(segments: npt.NDArray[np.floating]) -> Float32Array:

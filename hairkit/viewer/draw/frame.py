@@ -11,7 +11,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.rendering.context import Renderer
-from hairkit.rendering.gl_camera import DepthRange
+from hairkit.rendering.gl_camera import NEAREST, DepthRange
 from hairkit.rendering.head import Solid
 from hairkit.rendering.light import Lights
 from hairkit.types.camera import Camera
@@ -31,6 +31,8 @@ RIM = (0.55, 0.6, -0.55)
 """Direction towards the rim light, same axes."""
 DEPTH_STEP, DEPTH_MARGIN = 0.25, 0.025
 """Metres: steps of the depth range, and what it has beyond the farthest point at least."""
+AROUND, THICKNESS = 0.6, 0.005
+"""Metres: how much farther lines and billboards reach, and drawn hair than its guides in depth."""
 PULL = 0.002
 """Depth bias of overlaid lines, as a share of the depth range: skin does not hide them."""
 
@@ -138,10 +140,10 @@ class FrameRenderer:
         off = self.cloud - middle.astype(np.float32)
         farthest = max(size, float(np.sqrt(np.einsum("pc,pc->p", off, off).max())))
         farthest = max([farthest, *(self._reaches[name] for name in inputs.solids)])
-        reach = farthest + DEPTH_MARGIN + (0.6 if inputs.billboards or inputs.lines else 0)
+        reach = farthest + DEPTH_MARGIN + (AROUND if inputs.billboards or inputs.lines else 0)
         centre = float(own.depth(middle))
         near, far = np.floor((centre - reach) / DEPTH_STEP), np.ceil((centre + reach) / DEPTH_STEP)
-        return DepthRange(max(DEPTH_STEP * float(near), 0.01), DEPTH_STEP * float(far))
+        return DepthRange(max(DEPTH_STEP * float(near), NEAREST), DEPTH_STEP * float(far))
 
     def _draw_overlays(self, inputs: FrameInputs, own: Camera, depth: DepthRange) -> None:
         if not inputs.lines and not inputs.billboards:
@@ -194,4 +196,4 @@ def _camera_in_head(camera: Camera, world_from_head: Float64Array) -> Camera:
 
 def _hair_depth(camera: Camera, cloud: Float32Array) -> DepthRange:
     depth = camera.depth(cloud)
-    return DepthRange(float(depth.min()) - 0.005, float(depth.max()) + 0.005)
+    return DepthRange(float(depth.min()) - THICKNESS, float(depth.max()) + THICKNESS)

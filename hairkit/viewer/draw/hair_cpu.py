@@ -12,18 +12,30 @@ import numpy as np
 
 from hairkit.arrays import Float32Array
 from hairkit.parallel import parallel_for, thread_count
-from hairkit.rendering.gl_camera import NEAREST, DepthRange, clip_from_camera
+from hairkit.rendering.gl_camera import NEAREST
 from hairkit.rendering.hair import strand_numbers
-from hairkit.types.camera import Camera
 from hairkit.viewer.draw import mesh_edges, place_kernels, raster_kernels, shade_kernels
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import HairLook, HairScene, HairView
+from hairkit.viewer.draw.place_kernels import SLICES, TILE
+from hairkit.viewer.draw.records import (
+    Chunks,
+    Columns,
+    Guides,
+    HairData,
+    HairShading,
+    HairState,
+    Strokes,
+    ViewCells,
+    project_from,
+    shading_of,
+)
 from hairkit.viewer.draw.region import NOWHERE, Region
 
 MOST_CHUNKS = 8
 """Each thread draws into sums of its own, which are added up for every picture."""
-PIECE = 256
-"""Hairs that a thread shades at a time, at least."""
+PIECE, GUIDES, TILES, ROWS = 256, 64, 8, 32
+"""Least numbers of hairs, of guides, of rows of tiles and of rows of pixels for a thread."""
 FARTHEST = 100.0
 """Guide coordinates are clamped to this, metres from the head's origin."""
 EDGE = 3
@@ -36,11 +48,13 @@ class SoftHairPass:
     def __init__(self, body: HairBody) -> None:
         self.body = body
         count, points = len(body), body.points_each
-        self._places = np.empty((count, points, 3), np.float32)
-        self._seen = np.empty((count, points, 4), np.float32)
-        self._looks = np.zeros((count, points, 4), np.float32)
-        self._hidden = np.empty((count, points), np.int8)
-        self._reach = np.empty((count, 2), np.float32)
+        self._state = HairState(
+            np.empty((count, points, 3), np.float32),
+            np.empty((count, points, 4), np.float32),
+            np.zeros((count, points, 4), np.float32),
+            np.empty((count, points), np.int8),
+            np.empty((count, 2), np.float32),
+        )
         self._random = np.asarray(strand_numbers(count), np.float32)
         rest = np.ascontiguousarray(body.guide_rest, np.float32)
         guides = len(rest)
@@ -48,15 +62,19 @@ class SoftHairPass:
             place_kernels.segments(rest), np.empty((guides, 4, points), np.float32)
         )
         place_kernels.carry_frames(0, guides, self._rest.segments, rest, self._rest.frames)
-        self._edges = place_kernels.in_lanes(body.edges, np.zeros(3, np.float32))
-        resting = np.array([0, 0, 0, 1, 1], np.float32)
-        self._turns = place_kernels.in_lanes(np.tile(resting, (guides, points, 1)), resting)
+        edges = place_kernels.in_lanes(body.edges, np.zeros(3, np.float32))
+        self._hair = HairData(body.followed, body.weights, edges, body.widths)
+        resting = np.array([1, 0, 0, 0, 1], np.float32)
+        turns = place_kernels.in_lanes(np.tile(resting, (guides, points, 1)), resting)
+        self._guides = Guides(rest, turns)
         self._tones = shade_kernels.tone_table()
-        self._chunks = min(thread_count(), MOST_CHUNKS)
-        self._way = np.empty((self._chunks, *self._edges.shape[1:]), np.float32)
+        chunks = min(thread_count(), MOST_CHUNKS)
+        self._chunks = Chunks(
+            np.empty((chunks, *edges.shape[1:]), np.float32), np.empty((chunks, 4), np.float32)
+        )
+        self._cells = self._make_cells((0, 0))
         self._sums = np.zeros((0, 4), np.float32)
         self._picture = np.empty((0, 0, 4), np.uint8)
-        self._filled = np.empty((0, 0, 0, 0), np.uint32)
         self._hair_region = NOWHERE
         self._colours: tuple[object, Float32Array] | None = None
 
@@ -65,110 +83,64 @@ class SoftHairPass:
 
     def places(self) -> Float32Array:
         """Return the last positions (S, m, 3) of the hair, head frame, metres."""
-        return self._places
+        return self._state.places
 
     def move_guides(self, rows: Float32Array) -> Float32Array:
         """Move the guides to `rows` (G, m, 3), head frame, metres; return them as points (N, 3)."""
         # compiled loops do not check bounds: replace NaN and infinity of a diverged simulation
         tame = np.nan_to_num(np.clip(rows, -FARTHEST, FARTHEST))
-        self._now = np.ascontiguousarray(tame, np.float32)
-        rest, turns = self._rest, self._turns
-        parallel_for(place_kernels.turn_guides, len(turns), *rest, self._now, turns, min_chunk=64)
-        return self._now.reshape(-1, 3)
+        now = Guides(np.ascontiguousarray(tame, np.float32), self._guides.turns)
+        parallel_for(place_kernels.turn_guides, len(tame), self._rest, now, min_chunk=GUIDES)
+        self._guides = now
+        return now.points.reshape(-1, 3)
 
     def place(self, view: HairView, look: HairLook) -> None:
         """Interpolate the hair from the guides and accumulate its opacity by depth."""
-        body, camera = self.body, view.camera
-        self._camera = pack_camera(camera, view.depth)
-        near, far = view.hair_depth.near, view.hair_depth.far
-        per_metre = place_kernels.SLICES / (far - near)
-        self._slices = np.array([near, per_metre, look.dimming], np.float32)
-        tiles = (-(-camera.height // place_kernels.TILE), -(-camera.width // place_kernels.TILE))
-        if self._filled.shape[2:] != tiles:
-            self._filled = np.zeros((self._chunks, place_kernels.SLICES, *tiles), np.uint32)
-            self._opacity = np.empty((place_kernels.SLICES + 1, *tiles), np.float32)
-            self._used = np.zeros(4, np.int64)
-        corners = np.empty((self._chunks, 4), np.float32)
-        parallel_for(
-            place_kernels.place_hair,
-            self._chunks,
-            self._now,
-            self._turns,
-            body.followed,
-            body.weights,
-            self._edges,
-            body.widths,
-            self._camera,
-            self._slices,
+        camera, near, far = view.camera, view.hair_depth.near, view.hair_depth.far
+        self._strokes = Strokes(
+            project_from(camera, view.depth),
+            np.float32(near),
+            np.float32(SLICES / (far - near)),
+            np.float32(look.dimming),
             np.float32(look.times_wider),
             look.hairs,
-            self._way,
-            self._places,
-            self._seen,
-            self._filled,
-            self._used,
-            corners,
+            look.smooth,
         )
+        tiles = (-(-camera.height // TILE), -(-camera.width // TILE))
+        if self._cells.filled.shape[2:] != tiles:
+            self._cells = self._make_cells(tiles)
+        cells, chunks = self._cells, self._chunks
+        placing = self._guides, self._hair, self._strokes, self._state, cells, chunks
+        parallel_for(place_kernels.place_hair, len(chunks.corners), *placing)
+        corners = chunks.corners
         size = np.array([camera.width, camera.height])
         low = np.clip(np.floor(corners[:, :2].min(axis=0)) - EDGE, 0, size - 1).astype(int)
         high = np.clip(np.ceil(corners[:, 2:].max(axis=0)) + EDGE, low + 1, size).astype(int)
         self._hair_before, self._hair_region = self._hair_region, Region(*low, *high)
-        tile = place_kernels.TILE  # shading interpolates between neighbours
-        self._used[:2] = np.maximum(low // tile - 1, 0)
-        self._used[2:] = np.minimum(high // tile + 2, tiles[::-1])
-        opacity, rows = (self._filled, self._used, self._opacity), self._used[3] - self._used[1]
-        parallel_for(place_kernels.accumulate_opacity, int(rows), *opacity, min_chunk=8)
+        cells.used[:2] = np.maximum(low // TILE - 1, 0)  # shading interpolates between neighbours
+        cells.used[2:] = np.minimum(high // TILE + 2, tiles[::-1])
+        rows = int(cells.used[3] - cells.used[1])
+        parallel_for(place_kernels.accumulate_opacity, rows, cells, min_chunk=TILES)
 
     def draw(self, scene: HairScene) -> None:
         """Draw the meshes into the picture, and over them hair that is nearer."""
         view, look = scene.view, scene.look
         left, right = self._hair_region.left, self._hair_region.right
         solid = scene.meshes.depth[left:right]
-        corner = np.array([left, 0], np.float32)
         if len(self._sums) < solid.size:
             self._sums = np.zeros((scene.meshes.depth.size, 4), np.float32)
-        wider = np.float32(look.times_wider)
-        beside = self._beside(view, float(wider))
-        shading = shade_kernels.pack_shading(
-            view.camera, scene.lights, scene.light.grid, direction=look.by_direction
+        beside = self._beside(view, look.times_wider)
+        columns = Columns(solid, np.float32(left), beside, self._sums)
+        light = shading_of(view.camera, scene.lights, scene.light.grid, scene.light.array)
+        around = shade_kernels.light_around(scene.lights)
+        shading = HairShading(
+            light, self._fibres(look), self._random, around, look.by_direction, self._tones
         )
-        parallel_for(
-            shade_kernels.shade_hair,
-            look.hairs,
-            self._seen,
-            self._places,
-            self._fibres(look),
-            self._random,
-            self._opacity,
-            self._slices,
-            shading,
-            scene.light.array,
-            self._tones,
-            solid,
-            corner,
-            beside,
-            self._looks,
-            self._hidden,
-            self._reach,
-            min_chunk=PIECE,
-        )
-        parallel_for(
-            raster_kernels.draw_hair,
-            -(-(right - left) // raster_kernels.STRIP),
-            self._seen,
-            self._looks,
-            self._hidden,
-            self._reach,
-            self.body.widths,
-            solid,
-            self._camera,
-            wider,
-            int(look.smooth),
-            look.hairs,
-            corner,
-            beside,
-            self._sums,
-        )
+        lit = self._state, self._cells.opacity, self._strokes, shading, columns
+        parallel_for(shade_kernels.shade_hair, look.hairs, *lit, min_chunk=PIECE)
+        drawn = self._state, self.body.widths, self._strokes, columns
+        strips = -(-(right - left) // raster_kernels.STRIP)
+        parallel_for(raster_kernels.draw_hair, strips, *drawn)
         self._composite(scene.meshes)
         target: Any = scene.target.color_attachments[0]
         target.write(self._picture)
@@ -186,8 +158,13 @@ class SoftHairPass:
         parts = self._sums, np.array(hair), np.array(changed), behind, self._picture
         rows = changed.bottom - changed.top
         mesh_edges.put_back(self._picture, self._replaced)
-        parallel_for(raster_kernels.composite, rows, *parts, min_chunk=32)
+        parallel_for(raster_kernels.composite, rows, *parts, min_chunk=ROWS)
         meshes.smooth(self._picture, self._replaced)
+
+    def _make_cells(self, tiles: tuple[int, int]) -> ViewCells:
+        """Return empty cells of so many tiles, y and x."""
+        filled = np.zeros((len(self._chunks.corners), SLICES, *tiles), np.uint32)
+        return ViewCells(filled, np.empty((SLICES + 1, *tiles), np.float32), np.zeros(4, np.int64))
 
     def _beside(self, view: HairView, wider: float) -> np.float32:
         """Return how far a stroke may reach beside its ends, pixels."""
@@ -195,7 +172,7 @@ class SoftHairPass:
         if view.camera.model == "perspective":
             scale /= max(view.hair_depth.near, NEAREST)
         widest = float(self.body.widths.max(initial=0.0)) * wider * scale
-        return np.float32(min(widest, raster_kernels.WIDEST) + 1)
+        return np.float32(min(widest, float(raster_kernels.WIDEST)) + 1)
 
     def _fibres(self, look: HairLook) -> Float32Array:
         key = (look.root_colour, look.tip_colour)
@@ -203,13 +180,3 @@ class SoftHairPass:
             made = shade_kernels.fibre_colours(*key, self._random, self.body.points_each)
             self._colours = (key, made)
         return self._colours[1]
-
-
-def pack_camera(camera: Camera, depth: DepthRange) -> Float32Array:
-    """Return (24,): clip_from_head by rows, forward and offset, size, focal length, perspective."""
-    matrix = clip_from_camera(camera, depth) @ camera.camera_from_head
-    rest = [
-        *camera.forward, camera.translation[2], camera.width, camera.height, camera.focal,
-        float(camera.model == "perspective"),
-    ]  # fmt: skip
-    return np.concatenate([matrix.ravel(), rest]).astype(np.float32)

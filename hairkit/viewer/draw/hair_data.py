@@ -24,6 +24,8 @@ TAPER = 0.7
 """Share of its width that a strand loses towards the tip, so that locks do not end bluntly."""
 TUFT = 8
 """Neighbouring strands that stay adjacent in the order of drawing."""
+BITS = 10
+"""Of a place along an axis, in the order of neighbours."""
 FINE = 256
 """Points of the dense resampling from which drawn points are interpolated."""
 BLOCK = 20_000
@@ -238,9 +240,9 @@ def _shuffle_tufts(roots: Float32Array, generator: np.random.Generator) -> Int64
     Software renderers draw `TUFT` strands in lockstep; neighbours are occluded together.
     """
     low, high = roots.min(axis=0), roots.max(axis=0)
-    cell = ((roots - low) / np.maximum(high - low, 1e-9) * 1023).astype(np.int64)
+    cell = ((roots - low) / np.maximum(high - low, 1e-9) * ((1 << BITS) - 1)).astype(np.int64)
     code = np.zeros(len(roots), np.int64)  # Morton code: neighbours in space are near in order
-    for bit in range(10):
+    for bit in range(BITS):
         for axis in range(3):
             code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
     sorted_ = np.argsort(code, kind="stable")

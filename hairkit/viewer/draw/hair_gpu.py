@@ -20,10 +20,16 @@ from hairkit.rendering.hair import strand_numbers
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import HairLook, HairScene, HairView
+from hairkit.viewer.draw.place_kernels import SLICES, TILE
 
-SLICES, TILE = 32, 8
-"""As in viewer_hair.glsl."""
-_GROUP = 64
+_GROUP, SUMS = 64, 7
+"""Invocations of a work group; binding of the sums, as in the shaders."""
+_POINT, _BLOCK = 12, 64
+"""Bytes of a point: three words; and of a block of sums, see viewer_accumulation.glsl."""
+_WORD, _HALF_FLOAT = 65535, 6e4
+"""Largest 16-bit number; about the largest half float."""
+EDGE = 8
+"""Margin around the guides for the width of strokes, pixels."""
 MOST_GUIDES = 65_535
 NEAR_HAIR, OFF_GUIDES = 0.05, 0.06
 """Metres: hair nearer to the camera than the first may cover the whole picture; hair is within the
@@ -44,10 +50,10 @@ class HairPass:
         context = gl.context
         self._rest = context.buffer(np.ascontiguousarray(body.guide_rest, np.float32))
         self._now = context.buffer(np.ascontiguousarray(body.guide_rest, np.float32))
-        self._guides = context.buffer(reserve=12 * len(body.guides) * points)
+        self._guides = context.buffer(reserve=_POINT * len(body.guides) * points)
         self._hairs = context.buffer(_hair_records(body))
         self._edges = context.buffer(_edge_records(body))
-        self._places = context.buffer(reserve=12 * count * points)
+        self._places = context.buffer(reserve=_POINT * count * points)
         self._view: _ViewBuffers | None = None
         self._resolve = context.vertex_array(gl.program("viewer_screen", "viewer_resolve"), [])
 
@@ -102,7 +108,7 @@ class HairPass:
         self._hairs.bind_to_storage_buffer(1)
         self._edges.bind_to_storage_buffer(2)
         self._places.bind_to_storage_buffer(3)
-        buffers.sums.bind_to_storage_buffer(7)
+        buffers.sums.bind_to_storage_buffer(SUMS)
         self._run(
             "viewer_raster",
             look.hairs,
@@ -138,7 +144,7 @@ class HairPass:
         context.blend_func = moderngl.SRC_ALPHA, moderngl.ONE_MINUS_SRC_ALPHA
         program = self._gl.program("viewer_screen", "viewer_resolve")
         set_uniforms(program, u_picture=buffers.size, u_dimming=dimming)
-        buffers.sums.bind_to_storage_buffer(7)
+        buffers.sums.bind_to_storage_buffer(SUMS)
         self._resolve.render(moderngl.TRIANGLES, vertices=3)
         target.scissor = (0, 0, *buffers.size)
 
@@ -177,7 +183,7 @@ class _ViewBuffers:
         opacity.repeat_x = opacity.repeat_y = opacity.repeat_z = False
         # whole blocks of 2 x 4 pixels, see viewer_accumulation.glsl
         blocks = -(-size[0] // 2) * -(-size[1] // 4)
-        sums = context.buffer(reserve=64 * blocks)
+        sums = context.buffer(reserve=_BLOCK * blocks)
         sums.clear()
         filled = context.buffer(reserve=4 * tiles[0] * tiles[1] * SLICES)
         return cls(size, tiles, filled, opacity, sums)
@@ -194,7 +200,7 @@ def _frame_of(camera: Camera, cloud: Float32Array) -> tuple[int, int, int, int]:
     if depth.min() < NEAR_HAIR:
         return 0, 0, camera.width, camera.height
     pixels = camera.project(cloud)
-    margin = 8 + OFF_GUIDES * camera.focal / float(depth.min())
+    margin = EDGE + OFF_GUIDES * camera.focal / float(depth.min())
     low = np.clip(np.floor(pixels.min(axis=0) - margin), 0, size)
     high = np.clip(np.ceil(pixels.max(axis=0) + margin), low + 1, size + 1)
     x, y, width, height = np.concatenate([low, high - low]).astype(int).tolist()
@@ -204,8 +210,8 @@ def _frame_of(camera: Camera, cloud: Float32Array) -> tuple[int, int, int, int]:
 def _hair_records(body: HairBody) -> bytes:
     """Pack three words for each strand: guides, third guide and random number, two weights."""
     guides = body.followed.astype(np.uint32)
-    random = np.rint(strand_numbers(len(body)) * 65535).astype(np.uint32)
-    weights = np.rint(np.clip(body.weights, 0, 1) * 65535).astype(np.uint32)
+    random = np.rint(strand_numbers(len(body)) * _WORD).astype(np.uint32)
+    weights = np.rint(np.clip(body.weights, 0, 1) * _WORD).astype(np.uint32)
     words = [
         guides[:, 0] | guides[:, 1] << 16,
         guides[:, 2] | random << 16,
@@ -217,4 +223,4 @@ def _hair_records(body: HairBody) -> bytes:
 def _edge_records(body: HairBody) -> bytes:
     """Pack two words for each point: edge and diameter in millimetres, as half floats."""
     values = np.concatenate([body.edges, body.widths[..., None]], axis=2) * 1e3
-    return np.clip(values, -6e4, 6e4).astype(np.float16).tobytes()
+    return np.clip(values, -_HALF_FLOAT, _HALF_FLOAT).astype(np.float16).tobytes()

@@ -23,6 +23,8 @@ MOST_CELLS = 56
 """Cells along the longest side; longer hair gets larger cells."""
 MARGIN = 0.08
 """Margin around the hair at rest, metres."""
+GROUP, TILE = 64, 8
+"""Strands of a work group; edge of its tile of cells."""
 TURNS = 6
 """Frames over which the update of one volume is spread."""
 
@@ -119,14 +121,14 @@ class LightPass(LightVolume):
         self._dense.bind_to_storage_buffer(0)
         points = hair.body.points_each
         set_uniforms(fill, u_points=points, u_count=hairs, u_cells=self._cells, **self.uniforms())
-        fill.run(max(-(-hairs // 64), 1))
+        fill.run(max(-(-hairs // GROUP), 1))
         self._gl.context.memory_barrier()
         extinction = self._gl.compute("viewer_extinction")
         set_uniforms(extinction, u_cells=self._cells, u_hair_extinction=per_micrometre)
         self._solids.bind_to_storage_buffer(1)
         self._extinction.bind_to_image(0, read=False, write=True)
         x, y, z = self._cells
-        extinction.run(-(-x // 8), -(-y // 8), z)
+        extinction.run(-(-x // TILE), -(-y // TILE), z)
         self._gl.context.memory_barrier()
 
     def _light(self, lights: Lights, turn: int, turns: int) -> None:
@@ -144,7 +146,7 @@ class LightPass(LightVolume):
         self._extinction.use(3)
         self._coming.bind_to_image(0, read=False, write=True)
         x, y, z = self._cells
-        light.run(-(-x // 8), -(-y // 8), -(-z // turns))
+        light.run(-(-x // TILE), -(-y // TILE), -(-z // turns))
         self._gl.context.memory_barrier()
 
     def _show(self) -> None:

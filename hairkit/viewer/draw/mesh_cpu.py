@@ -18,16 +18,16 @@ from hairkit.rendering.context import Renderer
 from hairkit.rendering.head import Solid
 from hairkit.types.skin_look import SkinLook
 from hairkit.viewer.draw import mesh_edges, mesh_kernels, mesh_raster, shade_kernels
-from hairkit.viewer.draw.hair_cpu import pack_camera
 from hairkit.viewer.draw.interface import MeshScene
 from hairkit.viewer.draw.mesh_layer import MeshLayer
 from hairkit.viewer.draw.meshes import PlacedMesh
+from hairkit.viewer.draw.records import project_from, shading_of
 from hairkit.viewer.draw.region import NOWHERE, Region
 
 CHUNKS = 8
 """Parts of a mesh whose seen faces are listed apart."""
-PIECE = 512
-"""Vertices that are worth a call on another thread."""
+PIECE, COLUMNS = 512, 32
+"""Vertices and columns of pixels that are worth a call on another thread."""
 
 
 class SoftSolid(PlacedMesh):
@@ -47,10 +47,12 @@ class SoftSolid(PlacedMesh):
             np.array(solid.faces, np.int32, order="C"),
         )
         self._state = mesh_kernels.MeshState(
-            np.empty((count, 6), np.float32),
+            np.empty((count, 3), np.float32),
+            np.empty((count, 3), np.float32),
             np.empty((count, 4), np.float32),
             np.empty(count, np.uint8),
-            np.empty((count, 6), np.float32),
+            np.empty((count, 3), np.float32),
+            np.empty((count, 3), np.float32),
             np.empty(faces, np.int32),
             np.empty((faces, 2), np.int32),
             np.empty(CHUNKS, np.int32),
@@ -65,7 +67,6 @@ class SoftSolid(PlacedMesh):
         textured = solid.uv is not None and solid.maps is not None
         picture = solid.maps.albedo if textured and solid.maps is not None else None
         self._albedo = mipmaps(None if picture is None else picture.pixels[::-1])
-        self._tones = np.rint(255 * shade_kernels.tone_table()).astype(np.uint8)
 
     def draw(
         self, scene: MeshScene, push: float, picture: UInt8Array, depth: Float32Array
@@ -76,19 +77,15 @@ class SoftSolid(PlacedMesh):
         """
         mesh, state = self._mesh, self._state
         motion = self.motion[:3].astype(np.float32)
-        camera = pack_camera(scene.camera, scene.depth)
-        shading = shade_kernels.pack_shading(
-            scene.camera, scene.lights, scene.light.grid, direction=False
-        )
-        ambient = np.array([scene.lights.ground_colour, scene.lights.sky_colour], np.float32)
+        camera = project_from(scene.camera, scene.depth)
+        light = shading_of(scene.camera, scene.lights, scene.light.grid, scene.light.array)
         count, (width, height) = len(mesh.vertices), depth.shape
-        kernels, light = mesh_kernels, scene.light.array
         placing = mesh, motion, camera, np.float32(push), state
-        parallel_for(kernels.place_vertices, count, *placing, min_chunk=PIECE)
-        parallel_for(kernels.select_faces, CHUNKS, mesh, width, height, state)
-        lit = mesh, shading, ambient, light, self._oil, state
-        parallel_for(kernels.light_vertices, count, *lit, min_chunk=PIECE)
-        strips, drawn = -(-width // mesh_raster.STRIP), (self._albedo, self._tones, depth, picture)
+        parallel_for(mesh_kernels.place_vertices, count, *placing, min_chunk=PIECE)
+        parallel_for(mesh_kernels.select_faces, CHUNKS, mesh, width, height, state)
+        lit = mesh, light, self._oil, state
+        parallel_for(mesh_kernels.light_vertices, count, *lit, min_chunk=PIECE)
+        strips, drawn = -(-width // mesh_raster.STRIP), (self._albedo, depth, picture)
         parallel_for(mesh_raster.draw_faces, strips, mesh, state, *drawn)
         self._outline_count = mesh_edges.select_outlines(self._edges, state.seen, self._outlines)
         low, high = state.covered[:, :2].min(axis=0), state.covered[:, 2:].max(axis=0)
@@ -169,7 +166,7 @@ class SoftMeshLayer(MeshLayer[SoftSolid]):
         before, self._moved = self._moved, NOWHERE
         restored = self._scenery, self._scenery_depth, self.picture, self.depth
         columns, region = before.right - before.left, np.array(before)
-        parallel_for(mesh_raster.restore, columns, region, *restored, min_chunk=32)
+        parallel_for(mesh_raster.restore, columns, region, *restored, min_chunk=COLUMNS)
         if scene.inputs.fine_skin:
             self._read_fine_skin(scene, parts)
             self._outlined = ()  # samples of a still picture are smooth together
@@ -213,4 +210,5 @@ def mipmaps(pixels: UInt8Array | None) -> mesh_raster.Albedo:
         smaller = cv2.resize(np.ascontiguousarray(pixels), half, interpolation=cv2.INTER_AREA)
         pixels = np.asarray(smaller, np.uint8)
     texels = np.concatenate(levels) if levels else np.empty((0, 3), np.uint8)
-    return mesh_raster.Albedo(texels, np.array(sizes, np.int32).reshape(-1, 3))
+    tones = np.rint(255 * shade_kernels.tone_table()).astype(np.uint8)
+    return mesh_raster.Albedo(texels, np.array(sizes, np.int32).reshape(-1, 3), tones)

@@ -7,15 +7,15 @@ pixel lacks is taken from its neighbour across the outline.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array, Int64Array, UInt8Array
+from hairkit.simulation.lanes import stage
+from hairkit.simulation.vectors import HALF, ONE, ZERO, Number, inlined
 from hairkit.viewer.draw.mesh_kernels import area
-from hairkit.viewer.draw.place_kernels import inlined, shared
 
-_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
 _TINY = np.float32(1e-6)
 MOST_SMOOTHED = 16
 """Pixels of outlines that are smoothed, over the larger edge of the picture."""
@@ -60,10 +60,8 @@ def list_edges(vertices: Float32Array, faces: Int32Array) -> Int32Array:
     return edges
 
 
-@shared
-def select_outlines(
-    edges: Int32Array, seen: Float32Array, outlines: Int32Array
-) -> int:  # pragma: no cover - compiled
+@stage
+def select_outlines(edges: Int32Array, seen: Float32Array, outlines: Int32Array) -> int:
     """Write the edges of which one face alone is seen: ends and the corner of that face.
 
     `seen` (V, 4) is that of `MeshState`, `outlines` (E, 3); returns how many there are.
@@ -71,7 +69,7 @@ def select_outlines(
     count = 0
     for e in range(len(edges)):
         a, b, c, d = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
-        if min(seen[a, 3], seen[b, 3]) <= _ZERO:
+        if min(seen[a, 3], seen[b, 3]) <= ZERO:
             continue
         one, other = _faces_camera(seen, a, b, c), d >= 0 and _faces_camera(seen, b, a, d)
         if one != other:
@@ -80,7 +78,7 @@ def select_outlines(
     return count
 
 
-@shared
+@stage
 def smooth_outlines(
     outlines: Int32Array,
     seen: Float32Array,
@@ -88,7 +86,7 @@ def smooth_outlines(
     depth: Float32Array,
     picture: UInt8Array,
     replaced: Replaced,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Smooth outlines (N, 3) of a mesh in `picture` (H, W, 4), unless hair is before them.
 
     `meshes` (H, W, 4) is the picture without hair, and `depth` (W, H) its depth. What is
@@ -100,21 +98,21 @@ def smooth_outlines(
 
 
 @inlined
-def _faces_camera(seen: Float32Array, a: Any, b: Any, c: Any) -> Any:  # pragma: no cover - compiled
-    return seen[c, 3] > _ZERO and area(seen, a, b, c) < _ZERO
+def _faces_camera(seen: Float32Array, a: int, b: int, c: int) -> bool:
+    return bool(seen[c, 3] > ZERO and area(seen, a, b, c) < ZERO)
 
 
-@shared
+@stage
 def _smooth(
     seen: Float32Array,
-    a: Any,
-    b: Any,
-    c: Any,
+    a: int,
+    b: int,
+    c: int,
     meshes: UInt8Array,
     depth: Float32Array,
     picture: UInt8Array,
     replaced: Replaced,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Smooth the outline from vertex a to b of a face with the corner c.
 
     x runs along the longer side of the outline's box, y along the other.
@@ -124,22 +122,22 @@ def _smooth(
     if seen[b, u] < seen[a, u]:
         a, b = b, a
     ax, ay, az = seen[a, u], seen[a, v], seen[a, 2]
-    pace = _ONE / max(seen[b, u] - ax, _TINY)
+    pace = ONE / max(seen[b, u] - ax, _TINY)
     dy, dz = seen[b, v] - ay, seen[b, 2] - az
     side = 1 if seen[c, v] > ay + (seen[c, u] - ax) * pace * dy else -1  # of the mesh
     behind = _STEEP * abs(seen[c, 2] - az) + _TINY
     wide, high = (depth.shape[1], depth.shape[0]) if steep else depth.shape
-    first = np.int64(np.ceil(_within(ax - _HALF, wide)))
-    last = np.int64(np.ceil(_within(seen[b, u] - _HALF, wide)))
+    first = int(np.ceil(_within(ax - HALF, wide)))
+    last = int(np.ceil(_within(seen[b, u] - HALF, wide)))
     for x in range(first, last):
-        t = (np.float32(x) + _HALF - ax) * pace
+        t = (np.float32(x) + HALF - ax) * pace
         y = ay + t * dy
-        line: Any = np.int64(np.floor(_within(y, high)))
+        line = int(np.floor(_within(y, high)))
         covered = np.float32(line + 1) - y if side > 0 else y - np.float32(line)
         inner, outer = line, line - side  # the two pixels next to the outline, by their middles
-        if covered < _HALF:
+        if covered < HALF:
             inner, outer = line + side, line
-        if y < _ZERO or min(inner, outer) < 0 or max(inner, outer) >= high:
+        if y < ZERO or min(inner, outer) < 0 or max(inner, outer) >= high:
             continue
         i, j, u, v = (inner, x, outer, x) if steep else (x, inner, x, outer)
         z = az + t * dz
@@ -148,20 +146,20 @@ def _smooth(
         if picture[j, i, 0] != meshes[j, i, 0] or picture[j, i, 1] != meshes[j, i, 1]:
             continue  # hair before the mesh
         if line == inner:
-            _blend(picture, i, j, u, v, _ONE - covered, replaced)
+            _blend(picture, i, j, u, v, ONE - covered, replaced)
         else:
             _blend(picture, u, v, i, j, covered, replaced)
 
 
 @inlined
-def _within(x: Any, size: Any) -> Any:  # pragma: no cover - compiled
-    return min(max(x, _ZERO), np.float32(size))
+def _within(x: Number, size: int) -> Number:
+    return min(max(x, ZERO), np.float32(size))
 
 
 @inlined
 def _blend(
-    picture: UInt8Array, x: Any, y: Any, i: Any, j: Any, share: Any, replaced: Replaced
-) -> None:  # pragma: no cover - compiled
+    picture: UInt8Array, x: int, y: int, i: int, j: int, share: Number, replaced: Replaced
+) -> None:
     """Mix a share of the pixel in column i and row j into that in column x and row y."""
     at = replaced.used[0]
     replaced.at[at, 0], replaced.at[at, 1] = x, y
@@ -169,12 +167,12 @@ def _blend(
         before = np.float32(picture[y, x, c])
         replaced.colours[at, c] = picture[y, x, c]
         mixed = before + share * (np.float32(picture[j, i, c]) - before)
-        picture[y, x, c] = np.uint8(mixed + _HALF)
+        picture[y, x, c] = np.uint8(mixed + HALF)
     replaced.used[0] = at + 1
 
 
-@shared
-def put_back(picture: UInt8Array, replaced: Replaced) -> None:  # pragma: no cover - compiled
+@stage
+def put_back(picture: UInt8Array, replaced: Replaced) -> None:
     """Undo `smooth_outlines`, and forget what was replaced."""
     for at in range(replaced.used[0] - 1, -1, -1):
         x, y = replaced.at[at, 0], replaced.at[at, 1]

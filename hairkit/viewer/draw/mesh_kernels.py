@@ -6,29 +6,30 @@ albedo at the pixels, by `mesh_raster`. Only vertices of faces that are seen are
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array, UInt8Array
-from hairkit.viewer.draw.place_kernels import inlined, project_point, shared
-from hairkit.viewer.draw.shade_kernels import (
-    BRIGHTEST,
-    EXPOSURE,
-    EYE,
-    FORWARD,
-    KEY,
-    KEY_COLOUR,
-    RIM,
-    RIM_COLOUR,
-    light_at,
+from hairkit.rendering.skin_lobe import LIFT, WRAP
+from hairkit.simulation.lanes import stage
+from hairkit.simulation.vectors import (
+    HALF,
+    ONE,
+    TWO,
+    ZERO,
+    Number,
+    Vector,
+    dot,
+    inlined,
+    plus,
+    times,
 )
+from hairkit.viewer.draw.place_kernels import project_point
+from hairkit.viewer.draw.records import Lamp, Projection, Shading
+from hairkit.viewer.draw.shade_kernels import BRIGHTEST, light_at, to_eye
 
-_ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
-_TINY = np.float32(1e-9)
-_LIFT = np.float32(0.007)
-_WRAP = np.array([0.28, 0.18, 0.14], np.float32)
-"""As in skin.glsl."""
+_FOUR, _TINY = np.float32(4), np.float32(1e-9)
 
 
 class MeshData(NamedTuple):
@@ -51,14 +52,18 @@ class MeshData(NamedTuple):
 class MeshState(NamedTuple):
     """What the passes over a mesh hand on."""
 
-    placed: Float32Array
-    """(V, 6) places and normals, metres, head frame."""
+    places: Float32Array
+    """(V, 3) metres, head frame."""
+    normals: Float32Array
+    """(V, 3) not normalised."""
     seen: Float32Array
     """(V, 4) pixel x and y, depth-buffer depth, axial depth."""
     wanted: UInt8Array
     """(V,) 1 for vertices of faces that are seen."""
-    lit: Float32Array
-    """(V, 6) light that leaves the flesh and light that the oil reflects, times `bright`."""
+    flesh: Float32Array
+    """(V, 3) light that leaves the flesh, times exposure, over `BRIGHTEST`."""
+    oil: Float32Array
+    """(V, 3) light that the oil reflects, the same."""
     front: Int32Array
     """(F,) faces that are seen; each chunk of the faces fills its part from the start."""
     columns: Int32Array
@@ -80,21 +85,21 @@ class Oil(NamedTuple):
     """Reflectance at normal incidence."""
 
 
-@shared
+@stage
 def place_vertices(
     first: int,
     last: int,
     mesh: MeshData,
     motion: Float32Array,
-    camera: Float32Array,
+    camera: Projection,
     push: np.float32,
     state: MeshState,
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Write places and projections of vertices that follow `motion` (3, 4) as far as they are held.
 
     Their depth is that of a place `push` metres farther from the camera.
     """
-    placed, seen = state.placed, state.seen
+    seen = state.seen
     for v in range(first, last):
         share = mesh.held[v]
         for c in range(3):
@@ -103,18 +108,18 @@ def place_vertices(
             for d in range(3):
                 to += motion[c, d] * mesh.vertices[v, d]
                 turned += motion[c, d] * mesh.normals[v, d]
-            placed[v, c], placed[v, c + 3] = place + share * to, normal + share * turned
-        x, y, z = placed[v, 0], placed[v, 1], placed[v, 2]
-        seen[v, 0], seen[v, 1], _, seen[v, 3] = project_point(camera, x, y, z)
-        x, y, z = x + push * camera[16], y + push * camera[17], z + push * camera[18]
-        _, _, seen[v, 2], _ = project_point(camera, x, y, z)
+            state.places[v, c] = place + share * to
+            state.normals[v, c] = normal + share * turned
+        at = row(state.places, v)
+        seen[v, 0], seen[v, 1], _, seen[v, 3] = project_point(camera, at)
+        _, _, seen[v, 2], _ = project_point(camera, plus(at, times(push, camera.forward)))
         state.wanted[v] = 0
 
 
-@shared
+@stage
 def select_faces(
     first: int, last: int, mesh: MeshData, wide: int, high: int, state: MeshState
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Write which faces of some chunks face the camera and hold the middle of a pixel."""
     seen, chunks, count = state.seen, len(state.counts), len(mesh.faces)
     for chunk in range(first, last):
@@ -123,7 +128,7 @@ def select_faces(
         least_x, least_y, most_x, most_y = wide, high, 0, 0
         for f in range(start, count * (chunk + 1) // chunks):
             a, b, c = mesh.faces[f, 0], mesh.faces[f, 1], mesh.faces[f, 2]
-            if min(seen[a, 3], seen[b, 3], seen[c, 3]) <= _ZERO or area(seen, a, b, c) >= _ZERO:
+            if min(seen[a, 3], seen[b, 3], seen[c, 3]) <= ZERO or area(seen, a, b, c) >= ZERO:
                 continue
             left, right = pixel_middles(seen[a, 0], seen[b, 0], seen[c, 0], wide)
             top, bottom = pixel_middles(seen[a, 1], seen[b, 1], seen[c, 1], high)
@@ -139,101 +144,104 @@ def select_faces(
 
 
 @inlined
-def area(seen: Float32Array, a: int, b: int, c: int) -> Any:  # pragma: no cover - compiled
-    """Return twice the area of a face in the picture, below 0 if it faces the camera."""
-    x, y = seen[a, 0], seen[a, 1]
-    return (seen[b, 0] - x) * (seen[c, 1] - y) - (seen[c, 0] - x) * (seen[b, 1] - y)
+def row(values: Float32Array, v: int) -> Vector:
+    """Return the vector in a row of (V, 3)."""
+    return values[v, 0], values[v, 1], values[v, 2]
 
 
 @inlined
-def pixel_middles(a: Any, b: Any, c: Any, size: int) -> Any:  # pragma: no cover - compiled
+def area(seen: Float32Array, a: int, b: int, c: int) -> Number:
+    """Return twice the area of a face in the picture, below 0 if it faces the camera."""
+    x, y = seen[a, 0], seen[a, 1]
+    twice: Number = (seen[b, 0] - x) * (seen[c, 1] - y) - (seen[c, 0] - x) * (seen[b, 1] - y)
+    return twice
+
+
+@inlined
+def pixel_middles(a: Number, b: Number, c: Number, size: int) -> tuple[int, int]:
     """Return the first and last pixel whose middle is between the least and largest coordinate."""
-    low = max(min(a, b, c) - _HALF, _ZERO)
-    high = min(max(a, b, c) - _HALF, np.float32(size - 1))
-    return np.int64(np.ceil(low)), np.int64(np.floor(high))
+    low = max(min(a, b, c) - HALF, ZERO)
+    high = min(max(a, b, c) - HALF, np.float32(size - 1))
+    return int(np.ceil(low)), int(np.floor(high))
 
 
-@shared
+@stage
 def light_vertices(
-    first: int,
-    last: int,
-    mesh: MeshData,
-    shading: Float32Array,
-    ambient: Float32Array,
-    light: Float32Array,
-    oil: Oil,
-    state: MeshState,
-) -> None:  # pragma: no cover - compiled
-    """Light the wanted vertices: skin in two layers, as in skin.glsl.
-
-    `shading` is that of the hair, `ambient` (2, 3) are the colours of ground and sky, `light` is
-    the light volume.
-    """
-    perspective, bright = shading[EXPOSURE + 1], shading[EXPOSURE] / np.float32(BRIGHTEST)
+    first: int, last: int, mesh: MeshData, light: Shading, oil: Oil, state: MeshState
+) -> None:
+    """Light the wanted vertices: skin in two layers, as in skin.glsl."""
+    bright = light.exposure / BRIGHTEST
     for v in range(first, last):
         if state.wanted[v] == 0:
             continue
-        x, y, z = state.placed[v, 0], state.placed[v, 1], state.placed[v, 2]
-        nx, ny, nz = state.placed[v, 3], state.placed[v, 4], state.placed[v, 5]
-        over = _ONE / np.sqrt(max(nx * nx + ny * ny + nz * nz, _TINY))
-        nx, ny, nz = nx * over, ny * over, nz * over
-        lifted = x + _LIFT * nx, y + _LIFT * ny, z + _LIFT * nz
-        reached = light_at(lifted[0], lifted[1], lifted[2], shading, light)
-        ex = perspective * (shading[EYE] - x) - (_ONE - perspective) * shading[FORWARD]
-        ey = perspective * (shading[EYE + 1] - y) - (_ONE - perspective) * shading[FORWARD + 1]
-        ez = perspective * (shading[EYE + 2] - z) - (_ONE - perspective) * shading[FORWARD + 2]
-        over = _ONE / np.sqrt(max(ex * ex + ey * ey + ez * ez, _TINY))
-        ex, ey, ez = ex * over, ey * over, ez * over
-        up = _HALF + _HALF * ny
+        place, normal = row(state.places, v), row(state.normals, v)
+        normal = times(ONE / np.sqrt(max(dot(normal, normal), _TINY)), normal)
+        by_key, by_rim, sky = light_at(plus(place, times(LIFT, normal)), light)
+        eye = to_eye(light, place)
+        eye = times(ONE / np.sqrt(max(dot(eye, eye), _TINY)), eye)
+        up = HALF + HALF * normal[1]
+        flesh, oily = state.flesh[v], state.oil[v]
         for c in range(3):
-            sky = ambient[0, c] + up * (ambient[1, c] - ambient[0, c])
-            state.lit[v, c], state.lit[v, c + 3] = sky * reached[2], _ZERO
-        for lamp in range(2):
-            way, colour = (RIM, RIM_COLOUR) if lamp else (KEY, KEY_COLOUR)
-            lx, ly, lz = shading[way], shading[way + 1], shading[way + 2]
-            facing, seen = nx * lx + ny * ly + nz * lz, nx * ex + ny * ey + nz * ez
-            entering, reflected = _reflect(oil, facing, seen, lx * ex + ly * ey + lz * ez)
-            for c in range(3):
-                arriving = shading[colour + c] * reached[lamp]
-                wrap = _WRAP[c] * oil.scatter
-                diffuse = max((facing + wrap) / (_ONE + wrap), _ZERO)
-                state.lit[v, c] += arriving * diffuse * entering
-                state.lit[v, c + 3] += arriving * reflected
+            flesh[c] = (light.ground[c] + up * (light.sky[c] - light.ground[c])) * sky
+            oily[c] = ZERO
+        _add_lamp(light.key, by_key, normal, eye, oil, flesh, oily)
+        _add_lamp(light.rim, by_rim, normal, eye, oil, flesh, oily)
         for c in range(3):
-            state.lit[v, c] *= mesh.colours[v, c] * bright
-            state.lit[v, c + 3] *= bright
+            flesh[c] *= mesh.colours[v, c] * bright
+            oily[c] *= bright
 
 
 @inlined
-def _reflect(oil: Oil, facing: Any, seen: Any, between: Any) -> Any:  # pragma: no cover - compiled
+def _add_lamp(
+    lamp: Lamp,
+    reached: Number,
+    normal: Vector,
+    eye: Vector,
+    oil: Oil,
+    flesh: Float32Array,
+    oily: Float32Array,
+) -> None:
+    """Add the light of a lamp, of which a share arrives, to what flesh and oil send, (3,) each."""
+    facing, seen = dot(normal, lamp.direction), dot(normal, eye)
+    entering, reflected = _reflect(oil, facing, seen, dot(lamp.direction, eye))
+    for c in range(3):
+        arriving = lamp.colour[c] * reached
+        wrap = WRAP[c] * oil.scatter
+        flesh[c] += arriving * max((facing + wrap) / (ONE + wrap), ZERO) * entering
+        oily[c] += arriving * reflected
+
+
+@inlined
+def _reflect(oil: Oil, facing: Number, seen: Number, between: Number) -> tuple[Number, Number]:
     """Return the share of a light that leaves the flesh, and what the oil reflects.
 
     As in skin_lobe.glsl: GGX with Smith's shadowing (Walter et al. 2007), Fresnel by Schlick 1994.
     `facing`, `seen` and `between` are cosines of the normal and the light, the normal and the eye,
     and the light and the eye.
     """
-    nl, nv = min(max(facing, _ZERO), _ONE), min(max(seen, _ZERO), _ONE)
-    whole = (_ONE - oil.f0) * (_ONE - oil.f0)
-    below = (_ONE - _fresnel(oil.f0, nl)) * (_ONE - _fresnel(oil.f0, nv)) / whole
-    entering = _ONE + oil.scatter * (below - _ONE)
-    if nl <= _ZERO or nv <= _ZERO:
-        return entering, _ZERO
-    half = np.sqrt(max(_TWO + _TWO * between, _TINY))
-    nh, vh = min((nl + nv) / half, _ONE), min((_ONE + between) / half, _ONE)
+    nl, nv = min(max(facing, ZERO), ONE), min(max(seen, ZERO), ONE)
+    whole = (ONE - oil.f0) * (ONE - oil.f0)
+    below = (ONE - _fresnel(oil.f0, nl)) * (ONE - _fresnel(oil.f0, nv)) / whole
+    entering = ONE + oil.scatter * (below - ONE)
+    if nl <= ZERO or nv <= ZERO:
+        return entering, ZERO
+    half = np.sqrt(max(TWO + TWO * between, _TINY))
+    nh, vh = min((nl + nv) / half, ONE), min((ONE + between) / half, ONE)
     square = oil.alpha * oil.alpha
-    spread = nh * nh * (square - _ONE) + _ONE
+    spread = nh * nh * (square - ONE) + ONE
     lobe = square / (spread * spread)  # times pi, as the light is
     shadow = _smith(square, nl) * _smith(square, nv)
-    reflected = lobe * shadow * _fresnel(oil.f0, vh) / (np.float32(4) * nv)
+    reflected = lobe * shadow * _fresnel(oil.f0, vh) / (_FOUR * nv)
     return entering, oil.scatter * reflected
 
 
 @inlined
-def _fresnel(f0: Any, cosine: Any) -> Any:  # pragma: no cover - compiled
-    a = _ONE - cosine
-    return f0 + (_ONE - f0) * a * a * a * a * a
+def _fresnel(f0: Number, cosine: Number) -> Number:
+    a = ONE - cosine
+    return f0 + (ONE - f0) * a * a * a * a * a
 
 
 @inlined
-def _smith(square: Any, c: Any) -> Any:  # pragma: no cover - compiled
-    return _TWO * c / (c + np.sqrt(square + (_ONE - square) * c * c))
+def _smith(square: Number, c: Number) -> Number:
+    shadow: Number = TWO * c / (c + np.sqrt(square + (ONE - square) * c * c))
+    return shadow

@@ -6,38 +6,64 @@ compare both. Everything is float32.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from hairkit.arrays import Float32Array
-from hairkit.parallel import compiled_with
+from hairkit.rendering.gl_camera import NEAREST
+from hairkit.simulation.lanes import four, put, put_four, stage, three
+from hairkit.simulation.vectors import (
+    HALF,
+    ONE,
+    TWO,
+    ZERO,
+    Frame,
+    Number,
+    Vector,
+    cross,
+    dot,
+    inlined,
+    minus,
+    plus,
+    product,
+    times,
+    unit,
+)
+from hairkit.viewer.draw.records import (
+    Chunks,
+    Guides,
+    HairData,
+    HairState,
+    Projection,
+    Strokes,
+    UInt32Array,
+    ViewCells,
+)
 
-shared: Callable[[Any], Any] = compiled_with(fastmath=True)
-"""Compiles a function that threads share."""
-inlined: Callable[[Any], Any] = njit(fastmath=True, error_model="numpy", inline="always")
-"""Inlines a function, so that the compiler can vectorise loops around it."""
 SLICES, TILE = 32, 8
-"""Depth slices of the view; edge of a view cell in pixels, as in viewer_hair.glsl."""
+"""Depth slices of the view; edge of a view cell in pixels."""
 OPACITY_UNIT = np.float32(4096)
-PARTED, TOGETHER = np.cos(np.radians(45.0)), np.cos(np.radians(22.5))
+"""What an opacity of 1 adds to a view cell."""
+PARTED, TOGETHER = (np.float32(np.cos(np.radians(angle))) for angle in (45.0, 22.5))
 """Cosines of half the angle between the turns of two guides: from 90 degrees on they share no hair,
 up to 45 degrees they share it as at rest."""
 LANES = 8
 """Points of a strand that are worked on together."""
-MOST_STRETCH = 4.0
+STRETCH = 4
+"""Row of the stretch in `Guides.turns`."""
+MOST_STRETCH = np.float32(4.0)
 """Largest stretch of a segment that is drawn: places stay finite where a simulation diverges."""
-SHORTEST = 1e-9
+SHORTEST = np.float32(1e-9)
 """Least length of a segment, metres."""
-_PARTED, _TOGETHER = np.float32(PARTED), np.float32(TOGETHER)
-_MOST_STRETCH = np.float32(MOST_STRETCH)
-_FAR_BEHIND = np.float32(-1)
-_ZERO, _HALF, _ONE, _TWO = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
-_QUARTER, _TINY, _CLOSE = np.float32(0.25), np.float32(1e-8), np.float32(1e-4)
-_MIDDLE, _BESIDE = np.float32(0.4 / 4096), np.float32(0.15 / 4096)
-_NEAREST, _PER_TILE, _FAR = np.float32(0.01), np.float32(1 / TILE), np.float32(1e9)
+MIDDLE, BESIDE = np.float32(0.4), np.float32(0.15)
+"""Weights of a tile and of each of its four neighbours in its smoothed opacity; they add to 1."""
+CLOSE = np.float32(1e-4)
+"""Least divisor of a projection, metres."""
+_NEAREST, _FAR_BEHIND, _FAR = np.float32(NEAREST), np.float32(-1), np.float32(1e9)
+_QUARTER, _THREE, _TINY = np.float32(0.25), np.float32(3), np.float32(1e-8)
+_MIDDLE, _BESIDE = MIDDLE / OPACITY_UNIT, BESIDE / OPACITY_UNIT
+_PER_TILE = np.float32(1 / TILE)
 
 
 def in_lanes(values: Float32Array, fill: Float32Array) -> Float32Array:
@@ -56,7 +82,7 @@ class RestGuides(NamedTuple):
     segments: Float32Array
     """(G, m, 4) unit direction and length, metres, of the segment to each point; 0 to the root."""
     frames: Float32Array
-    """(G, 4, m) rotation, x, y, z, w, of a frame carried from the first segment to each one."""
+    """(G, 4, m) rotation, w, x, y, z, of a frame carried from the first segment to each one."""
 
 
 def segments(rows: Float32Array) -> Float32Array:
@@ -66,255 +92,253 @@ def segments(rows: Float32Array) -> Float32Array:
     return np.concatenate([edges / lengths, lengths], axis=2, dtype=np.float32)
 
 
-@shared
+@stage
 def carry_frames(
     first: int, last: int, rest: Float32Array, now: Float32Array, frames: Float32Array
-) -> None:  # pragma: no cover - compiled
+) -> None:
     """Write how a frame turns from the first segment of guides at rest to each segment of `now`.
 
     It is carried along without twist (Bishop 1975, "There is more than one way to frame a curve"),
     so that it changes no faster than the guide bends. `rest` are `segments`.
     """
     for g in range(first, last):
-        ax, ay, az = rest[g, 1, 0], rest[g, 1, 1], rest[g, 1, 2]
-        x, y, z, w = _ZERO, _ZERO, _ZERO, _ONE
+        before = rest[g, 1, 0], rest[g, 1, 1], rest[g, 1, 2]
+        frame = ONE, ZERO, ZERO, ZERO
         for k in range(1, now.shape[1]):
-            bx, by, bz, _ = _segment(now, g, k)
-            tx, ty, tz, tw = _between(ax, ay, az, bx, by, bz)
-            x, y, z, w = _multiply(tx, ty, tz, tw, x, y, z, w)
-            over = _ONE / np.sqrt(x * x + y * y + z * z + w * w)
-            x, y, z, w = x * over, y * over, z * over, w * over
-            frames[g, 0, k], frames[g, 1, k], frames[g, 2, k], frames[g, 3, k] = x, y, z, w
-            ax, ay, az = bx, by, bz
+            way, _ = _segment(now[g], k)
+            frame = unit(product(_between(before, way), frame))
+            put_four(frames[g], k, frame)
+            before = way
 
 
-@shared
-def turn_guides(
-    first: int,
-    last: int,
-    rest: Float32Array,
-    rest_frames: Float32Array,
-    now: Float32Array,
-    turns: Float32Array,
-) -> None:  # pragma: no cover - compiled
-    """Write rotation and stretch (G, 5, M) of the segments to the points of guides since rest.
-
-    `rest` and `rest_frames` are those of `RestGuides`, `now` (G, m, 3) are the guides' points.
-    """
-    carry_frames(first, last, rest, now, turns)
+@stage
+def turn_guides(first: int, last: int, rest: RestGuides, now: Guides) -> None:
+    """Write rotation and stretch of the segments of guides since rest."""
+    carry_frames(first, last, rest.segments, now.points, now.turns)
     for g in range(first, last):
-        for k in range(1, now.shape[1]):
-            x, y, z, w = turns[g, 0, k], turns[g, 1, k], turns[g, 2, k], turns[g, 3, k]
-            a, b, c = rest_frames[g, 0, k], rest_frames[g, 1, k], rest_frames[g, 2, k]
-            x, y, z, w = _multiply(x, y, z, w, -a, -b, -c, rest_frames[g, 3, k])
-            turns[g, 0, k], turns[g, 1, k], turns[g, 2, k], turns[g, 3, k] = x, y, z, w
-            _, _, _, length = _segment(now, g, k)
-            turns[g, 4, k] = min(length / rest[g, k, 3], _MOST_STRETCH)
+        turns = now.turns[g]
+        for k in range(1, now.points.shape[1]):
+            w, x, y, z = four(rest.frames[g], k)
+            put_four(turns, k, product(four(turns, k), (w, -x, -y, -z)))
+            _, length = _segment(now.points[g], k)
+            turns[STRETCH, k] = min(length / rest.segments[g, k, 3], MOST_STRETCH)
 
 
 @inlined
-def _segment(points, g, k):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return unit direction and length of the segment to point k of a guide."""
-    x = points[g, k, 0] - points[g, k - 1, 0]
-    y = points[g, k, 1] - points[g, k - 1, 1]
-    z = points[g, k, 2] - points[g, k - 1, 2]
-    length = max(np.sqrt(x * x + y * y + z * z), np.float32(SHORTEST))
-    return x / length, y / length, z / length, length
+def _segment(points: Float32Array, k: int) -> tuple[Vector, Number]:
+    """Return unit direction and length of the segment to point k of a guide (m, 3)."""
+    x, y, z = points[k, 0], points[k, 1], points[k, 2]
+    edge = minus((x, y, z), (points[k - 1, 0], points[k - 1, 1], points[k - 1, 2]))
+    length = max(np.sqrt(dot(edge, edge)), SHORTEST)
+    return (edge[0] / length, edge[1] / length, edge[2] / length), length
 
 
 @inlined
-def _between(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+def _between(a: Vector, b: Vector) -> Frame:
     """Return the least rotation, not normalised, from a unit vector to another."""
-    w = _ONE + ax * bx + ay * by + az * bz
-    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    w, (x, y, z) = ONE + dot(a, b), cross(a, b)
     if x * x + y * y + z * z + w * w <= _TINY:  # opposite
-        return _ZERO, _ZERO, _ONE, _ZERO
-    return x, y, z, w
+        return ZERO, ZERO, ZERO, ONE
+    return w, x, y, z
 
 
 @inlined
-def _multiply(ax, ay, az, aw, bx, by, bz, bw):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return the rotation b followed by a, quaternions."""
-    return (
-        aw * bx + bw * ax + ay * bz - az * by,
-        aw * by + bw * ay + az * bx - ax * bz,
-        aw * bz + bw * az + ax * by - ay * bx,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
-
-
-@inlined
-def project_point(camera, x, y, z):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+def project_point(camera: Projection, place: Vector) -> Frame:
     """Return pixel x, y, depth-buffer depth and axial depth of a point; below 0: behind."""
-    w = camera[12] * x + camera[13] * y + camera[14] * z + camera[15]
-    over = _ONE / max(w, _CLOSE)
-    px = (camera[0] * x + camera[1] * y + camera[2] * z + camera[3]) * over
-    py = (camera[4] * x + camera[5] * y + camera[6] * z + camera[7]) * over
-    pz = (camera[8] * x + camera[9] * y + camera[10] * z + camera[11]) * over
-    depth = camera[16] * x + camera[17] * y + camera[18] * z + camera[19]
-    if camera[23] > _HALF and depth < _NEAREST:
+    right, down, deep, away = camera.clip
+    over = ONE / max(dot(away, place) + away[3], CLOSE)
+    x, y = (dot(right, place) + right[3]) * over, (dot(down, place) + down[3]) * over
+    z = (dot(deep, place) + deep[3]) * over
+    depth = dot(camera.forward, place) + camera.offset
+    if camera.perspective and depth < _NEAREST:
         depth = _FAR_BEHIND
     return (
-        (px * _HALF + _HALF) * camera[20],
-        (py * _HALF + _HALF) * camera[21],
-        pz * _HALF + _HALF,
+        (x * HALF + HALF) * camera.width,
+        (y * HALF + HALF) * camera.height,
+        z * HALF + HALF,
         depth,
     )
 
 
 @inlined
-def pixels_per_metre(camera, depth):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+def pixels_per_metre(camera: Projection, depth: Number) -> Number:
     """Return the scale of the picture at an axial depth, pixels per metre."""
-    return camera[22] / max(depth, _CLOSE) if camera[23] > _HALF else camera[22]
+    return camera.focal / max(depth, CLOSE) if camera.perspective else camera.focal
 
 
 @inlined
-def count_hidden(ax, ay, az, bx, by, bz, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+def count_hidden(a: Vector, b: Vector, solid: Float32Array) -> int:
     """Return how many of a stroke's ends and its middle are behind meshes, 0 to 3.
 
-    Ends a and b in pixels of the frame and depth; `solid` (W, H) is the depth buffer of meshes.
+    Ends a and b in pixels of the columns and depth; `solid` (W, H) is the depth buffer of meshes.
     """
-    hidden = _behind(ax, ay, az, solid) + _behind(bx, by, bz, solid)
-    return hidden + _behind(_HALF * (ax + bx), _HALF * (ay + by), _HALF * (az + bz), solid)
+    return _behind(a, solid) + _behind(b, solid) + _behind(times(HALF, plus(a, b)), solid)
 
 
 @inlined
-def _behind(x, y, depth, solid):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    """Return 1 if a mesh, `solid` (W, H), is nearer than a point in pixels of the frame; else 0."""
-    column = min(max(np.int64(x), 0), solid.shape[0] - 1)
-    row = min(max(np.int64(y), 0), solid.shape[1] - 1)
-    return 1 if depth > solid[column, row] else 0
+def _behind(pixel: Vector, solid: Float32Array) -> int:
+    """Return 1 if a mesh, `solid` (W, H), is nearer than a point in pixels and depth; else 0."""
+    column = min(max(int(pixel[0]), 0), solid.shape[0] - 1)
+    row = min(max(int(pixel[1]), 0), solid.shape[1] - 1)
+    return 1 if pixel[2] > solid[column, row] else 0
 
 
-@shared
-def place_hair(  # type: ignore[no-untyped-def]
-    first_chunk, last_chunk, guides, turns, followed, weights, edges, widths, camera, slices,
-    wider, count, way, places, seen, filled, used, frame,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Interpolate chunks of `count` strands, and splat their segments into the view cells.
+@stage
+def place_hair(
+    first_chunk: int,
+    last_chunk: int,
+    guides: Guides,
+    hair: HairData,
+    strokes: Strokes,
+    state: HairState,
+    cells: ViewCells,
+    chunks: Chunks,
+) -> None:
+    """Interpolate chunks of the strands, and splat their segments into the view cells.
 
     Each segment keeps its length at rest, times the stretch of the nearest guide, and turns as the
     three guides on the mean. Guides that turn apart from the nearest one lose their share: hair
-    between them goes with the nearest, as locks do, and is neither stretched nor folded. `edges`
-    are (S, 3, M) and `turns` (G, 5, M), see `in_lanes`; `way` (chunks, 3, M) is scratch.
-    Writes `places` (S, m, 3) in metres and `seen` (S, m, 4), the results of `project_point`. Each
-    chunk also writes its part of `filled` (chunks, SLICES, tiles y, tiles x) and of `frame`
-    (chunks, 4), the lowest and highest pixel. `used` are the tiles that the last picture left
-    filled: first column and row, and the ends of both.
+    between them goes with the nearest, as locks do, and is neither stretched nor folded. Writes
+    `places` and `seen` of the state; each chunk also writes its part of `filled` and its corners.
     """
-    chunks = filled.shape[0]
+    count, used = len(chunks.corners), cells.used
     for chunk in range(first_chunk, last_chunk):
-        filled[chunk, :, used[1] : used[3], used[0] : used[2]] = 0
-        frame[chunk, :2], frame[chunk, 2:] = _FAR, -_FAR
-        _place_chunk(
-            guides, turns, followed, weights, edges, widths, camera, slices, wider,
-            count * chunk // chunks, count * (chunk + 1) // chunks, way[chunk], places, seen,
-            filled[chunk], frame[chunk],
-        )  # fmt: skip
-
-
-@shared
-def _place_chunk(  # type: ignore[no-untyped-def]
-    guides, turns, followed, weights, edges, widths, camera, slices, wider, first, last, way,
-    places, seen, filled, frame,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
-    points = guides.shape[1]
-    low_x, low_y, high_x, high_y = frame[0], frame[1], frame[2], frame[3]
-    for s in range(first, last):
-        a, b, c = followed[s, 0], followed[s, 1], followed[s, 2]
-        u, v, w = weights[s, 0], weights[s, 1], weights[s, 2]
-        _turn_edges(turns[a], turns[b], turns[c], u, v, w, edges[s], way)
-        for d in range(3):
-            way[d, 0] += u * guides[a, 0, d] + v * guides[b, 0, d] + w * guides[c, 0, d]
-        x = y = z = _ZERO
-        for k in range(points):
-            x, y, z = x + way[0, k], y + way[1, k], z + way[2, k]
-            places[s, k, 0], places[s, k, 1], places[s, k, 2] = x, y, z
-            px, py, pz, depth = project_point(camera, x, y, z)
-            seen[s, k, 0], seen[s, k, 1], seen[s, k, 2], seen[s, k, 3] = px, py, pz, depth
-            if depth > _ZERO:
-                low_x, low_y = min(low_x, px), min(low_y, py)
-                high_x, high_y = max(high_x, px), max(high_y, py)
-        for k in range(1, points):
-            depth = seen[s, k, 3]
-            if depth > _ZERO and seen[s, k - 1, 3] > _ZERO:
-                width = widths[s, k] * wider * pixels_per_metre(camera, depth)
-                _fill(filled, seen, s, k, slices, width)
-    frame[0], frame[1], frame[2], frame[3] = low_x, low_y, high_x, high_y
-
-
-@shared
-def _turn_edges(near, second, third, u, v, w, edges, way) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Write `way` (3, M), the segments to the points of a strand with `edges` (3, M) at rest.
-
-    From the turns (5, M) of its guides, of weights u, v and w. M is a multiple of `LANES`, so that
-    all is vectorised.
-    """
-    for start in range(0, edges.shape[1], LANES):
-        for lane in range(LANES):
-            k = start + lane
-            ax, ay, az, aw = near[0, k], near[1, k], near[2, k], near[3, k]
-            bx, by, bz, bw = second[0, k], second[1, k], second[2, k], second[3, k]
-            cx, cy, cz, cw = third[0, k], third[1, k], third[2, k], third[3, k]
-            b = v * _share(ax * bx + ay * by + az * bz + aw * bw)
-            c = w * _share(ax * cx + ay * cy + az * cz + aw * cw)
-            x, y, z = u * ax + b * bx + c * cx, u * ay + b * by + c * cy, u * az + b * bz + c * cz
-            turn = u * aw + b * bw + c * cw
-            ex, ey, ez = edges[0, k], edges[1, k], edges[2, k]
-            ix, iy = y * ez - z * ey + turn * ex, z * ex - x * ez + turn * ey
-            iz = x * ey - y * ex + turn * ez
-            stretch = near[4, k]
-            twice = _TWO * stretch / max(x * x + y * y + z * z + turn * turn, _TINY)
-            way[0, k] = stretch * ex + twice * (y * iz - z * iy)
-            way[1, k] = stretch * ey + twice * (z * ix - x * iz)
-            way[2, k] = stretch * ez + twice * (x * iy - y * ix)
+        filled, corners = cells.filled[chunk], chunks.corners[chunk]
+        filled[:, used[1] : used[3], used[0] : used[2]] = 0
+        corners[:2], corners[2:] = _FAR, -_FAR
+        for s in range(strokes.hairs * chunk // count, strokes.hairs * (chunk + 1) // count):
+            _turn_edges(guides, hair, s, chunks.way[chunk])
+            _place_strand(guides, hair, s, chunks.way[chunk], strokes.camera, state, corners)
+            _fill_strand(state.seen[s], hair.widths[s], strokes, filled)
 
 
 @inlined
-def _share(along):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+def _place_strand(
+    guides: Guides,
+    hair: HairData,
+    s: int,
+    way: Float32Array,
+    camera: Projection,
+    state: HairState,
+    corners: Float32Array,
+) -> None:
+    """Add up the segments (3, M) from the root, and project the points."""
+    a, b, c = hair.followed[s, 0], hair.followed[s, 1], hair.followed[s, 2]
+    u, v, w = hair.weights[s, 0], hair.weights[s, 1], hair.weights[s, 2]
+    roots, places, seen = guides.points, state.places[s], state.seen[s]
+    for d in range(3):
+        way[d, 0] += u * roots[a, 0, d] + v * roots[b, 0, d] + w * roots[c, 0, d]
+    place = ZERO, ZERO, ZERO
+    low_x, low_y, high_x, high_y = corners[0], corners[1], corners[2], corners[3]
+    for k in range(len(places)):
+        place = plus(place, three(way, k))
+        places[k, 0], places[k, 1], places[k, 2] = place
+        x, y, z, depth = project_point(camera, place)
+        seen[k, 0], seen[k, 1], seen[k, 2], seen[k, 3] = x, y, z, depth
+        if depth > ZERO:
+            low_x, low_y = min(low_x, x), min(low_y, y)
+            high_x, high_y = max(high_x, x), max(high_y, y)
+    corners[0], corners[1], corners[2], corners[3] = low_x, low_y, high_x, high_y
+
+
+@stage
+def _turn_edges(guides: Guides, hair: HairData, s: int, way: Float32Array) -> None:
+    """Write `way` (3, M), the segments to the points of a strand, from the turns of its guides.
+
+    M is a multiple of `LANES`, so that all is vectorised.
+    """
+    near, second = guides.turns[hair.followed[s, 0]], guides.turns[hair.followed[s, 1]]
+    third, edges = guides.turns[hair.followed[s, 2]], hair.edges[s]
+    u, v, w = hair.weights[s, 0], hair.weights[s, 1], hair.weights[s, 2]
+    for start in range(0, edges.shape[1], LANES):
+        for lane in range(LANES):
+            k = start + lane
+            a, b, c = four(near, k), four(second, k), four(third, k)
+            p, q = v * _share(_inner(a, b)), w * _share(_inner(a, c))
+            turn = u * a[0] + p * b[0] + q * c[0]
+            axis = (
+                u * a[1] + p * b[1] + q * c[1],
+                u * a[2] + p * b[2] + q * c[2],
+                u * a[3] + p * b[3] + q * c[3],
+            )
+            edge, stretch = three(edges, k), near[STRETCH, k]
+            aside = plus(cross(axis, edge), times(turn, edge))
+            twice = TWO * stretch / max(dot(axis, axis) + turn * turn, _TINY)
+            put(way, k, plus(times(stretch, edge), times(twice, cross(axis, aside))))
+
+
+@inlined
+def _inner(a: Frame, b: Frame) -> Number:
+    """Return the inner product of quaternions: the cosine of half the angle between the turns."""
+    cosine: Number = a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[0] * b[0]
+    return cosine
+
+
+@inlined
+def _share(along: Number) -> Number:
     """Return by how much, and with which sign, the turn of another than the nearest guide counts.
 
-    `along` is the product of both quaternions: the cosine of half the angle between the turns.
+    `along` is the inner product of both quaternions.
     """
-    t = min(max((abs(along) - _PARTED) / (_TOGETHER - _PARTED), _ZERO), _ONE)
-    t = t * t * (np.float32(3) - _TWO * t)
-    return t if along >= _ZERO else -t
+    t: Number = min(max((max(along, -along) - PARTED) / (TOGETHER - PARTED), ZERO), ONE)
+    t = t * t * (_THREE - TWO * t)
+    return t if along >= ZERO else -t
 
 
-@shared
-def _fill(filled, seen, s, k, slices, width) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+@inlined
+def _fill_strand(
+    seen: Float32Array, widths: Float32Array, strokes: Strokes, filled: UInt32Array
+) -> None:
+    """Splat the segments of a strand before the camera."""
+    for k in range(1, len(seen)):
+        depth = seen[k, 3]
+        if depth > ZERO and seen[k - 1, 3] > ZERO:
+            width = widths[k] * strokes.wider * pixels_per_metre(strokes.camera, depth)
+            _fill(filled, seen, k, width, strokes.near, strokes.slices_per_metre)
+
+
+@stage
+def _fill(
+    filled: UInt32Array,
+    seen: Float32Array,
+    k: int,
+    width: Number,
+    nearest: Number,
+    per_metre: Number,
+) -> None:
     """Splat the segment from point k - 1 to k into the cells at its quarters."""
-    ax, ay = seen[s, k - 1, 0], seen[s, k - 1, 1]
-    x, y = seen[s, k, 0] - ax, seen[s, k, 1] - ay
-    opacity = _HALF * np.sqrt(x * x + y * y) * width / np.float32(TILE * TILE)
-    whole = np.uint32(opacity * OPACITY_UNIT + _HALF)
-    near = seen[s, k - 1, 3]
-    depth = seen[s, k, 3] - near
-    for part in (_QUARTER, _ONE - _QUARTER):
+    ax, ay = seen[k - 1, 0], seen[k - 1, 1]
+    x, y = seen[k, 0] - ax, seen[k, 1] - ay
+    opacity = HALF * np.sqrt(x * x + y * y) * width / np.float32(TILE * TILE)
+    whole = np.uint32(opacity * OPACITY_UNIT + HALF)
+    near = seen[k - 1, 3]
+    depth = seen[k, 3] - near
+    for part in (_QUARTER, ONE - _QUARTER):
         column, line = (ax + part * x) * _PER_TILE, (ay + part * y) * _PER_TILE
-        if column < _ZERO or line < _ZERO:
+        if column < ZERO or line < ZERO:
             continue
-        i, j = np.int64(column), np.int64(line)
+        i, j = int(column), int(line)
         if i >= filled.shape[2] or j >= filled.shape[1]:
             continue
-        layer = np.int64((near + part * depth - slices[0]) * slices[1])
+        layer = int((near + part * depth - nearest) * per_metre)
         filled[min(max(layer, 0), SLICES - 1), j, i] += whole
 
 
-@shared
-def accumulate_opacity(first, last, filled, used, opacity) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
-    """Write rows of the optical depth (SLICES + 1, tiles y, tiles x) of hair before each slice.
+@stage
+def accumulate_opacity(first: int, last: int, cells: ViewCells) -> None:
+    """Write rows of the optical depth of hair before each slice.
 
     A coarse form of deep opacity maps (Yuksel and Keyser 2008) along the line of sight; each tile
-    is smoothed with its neighbours. `filled` is the result of `place_hair`. Only tiles `used` are
-    written, in rows `first` to `last` of them.
+    is smoothed with its neighbours. Only tiles `used` are written, in rows `first` to `last` of
+    them.
     """
+    filled, opacity = cells.filled, cells.opacity
     chunks, slices, rows, columns = filled.shape
-    left, top, right = used[0], used[1], used[2]
+    left, top, right = cells.used[0], cells.used[1], cells.used[2]
     for j in range(top + first, top + last):
         up, down = max(j - 1, 0), min(j + 1, rows - 1)
         for i in range(left, right):
-            opacity[0, j, i] = _ZERO
+            opacity[0, j, i] = ZERO
         for layer in range(slices):
             before, after = opacity[layer, j], opacity[layer + 1, j]
             for i in range(left, right):

@@ -7,66 +7,92 @@ the order of the strands, so that equal input gives equal pictures; the sums of 
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from hairkit.viewer.draw.place_kernels import inlined, pixels_per_metre, shared
+from hairkit.arrays import Float32Array, Int64Array, UInt8Array
+from hairkit.simulation.lanes import stage
+from hairkit.simulation.vectors import HALF, ONE, ZERO, Frame, Number, inlined
+from hairkit.viewer.draw.place_kernels import pixels_per_metre
+from hairkit.viewer.draw.records import Columns, HairState, Strokes
 from hairkit.viewer.draw.shade_kernels import ALL_HIDDEN
 
 STRIP = 64
 """Columns of a strip: 0.5 MB of sums where hair is 500 pixels high, as much as a core's cache."""
-WIDEST = 64.0
+WIDEST = np.float32(64)
 """Largest width of a stroke, pixels."""
-_ZERO, _HALF, _ONE = np.float32(0), np.float32(0.5), np.float32(1)
-_WIDEST = np.float32(WIDEST)
+CROWDED = np.float32(0.8)
+"""Dense hair closes before its strokes cover a pixel: coverage c is an opacity of c (1 + 0.8 c)."""
 _TINY = np.float32(1e-6)
 _WHITE = np.float32(255)
 
 
-@shared
-def draw_hair(  # type: ignore[no-untyped-def]
-    first_strip, last_strip, seen, looks, hidden, reach, widths, solid, camera, wider, smooth,
-    count, frame, beside, sums,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Draw strips of `count` strands into `sums` (at least W H, 4).
+class Pen(NamedTuple):
+    """How a stroke is drawn."""
 
-    `seen` comes from `place_hair`, `looks`, `hidden` and `reach` from `shade_hair`; `frame` holds
-    the least x and y of the drawn part of the picture, and `solid` (W, H) its depth buffer. Both
-    are stored column by column: most hair hangs, so that a stroke's pixels lie side by side in
-    memory. No stroke is wider than `beside`, pixels on either side.
-    """
+    width: Number
+    """Pixels."""
+    smooth: bool
+    """Whether it is antialiased."""
+    free: bool
+    """Whether no mesh is before it."""
+
+
+@stage
+def draw_hair(
+    first_strip: int,
+    last_strip: int,
+    state: HairState,
+    widths: Float32Array,
+    strokes: Strokes,
+    columns: Columns,
+) -> None:
+    """Draw strips of the strands, of `widths` (S, m) at rest in metres, into columns."""
+    reach, left = state.reach, columns.left
     for strip in range(first_strip, last_strip):
-        left, right = strip * STRIP, min((strip + 1) * STRIP, solid.shape[0])
-        for s in range(count):
-            if reach[s, 0] - frame[0] < right and reach[s, 1] - frame[0] >= left:
-                _draw_strand(
-                    seen, looks, hidden, widths, solid, camera, wider, smooth, s, frame, beside,
-                    left, right, sums,
-                )  # fmt: skip
+        begin, end = strip * STRIP, min((strip + 1) * STRIP, columns.solid.shape[0])
+        for s in range(strokes.hairs):
+            if reach[s, 0] - left < end and reach[s, 1] - left >= begin:
+                _draw_strand(state, s, widths[s], strokes, columns, begin, end)
 
 
-@shared
-def _draw_strand(  # type: ignore[no-untyped-def]
-    seen, looks, hidden, widths, solid, camera, wider, smooth, s, frame, beside, left, right, sums
-) -> None:  # pragma: no cover - compiled
+@inlined
+def _draw_strand(
+    state: HairState,
+    s: int,
+    widths: Float32Array,
+    strokes: Strokes,
+    columns: Columns,
+    left: int,
+    right: int,
+) -> None:
     """Draw the strokes of a strand in the columns `left` to before `right`."""
-    for k in range(1, seen.shape[1]):
-        behind = hidden[s, k - 1]
+    seen, beside = state.seen[s], columns.beside
+    for k in range(1, len(seen)):
+        behind = state.hidden[s, k - 1]
         if behind < ALL_HIDDEN:
-            a, b = seen[s, k - 1, 0] - frame[0], seen[s, k, 0] - frame[0]
+            a, b = seen[k - 1, 0] - columns.left, seen[k, 0] - columns.left
             if min(a, b) - beside < right and max(a, b) + beside >= left:
-                width = widths[s, k] * wider * pixels_per_metre(camera, seen[s, k, 3])
-                _stroke(seen, looks, behind, s, k, width, smooth, solid, frame, left, right, sums)
+                scale = pixels_per_metre(strokes.camera, seen[k, 3])
+                pen = Pen(widths[k] * strokes.wider * scale, strokes.smooth, behind == 0)
+                _stroke(seen, state.looks[s], k, pen, columns, left, right)
 
 
-@shared
-def _stroke(  # type: ignore[no-untyped-def]
-    seen, looks, behind, s, k, width, smooth, solid, frame, left, right, sums
-) -> None:  # pragma: no cover - compiled
-    """Draw the segment from point k - 1 to k in some columns."""
-    ax, ay, az = seen[s, k - 1, 0] - frame[0], seen[s, k - 1, 1] - frame[1], seen[s, k - 1, 2]
-    bx, by, bz = seen[s, k, 0] - frame[0], seen[s, k, 1] - frame[1], seen[s, k, 2]
+@stage
+def _stroke(
+    seen: Float32Array,
+    looks: Float32Array,
+    k: int,
+    pen: Pen,
+    columns: Columns,
+    left: int,
+    right: int,
+) -> None:
+    """Draw the segment from point k - 1 to k of a strand in some columns."""
+    solid, sums = columns.solid, columns.sums
+    ax, ay, az = seen[k - 1, 0] - columns.left, seen[k - 1, 1], seen[k - 1, 2]
+    bx, by, bz = seen[k, 0] - columns.left, seen[k, 1], seen[k, 2]
     steep = abs(by - ay) > abs(bx - ax)
     if steep:
         ax, ay, bx, by = ay, ax, by, bx
@@ -80,63 +106,71 @@ def _stroke(  # type: ignore[no-untyped-def]
     least_x, limit_x = (0, high) if steep else (left, right)
     least_y, limit_y = (left, right) if steep else (0, high)
     along, slope = bx - ax, by - ay
-    pace = _ONE / max(along, _TINY)
-    across = min(width * np.sqrt(along * along + slope * slope) * pace, _WIDEST)
-    x: Any = max(np.int64(np.ceil(ax - _HALF)), least_x)
-    last = min(np.int64(np.ceil(bx - _HALF)), limit_x)
-    t = (np.float32(x) + _HALF - ax) * pace
+    pace = ONE / max(along, _TINY)
+    across = min(pen.width * np.sqrt(along * along + slope * slope) * pace, WIDEST)
+    x = max(int(np.ceil(ax - HALF)), least_x)
+    last = min(int(np.ceil(bx - HALF)), limit_x)
+    t = (np.float32(x) + HALF - ax) * pace
     y, slope = ay + t * slope, slope * pace
-    r, g, b, w = _weight_colour(looks, s, begin, min(across, _ONE))
-    red, green, blue, weight = _weight_colour(looks, s, end, min(across, _ONE))
+    r, g, b, w = _weight_colour(looks, begin, min(across, ONE))
+    red, green, blue, weight = _weight_colour(looks, end, min(across, ONE))
     dr, dg, db, dw = red - r, green - g, blue - b, weight - w
-    half = _HALF * max(across, _ONE)
-    narrow, soft, free = across <= _ONE, smooth != 0, behind == 0
+    half = HALF * max(across, ONE)
+    narrow, soft, free = across <= ONE, pen.smooth, pen.free
     while x < last:
-        red, green, blue, weight = r + t * dr, g + t * dg, b + t * db, w + t * dw
+        look = r + t * dr, g + t * dg, b + t * db, w + t * dw
         depth = az + t * (bz - az)
         if narrow and soft:  # one pixel wide: split between two pixels
-            low = np.int64(np.floor(y - _HALF))
-            part = y - _HALF - np.float32(low)
+            low = int(np.floor(y - HALF))
+            part = y - HALF - np.float32(low)
             at = x * stride_x + low * stride_y
             if least_y <= low < limit_y and (free or depth <= solids[at]):
-                _add(sums, at, _ONE - part, red, green, blue, weight)
+                _add(sums, at, ONE - part, look)
             if least_y - 1 <= low < limit_y - 1 and (free or depth <= solids[at + stride_y]):
-                _add(sums, at + stride_y, part, red, green, blue, weight)
+                _add(sums, at + stride_y, part, look)
         elif narrow:
-            low = np.int64(np.floor(y))
+            low = int(np.floor(y))
             at = x * stride_x + low * stride_y
             if least_y <= low < limit_y and (free or depth <= solids[at]):
-                _add(sums, at, _ONE, red, green, blue, weight)
+                _add(sums, at, ONE, look)
         else:
-            first: Any = max(np.int64(np.floor(y - half)), least_y)
-            top: Any = min(np.int64(np.floor(y + half)), limit_y - 1)
+            first = max(int(np.floor(y - half)), least_y)
+            top = min(int(np.floor(y + half)), limit_y - 1)
             for line in range(first, top + 1):
                 at = x * stride_x + line * stride_y
                 part = min(y + half, np.float32(line + 1)) - max(y - half, np.float32(line))
                 if free or depth <= solids[at]:
-                    _add(sums, at, part, red, green, blue, weight)
+                    _add(sums, at, part, look)
         x += 1
         t += pace
         y += slope
 
 
 @inlined
-def _weight_colour(looks, s, k, cover):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
+def _weight_colour(looks: Float32Array, k: int, cover: Number) -> Frame:
     """Return the colour of a point times its weight, and the weight."""
-    weight = looks[s, k, 3] * cover
-    return looks[s, k, 0] * weight, looks[s, k, 1] * weight, looks[s, k, 2] * weight, weight
+    weight = looks[k, 3] * cover
+    return looks[k, 0] * weight, looks[k, 1] * weight, looks[k, 2] * weight, weight
 
 
 @inlined
-def _add(sums, at, part, red, green, blue, weight):  # type: ignore[no-untyped-def] # pragma: no cover - compiled
-    sums[at, 0] += part * red
-    sums[at, 1] += part * green
-    sums[at, 2] += part * blue
-    sums[at, 3] += part * weight
+def _add(sums: Float32Array, at: int, part: Number, look: Frame) -> None:
+    sums[at, 0] += part * look[0]
+    sums[at, 1] += part * look[1]
+    sums[at, 2] += part * look[2]
+    sums[at, 3] += part * look[3]
 
 
-@shared
-def composite(first, last, sums, hair, changed, behind, picture) -> None:  # type: ignore[no-untyped-def] # pragma: no cover
+@stage
+def composite(
+    first: int,
+    last: int,
+    sums: Float32Array,
+    hair: Int64Array,
+    changed: Int64Array,
+    behind: UInt8Array,
+    picture: UInt8Array,
+) -> None:
     """Write rows of the `changed` region of `picture` (H, W, 4): hair over `behind`.
 
     The sums are those of the columns of the region `hair`, in which they are cleared; regions are
@@ -152,16 +186,16 @@ def composite(first, last, sums, hair, changed, behind, picture) -> None:  # typ
         for y in range(max(first, hair[1]), min(last, hair[3])):
             at = (x - hair[0]) * high + y
             weight = sums[at, 3]
-            if weight <= _ZERO:
+            if weight <= ZERO:
                 continue
             red, green, blue = sums[at, 0], sums[at, 1], sums[at, 2]
-            sums[at, 0] = sums[at, 1] = sums[at, 2] = sums[at, 3] = _ZERO
-            opaque = min(weight * (_ONE + np.float32(0.8) * weight), _ONE)
+            sums[at, 0] = sums[at, 1] = sums[at, 2] = sums[at, 3] = ZERO
+            opaque = min(weight * (ONE + CROWDED * weight), ONE)
             share = opaque * _WHITE / max(weight, _TINY)
-            through = _ONE - opaque
+            through = ONE - opaque
             red = red * share + through * np.float32(behind[y, x, 0])
             green = green * share + through * np.float32(behind[y, x, 1])
             blue = blue * share + through * np.float32(behind[y, x, 2])
-            picture[y, x, 0] = np.uint8(min(red + _HALF, _WHITE))
-            picture[y, x, 1] = np.uint8(min(green + _HALF, _WHITE))
-            picture[y, x, 2] = np.uint8(min(blue + _HALF, _WHITE))
+            picture[y, x, 0] = np.uint8(min(red + HALF, _WHITE))
+            picture[y, x, 1] = np.uint8(min(green + HALF, _WHITE))
+            picture[y, x, 2] = np.uint8(min(blue + HALF, _WHITE))

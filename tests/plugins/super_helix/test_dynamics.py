@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hairkit_plugins.super_helix import element_kernels, reference
 from hairkit_plugins.super_helix.kinematics import move_slopes, moves, place
-from hairkit_plugins.super_helix.linear_time_step import newton, step_strands
+from hairkit_plugins.super_helix.linear_time_step import Strand, newton, step_strands
 from hairkit_plugins.super_helix.rods import NODES, Rods
 from hairkit_plugins.super_helix.state import Body, Loads, Motion, Step
 from hairkit_plugins.super_helix.statics import gravity_forces, rest_as_captured
@@ -149,7 +149,8 @@ def test_the_recursion_equals_the_dense_solve(two_step: bool, rng: np.random.Gen
         assert np.linalg.norm(reference.change(matrix, gradient) - dense) <= 1e-8 * size
         after = before._replace(q=q.copy())
         start = (4 * before.q - before.q_before) / 3 if two_step else before.q
-        newton(one, after, acting, now, two_step, 0, 6, one.roots[0], one.frames[0], start)
+        whole = Strand(0, 6, one.roots[0], one.frames[0], two_step)
+        newton(one, after, acting, now, whole, start)
         turned = one.lengths * np.linalg.norm(dense.reshape(-1, 3), axis=1)
         bounded = dense.reshape(-1, 3) / np.maximum(turned, 1.0)[:, None]
         assert np.linalg.norm(after.q - q - bounded) <= 1e-8 * size

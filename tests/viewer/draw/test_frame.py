@@ -282,7 +282,8 @@ def test_hair_behind_meshes_is_not_shaded() -> None:
         picture(frame_renderer, inputs())
         hair = frame_renderer.hair
         assert isinstance(hair, SoftHairPass)
-        looks, seen = hair._looks[: LOOK.hairs, :, 3], hair._seen[: LOOK.hairs]
+        state = hair._state
+        looks, seen = state.looks[: LOOK.hairs, :, 3], state.seen[: LOOK.hairs]
         mesh = frame_renderer._meshes.depth.T.copy()  # type: ignore[attr-defined]
         frame_renderer.release()
 

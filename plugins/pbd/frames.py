@@ -1,17 +1,17 @@
-"""Numbers, vectors and quaternions of the strands of a block, and turns of frames, for kernels."""
+"""Turns of frames, for kernels."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from hairkit.parallel import compiled_with
 from hairkit.simulation.vectors import (
     ONE,
     ZERO,
+    Floats,
     Frame,
+    Number,
     Rows,
     Vector,
     cross,
@@ -28,36 +28,10 @@ from hairkit.simulation.vectors import (
 THIRD, THREE, FOUR, NINE_FIFTHS = (np.float32(c) for c in (1 / 3, 3, 4, 9 / 5))
 OPPOSITE = np.float32(1e-4)
 """Least 1 + cosine between an axis and where it is swung to."""
-stage = compiled_with(fastmath=True)
-"""Compiles one step of the method for a block, by itself."""
 
 
 @inlined
-def three(field: Any, w: int) -> Vector:
-    """Return the vector of strand w in a field (3, LANES)."""
-    return field[0, w], field[1, w], field[2, w]
-
-
-@inlined
-def four(field: Any, w: int) -> Frame:
-    """Return the quaternion of strand w in a field (4, LANES)."""
-    return field[0, w], field[1, w], field[2, w], field[3, w]
-
-
-@inlined
-def put(field: Any, w: int, value: Any) -> None:
-    """Store a vector of strand w."""
-    field[0, w], field[1, w], field[2, w] = value[0], value[1], value[2]
-
-
-@inlined
-def put_four(field: Any, w: int, value: Frame) -> None:
-    """Store a quaternion of strand w."""
-    field[0, w], field[1, w], field[2, w], field[3, w] = value
-
-
-@inlined
-def rows_of(matrix: Any) -> Rows:
+def rows_of(matrix: Floats) -> Rows:
     """Return (3, 4) as tuples, which stay in registers."""
     return (
         (matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3]),
@@ -93,7 +67,7 @@ def half_way(a: Frame, b: Frame, v: Vector) -> tuple[Vector, Vector]:
 
 
 @inlined
-def twist_angle(a: Frame, b: Frame) -> Any:
+def twist_angle(a: Frame, b: Frame) -> Number:
     """Return twice the angle of (w, z) of a^-1 b: the twist between frames, radians.
 
     Four times the arc tangent of u, the tangent of a quarter of it, by the continued fraction
@@ -103,4 +77,5 @@ def twist_angle(a: Frame, b: Frame) -> Any:
     z = a[0] * b[3] - a[1] * b[2] + a[2] * b[1] - a[3] * b[0]
     size = math.sqrt(w * w + z * z)
     u = z / (w - size if w < ZERO else w + size)
-    return FOUR * u * (ONE - u * u / (THREE + NINE_FIFTHS * u * u))
+    angle: Number = FOUR * u * (ONE - u * u / (THREE + NINE_FIFTHS * u * u))
+    return angle

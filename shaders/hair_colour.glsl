@@ -1,0 +1,27 @@
+// Colour of a point of hair: light of two lamps and the sky, or its direction. Needs u_perspective and
+// u_forward.
+#include "lighting.glsl"
+#include "marschner.glsl"
+#include "tone.glsl"
+#constants hairkit.rendering.fibre BOUNCED SKYWARD OTHER LEAST_POWER POWERS LEAST_BRIGHT BRIGHTS DIRECTION_BASE
+
+uniform vec3 u_eye;             // camera centre, head frame
+uniform vec3 u_root_colour;
+uniform vec3 u_tip_colour;
+uniform float u_show_direction; // 1: red runs left and right, green front and back, blue up and down
+
+// `share` is the place along the strand, 0 root, 1 tip, `random` the strand's random number.
+vec3 seen_colour(vec3 position, vec3 tangent, float share, float random) {
+    vec3 to_eye = u_perspective > 0.5 ? normalize(u_eye - position) : -u_forward;
+    float other = fract(random * OTHER);
+    vec3 colour = mix(u_root_colour, u_tip_colour, share);
+    colour = pow(colour, vec3(LEAST_POWER + POWERS * random)) * (LEAST_BRIGHT + BRIGHTS * other);
+    vec3 reached = light_at(position);
+    if (u_show_direction > 0.5)
+        return mix(abs(tangent.xzy), vec3(1.0), DIRECTION_BASE) * (0.5 + 0.5 * reached.b)
+            * mix(1.0, other, DIRECTION_BASE);
+    vec3 key = fibre(tangent, u_key_direction, to_eye, colour, random) * u_key_colour * reached.r;
+    vec3 rim = fibre(tangent, u_rim_direction, to_eye, colour, other) * u_rim_colour * reached.g;
+    vec3 sky = colour * ambient(SKYWARD) * mix(BOUNCED, 1.0, reached.b);
+    return tone(key + rim + sky);
+}
