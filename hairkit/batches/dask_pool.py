@@ -30,7 +30,7 @@ LOST_WORKERS = 10
 kill their workers, which these cannot."""
 WINDOW = 10_000
 """Captures that the scheduler knows at once: its memory, some 5 kB a capture, stays below 0.1 GB,
-and adaptive clusters see hours of work (benchmarks/farm_scheduler.py)."""
+and adaptive clusters see hours of work (studies/farm_scheduler.py)."""
 TASK = "hairkit-capture"
 """First part of the keys, by which Dask takes all captures for one group and queues them: keys that
 begin otherwise each would be groups of their own, and given to workers at once."""

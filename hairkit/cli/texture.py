@@ -34,7 +34,7 @@ _READY: dict[str, dict[str, object]] = {
     "normal": {"colours": True, "remap": False, "alpha": 0.1},
 }
 """Options of `image_analogies` by work. Alpha 0.1 is the best of none, 0.1, 0.2 and 0.4 for skin
-(`benchmarks/texture_gallery.py`): sharp skin gains 4 dB over none, normal maps 7 to 9 dB."""
+(`studies/texture_gallery.py`): sharp skin gains 4 dB over none, normal maps 7 to 9 dB."""
 
 
 def register(subparsers: Any) -> None:

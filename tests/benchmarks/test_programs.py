@@ -1,4 +1,4 @@
-"""Laws of all programs in benchmarks/: they run on small inputs and print what they announce."""
+"""Laws of all benchmarks and studies: they run on small inputs and print what they announce."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ SHARED = {
     "peer_volumes", "plain_analogies", "random_hair", "xpbd_peer",
 }  # fmt: skip
 """Modules that programs import."""
-PROGRAMS = sorted({path.stem for path in (PROJECT / "benchmarks").glob("*.py")} - SHARED)
+FOLDERS = ("benchmarks", "studies")
+PATHS = {path.stem: path for folder in FOLDERS for path in (PROJECT / folder).glob("*.py")}
+PROGRAMS = sorted(PATHS.keys() - SHARED)
 KNOWN_TURN = SimpleNamespace(
     Options=landmarks.Options,
     estimate_scene=lambda capture, masks, head, _, options: landmarks.estimate_scene(
@@ -90,7 +92,6 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
 }
 """Constants and arguments that make a program quick. CAPTURES is a folder with one capture."""
 ELSEWHERE = {
-    "batch_chaos",
     "bench",
     "blender_picture",
     "compare",
@@ -99,7 +100,6 @@ ELSEWHERE = {
     "fidelity",
     "simulation",
     "stages",
-    "studio_kills",
 }
 """Programs with tests of their own beside this one, or that need Blender."""
 
@@ -114,8 +114,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def program(name: str, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """Return a program of benchmarks/ as a module."""
-    spec = importlib.util.spec_from_file_location(name, PROJECT / "benchmarks" / f"{name}.py")
+    """Return a program as a module."""
+    spec = importlib.util.spec_from_file_location(name, PATHS[name])
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -185,12 +185,13 @@ def test_help_tells_what_it_measures(
 
 def test_programs_run_as_scripts() -> None:
     """A program finds the modules beside it, and `main` is called."""
-    path = PROJECT / "benchmarks" / "cameras.py"
-    done = subprocess.run([sys.executable, path, "--help"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert "usage: cameras.py" in done.stdout
+    for name in ("cameras", "looks"):
+        words = [sys.executable, PATHS[name], "--help"]
+        done = subprocess.run(words, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert f"usage: {name}.py" in done.stdout
     for name in PROGRAMS:
-        assert '\nif __name__ == "__main__":\n' in (path.with_name(f"{name}.py")).read_text()
+        assert '\nif __name__ == "__main__":\n' in PATHS[name].read_text()
 
 
 def test_runs_are_timed_on_some_of_the_photos(

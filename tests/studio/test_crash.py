@@ -21,7 +21,7 @@ from hairkit.io.capture_reader import read_capture
 from hairkit.studio.project import Project
 
 MOMENTS = 5
-"""Moments in each test; `benchmarks/studio_kills.py` goes through the whole story with 20."""
+"""Moments in each test; `tests/slow/studio_kills.py` goes through the whole story with 20."""
 LONGEST_S = 2.0
 """The last of the moments at which the server is killed, after the first request."""
 

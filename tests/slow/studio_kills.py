@@ -1,6 +1,6 @@
 """Kill the studio's server and workers at random moments of the story, and print what was lost.
 
-python benchmarks/studio_kills.py --photos photos/ --kills 20
+python tests/slow/studio_kills.py --photos photos/ --kills 20
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from hairkit.io.capture_reader import read_capture, sample_folder
 from hairkit.io.capture_toml import read_capture_file
 from hairkit.pipeline.reconstruct import reconstruct
 
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from studio import Studio
 
 GUIDES = 100

@@ -1,6 +1,6 @@
 """Print errors of 2D orientation against the colour and the gloss of hair.
 
-python benchmarks/orientation_looks.py
+python studies/orientation_looks.py
 
 Photographs two procedural heads, straight and wavy, in each colour and gloss, and measures both
 orienters with true masks: mean degrees over the hair, then of the half with the most confidence;
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import multiprocessing
+import sys
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -20,11 +21,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 from hairkit_plugins import gabor, structure_tensor
-from orientation import Sample, plugin, read_samples, score
 
 from hairkit.head_model.template import default_head
 from hairkit.rendering import fibre
 from hairkit.synth import StyleName, grow, photograph
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from orientation import Sample, plugin, read_samples, score
 
 COLOURS = {
     "black": (0.010, 0.008, 0.007),

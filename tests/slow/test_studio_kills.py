@@ -24,7 +24,7 @@ ENDS, STAYS = "import sys; sys.stdin.read()", "import time; time.sleep(20)"
 @pytest.fixture
 def program(monkeypatch: pytest.MonkeyPatch) -> Any:
     """The program, impatient."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "benchmarks"))
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
     import studio_kills
 
     monkeypatch.setattr(studio_kills, "SPACING_S", (0.0, 0.01))

@@ -1,6 +1,6 @@
 """Draws the figures of the textures page: one row each, as JPEG.
 
-python benchmarks/texture_gallery.py -o docs/images
+python studies/texture_gallery.py -o docs/images
 
 The rows are those of the figures in the report of the University of Bath ("Visual Effects", 2015):
 regions of common colour, bump maps made sharp, textures made sharp, super-resolution, normal maps
@@ -18,7 +18,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-from example_textures import blur, draw_skin, noise
 from hairkit_plugins.image_analogies.regions import find_regions
 
 from hairkit.arrays import UInt8Array
@@ -27,6 +26,9 @@ from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.types.skin import Texture
 from hairkit.types.texture_example import TextureExample
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from example_textures import blur, draw_skin, noise
 
 SIZE = 256
 """Pixels of a picture's edge."""

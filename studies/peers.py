@@ -1,6 +1,6 @@
 """Time functions of hairkit beside those of libraries, and check that results are the same.
 
-python benchmarks/peers.py --only distance
+python studies/peers.py --only distance
 
 Prints a Markdown table: processor milliseconds over all threads, medians of runs by turns, and how
 far the results are apart. Libraries that hairkit does not depend on are compared where they are

@@ -1,6 +1,6 @@
 """Draws the default head's skin in several looks, and prints what each costs.
 
-python benchmarks/skin_looks.py -o docs/images/skin_looks.jpg
+python studies/skin_looks.py -o docs/images/skin_looks.jpg
 
 The upper row: without diffusion, with it, with mean free paths three times as long, smooth oil. The
 lower row: a normal map, a roughness map, more blood and more melanin in the cheeks. The table has
@@ -19,7 +19,6 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from example_textures import noise
 
 from hairkit.arrays import UInt8Array
 from hairkit.colour import linear_from_srgb
@@ -32,6 +31,9 @@ from hairkit.types.head import Head
 from hairkit.types.skin import SkinMaps, Texture
 from hairkit.types.skin_look import SkinLook
 from hairkit.types.strands import Strands
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from example_textures import noise
 
 HEIGHT = 480
 """Pixels of a picture; a quarter narrower than high."""

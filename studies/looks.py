@@ -1,6 +1,6 @@
 """Draw the strands of captures from above, from the side and from behind, beside the true ones.
 
-python benchmarks/looks.py captures/ -o looks.jpg --results results/
+python studies/looks.py captures/ -o looks.jpg --results results/
 
 `results/NAME` is what `hairkit reconstruct captures/NAME -o results/NAME` wrote; what is missing is
 reconstructed. Each capture has a row: the true strands, then ours, by the same light and camera.
@@ -9,13 +9,13 @@ reconstructed. Each capture has a row: the true strands, then ours, by the same 
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
-from captures_argument import NO_CAPTURES, add_captures
 
 from hairkit.arrays import UInt8Array
 from hairkit.evaluation import Truth, read_prediction, read_truth
@@ -26,6 +26,9 @@ from hairkit.rendering.framing import framing_cameras
 from hairkit.rendering.picture_file import write_picture
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from captures_argument import NO_CAPTURES, add_captures
 
 GUIDES = 8000
 """Strands of a capture that is reconstructed here, and true strands that are drawn."""

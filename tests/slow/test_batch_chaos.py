@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from ball import PLUGIN_FILE, RECIPE, write_capture
 
-PROGRAM = Path(__file__).parents[2] / "benchmarks" / "batch_chaos.py"
+PROGRAM = Path(__file__).with_name("batch_chaos.py")
 
 
 @pytest.fixture
