@@ -158,7 +158,7 @@ def install(context: moderngl.Context, backend: str) -> Renderer:
 
 def shader_source(name: str) -> str:
     """Return the source of a shader with each `#include "other.glsl"` expanded."""
-    text = resources.files("hairkit.shaders").joinpath(name).read_text()
+    text = resources.files("hairkit_shaders").joinpath(name).read_text()
     lines = [
         shader_source(line.split('"')[1]) if line.startswith("#include") else line
         for line in text.splitlines()
