@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -68,3 +69,11 @@ def test_the_command_line_draws(clone: Path, python: Path, tmp_path: Path, place
     )
     assert done.returncode == 0, done.stderr
     assert picture.is_file()
+
+
+def test_the_workflow_tests_every_python(project: Path) -> None:
+    """The versions of Python that pyproject.toml names are those that the workflow tests."""
+    named = re.findall(r"Python :: (3\.\d+)", (project / "pyproject.toml").read_text())
+    workflow = (project / ".github" / "workflows" / "checks.yml").read_text()
+    [tested] = re.findall(r"python: \[(.*)\]", workflow)
+    assert re.findall(r"\d+\.\d+", tested) == named
