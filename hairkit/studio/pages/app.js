@@ -11,19 +11,18 @@ const pages = { photos, capture, annotate, pose, strands, hair };
 const stageNames = {
   draft: "a quick preview",
   landmarks: "looking for faces", person: "looking for the person", turn: "ordering the photos",
-  segment: "finding hair", scene: "placing cameras", refine: "comparing masks", head: "fitting the head",
+  segment: "finding hair", scene: "placing cameras", refine: "comparing masks",
+  head: "fitting the head",
   orient: "following strands in photos", waves: "measuring waves", hull: "carving the volume",
   distance: "measuring thickness", parting: "finding the parting", field: "spreading directions",
   hairline: "finding the hairline", track: "growing strands", sheet: "drawing the overview",
 };
 let leave = () => {};
-let current = "";
 
 function show() {
   const [name, argument] = location.hash.slice(1).split("/");
   const page = pages[name] ? name : "photos";
   leave();
-  current = page;
   for (const link of document.querySelectorAll("nav a")) {
     if (link.hash === `#${page}`) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
