@@ -14,7 +14,7 @@ const DRAFT = "This is a quick preview of your last change: the cameras are thos
   + "takes its place here; files are those of the hair before until then.";
 
 export function show(main) {
-  let shown = "";
+  let shown = "", side = null;
   let close = () => {};
 
   async function draw() {
@@ -25,7 +25,10 @@ export function show(main) {
       return;
     }
     const version = state.draft || state.result;
-    if (shown === version) return;
+    if (shown === version) {
+      side?.follow();
+      return;
+    }
     shown = version;
     try {
       const packet = await packetOf(version);
@@ -34,7 +37,8 @@ export function show(main) {
       const stage = make("section",
         { class: "stage", id: "hair", "aria-label": "The hair in motion" });
       close = showHair(stage, packet);
-      refill(main, make("div", { class: "split" }, stage, side()));
+      side = new Side();
+      refill(main, make("div", { class: "split" }, stage, side.element));
     } catch (error) {
       await refresh().catch(() => {}); // a draft goes when the whole hair comes
       if (shown === version && (state.draft || state.result) === version) say(error.message);
@@ -66,12 +70,27 @@ function absence() {
     running ? null : onward);
 }
 
-function side() {
+// The files of the hair, and how good it is.
+class Side {
+  constructor() {
+    this.formats = String(state.formats);
+    this.element = make("section", { class: "side", "aria-label": "Files" }, ...offers());
+  }
+
+  // A studio that has just started learns later in which formats it can write.
+  follow() {
+    if (this.formats === String(state.formats)) return;
+    this.formats = String(state.formats);
+    refill(this.element, ...offers());
+  }
+}
+
+function offers() {
   const health = (state.build.health ?? []).map(([light, line]) =>
     make("li", { class: light }, line.replace(`${light} `, "").trim()));
   const known = ([plugin]) => (ENGINES[plugin] ? 1 : 0);
   const formats = [...state.formats].sort((a, b) => known(b) - known(a));
-  return make("section", { class: "side", "aria-label": "Files" },
+  return [
     state.draft ? make("p", { class: "note-box", role: "status" }, DRAFT) : null,
     make("h2", {}, "Take it with you"),
     make("a", { class: "button primary", href: "/api/result/page", download: "result.html" },
@@ -81,7 +100,8 @@ function side() {
     make("a", { href: "/api/result/sheet", target: "_blank" }, "Overview of all steps"),
     health.length ? make("h2", {}, "How good it is") : null,
     make("ul", { class: "lights" }, ...health),
-    make("p", { class: "quiet" }, "On this machine: hairkit view PROJECT/result"));
+    make("p", { class: "quiet" }, "On this machine: hairkit view PROJECT/result"),
+  ];
 }
 
 function download([plugin, suffix]) {
