@@ -132,9 +132,27 @@ def test_an_edge_brush_keeps_its_radius(page: Any, story: Any) -> None:
     page.get_by_text("Found automatically").wait_for()
 
 
-def kept_strokes(story: Any, count: int) -> list[dict[str, Any]]:
-    """Wait until that many strokes of the first photo are kept, and return them."""
-    path = story.folder / "strokes" / "001.json"
+def test_strokes_on_two_photos_are_both_kept(page: Any, story: Any) -> None:
+    """What is drawn while the stroke of another photo is on its way is kept, too."""
+    late: list[Any] = []
+    page.route(
+        "**/api/photos/1/strokes",
+        lambda route: late.append(route) if route.request.method == "PUT" else route.continue_(),
+    )
+    go(page, story, "annotate/1")
+    for name in ("1", "2"):
+        page.locator(f"button[aria-label='Photo {name}'][aria-pressed='true']").wait_for()
+        page.get_by_text("Found automatically").wait_for()
+        page.locator(".stage canvas").click()
+        page.keyboard.press("d")
+    kept_strokes(story, 1, "002.json")
+    late[0].continue_()
+    kept_strokes(story, 1, "001.json")
+
+
+def kept_strokes(story: Any, count: int, name: str = "001.json") -> list[dict[str, Any]]:
+    """Wait until that many strokes of a photo are kept, and return them."""
+    path = story.folder / "strokes" / name
     end = time.monotonic() + SLOW_S
     while True:  # the page counts a stroke before it is saved
         document = json.loads(path.read_text()) if path.is_file() else {"shapes": []}

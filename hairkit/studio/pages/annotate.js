@@ -42,7 +42,6 @@ class MaskPage {
     [this.bright, this.contrast] = [1, 1];
     this.bare = false; // the photo is shown without lines
     this.moving = false; // pointers move the photo
-    this.saving = null;
     this.strokes = new Strokes();
     this.stage = new PhotoStage(LABEL);
     this.cross = new Cross(this);
@@ -184,28 +183,27 @@ class MaskPage {
     this.draw();
   }
 
-  // One request at a time; what is drawn meanwhile goes with the next.
+  // One request of a photo at a time; what is drawn meanwhile goes with the next.
   async save() {
+    const { photo, strokes, stage: { facts } } = this;
     this.tell();
-    if (this.saving) { this.saving = "again"; return; }
-    const { photo, strokes } = this;
-    do {
-      this.saving = "now";
-      this.status.textContent = "…";
-      try {
-        await this.send(photo, strokes);
-      } catch (error) { say(error.message); }
-    } while (this.saving === "again" && strokes === this.strokes);
-    this.saving = null;
+    strokes.unsaved = true;
+    if (strokes.saving) return;
+    strokes.saving = true;
+    while (strokes.unsaved) {
+      strokes.unsaved = false;
+      if (strokes === this.strokes) this.status.textContent = "…";
+      await this.send(photo, strokes, facts).catch((error) => say(error.message));
+    }
+    strokes.saving = false;
   }
 
-  async send(photo, strokes) {
+  async send(photo, strokes, { width, height }) {
     const { stage } = this;
     const began = performance.now();
     const found = await send("PUT", `/api/photos/${photo.id}/strokes`, {
       version: "5.0.0", flags: { corrects: true }, shapes: strokes.shapes,
-      imagePath: photo.file, imageData: null,
-      imageWidth: stage.facts.width, imageHeight: stage.facts.height,
+      imagePath: photo.file, imageData: null, imageWidth: width, imageHeight: height,
     });
     forget(photo.id);
     if (strokes !== this.strokes) return;

@@ -28,6 +28,7 @@ export class Strokes {
     this.shapes = [];
     this.undone = [];
     this.current = null; // the one that is being drawn
+    this.unsaved = this.saving = false;
   }
 
   // Begins a stroke; the radius, in pixels of the photo, is that of an edge brush.
