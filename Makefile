@@ -39,6 +39,7 @@ demo: $(VENV)/.kernels
 lint: $(VENV)/.lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	@sh .ci/eslint $(CLIENTS)
 	$(BIN)/mypy
 
 docs: $(VENV)/.docs

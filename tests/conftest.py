@@ -20,15 +20,6 @@ hypothesis.settings.load_profile("hairkit")
 PROJECT = Path(__file__).parents[1]
 
 
-LONGEST = "test_the_whole_story"
-"""Seven minutes of one core; all others take about forty."""
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the longest test, so that no core ends with it alone."""
-    items.sort(key=lambda item: item.name != LONGEST)
-
-
 @pytest.fixture(scope="session")
 def captures() -> Path:
     """The folder of captures with truth, which does not ship with the project."""
@@ -39,16 +30,12 @@ def captures() -> Path:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def small_skins() -> Iterator[dict[str, int]]:
-    """Skins from photos of a quarter of the edge: the work of whole runs is mostly their texels.
-
-    The sizes of whole skins, for tests that compare with other processes.
-    """
-    whole = {"SIZE": photo_skin.SIZE, "COARSE": photo_skin.COARSE}
+def small_skins() -> Iterator[None]:
+    """Skins from photos of a quarter of the edge: the work of whole runs is mostly their texels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(photo_skin, "SIZE", 512)
         patch.setattr(photo_skin, "COARSE", 256)
-        yield whole
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,3 @@
-# ruff: noqa: N999 (the folder is named as a distribution is, Blender goes by the manifest)
 """hairkit in Blender: hair from photos and files, on its head, simulated and filled in.
 
 hairkit itself runs in a Python of its own, as a child process, so that no package of hairkit meets

@@ -42,6 +42,7 @@ _GL_CURE = "on Debian: apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6
 _TRY_GL = """
 from hairkit.rendering.context import renderer
 with renderer() as found:
+    found.program("hair_flat", "flat")
     print(found.description)
 """
 

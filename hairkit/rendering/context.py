@@ -164,7 +164,7 @@ def shader_source(name: str) -> str:
     `#include "other.glsl"` stands for that source, `#constants hairkit.rendering.fibre TILT` for
     constants of a Python module, where their values have units and reasons.
     """
-    text = resources.files("hairkit.shaders").joinpath(name).read_text()
+    text = resources.files("hairkit_shaders").joinpath(name).read_text()
     return "\n".join(map(_expand, text.splitlines()))
 
 

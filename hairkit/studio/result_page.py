@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hairkit.storage import read_bytes, read_text
 
-SCRIPTS = ("hair_motion.js", "hair_view.js", "hair_controls.js")
+SCRIPTS = ("hair_motion.js", "hair_shaders.js", "hair_view.js", "hair_controls.js")
 """Modules of the page in the order in which they use one another."""
 
 

@@ -204,7 +204,7 @@ def test_every_package_is_in_the_wheel() -> None:
         ".".join(path.parent.relative_to(PROJECT).parts)
         for path in (PROJECT / "hairkit").rglob("__init__.py")
     }
-    found |= {"hairkit.shaders", "hairkit_plugins"}
+    found |= {"hairkit_shaders", "hairkit_plugins"}
     found |= {f"hairkit_plugins.{p.parent.name}" for p in PROJECT.glob("plugins/*/__init__.py")}
     assert set(pyproject()["tool"]["setuptools"]["packages"]) == found
 
@@ -220,7 +220,7 @@ def test_every_plugin_has_its_entry_point() -> None:
 def test_data_files_are_in_the_wheel() -> None:
     """Every file beside the sources that is not Python is covered by a package-data pattern."""
     patterns = pyproject()["tool"]["setuptools"]["package-data"]
-    for package, folder in (("hairkit", "hairkit"), ("hairkit.shaders", "shaders")):
+    for package, folder in (("hairkit", "hairkit"), ("hairkit_shaders", "shaders")):
         base = PROJECT / folder
         covered = {path for pattern in patterns[package] for path in base.glob(pattern)}
         for path in base.rglob("*"):

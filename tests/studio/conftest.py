@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,21 +16,14 @@ from typing import Any
 
 import cv2
 import pytest
+from studio_browser import GUIDES, OPTION, SLOW_S, USED, opened
 
-from hairkit.head_model import photo_skin
 from hairkit.io.capture_reader import sample_folder
 
 START_S = 60
 SIZE = (360, 480)
 """Pixels of the photos: a third of the time of the sample's own."""
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-
-
-@pytest.fixture(autouse=True)
-def _whole_skins(small_skins: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Make skins as large as those of the studio's processes, whose files are compared."""
-    for name, value in small_skins.items():
-        monkeypatch.setattr(photo_skin, name, value)
 
 
 @dataclass
@@ -155,3 +149,47 @@ def browser() -> Iterator[Any]:
         started = play.chromium.launch(executable_path=CHROMIUM, args=arguments)
         yield started
         started.close()
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory: pytest.TempPathFactory, photos: list[Path]) -> Path:
+    """A project whose hair is made, with an option of its own; not to be changed."""
+    studio = start(tmp_path_factory.mktemp("made") / "head", "--guides", str(GUIDES)).enter()
+    try:
+        studio.ask("PUT", "/api/hold", {"held": True})  # the hair is made once, of all photos
+        for photo in photos:
+            path = f"/api/photos?view={photo.stem.partition('_')[2]}"
+            assert studio.ask("POST", path, photo.read_bytes()).status == 201
+        assert studio.ask("PUT", "/api/choices", {"options": {OPTION: USED}}).status == 200
+        studio.ask("PUT", "/api/hold", {"held": False})
+        wait_for_hair(studio)
+    finally:
+        studio.kill()
+    return studio.folder
+
+
+@pytest.fixture
+def story(made: Path, tmp_path: Path) -> Iterator[Server]:
+    """A studio on a copy of the project whose hair is made; no session is open."""
+    shutil.copytree(made, tmp_path / "head")
+    started = start(tmp_path / "head", "--guides", str(GUIDES))
+    yield started
+    started.kill()
+
+
+@pytest.fixture
+def page(browser: Any, story: Server) -> Iterator[Any]:
+    """The page that the link of that studio opens."""
+    with opened(browser, story) as page:
+        yield page
+
+
+def wait_for_hair(studio: Server) -> None:
+    """Wait until the hair of a studio with a session is made."""
+    end = time.monotonic() + SLOW_S
+    build: dict[str, Any] = {}
+    while build.get("state") != "done":
+        assert time.monotonic() < end, f"no hair: {build}"
+        time.sleep(0.2)
+        build = studio.ask("GET", "/api/project").json["build"]
+        assert build["state"] != "failed", build

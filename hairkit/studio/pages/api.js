@@ -29,7 +29,9 @@ async function answer(response) {
 }
 
 // One state for all pages: what the server said last.
-export const state = { photos: [], build: { state: "none" }, formats: [], result: "", draft: "", name: "" };
+export const state = {
+  photos: [], build: { state: "none" }, formats: [], result: "", draft: "", name: "",
+};
 const listeners = new Set();
 
 export function onChange(listener) {
@@ -91,7 +93,8 @@ export function refill(parent, ...children) {
   const now = controls();
   const same = now.findIndex((control) => key && control.dataset.key === key);
   const from = same < 0 ? Math.min(place, now.length - 1) : same;
-  const free = [...now.slice(from), ...now.slice(0, from).reverse()].find((control) => !control.disabled);
+  const nearest = [...now.slice(from), ...now.slice(0, from).reverse()];
+  const free = nearest.find((control) => !control.disabled);
   free?.focus({ preventScroll: true });
 }
 

@@ -9,13 +9,11 @@ import * as hair from "./hair.js";
 
 const pages = { photos, capture, annotate, pose, strands, hair };
 let leave = () => {};
-let current = "";
 
 function show() {
   const [name, argument] = location.hash.slice(1).split("/");
   const page = pages[name] ? name : "photos";
   leave();
-  current = page;
   for (const link of document.querySelectorAll("nav a")) {
     if (link.hash === `#${page}`) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");

@@ -3,142 +3,210 @@ import { HairMotion } from "./hair_motion.js";
 import { HairView, readPacket } from "./hair_view.js";
 
 const GRAB_PX = 30; // a strand is taken within this distance
+const FIRST_POINT = 3; // of a guide that can be taken: those before are at the head
 const PULL_M = 0.012; // metres that a key pulls a strand
 const SHAKE_S = 2.4, SHAKE_TURNS = 3, SHAKE_RAD = 0.7;
+const WIND = 1.5; // of the key, metres in a second
+const HAIR_LABEL = "Hair on a head. Arrow keys turn it, plus and minus zoom, W is wind, S shakes "
+  + "the head. P takes the strand in the middle: arrow keys pull it, P lets it go.";
 
+// Shows hair in an element of the page; returns what ends that.
 export function showHair(stage, buffer) {
-  const element = (name, values, text = "") => {
-    const made = document.createElement(name);
-    for (const [key, value] of Object.entries(values)) made.setAttribute(key, value);
-    made.append(text);
+  const controls = new HairControls(stage, readPacket(buffer));
+  stage.hairMotion = controls.motion; // for scripts that measure the motion
+  return () => controls.close();
+}
+
+class HairControls {
+  constructor(stage, packet) {
+    this.stage = stage;
+    this.canvas = element("canvas", { tabindex: "0", role: "img", "aria-label": HAIR_LABEL });
+    stage.append(this.canvas, this.buttons());
+    this.view = new HairView(this.canvas, packet);
+    this.motion = new HairMotion(packet);
+    this.combing = false; // pointers pull strands
+    this.grabbed = null; // the strand that is pulled
+    this.shaken = -1; // seconds since the head began to shake, negative at rest
+    this.ended = false;
+    [this.drawn, this.last] = [0, 0]; // frames, and the time of the last one
+    this.pointers = new Map();
+    this.listen();
+    requestAnimationFrame((time) => this.frame(time));
+  }
+
+  close() {
+    this.ended = true;
+    this.view.close();
+  }
+
+  buttons() {
+    const comb = element("button", { type: "button", "aria-pressed": "false" }, "Pull strands");
+    const shake = element("button", { type: "button" }, "Shake head");
+    const label = element("label", {}, "Wind");
+    this.wind = element("input", {
+      type: "range", min: "0", max: "3", step: "0.1", value: "0", "aria-label": "Wind",
+    });
+    label.append(this.wind);
+    comb.addEventListener("click", () => {
+      this.combing = !this.combing;
+      comb.setAttribute("aria-pressed", String(this.combing));
+    });
+    shake.addEventListener("click", () => { this.shaken = 0; });
+    const made = element("div", { class: "controls" });
+    made.append(comb, label, shake);
     return made;
-  };
-  const packet = readPacket(buffer);
-  const canvas = element("canvas", { tabindex: "0", role: "img", "aria-label": "Hair on a head. Arrow keys turn it, plus and minus zoom, W is wind, S shakes the head. P takes the strand in the middle: arrow keys pull it, P lets it go." });
-  const comb = element("button", { type: "button", "aria-pressed": "false" }, "Pull strands");
-  const shake = element("button", { type: "button" }, "Shake head");
-  const label = element("label", {}, "Wind");
-  const wind = element("input", { type: "range", min: "0", max: "3", step: "0.1", value: "0", "aria-label": "Wind" });
-  label.append(wind);
-  const controls = element("div", { class: "controls" });
-  controls.append(comb, label, shake);
-  stage.append(canvas, controls);
-  const view = new HairView(canvas, packet);
-  const motion = new HairMotion(packet);
-  let combing = false, shaken = -1, turnSpeed = 0, ended = false, drawn = 0, last = 0;
-  const pointers = new Map();
-  let grabbed = null;
+  }
 
-  comb.addEventListener("click", () => {
-    combing = !combing;
-    comb.setAttribute("aria-pressed", String(combing));
-  });
-  shake.addEventListener("click", () => { shaken = 0; });
+  listen() {
+    const listen = (kind, act, options) =>
+      this.canvas.addEventListener(kind, (event) => act.call(this, event), options);
+    listen("pointerdown", this.down);
+    listen("pointermove", this.move);
+    listen("pointerup", this.up);
+    listen("pointercancel", this.up);
+    listen("contextmenu", (event) => event.preventDefault());
+    listen("wheel", (event) => {
+      event.preventDefault();
+      this.zoom(Math.exp(0.001 * event.deltaY));
+    }, { passive: false });
+    listen("keydown", this.key);
+  }
 
-  function grab(x, y, within = GRAB_PX) {
-    const { matrix, right, up } = view.camera();
+  down(event) {
+    this.canvas.setPointerCapture(event.pointerId);
+    this.pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
+    if (this.pointers.size !== 1) return;
+    if (this.combing || event.shiftKey || event.button === 2) {
+      this.hold(this.grab(event.offsetX, event.offsetY, GRAB_PX));
+    }
+  }
+
+  move(event) {
+    const before = this.pointers.get(event.pointerId);
+    if (!before) return;
+    const wide = this.reach();
+    const dx = event.offsetX - before[0], dy = event.offsetY - before[1];
+    this.pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
+    if (this.grabbed) this.pull(this.grabbed.scale * dx, -this.grabbed.scale * dy);
+    else if (this.pointers.size === 2) this.zoom(wide / Math.max(this.reach(), 1));
+    else this.turn(-0.008 * dx, 0.006 * dy);
+  }
+
+  up(event) {
+    this.pointers.delete(event.pointerId);
+    this.hold(null);
+  }
+
+  // Pixels between the first two pointers.
+  reach() {
+    const [a, b = a] = [...this.pointers.values()];
+    return Math.hypot(a[0] - b[0], a[1] - b[1]);
+  }
+
+  key(event) {
+    const way = {
+      ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
+    }[event.key];
+    const act = way ? () => this.arrow(...way) : {
+      p: () => this.take(), Escape: () => this.hold(null),
+      "+": () => this.zoom(0.9), "-": () => this.zoom(1.1),
+      w: () => { this.wind.value = Number(this.wind.value) > 0 ? 0 : WIND; },
+      s: () => { this.shaken = 0; },
+    }[event.key];
+    if (!act) return;
+    event.preventDefault();
+    act();
+  }
+
+  arrow(right, up) {
+    if (this.grabbed && !this.pointers.size) this.pull(PULL_M * right, PULL_M * up);
+    else this.turn(0.1 * right, 0.1 * up);
+  }
+
+  // Takes the strand that comes nearest to a point of the canvas, in pixels, in front of others.
+  grab(x, y, within) {
+    const { motion: { count, points, now }, canvas } = this;
+    const { matrix, right, up } = this.view.camera();
     const w = canvas.clientWidth, h = canvas.clientHeight;
     let best = within, depth = Infinity, hit = null;
-    for (let g = 0; g < motion.count; g += 1) {
-      for (let p = 3; p < motion.points; p += 1) {
-        const i = (g * motion.points + p) * 3;
-        const clip = [0, 1, 2, 3].map((k) => matrix[k] * motion.now[i] + matrix[4 + k] * motion.now[i + 1] + matrix[8 + k] * motion.now[i + 2] + matrix[12 + k]);
-        const away = Math.hypot((clip[0] / clip[3] + 1) * w / 2 - x, (1 - clip[1] / clip[3]) * h / 2 - y);
-        if (away < best * 0.7 || (away < best && clip[3] < depth)) {
-          best = Math.max(away, 6); depth = clip[3];
-          hit = { guide: g, point: p, at: [motion.now[i], motion.now[i + 1], motion.now[i + 2]] };
+    for (let guide = 0; guide < count; guide += 1) {
+      for (let point = FIRST_POINT; point < points; point += 1) {
+        const i = (guide * points + point) * 3;
+        const at = [now[i], now[i + 1], now[i + 2]];
+        const [cx, cy, , cw] = clip(matrix, at);
+        const away = Math.hypot((cx / cw + 1) * w / 2 - x, (1 - cy / cw) * h / 2 - y);
+        if (away < best * 0.7 || (away < best && cw < depth)) {
+          best = Math.max(away, 6);
+          depth = cw;
+          hit = { guide, point, at };
         }
       }
     }
     return hit && { hit, scale: 2 * depth * Math.tan(0.25) / h, right, up };
   }
 
-  canvas.addEventListener("pointerdown", (event) => {
-    canvas.setPointerCapture(event.pointerId);
-    pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
-    if (pointers.size === 1 && (combing || event.shiftKey || event.button === 2)) {
-      grabbed = grab(event.offsetX, event.offsetY);
-      motion.held = grabbed?.hit ?? null;
-    }
-  });
-  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-  canvas.addEventListener("pointermove", (event) => {
-    const before = pointers.get(event.pointerId);
-    if (!before) return;
-    const dx = event.offsetX - before[0], dy = event.offsetY - before[1];
-    if (grabbed) {
-      for (let k = 0; k < 3; k += 1) grabbed.hit.at[k] += grabbed.scale * (dx * grabbed.right[k] - dy * grabbed.up[k]);
-    } else if (pointers.size === 2) {
-      const [a, b] = [...pointers.values()];
-      const wide = Math.hypot(a[0] - b[0], a[1] - b[1]);
-      before[0] = event.offsetX; before[1] = event.offsetY;
-      const [c, d] = [...pointers.values()];
-      zoom(wide / Math.max(Math.hypot(c[0] - d[0], c[1] - d[1]), 1));
-    } else {
-      turn(-0.008 * dx, 0.006 * dy);
-    }
-    pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
-  });
-  for (const kind of ["pointerup", "pointercancel"]) {
-    canvas.addEventListener(kind, (event) => {
-      pointers.delete(event.pointerId);
-      grabbed = motion.held = null;
-    });
-  }
-  canvas.addEventListener("wheel", (event) => { event.preventDefault(); zoom(Math.exp(0.001 * event.deltaY)); }, { passive: false });
-  function take() {
-    grabbed = grabbed ? null : grab(canvas.clientWidth / 2, 0.6 * canvas.clientHeight, canvas.clientHeight);
-    motion.held = grabbed?.hit ?? null;
+  // Holds a strand that was taken, or lets it go.
+  hold(grabbed) {
+    this.grabbed = grabbed;
+    this.motion.held = grabbed?.hit ?? null;
   }
 
-  function pull(right, up) {
-    for (let k = 0; k < 3; k += 1) grabbed.hit.at[k] += PULL_M * (right * grabbed.right[k] + up * grabbed.up[k]);
+  take() {
+    const { clientWidth: w, clientHeight: h } = this.canvas;
+    this.hold(this.grabbed ? null : this.grab(w / 2, 0.6 * h, h));
   }
 
-  canvas.addEventListener("keydown", (event) => {
-    const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
-    if (grabbed && !pointers.size && way) { event.preventDefault(); pull(...way); return; }
-    const act = {
-      p: take, Escape: () => { grabbed = motion.held = null; },
-      ArrowLeft: () => turn(-0.1, 0), ArrowRight: () => turn(0.1, 0), ArrowUp: () => turn(0, 0.1), ArrowDown: () => turn(0, -0.1),
-      "+": () => zoom(0.9), "-": () => zoom(1.1), w: () => { wind.value = Number(wind.value) > 0 ? 0 : 1.5; }, s: () => { shaken = 0; },
-    }[event.key];
-    if (act) { event.preventDefault(); act(); }
-  });
-
-  function turn(across, up) {
-    view.azimuth += across;
-    view.elevation = Math.max(-1.2, Math.min(1.4, view.elevation + up));
+  pull(across, upwards) {
+    const { hit: { at }, right, up } = this.grabbed;
+    for (let k = 0; k < 3; k += 1) at[k] += across * right[k] + upwards * up[k];
   }
 
-  function zoom(factor) {
-    view.distance = Math.max(0.3, Math.min(5, view.distance * factor));
+  turn(across, up) {
+    this.view.azimuth += across;
+    this.view.elevation = Math.max(-1.2, Math.min(1.4, this.view.elevation + up));
   }
 
-  function frame(time) {
-    if (ended) return;
-    const seconds = Math.min((time - last) / 1000 || 0, 0.1);
-    last = time;
+  zoom(factor) {
+    this.view.distance = Math.max(0.3, Math.min(5, this.view.distance * factor));
+  }
+
+  frame(time) {
+    if (this.ended) return;
+    const { view, motion } = this;
+    const seconds = Math.min((time - this.last) / 1000 || 0, 0.1);
+    this.last = time;
     const { right, back } = view.camera();
-    const speed = Number(wind.value);
+    const speed = Number(this.wind.value);
     motion.wind = right.map((value, k) => speed * (0.9 * value - 0.35 * back[k]));
-    if (shaken >= 0) {
-      shaken += seconds;
-      const phase = shaken / SHAKE_S;
-      motion.turn = phase < 1 ? SHAKE_RAD * Math.sin(2 * Math.PI * SHAKE_TURNS * phase) * Math.sin(Math.PI * phase) : 0;
-      turnSpeed = motion.turn;
-      if (phase >= 1) shaken = -1;
-    }
+    if (this.shaken >= 0) this.shake(seconds);
     motion.advance(seconds);
     const steady = view.azimuth;
     view.azimuth = steady - motion.turn;
     view.draw(motion);
     view.azimuth = steady;
-    drawn += 1;
-    stage.dataset.frames = drawn;
-    requestAnimationFrame(frame);
+    this.drawn += 1;
+    this.stage.dataset.frames = this.drawn;
+    requestAnimationFrame((next) => this.frame(next));
   }
-  requestAnimationFrame(frame);
-  stage.hairMotion = motion; // for scripts that measure the motion
-  return () => { ended = true; view.close(); };
+
+  shake(seconds) {
+    this.shaken += seconds;
+    const phase = this.shaken / SHAKE_S;
+    const swing = Math.sin(2 * Math.PI * SHAKE_TURNS * phase) * Math.sin(Math.PI * phase);
+    this.motion.turn = phase < 1 ? SHAKE_RAD * swing : 0;
+    if (phase >= 1) this.shaken = -1;
+  }
+}
+
+// `make` of the other pages: `result.html` has this file without them.
+function element(name, values, text = "") {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(values)) made.setAttribute(key, value);
+  made.append(text);
+  return made;
+}
+
+function clip(matrix, [x, y, z]) {
+  return [0, 1, 2, 3].map((k) =>
+    matrix[k] * x + matrix[4 + k] * y + matrix[8 + k] * z + matrix[12 + k]);
 }

@@ -32,8 +32,8 @@ export class HairMotion {
     for (let g = 0; g < this.count; g += 1) {
       for (let p = 1; p < this.points; p += 1) {
         const i = (g * this.points + p) * 3;
-        this.lengths[g * this.points + p] = Math.hypot(
-          this.rest[i] - this.rest[i - 3], this.rest[i + 1] - this.rest[i - 2], this.rest[i + 2] - this.rest[i - 1]);
+        const along = [0, 1, 2].map((k) => this.rest[i + k] - this.rest[i + k - 3]);
+        this.lengths[g * this.points + p] = Math.hypot(...along);
       }
     }
   }
@@ -48,40 +48,53 @@ export class HairMotion {
 
   // Positions are in the head's frame; a turning head is felt as a force.
   step() {
-    const { now, before, rest, points, lengths } = this;
     this.time += STEP_S;
-    const swing = (this.turn - this.turnBefore);
+    const swing = this.turn - this.turnBefore;
     this.turnBefore = this.turn;
     for (let g = 0; g < this.count; g += 1) {
-      const gust = 0.55 + 0.45 * Math.sin(3.1 * this.time + 0.37 * g) * Math.sin(1.7 * this.time + 0.11 * g);
-      for (let p = 1; p < points; p += 1) {
-        const i = (g * points + p) * 3;
-        const share = p / (points - 1);
-        const vx = (now[i] - before[i]) * DAMPING, vy = (now[i + 1] - before[i + 1]) * DAMPING, vz = (now[i + 2] - before[i + 2]) * DAMPING;
-        const push = DRAG * gust * share * STEP_S * STEP_S;
-        before[i] = now[i]; before[i + 1] = now[i + 1]; before[i + 2] = now[i + 2];
-        // the head turns by `swing`: seen from it, the hair turns back
-        const x = now[i], z = now[i + 2];
-        now[i] += limited(vx + this.wind[0] * push - swing * z * share);
-        now[i + 1] += limited(vy + this.wind[1] * push);
-        now[i + 2] += limited(vz + this.wind[2] * push + swing * x * share);
-        const pull = GLOBAL_TIP + (GLOBAL_ROOT - GLOBAL_TIP) * (1 - share) ** 3;
-        for (let k = 0; k < 3; k += 1) now[i + k] += pull * (rest[i + k] - now[i + k]);
+      this.drift(g, swing);
+      if (this.held?.guide === g) this.hold(g);
+      this.constrain(g);
+    }
+  }
+
+  // Moves the points of a guide by their velocity, wind, the head's turn and the captured place.
+  drift(g, swing) {
+    const { now, before, rest, points, wind, time } = this;
+    const gust = 0.55 + 0.45 * Math.sin(3.1 * time + 0.37 * g) * Math.sin(1.7 * time + 0.11 * g);
+    for (let p = 1; p < points; p += 1) {
+      const i = (g * points + p) * 3;
+      const share = p / (points - 1);
+      const vx = (now[i] - before[i]) * DAMPING;
+      const vy = (now[i + 1] - before[i + 1]) * DAMPING;
+      const vz = (now[i + 2] - before[i + 2]) * DAMPING;
+      const push = DRAG * gust * share * STEP_S * STEP_S;
+      for (let k = 0; k < 3; k += 1) before[i + k] = now[i + k];
+      // the head turns by `swing`: seen from it, the hair turns back
+      const x = now[i], z = now[i + 2];
+      now[i] += limited(vx + wind[0] * push - swing * z * share);
+      now[i + 1] += limited(vy + wind[1] * push);
+      now[i + 2] += limited(vz + wind[2] * push + swing * x * share);
+      const pull = GLOBAL_TIP + (GLOBAL_ROOT - GLOBAL_TIP) * (1 - share) ** 3;
+      for (let k = 0; k < 3; k += 1) now[i + k] += pull * (rest[i + k] - now[i + k]);
+    }
+  }
+
+  // From the root to the tip: the captured direction, then head and length.
+  constrain(g) {
+    const { now, rest, points, lengths } = this;
+    for (let p = 1; p < points; p += 1) {
+      const i = (g * points + p) * 3, j = i - 3;
+      const kept = this.held?.guide === g && this.held.point === p;
+      if (!kept) {
+        for (let k = 0; k < 3; k += 1) {
+          const goal = now[j + k] + rest[i + k] - rest[j + k];
+          now[i + k] += LOCAL * (goal - now[i + k]) * (1 - 0.7 * p / points);
+        }
       }
-      if (this.held && this.held.guide === g) this.hold(g);
-      for (let p = 1; p < points; p += 1) {
-        const i = (g * points + p) * 3, j = i - 3;
-        const kept = this.held && this.held.guide === g && this.held.point === p;
-        if (!kept) {
-          for (let k = 0; k < 3; k += 1) {
-            const goal = now[j + k] + rest[i + k] - rest[j + k];
-            now[i + k] += LOCAL * (goal - now[i + k]) * (1 - 0.7 * p / points);
-          }
-        }
-        for (let round = 0; round < ROUNDS; round += 1) {
-          this.leaveHead(i);
-          this.restoreLength(i, lengths[g * points + p]);
-        }
+      for (let round = 0; round < ROUNDS; round += 1) {
+        this.leaveHead(i);
+        this.restoreLength(i, lengths[g * points + p]);
       }
     }
   }
@@ -91,7 +104,9 @@ export class HairMotion {
     const { now } = this, j = i - 3;
     const dx = now[i] - now[j], dy = now[i + 1] - now[j + 1], dz = now[i + 2] - now[j + 2];
     const scale = length / Math.max(Math.hypot(dx, dy, dz), 1e-9);
-    now[i] = now[j] + dx * scale; now[i + 1] = now[j + 1] + dy * scale; now[i + 2] = now[j + 2] + dz * scale;
+    now[i] = now[j] + dx * scale;
+    now[i + 1] = now[j + 1] + dy * scale;
+    now[i + 2] = now[j + 2] + dz * scale;
   }
 
   hold(g) {
@@ -133,7 +148,8 @@ function distanceAndNormal(k, c, x, y, z) {
   const ax = k[c], ay = k[c + 1], az = k[c + 2];
   const bx = k[c + 3] - ax, by = k[c + 4] - ay, bz = k[c + 5] - az;
   const length = bx * bx + by * by + bz * bz;
-  const t = length > 0 ? Math.max(0, Math.min(1, ((x - ax) * bx + (y - ay) * by + (z - az) * bz) / length)) : 0;
+  const along = (x - ax) * bx + (y - ay) * by + (z - az) * bz;
+  const t = length > 0 ? Math.max(0, Math.min(1, along / length)) : 0;
   const dx = x - ax - t * bx, dy = y - ay - t * by, dz = z - az - t * bz;
   const size = Math.max(Math.hypot(dx, dy, dz), 1e-9);
   found[0] = size - (k[c + 6] + t * (k[c + 7] - k[c + 6]));

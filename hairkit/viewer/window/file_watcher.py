@@ -33,7 +33,7 @@ class FileWatcher:
 
 def shader_files() -> list[Path]:
     """Return the shader files; empty if the package is not a folder."""
-    folder = Path(str(resources.files("hairkit.shaders")))
+    folder = Path(str(resources.files("hairkit_shaders")))
     return sorted(folder.glob("*.*")) if folder.is_dir() else []
 
 
