@@ -145,6 +145,12 @@ def matches(size: float) -> Iterator[Case]:
     )
 
 
+def _lengths_apart(first: Array, second: Array) -> float:
+    """Return the largest difference of two vectors' lengths, percent of the mean length."""
+    a, b = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
+    return 100 * float(np.abs(a - b).max() / b.mean())
+
+
 def searches(size: float) -> Iterator[Case]:
     """Exact nearest features of pixels, as in textures by example."""
     rng, edge = np.random.default_rng(0), int(SEARCHED * size**0.5)
@@ -170,10 +176,6 @@ def searches(size: float) -> Iterator[Case]:
         wanted = (queries - given.mean) @ given.components
         return wanted - points[search(cKDTree(points), wanted)]
 
-    def apart(first: Array, second: Array) -> float:
-        a, b = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
-        return 100 * float(np.abs(a - b).max() / b.mean())
-
     peers: dict[str, Callable[[], Any]] = {
         "`cKDTree.query`, one after another": lambda: by_tree(
             lambda tree, wanted: np.array([tree.query(one)[1] for one in wanted])
@@ -185,7 +187,7 @@ def searches(size: float) -> Iterator[Case]:
         f"{len(queries):,} queries in as many points of {given.components.shape[1]} numbers",
         ours,
         peers,
-        apart,
+        _lengths_apart,
         "% of the distance",
         0.1,
     )

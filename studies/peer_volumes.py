@@ -69,9 +69,6 @@ def diffusion(size: float) -> Iterator[Case]:
         left = np.linalg.norm((matrix @ solution - right) / diagonal, axis=0)
         return float((left / np.linalg.norm(right / diagonal, axis=0)).max())
 
-    def apart(_: Array, theirs: Array) -> float:
-        return residual(theirs)
-
     def reaching(prepare: Callable[[Any], _Solve]) -> Callable[[], Array]:
         """Return the solver with the largest tolerance of a row of them that is enough."""
         rtol, wanted = 16 * TOLERANCE, residual(ours())
@@ -85,7 +82,7 @@ def diffusion(size: float) -> Iterator[Case]:
         f"{count:,} cells, {COLUMNS} columns",
         ours,
         {name: _once(partial(reaching, prepare)) for name, prepare in peers.items()},
-        apart,
+        lambda _, theirs: residual(theirs),
         f"residual (ours {residual(ours()):.2g})",
         TOLERANCE,
     )

@@ -8,10 +8,13 @@ import sys
 import time
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from hairkit.cli.settings import STAGE_HELP, add_setting
 from hairkit.errors import InputError
+
+if TYPE_CHECKING:
+    from hairkit.types.strands import Strands
 
 _DESCRIPTION = """\
 Example: hairkit reconstruct photos/ -o out/
@@ -73,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     from hairkit.io.capture_reader import WORKING_EDGE
     from hairkit.manager import Manager
     from hairkit.pipeline.health import summarise
-    from hairkit.pipeline.reconstruct import SHEET, export_paths, reconstruct
+    from hairkit.pipeline.reconstruct import export_paths, reconstruct
     from hairkit.pipeline.run_record import RECORD, read_record
     from hairkit.pipeline.take_capture import take_with_choices
     from hairkit.progress import Recorder, progress_for
@@ -89,30 +92,14 @@ def run(args: argparse.Namespace) -> int:
     quiet = args.quiet or args.json
     with progress_for(sys.stderr, quiet=quiet, steps=args.steps) as shown:
         record = Recorder(shown)
+        chosen = _chosen(args)
         groom = reconstruct(
-            capture,
-            args.out,
-            recipe,
-            manager,
-            head=head,
-            guides=args.guides,
-            seed=args.seed,
-            progress=record,
-            reuse=not args.no_cache,
-            sheet=not args.no_sheet,
-            keep_work=not args.drop_work,
+            capture, args.out, recipe, manager, head=head, progress=record, **chosen
         )
-    sheet = Path(args.out) / SHEET
     health = read_record(Path(args.out) / RECORD).health
-    lengths = groom.strands.lengths()
-    summary = {
-        "groom": str(Path(args.out) / "groom.npz"),
-        "scene": str(Path(args.out) / "scene.json"),
+    summary = _summary(Path(args.out), groom.strands) | {
         "exports": {name: str(path) for name, path in export_paths(args.out, recipe, manager)},
-        "contact_sheet": str(sheet) if sheet.exists() else None,
-        "strands": len(groom.strands),
         "roots": args.guides,
-        "mean_length_m": round(float(lengths.mean()), 4),
         "stages": record.stages,
         "health": [asdict(figure) for figure in health],
         "seconds": round(time.perf_counter() - began, 3),
@@ -122,6 +109,31 @@ def run(args: argparse.Namespace) -> int:
     else:
         print("\n".join([_summary_text(summary), *summarise(health)]))
     return 0
+
+
+def _chosen(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what the command line says of the run itself."""
+    return {
+        "guides": args.guides,
+        "seed": args.seed,
+        "reuse": not args.no_cache,
+        "sheet": not args.no_sheet,
+        "keep_work": not args.drop_work,
+    }
+
+
+def _summary(out: Path, strands: Strands) -> dict[str, Any]:
+    """Return what is told of the files and the strands."""
+    from hairkit.pipeline.reconstruct import SHEET
+
+    sheet = out / SHEET
+    return {
+        "groom": str(out / "groom.npz"),
+        "scene": str(out / "scene.json"),
+        "contact_sheet": str(sheet) if sheet.exists() else None,
+        "strands": len(strands),
+        "mean_length_m": round(float(strands.lengths().mean()), 4),
+    }
 
 
 def _photos(args: argparse.Namespace) -> str:

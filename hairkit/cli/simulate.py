@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +15,10 @@ from hairkit.arrays import Float64Array
 from hairkit.cli.settings import add_setting, importer_of, split_settings
 from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
+
+if TYPE_CHECKING:
+    from hairkit.manager import Manager
+    from hairkit.types.groom import Groom
 
 _DESCRIPTION = """\
 Example: hairkit simulate out/groom.npz -o cache.npz --shake yaw:20:1.5 --wind 3,0,1
@@ -72,9 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _run(args: argparse.Namespace) -> int:
     from hairkit.api import export
-    from hairkit.grooming.decimate import decimate
     from hairkit.manager import Manager
-    from hairkit.pipeline.open_groom import load_groom
     from hairkit.progress import progress_for
     from hairkit.simulation import Weather, add_shakes, read_motion, static_motion
     from hairkit.simulation import run as simulated
@@ -90,11 +93,7 @@ def _run(args: argparse.Namespace) -> int:
     if exporter is not None:
         manager.options(exporter, settings["writer"])  # refused before the simulation, not after
     weather = Weather(_vector("--wind", args.wind), args.turbulence, _gravity(args.gravity))
-    groom = load_groom(manager, args.groom, settings["reader"])
-    if not len(groom.strands):
-        raise InputError(f"{args.groom}: holds no strands, so there is nothing to simulate")
-    if args.guides is not None:
-        groom = decimate(groom, args.guides)
+    groom = _groom(args, manager, settings["reader"])
     motion = static_motion() if args.motion is None else read_motion(args.motion)
     motion = add_shakes(args.shake, groom.head, motion)
     simulator = manager.call("make_simulator", using, options, groom=groom)
@@ -111,15 +110,26 @@ def _run(args: argparse.Namespace) -> int:
         cache.save(args.out)
     else:
         export(groom, args.out, cache=cache, plugin=exporter, manager=manager, **settings["writer"])
-    print(
-        f"{args.out.name}: {len(cache)} frames of {len(simulator.strands)} guides,"
-        f" stretch {100 * stretch:.2f} % at the end",
-        file=sys.stderr,
-    )
-    print_written(
-        args, args.out, frames=len(cache), guides=len(simulator.strands), stretch=float(stretch)
-    )
+    _tell(args, len(cache), len(simulator.strands), float(stretch))
     return 0
+
+
+def _tell(args: argparse.Namespace, frames: int, guides: int, stretch: float) -> None:
+    """Print what was written."""
+    what = f"{frames} frames of {guides} guides, stretch {100 * stretch:.2f} % at the end"
+    print(f"{args.out.name}: {what}", file=sys.stderr)
+    print_written(args, args.out, frames=frames, guides=guides, stretch=stretch)
+
+
+def _groom(args: argparse.Namespace, manager: Manager, settings: Mapping[str, object]) -> Groom:
+    """Return the guides that are simulated, on their head."""
+    from hairkit.grooming.decimate import decimate
+    from hairkit.pipeline.open_groom import load_groom
+
+    groom = load_groom(manager, args.groom, settings)
+    if not len(groom.strands):
+        raise InputError(f"{args.groom}: holds no strands, so there is nothing to simulate")
+    return groom if args.guides is None else decimate(groom, args.guides)
 
 
 def _check(args: argparse.Namespace) -> None:

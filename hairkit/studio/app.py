@@ -87,19 +87,7 @@ async def _run(
     studio = Studio(project, settings.guides)
     hosts = frozenset(f"{name}:{port}" for name in names)
     app = Guard(make_app(studio, sessions, link), sessions, hosts, scheme)
-    config = uvicorn.Config(
-        app,
-        log_level="error",
-        access_log=False,
-        limit_concurrency=MOST_CONNECTIONS,
-        timeout_keep_alive=KEEP_ALIVE_S,
-        timeout_graceful_shutdown=GRACE_S,
-        h11_max_incomplete_event_size=LARGEST_HEADER,
-        http="h11",
-        ws="none",
-        server_header=False,
-        date_header=False,
-    )
+    config = _config(app)
     if settings.lan:
         certificate = make_certificate(project.folder / ".studio", addresses)
         config.ssl_certfile = str(certificate.certificate)
@@ -114,6 +102,23 @@ async def _run(
         own = first.replace(names[0], "127.0.0.1", 1)
         asyncio.get_running_loop().call_later(1.0, webbrowser.open, own)
     await server.serve([listening])
+
+
+def _config(app: ASGIApp) -> uvicorn.Config:
+    """Return how requests are taken: few at a time, none of them large, nothing logged."""
+    return uvicorn.Config(
+        app,
+        log_level="error",
+        access_log=False,
+        limit_concurrency=MOST_CONNECTIONS,
+        timeout_keep_alive=KEEP_ALIVE_S,
+        timeout_graceful_shutdown=GRACE_S,
+        h11_max_incomplete_event_size=LARGEST_HEADER,
+        http="h11",
+        ws="none",
+        server_header=False,
+        date_header=False,
+    )
 
 
 def make_app(studio: Studio, sessions: Sessions, link: Callable[[], str]) -> ASGIApp:

@@ -188,6 +188,16 @@ def _locate(
 
 
 @compiled
+def _normal(u: float, tx: float, ty: float, tz: float) -> tuple[float, float]:
+    """Return x and y of the unit normal of a rounded card at `u`, -1 to 1 across it, square to a
+    strand's unit tangent."""
+    lean = ROUNDNESS * u * tx + tz
+    nx, ny, nz = ROUNDNESS * u - lean * tx, -lean * ty, 1.0 - lean * tz
+    norm = max(np.sqrt(nx * nx + ny * ny + nz * nz), 1e-9)
+    return nx / norm, ny / norm
+
+
+@compiled
 def _line(
     card: int,
     sheet: _Sheet,
@@ -204,9 +214,7 @@ def _line(
     column, row_size = scale
     columns, rows = sheet.size[card]
     dx, dy = end[0] - start[0], end[1] - start[1]
-    across = column * dx
-    along = row_size * dy
-    above = end[2] - start[2]
+    across, along, above = column * dx, row_size * dy, end[2] - start[2]
     size = np.sqrt(across**2 + along**2 + above**2)
     if size <= 0 or start[1] > rows + 1 or end[1] < -2:
         return
@@ -219,11 +227,7 @@ def _line(
         x, y = start[0] + t * dx, start[1] + t * dy
         height = start[2] + t * above
         share = start[3] + t * (end[3] - start[3])
-        u = 2 * (x + 0.5) / columns - 1
-        nx, nz = ROUNDNESS * u, 1.0
-        lean = nx * tx + nz * tz
-        nx, ny, nz = nx - lean * tx, -lean * ty, nz - lean * tz
-        norm = max(np.sqrt(nx * nx + ny * ny + nz * nz), 1e-9)
+        nx, ny = _normal(2 * (x + 0.5) / columns - 1, tx, ty, tz)
         major = y if steep else x
         minor = x if steep else y
         cell = int(np.floor(minor))
@@ -244,8 +248,8 @@ def _line(
                 atlas.shade[cy, cx] = strand % SHADES
                 atlas.flow[cy, cx, 0] = int(UNIT * tx)
                 atlas.flow[cy, cx, 1] = int(UNIT * ty)
-                atlas.normal[cy, cx, 0] = int(UNIT * nx / norm)
-                atlas.normal[cy, cx, 1] = int(UNIT * ny / norm)
+                atlas.normal[cy, cx, 0] = int(UNIT * nx)
+                atlas.normal[cy, cx, 1] = int(UNIT * ny)
 
 
 @compiled

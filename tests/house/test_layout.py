@@ -20,6 +20,8 @@ PACKAGES = sorted(path.parent for path in (PROJECT / "hairkit").rglob("__init__.
 PACKAGES += sorted(path.parent for path in (PROJECT / "plugins").glob("*/__init__.py"))
 PACKAGES += sorted(path.parent for path in (PROJECT / "training").rglob("__init__.py"))
 TRAINING = sorted((PROJECT / "training").rglob("*.py"))
+FOLDERS = ("hairkit", "plugins", "training", "benchmarks", "studies", "tests", "examples")
+ALL = sorted(path for folder in FOLDERS for path in (PROJECT / folder).rglob("*.py"))
 PLUGINS = sorted(set((PROJECT / "plugins").rglob("*.py")) - {PROJECT / "plugins" / "__init__.py"})
 
 FLOORS = (
@@ -49,6 +51,9 @@ FLOORS = (
     ("cli", "__main__"),
 )
 """Rooms of hairkit, lowest floor first. A room may use its own floor and those below."""
+
+LONGEST_BODY = 40
+"""Lines of a function without its docstring and its parameters."""
 
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 
@@ -196,6 +201,31 @@ def test_a_file_tells_one_story(path: Path) -> None:
     assert len(text.splitlines()) < 400
     assert path.stem not in ("utils", "helpers", "common", "misc")
     assert not text.strip() or ast.get_docstring(ast.parse(text))
+
+
+def long_functions(source: str) -> list[tuple[str, int]]:
+    """Return the functions whose bodies have over 40 lines, docstrings not counted."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+            lines = (node.end_lineno or 0) + 1 - body[0].lineno if body else 0
+            found += [(node.name, lines)] if lines > LONGEST_BODY else []
+    return found
+
+
+@pytest.mark.parametrize("path", ALL, ids=lambda p: str(p.relative_to(PROJECT)))
+def test_a_function_does_one_step(path: Path) -> None:
+    """The body of a function has at most 40 lines, in tests and benchmarks, too."""
+    assert long_functions(path.read_text()) == []
+
+
+def test_long_functions_are_found() -> None:
+    """Lines of a body count, those of its docstring and its parameters do not."""
+    head = 'def f(\n    a,\n    b,\n):\n    """One.\n\n    Two.\n    """\n'
+    assert long_functions(head + LONGEST_BODY * "    a = b\n") == []
+    assert long_functions(head + 41 * "    a = b\n") == [("f", 41)]
+    assert long_functions("async def g():\n" + 50 * "    pass\n") == [("g", 50)]
 
 
 def test_every_package_is_in_the_wheel() -> None:

@@ -131,8 +131,7 @@ def solve_substep(
     predicted[:, 0], velocity[:, 0] = rods.points[:, 0], old.velocity[:, 0]
     edge = np.diff(predicted, axis=1)
     direction = quaternion.normalize(edge)
-    frames = transport_frames(old.frames, direction)
-    frames = relax_twist(rods, frames)
+    frames = relax_twist(rods, transport_frames(old.frames, direction))
     force = elastic_force(rods, edge, frames)
     # Velocity of a point that rides on the head, in the world: where it is less where it was.
     head_velocity = (predicted - transform_points(load.head_step, predicted)) / h

@@ -39,6 +39,23 @@ class Pen(NamedTuple):
     """Whether no mesh is before it."""
 
 
+class Raster(NamedTuple):
+    """The pixels of a strip as a stroke goes through them."""
+
+    solids: Float32Array
+    """(N,) depths of the meshes."""
+    sums: Float32Array
+    """(N, 4)"""
+    along: int
+    """Places from a pixel to the next along the stroke's longer side."""
+    across: int
+    """Places to the next pixel across."""
+    least: int
+    """First pixel across that may be drawn."""
+    limit: int
+    """First pixel across behind those."""
+
+
 @stage
 def draw_hair(
     first_strip: int,
@@ -101,10 +118,10 @@ def _stroke(
         ax, ay, az, bx, by, bz = bx, by, bz, ax, ay, az
         begin, end = k, k - 1
     wide, high = solid.shape
-    solids = solid.reshape(wide * high)
     stride_x, stride_y = (1, high) if steep else (high, 1)
     least_x, limit_x = (0, high) if steep else (left, right)
     least_y, limit_y = (left, right) if steep else (0, high)
+    raster = Raster(solid.reshape(wide * high), sums, stride_x, stride_y, least_y, limit_y)
     along, slope = bx - ax, by - ay
     pace = ONE / max(along, _TINY)
     across = min(pen.width * np.sqrt(along * along + slope * slope) * pace, WIDEST)
@@ -115,35 +132,42 @@ def _stroke(
     r, g, b, w = _weight_colour(looks, begin, min(across, ONE))
     red, green, blue, weight = _weight_colour(looks, end, min(across, ONE))
     dr, dg, db, dw = red - r, green - g, blue - b, weight - w
-    half = HALF * max(across, ONE)
-    narrow, soft, free = across <= ONE, pen.smooth, pen.free
+    tip = Pen(across, pen.smooth, pen.free)
     while x < last:
         look = r + t * dr, g + t * dg, b + t * db, w + t * dw
-        depth = az + t * (bz - az)
-        if narrow and soft:  # one pixel wide: split between two pixels
-            low = int(np.floor(y - HALF))
-            part = y - HALF - np.float32(low)
-            at = x * stride_x + low * stride_y
-            if least_y <= low < limit_y and (free or depth <= solids[at]):
-                _add(sums, at, ONE - part, look)
-            if least_y - 1 <= low < limit_y - 1 and (free or depth <= solids[at + stride_y]):
-                _add(sums, at + stride_y, part, look)
-        elif narrow:
-            low = int(np.floor(y))
-            at = x * stride_x + low * stride_y
-            if least_y <= low < limit_y and (free or depth <= solids[at]):
-                _add(sums, at, ONE, look)
-        else:
-            first = max(int(np.floor(y - half)), least_y)
-            top = min(int(np.floor(y + half)), limit_y - 1)
-            for line in range(first, top + 1):
-                at = x * stride_x + line * stride_y
-                part = min(y + half, np.float32(line + 1)) - max(y - half, np.float32(line))
-                if free or depth <= solids[at]:
-                    _add(sums, at, part, look)
+        _dab(raster, tip, x, y, az + t * (bz - az), look)
         x += 1
         t += pace
         y += slope
+
+
+@inlined
+def _dab(raster: Raster, pen: Pen, x: int, y: Number, depth: Number, look: Frame) -> None:
+    """Draw the pixels of a stroke at `x` along it; `y` is its middle across."""
+    solids, sums, step = raster.solids, raster.sums, raster.across
+    least, limit, free = raster.least, raster.limit, pen.free
+    if pen.width <= ONE and pen.smooth:  # one pixel wide: split between two pixels
+        low = int(np.floor(y - HALF))
+        part = y - HALF - np.float32(low)
+        at = x * raster.along + low * step
+        if least <= low < limit and (free or depth <= solids[at]):
+            _add(sums, at, ONE - part, look)
+        if least - 1 <= low < limit - 1 and (free or depth <= solids[at + step]):
+            _add(sums, at + step, part, look)
+    elif pen.width <= ONE:
+        low = int(np.floor(y))
+        at = x * raster.along + low * step
+        if least <= low < limit and (free or depth <= solids[at]):
+            _add(sums, at, ONE, look)
+    else:
+        half = HALF * pen.width
+        first = max(int(np.floor(y - half)), least)
+        top = min(int(np.floor(y + half)), limit - 1)
+        for line in range(first, top + 1):
+            at = x * raster.along + line * step
+            part = min(y + half, np.float32(line + 1)) - max(y - half, np.float32(line))
+            if free or depth <= solids[at]:
+                _add(sums, at, part, look)
 
 
 @inlined
