@@ -1,7 +1,7 @@
 // The fitted head over every photo, landmarks to drag, and the order of the photos.
 import { get, make, onChange, outlineOf, say, send, state } from "./api.js";
 import { HeadMove } from "./head_move.js";
-import { Landmarks } from "./landmarks.js";
+import { Landmarks } from "./face_landmarks.js";
 import { photoOf, PhotoStage, showNoPhotos } from "./photo_stage.js";
 import { TurnOrder } from "./turn_order.js";
 
