@@ -10,7 +10,7 @@ import pytest
 
 from hairkit.colour import linear_from_srgb, srgb_from_linear
 from hairkit.errors import InputError
-from hairkit.grooming.assemble import TIP_SHADE, assemble_groom, measure_colour
+from hairkit.grooming.assemble import LIGHT, TIP_SHADE, assemble_groom, measure_colour
 from hairkit.testing import ball_head, ball_mask, scalp_roots, striped_view, turn_scene
 from hairkit.types.capture import View
 from hairkit.types.head import Roots
@@ -69,11 +69,36 @@ def two_colours(upper: np.ndarray, lower: np.ndarray) -> tuple[list[View], list[
 
 
 def test_colour_is_the_hairs_own() -> None:
-    """The colours come from hair only, linear; tips in the usual shade have those of the roots."""
+    """The hue comes from hair only; tips in the usual shade have the colour of the roots."""
     colour = np.array([0.2, 0.12, 0.06])
     material = measure_colour(*two_colours(colour, TIP_SHADE * colour))
-    assert material.root_colour == pytest.approx(colour, rel=0.02)
-    assert material.tip_colour == pytest.approx(colour, rel=0.02)
+    root = material.root_colour
+    assert root / root.sum() == pytest.approx(colour / colour.sum(), rel=0.02)
+    assert material.tip_colour == pytest.approx(root, rel=0.02)
+
+
+def test_hair_is_as_bright_as_photographed() -> None:
+    """Under the usual light the mean of roots and tips is that of the photo's sRGB values."""
+    upper, lower = np.array([0.2, 0.12, 0.06]), np.array([0.05, 0.03, 0.02])
+    views, masks = two_colours(upper, lower)
+    material = measure_colour(views, masks)
+    seen = linear_from_srgb(views[0].image[masks[0].hair].mean(axis=0) / 255).mean()
+    drawn = LIGHT * (material.root_colour.mean() + material.tip_colour.mean()) / 2
+    assert drawn == pytest.approx(seen, rel=0.01)
+
+
+def test_sheen_is_not_the_hairs_colour() -> None:
+    """White highlights on a twentieth of dark hair make its colour brighter by less than half,
+    which doubles the mean of linear light."""
+    colour = np.array([0.05, 0.03, 0.02])
+    views, masks = two_colours(colour, colour)
+    plain = measure_colour(views, masks).root_colour
+    image = views[0].image.copy()
+    image[20:80:4, 15:45:5] = 255
+    shiny = measure_colour([replace(views[0], image=image)], masks).root_colour
+    assert (shiny < 1.5 * plain).all()
+    light = linear_from_srgb(image[masks[0].hair] / 255).mean()
+    assert light > 2 * colour.mean()
 
 
 def test_dyed_tips_keep_their_hue() -> None:
@@ -90,7 +115,7 @@ def test_bright_tips_are_as_photographed(brightness: float) -> None:
     """Shade makes nothing brighter: hair in flat light, or with bleached tips, stays as it is."""
     colour = np.array([0.2, 0.12, 0.06])
     material = measure_colour(*two_colours(colour, brightness * colour))
-    assert material.tip_colour == pytest.approx(brightness * colour, rel=0.02)
+    assert material.tip_colour == pytest.approx(brightness * material.root_colour, rel=0.02)
 
 
 def test_a_single_hair_pixel_has_a_colour() -> None:
@@ -98,7 +123,7 @@ def test_a_single_hair_pixel_has_a_colour() -> None:
     labels = np.zeros(VIEW.image.shape[:2], np.uint8)
     labels[5, 5] = 255
     material = measure_colour([VIEW], [Mask(labels, True)])
-    assert material.root_colour == pytest.approx(linear_from_srgb(VIEW.image[5, 5] / 255))
+    assert material.root_colour == pytest.approx(linear_from_srgb(VIEW.image[5, 5] / 255) / LIGHT)
 
 
 def test_black_pixels_are_black_hair() -> None:
