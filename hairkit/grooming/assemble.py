@@ -141,8 +141,8 @@ def measure_colour(views: Sequence[View], masks: Sequence[Mask]) -> HairMaterial
     crown, end = max(float(root.mean()), DARKEST), max(float(tip.mean()), DARKEST)
     tip = tip * min(np.sqrt(crown / (end * TIP_SHADE)), max(crown / end, 1.0))
     own = float(whole.mean()) / LIGHT / max(float(root.mean() + tip.mean()) / 2, DARKEST)
-    colours = (np.minimum(own * part, 1.0).astype(np.float32) for part in (root, tip))
-    return HairMaterial(*colours)
+    root, tip = np.minimum(own * root, 1.0), np.minimum(own * tip, 1.0)
+    return HairMaterial(root.astype(np.float32), tip.astype(np.float32))
 
 
 def _without_sheen(pixels: Float64Array) -> Float64Array:
