@@ -95,10 +95,21 @@ def test_waves_of_nine_centimetres_are_no_straight_hair() -> None:
     assert not waves.curly
 
 
-def test_hair_shorter_than_a_turn_has_no_waves() -> None:
-    """What repeats every 27 mm in the picture of hair of 20 mm is no wave of it."""
+def test_views_that_do_not_agree_show_no_waves() -> None:
+    """The shading of locks repeats at another length in each photo; one that differs among four
+    does not hide the waves of the others."""
+    pitches = (0.027, 0.045, 0.06, 0.033)
+    photos = [drawing(0.0068, pitch) for pitch in pitches]
+    _, maps, masks, cameras = views_of(photos[0])
+    assert measure_waves(Capture(tuple(photos)), maps, masks, cameras) == Waves()
+    same = Capture((photos[0], photos[0], photos[2], photos[0]))
+    assert measure_waves(same, maps, masks, cameras).pitch == pytest.approx(0.027, rel=0.1)
+
+
+def test_hair_shorter_than_two_turns_has_no_waves() -> None:
+    """What repeats every 27 mm in the picture of hair of 40 mm is no wave of it."""
     views = views_of(drawing(0.0068, 0.027))
-    short, long = (ScalpDistance(np.zeros((1, 1, 1), np.float32), n) for n in (0.02, 0.05))
+    short, long = (ScalpDistance(np.zeros((1, 1, 1), np.float32), n) for n in (0.04, 0.07))
     assert measure_waves(*views, short) == Waves()
     assert measure_waves(*views, long) == measure_waves(*views) != Waves()
 
