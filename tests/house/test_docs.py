@@ -28,6 +28,8 @@ PAGES = [
         *sorted((PROJECT / "docs").rglob("*.md")),
     )
 ]
+LONGEST = 40
+"""Words of a sentence."""
 WITH_DOCTESTS = [
     (path, package)
     for folder, package in (("hairkit", "hairkit"), ("plugins", "hairkit_plugins"))
@@ -44,6 +46,25 @@ def plugins_page() -> str:
 def blocks(text: str, language: str) -> list[str]:
     """Return the code blocks of a language in a page."""
     return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
+def sentences(text: str) -> list[str]:
+    """Return the sentences of a page, cells of tables too, without code, headings and targets."""
+    code = r"^( *)```(?s:.*?)^\1```$|(?<=\n\n)(?: {4}(?![*\d ]).*\n+)+|^ *[#<].*$"
+    text = re.sub(code, "\n\n", text, flags=re.MULTILINE)
+    text = re.sub(r"`[^`]+`", "X", text)
+    text = re.sub(r"\]\([^)]*\)", "]", text)
+    parts = re.split(r"\n\s*\n|\n(?=\s*(?:[*+-]|\d+\.)\s)|\|", text)
+    return [
+        " ".join(sentence.split())
+        for part in parts
+        for sentence in re.split(r"(?<=[.!?])[)\"*]*\s+(?=\W*[A-Z0-9])", part)
+    ]
+
+
+def words(sentence: str) -> int:
+    """Return how many words and numbers a sentence has; a piece of code is one."""
+    return sum(any(map(str.isalnum, word)) for word in sentence.split())
 
 
 @pytest.mark.parametrize("hook", HOOK_SPECS)
@@ -118,6 +139,23 @@ def test_the_conventions_name_every_view_and_file() -> None:
     names = [*VIEW_NAMES, "photos/", "masks/", "strokes/", "landmarks.json", "capture.toml"]
     for name in names:
         assert f"`{name}`" in page, name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_no_sentence_has_more_than_forty_words(page: Path) -> None:
+    """What a page says in one sentence can be read in one breath; lists are lists."""
+    found = sentences((PROJECT / page).read_text())
+    assert any(words(sentence) > 1 for sentence in found)
+    assert [sentence for sentence in found if words(sentence) > LONGEST] == []
+
+
+def test_long_sentences_are_found_wherever_they_stand() -> None:
+    """In a paragraph, an item or a cell, through links and over lines; not in code."""
+    long = "word " * 20 + "[linked\nword](https://a.b/c.d) " + "`code of one word` " * 20
+    for page in (f"Short. {long}.", f"* one\n* {long}\n", f"| a | {long} |"):
+        assert [words(sentence) > LONGEST for sentence in sentences(page)].count(True) == 1, page
+    for page in (f"```\n{long}\n```\n", f"A:\n\n    {'word ' * 50}\n", f"# {'word ' * 50}\n"):
+        assert not any(words(sentence) > LONGEST for sentence in sentences(page)), page
 
 
 @pytest.mark.parametrize(("path", "package"), WITH_DOCTESTS, ids=lambda v: getattr(v, "stem", v))
