@@ -62,7 +62,7 @@ def format_table_text() -> str:
 
 def front_door() -> str:
     """Return the public names of hairkit: links to types and decorators, then the functions."""
-    homes = {name: f"{hairkit._HOME_OF[name]}.{name}" for name in hairkit.__all__ if name[0] != "_"}
+    homes = {name: f"{hairkit._HOME_OF[name]}.{name}" for name in hairkit.__all__}
     functions = [name for name in homes if inspect.isfunction(getattr(hairkit, name))]
     links = [name for name in homes if name not in functions or name == "option"]
     others = [f"[`{name}`][{homes[name]}]" for name in links]
