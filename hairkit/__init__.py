@@ -53,7 +53,7 @@ import stat
 import tempfile
 from typing import TYPE_CHECKING, Any
 
-from hairkit.version import __version__
+from hairkit.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from hairkit.api import (
@@ -125,7 +125,6 @@ __all__ = [
     "View",
     "VoxelGrid",
     "Waves",
-    "__version__",
     "batch",
     "evaluate",
     "export",

@@ -267,10 +267,18 @@ def test_every_dependency_is_used() -> None:
 
 
 def test_versions_agree() -> None:
-    """The version in pyproject.toml is the one in the package."""
+    """The package's version is that of its metadata, its Blender add-on and its last release."""
     import hairkit
 
     assert pyproject()["project"]["version"] == hairkit.__version__
+    for file, line in (
+        ("CITATION.cff", r"version: (.+)"),
+        ("examples/hairkit-blender/blender_manifest.toml", r'version = "(.+)"'),
+        ("CHANGELOG.md", r"## (\d\S+)"),
+    ):
+        written = re.search(f"^{line}", (PROJECT / file).read_text(), re.MULTILINE)
+        assert written is not None, file
+        assert written[1] == hairkit.__version__, file
 
 
 def test_importing_hairkit_is_light() -> None:
