@@ -6,6 +6,7 @@ plugins.
 * `contact_sheet`: one picture of all stages
 * `draft`: a quick groom after a change by hand
 * `find_views`: faces, persons, and from where each photo was taken
+* `drawn_directions`: guides against the directions in the photos
 * `findings`: the walk through the stages
 * `head_alone`: the head with its skin, without hair
 * `health`: figures that tell how good a run is

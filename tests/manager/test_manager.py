@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import logging
 import typing
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -18,8 +18,9 @@ from hairkit.errors import HairkitError, InputError, OptionError, PluginError
 from hairkit.hookspecs import hookimpl
 from hairkit.manager import DISABLE_AUTOLOAD, Manager
 from hairkit.options import option
-from hairkit.stages import OF_HOOK
+from hairkit.stages import FIELD, OF_HOOK, TRACK
 from hairkit.testing import combed_orientation, stage_arguments
+from hairkit.types.evidence import Evidence
 from hairkit.types.orientation import OrientationMap
 
 
@@ -94,6 +95,13 @@ def test_the_result_types_are_those_of_the_contract() -> None:
             "Simulator",
             object,
         )  # any class may be one
+
+
+def test_hooks_get_all_the_evidence() -> None:
+    """What is measured for field and strands reaches the plugins that make them."""
+    names = [each.name for each in fields(Evidence)]
+    assert list(FIELD.takes) == names
+    assert set(names) <= set(TRACK.takes)
 
 
 def test_only_the_named_plugin_runs() -> None:

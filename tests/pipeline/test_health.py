@@ -16,11 +16,13 @@ from hairkit.cameras.depth_raster import mesh_depth
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.pipeline.health import GREEN, RED, Figure, Limits, assess, summarise
+from hairkit.rendering.measurement import draw_measurements
 from hairkit.synth import grow
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.groom import Groom
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
 from hairkit.types.tie import Tail, Tie, TiedHair
@@ -59,6 +61,7 @@ class Run:
         self.turn: Turnaround | None = self._turn(1.5)
         self.roots = len(self.groom.strands)
         self.hair_length = HAIR_LENGTH
+        self.orientations = tuple(self._seen(camera) for camera in cameras)
         self.parting = Parting.at(0.0, skin_share=0.02, spread=0.012)
         self.tied = TiedHair()
 
@@ -70,6 +73,11 @@ class Run:
         labels = np.where(np.isfinite(skin), PERSON, BACKGROUND)
         labels[np.isfinite(hair) & (hair < skin)] = HAIR
         return Mask(labels, True)
+
+    def _seen(self, camera: Camera) -> OrientationMap:
+        """Return the directions of the hair as a perfect `orient` finds them."""
+        drawn = draw_measurements(self.groom.strands, self.scene.head, camera, width=0.004)
+        return OrientationMap(np.nan_to_num(drawn.angle), drawn.seen.astype(np.float32))
 
     def _view(self, k: int, points: Float64Array) -> View:
         image = np.full((HEIGHT, WIDTH, 3), 100, np.uint8)
@@ -83,6 +91,7 @@ class Run:
         """Return the figures by stage and name."""
         evidence = ball_evidence(
             masks=self.masks,
+            orientations=self.orientations,
             scene=self.scene,
             hull=self.hull,
             scalp_distance=replace(DISTANCE, hair_length=self.hair_length),
@@ -186,6 +195,14 @@ def any_turn(run: Run) -> None:
     run.turn = run._turn(1.0)
 
 
+def combed_otherwise(run: Run) -> None:
+    """The guides run across the directions that the photos show."""
+    run.orientations = tuple(
+        OrientationMap(wrap_angle(found.angle + np.float32(np.pi / 2)), found.confidence)
+        for found in run.orientations
+    )
+
+
 FAULTS = {
     "cameras: landmarks off by": shuffle,
     "masks: hair that all views agree on, worst view": two_heads,
@@ -198,6 +215,7 @@ FAULTS = {
     "turn: margin over the next best": any_turn,
     "parting: width of the skin": bare_hairline,
     "parting: sureness": unsure_crown,
+    "strands: directions as photographed": combed_otherwise,
 }
 
 
@@ -215,6 +233,14 @@ def test_short_hair_is_not_blamed_for_its_parting(run: Run) -> None:
     bare_hairline(run)
     run.hair_length = 0.02
     assert not [name for name in run.figures() if name.startswith("parting")]
+
+
+def test_curls_are_not_blamed_for_their_coils(run: Run) -> None:
+    """Coils of the right radius and pitch are not where those of the photos are."""
+    combed_otherwise(run)
+    material = replace(run.groom.material, curl_radius=0.005, curl_pitch=0.02)
+    run.groom = replace(run.groom, material=material)
+    assert "strands: directions as photographed" not in run.figures()
 
 
 def test_a_beard_in_the_masks_is_red(run: Run) -> None:
