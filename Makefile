@@ -14,7 +14,7 @@ LIBRARIES := libegl1 libgl1 libgl1-mesa-dri libosmesa6
 DISPLAYS := xvfb chromium
 ENGINES := xvfb xauth godot3
 
-.PHONY: test test-clients demo lint docs matrix wheel bench clean
+.PHONY: test test-clients test-slow demo lint docs matrix wheel bench clean
 
 # A worker has one core: threads of matrix products would wait for each other.
 test test-clients: export OPENBLAS_NUM_THREADS := 1
@@ -29,6 +29,11 @@ test-clients: $(VENV)/.tests $(CLIENTS)/.blender
 	@sh .ci/validator $(CLIENTS)
 	@sh .ci/three $(CLIENTS)
 	$(BIN)/python -m pytest -n auto --dist worksteal tests/clients
+
+# The studio and a batch whose processes are killed at random moments.
+test-slow: $(VENV)/.tests $(VENV)/.kernels
+	$(BIN)/python tests/slow/studio_kills.py
+	$(BIN)/python tests/slow/batch_chaos.py
 
 demo: $(VENV)/.kernels
 	$(BIN)/hairkit reconstruct hairkit/sample -o $(DEMO)
