@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from foreign_heads import FOREIGN_HEADS
 
 from hairkit.grooming.wrap import wrap_groom
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
@@ -25,7 +26,6 @@ from hairkit.rendering.framing import framing_cameras
 from hairkit.rendering.picture import draw_views
 from hairkit.rendering.picture_file import write_picture
 from hairkit.synth import grow
-from hairkit.synth.foreign_heads import FOREIGN_HEADS
 from hairkit.types.groom import Groom
 
 STYLES = ("short", "wavy", "curly")

@@ -6,7 +6,6 @@ processes of its own, and all state is in the project's folder.
 * `app`: pages, routes and guard as one server
 * `capture_guides`: where the head should be in each picture of a turn
 * `clean_photo`: photos without what their files tell of a person
-* `draw_examples`: right and wrong pictures for the Camera page
 * `events`: what changed, sent to pages
 * `feedback`: what is said about a photo, one list for all
 * `guard`: who may ask for what
