@@ -17,8 +17,8 @@ from hairkit.cli import main as hairkit
 
 PROJECT = Path(__file__).parents[2]
 SHARED = {
-    "captures_argument", "example_textures", "foreign_heads", "peer_cases", "peer_surfaces",
-    "peer_views", "peer_volumes", "plain_analogies", "random_hair", "xpbd_peer",
+    "captures_argument", "card_picture", "example_textures", "foreign_heads", "peer_cases",
+    "peer_surfaces", "peer_views", "peer_volumes", "plain_analogies", "random_hair", "xpbd_peer",
 }  # fmt: skip
 """Modules that programs import."""
 PROGRAMS = sorted({path.stem for path in (PROJECT / "benchmarks").glob("*.py")} - SHARED)
