@@ -42,7 +42,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `storage`: safe files, frozen types as `.npz`
 * `testing`: a small head with hair for tests of plugins
 * `version`: the version of this package
-* `worker`: the other side of plugins in environments of their own
+* `worker`: what plugins in environments of their own answer by
 """
 
 from __future__ import annotations

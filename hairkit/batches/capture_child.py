@@ -193,7 +193,7 @@ def _scores(folder: Path, photos: Path | None) -> Mapping[str, float]:
 
 
 class _Told:
-    """Progress that tells the other side which stage has begun."""
+    """Progress that tells the parent which stage has begun."""
 
     def __init__(self, tell: Callable[[Any], None]) -> None:
         self._tell = tell

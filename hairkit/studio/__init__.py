@@ -19,7 +19,7 @@ processes of its own, and all state is in the project's folder.
 * `routes`: what pages ask
 * `strand_picture`: the strands found in a photo, drawn over it
 * `studio`: one project being worked on
-* `task_child`: the other end of a process for tasks
+* `task_child`: the program that does tasks, in that process
 * `task_process`: a process for tasks, replaced when it dies
 * `tasks`: what these processes do
 * `uploads`: bodies of requests within limits
