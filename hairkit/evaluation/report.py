@@ -8,7 +8,6 @@ import json
 import os
 from pathlib import Path
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -18,6 +17,7 @@ from hairkit.evaluation.prediction import Prediction
 from hairkit.evaluation.scorecard import Figure, figures
 from hairkit.evaluation.scores import Score
 from hairkit.evaluation.truth import Truth
+from hairkit.imaging.picture_file import encode_picture
 from hairkit.storage import write_text
 
 _JPEG_QUALITY = 82
@@ -145,6 +145,5 @@ def _view(
 
 
 def _data_url(picture: npt.NDArray[np.uint8]) -> str:
-    quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
-    _, data = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), quality)
-    return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode()
+    data = encode_picture(picture, ".jpg", _JPEG_QUALITY)
+    return "data:image/jpeg;base64," + base64.b64encode(data).decode()

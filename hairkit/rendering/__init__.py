@@ -13,7 +13,6 @@ The viewer shares its OpenGL context, cameras and lights.
 * `measurement`: coverage, direction, depth and visibility of hair
 * `osmesa`: OSMesa contexts for moderngl
 * `picture`: shaded pictures
-* `picture_file`: PNG and JPEG files
 * `skin_lobe`: the two layers of skin
 * `skin_passes`: skin on the GPU
 """

@@ -14,6 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from hairkit.imaging.picture_file import write_picture
 from hairkit.io.capture_reader import MOST, WORKING_EDGE
 from hairkit.io.capture_toml import read_capture_file
 from hairkit.io.photos import read_photo
@@ -22,7 +23,6 @@ from hairkit.options import make_options
 from hairkit.pipeline.recipe import Choice, Recipe, load_recipe
 from hairkit.pipeline.single_photo import SeenPhoto, see_photo
 from hairkit.stages import FACES, PERSONS
-from hairkit.storage import write_bytes
 from hairkit.studio.feedback import judge_view
 from hairkit.types.capture import View
 from hairkit.types.chosen import ChosenHair
@@ -103,9 +103,7 @@ def draw_strands(request: dict[str, Any], tell: Tell) -> Any:
     found = manager().call(
         "orient", oriented().plugin, request["options"], view=seen.view.toned(), mask=seen.mask
     )
-    lines = draw_strand_lines(found)
-    data = cv2.imencode(".png", lines[..., [2, 1, 0, 3]], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
-    write_bytes(request["path"], data.tobytes(), durable=False)
+    write_picture(request["path"], draw_strand_lines(found), 1, durable=False)
     return {}
 
 

@@ -15,9 +15,10 @@ import cv2
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
-from hairkit.errors import HairkitError, InputError
+from hairkit.errors import HairkitError
 from hairkit.grooming.densify import roots_between
 from hairkit.head_model.scalp import roots_at
+from hairkit.imaging.picture_file import encode_picture, write_picture
 from hairkit.io.capture_toml import head_entry, head_pose, read_capture_file
 from hairkit.io.photos import MAX_BYTES, read_header, read_photo
 from hairkit.io.video import read_video
@@ -71,7 +72,7 @@ def accept_photo(request: dict[str, Any], tell: Tell) -> Any:
     header = read_header(incoming)
     if header.kind == "HEIC":
         image, header = read_photo(incoming)
-        encoded = _jpeg(image, KEPT_QUALITY)
+        encoded = encode_picture(image, ".jpg", KEPT_QUALITY)
         data, suffix = clean_photo(encoded, header.exif), ".jpg"
     else:
         data = clean_photo(read_bytes(incoming, MAX_BYTES), header.exif)
@@ -96,8 +97,7 @@ def pick_frames(request: dict[str, Any], tell: Tell) -> Any:
     paths = []
     for index, view in enumerate(capture.views):
         path = Path(request["folder"]) / f"{request['name']}-{index:02d}.png"
-        data = cv2.imencode(".png", view.image[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
-        write_bytes(path, data.tobytes())
+        write_picture(path, view.image, 1)
         paths.append(str(path))
     return {"frames": paths}
 
@@ -263,12 +263,5 @@ def _write_pictures(image: UInt8Array, request: dict[str, Any]) -> None:
             scale = min(1.0, edge / max(image.shape[:2]))
             size = [max(1, round(side * scale)) for side in image.shape[1::-1]]
             shown = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if scale < 1 else image
-            data = _jpeg(np.asarray(shown, np.uint8), PICTURE_QUALITY)
+            data = encode_picture(np.asarray(shown, np.uint8), ".jpg", PICTURE_QUALITY)
             write_bytes(request[name], data, durable=False)
-
-
-def _jpeg(image: UInt8Array, quality: int) -> bytes:
-    done, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
-    if not done:
-        raise InputError("the picture cannot be encoded")
-    return data.tobytes()

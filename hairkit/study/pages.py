@@ -13,12 +13,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from hairkit.arrays import Int64Array, UInt8Array
 from hairkit.errors import FormatError, InputError
-from hairkit.storage import read_text, write_bytes, write_text
+from hairkit.imaging.picture_file import write_picture
+from hairkit.storage import read_text, write_text
 from hairkit.study.questionnaire import CHOICES, Question, Study, nearest_view
 from hairkit.study.subject import Shot, Subject
 
@@ -92,8 +92,8 @@ def write_study(
     drawn = _draw(study)
     for number, question in enumerate(study.questions):
         for name, picture in zip(_names(number), _pictures(study, question, drawn), strict=True):
-            write_bytes(base / name, _jpeg(picture))
-    write_bytes(base / GALLERY, _jpeg(_gallery(study, drawn)))
+            write_picture(base / name, picture, _JPEG_QUALITY)
+    write_picture(base / GALLERY, _gallery(study, drawn), _JPEG_QUALITY)
     write_text(base / PAGE, _page([question.kind for question in study.questions], identity))
     asked = [
         dataclasses.asdict(question) | {"program": int(choice)}
@@ -301,11 +301,3 @@ def _document(title: str, parts: Sequence[str]) -> str:
     return "\n".join(
         [f"<!doctype html><html lang=en><meta charset=utf-8>{view}{head}", *parts, "</html>\n"]
     )
-
-
-def _jpeg(picture: UInt8Array) -> bytes:
-    done, data = cv2.imencode(
-        ".jpg", np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
-    )
-    assert done
-    return data.tobytes()

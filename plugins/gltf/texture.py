@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
-from hairkit.arrays import Float64Array, UInt8Array
+from hairkit.arrays import Float64Array
 from hairkit.colour import srgb_from_linear
+from hairkit.imaging.picture_file import encode_picture
 
 _SHORTEST = 0.72
 _LONGEST = 1.02
@@ -80,7 +80,4 @@ def _normals(relief: Float64Array) -> Float64Array:
 
 
 def _png(picture: Float64Array) -> bytes:
-    pixels: UInt8Array = np.rint(picture).astype(np.uint8)
-    order = [2, 1, 0, 3][: pixels.shape[-1]]
-    encoded = cv2.imencode(".png", np.ascontiguousarray(pixels[..., order]))[1]
-    return bytes(encoded)
+    return encode_picture(np.rint(picture).astype(np.uint8))
