@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import cv2
 import numpy as np
@@ -18,6 +17,7 @@ from hairkit.field.growth_prior import ScalpComb
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
 from hairkit.types.volume import cell_slopes, outer_products
 
+from .options import Options
 from .ribbons import Band
 
 FIXED = 1e3
@@ -32,29 +32,6 @@ NEGLIGIBLE = 6.0
 """Distance from strands, in `surface_reach`, from which S hardly counts: less than 0.003."""
 SCALP_CELLS = 2.0
 """Distance from the head in cells at which the weight of grad(I) falls to 1/e."""
-
-
-class FieldOptions(Protocol):
-    """Options of the fields and their weights."""
-
-    @property
-    def smoothness(self) -> float: ...
-    @property
-    def strand_weight(self) -> float: ...
-    @property
-    def scalp_reach(self) -> float: ...
-    @property
-    def scalp_lift(self) -> float: ...
-    @property
-    def surface(self) -> float: ...
-    @property
-    def surface_reach(self) -> float: ...
-    @property
-    def outward(self) -> float: ...
-    @property
-    def signed(self) -> float: ...
-    @property
-    def tolerance(self) -> float: ...
 
 
 def surface_structure(cells: CellGraph, band: Band, tolerance: float) -> Float32Array:
@@ -83,7 +60,7 @@ def internal_direction(
     wanted: Float32Array,
     weight: Float32Array,
     band: Band,
-    options: FieldOptions,
+    options: Options,
 ) -> Float32Array:
     """Return V (N, 6) of the loose cells: `wanted` by `weight`, and ribbons, diffused."""
     on = band.on
@@ -160,7 +137,7 @@ class Fields:
     """O, (N, 3)."""
 
 
-def blend(hull: Hull, band: Band, fields: Fields, options: FieldOptions) -> Float32Array:
+def blend(hull: Hull, band: Band, fields: Fields, options: Options) -> Float32Array:
     """Return H (X, Y, Z, 3), 0 outside the loose hull.
 
     The weights differ from cell to cell: S counts on strands, V away from them, grad(I) at the

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,8 @@ from hairkit.field.sampling_kernels import copy_point, sample_at
 from hairkit.field.view_fusion import DEPTH_SHRINK, FusedViews
 from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
+
+from .options import Options
 
 PIXELS = 2.0
 """Step along a line in a photo, pixels."""
@@ -41,17 +43,8 @@ MIN_LINES = 64
 """Least number of lines worth a call on another thread."""
 
 
-class LineOptions(Protocol):
-    """Options of the lines."""
-
-    @property
-    def line_spacing(self) -> int: ...
-    @property
-    def longest(self) -> float: ...
-
-
 def lift_photo_lines(
-    cameras: Sequence[Camera], masks: Sequence[Mask], fused: FusedViews, options: LineOptions
+    cameras: Sequence[Camera], masks: Sequence[Mask], fused: FusedViews, options: Options
 ) -> Strands:
     """Return lines that follow the 2D orientation in each photo, lifted to the hull's front."""
     found = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -19,12 +19,12 @@ from hairkit.field.sampling_kernels import copy_point, make_unit, principal_dire
 from hairkit.field.view_fusion import FusedViews
 from hairkit.parallel import compiled_with, parallel_for
 
+from .options import Options
 from .photo_lines import (
     CONFIDENT,
     FEWEST,
     MIN_LINES,
     STEP,
-    LineOptions,
     TensorVolume,
     agreeing,
     join,
@@ -62,20 +62,13 @@ class Way(NamedTuple):
     """Longest way through the hair from the nearest scalp, metres."""
 
 
-class SegmentOptions(LineOptions, Protocol):
-    """Options of the segments."""
-
-    @property
-    def agreement_deg(self) -> float: ...
-
-
 def find_segments(
     cameras: Sequence[Camera],
     masks: Sequence[Mask],
     fused: FusedViews,
     hull: Hull,
     way: Way,
-    options: SegmentOptions,
+    options: Options,
 ) -> Strands:
     """Return segments root to tip, points `STEP` apart, in the head frame.
 
