@@ -19,6 +19,8 @@ from hairkit.types.capture import View
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import wrap_angle
 
+REDUCED_HEIGHT = 360
+"""Rows of the picture that is labelled first; edges are then refined at full size."""
 REFERENCE_HEIGHT = 1080
 """Rows of the picture that options in pixels refer to; `picture_scale` converts them."""
 
@@ -54,6 +56,12 @@ COHERENT_WINDOW = 9
 
 COHERENT_RESULTANT = 0.85
 """Least mean resultant of the double angles in that box."""
+
+
+def reduced_size(width: int, height: int) -> tuple[int, int]:
+    """Return (width, height) of the picture that is labelled first, `REDUCED_HEIGHT` at most."""
+    rows = min(height, REDUCED_HEIGHT)
+    return max(round(width * rows / height), 1), rows
 
 
 def picture_scale(height: int) -> float:

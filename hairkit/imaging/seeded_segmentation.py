@@ -104,12 +104,6 @@ class Mixture(NamedTuple):
         return np.asarray((self.weights @ terms + self.offsets[:, None]).max(axis=0), np.float32)
 
 
-def reduced_size(width: int, height: int, reduced_height: int) -> tuple[int, int]:
-    """Return (width, height) of a picture scaled down to at most `reduced_height` rows."""
-    rows = min(height, reduced_height)
-    return max(round(width * rows / height), 1), rows
-
-
 def label_from_seeds(
     image: UInt8Array,
     seeds: UInt8Array,

@@ -106,10 +106,6 @@ class Options:
         " else 100,000.",
     )
     author: str = option("", doc="Author's name in the file.")
-    last_modified: str = option(
-        "2000-01-01 00:00:00 UTC",
-        doc="Date in the file; fixed, so that equal grooms are equal files.",
-    )
     head: Path | None = option(
         None, doc="Head to bind the guides to when a file is read; else its own growth mesh."
     )
@@ -142,7 +138,6 @@ def _layout(options: Options, kept: ApxAsset | None) -> Layout:
         handedness=kept.handedness if kept else RIGHT_HANDED,
         hairs=options.hairs or (0 if kept else _HAIRS),
         author=options.author or (kept.info[3] if kept else ""),
-        last_modified=options.last_modified,
     )
 
 

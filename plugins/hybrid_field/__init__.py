@@ -79,7 +79,7 @@ def solve_field(
     options: Options,
 ) -> OrientationField:
     """Return the blended field with its signs and the internal distance."""
-    growth = growth_potential(hull, scalp_distance, options.tip_share)
+    growth = growth_potential(hull, scalp_distance)
     if waves.curly:
         return hang_curls(scene.head, hull, growth)
     length = scalp_distance.hair_length
@@ -91,9 +91,7 @@ def solve_field(
         given = segments_in_hair(read_segments(options.segments), hull, options.segments)
         segments = orient_segments(given, hull, way)
     band = ribbons(segments, hull, options.ribbon)
-    comb = comb_cells(
-        scene.head, hull, growth, options.scalp_reach, options.scalp_lift, parting, length
-    )
+    comb = comb_cells(scene.head, hull, growth, parting, length)
     prior = ScalpPrior(options.scalp_weight, options.parting_weight)
     wanted, weight = add_scalp_prior(
         scene.head, hull, fused.tensor, fused.certainty, comb, prior, parting, length

@@ -30,6 +30,8 @@ COARSE = 2
 """The internal distance is solved on cells this many times as large, then interpolated."""
 NEGLIGIBLE = 6.0
 """Distance from strands, in `surface_reach`, from which S hardly counts: less than 0.003."""
+SMOOTHNESS = 0.4
+"""Weight of the diffusion of V against its data."""
 SCALP_CELLS = 2.0
 """Distance from the head in cells at which the weight of grad(I) falls to 1/e."""
 
@@ -70,7 +72,7 @@ def internal_direction(
     total[on] += options.strand_weight
     share = (options.strand_weight / np.maximum(total[on], 1e-9))[:, None]
     data[on] = (1 - share) * wanted[on] + share * outer_products(tangent)
-    return solve_screened(cells, data, total, options.smoothness, tolerance=options.tolerance)
+    return solve_screened(cells, data, total, SMOOTHNESS, tolerance=options.tolerance)
 
 
 def internal_distance(hull: Hull, segments: Strands, tolerance: float) -> Float32Array:

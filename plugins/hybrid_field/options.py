@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from hairkit.field.growth_prior import (
-    TIP_SHARE,
-)
 from hairkit.field.view_fusion import FusionOptions
 from hairkit.options import option
 
@@ -19,33 +16,18 @@ class Options(FusionOptions):
     segments: Path | None = option(
         None, doc="A .ply or .npz with 3D segments in metres, to use instead of the photos' lines."
     )
-    line_spacing: int = option(
-        10, low=2, high=100, unit="px", doc="Distance between lines followed in a photo."
-    )
     longest: float = option(
         0.06, low=0.005, high=0.5, unit="m", doc="Length of the longest segment."
-    )
-    agreement_deg: float = option(
-        35.0,
-        low=1,
-        high=90,
-        unit="deg",
-        doc="A lifted line is dropped if it differs by more from the fused field of all views.",
     )
     ribbon: float = option(
         0.004, low=0, high=0.05, unit="m", doc="How far a ribbon reaches to either side."
     )
-    smoothness: float = option(0.4, low=1e-4, high=100, doc="Weight of the diffusion of V.")
     strand_weight: float = option(
         0.05, low=0, high=1000, doc="Weight of strand cells in V; large values fix them."
     )
     scalp_weight: float = option(
         0.1, low=0, high=100, doc="Weight of the combing prior at the scalp in V."
     )
-    scalp_reach: float = option(
-        0.02, low=0, high=0.1, unit="m", doc="Distance from the scalp within which the prior acts."
-    )
-    scalp_lift: float = option(0.6, low=0, high=5, doc="Outward part of the prior.")
     parting_weight: float = option(
         0.15, low=0, high=10, doc="Weight of the comb from the parting in the hair on the crown."
     )
@@ -55,10 +37,4 @@ class Options(FusionOptions):
     )
     outward: float = option(0.2, low=0, high=10, doc="Largest weight of grad(I), at the scalp.")
     signed: float = option(0.1, low=0, high=10, doc="Weight of O.")
-    tip_share: float = option(
-        TIP_SHARE,
-        low=0.05,
-        high=1,
-        doc="Cells this far along the longest way from the scalp count as tips.",
-    )
     tolerance: float = option(2e-2, low=1e-8, high=0.1, doc="Relative residual of the solvers.")

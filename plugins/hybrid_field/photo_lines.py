@@ -31,6 +31,8 @@ SMOOTHING = 3.0
 """Gaussian in points under which lifted lines are smoothed: the hull's front has steps."""
 KERNEL_SIGMAS = 3
 """Half width of that Gaussian's kernel in its sigmas."""
+LINE_SPACING = 10
+"""Pixels between the lines that are followed in a photo."""
 FEWEST = 5
 """Points of the shortest segment."""
 MIN_COSINE = 0.8
@@ -51,7 +53,7 @@ def lift_photo_lines(
     views = zip(cameras, masks, fused.orientations, fused.fronts, strict=True)
     for camera, mask, oriented, front in views:
         weight = (oriented.confidence * mask.hair).astype(np.float32)
-        rows, columns = _seeds(weight, options.line_spacing)
+        rows, columns = _seeds(weight, LINE_SPACING)
         steps = int(options.longest / PIXELS * camera.focal / _median_depth(front))
         lines = np.empty((len(rows), 2 * max(steps // 2, FEWEST) + 1, 3), np.float32)
         counts = np.zeros(len(rows), np.int64)

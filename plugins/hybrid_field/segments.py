@@ -43,6 +43,8 @@ OUTER_CELLS = 2
 """Depth in cells of the hull's outer shell, which photos see."""
 BEST = 95
 """Percentile of the shell's certainty that is taken for the best: the maximum may be an outlier."""
+AGREEMENT_DEG = 35.0
+"""A lifted line is dropped if it differs by more from the fused field of all views."""
 RUN_ON = 0.5
 """Share of a seed's least certainty at which a line still runs on."""
 FIRST_WAY = np.array([0.3, 0.9, 0.3])
@@ -83,7 +85,7 @@ def find_segments(
     volume = np.zeros((*hull.grid.shape, 6), np.float32)
     volume[hull.loose] = fused.tensor * np.minimum(certainty, 1)[:, None]
     lines = lift_photo_lines(cameras, masks, fused, options)
-    lines = agreeing(lines, hull, volume, options.agreement_deg)
+    lines = agreeing(lines, hull, volume, AGREEMENT_DEG)
     inner = lines_through_cells(hull, volume, certainty, options.longest)
     points = np.concatenate([lines.points, inner.points])
     offsets = np.concatenate([lines.offsets, inner.offsets[1:] + lines.offsets[-1]])

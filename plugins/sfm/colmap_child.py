@@ -17,6 +17,8 @@ FIRST_PAIR, FIRST_ANGLE_DEG = 20, 5.0
 """Matches and angle of the pair that begins; COLMAP's 100 and 16 degrees are for buildings."""
 MORE, SHARE, MISS_PX = 10, 0.15, 8.0
 """Points that a further photo must share, their share of the matches, and how far they may miss."""
+CONTRAST = 0.002
+"""Least contrast of a point; COLMAP's own is 0.0067."""
 LEAST_MATCHES = 10
 """Matches of a pair that the epipolar geometry explains; COLMAP's 15 break turns of plain skin."""
 LEAST_ANGLE_DEG = 1.0
@@ -47,7 +49,7 @@ def _find_features(pycolmap: Any, folder: Path, database: Path, task: dict[str, 
     options = pycolmap.FeatureExtractionOptions()
     options.use_gpu = False
     options.sift.max_num_features = task["features"]
-    options.sift.peak_threshold = task["contrast"]
+    options.sift.peak_threshold = CONTRAST
     reader = pycolmap.ImageReaderOptions()
     reader.mask_path, reader.camera_model = str(folder / "masks"), "SIMPLE_PINHOLE"
     mode = pycolmap.CameraMode.SINGLE if task["shared"] else pycolmap.CameraMode.PER_IMAGE

@@ -55,12 +55,12 @@ class Model:
 def solve(
     views: Sequence[View],
     masks: Sequence[Mask],
-    settings: tuple[int, float, int],
+    settings: tuple[int, int],
     seconds: float,
 ) -> Model:
     """Return the model of photos in the order of the turn.
 
-    `settings` are features, contrast and neighbours of the plugin's options.
+    `settings` are features and neighbours of the plugin's options.
 
     Raises
     ------
@@ -73,9 +73,7 @@ def solve(
         raise MissingExtraError(MISSING)
     with tempfile.TemporaryDirectory(prefix="hairkit-sfm-") as folder:
         _write_photos(Path(folder), views, masks)
-        task: dict[str, object] = dict(
-            zip(("features", "contrast", "neighbours"), settings, strict=True)
-        )
+        task: dict[str, object] = dict(zip(("features", "neighbours"), settings, strict=True))
         focals = [view.focal_px or USUAL_FOCAL * max(view.width, view.height) for view in views]
         known = all(view.focal_px for view in views)
         alike = len({(view.width, view.height) for view in views}) == 1
