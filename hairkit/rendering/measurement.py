@@ -34,22 +34,21 @@ def draw_layers(
     camera: Camera,
     *,
     width: float | Float32Array = 5e-4,
-    min_width_px: float = 1.0,
-    supersample: int = SUPERSAMPLE,
 ) -> tuple[Float32Array, Float32Array]:
     """Return the coverage (H, W) of each pixel, 0 to 1, by visible hair and by bare meshes.
 
-    `width` is the drawn diameter in metres, a number or (P,); `min_width_px` its minimum in pixels.
+    `width` is the drawn diameter in metres, a number or (P,); a pixel at least.
     """
-    fine = supersample_camera(camera, supersample)
+    fine = supersample_camera(camera, SUPERSAMPLE)
     meshes = _meshes(solids)
     depth = DepthRange.around(fine, strands.points, *[mesh.vertices for mesh in meshes])
     with renderer() as gl, target(gl, fine) as picture:
         _draw_solids(gl, meshes, fine, depth, _SOLID)
-        least = min_width_px * supersample
         program = gl.program("hair_flat", "flat")
         with ribbons(gl, strands, width) as buffers:
-            draw_ribbons(gl, buffers, program, fine, depth, min_width_px=least, u_colour=_HAIR)
+            draw_ribbons(
+                gl, buffers, program, fine, depth, min_width_px=SUPERSAMPLE, u_colour=_HAIR
+            )
         samples = np.asarray(picture.read()[..., :2], np.float32)
     shares = average_samples(samples, camera) / np.float32(255)
     return shares[..., 0], shares[..., 1]
@@ -73,7 +72,6 @@ def draw_measurements(
     camera: Camera,
     *,
     width: float | Float32Array = 2e-4,
-    min_width_px: float = 1.0,
 ) -> Measurements:
     """Return direction and depth of the visible strand at each pixel, in one pass."""
     meshes = _meshes(solids)
@@ -82,7 +80,7 @@ def draw_measurements(
         _draw_solids(gl, meshes, camera, depth, _NOTHING)
         program = gl.program("hair_direction")
         with ribbons(gl, strands, width) as buffers:
-            draw_ribbons(gl, buffers, program, camera, depth, min_width_px=min_width_px)
+            draw_ribbons(gl, buffers, program, camera, depth)
         values: Float32Array = np.asarray(picture.read(), np.float32)
     seen: BoolArray = values[..., 3] > 0.5
     angle = wrap_angle(np.arctan2(values[..., 1], values[..., 0]))
@@ -99,10 +97,9 @@ def draw_coverage(
     camera: Camera,
     *,
     width: float | Float32Array = 5e-4,
-    min_width_px: float = 1.0,
 ) -> Float32Array:
     """Return the coverage (H, W) of each pixel, 0 to 1, by hair in front of the head."""
-    return draw_layers(strands, head, camera, width=width, min_width_px=min_width_px)[0]
+    return draw_layers(strands, head, camera, width=width)[0]
 
 
 def draw_directions(
@@ -111,13 +108,12 @@ def draw_directions(
     camera: Camera,
     *,
     width: float | Float32Array = 2e-4,
-    min_width_px: float = 1.0,
 ) -> tuple[Float32Array, BoolArray]:
     """Return the 2D angle (H, W) of the visible strand at each pixel, and where there is one.
 
     Angles are undirected, in [0, pi), from +x towards +y, as in `OrientationMap`; 0 without hair.
     """
-    measured = draw_measurements(strands, head, camera, width=width, min_width_px=min_width_px)
+    measured = draw_measurements(strands, head, camera, width=width)
     return measured.angle, measured.seen
 
 
@@ -127,10 +123,9 @@ def draw_depth(
     camera: Camera,
     *,
     width: float | Float32Array = 2e-4,
-    min_width_px: float = 1.0,
 ) -> Float32Array:
     """Return the axial depth (H, W) of the visible strand at each pixel, metres, else infinity."""
-    return draw_measurements(strands, head, camera, width=width, min_width_px=min_width_px).depth
+    return draw_measurements(strands, head, camera, width=width).depth
 
 
 def visible_points(strands: Strands, head: Solids, camera: Camera) -> BoolArray:

@@ -25,7 +25,7 @@ _THINNEST = 1e-4
 """Least half width in shares of the strip's: strands that have ended do not divide by 0."""
 
 
-def strand_pictures(strands: int, opaque: bool, seed: int = 0) -> tuple[bytes, bytes]:
+def strand_pictures(strands: int, opaque: bool) -> tuple[bytes, bytes]:
     """Return PNGs of colour with alpha (sRGB, to be multiplied with the hair's) and of normals.
 
     Parameters
@@ -34,11 +34,9 @@ def strand_pictures(strands: int, opaque: bool, seed: int = 0) -> tuple[bytes, b
         How many lie side by side, root at the upper edge.
     opaque
         Without holes.
-    seed
-        Of places, lengths and shades.
     """
     width, height = (64, 256) if strands <= 8 else (256, 256)
-    relief, shade = _strands_side_by_side(strands, width, height, seed)
+    relief, shade = _strands_side_by_side(strands, width, height)
     lit = shade * (_EDGE_SHADE + 0.25 * np.maximum(relief, 0))
     colour = np.repeat(255 * srgb_from_linear(lit)[..., None], 4, axis=-1)
     edge = 0.25  # of the relief: alpha goes from 0 to 1 there, so that the cut is smooth
@@ -52,10 +50,10 @@ def white_picture() -> bytes:
 
 
 def _strands_side_by_side(
-    strands: int, width: int, height: int, seed: int
+    strands: int, width: int, height: int
 ) -> tuple[Float64Array, Float64Array]:
     """Return the strands' height over the strip (H, W), below 0 between them, and shades."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     u = (np.arange(width) + 0.5)[:, None] / width
     v = (np.arange(height) + 0.5)[:, None, None] / height
     slot = (np.arange(strands) + 0.5) / strands
