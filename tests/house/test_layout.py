@@ -35,6 +35,7 @@ FLOORS = (
         "parallel",
         "kernel_cache",
         "memory",
+        "html_page",
         "compilation",
         "child_process",
         "worker",
