@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -42,17 +41,15 @@ from hairkit.types.strands import Strands
 FORMAT = FileFormat(
     "PLY",
     (".ply",),
-    exact=frozenset(
-        {
-            Feature.POINTS,
-            Feature.COUNTS,
-            Feature.WIDTHS,
-            Feature.ROOT_UV,
-            Feature.GROUP,
-            Feature.GUIDE,
-        }
-    ),
-    partial=MappingProxyType({Feature.COLOUR: "8-bit sRGB"}),
+    exact={
+        Feature.POINTS,
+        Feature.COUNTS,
+        Feature.WIDTHS,
+        Feature.ROOT_UV,
+        Feature.GROUP,
+        Feature.GUIDE,
+    },
+    partial={Feature.COLOUR: "8-bit sRGB"},
 )
 
 _MOST_SEGMENTS = 2**16 - 1

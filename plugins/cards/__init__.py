@@ -37,12 +37,10 @@ if TYPE_CHECKING:
 FORMAT = FileFormat(
     "Hair cards",
     (".cards.glb", ".cards.obj", ".vrm"),
-    written=frozenset(
-        {
-            Feature.HEAD, Feature.MAPS, Feature.SKIN, Feature.CAPSULES, Feature.COLOUR,
-            Feature.PHYSICS,
-        }
-    ),
+    written={
+        Feature.HEAD, Feature.MAPS, Feature.SKIN, Feature.CAPSULES, Feature.COLOUR,
+        Feature.PHYSICS,
+    },
 )  # fmt: skip
 DEFAULT_CHAINS = 40
 """Chains of a .vrm file where the option leaves it open."""

@@ -20,7 +20,6 @@ and as triangles for viewers, which is not.
 from __future__ import annotations
 
 from pathlib import Path
-from types import MappingProxyType
 
 from hairkit.grooming.prepare_export import prepare_export
 from hairkit.hookspecs import hookimpl
@@ -32,26 +31,10 @@ from .options import Options
 FORMAT = FileFormat(
     "glTF",
     (".glb", ".gltf"),
-    exact=frozenset(
-        {
-            Feature.POINTS,
-            Feature.COUNTS,
-            Feature.WIDTHS,
-            Feature.ROOT_UV,
-            Feature.GROUP,
-            Feature.TIES,
-            Feature.GUIDE,
-            Feature.HEAD,
-            Feature.CAPSULES,
-            Feature.COLOUR,
-            Feature.CURL,
-            Feature.PHYSICS,
-            Feature.SKIN,
-            Feature.SHAPES,
-        }
-    ),
-    partial=MappingProxyType({Feature.MAPS: "without the bump map"}),
-    written=frozenset({Feature.ANIMATION}),
+    exact=frozenset(Feature)
+    - {Feature.GUIDE_WEIGHTS, Feature.DENSITY, Feature.MAPS, Feature.ANIMATION},
+    partial={Feature.MAPS: "without the bump map"},
+    written={Feature.ANIMATION},
 )
 
 

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -55,16 +54,12 @@ __all__ = [
 FORMAT = FileFormat(
     "HairWorks",
     (".apx",),
-    exact=frozenset(
-        {Feature.ROOT_UV, Feature.SKIN, Feature.CAPSULES, Feature.COLOUR, Feature.PHYSICS}
-    ),
-    partial=MappingProxyType(
-        {
-            Feature.POINTS: "guides only, resampled to `points_per_strand`",
-            Feature.HEAD: "growth mesh of the roots",
-            Feature.CURL: "as waves, where points are too far apart to show it",
-        }
-    ),
+    exact={Feature.ROOT_UV, Feature.SKIN, Feature.CAPSULES, Feature.COLOUR, Feature.PHYSICS},
+    partial={
+        Feature.POINTS: "guides only, resampled to `points_per_strand`",
+        Feature.HEAD: "growth mesh of the roots",
+        Feature.CURL: "as waves, where points are too far apart to show it",
+    },
 )
 
 

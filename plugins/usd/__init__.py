@@ -27,7 +27,6 @@ Source: OpenUSD, UsdGeomBasisCurves and UsdSkel schemas; Epic's groom attributes
 from __future__ import annotations
 
 from pathlib import Path
-from types import MappingProxyType
 
 from hairkit.grooming.prepare_export import prepare_export
 from hairkit.hookspecs import hookimpl
@@ -41,7 +40,7 @@ FORMAT = FileFormat(
     title="USD",
     suffixes=(".usdc", ".usda", ".usd"),
     exact=frozenset(Feature) - _WRITTEN - {Feature.ANIMATION},
-    partial=MappingProxyType({Feature.ANIMATION: "written; the rest pose is read"}),
+    partial={Feature.ANIMATION: "written; the rest pose is read"},
     written=_WRITTEN,
 )
 
