@@ -13,8 +13,9 @@ from hairkit.arrays import Float32Array, Int32Array, UInt8Array
 from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.framebuffer import SUPERSAMPLE, average_samples, supersample_camera, target
 from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
-from hairkit.rendering.head import Mesh, draw_solid
+from hairkit.rendering.head import draw_solid
 from hairkit.types.camera import Camera
+from hairkit.types.preview import Surface
 
 VERTEX_SHADER = """#version 430
 uniform mat4 u_clip_from_head;
@@ -64,7 +65,7 @@ class TexturedMesh:
 
 def draw_cards(
     cards: TexturedMesh,
-    solid: Mesh | None,
+    solid: Surface | None,
     cameras: Sequence[Camera],
 ) -> list[UInt8Array]:
     """Return (H, W, 4) RGBA for each camera; alpha is the pixel's coverage by cards."""

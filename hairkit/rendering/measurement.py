@@ -12,12 +12,13 @@ from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.framebuffer import SUPERSAMPLE, average_samples, supersample_camera, target
 from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.hair import draw_ribbons, ribbons
-from hairkit.rendering.head import Mesh, draw_solid
+from hairkit.rendering.head import draw_solid
 from hairkit.types.camera import Camera
 from hairkit.types.orientation import wrap_angle
+from hairkit.types.preview import Surface
 from hairkit.types.strands import Strands
 
-Solids = Mesh | Sequence[Mesh] | None
+Solids = Surface | Sequence[Surface] | None
 """Occluders of hair: a head, several meshes, or None."""
 
 HEAD_PUSH = 0.002
@@ -143,7 +144,7 @@ def points_at_depth(strands: Strands, depth: Float32Array, camera: Camera) -> Bo
     return seen
 
 
-def _meshes(solids: Solids) -> Sequence[Mesh]:
+def _meshes(solids: Solids) -> Sequence[Surface]:
     if solids is None:
         return ()
     return solids if isinstance(solids, Sequence) else (solids,)
@@ -151,7 +152,7 @@ def _meshes(solids: Solids) -> Sequence[Mesh]:
 
 def _draw_solids(
     gl: Renderer,
-    meshes: Sequence[Mesh],
+    meshes: Sequence[Surface],
     camera: Camera,
     depth: DepthRange,
     colour: tuple[float, float, float, float],
