@@ -10,7 +10,7 @@ import numpy as np
 from scipy import ndimage
 
 from hairkit import Hull, Strands
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, read_only
+from hairkit.arrays import BoolArray, Float32Array, read_only, unit_vectors
 from hairkit.field.cell_shells import erode_cells
 from hairkit.field.diffusion import CellGraph, solve_screened
 from hairkit.field.growth_prior import ScalpComb
@@ -155,10 +155,10 @@ def blend(hull: Hull, band: Band, fields: Fields, options: Options) -> Float32Ar
     a_s = options.surface * np.exp(-off / options.surface_reach)
     a_v = 1 - np.minimum(a_s, 1)
     a_i = options.outward * near_scalp
-    mixed = a_s[:, None] * _unit(fields.surface) + a_v[:, None] * main
-    mixed += a_i[:, None] * slope + options.signed * _unit(fields.growth)
+    mixed = a_s[:, None] * unit_vectors(fields.surface) + a_v[:, None] * main
+    mixed += a_i[:, None] * slope + options.signed * unit_vectors(fields.growth)
     direction = np.zeros((*hull.grid.shape, 3), np.float32)
-    direction[hull.loose] = _unit(mixed)
+    direction[hull.loose] = unit_vectors(mixed)
     return read_only(direction)
 
 
@@ -182,10 +182,3 @@ def _distance_to(on: BoolArray, around: BoolArray, far: float) -> Float32Array:
         np.minimum(nearest[k:], square[:-k] + np.float32(k * k), out=nearest[k:])
         np.minimum(nearest[:-k], square[k:] + np.float32(k * k), out=nearest[:-k])
     return np.asarray(np.sqrt(nearest[around[box]]), np.float32)
-
-
-def _unit(vectors: Float32Array | Float64Array) -> Float64Array:
-    """Return vectors (N, 3) at length 1, those of no length unchanged."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    result: Float64Array = vectors / np.maximum(length, 1e-9)
-    return result
