@@ -23,11 +23,11 @@ import numpy as np
 from hairkit.arrays import UInt8Array
 from hairkit.cli.render import parse_size
 from hairkit.grooming.prepare_export import dense_groom
+from hairkit.imaging.picture_file import write_picture
 from hairkit.manager import Manager
 from hairkit.rendering import Lights, draw
 from hairkit.rendering.framing import framing_cameras
 from hairkit.rendering.picture import backdrop, display_width
-from hairkit.rendering.picture_file import write_picture
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 

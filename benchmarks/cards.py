@@ -17,14 +17,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from card_picture import TexturedMesh, draw_cards
 from hairkit_plugins import cards as plugin
 from hairkit_plugins.cards.build import CardSet, Level, build_cards
 
 from hairkit.head_model.template import default_head
+from hairkit.imaging.picture_file import write_picture
 from hairkit.rendering import draw, draw_coverage
-from hairkit.rendering.cards import TexturedMesh, draw_cards
 from hairkit.rendering.framing import framing_cameras
-from hairkit.rendering.picture_file import write_picture
 from hairkit.synth import grow
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom

@@ -19,12 +19,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
 from captures_argument import add_captures
 
 from hairkit.errors import HairkitError
 from hairkit.evaluation import Evaluation, Truth, evaluate, mask_iou, read_prediction, read_truth
 from hairkit.evaluation.report import write_report
-from hairkit.evaluation.scorecard import Figure, figures, mean_figures
+from hairkit.evaluation.scorecard import Figure, figures
 from hairkit.io.capture_reader import read_capture
 from hairkit.manager import Manager
 from hairkit.types.mask import HAIR
@@ -179,6 +180,15 @@ def _column(evaluation: Evaluation, run: Run, masks: float | None) -> tuple[Figu
         Figure(f"reconstruct, {run.roots} guides", run.seconds, " s"),
         Figure("peak memory", run.peak_gb, " GB", digits=2),
     )
+
+
+def mean_figures(several: Sequence[Sequence[Figure]]) -> tuple[Figure, ...]:
+    """Return the mean of each figure over evaluations whose figures come in the same order."""
+    means = []
+    for column in zip(*several, strict=True):
+        known = [figure.value for figure in column if figure.value is not None]
+        means.append(replace(column[0], value=float(np.mean(known)) if known else None))
+    return tuple(means)
 
 
 def _table(columns: Columns, recipes: Sequence[str], names: Sequence[str]) -> str:

@@ -15,17 +15,17 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from foreign_heads import FOREIGN_HEADS
 
 from hairkit.grooming.wrap import wrap_groom
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.head_model.template import default_head
+from hairkit.imaging.picture_file import write_picture
 from hairkit.io.head_reader import read_bare_head
 from hairkit.rendering.framing import framing_cameras
 from hairkit.rendering.picture import draw_views
-from hairkit.rendering.picture_file import write_picture
 from hairkit.synth import grow
-from hairkit.synth.foreign_heads import FOREIGN_HEADS
 from hairkit.types.groom import Groom
 
 STYLES = ("short", "wavy", "curly")

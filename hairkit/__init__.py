@@ -30,6 +30,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `colour`: the sRGB curve
 * `compilation`: the line that says that kernels are compiled
 * `errors`: errors that users can mend
+* `html_page`: pages that need no server
 * `hookspecs`: the hooks that plugins implement
 * `kernel_cache`: compiled functions of the machine, and those that a wheel brings along
 * `manager`: plugins by name
@@ -42,7 +43,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `storage`: safe files, frozen types as `.npz`
 * `testing`: a small head with hair for tests of plugins
 * `version`: the version of this package
-* `worker`: the other side of plugins in environments of their own
+* `worker`: what plugins in environments of their own answer by
 """
 
 from __future__ import annotations

@@ -213,9 +213,9 @@ def render(
         A simulation of the groom, and the frame of it to draw.
     """
     from hairkit.grooming.densify import densify
+    from hairkit.imaging.picture_file import write_picture
     from hairkit.rendering import draw
     from hairkit.rendering.framing import framing_cameras
-    from hairkit.rendering.picture_file import write_picture
     from hairkit.simulation.posing import pose_groom
 
     shown = _open(groom, manager)

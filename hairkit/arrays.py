@@ -55,6 +55,12 @@ def read_only(array: _Array) -> _Array:
     return array
 
 
+def unit_vectors(vectors: npt.NDArray[np.floating[Any]]) -> npt.NDArray[Any]:
+    """Return vectors (..., N) at length 1, those of nearly no length at less."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.maximum(length, 1e-9))
+
+
 def check_reach(values: npt.NDArray[np.floating[Any]], source: object, name: str) -> None:
     """Raise `FormatError` naming the source where a length or coordinate is beyond `MAX_REACH`."""
     farthest = float(np.abs(values).max(initial=0.0))

@@ -1,7 +1,7 @@
 """A program that answers questions, and may crash, hang, flood or eat memory without harm.
 
 Question and answer are JSON objects, one a line, on the program's stdin and stdout;
-`hairkit.worker` is the other side. A question has a number `id`; its answer has the same. Lines
+`hairkit.worker` answers there. A question has a number `id`; its answer has the same. Lines
 `{"id": 1, "tell": ...}` may come before. Whatever goes wrong is one `ChildError`, the process is
 ended with all that it started, and the next question starts a new one.
 """
@@ -13,14 +13,17 @@ import itertools
 import json
 import os
 import queue
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from hairkit.errors import HairkitError
@@ -39,6 +42,9 @@ ENDING_S = 2.0
 """Seconds that a process which closed its output is given to end by itself."""
 LARGEST_FILE = 2**32
 """Bytes of a file that a process may write."""
+IN_MEMORY, LEAST_FREE = "/dev/shm", 2**30
+"""Where a call's files lie on Linux, and bytes that must be free there; else with other temporary
+files."""
 _NOISE = -1
 """Stands on the queue for output without end."""
 
@@ -74,10 +80,13 @@ class ChildProcess:
         *,
         environment: Mapping[str, str] | None = None,
         folder: str | None = None,
+        address_bytes: int | None = None,
     ) -> None:
+        """Take a command, and the address space that Linux gives it: a second limit of memory."""
         self._command = tuple(command)
         self._environment = None if environment is None else dict(environment)
         self._folder = folder
+        self._address_bytes = address_bytes
         self._turn = threading.Lock()
         self._numbers = itertools.count(1)
         self._running: _Running | None = None
@@ -107,6 +116,15 @@ class ChildProcess:
                     raise ChildError("was stopped", limit=True) from error
                 raise
 
+    def ask_twice(self, question: Mapping[str, Any], limits: Limits) -> dict[str, Any]:
+        """Return the answer of `ask`; a process that somebody killed is replaced, once."""
+        try:
+            return self.ask(question, limits)
+        except ChildError as error:
+            if not error.killed:
+                raise
+            return self.ask(question, limits)
+
     @property
     def started(self) -> bool:
         """Whether there is a process."""
@@ -133,6 +151,7 @@ class ChildProcess:
         if self._running is None or not self._running.alive:
             self._end()
             self._running = _Running(self._command, self._environment, self._folder)
+            _limit(self._running.process.pid, self._address_bytes)
             weakref.finalize(self, _Running.end, self._running)
         return self._running
 
@@ -166,7 +185,6 @@ class _Running:
         self._lines: queue.SimpleQueue[bytes | int | None] = queue.SimpleQueue()
         self._printed = 0
         self._tail = b""
-        _limit_files(self.process.pid)
         self._readers = [
             threading.Thread(target=target, daemon=True) for target in (self._listen, self._hear)
         ]
@@ -285,6 +303,47 @@ class _Running:
                 self._tail = (self._tail + piece)[-TAIL_BYTES:]
 
 
+def ask_once(
+    program: Path,
+    question: Mapping[str, Any],
+    limits: Limits,
+    address_bytes: int | None = None,
+) -> dict[str, Any]:
+    """Return the result of the only question to a program of Python.
+
+    Raises `ChildError` where it gives none, an error of the program's own among the reasons.
+    """
+    child = ChildProcess((sys.executable, "-P", str(program)), address_bytes=address_bytes)
+    try:
+        answer = child.ask(question, limits)
+    finally:
+        child.close()
+    if "error" in answer:
+        raise ChildError(f"failed: {shortened(str(answer['error']))}")
+    return dict(answer["result"])
+
+
+def call_folder() -> tempfile.TemporaryDirectory[str]:
+    """Return a folder for the files of one call, in memory where the system has room there."""
+    return tempfile.TemporaryDirectory(
+        prefix="hairkit-call-", dir=memory_folder(), ignore_cleanup_errors=True
+    )
+
+
+def memory_folder() -> str | None:
+    """Return the system's folder in memory, None where it has none or little is left there.
+
+    `TMPDIR`, where it is set, is used instead.
+    """
+    if os.environ.get("TMPDIR"):
+        return None
+    try:
+        free = shutil.disk_usage(IN_MEMORY).free
+    except OSError:
+        return None
+    return IN_MEMORY if free > LEAST_FREE and os.access(IN_MEMORY, os.W_OK) else None
+
+
 def resident_bytes(pid: int) -> int:
     """Return the resident memory of a process and its descendants; 0 where Linux does not say."""
     try:
@@ -313,13 +372,19 @@ def _parsed(line: bytes) -> dict[str, Any]:
     return message
 
 
-def _limit_files(pid: int) -> None:
-    """Keep a process from filling the disk by one file, and from leaving its memory there."""
+def _limit(pid: int, address_bytes: int | None) -> None:
+    """Keep a process from filling the disk by one file or its core, and from more addresses.
+
+    A limit that is lower already stays.
+    """
     if sys.platform == "linux":
         import resource
 
-        with contextlib.suppress(OSError):
-            resource.prlimit(pid, resource.RLIMIT_CORE, (0, 0))
-            _, most = resource.prlimit(pid, resource.RLIMIT_FSIZE)
-            if most == resource.RLIM_INFINITY or most > LARGEST_FILE:
-                resource.prlimit(pid, resource.RLIMIT_FSIZE, (LARGEST_FILE, LARGEST_FILE))
+        limits = {resource.RLIMIT_CORE: 0, resource.RLIMIT_FSIZE: LARGEST_FILE}
+        if address_bytes is not None:
+            limits[resource.RLIMIT_AS] = address_bytes
+        for kind, wanted in limits.items():
+            with contextlib.suppress(OSError):
+                _, most = resource.prlimit(pid, kind)
+                if most == resource.RLIM_INFINITY or most > wanted:
+                    resource.prlimit(pid, kind, (wanted, wanted))

@@ -1,4 +1,4 @@
-"""The other side of a plugin that runs in an environment of its own.
+"""What the child runs: a plugin in an environment of its own answers hairkit by it.
 
 >>> import numpy as np
 >>> def segment(view, options):
@@ -124,7 +124,7 @@ def answer_questions(tasks: Mapping[str, Callable[..., Any]]) -> None:
 
     An error of a task is its answer. The process ends when stdin does, whatever it is doing.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the other side, which ends this
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends this
     answers = os.fdopen(os.dup(1), "wb", 0)
     os.dup2(2, 1)  # what a plugin prints is no answer
     source = os.fdopen(os.dup(0), "rb")

@@ -19,10 +19,9 @@ from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
 from hairkit.imaging.corrections import BRUSHED, Corrections, paint_to_edges
 from hairkit.imaging.hair_network import find_hair, mark_face
-from hairkit.imaging.masked_filters import picture_scale
-from hairkit.imaging.seeded_segmentation import label_from_probability, reduced_size
-from hairkit.io.strokes import rasterise, read_view_strokes
-from hairkit.options import option
+from hairkit.imaging.masked_filters import picture_scale, reduced_size
+from hairkit.imaging.seeded_segmentation import label_from_probability
+from hairkit.io.strokes import LINE_WIDTH, rasterise, read_view_strokes
 from hairkit.types.capture import View
 from hairkit.types.mask import HAIR, Mask
 
@@ -34,13 +33,6 @@ _LEAST_HAIR = 5e-4
 class Options:
     """Settings of the segmentation without strokes."""
 
-    reduced_height: int = option(
-        360, low=120, high=1080, doc="Rows of the picture that is segmented first.", unit="px"
-    )
-    thickness: float = option(
-        9.0, low=1.0, high=60.0, doc="Width of correcting lines in a photo 1080 px high.", unit="px"
-    )
-
 
 @hookimpl
 def segment(view: View, options: Options) -> Mask:
@@ -51,8 +43,8 @@ def segment(view: View, options: Options) -> Mask:
     InputError
         No hair was found.
     """
-    size = reduced_size(view.width, view.height, options.reduced_height)
-    corrections = _corrections(view, size, options.thickness)
+    size = reduced_size(view.width, view.height)
+    corrections = _corrections(view, size)
     labels, alpha = label_from_probability(
         view.image, find_hair(view), size, mark_face(view, size) > 0, corrections=corrections
     )
@@ -63,7 +55,7 @@ def segment(view: View, options: Options) -> Mask:
     return Mask(labels, person_known=True, alpha=alpha)
 
 
-def _corrections(view: View, size: tuple[int, int], thickness: float) -> Corrections | None:
+def _corrections(view: View, size: tuple[int, int]) -> Corrections | None:
     """Return what strokes say of the reduced picture's pixels."""
     drawn = read_view_strokes(view, *size)
     if drawn is None:
@@ -78,7 +70,7 @@ def _corrections(view: View, size: tuple[int, int], thickness: float) -> Correct
     for stroke in drawn.strokes:
         if stroke.label == "parting":
             continue
-        under = rasterise(stroke, *size, thickness * picture_scale(size[1]))
+        under = rasterise(stroke, *size, LINE_WIDTH * picture_scale(size[1]))
         is_hair = stroke.label == "foreground"
         hair[under], rest[under] = is_hair, not is_hair
         if stroke.radius is not None:

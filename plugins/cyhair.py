@@ -39,7 +39,7 @@ from hairkit.types.strands import Strands
 FORMAT = FileFormat(
     "cyHair",
     (".hair",),
-    exact=frozenset({Feature.POINTS, Feature.COUNTS, Feature.WIDTHS, Feature.COLOUR}),
+    exact={Feature.POINTS, Feature.COUNTS, Feature.WIDTHS, Feature.COLOUR},
 )
 
 SIGNATURES = (b"HAIR", b"hair")

@@ -46,6 +46,9 @@ _BASIS_TOLERANCE = 1e-4
 _TOP_QUANTILE = 0.99
 """Quantile of the confidence that becomes 1, so that outliers do not dim the rest."""
 
+_DOG_FINE, _DOG_WIDE = 0.4, 10.0
+"""Sigmas in pixels of the two Gaussians whose difference keeps detail."""
+
 _EDGE_SIGMA = 1.0
 """Gaussian in pixels by which the mask's edge, which mixes hair and backdrop, is left out."""
 
@@ -78,10 +81,8 @@ class Options:
         False, doc="Add the sine kernel: the response no longer depends on the stripe's phase."
     )
     difference_of_gaussians: bool = option(
-        False, doc="First keep only detail between dog_fine and dog_wide."
+        False, doc="First keep only detail, by a difference of Gaussians."
     )
-    dog_fine: float = option(0.4, low=0.1, high=10.0, doc="Narrow Gaussian.", unit="px")
-    dog_wide: float = option(10.0, low=0.5, high=100.0, doc="Wide Gaussian.", unit="px")
     interpolate: bool = option(
         False, doc="Place the angle between the filter directions by a parabola."
     )
@@ -96,7 +97,7 @@ def orient(view: View, mask: Mask, options: Options) -> OrientationMap:
     core = well_inside(hair[box], _EDGE_SIGMA)
     picture = luminance(view.image[box])
     if options.difference_of_gaussians:
-        picture = _band(fill_beyond(picture, core, options.dog_wide), options)
+        picture = _band(fill_beyond(picture, core, _DOG_WIDE))
 
     banks = gabor_kernels(options)
     bases = [_basis(bank) for bank in banks]
@@ -142,9 +143,9 @@ def gabor_kernels(options: Options) -> Float64Array:
     return np.asarray(bank, np.float64)
 
 
-def _band(picture: Float32Array, options: Options) -> Float32Array:
+def _band(picture: Float32Array) -> Float32Array:
     """Return the picture's difference of Gaussians."""
-    return blur(picture, options.dog_fine) - blur(picture, options.dog_wide)
+    return blur(picture, _DOG_FINE) - blur(picture, _DOG_WIDE)
 
 
 def _basis(bank: Float64Array) -> tuple[Float32Array, Float32Array]:

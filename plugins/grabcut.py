@@ -17,14 +17,13 @@ import numpy as np
 from hairkit.arrays import BoolArray, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
-from hairkit.imaging.masked_filters import picture_scale
+from hairkit.imaging.masked_filters import picture_scale, reduced_size
 from hairkit.imaging.seeded_segmentation import (
     UNKNOWN,
     LabelSettings,
     label_from_seeds,
-    reduced_size,
 )
-from hairkit.io.strokes import Stroke, Strokes, rasterise, read_view_strokes
+from hairkit.io.strokes import LINE_WIDTH, Stroke, Strokes, rasterise, read_view_strokes
 from hairkit.options import option
 from hairkit.types.capture import View
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
@@ -51,12 +50,6 @@ class Options:
         choices=("layered", "opencv"),
         doc="Three classes, or OpenCV's two-class GrabCut.",
     )
-    reduced_height: int = option(
-        360, low=120, high=1080, doc="Rows of the picture that is segmented first.", unit="px"
-    )
-    thickness: float = option(
-        9.0, low=1.0, high=60.0, doc="Width of lines in a photo 1080 px high.", unit="px"
-    )
     brightness: str = option(
         "as_is", choices=tuple(_GAMMA), doc="Preset applied to the photo before segmentation."
     )
@@ -70,7 +63,7 @@ def segment(view: View, options: Options) -> Mask | None:
 
     Strokes that only correct the automatic mask are left to the plugin that makes it.
     """
-    width, height = reduced_size(view.width, view.height, options.reduced_height)
+    width, height = reduced_size(view.width, view.height)
     strokes = read_view_strokes(view, width, height)
     if strokes is None or strokes.only_parting or strokes.corrects:
         return None
@@ -79,7 +72,7 @@ def segment(view: View, options: Options) -> Mask | None:
             f"{view.strokes_path}: no foreground stroke, draw at least one on the hair"
         )
     image = brighten(view.image, options.brightness)
-    thickness = options.thickness * picture_scale(height)
+    thickness = LINE_WIDTH * picture_scale(height)
     allowed = _inside(strokes, width, height)
     if options.model == "opencv":
         hair = _opencv_grabcut(image, strokes, allowed, thickness, options)

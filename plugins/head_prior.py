@@ -28,7 +28,8 @@ from hairkit.head_model.bare_head import mark_bare_head
 from hairkit.imaging.alpha_matting import refine_near_hair
 from hairkit.imaging.hair_colours import ALL_PHOTOS, HairPrior, label_colours
 from hairkit.imaging.hair_network import find_hair, mark_face
-from hairkit.imaging.seeded_segmentation import UNKNOWN, reduced_size
+from hairkit.imaging.masked_filters import reduced_size
+from hairkit.imaging.seeded_segmentation import UNKNOWN
 from hairkit.options import option
 from hairkit.types.capture import View
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Masks
@@ -53,9 +54,6 @@ stays, with 0.4 two specks go."""
 class Options:
     """Settings of the masks mended together."""
 
-    reduced_height: int = option(
-        360, low=120, high=1080, doc="Rows of the pictures that are labelled first.", unit="px"
-    )
     given: float = option(
         0.2,
         low=0.0,
@@ -104,7 +102,7 @@ def _mend(mask: Mask, prior: HairPrior, kept: UInt8Array) -> Mask:
 
 def _prior(view: View, mask: Mask, head: Head, camera: Camera, options: Options) -> HairPrior:
     """Return what network, mask, landmarks and head say about a view."""
-    size = reduced_size(view.width, view.height, options.reduced_height)
+    size = reduced_size(view.width, view.height)
     network = find_hair(view)
     given = _shares(mask, network.shape[1::-1])
     share = np.float32(options.given)

@@ -51,6 +51,8 @@ DISTANCE = 3
 """Channel of the internal distance after the three of the direction."""
 GROWTH = 4
 """Channel of the growth potential."""
+MAX_LENGTH = 1.2
+"""Metres of the longest strand."""
 CENTIMETRES = 100
 """Of a metre: the unit of the internal distance where the field has none of its own."""
 
@@ -63,7 +65,6 @@ class Options(FinishOptions):
     bound: float = option(
         1.6, low=1, high=10, doc="Internal distance at which a strand has left the hair."
     )
-    max_length: float = option(1.2, low=0.01, high=5, unit="m", doc="Longest strand.")
     reach: float = option(
         2.0,
         low=0.1,
@@ -186,7 +187,7 @@ def grow(
     """
     left = -field.grid.sample(field.growth, starts).astype(np.float64)
     ways = way + long_share(way) * np.maximum(left - way, 0)
-    steps = np.maximum(np.minimum(options.max_length, options.reach * ways) / options.step, 2)
+    steps = np.maximum(np.minimum(MAX_LENGTH, options.reach * ways) / options.step, 2)
     limits = np.stack([steps, ways / options.step], axis=1).astype(np.int64)
     points = np.zeros((len(starts), options.points, 3), np.float32)
     rules = Rules(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import MappingProxyType
 
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
@@ -14,7 +13,7 @@ FORMAT = FileFormat(
     "hairkit",
     (".npz",),
     exact=frozenset(Feature) - {Feature.GUIDE_WEIGHTS, Feature.ANIMATION},
-    partial=MappingProxyType({Feature.GUIDE_WEIGHTS: "made again from the guides"}),
+    partial={Feature.GUIDE_WEIGHTS: "made again from the guides"},
 )
 
 Options = ExportOptions

@@ -25,7 +25,7 @@ from hairkit.io.file_format import Feature, FileFormat
 from hairkit.storage import read_bytes
 from hairkit.types.groom import Groom
 
-FORMAT = FileFormat("NumPy, HairNet", (".npy", ".convdata"), exact=frozenset({Feature.POINTS}))
+FORMAT = FileFormat("NumPy, HairNet", (".npy", ".convdata"), exact={Feature.POINTS})
 
 _MAGIC = b"\x93NUMPY"
 _LONGEST_HEADER = 10_000

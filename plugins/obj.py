@@ -26,7 +26,7 @@ from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
-FORMAT = FileFormat("OBJ lines", (".obj",), exact=frozenset({Feature.POINTS, Feature.COUNTS}))
+FORMAT = FileFormat("OBJ lines", (".obj",), exact={Feature.POINTS, Feature.COUNTS})
 
 
 @dataclass(frozen=True)

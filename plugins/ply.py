@@ -11,14 +11,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Int64Array
 from hairkit.colour import linear_from_srgb, srgb_from_linear
-from hairkit.errors import FormatError, InputError
+from hairkit.errors import InputError
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
@@ -33,7 +32,7 @@ from hairkit.io.byte_reader import finite
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.io.ply_elements import read_elements, strand_order
+from hairkit.io.ply_elements import columns, read_elements, strand_order, vertex_points
 from hairkit.io.strand_blocks import blocks, colours
 from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom, HairMaterial
@@ -42,17 +41,15 @@ from hairkit.types.strands import Strands
 FORMAT = FileFormat(
     "PLY",
     (".ply",),
-    exact=frozenset(
-        {
-            Feature.POINTS,
-            Feature.COUNTS,
-            Feature.WIDTHS,
-            Feature.ROOT_UV,
-            Feature.GROUP,
-            Feature.GUIDE,
-        }
-    ),
-    partial=MappingProxyType({Feature.COLOUR: "8-bit sRGB"}),
+    exact={
+        Feature.POINTS,
+        Feature.COUNTS,
+        Feature.WIDTHS,
+        Feature.ROOT_UV,
+        Feature.GROUP,
+        Feature.GUIDE,
+    },
+    partial={Feature.COLOUR: "8-bit sRGB"},
 )
 
 _MOST_SEGMENTS = 2**16 - 1
@@ -85,12 +82,8 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
 def import_groom(path: Path, options: Options) -> Groom:
     """Read the strands, or put edges together to strands; a head is put under them."""
     elements = read_elements(read_bytes(path), path)
-    vertex = elements.get("vertex")
-    if vertex is None or not {"x", "y", "z"} <= set(vertex):
-        raise FormatError(f"{path}: has no element vertex with x, y and z")
-    with np.errstate(over="ignore"):  # what is not finite is refused below
-        points = np.stack([vertex[name] for name in "xyz"], axis=1).astype(np.float32)
-    finite(points, path, "vertices")
+    points = finite(vertex_points(elements, path), path, "vertices")
+    vertex = elements["vertex"]
     order, counts = strand_order(elements, len(points), path)
     strands, kept = pack_strands(options.space.points_to_head(points[order]), counts, path)
     rows = rows_kept(counts, kept)
@@ -151,11 +144,10 @@ def _with_strand_values(
     strands: Strands, values: dict[str, npt.NDArray[np.generic]], kept: Int64Array, path: Path
 ) -> Strands:
     """Return the strands with the root uv, groups and guide flags that the file has."""
-    uv, group, guide = None, None, None
-    if {"u", "v"} <= set(values):
-        with np.errstate(over="ignore"):
-            uv = np.stack([values["u"], values["v"]], axis=1).astype(np.float32)[kept]
-        finite(uv, path, "root uv")
+    group, guide = None, None
+    uv = columns(values, ("u", "v"))
+    if uv is not None:
+        uv = finite(uv[kept], path, "root uv")
     if "group" in values:
         group = finite(values["group"], path, "groups")[kept].astype(np.int32)
     if "guide" in values:

@@ -36,8 +36,6 @@ from hairkit.types.volume import outer_products
 
 FIXED = 1e3
 """Weight of known cells against the differences of neighbours: a Dirichlet condition."""
-TIP_SHARE = 0.6
-"""Cells this far along the longest way from the scalp count as tips, where growth ends."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,7 @@ def solve_field(
     field[hull.loose] = solve_screened(cells, tensor, weight, 1.0, tolerance=options.tolerance)
     confidence = np.zeros(hull.grid.shape, np.float32)
     confidence[hull.loose] = np.clip(weight, 0, 1)
-    growth = growth_potential(hull, scalp_distance, TIP_SHARE)
+    growth = growth_potential(hull, scalp_distance)
     return OrientationField(hull.grid, field, confidence, growth)
 
 

@@ -24,6 +24,11 @@ from hairkit.head_model.thin_plate_spline import ThinPlateSpline
 from hairkit.options import option
 from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 
+SMOOTHING, ANCHOR_SMOOTHING = 0.02, 1.0
+"""Metres: how far landmarks may be missed for a smoother bend, and the cranium's points, which hold
+still."""
+ANCHORS, CONTROLS = 60, 240
+"""Points that hold the cranium, and points that silhouettes push."""
 JAW_LOOSENESS = 3.0
 """Factor of the smoothing at the jaw's landmarks, which detectors place less surely."""
 OUTLINE_POINTS = 20
@@ -50,14 +55,6 @@ it."""
 class Options:
     """Settings of the bend."""
 
-    smoothing: float = option(
-        0.02, low=0, high=10, doc="How far landmarks may be missed for a smoother bend.", unit="m"
-    )
-    anchor_smoothing: float = option(
-        1.0, low=0, high=100, doc="The same for the cranium's points, which hold still.", unit="m"
-    )
-    anchors: int = option(60, low=4, high=1000, doc="Points that hold the cranium.")
-    controls: int = option(240, low=10, high=2000, doc="Points pushed by silhouettes.")
     margin: float = option(
         0.002, low=0, high=0.02, doc="How far the scalp stays inside silhouettes.", unit="m"
     )
@@ -72,7 +69,7 @@ def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: O
     head = _bend_to_landmarks(capture, scene, options)
     if options.rounds and all(mask.person_known for mask in masks):
         outlines = Outlines.of(masks, count=OUTLINE_POINTS)
-        controls = _spread(head, options.controls)
+        controls = _spread(head, CONTROLS)
         cranium = Cranium.of(head, masks, outlines.scale)
         for _ in range(options.rounds):
             head = _bend_to_outlines(head, scene.cameras, outlines, controls, cranium, options)
@@ -88,10 +85,10 @@ def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head
     cameras = [camera for camera, has in zip(scene.cameras, seen, strict=True) if has]
     points = triangulate(cameras, pixels)
     source = head.vertices[head.landmark_vertices].astype(np.float64)
-    held = spread_vertices(head, _cranium(head), options.anchors)
+    held = spread_vertices(head, _cranium(head), ANCHORS)
     anchors = head.vertices[held].astype(np.float64)
-    loose = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_LOOSENESS, 1.0) * options.smoothing
-    smoothing = np.concatenate([loose, np.full(len(anchors), options.anchor_smoothing)])
+    loose = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_LOOSENESS, 1.0) * SMOOTHING
+    smoothing = np.concatenate([loose, np.full(len(anchors), ANCHOR_SMOOTHING)])
     places = np.concatenate([source, anchors])
     moves = np.concatenate([points - source, np.zeros_like(anchors)])
     return _warp(head, places, moves, smoothing)
@@ -142,7 +139,7 @@ def _bend_to_outlines(
         share = np.where(np.abs(left - bulge) < ON_OUTLINE, rims[view] * bare_there, 0.0)
         pull, total = pull + share * way, total + share
     bare = total > LEAST_SHARE
-    smoothing = np.where(bare | (push > 0), options.smoothing, options.anchor_smoothing)
+    smoothing = np.where(bare | (push > 0), SMOOTHING, ANCHOR_SMOOTHING)
     move = np.where(bare, pull / np.maximum(total, LEAST_SHARE), -push)
     return _warp(head, places, move[:, None] * normals, smoothing)
 

@@ -30,7 +30,7 @@ from hairkit.types.strands import Strands
 FORMAT = FileFormat(
     "USC-HairSalon, CT2Hair",
     (".data", ".bin"),
-    exact=frozenset({Feature.POINTS, Feature.COUNTS}),
+    exact={Feature.POINTS, Feature.COUNTS},
 )
 
 

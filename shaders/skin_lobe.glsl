@@ -1,4 +1,4 @@
-// The oil on skin: a microfacet lobe, f = D F G / (4 (n.l) (n.v)); the twin of rendering/skin_lobe.py.
+// The oil on skin: a microfacet lobe, f = D F G / (4 (n.l) (n.v)); the twin of tests/support/skin_twins.py.
 // GGX and Beckmann with Smith's shadowing: Walter et al. 2007. Blinn-Phong as a distribution of
 // facets: Blinn 1977. Torrance-Sparrow: their V-shaped grooves with Beckmann's distribution,
 // Cook and Torrance 1982. Fresnel: Schlick 1994.

@@ -20,10 +20,10 @@ import numpy as np
 from hairkit.arrays import UInt8Array
 from hairkit.evaluation import Truth, read_prediction, read_truth
 from hairkit.evaluation.align import align, alignment_points
+from hairkit.imaging.picture_file import write_picture
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.rendering import draw_views
 from hairkit.rendering.framing import framing_cameras
-from hairkit.rendering.picture_file import write_picture
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
 

@@ -164,20 +164,21 @@ def _draw_thumbnail(folder: Path, photo: Any) -> str:
     """Write a small picture: of the contact sheet, else of the first photo; return its name."""
     import cv2
 
+    from hairkit.imaging.picture_file import write_picture
     from hairkit.pipeline.reconstruct import SHEET
-    from hairkit.storage import read_bytes, write_bytes
+    from hairkit.storage import read_bytes
 
     sheet = folder / SHEET
-    picture = photo[..., ::-1]
+    picture = photo
     if sheet.is_file():
         import numpy as np
 
         data = np.frombuffer(read_bytes(sheet), np.uint8)
-        picture = cv2.imdecode(data, cv2.IMREAD_COLOR)
+        decoded: Any = cv2.imdecode(data, cv2.IMREAD_COLOR)
+        picture = decoded[..., ::-1]
     scale = THUMBNAIL_EDGE / max(picture.shape[:2])
     small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    quality = [cv2.IMWRITE_JPEG_QUALITY, THUMBNAIL_QUALITY]
-    write_bytes(folder / THUMBNAIL, cv2.imencode(".jpg", small, quality)[1].tobytes())
+    write_picture(folder / THUMBNAIL, small, THUMBNAIL_QUALITY)
     return THUMBNAIL
 
 
@@ -193,7 +194,7 @@ def _scores(folder: Path, photos: Path | None) -> Mapping[str, float]:
 
 
 class _Told:
-    """Progress that tells the other side which stage has begun."""
+    """Progress that tells the parent which stage has begun."""
 
     def __init__(self, tell: Callable[[Any], None]) -> None:
         self._tell = tell

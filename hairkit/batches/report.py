@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from urllib.parse import quote
 
 from hairkit.batches.jobs import FAILED, Result
+from hairkit.html_page import page
 from hairkit.pipeline.health import GREEN, Figure
 from hairkit.remote import join, write_text
 
@@ -57,18 +58,14 @@ def _page(results: Sequence[Result], seconds: float) -> str:
     rows = "\n".join(_row(result) for result in results)
     made = [result.seconds for result in results if result.state != FAILED]
     mean = f", {sum(made) / len(made):.1f} s each" if made else ""
-    return f"""<!doctype html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>hairkit batch</title><style>{_STYLE}</style></head><body>
-<h1>Batch</h1>
-<p>{html.escape(summary(results, seconds))}{mean}.</p>
-<table><thead><tr><th>Capture</th><th>Result</th><th>Health</th><th class="wide">Scores</th>
-<th>Seconds</th><th class="wide">Memory</th></tr></thead>
-<tbody>
-{rows}
-</tbody></table></body></html>
-"""
+    heads = """<tr><th>Capture</th><th>Result</th><th>Health</th><th class="wide">Scores</th>
+<th>Seconds</th><th class="wide">Memory</th></tr>"""
+    return page(
+        "hairkit batch",
+        _STYLE,
+        f"<body><h1>Batch</h1>\n<p>{html.escape(summary(results, seconds))}{mean}.</p>",
+        f"<table><thead>{heads}</thead>\n<tbody>\n{rows}\n</tbody></table></body>",
+    )
 
 
 def _row(result: Result) -> str:

@@ -15,12 +15,12 @@ from hairkit.cli.settings import add_setting, importer_of, split_settings
 from hairkit.cli.written import add_json, print_written
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
+from hairkit.imaging.picture_file import write_picture
 from hairkit.io.capture_reader import TURN
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom
 from hairkit.rendering import Lights, draw_views
 from hairkit.rendering.framing import framing_cameras
-from hairkit.rendering.picture_file import write_picture
 from hairkit.simulation.posing import pose_groom
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom

@@ -20,6 +20,8 @@ from hairkit.types.orientation import OrientationMap
 LEVEL_COLOURS = ((20, 120, 20), (130, 190, 60), (240, 190, 40), (200, 30, 30))
 """Within 2 mm/20, 3 mm/30, 4 mm/40 degrees, and farther off."""
 _RIGHT, _WRONG = (60, 210, 90), (235, 60, 60)
+HEIGHT = 480
+"""Pixels of the pictures."""
 _BACKDROP = 24
 _FOUND, _TOO_MUCH, _MISSING = (200, 200, 200), (230, 60, 60), (60, 110, 240)
 """RGB of silhouettes: drawn and true, only drawn, only true."""
@@ -34,10 +36,8 @@ def view_pictures(
     truth: Truth,
     view: int,
     orientation: OrientationMap | None = None,
-    *,
-    height: int = 480,
 ) -> dict[str, UInt8Array]:
-    """Return captioned RGB pictures (height, W, 3) of one view."""
+    """Return captioned RGB pictures (HEIGHT, W, 3) of one view."""
     evidence = evaluation.evidence
     pictures = {
         "drawn direction: right green, wrong red": _directions(evaluation, truth, view),
@@ -49,7 +49,7 @@ def view_pictures(
         pictures["2D orientation error, black 0 to white 45 degrees"] = _orientation(
             orientation, truth, view
         )
-    return {caption: _small(picture, height) for caption, picture in pictures.items()}
+    return {caption: _small(picture, HEIGHT) for caption, picture in pictures.items()}
 
 
 def _directions(evaluation: Evaluation, truth: Truth, view: int) -> UInt8Array:

@@ -131,14 +131,13 @@ def hair_silhouette(
     head: Head,
     *,
     clothes: npt.NDArray[np.bool_] | None = None,
-    width: float = HAIR_WIDTH,
 ) -> BoolArray:
-    """Return (H, W) where hair drawn `width` metres wide stands before the head.
+    """Return (H, W) where hair drawn `HAIR_WIDTH` wide stands before the head.
 
     `clothes` (H, W) are pixels of the person. A truth has no mesh of the body below the neck; where
     a pixel of `clothes` misses the head, hair farther away than the neck's middle is hidden.
     """
-    depth = point_depth(camera, samples.points, width / 2)
+    depth = point_depth(camera, samples.points, HAIR_WIDTH / 2)
     hidden = head_depth(head, camera)
     if clothes is not None:
         hidden = np.where(clothes, np.minimum(hidden, camera.depth(_neck(head))), hidden)

@@ -8,16 +8,14 @@ import json
 import os
 from pathlib import Path
 
-import cv2
-import numpy as np
-import numpy.typing as npt
-
 from hairkit.evaluation.error_maps import LEVEL_COLOURS, view_pictures
 from hairkit.evaluation.evaluation import Evaluation
 from hairkit.evaluation.prediction import Prediction
 from hairkit.evaluation.scorecard import Figure, figures
 from hairkit.evaluation.scores import Score
 from hairkit.evaluation.truth import Truth
+from hairkit.html_page import page, table
+from hairkit.imaging.picture_file import encode_picture
 from hairkit.storage import write_text
 
 _JPEG_QUALITY = 82
@@ -25,8 +23,8 @@ _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 1800px; color: #222 }
 table { border-collapse: collapse; margin: 1em 0 }
 td, th { padding: .2em .8em; border-bottom: 1px solid #ddd; text-align: right }
-td:first-child, th:first-child, td.text { text-align: left }
-td.text { color: #555 }
+td:first-child, th:first-child, .words td:last-child { text-align: left }
+.words td:last-child { color: #555 }
 .view { display: flex; gap: 6px; flex-wrap: wrap }
 figure { margin: 0 } figcaption { font-size: 12px; color: #555 }
 .key { display: inline-block; width: 1em; height: 1em; vertical-align: -2px }
@@ -60,55 +58,47 @@ def score_rows(evaluation: Evaluation) -> list[tuple[str, tuple[Score, ...]]]:
 
 
 def _page(evaluation: Evaluation, prediction: Prediction, truth: Truth) -> str:
-    title = html.escape(f"{evaluation.strands} strands against {len(truth.strands)} true ones")
+    title = f"{evaluation.strands} strands against {len(truth.strands)} true ones"
     views = [
         _view(evaluation, prediction, truth, view, name) for view, name in enumerate(truth.names)
     ]
-    return "\n".join(
-        [
-            "<!doctype html><html lang=en><meta charset=utf-8>",
-            f"<title>{title}</title><style>{_STYLE}</style><h1>{title}</h1>",
-            _figure_table(figures(evaluation)),
-            _score_table(evaluation),
-            _view_table(evaluation, truth),
-            _key(),
-            *views,
-            "</html>\n",
-        ]
+    return page(
+        title,
+        _STYLE,
+        f"<h1>{html.escape(title)}</h1>",
+        _figure_table(figures(evaluation)),
+        _score_table(evaluation),
+        _view_table(evaluation, truth),
+        _key(),
+        *views,
     )
 
 
 def _figure_table(rows: tuple[Figure, ...]) -> str:
-    lines = ["<table><tr><th>figure<th>value<th>what is good"]
-    lines += [
-        f"<tr><td>{html.escape(row.name)}<td>{html.escape(row.text())}"
-        f"<td class=text>{html.escape(row.meaning)}"
-        for row in rows
-    ]
-    return "\n".join([*lines, "</table>"])
+    cells = ([html.escape(x) for x in (row.name, row.text(), row.meaning)] for row in rows)
+    return f"<div class=words>{table(['figure', 'value', 'what is good'], cells)}</div>"
 
 
 def _score_table(evaluation: Evaluation) -> str:
-    first = score_rows(evaluation)[0][1]
-    head = "".join(f"<th>{s.distance_mm:g} mm / {s.angle_deg:g}&deg; P, R, F" for s in first)
-    lines = [f"<table><tr><th>per cent{head}"]
-    for name, scores in score_rows(evaluation):
-        cells = "".join(
-            f"<td>{100 * s.precision:.1f}, {100 * s.recall:.1f}, <b>{100 * s.f:.1f}</b>"
-            for s in scores
-        )
-        lines.append(f"<tr><td>{name}{cells}")
-    return "\n".join([*lines, "</table>"])
+    rows = score_rows(evaluation)
+    heads = [f"{s.distance_mm:g} mm / {s.angle_deg:g}&deg; P, R, F" for s in rows[0][1]]
+    cells = [
+        [name]
+        + [f"{100 * s.precision:.1f}, {100 * s.recall:.1f}, <b>{100 * s.f:.1f}</b>" for s in scores]
+        for name, scores in rows
+    ]
+    return table(["per cent", *heads], cells)
 
 
 def _view_table(evaluation: Evaluation, truth: Truth) -> str:
-    lines = [
-        "<table><tr><th>view<th>azimuth error<th>rotation error<th>position error<th>reprojection"
-        "<th>drawn direction<th>silhouette IoU<th>2D orientation error<th>hair mask IoU"
-    ]
-    for view, (name, camera) in enumerate(zip(truth.names, evaluation.cameras, strict=True)):
-        bends, masks = evaluation.orientation_views, evaluation.mask_views
-        cells = (
+    heads = (
+        *("view", "azimuth error", "rotation error", "position error", "reprojection"),
+        *("drawn direction", "silhouette IoU", "2D orientation error", "hair mask IoU"),
+    )
+    bends, masks = evaluation.orientation_views, evaluation.mask_views
+    cells = [
+        (
+            html.escape(name),
             f"{camera.azimuth_deg:+.2f}&deg;",
             f"{camera.rotation_deg:.2f}&deg;",
             f"{1000 * camera.position_m:.1f} mm",
@@ -118,8 +108,9 @@ def _view_table(evaluation: Evaluation, truth: Truth) -> str:
             "-" if bends is None else f"{bends[view].mean_deg:.1f}&deg;",
             "-" if masks is None else f"{masks[view]:.3f}",
         )
-        lines.append(f"<tr><td>{html.escape(name)}" + "".join(f"<td>{cell}" for cell in cells))
-    return "\n".join([*lines, "</table>"])
+        for view, (name, camera) in enumerate(zip(truth.names, evaluation.cameras, strict=True))
+    ]
+    return table(heads, cells)
 
 
 def _key() -> str:
@@ -137,14 +128,9 @@ def _view(
     pictures = view_pictures(evaluation, truth, view, None if maps is None else maps[view])
     parts = [f"<h2>{html.escape(name)}</h2><div class=view>"]
     for caption, picture in pictures.items():
+        jpeg = base64.b64encode(encode_picture(picture, ".jpg", _JPEG_QUALITY)).decode()
         parts.append(
-            f"<figure><img alt='{html.escape(caption)}' src='{_data_url(picture)}'>"
+            f"<figure><img alt='{html.escape(caption)}' src='data:image/jpeg;base64,{jpeg}'>"
             f"<figcaption>{html.escape(caption)}</figcaption></figure>"
         )
     return "\n".join([*parts, "</div>"])
-
-
-def _data_url(picture: npt.NDArray[np.uint8]) -> str:
-    quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
-    _, data = cv2.imencode(".jpg", np.ascontiguousarray(picture[..., ::-1]), quality)
-    return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,15 +35,6 @@ class Figure:
 def figures(evaluation: Evaluation) -> tuple[Figure, ...]:
     """Return the figures of one evaluation, the most telling ones first."""
     return (*_strand_figures(evaluation), *_view_figures(evaluation), *_head_figures(evaluation))
-
-
-def mean_figures(several: Sequence[Sequence[Figure]]) -> tuple[Figure, ...]:
-    """Return the mean of each figure over evaluations whose figures come in the same order."""
-    means = []
-    for column in zip(*several, strict=True):
-        known = [figure.value for figure in column if figure.value is not None]
-        means.append(replace(column[0], value=float(np.mean(known)) if known else None))
-    return tuple(means)
 
 
 def _strand_figures(evaluation: Evaluation) -> tuple[Figure, ...]:

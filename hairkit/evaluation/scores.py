@@ -166,29 +166,28 @@ def scores_of_hits(
     )
 
 
-def occupancy_score(predicted: Samples, true: Samples, voxel: float = OCCUPANCY_VOXEL) -> Score:
+def occupancy_score(predicted: Samples, true: Samples) -> Score:
     """Return precision and recall of the voxels that strands run through, whatever the direction.
 
-    Voxels have edges of `voxel` metres and a corner at the origin. Counted once each, they do not
-    depend on the number of strands in them, which F of samples does.
+    Voxels have edges of `OCCUPANCY_VOXEL` from the origin. Counted once each, they do
+    not depend on the number of strands in them, which F of samples does.
     """
     mine, other = (
-        np.unique(np.floor(samples.points / voxel).astype(np.int64), axis=0)
+        np.unique(np.floor(samples.points / OCCUPANCY_VOXEL).astype(np.int64), axis=0)
         for samples in (predicted, true)
     )
     both = len(mine) + len(other) - len(np.unique(np.concatenate([mine, other]), axis=0))
-    return Score(1000 * voxel, ANY_DIRECTION, both / len(mine), both / len(other))
+    return Score(1000 * OCCUPANCY_VOXEL, ANY_DIRECTION, both / len(mine), both / len(other))
 
 
 def sample_strands(
     strands: Strands,
     *,
     marked: npt.ArrayLike | None = None,
-    step: float = SAMPLE_STEP,
     shortest: float = SHORTEST_STRAND,
     name: str = "given",
 ) -> Samples:
-    """Return samples every `step` metres of arc length, of the strands at least `shortest` long.
+    """Return samples every `SAMPLE_STEP` of arc length, of the strands at least `shortest` long.
 
     `marked` (P,) are flags of the native points; a sample takes that of the nearer one.
     """
@@ -201,7 +200,7 @@ def sample_strands(
     # Linear interpolation of 0/1 flags, cut at one half, is the flag of the nearer point;
     # the optional per-point channel of Strands carries them through the resampling.
     flags = None if marked is None else (np.asarray(marked) != 0).astype(np.float32)
-    dense = replace(strands, widths=flags).select(kept).resampled_by_length(step)
+    dense = replace(strands, widths=flags).select(kept).resampled_by_length(SAMPLE_STEP)
     vectors, first = dense.segments()
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     directions = (vectors / np.maximum(length, 1e-12)).astype(np.float32)

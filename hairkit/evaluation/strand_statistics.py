@@ -123,7 +123,6 @@ def strand_consistency(
     pred: Strands,
     true: Strands,
     *,
-    threshold: tuple[float, float] = THRESHOLDS[-1],
     every: int = 10,
 ) -> float:
     """Return how much of a true strand one single predicted strand follows, mean in [0, 1].
@@ -134,7 +133,7 @@ def strand_consistency(
     predicted = sample_strands(pred, name="predicted")
     chosen = true.select(np.arange(0, len(true), every))
     truth = sample_strands(chosen, name="true")
-    distance, angle = threshold
+    distance, angle = THRESHOLDS[-1]
     grid = HashGrid.build(predicted.points, predicted.directions, distance / 2)
     owner = predicted.strand[grid.source]
     starts = np.flatnonzero(np.diff(truth.strand, prepend=-1))

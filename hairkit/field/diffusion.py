@@ -17,6 +17,8 @@ from scipy.sparse import csr_matrix
 from hairkit.arrays import BoolArray, Float32Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 
+MOST_ITERATIONS = 400
+"""Steps of conjugate gradients at most."""
 COARSEST_CELLS = 4000
 """Below this many cells no coarser grid is made."""
 COARSE_TOLERANCE = 1e-2
@@ -73,7 +75,6 @@ def solve_screened(
     smoothness: float,
     *,
     tolerance: float = 1e-3,
-    max_iterations: int = 400,
     start: Float32Array | None = None,
 ) -> Float32Array:
     """Return the minimiser (N, C), one row for each cell in C order.
@@ -105,7 +106,7 @@ def solve_screened(
     guess = start if start is not None else _coarse_guess(cells, data, weight, smoothness)
     system = _System(cells.touching, weight + np.float32(smoothness) * cells.degree, smoothness)
     columns = [
-        _conjugate_gradients(system, weight * column, start, tolerance, max_iterations)
+        _conjugate_gradients(system, weight * column, start, tolerance)
         for column, start in zip(data.T, np.array(guess.T, np.float32, order="C"), strict=True)
     ]
     return np.stack(columns, axis=1)
@@ -168,7 +169,6 @@ def _conjugate_gradients(
     right: Float32Array,
     solution: Float32Array,
     tolerance: float,
-    max_iterations: int,
 ) -> Float32Array:
     """Return the solution (N,) by Jacobi-preconditioned conjugate gradients from a guess.
 
@@ -182,7 +182,7 @@ def _conjugate_gradients(
     direction = scaled.copy()
     energy = _product(residual, scaled)
     enough = tolerance**2 * _product(inverse * right, inverse * right)
-    for _ in range(max_iterations):
+    for _ in range(MOST_ITERATIONS):
         if _product(scaled, scaled) <= enough:
             break
         image = system.times(direction)

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float64Array
-from hairkit.field.growth_prior import TIP_SHARE, growth_potential
+from hairkit.field.growth_prior import growth_potential
 from hairkit.field.scalp_comb import comb_beside_parting, comb_scalp, see_front
 from hairkit.field.scalp_sight import look_at, see_scalp
 from hairkit.io.strokes import read_view_strokes
@@ -84,7 +84,7 @@ def measure_parting(
     front = see_front(sight, masks, cameras, head)
     if skin.seen:
         return comb_beside_parting(skin, front)
-    growth = growth_potential(hull, scalp_distance, TIP_SHARE)
+    growth = growth_potential(hull, scalp_distance)
     return comb_scalp(skin, front, sight, head, hull, growth)
 
 

@@ -34,6 +34,10 @@ and 0.058 in a bob of 15 cm, whose strands end too soon where the second is 0.1 
 the true one, not 0.86)."""
 PARTED_HAIR = 0.05
 """Longest way through the hair, in metres, from which hair is combed from a parting."""
+REACH = 0.02
+"""Metres from the scalp within which hair is combed."""
+LIFT = 0.6
+"""Outward part of the direction in which it is combed, against 1 along the scalp."""
 TIP_SHARE = 0.6
 """Cells this far along the longest way from the scalp count as tips."""
 TIP_SLOPE = 0.2
@@ -82,21 +86,19 @@ def comb_cells(
     head: Head,
     hull: Hull,
     growth: Float32Array,
-    reach: float,
-    lift: float,
     parting: Parting,
     hair_length: float,
 ) -> ScalpComb:
-    """Return `combing_direction` at the centres of loose cells less than `reach` off the head.
+    """Return `combing_direction` at the centres of loose cells less than `REACH` off the head.
 
     Gradients at centres are differences of cells.
     """
-    near = hull.head_distance[hull.loose] < reach
-    cells = hull.loose & (hull.head_distance < reach)
+    near = hull.head_distance[hull.loose] < REACH
+    cells = hull.loose & (hull.head_distance < REACH)
     at = hull.grid.centres_of(cells).astype(np.float64)
     outward = _unit(cell_slopes(hull.head_distance, cells))
     flow = _unit(cell_slopes(growth, cells))
-    return ScalpComb(near, _comb(head, at, outward, flow, lift, parting, hair_length))
+    return ScalpComb(near, _comb(head, at, outward, flow, LIFT, parting, hair_length))
 
 
 def _comb(
@@ -219,19 +221,19 @@ def measure_scalp_distance(head: Head, hull: Hull) -> ScalpDistance:
     return ScalpDistance(distance, float(np.percentile(distance[hull.dense], LENGTH_PERCENTILE)))
 
 
-def growth_potential(hull: Hull, from_scalp: ScalpDistance, tip_share: float) -> Float32Array:
+def growth_potential(hull: Hull, from_scalp: ScalpDistance) -> Float32Array:
     """Return minus the distance to the tips through the hair (X, Y, Z), metres, smoothed.
 
     It grows from root to tip. Tips are the dense cells whose distance from the scalp is at least
-    `tip_share` of the hair's length. In long hair the potential also grows among the tips, slowly,
+    `TIP_SHARE` of the hair's length. In long hair the potential also grows among the tips, slowly,
     with the distance from the scalp, so that strands have a sign up to their ends.
     """
     length = from_scalp.hair_length
-    tips = hull.dense & (from_scalp.values >= tip_share * length)
+    tips = hull.dense & (from_scalp.values >= TIP_SHARE * length)
     left = chamfer_distance(hull.loose, tips, hull.grid.spacing)
     known = np.isfinite(left)
     weight = smooth_volume(known.astype(np.float32), FLOW_SMOOTHING)
-    beyond = np.maximum(from_scalp.values - tip_share * length, 0)
+    beyond = np.maximum(from_scalp.values - TIP_SHARE * length, 0)
     left -= long_share(length) * TIP_SLOPE * beyond
     total = smooth_volume(np.where(known, left, 0).astype(np.float32), FLOW_SMOOTHING)
     smooth = total / np.maximum(weight, 1e-6)

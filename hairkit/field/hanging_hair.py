@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array, unit_vectors
 from hairkit.field.growth_prior import WHORL_BEHIND
 from hairkit.types.head import Head
 from hairkit.types.volume import Hull, OrientationField
@@ -38,16 +38,10 @@ def hanging_axes(head: Head, points: Float32Array, height: Float32Array) -> Floa
     hair inward under chin and neck.
     """
     at = np.asarray(points, np.float64)
-    outward = _unit(at * [1, 0, 1] + np.maximum(at, 0) * [0, 1, 0])
+    outward = unit_vectors(at * [1, 0, 1] + np.maximum(at, 0) * [0, 1, 0])
     top = head.vertices[np.argmax(head.vertices[:, 1])].astype(np.float64)
-    away = _unit((at - top + [0, 0, WHORL_BEHIND]) * [1, 0, 1])
+    away = unit_vectors((at - top + [0, 0, WHORL_BEHIND]) * [1, 0, 1])
     along = AWAY * away + [0.0, -1.0, 0.0]
-    along = _unit(along - np.sum(along * outward, axis=1, keepdims=True) * outward)
+    along = unit_vectors(along - np.sum(along * outward, axis=1, keepdims=True) * outward)
     lift = LIFT * np.clip(1 - height.astype(np.float64) / STANDS_OFF, 0, 1)
-    return _unit(along + lift[:, None] * outward)
-
-
-def _unit(vectors: Float64Array) -> Float64Array:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    unit: Float64Array = vectors / np.maximum(length, 1e-9)
-    return unit
+    return unit_vectors(along + lift[:, None] * outward)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float64Array
+from hairkit.arrays import Float64Array, unit_vectors
 from hairkit.types.head import Head
 from hairkit.types.parting import Parting
 from hairkit.types.volume import Hull
@@ -77,7 +77,7 @@ def comb_from_parting(
     if parting.fringe:
         share = front_share(head, at)[:, None]
         forward = _over_head(outward, -1.0)
-        combed = _unit((1 - share) * combed + share * forward)
+        combed = unit_vectors((1 - share) * combed + share * forward)
     return combed
 
 
@@ -87,19 +87,19 @@ def _comb_behind_front(parting: Parting, at: Float64Array, outward: Float64Array
         gap, near = cKDTree(parting.places).query(at, k=min(NEAREST, len(parting.places)))
         weight = np.exp(-0.5 * (gap / BETWEEN) ** 2) + LEAST_WEIGHT
         seen = np.einsum("nk,nki->ni", weight, parting.directions[near])
-        return _unit(_tangent(seen, outward))
+        return unit_vectors(_tangent(seen, outward))
     if parting.line is None:
         return _over_head(outward, 1.0)
     flat, away = at[:, [0, 2]], np.zeros_like(at)
     away[:, [0, 2]] = flat - _nearest_on(parting.line, flat)
     back = np.clip(SWEEP + SWEEP_SLOPE * (SWEEP_AT - at[:, 2]), -MOST_SWEEP, MOST_SWEEP)
     pull = DOWN * np.array([0.0, -1.0, 0.0]) + back[:, None] * np.array([0.0, 0.0, -1.0])
-    return _unit(_unit(_tangent(away, outward)) + _tangent(pull, outward))
+    return unit_vectors(unit_vectors(_tangent(away, outward)) + _tangent(pull, outward))
 
 
 def _over_head(outward: Float64Array, back: float) -> Float64Array:
     """Return unit tangents (N, 3) over the head from the face to the nape, or for -1 against it."""
-    return _unit(_tangent(back * np.cross(outward, [1.0, 0.0, 0.0]) + DROP, outward))
+    return unit_vectors(_tangent(back * np.cross(outward, [1.0, 0.0, 0.0]) + DROP, outward))
 
 
 def _nearest_on(line: Float64Array, at: Float64Array) -> Float64Array:
@@ -131,9 +131,3 @@ def root_lift(hull: Hull, points: npt.ArrayLike) -> Float64Array:
 def _tangent(vector: Float64Array, outward: Float64Array) -> Float64Array:
     tangent: Float64Array = vector - np.einsum("ij,ij->i", vector, outward)[:, None] * outward
     return tangent
-
-
-def _unit(vector: Float64Array) -> Float64Array:
-    length = np.linalg.norm(vector, axis=1, keepdims=True)
-    unit: Float64Array = vector / np.maximum(length, 1e-9)
-    return unit

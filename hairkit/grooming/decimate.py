@@ -18,6 +18,8 @@ from hairkit.errors import InputError
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
+SHAPE_WEIGHT = 0.5
+"""Metres between roots that weigh as much as a metre between shapes."""
 SAMPLES = 6
 """Points of a strand that its shape is compared at, besides the root."""
 ROUNDS = 12
@@ -35,7 +37,7 @@ class Clusters:
     """(S,) the cluster of every strand."""
 
 
-def decimate(groom: Groom, count: int, *, shape_weight: float = 0.5, seed: int = 0) -> Groom:
+def decimate(groom: Groom, count: int) -> Groom:
     """Return the groom with all its strands, `count` of them marked as guides.
 
     Parameters
@@ -44,21 +46,14 @@ def decimate(groom: Groom, count: int, *, shape_weight: float = 0.5, seed: int =
         Full hair; what it marks as guides is forgotten.
     count
         Guides wanted, 1 to the number of strands.
-    shape_weight
-        Metres of distance between roots that weigh as much as a metre between shapes: 0 clusters
-        by roots alone.
-    seed
-        Of the first means.
     """
-    clusters = cluster_strands(groom.strands, count, shape_weight, seed)
+    clusters = cluster_strands(groom.strands, count)
     guide = np.zeros(len(groom.strands), bool)
     guide[clusters.guides] = True
     return replace(groom, strands=replace(groom.strands, guide=guide))
 
 
-def cluster_strands(
-    strands: Strands, count: int, shape_weight: float = 0.5, seed: int = 0
-) -> Clusters:
+def cluster_strands(strands: Strands, count: int, seed: int = 0) -> Clusters:
     """Return `count` clusters of strands that start near each other and run alike.
 
     Raises
@@ -68,7 +63,7 @@ def cluster_strands(
     """
     if not 1 <= count <= len(strands):
         raise InputError(f"{count} guides are wanted, expected 1 to {len(strands)}, the strands")
-    features = _features(strands, shape_weight)
+    features = _features(strands)
     rng = np.random.default_rng(seed)
     sample = features
     if len(features) > max(TRAINED_ON, 4 * count):
@@ -82,11 +77,11 @@ def cluster_strands(
     return Clusters(guides, cKDTree(features[guides]).query(features)[1])
 
 
-def _features(strands: Strands, shape_weight: float) -> Float64Array:
+def _features(strands: Strands) -> Float64Array:
     """Return (S, 3 + 3 SAMPLES) roots, and points relative to them, in metres."""
     points = strands.resampled(SAMPLES + 1).points.reshape(len(strands), -1, 3).astype(np.float64)
     shape = (points[:, 1:] - points[:, :1]).reshape(len(strands), -1)
-    return np.hstack([points[:, 0], shape_weight / np.sqrt(SAMPLES) * shape])
+    return np.hstack([points[:, 0], SHAPE_WEIGHT / np.sqrt(SAMPLES) * shape])
 
 
 def _means(sample: Float64Array, count: int, rng: np.random.Generator) -> Float64Array:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array, unit_vectors
 from hairkit.field.growth_prior import gradient
 from hairkit.grooming.fringe import hang_fringe
 from hairkit.grooming.plait import plait
@@ -111,11 +111,11 @@ def _ways_to_tie(
             break
         p = at[going]
         outward = _outward(hull, p)
-        goal = _unit(_tangent(ring - p, outward))
+        goal = unit_vectors(_tangent(ring - p, outward))
         around = symmetric_matrices(hull.grid.sample(tensors, p + SKIN * outward))
-        measured = _unit(_tangent(np.einsum("nij,nj->ni", around, goal), outward))
-        wanted = _unit(goal + TRUST * (measured - goal))
-        heading[going] = _unit(heading[going] + wanted)
+        measured = unit_vectors(_tangent(np.einsum("nij,nj->ni", around, goal), outward))
+        wanted = unit_vectors(goal + TRUST * (measured - goal))
+        heading[going] = unit_vectors(heading[going] + wanted)
         p = p + STEP * heading[going]
         distance = hull.grid.sample(hull.head_distance, p)[:, None].astype(np.float64)
         at[going] = p + (SKIN - distance) * _outward(hull, p)
@@ -174,7 +174,7 @@ def _places_in_section(ways: Float64Array, last: Int64Array, tail: Tail) -> Floa
     The angle is that from which a strand comes, the radius grows with the length of its way.
     """
     come = ways[np.arange(len(ways)), last] - tail.tie.centre
-    frame = _unit(tail.spokes[0].astype(np.float64))
+    frame = unit_vectors(tail.spokes[0].astype(np.float64))
     angle = np.arctan2(come @ frame[1], come @ frame[0])
     order = np.argsort(angle, kind="stable")
     turn = np.empty(len(ways))
@@ -225,8 +225,3 @@ def _outward(hull: Hull, points: Float64Array) -> Float64Array:
 def _tangent(vector: Float64Array, outward: Float64Array) -> Float64Array:
     tangent: Float64Array = vector - np.einsum("ij,ij->i", vector, outward)[:, None] * outward
     return tangent
-
-
-def _unit(vector: Float64Array) -> Float64Array:
-    unit: Float64Array = vector / np.maximum(np.linalg.norm(vector, axis=-1, keepdims=True), 1e-9)
-    return unit

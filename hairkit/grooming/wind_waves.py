@@ -26,12 +26,10 @@ RAMP = 0.03
 """Metres from the root over which the radius grows from 0."""
 
 
-def add_waves(
-    strands: Strands, waves: Waves, seed: int = 0, ramp: float = RAMP, spread: float = 1.0
-) -> Strands:
+def add_waves(strands: Strands, waves: Waves, seed: int = 0, spread: float = 1.0) -> Strands:
     """Wind strands of equal point counts into helices around their own axes.
 
-    The radius grows from 0 over `ramp` metres from the root. The phase is a function of the root's
+    The radius grows from 0 over `RAMP` from the root. The phase is a function of the root's
     position, so a strand does not depend on how many others there are. It varies slowly over the
     scalp and again from wisp to wisp; hair within a wisp is in phase. Without a handedness, wisps
     turn either way. Radius and pitch vary from wisp to wisp, by `spread` times the usual share.
@@ -50,7 +48,7 @@ def add_waves(
     share = np.sqrt(2) * spread  # a sine's standard deviation is 1 over sqrt(2)
     pitch = waves.pitch * (1 + share * PITCH_SPREAD * np.sin(long))[:, None]
     radius = waves.radius * (1 + share * RADIUS_SPREAD * np.sin(wide))[:, None]
-    radius = radius * np.clip(arc / ramp, 0, 1)
+    radius = radius * np.clip(arc / RAMP, 0, 1)
     angle = phase[:, None] + turn * 2 * np.pi * arc / pitch
     offset = np.cos(angle)[..., None] * first + np.sin(angle)[..., None] * second
     wound = points + radius[..., None] * offset

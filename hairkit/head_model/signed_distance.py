@@ -11,7 +11,7 @@ On the default head a grid of 25,000 cells takes 0.04 s of processor time, one o
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,7 @@ from hairkit.head_model.bvh import (
 )
 from hairkit.parallel import compiled, compiled_with
 from hairkit.types.head import Head
+from hairkit.types.preview import Surface
 from hairkit.types.volume import VoxelGrid
 
 _FAR = 1e30
@@ -41,20 +42,6 @@ _WALK = 4
 """Steps along the surface at most that look for a nearer foot."""
 _SAME_PLACE = 1e-12
 """Metres along a line at which two feet are at one place."""
-
-
-class Surface(Protocol):
-    """A mesh: a head, a bust."""
-
-    @property
-    def vertices(self) -> Float32Array:
-        """(V, 3) metres."""
-        ...
-
-    @property
-    def faces(self) -> Int32Array:
-        """(F, 3) vertices of the triangles."""
-        ...
 
 
 class Cells(NamedTuple):

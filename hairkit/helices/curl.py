@@ -65,14 +65,6 @@ class Curl:
         """(S,) strands that have a curl."""
         return np.asarray(self.radius > 0)
 
-    def of_wisps(self, wisp: Int64Array) -> Curl:
-        """Return the curl of each wisp, in ascending order of the numbers in `wisp` (S,).
-
-        The median of its curled strands; a wisp most of whose strands are straight is straight.
-        """
-        _, index = np.unique(wisp, return_inverse=True)
-        return _join([self._median(index == k) for k in range(index.max(initial=-1) + 1)])
-
     def written_to(self, material: HairMaterial) -> HairMaterial:
         """Return the material with the median radius and pitch of all strands."""
         radius, pitch, _ = self._median(np.ones(len(self), bool))
@@ -88,19 +80,11 @@ class Curl:
         return float(np.median(self.radius[some])), float(np.median(self.pitch[some])), hand
 
 
-def measure_curl(strands: Strands, noise: float = NOISE) -> Curl:
-    """Return radius, pitch and handedness of every strand.
-
-    Parameters
-    ----------
-    strands
-        Strands, root first.
-    noise
-        Mean distance, metres, that is taken for noise and smoothed away by helix arcs.
-    """
+def measure_curl(strands: Strands) -> Curl:
+    """Return radius, pitch and handedness of every strand, root first."""
     if not len(strands):
         return _join([])
-    smooth = smooth_strands(strands, noise).resampled_by_length(STEP)
+    smooth = smooth_strands(strands, NOISE).resampled_by_length(STEP)
     bounds = zip(smooth.offsets[:-1], smooth.offsets[1:], strict=True)
     return _join([_curl_of(smooth.points[a:b].astype(np.float64)) for a, b in bounds])
 

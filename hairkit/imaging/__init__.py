@@ -10,6 +10,7 @@ measured over all views.
 * `hair_features`: what the hair network sees of a photo
 * `hair_network`: probability of hair, person and background by a small network
 * `masked_filters`: filters that respect a mask, means of undirected angles
+* `picture_file`: PNG and JPEG files
 * `seeded_segmentation`: hair, person and background from seeds
 * `relief`: bump and normal maps, pictures of differences
 * `skin_colour`: blood and melanin in an albedo

@@ -19,6 +19,8 @@ from hairkit.types.capture import View
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import wrap_angle
 
+REDUCED_HEIGHT = 360
+"""Rows of the picture that is labelled first; edges are then refined at full size."""
 REFERENCE_HEIGHT = 1080
 """Rows of the picture that options in pixels refer to; `picture_scale` converts them."""
 
@@ -30,6 +32,9 @@ _LEAST_CONTRAST = 0.25
 
 _MOST_CONTRAST = 3.0
 """Local deviations at which contrast is clipped, so that highlights do not dominate."""
+
+_SURROUNDED = 0.9
+"""Share of a pixel's surroundings on the mask from which it lies well inside."""
 
 _GREY_LEVEL = 1 / 255
 """One step of an 8-bit image."""
@@ -54,6 +59,12 @@ COHERENT_WINDOW = 9
 
 COHERENT_RESULTANT = 0.85
 """Least mean resultant of the double angles in that box."""
+
+
+def reduced_size(width: int, height: int) -> tuple[int, int]:
+    """Return (width, height) of the picture that is labelled first, `REDUCED_HEIGHT` at most."""
+    rows = min(height, REDUCED_HEIGHT)
+    return max(round(width * rows / height), 1), rows
 
 
 def picture_scale(height: int) -> float:
@@ -143,14 +154,14 @@ def bounding_box(mask: BoolArray, margin: int) -> tuple[slice, slice]:
     )
 
 
-def well_inside(mask: BoolArray, sigma: float, share: float = 0.9) -> BoolArray:
-    """Return the part of `mask` whose surroundings (Gaussian `sigma`) lie on it by `share` or more.
+def well_inside(mask: BoolArray, sigma: float) -> BoolArray:
+    """Return the part of `mask` whose surroundings (Gaussian `sigma`) lie on it, too.
 
     A mask that is too thin to have such a part is returned whole.
     """
     if sigma <= 0:
         return mask
-    core = mask & (blur(mask.astype(np.float32), sigma) >= share)
+    core = mask & (blur(mask.astype(np.float32), sigma) >= _SURROUNDED)
     return core if core.any() else mask
 
 
@@ -223,17 +234,12 @@ def single_angle(vectors: Float32Array) -> Float32Array:
     return wrap_angle(0.5 * np.arctan2(vectors[..., 1], vectors[..., 0]))
 
 
-def coherent_truth(
-    angle: Float32Array,
-    mask: BoolArray,
-    window: int = COHERENT_WINDOW,
-    resultant: float = COHERENT_RESULTANT,
-) -> BoolArray:
+def coherent_truth(angle: Float32Array, mask: BoolArray) -> BoolArray:
     """Return where a true orientation is coherent enough to be scored against.
 
     A pixel is coherent when the double-angle vectors of the known pixels in the box of edge
-    `window` around it have a mean of length at least `resultant`: where strands cross there is no
-    single orientation to compare with.
+    `COHERENT_WINDOW` around it have a mean of length at least `COHERENT_RESULTANT`: where strands
+    cross there is no single orientation to compare with.
 
     Parameters
     ----------
@@ -241,16 +247,14 @@ def coherent_truth(
         True strand angles in radians.
     mask : (H, W)
         Where the truth is known.
-    window, resultant
-        Edge of the box in pixels, least length of the mean in [0, 1].
     """
     weight = mask.astype(np.float32)
 
     def box(values: Float32Array) -> Float32Array:
         return np.asarray(
-            cv2.blur(values, (window, window), borderType=cv2.BORDER_CONSTANT), np.float32
+            cv2.blur(values, (COHERENT_WINDOW,) * 2, borderType=cv2.BORDER_CONSTANT), np.float32
         )
 
     total = box(double_angle(angle, weight))
     length = np.hypot(total[..., 0], total[..., 1])
-    return np.asarray(mask & (length >= resultant * box(weight)))
+    return np.asarray(mask & (length >= COHERENT_RESULTANT * box(weight)))

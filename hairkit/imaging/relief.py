@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, UInt8Array
+from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.errors import DataError
 
 _SCHARR_GAIN = 32.0
@@ -47,13 +47,6 @@ def normal_from_height(height: UInt8Array, depth: float) -> UInt8Array:
     normal = np.concatenate([slope, np.ones_like(slope[..., :1])], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     return np.asarray(np.rint(255 * (0.5 + 0.5 * normal)), np.uint8)
-
-
-def normals_of(pixels: UInt8Array) -> Float32Array:
-    """Return the unit normals (H, W, 3) of a normal map."""
-    normal = pixels.astype(np.float32) * np.float32(2 / 255) - 1
-    length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    return np.asarray(normal / np.maximum(length, 1e-9), np.float32)
 
 
 def draw_difference(before: UInt8Array, after: UInt8Array) -> UInt8Array:

@@ -104,12 +104,6 @@ class Mixture(NamedTuple):
         return np.asarray((self.weights @ terms + self.offsets[:, None]).max(axis=0), np.float32)
 
 
-def reduced_size(width: int, height: int, reduced_height: int) -> tuple[int, int]:
-    """Return (width, height) of a picture scaled down to at most `reduced_height` rows."""
-    rows = min(height, reduced_height)
-    return max(round(width * rows / height), 1), rows
-
-
 def label_from_seeds(
     image: UInt8Array,
     seeds: UInt8Array,
@@ -181,7 +175,6 @@ def label_from_probability(
     probability: Float32Array,
     size: tuple[int, int],
     face: BoolArray | None = None,
-    settings: LabelSettings | None = None,
     corrections: Corrections | None = None,
 ) -> tuple[UInt8Array, UInt8Array]:
     """Return labels (H, W) of the photo's pixels, and the opacity of the hair, 0 to 255.
@@ -199,13 +192,10 @@ def label_from_probability(
         Of the reduced picture that is labelled before the edges are refined.
     face : (height, width), optional
         Where colours do not count, because a beard, brows and glasses have those of the hair.
-    settings : LabelSettings, optional
-        Its weights of the distance from seeds are not used.
     corrections : Corrections, optional
         Where a user says that there is hair, and that there is none; what is like these places and
         near them follows.
     """
-    settings = settings or BESIDE_A_PRIOR
     prior = np.asarray(cv2.resize(probability, size, interpolation=cv2.INTER_CUBIC), np.float32)
     prior = np.clip(prior, np.float32(_LEAST_PROBABILITY), 1)
     colour, flat = _standard_features(image, *size)
@@ -215,7 +205,7 @@ def label_from_probability(
         prior = pull_prior(prior, costs, corrections)
     said = [] if corrections is None else [corrections.hair, corrections.rest]
     told = said if face is None else [face, *said]
-    posterior = _weigh_colours(prior, flat, told, settings)
+    posterior = _weigh_colours(prior, flat, told, BESIDE_A_PRIOR)
     labels = np.take(np.array(_ORDER, np.uint8), posterior.argmax(axis=-1))
     seeds = np.full_like(labels, UNKNOWN)
     if corrections is not None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from enum import StrEnum
-from types import MappingProxyType
 
 
 class Feature(StrEnum):
@@ -43,11 +42,11 @@ class FileFormat:
     """Name in the matrix: `Alembic`."""
     suffixes: tuple[str, ...]
     """Endings in lower case, dot first: `(".abc",)`."""
-    exact: frozenset[Feature] = frozenset()
+    exact: Set[Feature] = frozenset()
     """Export then import gives this back within float32."""
-    partial: Mapping[Feature, str] = field(default_factory=lambda: MappingProxyType({}))
+    partial: Mapping[Feature, str] = field(default_factory=dict)
     """Comes back changed; the text says how: `mean of each strand`."""
-    written: frozenset[Feature] = frozenset()
+    written: Set[Feature] = frozenset()
     """Written for other programs, not read back here (formats without importer: everything)."""
 
     def state(self, feature: Feature) -> str:

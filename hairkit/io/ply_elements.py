@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Int64Array
+from hairkit.arrays import Float32Array, Int64Array
 from hairkit.errors import FormatError
 from hairkit.io.byte_reader import ByteReader
 from hairkit.io.number_text import read_numbers
@@ -150,6 +151,24 @@ def _convert(
     if (values < limits.min).any() or (values > limits.max).any() or (values % 1).any():
         raise FormatError(f"{source}: holds numbers beyond the type of their property")
     return values.astype(kind)
+
+
+def vertex_points(elements: Elements, path: str | os.PathLike[str]) -> Float32Array:
+    """Return the vertices (P, 3), which may be infinite; raises `FormatError` without places."""
+    points = columns(elements.get("vertex", {}), ("x", "y", "z"))
+    if points is None:
+        raise FormatError(f"{path}: has no element vertex with x, y and z")
+    return points
+
+
+def columns(
+    values: Mapping[str, npt.NDArray[np.generic]], names: Sequence[str]
+) -> Float32Array | None:
+    """Return properties of an element (N, names) side by side; None where one is missing."""
+    if not set(names) <= set(values):
+        return None
+    with np.errstate(over="ignore"):  # the caller refuses what is not finite
+        return np.stack([values[name] for name in names], axis=1).astype(np.float32)
 
 
 def strand_order(

@@ -155,6 +155,10 @@ def read_view_strokes(view: View, width: int, height: int) -> Strokes | None:
     return strokes.scaled(width / drawn_on[0], height / drawn_on[1])
 
 
+LINE_WIDTH = 9.0
+"""Pixels that drawn lines are wide in a photo 1080 px high."""
+
+
 def rasterise(stroke: Stroke, width: int, height: int, thickness: float) -> BoolArray:
     """Return the pixels (height, width) under a stroke: an area, or a line `thickness` px wide."""
     canvas = np.zeros((height, width), np.uint8)

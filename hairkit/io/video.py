@@ -8,9 +8,6 @@ turn ran, is found later, by the stage `turn`.
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -21,6 +18,7 @@ import numpy.typing as npt
 from scipy.ndimage import median_filter
 
 from hairkit.arrays import Float64Array, Int64Array
+from hairkit.child_process import ChildError, Limits, ask_once
 from hairkit.errors import FormatError, InputError
 from hairkit.io import video_child
 from hairkit.storage import open_file, read_npz
@@ -68,7 +66,7 @@ def read_video(path: Path, max_edge: int, count: int = FRAMES) -> Capture:
         The file cannot be decoded, is cut short, too short, or nothing moves in it.
     """
     open_file(path).close()
-    found = _decode("scan", path, str(SMALL_WIDTH), str(MOST_SCANNED))
+    found = _decode("scan", path, width=SMALL_WIDTH, most=MOST_SCANNED)
     numbers, claimed, read = found["numbers"], int(found["claimed"]), int(found["read"])
     if read < LEAST_READABLE * claimed:
         raise FormatError(f"{path}: only {read} of {claimed} frames can be read; save it again")
@@ -76,7 +74,7 @@ def read_video(path: Path, max_edge: int, count: int = FRAMES) -> Capture:
         raise InputError(f"{path}: {len(numbers)} frames, expected a turn of at least {count}")
     chosen = choose_frames(frame_motion(found["small"]), found["sharp"], count, str(path))
     wanted = numbers[chosen]
-    picked = _decode("pick", path, str(max_edge), ",".join(map(str, wanted)))
+    picked = _decode("pick", path, edge=max_edge, numbers=wanted.tolist())
     if len(picked["frames"]) != count:
         raise FormatError(f"{path}: some frames cannot be read twice; save it again")
     width, height = (int(side) for side in picked["size"])
@@ -148,22 +146,17 @@ def choose_frames(
     return np.array(chosen)
 
 
-def _decode(mode: str, path: Path, *rest: str) -> dict[str, npt.NDArray[Any]]:
+def _decode(mode: str, path: Path, **values: Any) -> dict[str, npt.NDArray[Any]]:
     """Return the arrays that the process for decoding writes; `FormatError` when it fails."""
     with tempfile.TemporaryDirectory(prefix="hairkit-video-") as folder:
         out = Path(folder) / "frames.npz"
-        command = [sys.executable, "-P", video_child.__file__, mode, str(path.resolve()), str(out)]
+        question = {"do": mode, "video": str(path.resolve()), "out": str(out), **values}
         try:
-            done = subprocess.run(
-                [*command, *rest],
-                capture_output=True,
-                timeout=TIME_LIMIT_S,
-                env=os.environ | {"OPENCV_LOG_LEVEL": "SILENT"},
-            )
-        except subprocess.TimeoutExpired as error:
-            raise InputError(f"{path}: not decoded within {TIME_LIMIT_S:g} s; cut it") from error
-        if done.returncode or not out.is_file():
-            said = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
-            reason = said[0] if done.returncode == 1 and said else "the decoder crashed"
-            raise FormatError(f"{path}: not a readable video ({reason})")
+            answer = ask_once(Path(video_child.__file__), question, Limits(TIME_LIMIT_S))
+        except ChildError as error:
+            if error.limit:
+                raise InputError(f"{path}: its decoder {error}; cut it") from error
+            raise FormatError(f"{path}: not a readable video: its decoder {error}") from error
+        if "refused" in answer:
+            raise FormatError(f"{path}: not a readable video: {answer['refused']}")
         return read_npz(out)

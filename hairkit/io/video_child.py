@@ -1,18 +1,20 @@
 """The process that decodes a video: a damaged file may crash a decoder, and must not end a run.
 
-Run as `python video_child.py MODE VIDEO OUT.npz ...`; it knows nothing of hairkit.
+Asked for a `video`, it writes the arrays `out`, an .npz file, or answers why it is `refused`.
 
-* `scan`: WIDTH MOST, writes small grey frames, their numbers and their sharpness
-* `pick`: EDGE NUMBERS, writes the frames with these numbers, scaled down to the edge
+* `scan`: small grey frames of a `width`, at most twice as many as `most`, numbers and sharpness
+* `pick`: the frames with these `numbers`, scaled down to the `edge`
 """
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Callable
 from typing import Any
 
 import cv2
 import numpy as np
+
+from hairkit import worker
 
 
 def scan(video: Any, width: int, most: int) -> dict[str, Any]:
@@ -58,20 +60,27 @@ def pick(video: Any, edge: int, numbers: list[int]) -> dict[str, Any]:
     return {"frames": frames, "size": size}
 
 
-def main(mode: str, path: str, out: str, *rest: str) -> None:
-    """Do one of the two and write the arrays."""
+def main() -> None:
+    """Answer for both."""
     cv2.setNumThreads(1)
-    video = cv2.VideoCapture(path)
+    worker.answer_questions(
+        {
+            "scan": lambda asked, _: _write(asked, scan, asked["width"], asked["most"]),
+            "pick": lambda asked, _: _write(asked, pick, asked["edge"], asked["numbers"]),
+        }
+    )
+
+
+def _write(asked: dict[str, Any], find: Callable[..., dict[str, Any]], *rest: Any) -> Any:
+    """Write what is found in the video, if OpenCV opens it."""
+    video = cv2.VideoCapture(asked["video"])
     video.set(cv2.CAP_PROP_ORIENTATION_AUTO, 1)
     if not video.isOpened():
-        sys.exit("OpenCV cannot open it as a video")
-    if mode == "scan":
-        found = scan(video, int(rest[0]), int(rest[1]))
-    else:
-        found = pick(video, int(rest[0]), [int(number) for number in rest[1].split(",")])
-    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in found.items()}
-    np.savez(out, **arrays)
+        return {"refused": "OpenCV cannot open it"}
+    arrays: dict[str, Any] = {k: np.asarray(v) for k, v in find(video, *rest).items()}
+    np.savez(asked["out"], **arrays)
+    return {}
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

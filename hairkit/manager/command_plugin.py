@@ -2,7 +2,7 @@
 
 To the manager it is a plugin like any other: its functions, found by asking the command, send their
 arguments to the process and check what comes back. Arguments and results travel as JSON and npz in
-a folder that exists for the call. The other side is `hairkit.worker`.
+a folder that exists for the call. The child answers by `hairkit.worker`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ import json
 import os
 import queue
 import shlex
-import shutil
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit import hookspecs, worker
-from hairkit.child_process import ChildError, ChildProcess, Limits, shortened
+from hairkit.child_process import ChildError, ChildProcess, Limits, call_folder, shortened
 from hairkit.errors import DataError, HairkitError, OptionError, PluginError
 from hairkit.manager.guard import subject
 from hairkit.options import option, unknown_name
@@ -36,9 +34,6 @@ KINDS: dict[str, type] = {"bool": bool, "int": int, "float": float, "str": str, 
 """Types of options by the names that `hairkit.worker.option` gives them."""
 CLEARED = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "__PYVENV_LAUNCHER__")
 """Environment variables of this Python that would lead another one to the wrong packages."""
-IN_MEMORY, LEAST_FREE = "/dev/shm", 2**30
-"""Where a call's files lie on Linux, and bytes that must be free there; else with other temporary
-files."""
 LONGEST_TEXT = 2**24
 """Bytes of a result's JSON."""
 
@@ -159,9 +154,7 @@ class CommandPlugin:
         options = arguments.pop("options", None)
         values = {} if options is None else dataclasses.asdict(options)
         question = {"hook": hook, "options": values, "arguments": arguments}
-        with tempfile.TemporaryDirectory(
-            prefix="hairkit-call-", dir=memory_folder(), ignore_cleanup_errors=True
-        ) as at:
+        with call_folder() as at:
             folder = Path(at)
             worker.write_tree(question, folder / "call.json", folder / "arguments.npz")
             try:
@@ -172,15 +165,10 @@ class CommandPlugin:
             return read_result(OF_HOOK[hook].makes, folder)
 
     def _ask(self, question: Mapping[str, Any], limits: Limits) -> dict[str, Any]:
-        """Return an answer; a process that somebody killed is replaced, once."""
+        """Return an answer."""
         process = self._processes.get()
         try:
-            try:
-                message = process.ask(question, limits)
-            except ChildError as error:
-                if not error.killed:
-                    raise
-                message = process.ask(question, limits)
+            message = process.ask_twice(question, limits)
         except ChildError as error:
             raise PluginError(str(error)) from error
         finally:
@@ -210,20 +198,6 @@ def read_result(kind: type, folder: Path) -> Any:
     except (ValueError, ArithmeticError, LookupError, TypeError, RecursionError, OSError) as error:
         said = shortened(str(error).replace(f"{folder}/", ""))
         raise DataError(f"its result cannot be used: {said}") from error
-
-
-def memory_folder() -> str | None:
-    """Return the system's folder in memory, None where it has none or little is left there.
-
-    `TMPDIR`, where it is set, is used instead.
-    """
-    if os.environ.get("TMPDIR"):
-        return None
-    try:
-        free = shutil.disk_usage(IN_MEMORY).free
-    except OSError:
-        return None
-    return IN_MEMORY if free > LEAST_FREE and os.access(IN_MEMORY, os.W_OK) else None
 
 
 def _read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:

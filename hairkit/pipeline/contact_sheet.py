@@ -11,13 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import UInt8Array
-from hairkit.errors import InputError
 from hairkit.field.isosurface import volume_surface
 from hairkit.grooming.densify import densify
 from hairkit.grooming.prepare_export import select_strands
+from hairkit.imaging.picture_file import write_picture
 from hairkit.pipeline.health import AMBER, GREEN, RED, Figure
 from hairkit.rendering import Lights, Solid, draw_views
-from hairkit.storage import write_bytes
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.evidence import Evidence
@@ -75,11 +74,7 @@ def write_contact_sheet(
 
     Masks and orientation maps may have any size; they are shown over the photos of `capture`.
     """
-    sheet = contact_sheet(capture, evidence, groom, health)
-    done, data = cv2.imencode(".png", sheet[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
-    if not done:
-        raise InputError(f"{path}: the contact sheet of {sheet.shape[:2]} pixels cannot be encoded")
-    write_bytes(path, data.tobytes())
+    write_picture(path, contact_sheet(capture, evidence, groom, health), 1)
 
 
 def contact_sheet(

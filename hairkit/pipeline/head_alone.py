@@ -44,7 +44,6 @@ def photograph_head(
     recipe: Recipe | str | os.PathLike[str] = "default",
     manager: Manager | None = None,
     *,
-    head: Head | None = None,
     progress: Progress | None = None,
 ) -> Scene:
     """Return the head fitted to photos, with an albedo map taken from them, and the cameras.
@@ -58,8 +57,6 @@ def photograph_head(
         up to `head` and `texture` are run.
     manager
         The plugins; the installed ones when None.
-    head
-        The head to fit; None for the default head.
     progress
         Receives the progress of the run; None reports nothing.
 
@@ -77,7 +74,7 @@ def photograph_head(
         ThreadPoolExecutor(thread_count(), thread_name_prefix="hairkit") as pool,
     ):
         tell_missing(chosen, manager, log)
-        findings = Findings(StageRunner(chosen, manager, work, log, pool), given, head)
+        findings = Findings(StageRunner(chosen, manager, work, log, pool), given, None)
         scene = findings.scene.value
         return replace(scene, head=replace(scene.head, maps=findings.skin))
 

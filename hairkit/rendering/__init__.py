@@ -2,7 +2,6 @@
 
 The viewer shares its OpenGL context, cameras and lights.
 
-* `cards`: textured cards, as engines draw them
 * `context`: OpenGL contexts: EGL, else OSMesa
 * `fibre`: constants of the look of hair
 * `framebuffer`: frame buffers, supersampling, read-back
@@ -14,8 +13,7 @@ The viewer shares its OpenGL context, cameras and lights.
 * `measurement`: coverage, direction, depth and visibility of hair
 * `osmesa`: OSMesa contexts for moderngl
 * `picture`: shaded pictures
-* `picture_file`: PNG and JPEG files
-* `skin_lobe`: the two layers of skin, and twins of their shaders
+* `skin_lobe`: the two layers of skin
 * `skin_passes`: skin on the GPU
 """
 

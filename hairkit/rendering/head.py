@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -17,6 +17,7 @@ from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
 from hairkit.types.camera import Camera
 from hairkit.types.groom import HairMaterial
 from hairkit.types.head import Head
+from hairkit.types.preview import Surface
 from hairkit.types.skin import SkinMaps, Texture
 from hairkit.types.strands import Strands
 
@@ -32,20 +33,6 @@ MAP_UNIFORMS = {
     "roughness": ("u_rough", "u_has_rough"),
 }
 """Sampler of each map, and the uniform that says whether there is one."""
-
-
-class Mesh(Protocol):
-    """A triangle mesh: a `Head`, or anything else with vertices and faces."""
-
-    @property
-    def vertices(self) -> Float32Array:
-        """(V, 3) metres."""
-        ...
-
-    @property
-    def faces(self) -> Int32Array:
-        """(F, 3) vertex indices."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -135,7 +122,7 @@ def _upload(gl: Renderer, picture: Texture) -> moderngl.Texture:
 
 def draw_solid(
     gl: Renderer,
-    mesh: Mesh,
+    mesh: Surface,
     program: moderngl.Program,
     camera: Camera,
     depth: DepthRange,

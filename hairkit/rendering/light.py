@@ -16,8 +16,8 @@ import numpy.typing as npt
 from scipy.ndimage import uniform_filter
 
 from hairkit.arrays import Float32Array
-from hairkit.rendering.head import Mesh
 from hairkit.types.camera import Camera
+from hairkit.types.preview import Surface
 from hairkit.types.strands import Strands
 from hairkit.types.volume import VoxelGrid
 
@@ -107,7 +107,7 @@ class LightVolume:
         }
 
 
-def hair_density(strands: Strands, solids: Sequence[Mesh]) -> Density:
+def hair_density(strands: Strands, solids: Sequence[Surface]) -> Density:
     """Return the extinction of hair and meshes on a grid around them."""
     points = [strands.points, *[solid.vertices for solid in solids]]
     low = np.min([p.min(axis=0) for p in points if len(p)], axis=0) - 3 * CELL
@@ -148,7 +148,7 @@ def _hair_extinction(grid: VoxelGrid, strands: Strands) -> Float32Array:
     return np.asarray(uniform_filter(extinction.astype(np.float32), 3), np.float32)
 
 
-def _mark_below_surface(marks: Float32Array, grid: VoxelGrid, solid: Mesh) -> None:
+def _mark_below_surface(marks: Float32Array, grid: VoxelGrid, solid: Surface) -> None:
     """Set the cells just below the surface of a mesh to 1."""
     corners = solid.vertices[solid.faces].astype(np.float64)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

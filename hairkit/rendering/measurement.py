@@ -12,12 +12,13 @@ from hairkit.rendering.context import Renderer, renderer
 from hairkit.rendering.framebuffer import SUPERSAMPLE, average_samples, supersample_camera, target
 from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.hair import draw_ribbons, ribbons
-from hairkit.rendering.head import Mesh, draw_solid
+from hairkit.rendering.head import draw_solid
 from hairkit.types.camera import Camera
 from hairkit.types.orientation import wrap_angle
+from hairkit.types.preview import Surface
 from hairkit.types.strands import Strands
 
-Solids = Mesh | Sequence[Mesh] | None
+Solids = Surface | Sequence[Surface] | None
 """Occluders of hair: a head, several meshes, or None."""
 
 HEAD_PUSH = 0.002
@@ -34,22 +35,21 @@ def draw_layers(
     camera: Camera,
     *,
     width: float | Float32Array = 5e-4,
-    min_width_px: float = 1.0,
-    supersample: int = SUPERSAMPLE,
 ) -> tuple[Float32Array, Float32Array]:
     """Return the coverage (H, W) of each pixel, 0 to 1, by visible hair and by bare meshes.
 
-    `width` is the drawn diameter in metres, a number or (P,); `min_width_px` its minimum in pixels.
+    `width` is the drawn diameter in metres, a number or (P,); a pixel at least.
     """
-    fine = supersample_camera(camera, supersample)
+    fine = supersample_camera(camera, SUPERSAMPLE)
     meshes = _meshes(solids)
     depth = DepthRange.around(fine, strands.points, *[mesh.vertices for mesh in meshes])
     with renderer() as gl, target(gl, fine) as picture:
         _draw_solids(gl, meshes, fine, depth, _SOLID)
-        least = min_width_px * supersample
         program = gl.program("hair_flat", "flat")
         with ribbons(gl, strands, width) as buffers:
-            draw_ribbons(gl, buffers, program, fine, depth, min_width_px=least, u_colour=_HAIR)
+            draw_ribbons(
+                gl, buffers, program, fine, depth, min_width_px=SUPERSAMPLE, u_colour=_HAIR
+            )
         samples = np.asarray(picture.read()[..., :2], np.float32)
     shares = average_samples(samples, camera) / np.float32(255)
     return shares[..., 0], shares[..., 1]
@@ -73,7 +73,6 @@ def draw_measurements(
     camera: Camera,
     *,
     width: float | Float32Array = 2e-4,
-    min_width_px: float = 1.0,
 ) -> Measurements:
     """Return direction and depth of the visible strand at each pixel, in one pass."""
     meshes = _meshes(solids)
@@ -82,7 +81,7 @@ def draw_measurements(
         _draw_solids(gl, meshes, camera, depth, _NOTHING)
         program = gl.program("hair_direction")
         with ribbons(gl, strands, width) as buffers:
-            draw_ribbons(gl, buffers, program, camera, depth, min_width_px=min_width_px)
+            draw_ribbons(gl, buffers, program, camera, depth)
         values: Float32Array = np.asarray(picture.read(), np.float32)
     seen: BoolArray = values[..., 3] > 0.5
     angle = wrap_angle(np.arctan2(values[..., 1], values[..., 0]))
@@ -99,10 +98,9 @@ def draw_coverage(
     camera: Camera,
     *,
     width: float | Float32Array = 5e-4,
-    min_width_px: float = 1.0,
 ) -> Float32Array:
     """Return the coverage (H, W) of each pixel, 0 to 1, by hair in front of the head."""
-    return draw_layers(strands, head, camera, width=width, min_width_px=min_width_px)[0]
+    return draw_layers(strands, head, camera, width=width)[0]
 
 
 def draw_directions(
@@ -111,13 +109,12 @@ def draw_directions(
     camera: Camera,
     *,
     width: float | Float32Array = 2e-4,
-    min_width_px: float = 1.0,
 ) -> tuple[Float32Array, BoolArray]:
     """Return the 2D angle (H, W) of the visible strand at each pixel, and where there is one.
 
     Angles are undirected, in [0, pi), from +x towards +y, as in `OrientationMap`; 0 without hair.
     """
-    measured = draw_measurements(strands, head, camera, width=width, min_width_px=min_width_px)
+    measured = draw_measurements(strands, head, camera, width=width)
     return measured.angle, measured.seen
 
 
@@ -127,10 +124,9 @@ def draw_depth(
     camera: Camera,
     *,
     width: float | Float32Array = 2e-4,
-    min_width_px: float = 1.0,
 ) -> Float32Array:
     """Return the axial depth (H, W) of the visible strand at each pixel, metres, else infinity."""
-    return draw_measurements(strands, head, camera, width=width, min_width_px=min_width_px).depth
+    return draw_measurements(strands, head, camera, width=width).depth
 
 
 def visible_points(strands: Strands, head: Solids, camera: Camera) -> BoolArray:
@@ -148,7 +144,7 @@ def points_at_depth(strands: Strands, depth: Float32Array, camera: Camera) -> Bo
     return seen
 
 
-def _meshes(solids: Solids) -> Sequence[Mesh]:
+def _meshes(solids: Solids) -> Sequence[Surface]:
     if solids is None:
         return ()
     return solids if isinstance(solids, Sequence) else (solids,)
@@ -156,7 +152,7 @@ def _meshes(solids: Solids) -> Sequence[Mesh]:
 
 def _draw_solids(
     gl: Renderer,
-    meshes: Sequence[Mesh],
+    meshes: Sequence[Surface],
     camera: Camera,
     depth: DepthRange,
     colour: tuple[float, float, float, float],

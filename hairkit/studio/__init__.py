@@ -6,7 +6,6 @@ processes of its own, and all state is in the project's folder.
 * `app`: pages, routes and guard as one server
 * `capture_guides`: where the head should be in each picture of a turn
 * `clean_photo`: photos without what their files tell of a person
-* `draw_examples`: right and wrong pictures for the Camera page
 * `events`: what changed, sent to pages
 * `feedback`: what is said about a photo, one list for all
 * `guard`: who may ask for what
@@ -20,7 +19,7 @@ processes of its own, and all state is in the project's folder.
 * `routes`: what pages ask
 * `strand_picture`: the strands found in a photo, drawn over it
 * `studio`: one project being worked on
-* `task_child`: the other end of a process for tasks
+* `task_child`: the program that does tasks, in that process
 * `task_process`: a process for tasks, replaced when it dies
 * `tasks`: what these processes do
 * `uploads`: bodies of requests within limits

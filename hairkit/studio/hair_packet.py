@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import UInt8Array
 from hairkit.grooming.densify import densify
+from hairkit.imaging.picture_file import encode_picture
 from hairkit.rendering.head import Solid, bust_solid, head_solid
 from hairkit.storage import write_bytes
 from hairkit.types.groom import Groom
@@ -115,9 +116,8 @@ def _skin(head: Head) -> dict[str, UInt8Array]:
     pixels = head.maps.albedo.pixels
     scale = min(1.0, SKIN_EDGE / max(pixels.shape[:2]))
     small = cv2.resize(pixels, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    options = [cv2.IMWRITE_JPEG_QUALITY, SKIN_QUALITY]
-    data = cv2.imencode(".jpg", small[..., ::-1], options)[1]
-    return {"head_skin": np.asarray(data, np.uint8).ravel()}
+    data = encode_picture(np.asarray(small, np.uint8), ".jpg", SKIN_QUALITY)
+    return {"head_skin": np.frombuffer(data, np.uint8)}
 
 
 def _carriers(

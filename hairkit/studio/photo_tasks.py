@@ -14,6 +14,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from hairkit.imaging.picture_file import write_picture
 from hairkit.io.capture_reader import MOST, WORKING_EDGE
 from hairkit.io.capture_toml import read_capture_file
 from hairkit.io.photos import read_photo
@@ -22,7 +23,6 @@ from hairkit.options import make_options
 from hairkit.pipeline.recipe import Choice, Recipe, load_recipe
 from hairkit.pipeline.single_photo import SeenPhoto, see_photo
 from hairkit.stages import FACES, PERSONS
-from hairkit.storage import write_bytes
 from hairkit.studio.feedback import judge_view
 from hairkit.types.capture import View
 from hairkit.types.chosen import ChosenHair
@@ -39,7 +39,7 @@ OUTLINE_TOLERANCE = 0.6
 Tell = Callable[[dict[str, Any]], None]
 
 
-def look(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def look(request: dict[str, Any], tell: Tell) -> Any:
     """Return what is wrong with a small picture of the camera, `incoming`, for an `azimuth`."""
     from hairkit.studio.capture_guides import hair_line  # loads OpenGL
 
@@ -49,7 +49,7 @@ def look(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> An
     return {"feedback": codes, "yaw": None if view.face is None else view.face.yaw_deg}
 
 
-def find_outline(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def find_outline(request: dict[str, Any], tell: Tell) -> Any:
     """Return the hair of a `photo` as closed curves in its pixels, by the recipe's `segment`.
 
     `strokes` and `mask` are the files that belong to the photo, or None; `landmarks` those that
@@ -75,13 +75,13 @@ def find_outline(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool
     }
 
 
-def follow_strands(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def follow_strands(request: dict[str, Any], tell: Tell) -> Any:
     """Find the strands of a photo whose mask stands; previews take them from `seen`."""
     _see(request, strands=True)
     return {}
 
 
-def prepare_photo(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def prepare_photo(request: dict[str, Any], tell: Tell) -> Any:
     """Find in a photo of full size what a whole run needs of it, into its folder `ahead`.
 
     Its strands only where strokes or a mask file decide its mask: others are mended by all views.
@@ -91,7 +91,7 @@ def prepare_photo(request: dict[str, Any], tell: Tell, stopped: Callable[[], boo
     return {}
 
 
-def draw_strands(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def draw_strands(request: dict[str, Any], tell: Tell) -> Any:
     """Draw the strands that `orient` finds in a `photo` into the PNG file `path`.
 
     `options` are those of its plugin, `tone` is brightness and contrast; the rest is as for
@@ -103,13 +103,11 @@ def draw_strands(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool
     found = manager().call(
         "orient", oriented().plugin, request["options"], view=seen.view.toned(), mask=seen.mask
     )
-    lines = draw_strand_lines(found)
-    data = cv2.imencode(".png", lines[..., [2, 1, 0, 3]], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
-    write_bytes(request["path"], data.tobytes(), durable=False)
+    write_picture(request["path"], draw_strand_lines(found), 1, durable=False)
     return {}
 
 
-def describe_choices(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def describe_choices(request: dict[str, Any], tell: Tell) -> Any:
     """Return what can be chosen for the project in `folder`, and what is."""
     chosen = read_capture_file(Path(request["folder"]) / "capture.toml").chosen
     stage = oriented(chosen.settings)
@@ -132,7 +130,7 @@ def describe_choices(request: dict[str, Any], tell: Tell, stopped: Callable[[], 
     }  # fmt: skip
 
 
-def check_choices(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def check_choices(request: dict[str, Any], tell: Tell) -> Any:
     """Return plugin, options and hair of a request as they are kept; `HairkitError` if wrong."""
     plugin = oriented().plugin
     options = asdict(manager().options(plugin, request["options"]))

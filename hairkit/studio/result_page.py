@@ -6,6 +6,7 @@ import base64
 import re
 from pathlib import Path
 
+from hairkit.html_page import page
 from hairkit.storage import read_bytes, read_text
 
 SCRIPTS = ("hair_motion.js", "hair_shaders.js", "hair_view.js", "hair_controls.js")
@@ -19,7 +20,7 @@ def result_page(packet: Path) -> bytes:
     scripts = [read_text(pages / name) for name in SCRIPTS]
     code = "\n".join(_without_modules(script) for script in scripts)
     data = base64.b64encode(read_bytes(packet)).decode()
-    return _PAGE.format(style=style, code=code, data=data).encode()
+    return page("Hair", style, _BODY.format(code=code, data=data)).encode()
 
 
 def _without_modules(script: str) -> str:
@@ -28,15 +29,10 @@ def _without_modules(script: str) -> str:
     return re.sub(r"^export ", "", script, flags=re.MULTILINE)
 
 
-_PAGE = """<!doctype html>
-<html lang="en"><head><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>Hair</title><style>{style}</style></head>
-<body class="alone"><main id="hair" class="stage"></main>
+_BODY = """<body class="alone"><main id="hair" class="stage"></main>
 <script type="module">
 {code}
 const text = atob("{data}");
 const bytes = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
 showHair(document.getElementById("hair"), bytes.buffer);
-</script></body></html>
-"""
+</script></body>"""

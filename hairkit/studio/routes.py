@@ -309,7 +309,7 @@ class Routes:
         return JSONResponse({}, HTTPStatus.ACCEPTED)
 
     async def _stop(self, request: Request) -> Response:
-        await self._studio.stop_build()
+        self._studio.stop_build()
         return JSONResponse({}, HTTPStatus.ACCEPTED)
 
     async def _hair(self, request: Request) -> Response:

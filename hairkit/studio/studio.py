@@ -73,7 +73,8 @@ class Studio:
         for task in self._tasks:
             task.cancel()
         self.events.close()
-        await asyncio.gather(self.editor.close(), self.builder.close(), self.drafter.close())
+        for process in (self.editor, self.builder, self.drafter):
+            process.close()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     def changed(self, ask: bool = False, touched: Collection[str] | None = None) -> None:
@@ -186,9 +187,9 @@ class Studio:
             "ahead": str(project.result / "work" / AHEAD / stem),
         }
 
-    async def stop_build(self) -> None:
+    def stop_build(self) -> None:
         """End a build that is running, at the end of its step."""
-        await self.builder.stop()
+        self.builder.stop()
 
     async def _look(self) -> None:
         """Find what is not known yet of the photos, one after the other."""
@@ -311,7 +312,7 @@ class Studio:
 
     async def _stop_on_change(self) -> None:
         await self._wanted.wait()
-        await self.drafter.stop()
+        self.drafter.stop()
 
     async def _build(self) -> None:
         project, inputs = self.project, self.project.inputs()

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import itertools
-import json
-import os
+import secrets
 import sys
+import tempfile
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
+from hairkit.child_process import ChildError, ChildProcess, Limits
 from hairkit.errors import HairkitError
 
-LONGEST_LINE = 64 * 2**20
-"""Bytes of an answer."""
 COMMAND = (sys.executable, "-P", "-m", "hairkit.studio.task_child")
 """What is started."""
 TRIES = 6
@@ -30,10 +28,10 @@ class TaskProcess:
     """One process; calls take turns in the order in which they came."""
 
     def __init__(self) -> None:
-        self._process: asyncio.subprocess.Process | None = None
+        self._child = ChildProcess(COMMAND)
         self._turn = asyncio.Lock()
-        self._numbers = itertools.count(1)
-        self._running = 0
+        self._stop = Path(tempfile.gettempdir()) / f"hairkit-stop-{secrets.token_hex()}"
+        """A file that is there once the task is to end."""
 
     async def call(
         self,
@@ -52,77 +50,39 @@ class TaskProcess:
         TaskError
             The task failed, took longer than `limit_s`, or ended `TRIES` processes.
         """
+        loop = asyncio.get_running_loop()
+
+        def hear(event: dict[str, Any]) -> None:
+            if tell is not None:
+                loop.call_soon_threadsafe(tell, event)
+
+        question = {"do": do, "stop": str(self._stop), **(values or {})}
         async with self._turn:
+            self._stop.unlink(missing_ok=True)
             for _ in range(TRIES):
-                number = self._running = next(self._numbers)
+                child = self._child
                 try:
-                    process = await self._started()
-                    await _send(process, {"id": number, "do": do, **(values or {})})
-                    return await asyncio.wait_for(_answer(process, number, tell), limit_s)
-                except TimeoutError as error:
-                    await self._end()
-                    raise TaskError(f"not done within {limit_s:g} s") from error
-                except (OSError, EOFError, ValueError):
-                    await self._end()
+                    answer = await asyncio.to_thread(child.ask, question, Limits(limit_s), hear)
+                except ChildError as error:
+                    if error.limit:
+                        raise TaskError(f"its process {error}") from error
                 except asyncio.CancelledError:
-                    await self._end()
+                    child.stop()
+                    self._child = ChildProcess(COMMAND)
                     raise
-                finally:
-                    self._running = 0
+                else:
+                    if "error" in answer:
+                        raise TaskError(f"unexpected {answer['error']}")
+                    if "refused" in answer["result"]:
+                        raise TaskError(answer["result"]["refused"])
+                    return answer["result"]["made"]
             raise TaskError("the process for it ended again and again; a file may be damaged")
 
-    async def stop(self) -> None:
+    def stop(self) -> None:
         """Ask the task that is running to end early, as if it had failed."""
-        if self._running and self._process is not None:
-            with contextlib.suppress(OSError):
-                await _send(self._process, {"stop": self._running})
+        self._stop.touch()
 
-    async def close(self) -> None:
-        """End the process."""
-        await self._end()
-
-    async def _started(self) -> asyncio.subprocess.Process:
-        if self._process is None or self._process.returncode is not None:
-            self._process = await asyncio.create_subprocess_exec(
-                *COMMAND,
-                stdin=asyncio.subprocess.PIPE,
-                stdout=asyncio.subprocess.PIPE,
-                limit=LONGEST_LINE,
-                env={**os.environ, "OPENCV_LOG_LEVEL": "SILENT"},
-                start_new_session=True,  # Ctrl-C is for the server, which ends it
-            )
-        return self._process
-
-    async def _end(self) -> None:
-        process, self._process = self._process, None
-        if process is not None and process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
-
-
-async def _send(process: asyncio.subprocess.Process, message: dict[str, Any]) -> None:
-    assert process.stdin is not None
-    process.stdin.write(json.dumps(message).encode() + b"\n")
-    await process.stdin.drain()
-
-
-async def _answer(
-    process: asyncio.subprocess.Process,
-    number: int,
-    tell: Callable[[dict[str, Any]], None] | None,
-) -> Any:
-    assert process.stdout is not None
-    while True:
-        line = await process.stdout.readline()
-        if not line:
-            raise EOFError
-        message = json.loads(line)
-        if message.get("id") != number:
-            continue
-        if "error" in message:
-            raise TaskError(message["error"])
-        if "result" in message:
-            return message["result"]
-        if tell is not None:
-            tell(message["tell"])
+    def close(self) -> None:
+        """End the process, and start no other one."""
+        self._child.stop()
+        self._stop.unlink(missing_ok=True)

@@ -15,9 +15,10 @@ import cv2
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
-from hairkit.errors import HairkitError, InputError
+from hairkit.errors import HairkitError
 from hairkit.grooming.densify import roots_between
 from hairkit.head_model.scalp import roots_at
+from hairkit.imaging.picture_file import encode_picture, write_picture
 from hairkit.io.capture_toml import head_entry, head_pose, read_capture_file
 from hairkit.io.photos import MAX_BYTES, read_header, read_photo
 from hairkit.io.video import read_video
@@ -61,7 +62,7 @@ class StoppedError(HairkitError):
     """A build was cancelled."""
 
 
-def accept_photo(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def accept_photo(request: dict[str, Any], tell: Tell) -> Any:
     """Check an upload, clean it, and write it with the pictures for pages.
 
     Takes `incoming`, the upload, and returns `suffix`, `feedback` and the size of the cleaned
@@ -71,7 +72,7 @@ def accept_photo(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool
     header = read_header(incoming)
     if header.kind == "HEIC":
         image, header = read_photo(incoming)
-        encoded = _jpeg(image, KEPT_QUALITY)
+        encoded = encode_picture(image, ".jpg", KEPT_QUALITY)
         data, suffix = clean_photo(encoded, header.exif), ".jpg"
     else:
         data = clean_photo(read_bytes(incoming, MAX_BYTES), header.exif)
@@ -83,26 +84,25 @@ def accept_photo(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool
     return {"suffix": suffix, "feedback": codes, "width": header.width, "height": header.height}
 
 
-def draw_pictures(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def draw_pictures(request: dict[str, Any], tell: Tell) -> Any:
     """Write the pictures of a `photo` for pages, as `accept_photo` does."""
     image, header = read_photo(request["photo"], LARGE_EDGE)
     _write_pictures(image, request)
     return {"width": header.width, "height": header.height}
 
 
-def pick_frames(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def pick_frames(request: dict[str, Any], tell: Tell) -> Any:
     """Write the best frames of a `video` as PNG files into a `folder`; returns their paths."""
     capture = read_video(Path(request["video"]), VIDEO_EDGE)
     paths = []
     for index, view in enumerate(capture.views):
         path = Path(request["folder"]) / f"{request['name']}-{index:02d}.png"
-        data = cv2.imencode(".png", view.image[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
-        write_bytes(path, data.tobytes())
+        write_picture(path, view.image, 1)
         paths.append(str(path))
     return {"frames": paths}
 
 
-def build_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def build_groom(request: dict[str, Any], tell: Tell) -> Any:
     """Reconstruct the project in `folder` into its `result`, as `hairkit reconstruct` does."""
     out = Path(request["result"])
     capture, chosen = take_with_choices(request["folder"], "default", manager())
@@ -112,7 +112,7 @@ def build_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]
         chosen,
         manager(),
         guides=request["guides"],
-        progress=_Told(tell, stopped),
+        progress=_Told(tell, Path(request["stop"])),
     )
     _hair_packet(groom, request)
     health = read_record(out / RECORD).health
@@ -124,7 +124,7 @@ def build_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]
     }
 
 
-def draft_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def draft_groom(request: dict[str, Any], tell: Tell) -> Any:
     """Write the `packet` of a quick groom after strokes on the photos `touched`.
 
     These are their names, each with the folder in which what is found in it is kept.
@@ -135,13 +135,13 @@ def draft_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]
     )
     work = Path(request["folder"]) / "result" / "work"
     drawn = {name: Path(folder) for name, folder in request["touched"].items()}
-    told = _Told(tell, stopped)
+    told = _Told(tell, Path(request["stop"]))
     groom = draft(capture, work, drawn, coarse, manager(), request["guides"], told)
     _hair_packet(groom, request)
     return {}
 
 
-def export_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def export_groom(request: dict[str, Any], tell: Tell) -> Any:
     """Write the `groom` by the `plugin` to `path`."""
     groom = Groom.load(request["groom"])
     plugin, path = request["plugin"], Path(request["path"])
@@ -149,21 +149,21 @@ def export_groom(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool
     return {}
 
 
-def list_formats(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def list_formats(request: dict[str, Any], tell: Tell) -> Any:
     """Return plugin and file suffix of every format that a groom can be written in."""
     plugins = manager()
     found = [(name, plugins.info(name).suffixes) for name in plugins.names("export_groom")]
     return {"formats": [[name, suffixes[0]] for name, suffixes in found if suffixes]}
 
 
-def draw_guides(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def draw_guides(request: dict[str, Any], tell: Tell) -> Any:
     """Return the outline of the template head for each view of a turn of `count` photos."""
     from hairkit.studio.capture_guides import guides_for  # loads OpenGL
 
     return {"guides": guides_for(request["count"], request["above"])}
 
 
-def describe_pose(request: dict[str, Any], tell: Tell, stopped: Callable[[], bool]) -> Any:
+def describe_pose(request: dict[str, Any], tell: Tell) -> Any:
     """Return the head as every camera sees it, and how well they fit.
 
     `folder` is the project, `built` the pose (4, 4) of the head with which its result was made.
@@ -186,7 +186,7 @@ def _matrix(pose: Any) -> Float64Array:
     return np.eye(4) if pose is None else np.asarray(pose, np.float64)
 
 
-TASKS: dict[str, Callable[[dict[str, Any], Tell, Callable[[], bool]], Any]] = {
+TASKS: dict[str, Callable[[dict[str, Any], Tell], Any]] = {
     "accept": accept_photo,
     "look": look,
     "pictures": draw_pictures,
@@ -209,9 +209,10 @@ TASKS: dict[str, Callable[[dict[str, Any], Tell, Callable[[], bool]], Any]] = {
 class _Told:
     """Passes progress on, and ends a run that was cancelled at the end of its step."""
 
-    def __init__(self, tell: Tell, stopped: Callable[[], bool]) -> None:
+    def __init__(self, tell: Tell, stop: Path) -> None:
+        """Take the file whose being there stops the run."""
         self._tell = tell
-        self._stopped = stopped
+        self._stop = stop
 
     def started(self, stage: str, steps: int) -> None:
         self._say({"event": "started", "stage": stage, "steps": steps})
@@ -226,7 +227,7 @@ class _Told:
         self._say({"event": "message", "text": text})
 
     def _say(self, event: dict[str, Any]) -> None:
-        if self._stopped():
+        if self._stop.exists():
             raise StoppedError("stopped; what is done is kept")
         self._tell(event)
 
@@ -262,12 +263,5 @@ def _write_pictures(image: UInt8Array, request: dict[str, Any]) -> None:
             scale = min(1.0, edge / max(image.shape[:2]))
             size = [max(1, round(side * scale)) for side in image.shape[1::-1]]
             shown = cv2.resize(image, size, interpolation=cv2.INTER_AREA) if scale < 1 else image
-            data = _jpeg(np.asarray(shown, np.uint8), PICTURE_QUALITY)
+            data = encode_picture(np.asarray(shown, np.uint8), ".jpg", PICTURE_QUALITY)
             write_bytes(request[name], data, durable=False)
-
-
-def _jpeg(image: UInt8Array, quality: int) -> bytes:
-    done, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
-    if not done:
-        raise InputError("the picture cannot be encoded")
-    return data.tobytes()

@@ -13,12 +13,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from hairkit.arrays import Int64Array, UInt8Array
 from hairkit.errors import FormatError, InputError
-from hairkit.storage import read_text, write_bytes, write_text
+from hairkit.html_page import page
+from hairkit.imaging.picture_file import write_picture
+from hairkit.storage import read_text, write_text
 from hairkit.study.questionnaire import CHOICES, Question, Study, nearest_view
 from hairkit.study.subject import Shot, Subject
 
@@ -92,8 +93,8 @@ def write_study(
     drawn = _draw(study)
     for number, question in enumerate(study.questions):
         for name, picture in zip(_names(number), _pictures(study, question, drawn), strict=True):
-            write_bytes(base / name, _jpeg(picture))
-    write_bytes(base / GALLERY, _jpeg(_gallery(study, drawn)))
+            write_picture(base / name, picture, _JPEG_QUALITY)
+    write_picture(base / GALLERY, _gallery(study, drawn), _JPEG_QUALITY)
     write_text(base / PAGE, _page([question.kind for question in study.questions], identity))
     asked = [
         dataclasses.asdict(question) | {"program": int(choice)}
@@ -142,7 +143,7 @@ def write_results(
         for number, (question, choice) in enumerate(zip(questions, program, strict=True))
     ]
     lead = f"<h1>{title}</h1><p>The program: {guessed} of {len(questions)}.</p>"
-    write_text(Path(folder) / RESULTS, _document(title, [lead, *rows]))
+    write_text(Path(folder) / RESULTS, page(title, _STYLE, lead, *rows))
     return Path(folder) / RESULTS, counts
 
 
@@ -253,7 +254,7 @@ def _page(kinds: Sequence[str], identity: str) -> str:
     end = "<button disabled>Save the answers</button></form>"
     script = f"<script>{_SCRIPT.replace('VERSION', str(VERSION))}</script>"
     lead = "<h1>Hair and photos</h1><p>Every question has one right answer. Keys: Tab, arrows.</p>"
-    return _document("Hair and photos", [lead, *form, end, script])
+    return page("Hair and photos", _STYLE, lead, *form, end, script)
 
 
 def _field(number: int, kind: str) -> str:
@@ -293,19 +294,3 @@ def _result(number: int, question: Question, counts: Int64Array, program: int) -
         f'<div class="question">{pictures}</div><p>{said}</p>'
         f'<div class="bar">{"".join(bars)}</div></fieldset>'
     )
-
-
-def _document(title: str, parts: Sequence[str]) -> str:
-    head = f"<title>{html.escape(title)}</title><style>{_STYLE}</style>"
-    view = '<meta name="viewport" content="width=device-width">'
-    return "\n".join(
-        [f"<!doctype html><html lang=en><meta charset=utf-8>{view}{head}", *parts, "</html>\n"]
-    )
-
-
-def _jpeg(picture: UInt8Array) -> bytes:
-    done, data = cv2.imencode(
-        ".jpg", np.ascontiguousarray(picture[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
-    )
-    assert done
-    return data.tobytes()

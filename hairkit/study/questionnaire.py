@@ -73,9 +73,9 @@ def make_study(
     return Study(tuple(subjects), tuple(stock), tuple(asked))
 
 
-def every_question(study: Study, seed: int = 0) -> tuple[Question, ...]:
+def every_question(study: Study) -> tuple[Question, ...]:
     """Return a question of each kind about each photo: what a program has the patience for."""
-    lots = np.random.default_rng(seed)
+    lots = np.random.default_rng(0)
     kinds: list[Kind] = ["hair", "photo"] if len(study.subjects) >= CHOICES else ["hair"]
     return tuple(
         _ask(kind, subject, study.subjects, study.stock, lots, view)

@@ -151,13 +151,11 @@ def read_subject(
     return replace(settle(name, prediction.groom, manager, settling), shots=shots)
 
 
-def make_stock(
-    manager: Manager, *, seed: int = 0, settling: float = SETTLING_S
-) -> tuple[Subject, ...]:
+def make_stock(manager: Manager, *, seed: int = 0) -> tuple[Subject, ...]:
     """Return a groom of each style of `hairkit synth`: hair that nobody photographed."""
     head = default_head()
     return tuple(
-        settle(f"stock {style}", grow(style, head, _STOCK_GUIDES, seed), manager, settling)
+        settle(f"stock {style}", grow(style, head, _STOCK_GUIDES, seed), manager, SETTLING_S)
         for style in STYLES
     )
 

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.errors import InputError
+from hairkit.imaging.picture_file import write_picture
 from hairkit.io.capture_reader import FEWEST, MOST, TURN
 from hairkit.rendering import (
     Lights,
@@ -28,7 +29,7 @@ from hairkit.rendering import (
     draw_views,
     points_at_depth,
 )
-from hairkit.storage import write_bytes, write_npz, write_text
+from hairkit.storage import write_npz, write_text
 from hairkit.synth.bust import Bust
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
@@ -124,10 +125,11 @@ def photograph(
     bits: type[np.uint8 | np.uint64] = np.uint64 if views > len(TURN) else np.uint8
     seen: npt.NDArray[np.unsignedinteger[Any]] = np.zeros(len(groom.strands.points), bits)
     for index, (stem, camera) in enumerate(zip(stems, cameras, strict=True)):
-        write_bytes(base / "photos" / f"{stem}.jpg", _jpeg(photos[index]))
-        write_bytes(base / "masks" / f"{stem}.png", _png(shoot.labels(camera)))
+        write_picture(base / "photos" / f"{stem}.jpg", photos[index], JPEG_QUALITY)
+        write_picture(base / "masks" / f"{stem}.png", shoot.labels(camera), PNG_COMPRESSION)
         measured = shoot.measured(camera)
-        write_bytes(base / "truth" / "orientation" / f"{stem}.png", _png(_angle_codes(measured)))
+        path = base / "truth" / "orientation" / f"{stem}.png"
+        write_picture(path, _angle_codes(measured), PNG_COMPRESSION)
         visible = points_at_depth(groom.strands, measured.depth, camera)
         seen |= visible.astype(seen.dtype) << seen.dtype.type(index)
     _write_landmarks(base, groom.head, stems, cameras, generator)
@@ -307,18 +309,3 @@ def _write_truth(
     lines += [f"f {a} {b} {c}" for a, b, c in (groom.head.faces + 1).tolist()]
     head = "\n".join(["# metres, +Y up, +Z out of the face", *lines, ""])
     write_text(folder / "head.obj", head)
-
-
-def _jpeg(picture: UInt8Array) -> bytes:
-    return _encode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-
-
-def _png(picture: UInt8Array) -> bytes:
-    return _encode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, PNG_COMPRESSION])
-
-
-def _encode(kind: str, picture: UInt8Array, settings: list[int]) -> bytes:
-    done, data = cv2.imencode(kind, picture, settings)
-    if not done:
-        raise InputError(f"a {kind} picture of {picture.shape} cannot be encoded")
-    return bytes(data.tobytes())

@@ -45,7 +45,7 @@ _FIXED_BITS = 4
 
 
 class Surface(Protocol):
-    """What a preview needs of a head: vertices (V, 3), metres, and faces (F, 3)."""
+    """A mesh, such as a head or a bust: vertices (V, 3), metres, and faces (F, 3)."""
 
     @property
     def vertices(self) -> npt.NDArray[np.float32]: ...

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 
 from hairkit.arrays import UInt8Array
+from hairkit.imaging.picture_file import write_picture
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import NEAREST
 from hairkit.rendering.head import Solid, bust_solid, head_solid
@@ -24,7 +25,7 @@ from hairkit.viewer.draw.lines import LineSet
 from hairkit.viewer.draw.still import Lens, Still, sample_camera
 from hairkit.viewer.layers import BILLBOARDS
 from hairkit.viewer.picking import surface_point
-from hairkit.viewer.recording import free_name, write_png
+from hairkit.viewer.recording import free_name
 from hairkit.viewer.session import Session
 from hairkit.viewer.window.hud import Readings
 
@@ -301,7 +302,7 @@ class Preview:
             session.recorder.add(picture)
         for path in session.screenshots:
             free = path if session.overwrite else free_name(path)
-            write_png(free, picture)
+            write_picture(free, picture, durable=False)
             self.written.append(free)
             session.message = f"wrote {free}"
         session.screenshots = []

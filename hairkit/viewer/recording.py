@@ -9,17 +9,9 @@ import numpy as np
 
 from hairkit.arrays import UInt8Array
 from hairkit.errors import InputError
-from hairkit.storage import write_bytes
+from hairkit.imaging.picture_file import write_picture
 
 FRAMES_PER_SECOND = 30
-
-
-def write_png(path: Path, picture: UInt8Array) -> None:
-    """Write a picture (H, W, 3) RGB, atomically."""
-    done, data = cv2.imencode(".png", np.ascontiguousarray(picture[..., ::-1]))
-    if not done:
-        raise InputError(f"{path}: the picture of {picture.shape[:2]} cannot be encoded")
-    write_bytes(path, data.tobytes(), durable=False)
 
 
 def free_name(path: Path) -> Path:
@@ -53,7 +45,7 @@ class Recorder:
         if self._is_video:
             self._add_to_video(picture)
         else:
-            write_png(self.path / f"{self.count:04d}.png", picture)
+            write_picture(self.path / f"{self.count:04d}.png", picture, durable=False)
         self.count += 1
 
     def close(self) -> None:

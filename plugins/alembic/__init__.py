@@ -22,7 +22,6 @@ Sources: Alembic 1.8 AbcGeom and Ogawa; Epic's "Alembic for Grooms Specification
 from __future__ import annotations
 
 from pathlib import Path
-from types import MappingProxyType
 
 from hairkit.grooming.prepare_export import prepare_export
 from hairkit.hookspecs import hookimpl
@@ -37,19 +36,17 @@ __all__ = ["FORMAT", "Options", "export_groom", "import_groom"]
 FORMAT = FileFormat(
     title="Alembic",
     suffixes=(".abc",),
-    exact=frozenset(
-        {
-            Feature.POINTS,
-            Feature.COUNTS,
-            Feature.WIDTHS,
-            Feature.ROOT_UV,
-            Feature.GROUP,
-            Feature.GUIDE,
-            Feature.COLOUR,
-        }
-    ),
-    partial=MappingProxyType({Feature.ANIMATION: "written; the first frame is read"}),
-    written=frozenset({Feature.GUIDE_WEIGHTS, Feature.DENSITY}),
+    exact={
+        Feature.POINTS,
+        Feature.COUNTS,
+        Feature.WIDTHS,
+        Feature.ROOT_UV,
+        Feature.GROUP,
+        Feature.GUIDE,
+        Feature.COLOUR,
+    },
+    partial={Feature.ANIMATION: "written; the first frame is read"},
+    written={Feature.GUIDE_WEIGHTS, Feature.DENSITY},
 )
 
 

@@ -10,6 +10,7 @@ avatar of the head and its hair, whose chains swing (`VRMC_springBone`) around t
 * `locks`: strands sorted into locks
 * `maps`: the atlas as PNG files
 * `obj`: Wavefront OBJ files
+* `options`: settings of cards
 * `packing`: places in the atlas
 * `painting`: strands drawn onto cards
 * `scene`: glTF documents
@@ -19,16 +20,16 @@ avatar of the head and its hair, whose chains swing (`VRMC_springBone`) around t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hairkit.grooming.prepare_export import ExportOptions, prepare_export
+from hairkit.grooming.prepare_export import prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.options import option
 from hairkit.storage import write_bytes
 from hairkit.types.groom import Groom
+
+from .options import Options
 
 if TYPE_CHECKING:
     from .build import CardSet
@@ -36,33 +37,13 @@ if TYPE_CHECKING:
 FORMAT = FileFormat(
     "Hair cards",
     (".cards.glb", ".cards.obj", ".vrm"),
-    written=frozenset(
-        {
-            Feature.HEAD, Feature.MAPS, Feature.SKIN, Feature.CAPSULES, Feature.COLOUR,
-            Feature.PHYSICS,
-        }
-    ),
+    written={
+        Feature.HEAD, Feature.MAPS, Feature.SKIN, Feature.CAPSULES, Feature.COLOUR,
+        Feature.PHYSICS,
+    },
 )  # fmt: skip
 DEFAULT_CHAINS = 40
 """Chains of a .vrm file where the option leaves it open."""
-
-
-@dataclass(frozen=True)
-class Options(ExportOptions):
-    """Settings of the exporter of cards."""
-
-    cards: int = option(2000, low=8, high=20_000, doc="Cards of the finest level.")
-    levels: int = option(
-        4, low=1, high=6, doc="Levels of detail, each with 0.55 of the cards before."
-    )
-    stations: int = option(10, low=3, high=64, doc="Pairs of vertices along each card.")
-    atlas: int = option(2048, low=256, high=16_384, doc="Edge of the atlas.", unit="px")
-    bones: int = option(
-        0, low=0, high=200, doc="Chains of bones; 0 is none in .glb and 40 in .vrm."
-    )
-    alpha: str = option("MASK", choices=("MASK", "BLEND"), doc="How the atlas is cut out.")
-    head_mesh: bool = option(True, doc="Write the head.")
-    author: str = option("unknown", doc="Author named in a .vrm file.")
 
 
 @hookimpl

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from hairkit.types.groom import Groom
 
 from .locks import course, sort_into_locks
 from .maps import encode_maps
+from .options import Options
 from .packing import Places, pack
 from .painting import blank_atlas, paint
 from .strips import Cards, make_cards
@@ -22,21 +22,6 @@ FEWEST = 8
 """Cards of a level at least."""
 DRAWN_POINTS = 32
 """Points of a strand, at most, that are drawn on its card."""
-
-
-class CardOptions(Protocol):
-    """Options of the plugin that `build_cards` uses."""
-
-    @property
-    def cards(self) -> int: ...
-    @property
-    def levels(self) -> int: ...
-    @property
-    def stations(self) -> int: ...
-    @property
-    def atlas(self) -> int: ...
-    @property
-    def seed(self) -> int: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +52,7 @@ class CardSet:
     """(S, 24) eight points of each strand, metres."""
 
 
-def build_cards(groom: Groom, options: CardOptions) -> CardSet:
+def build_cards(groom: Groom, options: Options) -> CardSet:
     """Return the cards of all strands of a groom whose widths are known."""
     strands = groom.strands
     if strands.counts.max() > DRAWN_POINTS:

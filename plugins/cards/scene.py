@@ -10,12 +10,13 @@ import numpy as np
 from hairkit.arrays import Float64Array
 from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES, head_weights
 from hairkit.io.glb_document import Document
-from hairkit.rendering.cards import CUTOFF
 from hairkit.types.groom import Groom
 
 from .bones import Chains, weigh
 from .build import CardSet, Level
 
+CUTOFF = 0.4
+"""Alpha from which a texel is drawn."""
 SKIN = (0.58, 0.4, 0.32, 1.0)
 """Linear RGBA of skin without an albedo map."""
 ROUGHNESS = {"hair": 0.45, "skin": 0.5}

@@ -34,16 +34,14 @@ from hairkit.types.groom import Groom
 FORMAT = FileFormat(
     title="FBX",
     suffixes=(".fbx",),
-    written=frozenset(
-        {
-            Feature.HEAD,
-            Feature.MAPS,
-            Feature.SHAPES,
-            Feature.SKIN,
-            Feature.POINTS,
-            Feature.COUNTS,
-        }
-    ),
+    written={
+        Feature.HEAD,
+        Feature.MAPS,
+        Feature.SHAPES,
+        Feature.SKIN,
+        Feature.POINTS,
+        Feature.COUNTS,
+    },
 )
 
 

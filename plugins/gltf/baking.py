@@ -43,7 +43,6 @@ def bake(
     step: int,
     morphs: int,
     deform: bool,
-    tolerance: float = _WORTH_SAYING,
 ) -> Baked:
     """Return the motion in at most `morphs` shapes; a warning states the error.
 
@@ -59,15 +58,13 @@ def bake(
         As many as moving frames, or more: the motion is kept within the tolerance.
     deform
         False leaves the hair rigid on the head: no shapes.
-    tolerance
-        Metres by which a point may be off where that saves shapes.
     """
     times = cache.times[::step]
     motion = cache.head_from_rest[::step]
     shapes, weights = np.zeros((0, *rest.shape), np.float32), np.zeros((len(times), 0), np.float32)
     if deform:
         shifts = _shifts(cache.points[::step], motion, rest)
-        shapes, weights = _mixed(shifts, morphs, tolerance)
+        shapes, weights = _mixed(shifts, morphs)
     return Baked((times - times[0]).astype(np.float32), motion, shapes, weights)
 
 
@@ -81,9 +78,7 @@ def _shifts(points: Float32Array, motion: Float64Array, rest: Float32Array) -> F
     return shifts
 
 
-def _mixed(
-    shifts: Float32Array, morphs: int, tolerance: float
-) -> tuple[Float32Array, Float32Array]:
+def _mixed(shifts: Float32Array, morphs: int) -> tuple[Float32Array, Float32Array]:
     """Return shapes (M, P, 3) and weights (T, M), 0 to 1, whose product is near the shifts.
 
     They are the moving frames themselves, or the fewest components within the tolerance where
@@ -95,7 +90,7 @@ def _mixed(
     flat -= mean
     components = _components(flat)
     most = min(morphs, len(moving)) - 1
-    count = _fewest(flat, components, most, tolerance) if most > 0 else max(most, 0)
+    count = _fewest(flat, components, most) if most > 0 else max(most, 0)
     if count == most and len(moving) <= morphs:
         flat += mean
         return shifts[moving], np.eye(len(shifts), dtype=np.float32)[:, moving]
@@ -115,13 +110,13 @@ def _components(flat: Float32Array) -> Float32Array:
     return vectors
 
 
-def _fewest(flat: Float32Array, components: Float32Array, most: int, tolerance: float) -> int:
+def _fewest(flat: Float32Array, components: Float32Array, most: int) -> int:
     """Return how many components keep every point within the tolerance; `most` if none do."""
     low, high = 0, most
     while low < high:
         middle = (low + high) // 2
         weights = components[:, :middle]
-        if _loss(flat, weights, weights.T @ flat)[0] <= tolerance:
+        if _loss(flat, weights, weights.T @ flat)[0] <= _WORTH_SAYING:
             high = middle
         else:
             low = middle + 1

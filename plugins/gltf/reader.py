@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +24,7 @@ from hairkit.types.strands import Strands
 from .extras import VERSION, capsules_of, material_of, physics_of, ties_of, with_landmarks
 from .joining import join_segments
 from .meshes import JOINTS
+from .options import Options
 
 _LINES, _LOOP, _STRIP, _TRIANGLES = 1, 2, 3, 4
 _MAX_GROUP = 2**31 - 1
@@ -32,15 +32,6 @@ _LEAST_BYTES = 4
 """Of a file for each point that is made of it: positions alone take twelve."""
 _FARTHEST = 1e5
 """Positions of a head and its hair, in any unit; beyond, 32-bit floats have no millimetres."""
-
-
-class ReaderOptions(Protocol):
-    """Options of the plugin that `read_gltf_groom` uses."""
-
-    @property
-    def head(self) -> Path | None: ...
-    @property
-    def metres(self) -> float: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +46,7 @@ class _Part:
     guide: npt.NDArray[np.bool_] | None
 
 
-def read_gltf_groom(path: str | os.PathLike[str], options: ReaderOptions) -> Groom:
+def read_gltf_groom(path: str | os.PathLike[str], options: Options) -> Groom:
     """Return the strands in a file's LINES, LINE_STRIP and LINE_LOOP primitives as a groom.
 
     The transforms of nodes are applied; a skinned mesh is taken in its bind pose. A file of

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-from typing import Protocol
 
 import numpy as np
 
@@ -18,7 +17,8 @@ from hairkit.types.groom import Groom
 from .baking import Baked, bake
 from .extras import groom_extras
 from .meshes import HEAD_JOINT, JOINTS, ROUGHNESS, Meshes, brightest
-from .strips import StripOptions, hair_meshes
+from .options import Options
+from .strips import hair_meshes
 from .texture import strand_pictures, white_picture
 
 BODY = ("head_mesh", "torso")
@@ -30,26 +30,7 @@ _STRANDS_ON = {"ribbons": 6, "cards": 22}
 """Strands in the picture of each strip."""
 
 
-class SceneOptions(StripOptions, Protocol):
-    """Options of the plugin that `groom_document` uses."""
-
-    @property
-    def lines(self) -> str: ...
-    @property
-    def alpha(self) -> str: ...
-    @property
-    def head_mesh(self) -> bool: ...
-    @property
-    def bust(self) -> bool: ...
-    @property
-    def animation(self) -> str: ...
-    @property
-    def frame_step(self) -> int: ...
-    @property
-    def morphs(self) -> int: ...
-
-
-def groom_document(ready: PreparedGroom, options: SceneOptions) -> Document:
+def groom_document(ready: PreparedGroom, options: Options) -> Document:
     """Return the document of a groom; each level of detail is a scene, the first holds the lines.
 
     Raises
@@ -89,7 +70,7 @@ def groom_document(ready: PreparedGroom, options: SceneOptions) -> Document:
     return document
 
 
-def _bake(ready: PreparedGroom, options: SceneOptions) -> Baked | None:
+def _bake(ready: PreparedGroom, options: Options) -> Baked | None:
     if ready.cache is None or options.animation == "none":
         return None
     rest = ready.groom.strands.points
@@ -188,7 +169,7 @@ def _head_track(groom: Groom, motion: Float64Array) -> tuple[Float32Array, Float
     return place.astype(np.float32), turn.astype(np.float32)
 
 
-def _hair_material(document: Document, groom: Groom, options: SceneOptions) -> int:
+def _hair_material(document: Document, groom: Groom, options: Options) -> int:
     colour, normal = strand_pictures(_STRANDS_ON[options.hair], options.alpha == "OPAQUE")
     return document.add(
         "materials",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from hairkit.grooming.guide_weights import follow, guide_mask
 from hairkit.grooming.prepare_export import bound_roots, dense_groom, select_strands
 from hairkit.types.groom import Groom
 
+from .options import Options
 from .ribbons import Locks, Ribbons, frames, gather_locks, make_ribbons, outward
 
 RIBBONS, CARDS = 4000, 800
@@ -31,23 +31,6 @@ _ROOT_WIDTH, _TAPER = 0.7, 0.65
 """Width of a strip at its root, and how much it loses towards its tip, in shares of the whole."""
 
 
-class StripOptions(Protocol):
-    """Options of the plugin that this module uses."""
-
-    @property
-    def hair(self) -> str: ...
-    @property
-    def strips(self) -> int: ...
-    @property
-    def strip_points(self) -> int: ...
-    @property
-    def strip_width(self) -> float: ...
-    @property
-    def lods(self) -> int: ...
-    @property
-    def seed(self) -> int: ...
-
-
 @dataclass(frozen=True, eq=False)
 class HairMesh:
     """Triangles of one level of detail."""
@@ -61,7 +44,7 @@ class HairMesh:
     """(M, V, 3) shifts from rest."""
 
 
-def hair_meshes(groom: Groom, shapes: Float32Array, options: StripOptions) -> Iterator[HairMesh]:
+def hair_meshes(groom: Groom, shapes: Float32Array, options: Options) -> Iterator[HairMesh]:
     """Yield the levels of detail, the finest first.
 
     Parameters
@@ -86,7 +69,7 @@ def hair_meshes(groom: Groom, shapes: Float32Array, options: StripOptions) -> It
 
 
 def _denser(
-    groom: Groom, shapes: Float32Array, wanted: int, options: StripOptions
+    groom: Groom, shapes: Float32Array, wanted: int, options: Options
 ) -> tuple[Groom, Float32Array]:
     """Return `wanted` strands and their shapes; without guides, what there is."""
     guide = guide_mask(groom.strands)
@@ -115,7 +98,7 @@ def _level(
     shapes: Float32Array,
     count: int,
     points: int,
-    options: StripOptions,
+    options: Options,
     wider: int,
 ) -> HairMesh:
     strands = groom.strands
@@ -141,7 +124,7 @@ def _widths(
     locks: Locks,
     lines: Float32Array,
     out: Float32Array,
-    options: StripOptions,
+    options: Options,
     wider: int,
 ) -> Float32Array:
     """Return (N, K) widths in metres: a little narrower at the root, narrow at the tip."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
-from hairkit.arrays import Float64Array, UInt8Array
+from hairkit.arrays import Float64Array
 from hairkit.colour import srgb_from_linear
+from hairkit.imaging.picture_file import encode_picture
 
 _SHORTEST = 0.72
 _LONGEST = 1.02
@@ -25,7 +25,7 @@ _THINNEST = 1e-4
 """Least half width in shares of the strip's: strands that have ended do not divide by 0."""
 
 
-def strand_pictures(strands: int, opaque: bool, seed: int = 0) -> tuple[bytes, bytes]:
+def strand_pictures(strands: int, opaque: bool) -> tuple[bytes, bytes]:
     """Return PNGs of colour with alpha (sRGB, to be multiplied with the hair's) and of normals.
 
     Parameters
@@ -34,11 +34,9 @@ def strand_pictures(strands: int, opaque: bool, seed: int = 0) -> tuple[bytes, b
         How many lie side by side, root at the upper edge.
     opaque
         Without holes.
-    seed
-        Of places, lengths and shades.
     """
     width, height = (64, 256) if strands <= 8 else (256, 256)
-    relief, shade = _strands_side_by_side(strands, width, height, seed)
+    relief, shade = _strands_side_by_side(strands, width, height)
     lit = shade * (_EDGE_SHADE + 0.25 * np.maximum(relief, 0))
     colour = np.repeat(255 * srgb_from_linear(lit)[..., None], 4, axis=-1)
     edge = 0.25  # of the relief: alpha goes from 0 to 1 there, so that the cut is smooth
@@ -52,10 +50,10 @@ def white_picture() -> bytes:
 
 
 def _strands_side_by_side(
-    strands: int, width: int, height: int, seed: int
+    strands: int, width: int, height: int
 ) -> tuple[Float64Array, Float64Array]:
     """Return the strands' height over the strip (H, W), below 0 between them, and shades."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     u = (np.arange(width) + 0.5)[:, None] / width
     v = (np.arange(height) + 0.5)[:, None, None] / height
     slot = (np.arange(strands) + 0.5) / strands
@@ -80,7 +78,4 @@ def _normals(relief: Float64Array) -> Float64Array:
 
 
 def _png(picture: Float64Array) -> bytes:
-    pixels: UInt8Array = np.rint(picture).astype(np.uint8)
-    order = [2, 1, 0, 3][: pixels.shape[-1]]
-    encoded = cv2.imencode(".png", np.ascontiguousarray(pixels[..., order]))[1]
-    return bytes(encoded)
+    return encode_picture(np.rint(picture).astype(np.uint8))

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -55,16 +54,12 @@ __all__ = [
 FORMAT = FileFormat(
     "HairWorks",
     (".apx",),
-    exact=frozenset(
-        {Feature.ROOT_UV, Feature.SKIN, Feature.CAPSULES, Feature.COLOUR, Feature.PHYSICS}
-    ),
-    partial=MappingProxyType(
-        {
-            Feature.POINTS: "guides only, resampled to `points_per_strand`",
-            Feature.HEAD: "growth mesh of the roots",
-            Feature.CURL: "as waves, where points are too far apart to show it",
-        }
-    ),
+    exact={Feature.ROOT_UV, Feature.SKIN, Feature.CAPSULES, Feature.COLOUR, Feature.PHYSICS},
+    partial={
+        Feature.POINTS: "guides only, resampled to `points_per_strand`",
+        Feature.HEAD: "growth mesh of the roots",
+        Feature.CURL: "as waves, where points are too far apart to show it",
+    },
 )
 
 
@@ -106,10 +101,6 @@ class Options:
         " else 100,000.",
     )
     author: str = option("", doc="Author's name in the file.")
-    last_modified: str = option(
-        "2000-01-01 00:00:00 UTC",
-        doc="Date in the file; fixed, so that equal grooms are equal files.",
-    )
     head: Path | None = option(
         None, doc="Head to bind the guides to when a file is read; else its own growth mesh."
     )
@@ -142,7 +133,6 @@ def _layout(options: Options, kept: ApxAsset | None) -> Layout:
         handedness=kept.handedness if kept else RIGHT_HANDED,
         hairs=options.hairs or (0 if kept else _HAIRS),
         author=options.author or (kept.info[3] if kept else ""),
-        last_modified=options.last_modified,
     )
 
 

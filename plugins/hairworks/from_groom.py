@@ -22,6 +22,8 @@ from .space import LEFT_HANDED, file_from_head
 BONES = ("root", "neck", "head")
 PARENTS = (-1, 0, 1)
 
+LAST_MODIFIED = "2000-01-01 00:00:00 UTC"
+"""Date in the file; fixed, so that equal grooms are equal files."""
 STANDARD_GRAVITY = 9.81
 _WAVE_POINTS = 4
 _MIN_DENSITY, _MAX_DENSITY = 0.01, 10.0
@@ -40,7 +42,6 @@ class Layout:
     hairs: int
     """Drawn in all."""
     author: str
-    last_modified: str
 
     @property
     def turn(self) -> Float64Array:
@@ -83,7 +84,7 @@ def groom_to_asset(groom: Groom, layout: Layout) -> ApxAsset:
         up_axis=layout.up_axis,
         handedness=layout.handedness,
         materials=_materials(groom, strands, len(faces), len(capsules) > 0, layout),
-        info=("1.1", f"hairkit {__version__}", "", layout.author, layout.last_modified),
+        info=("1.1", f"hairkit {__version__}", "", layout.author, LAST_MODIFIED),
     )
 
 

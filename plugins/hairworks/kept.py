@@ -92,7 +92,7 @@ def _turned(kept: ApxAsset, layout: Layout) -> dict[str, MaterialValue]:
 
 def _from_kept(kept: ApxAsset, layout: Layout) -> tuple[float, Float64Array]:
     """Return the scale and the rotation (3, 3) from the carried file's space to the new one."""
-    old = Layout(2, kept.scene_unit, kept.up_axis, kept.handedness, 0, "", "").turn
+    old = Layout(2, kept.scene_unit, kept.up_axis, kept.handedness, 0, "").turn
     whole = layout.turn @ np.linalg.inv(old)
     scale = float(np.cbrt(abs(np.linalg.det(whole))))
     return scale, whole / scale

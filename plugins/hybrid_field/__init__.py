@@ -16,6 +16,7 @@ Tight curls show no direction; theirs hang down along the head (`hairkit.field.h
 
 * `four_fields`: the four fields and their weighted sum
 * `given_segments`: oriented 3D segments from a file
+* `options`: settings of segments, fields and their weights
 * `photo_lines`: lines through orientation maps, lifted onto the hull
 * `ribbons`: segments widened along the surface
 * `segments`: oriented 3D segments
@@ -24,8 +25,6 @@ Tight curls show no direction; theirs hang down along the head (`hairkit.field.h
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -43,15 +42,13 @@ from hairkit import (
 from hairkit.arrays import read_only
 from hairkit.field.diffusion import CellGraph
 from hairkit.field.growth_prior import (
-    TIP_SHARE,
     ScalpPrior,
     add_scalp_prior,
     comb_cells,
     growth_potential,
 )
 from hairkit.field.hanging_hair import hang_curls
-from hairkit.field.view_fusion import FusionOptions, fuse_views
-from hairkit.options import option
+from hairkit.field.view_fusion import fuse_views
 from hairkit.parallel import thread_count
 
 from .four_fields import (
@@ -63,62 +60,11 @@ from .four_fields import (
     surface_structure,
 )
 from .given_segments import read_segments, segments_in_hair
+from .options import Options
 from .ribbons import ribbons
 from .segments import Way, find_segments, orient_segments
 
 __all__ = ["Options", "blend", "find_segments", "internal_distance", "ribbons"]
-
-
-@dataclass(frozen=True)
-class Options(FusionOptions):
-    """Settings of segments, fields and their weights."""
-
-    segments: Path | None = option(
-        None, doc="A .ply or .npz with 3D segments in metres, to use instead of the photos' lines."
-    )
-    line_spacing: int = option(
-        10, low=2, high=100, unit="px", doc="Distance between lines followed in a photo."
-    )
-    longest: float = option(
-        0.06, low=0.005, high=0.5, unit="m", doc="Length of the longest segment."
-    )
-    agreement_deg: float = option(
-        35.0,
-        low=1,
-        high=90,
-        unit="deg",
-        doc="A lifted line is dropped if it differs by more from the fused field of all views.",
-    )
-    ribbon: float = option(
-        0.004, low=0, high=0.05, unit="m", doc="How far a ribbon reaches to either side."
-    )
-    smoothness: float = option(0.4, low=1e-4, high=100, doc="Weight of the diffusion of V.")
-    strand_weight: float = option(
-        0.05, low=0, high=1000, doc="Weight of strand cells in V; large values fix them."
-    )
-    scalp_weight: float = option(
-        0.1, low=0, high=100, doc="Weight of the combing prior at the scalp in V."
-    )
-    scalp_reach: float = option(
-        0.02, low=0, high=0.1, unit="m", doc="Distance from the scalp within which the prior acts."
-    )
-    scalp_lift: float = option(0.6, low=0, high=5, doc="Outward part of the prior.")
-    parting_weight: float = option(
-        0.15, low=0, high=10, doc="Weight of the comb from the parting in the hair on the crown."
-    )
-    surface: float = option(0.5, low=0, high=10, doc="Largest weight of S, on strand cells.")
-    surface_reach: float = option(
-        0.004, low=1e-4, high=0.1, unit="m", doc="Distance from strands at which S falls to 1/e."
-    )
-    outward: float = option(0.2, low=0, high=10, doc="Largest weight of grad(I), at the scalp.")
-    signed: float = option(0.1, low=0, high=10, doc="Weight of O.")
-    tip_share: float = option(
-        TIP_SHARE,
-        low=0.05,
-        high=1,
-        doc="Cells this far along the longest way from the scalp count as tips.",
-    )
-    tolerance: float = option(2e-2, low=1e-8, high=0.1, doc="Relative residual of the solvers.")
 
 
 @hookimpl
@@ -133,7 +79,7 @@ def solve_field(
     options: Options,
 ) -> OrientationField:
     """Return the blended field with its signs and the internal distance."""
-    growth = growth_potential(hull, scalp_distance, options.tip_share)
+    growth = growth_potential(hull, scalp_distance)
     if waves.curly:
         return hang_curls(scene.head, hull, growth)
     length = scalp_distance.hair_length
@@ -145,9 +91,7 @@ def solve_field(
         given = segments_in_hair(read_segments(options.segments), hull, options.segments)
         segments = orient_segments(given, hull, way)
     band = ribbons(segments, hull, options.ribbon)
-    comb = comb_cells(
-        scene.head, hull, growth, options.scalp_reach, options.scalp_lift, parting, length
-    )
+    comb = comb_cells(scene.head, hull, growth, parting, length)
     prior = ScalpPrior(options.scalp_weight, options.parting_weight)
     wanted, weight = add_scalp_prior(
         scene.head, hull, fused.tensor, fused.certainty, comb, prior, parting, length

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import cv2
 import numpy as np
 from scipy import ndimage
 
 from hairkit import Hull, Strands
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, read_only
+from hairkit.arrays import BoolArray, Float32Array, read_only, unit_vectors
 from hairkit.field.cell_shells import erode_cells
 from hairkit.field.diffusion import CellGraph, solve_screened
 from hairkit.field.growth_prior import ScalpComb
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
 from hairkit.types.volume import cell_slopes, outer_products
 
+from .options import Options
 from .ribbons import Band
 
 FIXED = 1e3
@@ -30,31 +30,10 @@ COARSE = 2
 """The internal distance is solved on cells this many times as large, then interpolated."""
 NEGLIGIBLE = 6.0
 """Distance from strands, in `surface_reach`, from which S hardly counts: less than 0.003."""
+SMOOTHNESS = 0.4
+"""Weight of the diffusion of V against its data."""
 SCALP_CELLS = 2.0
 """Distance from the head in cells at which the weight of grad(I) falls to 1/e."""
-
-
-class FieldOptions(Protocol):
-    """Options of the fields and their weights."""
-
-    @property
-    def smoothness(self) -> float: ...
-    @property
-    def strand_weight(self) -> float: ...
-    @property
-    def scalp_reach(self) -> float: ...
-    @property
-    def scalp_lift(self) -> float: ...
-    @property
-    def surface(self) -> float: ...
-    @property
-    def surface_reach(self) -> float: ...
-    @property
-    def outward(self) -> float: ...
-    @property
-    def signed(self) -> float: ...
-    @property
-    def tolerance(self) -> float: ...
 
 
 def surface_structure(cells: CellGraph, band: Band, tolerance: float) -> Float32Array:
@@ -83,7 +62,7 @@ def internal_direction(
     wanted: Float32Array,
     weight: Float32Array,
     band: Band,
-    options: FieldOptions,
+    options: Options,
 ) -> Float32Array:
     """Return V (N, 6) of the loose cells: `wanted` by `weight`, and ribbons, diffused."""
     on = band.on
@@ -93,7 +72,7 @@ def internal_direction(
     total[on] += options.strand_weight
     share = (options.strand_weight / np.maximum(total[on], 1e-9))[:, None]
     data[on] = (1 - share) * wanted[on] + share * outer_products(tangent)
-    return solve_screened(cells, data, total, options.smoothness, tolerance=options.tolerance)
+    return solve_screened(cells, data, total, SMOOTHNESS, tolerance=options.tolerance)
 
 
 def internal_distance(hull: Hull, segments: Strands, tolerance: float) -> Float32Array:
@@ -160,7 +139,7 @@ class Fields:
     """O, (N, 3)."""
 
 
-def blend(hull: Hull, band: Band, fields: Fields, options: FieldOptions) -> Float32Array:
+def blend(hull: Hull, band: Band, fields: Fields, options: Options) -> Float32Array:
     """Return H (X, Y, Z, 3), 0 outside the loose hull.
 
     The weights differ from cell to cell: S counts on strands, V away from them, grad(I) at the
@@ -176,10 +155,10 @@ def blend(hull: Hull, band: Band, fields: Fields, options: FieldOptions) -> Floa
     a_s = options.surface * np.exp(-off / options.surface_reach)
     a_v = 1 - np.minimum(a_s, 1)
     a_i = options.outward * near_scalp
-    mixed = a_s[:, None] * _unit(fields.surface) + a_v[:, None] * main
-    mixed += a_i[:, None] * slope + options.signed * _unit(fields.growth)
+    mixed = a_s[:, None] * unit_vectors(fields.surface) + a_v[:, None] * main
+    mixed += a_i[:, None] * slope + options.signed * unit_vectors(fields.growth)
     direction = np.zeros((*hull.grid.shape, 3), np.float32)
-    direction[hull.loose] = _unit(mixed)
+    direction[hull.loose] = unit_vectors(mixed)
     return read_only(direction)
 
 
@@ -203,10 +182,3 @@ def _distance_to(on: BoolArray, around: BoolArray, far: float) -> Float32Array:
         np.minimum(nearest[k:], square[:-k] + np.float32(k * k), out=nearest[k:])
         np.minimum(nearest[:-k], square[k:] + np.float32(k * k), out=nearest[:-k])
     return np.asarray(np.sqrt(nearest[around[box]]), np.float32)
-
-
-def _unit(vectors: Float32Array | Float64Array) -> Float64Array:
-    """Return vectors (N, 3) at length 1, those of no length unchanged."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    result: Float64Array = vectors / np.maximum(length, 1e-9)
-    return result

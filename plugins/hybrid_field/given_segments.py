@@ -14,7 +14,7 @@ from hairkit import Hull, Strands
 from hairkit.arrays import BoolArray, Float32Array, Int64Array, check_reach
 from hairkit.errors import DataError, FormatError, InputError
 from hairkit.io.byte_reader import finite
-from hairkit.io.ply_elements import read_elements, strand_order
+from hairkit.io.ply_elements import columns, read_elements, strand_order, vertex_points
 from hairkit.storage import read_bytes, read_npz
 
 from .photo_lines import STEP
@@ -94,15 +94,10 @@ def _read_npz(path: Path) -> _Read:
 
 def _read_ply(path: Path) -> _Read:
     elements = read_elements(read_bytes(path), path)
-    vertex = elements.get("vertex", {})
-    if not {"x", "y", "z"} <= set(vertex):
-        raise FormatError(f"{path}: has no element vertex with x, y and z")
-    with np.errstate(over="ignore"):  # what is not finite is refused by the caller
-        points = np.stack([vertex[name] for name in "xyz"], axis=1).astype(np.float32)
-        if {"nx", "ny", "nz"} <= set(vertex) and "edge" not in elements:
-            names = ("nx", "ny", "nz")
-            directions = np.stack([vertex[name] for name in names], axis=1).astype(np.float32)
-            return points, directions, np.zeros(0, np.int64)
+    points = vertex_points(elements, path)
+    directions = columns(elements["vertex"], ("nx", "ny", "nz"))
+    if directions is not None and "edge" not in elements:
+        return points, directions, np.zeros(0, np.int64)
     order, counts = strand_order(elements, len(points), path)
     return points[order], None, counts
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,8 @@ from hairkit.field.sampling_kernels import copy_point, sample_at
 from hairkit.field.view_fusion import DEPTH_SHRINK, FusedViews
 from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
+
+from .options import Options
 
 PIXELS = 2.0
 """Step along a line in a photo, pixels."""
@@ -29,6 +31,8 @@ SMOOTHING = 3.0
 """Gaussian in points under which lifted lines are smoothed: the hull's front has steps."""
 KERNEL_SIGMAS = 3
 """Half width of that Gaussian's kernel in its sigmas."""
+LINE_SPACING = 10
+"""Pixels between the lines that are followed in a photo."""
 FEWEST = 5
 """Points of the shortest segment."""
 MIN_COSINE = 0.8
@@ -41,24 +45,15 @@ MIN_LINES = 64
 """Least number of lines worth a call on another thread."""
 
 
-class LineOptions(Protocol):
-    """Options of the lines."""
-
-    @property
-    def line_spacing(self) -> int: ...
-    @property
-    def longest(self) -> float: ...
-
-
 def lift_photo_lines(
-    cameras: Sequence[Camera], masks: Sequence[Mask], fused: FusedViews, options: LineOptions
+    cameras: Sequence[Camera], masks: Sequence[Mask], fused: FusedViews, options: Options
 ) -> Strands:
     """Return lines that follow the 2D orientation in each photo, lifted to the hull's front."""
     found = []
     views = zip(cameras, masks, fused.orientations, fused.fronts, strict=True)
     for camera, mask, oriented, front in views:
         weight = (oriented.confidence * mask.hair).astype(np.float32)
-        rows, columns = _seeds(weight, options.line_spacing)
+        rows, columns = _seeds(weight, LINE_SPACING)
         steps = int(options.longest / PIXELS * camera.focal / _median_depth(front))
         lines = np.empty((len(rows), 2 * max(steps // 2, FEWEST) + 1, 3), np.float32)
         counts = np.zeros(len(rows), np.int64)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -19,12 +19,12 @@ from hairkit.field.sampling_kernels import copy_point, make_unit, principal_dire
 from hairkit.field.view_fusion import FusedViews
 from hairkit.parallel import compiled_with, parallel_for
 
+from .options import Options
 from .photo_lines import (
     CONFIDENT,
     FEWEST,
     MIN_LINES,
     STEP,
-    LineOptions,
     TensorVolume,
     agreeing,
     join,
@@ -43,6 +43,8 @@ OUTER_CELLS = 2
 """Depth in cells of the hull's outer shell, which photos see."""
 BEST = 95
 """Percentile of the shell's certainty that is taken for the best: the maximum may be an outlier."""
+AGREEMENT_DEG = 35.0
+"""A lifted line is dropped if it differs by more from the fused field of all views."""
 RUN_ON = 0.5
 """Share of a seed's least certainty at which a line still runs on."""
 FIRST_WAY = np.array([0.3, 0.9, 0.3])
@@ -62,20 +64,13 @@ class Way(NamedTuple):
     """Longest way through the hair from the nearest scalp, metres."""
 
 
-class SegmentOptions(LineOptions, Protocol):
-    """Options of the segments."""
-
-    @property
-    def agreement_deg(self) -> float: ...
-
-
 def find_segments(
     cameras: Sequence[Camera],
     masks: Sequence[Mask],
     fused: FusedViews,
     hull: Hull,
     way: Way,
-    options: SegmentOptions,
+    options: Options,
 ) -> Strands:
     """Return segments root to tip, points `STEP` apart, in the head frame.
 
@@ -90,7 +85,7 @@ def find_segments(
     volume = np.zeros((*hull.grid.shape, 6), np.float32)
     volume[hull.loose] = fused.tensor * np.minimum(certainty, 1)[:, None]
     lines = lift_photo_lines(cameras, masks, fused, options)
-    lines = agreeing(lines, hull, volume, options.agreement_deg)
+    lines = agreeing(lines, hull, volume, AGREEMENT_DEG)
     inner = lines_through_cells(hull, volume, certainty, options.longest)
     points = np.concatenate([lines.points, inner.points])
     offsets = np.concatenate([lines.offsets, inner.offsets[1:] + lines.offsets[-1]])

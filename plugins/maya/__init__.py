@@ -37,7 +37,7 @@ from hairkit.types.strands import Strands
 FORMAT = FileFormat(
     title="Maya ASCII",
     suffixes=(".ma",),
-    exact=frozenset({Feature.POINTS, Feature.COUNTS, Feature.GUIDE, Feature.GROUP}),
+    exact={Feature.POINTS, Feature.COUNTS, Feature.GUIDE, Feature.GROUP},
 )
 
 UNITS = {0.001: "millimeter", 0.01: "centimeter", 1.0: "meter", 0.0254: "inch", 0.3048: "foot"}

@@ -45,9 +45,6 @@ class Options:
     """Settings of the reconstruction."""
 
     features: int = option(4000, low=200, high=20000, doc="Points looked for in a photo.")
-    contrast: float = option(
-        0.002, low=0.0005, high=0.05, doc="Least contrast of a point; COLMAP's own is 0.0067."
-    )
     neighbours: int = option(4, low=1, high=20, doc="Photos on either side that are compared.")
     seconds: float = option(1800.0, low=10, high=86400, doc="Time it may take.", unit="s")
 
@@ -69,7 +66,7 @@ def estimate_scene(
     model = solve(
         [capture.views[i] for i in order],
         [masks[i] for i in order],
-        (options.features, options.contrast, options.neighbours),
+        (options.features, options.neighbours),
         options.seconds,
     ).reordered(order)
     lost = [names[i] for i, camera in enumerate(model.cameras) if camera is None]

@@ -1,21 +1,24 @@
 """The program that runs COLMAP on the photos of a folder, and writes what it found as model.npz.
 
-It uses nothing of hairkit and no OpenCV. The folder has photos/, masks/ and task.json.
+It uses no OpenCV. The folder has photos/ and masks/.
 """
 
 from __future__ import annotations
 
-import json
-import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hairkit import worker
+
 FIRST_PAIR, FIRST_ANGLE_DEG = 20, 5.0
 """Matches and angle of the pair that begins; COLMAP's 100 and 16 degrees are for buildings."""
 MORE, SHARE, MISS_PX = 10, 0.15, 8.0
 """Points that a further photo must share, their share of the matches, and how far they may miss."""
+CONTRAST = 0.002
+"""Least contrast of a point; COLMAP's own is 0.0067."""
 LEAST_MATCHES = 10
 """Matches of a pair that the epipolar geometry explains; COLMAP's 15 break turns of plain skin."""
 LEAST_ANGLE_DEG = 1.0
@@ -24,12 +27,12 @@ RATIO = 0.85
 """Distance of the best match over that of the second: hair looks alike everywhere."""
 
 
-def main(folder: Path) -> None:
+def solve(task: dict[str, Any], _tell: Callable[[Any], None]) -> dict[str, Any]:
     """Find features, match, reconstruct, and write the largest model."""
     import pycolmap
 
     pycolmap.set_random_seed(0)
-    task = json.loads((folder / "task.json").read_text())
+    folder = Path(task["folder"])
     database = folder / "database.db"
     _find_features(pycolmap, folder, database, task)
     _match(pycolmap, database, task["neighbours"])
@@ -38,6 +41,7 @@ def main(folder: Path) -> None:
     )
     best = max(models.values(), key=lambda model: model.num_reg_images(), default=None)
     np.savez(folder / "model.npz", **_arrays(best, len(task["focals"])))
+    return {}
 
 
 def _find_features(pycolmap: Any, folder: Path, database: Path, task: dict[str, Any]) -> None:
@@ -45,7 +49,7 @@ def _find_features(pycolmap: Any, folder: Path, database: Path, task: dict[str, 
     options = pycolmap.FeatureExtractionOptions()
     options.use_gpu = False
     options.sift.max_num_features = task["features"]
-    options.sift.peak_threshold = task["contrast"]
+    options.sift.peak_threshold = CONTRAST
     reader = pycolmap.ImageReaderOptions()
     reader.mask_path, reader.camera_model = str(folder / "masks"), "SIMPLE_PINHOLE"
     mode = pycolmap.CameraMode.SINGLE if task["shared"] else pycolmap.CameraMode.PER_IMAGE
@@ -139,4 +143,4 @@ def _arrays(model: Any, count: int) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    worker.answer_questions({"solve": solve})

@@ -6,9 +6,6 @@ pycolmap and OpenCV in one process crash each other: both bring libraries that r
 from __future__ import annotations
 
 import importlib.util
-import json
-import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,6 +18,7 @@ import numpy.typing as npt
 
 from hairkit import Camera, Mask, View
 from hairkit.arrays import Float64Array, Int64Array
+from hairkit.child_process import ChildError, Limits, ask_once
 from hairkit.errors import InputError, MissingExtraError
 from hairkit.storage import read_npz
 from hairkit.types.mask import BACKGROUND
@@ -57,12 +55,12 @@ class Model:
 def solve(
     views: Sequence[View],
     masks: Sequence[Mask],
-    settings: tuple[int, float, int],
+    settings: tuple[int, int],
     seconds: float,
 ) -> Model:
     """Return the model of photos in the order of the turn.
 
-    `settings` are features, contrast and neighbours of the plugin's options.
+    `settings` are features and neighbours of the plugin's options.
 
     Raises
     ------
@@ -75,15 +73,16 @@ def solve(
         raise MissingExtraError(MISSING)
     with tempfile.TemporaryDirectory(prefix="hairkit-sfm-") as folder:
         _write_photos(Path(folder), views, masks)
-        task: dict[str, object] = dict(
-            zip(("features", "contrast", "neighbours"), settings, strict=True)
-        )
+        task: dict[str, object] = dict(zip(("features", "neighbours"), settings, strict=True))
         focals = [view.focal_px or USUAL_FOCAL * max(view.width, view.height) for view in views]
         known = all(view.focal_px for view in views)
         alike = len({(view.width, view.height) for view in views}) == 1
         task |= {"focals": focals, "known": known, "shared": alike and len(set(focals)) == 1}
-        (Path(folder) / "task.json").write_text(json.dumps(task))
-        _run(folder, seconds)
+        try:
+            ask_once(_PROGRAM, {"do": "solve", "folder": folder, **task}, Limits(seconds))
+        except ChildError as error:
+            cure = "; raise sfm.seconds" if error.limit else ""
+            raise InputError(f"sfm: COLMAP {error}{cure}") from error
         found = read_npz(Path(folder) / "model.npz")
     return _model(found, views)
 
@@ -97,19 +96,6 @@ def _write_photos(folder: Path, views: Sequence[View], masks: Sequence[Mask]) ->
         small = cv2.resize(person, size, interpolation=cv2.INTER_NEAREST)
         cv2.imwrite(str(folder / "photos" / f"{i:04}.png"), view.image[..., ::-1])
         cv2.imwrite(str(folder / "masks" / f"{i:04}.png.png"), small)
-
-
-def _run(folder: str, seconds: float) -> None:
-    command = [sys.executable, "-P", str(_PROGRAM), folder]
-    try:
-        done = subprocess.run(
-            command, capture_output=True, stdin=subprocess.DEVNULL, timeout=seconds, check=False
-        )
-    except subprocess.TimeoutExpired as error:
-        raise InputError(f"sfm: not done within {seconds:.0f} s; raise sfm.seconds") from error
-    if done.returncode:
-        last = [*done.stderr.decode("utf-8", "replace").strip().split("\n")][-1]
-        raise InputError(f"sfm: COLMAP ended with code {done.returncode} ({last.strip()[:160]})")
 
 
 def _model(found: Mapping[str, npt.NDArray[Any]], views: Sequence[View]) -> Model:

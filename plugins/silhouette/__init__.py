@@ -79,7 +79,8 @@ NEAR = 6.0
 """Rays that stay farther inside than this many times the noise tell nothing."""
 FROM_THE_SIDE = 0.35
 """Views this near (radians) to 90 degrees show the face's midline on the outline."""
-PROFILE_PX = 3.0
+SILHOUETTE_PX, PROFILE_PX = 3.0, 3.0
+"""Noise of outlines, and of the profile's, in pixels of pictures 1080 high."""
 FOCAL_SPREAD = 0.03
 """Of the logarithm of a known focal length: lenses breathe and cameras crop."""
 ABOVE, LOOSE_ABOVE = np.radians(35), 4.0
@@ -105,9 +106,6 @@ class Options:
     shift: float = option(0.008, low=0.0001, high=0.2, doc="Spread of the aim.", unit="m")
     landmark_px: float = option(
         1.5, low=0.1, high=50, doc="Noise of landmarks, pictures 1080 high.", unit="px"
-    )
-    silhouette_px: float = option(
-        3.0, low=0.1, high=50, doc="Noise of outlines, pictures 1080 high.", unit="px"
     )
     contour_points: int = option(
         100, low=20, high=1000, doc="Contour points of a view; fewer each beyond eight views."
@@ -201,7 +199,7 @@ class _Problem:
         own = np.tile(each, (len(capture.views), 1))
         own[turn.elevations > ABOVE, :2] *= LOOSE_ABOVE
         spread = np.concatenate([shared, own.ravel()])
-        noise = options.silhouette_px * pixel
+        noise = SILHOUETTE_PX * pixel
         focals = [view.focal_px for view in capture.views]
         focal = None if None in focals else focals[0]
         problem = cls(turn, outlines, head, landmarks, noise, spread, focal)

@@ -1,9 +1,9 @@
 """The same step formed densely and solved by conjugate gradients, as in the patent.
 
-Readable twin of `linear_time_step.py`, one strand at a time, and the energies and generalised
-forces that tests compare. Mass matrix and forces are those of Bertails et al. 2006, section 4:
-M = J' m J, K = diag(l GJ, l EI, l EI). The step is implicit (Euler or BDF2) in place of the text's
-semi-implicit one: its Coriolis forces arise from the Gauss points' own velocities.
+Readable twin of `linear_time_step.py`, one strand at a time. Mass matrix and forces are those of
+Bertails et al. 2006, section 4: M = J' m J, K = diag(l GJ, l EI, l EI). The step is
+implicit (Euler or BDF2) in place of the text's semi-implicit one: its Coriolis forces arise from
+the Gauss points' own velocities.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from hairkit.arrays import Float64Array
 
 from .contact import Point, touch
-from .kinematics import Placed, place
+from .kinematics import place
 from .rods import NODES, Rods
 from .state import CLOSE, FAR, Loads, Motion, Step
 
@@ -22,28 +22,9 @@ _MOST_ROUNDS = 40
 """Conjugate gradient steps per unknown: without rounding one would do."""
 
 
-def mass_matrix(rod: Rods, placed: Placed) -> Float64Array:
-    """Return M (3n, 3n), kilograms square metres: 1/2 q' M q' is the kinetic energy."""
-    flat = placed.jacobian.reshape(-1, 3 * len(rod.lengths))
-    return (flat.T * np.repeat(rod.masses.ravel(), 3)) @ flat
-
-
 def stiffness_matrix(rod: Rods) -> Float64Array:
     """Return K (3n, 3n), diagonal."""
     return np.diag((rod.lengths[:, None] * rod.stiffness).ravel())
-
-
-def potential(rod: Rods, q: Float64Array, placed: Placed, gravity: Float64Array) -> float:
-    """Return the elastic energy and that of gravity, joules."""
-    elastic = 0.5 * (rod.lengths[:, None] * rod.stiffness * (q - rod.natural) ** 2).sum()
-    return float(elastic - (rod.masses[..., None] * placed.points * gravity).sum())
-
-
-def forces(rod: Rods, q: Float64Array, placed: Placed, gravity: Float64Array) -> Float64Array:
-    """Return the generalised forces -dV/dq (n, 3) of elasticity and gravity."""
-    elastic = rod.lengths[:, None] * rod.stiffness * (rod.natural - q)
-    weight = np.einsum("eg,i,egikj->kj", rod.masses, gravity, placed.jacobian)
-    return np.asarray(elastic + weight)
 
 
 def system(

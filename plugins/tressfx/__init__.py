@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -51,14 +50,12 @@ POINTS = (4, 8, 16, 32, 64)
 FORMAT = FileFormat(
     "TressFX",
     (".tfx",),
-    exact=frozenset({Feature.ROOT_UV, Feature.COLOUR}),
-    partial=MappingProxyType(
-        {
-            Feature.POINTS: "resampled to `points_per_strand`, ends kept",
-            Feature.WIDTHS: "mean of each strand",
-        }
-    ),
-    written=frozenset({Feature.SKIN}),
+    exact={Feature.ROOT_UV, Feature.COLOUR},
+    partial={
+        Feature.POINTS: "resampled to `points_per_strand`, ends kept",
+        Feature.WIDTHS: "mean of each strand",
+    },
+    written={Feature.SKIN},
 )
 
 

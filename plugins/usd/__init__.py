@@ -17,6 +17,7 @@ Source: OpenUSD, UsdGeomBasisCurves and UsdSkel schemas; Epic's groom attributes
 * `curves`: strands as BasisCurves
 * `guarded`: the reading process, guarded against crashes
 * `look`: materials
+* `options`: settings of USD files
 * `reading_child`: the program that reads in a process of its own
 * `settings`: groom settings as custom data
 * `stage`: metadata and parts of the stage
@@ -25,47 +26,23 @@ Source: OpenUSD, UsdGeomBasisCurves and UsdSkel schemas; Epic's groom attributes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 
-from hairkit.grooming.adopt_strands import ImportOptions
-from hairkit.grooming.prepare_export import AnimationOptions, ExportOptions, prepare_export
+from hairkit.grooming.prepare_export import prepare_export
 from hairkit.hookspecs import hookimpl
-from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.options import option
 from hairkit.types.groom import Groom
+
+from .options import Options
 
 _WRITTEN = frozenset({Feature.GUIDE_WEIGHTS, Feature.DENSITY, Feature.MAPS, Feature.SHAPES})
 FORMAT = FileFormat(
     title="USD",
     suffixes=(".usdc", ".usda", ".usd"),
     exact=frozenset(Feature) - _WRITTEN - {Feature.ANIMATION},
-    partial=MappingProxyType({Feature.ANIMATION: "written; the rest pose is read"}),
+    partial={Feature.ANIMATION: "written; the rest pose is read"},
     written=_WRITTEN,
 )
-
-
-@dataclass(frozen=True)
-class Options(SpaceOptions, ImportOptions, AnimationOptions, ExportOptions):
-    """Settings of the USD exporter and importer.
-
-    USD files say their axes and unit themselves: `axis` is for writing, and reading takes `scale`
-    only to overrule the file.
-    """
-
-    head_mesh: bool = option(True, doc="Write the head's mesh.")
-    bust: bool = option(True, doc="Write a clothed bust under a head that ends at the neck.")
-    mark_guides: bool = option(
-        False,
-        doc="Mark guides in a file of guides alone, which Unreal then does not draw.",
-    )
-    attributes: bool = option(
-        True,
-        doc="Write ids, groups, guides and their weights, uv and colours of the strands; false"
-        " leaves points and widths.",
-    )
 
 
 @hookimpl

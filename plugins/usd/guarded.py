@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +12,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from hairkit.child_process import ChildError, Limits, ask_once
 from hairkit.errors import FormatError, InputError, MissingExtraError
 from hairkit.storage import open_file, read_npz, utf8_name
 
@@ -23,6 +22,8 @@ MAX_BYTES = 2 * 2**30
 """Files larger than this are refused."""
 SECONDS = 30.0
 """Time for reading, and one second on top for every megabyte."""
+MEMORY = 4 * 2**30
+"""Bytes of memory for reading, and eight times the file's size on top."""
 _PROGRAM = Path(__file__).with_name("reading_child.py")
 
 
@@ -67,22 +68,9 @@ def contents(path: Path) -> Contents:
 
 def run(path: Path, archive: Path, seconds: float) -> dict[str, Any]:
     """Return the program's answer; raises `FormatError` when it crashed or took too long."""
-    command = [sys.executable, "-P", str(_PROGRAM), str(path.resolve()), str(archive)]
+    question = {"do": "read", "source": str(path.resolve()), "target": str(archive)}
+    memory = MEMORY + 8 * path.stat().st_size
     try:
-        done = subprocess.run(
-            command, capture_output=True, stdin=subprocess.DEVNULL, timeout=seconds, check=False
-        )
-    except subprocess.TimeoutExpired as error:
-        raise FormatError(f"{path}: not read within {seconds:.0f} s: damaged or hostile") from error
-    lines = done.stdout.decode("utf-8", "replace").splitlines()
-    if done.returncode or not lines:
-        raise FormatError(f"{path}: damaged: {_ending(done.returncode, done.stderr)}")
-    answer: dict[str, Any] = json.loads(lines[-1])
-    return answer
-
-
-def _ending(code: int, stderr: bytes) -> str:
-    if code < 0:
-        return f"the USD library crashed while reading it (signal {-code})"
-    last = [*stderr.decode("utf-8", "replace").split("\n"), ""][-2:]
-    return f"the USD library ended while reading it ({' '.join(last).strip()[:160]})"
+        return ask_once(_PROGRAM, question, Limits(seconds, memory), memory)
+    except ChildError as error:
+        raise FormatError(f"{path}: damaged or hostile: the USD library {error}") from error

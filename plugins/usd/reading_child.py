@@ -1,9 +1,8 @@
 """A program of its own: takes the curves, head and skeleton out of a USD file.
 
-`python reading_child.py FILE OUT.npz` writes the arrays as they are in the file, with the
-transforms to the stage, and prints one line of JSON: {} or {"error": ..., "kind": ...}. It runs
-apart because usd-core, a C++ library, crashes on some damaged crate files; it uses nothing of
-hairkit, and limits its own memory.
+Asked to `read` the file `source`, it writes the arrays as they are in it to `target`, with the
+transforms to the stage, and answers {} or {"error": ..., "kind": ...}. It runs apart because
+usd-core, a C++ library, crashes on some damaged crate files.
 """
 
 from __future__ import annotations
@@ -11,17 +10,16 @@ from __future__ import annotations
 import json
 import os
 import re
-import sys
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from hairkit import worker
+
 MAX_POINTS = 64_000_000
 """Control points of all curves and meshes together, and primvars' values."""
 MAX_PRIMS = 200_000
-MEMORY = 4 * 2**30
-"""Bytes of address space, and eight times the file's size on top."""
 CURVE_PRIMVARS = (
     "groom_root_uv",
     "st",
@@ -46,15 +44,7 @@ class RefusedError(Exception):
     """The file is whole, but not read."""
 
 
-def main() -> None:
-    """Read the file named first and write the archive named second."""
-    source, target = sys.argv[1:]
-    _limit_memory(os.path.getsize(source))
-    print(json.dumps(answer_request(source, target)), flush=True)
-    os._exit(0)  # nothing of the library's is needed any more, least of all its destructors
-
-
-def answer_request(source: str, target: str) -> dict[str, str]:
+def read(source: str, target: str) -> dict[str, str]:
     """Write the archive; return nothing, or the `error` and its `kind`."""
     from pxr import Tf
 
@@ -248,18 +238,5 @@ def _first_reason(error: Exception) -> str:
     return " ".join(words.split())[:200]
 
 
-def _limit_memory(size: int) -> None:
-    try:
-        import resource
-    except ImportError:  # not on Windows
-        return
-    wanted = MEMORY + 8 * size
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    if hard != resource.RLIM_INFINITY:
-        wanted = min(wanted, hard)
-    resource.setrlimit(resource.RLIMIT_AS, (wanted, hard))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
 if __name__ == "__main__":
-    main()
+    worker.answer_questions({"read": lambda asked, _: read(asked["source"], asked["target"])})

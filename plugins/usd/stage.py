@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from hairkit.errors import InputError, MissingExtraError
 from hairkit.grooming.prepare_export import PreparedGroom
@@ -12,29 +12,14 @@ from hairkit.io.coordinate_space import FileSpace
 from hairkit.io.textures import picture_names, write_pictures
 from hairkit.storage import replace_file, utf8_name
 
+from .options import Options
+
 MISSING = "USD files need usd-core, which is not installed: pip install 'hairkit[usd]'"
 DIGITS = 6
 """Time codes are rounded to so many decimals, so that frame 3 is at 3."""
 
 
-class StageOptions(Protocol):
-    """Options of the plugin that `write_stage` uses."""
-
-    @property
-    def axis(self) -> str: ...
-    @property
-    def space(self) -> FileSpace: ...
-    @property
-    def head_mesh(self) -> bool: ...
-    @property
-    def bust(self) -> bool: ...
-    @property
-    def attributes(self) -> bool: ...
-    @property
-    def mark_guides(self) -> bool: ...
-
-
-def write_stage(ready: PreparedGroom, path: Path, options: StageOptions) -> None:
+def write_stage(ready: PreparedGroom, path: Path, options: Options) -> None:
     """Write the groom to `path`, whose ending says whether as text or as crate.
 
     Raises
@@ -96,7 +81,7 @@ def _fill(
     stage: Any,
     ready: PreparedGroom,
     space: FileSpace,
-    options: StageOptions,
+    options: Options,
     pictures: Mapping[str, str],
 ) -> None:
     from pxr import Kind, Usd, UsdSkel

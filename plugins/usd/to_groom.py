@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,19 +19,13 @@ from hairkit.types.strands import Strands
 
 from .body_reading import read_head
 from .guarded import Contents, contents
+from .options import Options
 from .settings import material_from, physics_from, ties_from
 
 _log = logging.getLogger("hairkit")
 
 _THROUGH = ("catmullRom", True)
 """Basis and pinning of curves that run through all their control points: these are the strand."""
-
-
-class ReadOptions(Protocol):
-    """Options of the plugin that `read_groom` uses, besides those of `adopt`."""
-
-    @property
-    def scale(self) -> float: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +67,7 @@ def read_groom(path: Path, options: Any) -> Groom:
     return _bound(groom, joined, kept, options) if head is not None else groom
 
 
-def _space(found: Contents, options: ReadOptions, path: Path) -> FileSpace:
+def _space(found: Contents, options: Options, path: Path) -> FileSpace:
     axes = {"Y": "y_up", "Z": "z_up"}.get(found.description["up"])
     if axes is None:
         raise FormatError(f"{path}: upAxis is {found.description['up']!r}, expected Y or Z")

@@ -10,15 +10,15 @@ from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
+from foreign_heads import make_coarse_head
 from hairkit_plugins import landmarks
 
 from hairkit.cli import main as hairkit
-from hairkit.synth.foreign_heads import make_coarse_head
 
 PROJECT = Path(__file__).parents[2]
 SHARED = {
-    "captures_argument", "example_textures", "peer_cases", "peer_surfaces", "peer_views",
-    "peer_volumes", "plain_analogies", "random_hair", "xpbd_peer",
+    "captures_argument", "card_picture", "example_textures", "foreign_heads", "peer_cases",
+    "peer_surfaces", "peer_views", "peer_volumes", "plain_analogies", "random_hair", "xpbd_peer",
 }  # fmt: skip
 """Modules that programs import."""
 FOLDERS = ("benchmarks", "studies")

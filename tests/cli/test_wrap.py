@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from foreign_heads import make_coarse_head
 
 import hairkit
 from hairkit.cli import main
 from hairkit.head_model.template import default_head
 from hairkit.io.head_reader import BareHead
 from hairkit.synth import grow
-from hairkit.synth.foreign_heads import make_coarse_head
 
 
 def _write_zup_centimetres(head: BareHead, path: Path) -> Path:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fidelity import mean_figures
 from scipy.spatial.transform import Rotation
 
 from hairkit.cli import main
@@ -19,7 +20,7 @@ from hairkit.evaluation import evaluate as evaluate_whole
 from hairkit.evaluation.align import Similarity
 from hairkit.evaluation.prediction import Prediction
 from hairkit.evaluation.report import write_report
-from hairkit.evaluation.scorecard import figures, mean_figures
+from hairkit.evaluation.scorecard import figures
 from hairkit.testing import VIEW_NAMES
 
 

@@ -40,7 +40,7 @@ def curtain(spacing: float = 0.01, hem: float = -0.3, thickness: float = 0.03) -
 
 def potential(hull: Hull) -> Float32Array:
     """The growth potential of hair on the ball."""
-    return growth_potential(hull, measure_scalp_distance(ball_head(), hull), 0.6)
+    return growth_potential(hull, measure_scalp_distance(ball_head(), hull))
 
 
 def graph_way(occupied: BoolArray, start: BoolArray) -> Float64Array:

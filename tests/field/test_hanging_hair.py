@@ -42,7 +42,7 @@ def test_left_and_right_mirror_each_other() -> None:
 def test_the_field_is_signed_and_of_unit_length_in_the_loose_hull_only() -> None:
     """A tracker can follow it from root to tip."""
     hull = shell_hull()
-    growth = growth_potential(hull, measure_scalp_distance(HEAD, hull), 0.6)
+    growth = growth_potential(hull, measure_scalp_distance(HEAD, hull))
     field = hang_curls(HEAD, hull, growth)
     assert field.direction is not None
     length = np.linalg.norm(field.direction, axis=3)

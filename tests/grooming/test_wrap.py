@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from foreign_heads import FOREIGN_HEADS, make_child_head
 
 from hairkit.errors import HairkitError, InputError
 from hairkit.grooming.wrap import wrap_groom
@@ -20,7 +21,6 @@ from hairkit.head_model.signed_distance import distance_to
 from hairkit.head_model.template import default_head
 from hairkit.io.head_reader import BareHead, read_bare_head
 from hairkit.synth import grow
-from hairkit.synth.foreign_heads import FOREIGN_HEADS, make_child_head
 from hairkit.types.groom import Groom
 from hairkit.types.tie import Tie
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from foreign_heads import make_coarse_head
 from scipy.spatial import cKDTree
 
 from hairkit.cli import main
 from hairkit.errors import InputError
 from hairkit.head_model.identity import blend_head
 from hairkit.io.head_reader import TRANSFER, read_head
-from hairkit.synth.foreign_heads import make_coarse_head
 from hairkit.types.head import Head
 
 

@@ -83,16 +83,6 @@ def test_turning_the_strands_changes_nothing(rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(mirror.handedness, -curl.handedness)
 
 
-def test_wisps_are_the_medians_of_their_strands(rng: np.random.Generator) -> None:
-    """Each wisp gets its own curl; a wisp of straight strands none."""
-    made = [coil(0.006, 0.03, 1, rng) for _ in range(3)]
-    made += [coil(0.003, 0.02, -1, rng) for _ in range(3)]
-    made += [coil(0.0, 1.0, 1, rng) for _ in range(3)]
-    wisps = measure_curl(Strands.from_list(made)).of_wisps(np.repeat([4, 7, 9], 3))
-    np.testing.assert_allclose(wisps.radius, [0.006, 0.003, 0], rtol=0.1, atol=1e-9)
-    np.testing.assert_array_equal(wisps.handedness, [1, -1, 0])
-
-
 def test_a_curly_groom_says_so() -> None:
     """Procedural curly hair has about its style's curl in the material; straight hair none."""
     curly = grow("curly", default_head(), 60)

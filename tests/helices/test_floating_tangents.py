@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from hairkit.errors import InputError
 from hairkit.helices import (
     Arcs,
-    HelixStrands,
     adaptive_counts,
     fit_arcs,
     patent_counts,
@@ -136,50 +134,6 @@ def test_bad_tolerances_are_refused(rng: np.random.Generator) -> None:
     """A tolerance is a length."""
     with pytest.raises(InputError, match="above 0"):
         adaptive_counts(wandering(rng, 2), 0.0)
-
-
-def test_strands_to_helices_and_back(rng: np.random.Generator) -> None:
-    """The compact form keeps roots, and the strands within its tolerance."""
-    strands = wandering(rng)
-    helices = HelixStrands.from_strands(strands, 2e-4)
-    back = helices.to_strands(0.002)
-    assert len(back) == len(strands)
-    np.testing.assert_allclose(back.roots, strands.roots, rtol=0, atol=1e-6)
-    gaps = [
-        cKDTree(strands.resampled_by_length(5e-4).select([s]).points)
-        .query(back.select([s]).points)[0]
-        .mean()
-        for s in range(len(strands))
-    ]
-    assert np.mean(gaps) < 3.5e-4
-
-
-def test_the_compact_form_is_the_arcs(rng: np.random.Generator) -> None:
-    """Frames that travel with the strand put the arcs where they were, to float32."""
-    strands = wandering(rng)
-    arcs = fit_arcs(strands, adaptive_counts(strands))
-    again = HelixStrands.from_arcs(arcs).arcs()
-    np.testing.assert_allclose(again.points, arcs.points, rtol=0, atol=2e-6)
-    np.testing.assert_allclose(again.tangents, arcs.tangents, rtol=0, atol=2e-5)
-
-
-def test_the_compact_form_is_stored(tmp_path: Path, rng: np.random.Generator) -> None:
-    """Saved and loaded it is the same, and it is smaller than the strands."""
-    strands = wandering(rng)
-    helices = HelixStrands.from_strands(strands)
-    helices.save(tmp_path / "hair.npz")
-    loaded = HelixStrands.load(tmp_path / "hair.npz")
-    np.testing.assert_array_equal(loaded.darboux, helices.darboux)
-    np.testing.assert_array_equal(loaded.offsets, helices.offsets)
-    with pytest.raises(InputError, match="offsets"):
-        HelixStrands(
-            helices.roots,
-            helices.frames,
-            helices.torsions,
-            helices.curvatures,
-            helices.lengths,
-            np.zeros(0, np.int64),
-        )
 
 
 def test_smoothing_takes_noise_off(rng: np.random.Generator) -> None:

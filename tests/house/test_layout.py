@@ -37,6 +37,7 @@ FLOORS = (
         "parallel",
         "kernel_cache",
         "memory",
+        "html_page",
         "compilation",
         "child_process",
         "worker",

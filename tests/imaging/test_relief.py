@@ -8,13 +8,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hairkit.arrays import Float32Array, UInt8Array
 from hairkit.errors import DataError
 from hairkit.imaging.relief import (
     bump_from_albedo,
     draw_difference,
     normal_from_height,
-    normals_of,
 )
+
+
+def normals_of(pixels: UInt8Array) -> Float32Array:
+    """Return the unit normals (H, W, 3) of a normal map."""
+    normal = pixels.astype(np.float32) * np.float32(2 / 255) - 1
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    return np.asarray(normal / np.maximum(length, 1e-9), np.float32)
 
 
 @given(st.integers(-3, 3), st.integers(-3, 3), st.floats(0.5, 200.0))

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from hairkit.errors import InputError
 from hairkit.imaging.alpha_matting import refine_labels
+from hairkit.imaging.masked_filters import reduced_size
 from hairkit.imaging.seeded_segmentation import (
     UNKNOWN,
     LabelSettings,
     coarse_labels,
     label_from_seeds,
-    reduced_size,
 )
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
@@ -163,5 +163,5 @@ def test_refinement_finds_a_wisp_that_the_reduced_picture_lost() -> None:
 
 def test_reduced_size_keeps_the_aspect_and_never_enlarges() -> None:
     """A picture is brought to the rows asked for, or left as it is when smaller."""
-    assert reduced_size(810, 1080, 360) == (270, 360)
-    assert reduced_size(90, 120, 360) == (90, 120)
+    assert reduced_size(810, 1080) == (270, 360)
+    assert reduced_size(90, 120) == (90, 120)

@@ -47,7 +47,6 @@ OWN_FILES = {
     "hairkit/pipeline/work_folder.py": "files that hairkit wrote there, and digests",
     "hairkit/rendering/context.py": "shaders",
     "plugins/face_mesh/landmark_table.py": "its own tables",
-    "plugins/sfm/colmap_child.py": "the task of its parent process",
 }
 """Modules that read files of hairkit itself in other ways."""
 

@@ -18,21 +18,25 @@ from hairkit.nets.net_process import NetProcess
 SERVER = """
 import os, signal, sys, time
 import numpy as np
-from hairkit.nets import net_child
-while (message := net_child.read_message(sys.stdin.buffer)) is not None:
-    head, arrays = message
-    if head["model"].endswith("crash"):
+from hairkit import worker
+
+def run(question, tell):
+    model = question["model"]
+    if model.endswith("crash"):
         os.kill(os.getpid(), signal.SIGSEGV)
-    if head["model"].endswith("slain"):
+    if model.endswith("slain"):
         os.kill(os.getpid(), signal.SIGKILL)
-    if head["model"].endswith("killed") and not os.path.exists(head["model"]):
-        open(head["model"], "w").close()
+    if model.endswith("killed") and not os.path.exists(model):
+        open(model, "w").close()
         os.kill(os.getpid(), signal.SIGKILL)
-    if head["model"].endswith("hang"):
+    if model.endswith("hang"):
         time.sleep(60)
-    if head["model"].endswith("leave"):
-        sys.exit(3)
-    net_child.write_message(sys.stdout.buffer, {}, [arrays[0] * 2, np.arange(3)])
+    if model.endswith("leave"):
+        os._exit(3)
+    batch = worker.map_arrays(question["folder"] + "/batch.npz")["batch"]
+    worker.write_arrays(question["folder"] + "/outputs.npz", {"0": batch * 2, "1": np.arange(3)})
+
+worker.answer_questions({"run": run})
 """
 """A stand-in for the child: it doubles what it is given, and fails as its model's name says."""
 BATCH = np.ones((2, 4, 4, 3), np.float32)
@@ -99,7 +103,7 @@ import sys, numpy as np
 from hairkit.nets.net_process import NetProcess
 nets = NetProcess(command=[sys.executable, "-c", {SERVER!r}])
 nets.run("fine", np.ones((1, 2, 2, 3), np.float32))
-print(nets._process.pid, flush=True)
+print(nets._child.pid, flush=True)
 sys.stdin.read()
 """
     with subprocess.Popen(

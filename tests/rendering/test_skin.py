@@ -8,21 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.special import iti0k0
+from skin_twins import below, diffuse, distribution, fresnel, reflect
 
 from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.rendering import Solid, draw_views
 from hairkit.rendering.context import renderer, shader_source
 from hairkit.rendering.light import Lights
-from hairkit.rendering.skin_lobe import (
-    TAPS,
-    below,
-    diffuse,
-    diffusion_kernel,
-    distribution,
-    fresnel,
-    reflect,
-)
+from hairkit.rendering.skin_lobe import TAPS, diffusion_kernel
 from hairkit.rendering.skin_passes import _diffuse
 from hairkit.types.camera import Camera
 from hairkit.types.skin import SkinMaps, Texture

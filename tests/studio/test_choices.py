@@ -172,9 +172,9 @@ def test_outlines_survive_a_restart(tmp_path: Path, start_studio: Any, photos: l
 
 def test_examples_show_what_they_are_named_after(monkeypatch: pytest.MonkeyPatch) -> None:
     """The right picture has no fault; each wrong one has its own."""
-    from hairkit.studio import draw_examples as drawing
+    from docs.images import camera_examples as drawing
+    from docs.images.camera_examples import GOOD, draw_examples
     from hairkit.studio.capture_guides import hair_line
-    from hairkit.studio.draw_examples import GOOD, draw_examples
     from hairkit.types.face import Face
 
     monkeypatch.setattr(drawing, "STRANDS", 400)

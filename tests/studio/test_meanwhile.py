@@ -43,10 +43,10 @@ class Process:
             Path(values["packet"]).write_bytes(b"packet")
         return {"formats": [["native", ".npz"]], "outline": [], "share": 0.5}
 
-    async def stop(self) -> None:
+    def stop(self) -> None:
         """End nothing."""
 
-    async def close(self) -> None:
+    def close(self) -> None:
         """End nothing."""
 
 

@@ -20,7 +20,7 @@ for line in sys.stdin:
         file.write("x")
     if os.path.getsize(path) <= kills:
         os.kill(os.getpid(), signal.SIGKILL)
-    print(json.dumps({"id": request["id"], "result": os.path.getsize(path)}), flush=True)
+    print(json.dumps({"id": request["id"], "result": {"made": os.path.getsize(path)}}), flush=True)
 """
 """A stand-in for the child: it is killed at its first `kills` tasks."""
 
@@ -41,7 +41,7 @@ def test_a_task_whose_process_is_killed_is_done_by_another(
     async def ask() -> int:
         values = {"kills": kills, "path": str(tmp_path / "count")}
         done: int = await process.call("count", 20.0, values)
-        await process.close()
+        process.close()
         return done
 
     assert run(ask) == kills + 1
@@ -55,7 +55,7 @@ def test_a_task_that_ends_every_process_is_given_up(process: TaskProcess, tmp_pa
         with pytest.raises(TaskError, match="again and again"):
             await process.call("count", 20.0, values)
         done: int = await process.call("count", 20.0, values)
-        await process.close()
+        process.close()
         return done
 
     assert run(ask) == TRIES + 1

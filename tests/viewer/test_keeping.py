@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from hairkit.errors import InputError, RenderError
+from hairkit.imaging.picture_file import write_picture
 from hairkit.manager import Manager
 from hairkit.options import describe
 from hairkit.rendering import context
@@ -18,7 +19,7 @@ from hairkit.rendering.context import renderer
 from hairkit.testing import bristle_groom
 from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.preview import Preview
-from hairkit.viewer.recording import Recorder, free_name, write_png
+from hairkit.viewer.recording import Recorder, free_name
 from hairkit.viewer.session import TICK, Session
 from hairkit.viewer.simulation import RigidHair
 from hairkit.viewer.window.file_watcher import POLL_INTERVAL, FileWatcher, shader_files
@@ -58,7 +59,7 @@ def test_names_that_are_taken_get_a_number(tmp_path: Path) -> None:
     """Nothing is written over."""
     path = tmp_path / "a.png"
     assert free_name(path) == path
-    write_png(path, PICTURE)
+    write_picture(path, PICTURE)
     assert free_name(path) == tmp_path / "a_1.png"
 
 

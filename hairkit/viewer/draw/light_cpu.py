@@ -14,10 +14,10 @@ import numpy.typing as npt
 from hairkit.arrays import Float32Array, Int32Array
 from hairkit.parallel import parallel_for, thread_count
 from hairkit.rendering.context import Renderer
-from hairkit.rendering.head import Mesh
 from hairkit.rendering.light import Lights
 from hairkit.simulation.lanes import stage
 from hairkit.simulation.vectors import HALF, ONE, Number
+from hairkit.types.preview import Surface
 from hairkit.types.strands import Strands
 from hairkit.viewer.draw.interface import HairDrawer
 from hairkit.viewer.draw.light_gpu import LightVolume, solid_depth
@@ -51,7 +51,7 @@ class Ways(NamedTuple):
 class SoftLightPass(LightVolume):
     """The light volume of hair drawn by `SoftHairPass`."""
 
-    def __init__(self, gl: Renderer, guides: Strands, solids: list[Mesh]) -> None:
+    def __init__(self, gl: Renderer, guides: Strands, solids: list[Surface]) -> None:
         super().__init__(gl, guides, solids)
         self._solids = np.ascontiguousarray(solid_depth(self.grid, solids).transpose(2, 1, 0))
         self._extinction, self._rough = np.zeros_like(self._solids), np.zeros_like(self._solids)

@@ -11,8 +11,8 @@ import numpy as np
 from hairkit.arrays import Float32Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import set_uniforms
-from hairkit.rendering.head import Mesh
 from hairkit.rendering.light import ABSORBED_SHARE, FULL_HEAD, HAIR_WIDTH, Lights, hair_density
+from hairkit.types.preview import Surface
 from hairkit.types.strands import Strands
 from hairkit.types.volume import VoxelGrid
 from hairkit.viewer.draw.interface import HairDrawer
@@ -32,7 +32,7 @@ TURNS = 6
 class LightVolume(ABC):
     """A 3D texture of the light that reaches hair and head, head frame."""
 
-    def __init__(self, gl: Renderer, guides: Strands, solids: list[Mesh]) -> None:
+    def __init__(self, gl: Renderer, guides: Strands, solids: list[Surface]) -> None:
         self._gl = gl
         self.grid = _grid(guides, solids)
         cells = self.grid.shape
@@ -100,7 +100,7 @@ class LightVolume(ABC):
 class LightPass(LightVolume):
     """The light volume of hair drawn by `HairPass`."""
 
-    def __init__(self, gl: Renderer, guides: Strands, solids: list[Mesh]) -> None:
+    def __init__(self, gl: Renderer, guides: Strands, solids: list[Surface]) -> None:
         super().__init__(gl, guides, solids)
         extinction = solid_depth(self.grid, solids)
         self._solids = gl.context.buffer(np.ascontiguousarray(extinction.transpose(2, 1, 0)))
@@ -153,14 +153,14 @@ class LightPass(LightVolume):
         self.texture, self._coming = self._coming, self.texture
 
 
-def _grid(guides: Strands, solids: list[Mesh]) -> VoxelGrid:
+def _grid(guides: Strands, solids: list[Surface]) -> VoxelGrid:
     clouds = [guides.points, *[solid.vertices for solid in solids]]
     low = np.min([cloud.min(axis=0) for cloud in clouds], axis=0) - MARGIN
     high = np.max([cloud.max(axis=0) for cloud in clouds], axis=0) + MARGIN
     return VoxelGrid.around(low, high, max(CELL, float((high - low).max()) / MOST_CELLS))
 
 
-def solid_depth(grid: VoxelGrid, solids: list[Mesh]) -> Float32Array:
+def solid_depth(grid: VoxelGrid, solids: list[Surface]) -> Float32Array:
     """Return the extinction (X, Y, Z) of meshes, per metre."""
     nothing = Strands(np.empty((0, 3), np.float32), np.zeros(1, np.int64))
     fine = hair_density(nothing, solids)

@@ -13,6 +13,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from card_picture import TexturedMesh, draw_cards
 from hairkit_plugins import cards as plugin
 from hairkit_plugins.cards.bones import find_chains, weigh
 from hairkit_plugins.cards.build import CardSet, build_cards
@@ -24,7 +25,6 @@ from hairkit.head_model.template import default_head
 from hairkit.io.mesh_text import read_obj
 from hairkit.manager import Manager
 from hairkit.rendering import draw_coverage
-from hairkit.rendering.cards import TexturedMesh, draw_cards
 from hairkit.rendering.framing import framing_cameras
 from hairkit.synth import grow
 from hairkit.types.groom import Groom

@@ -55,7 +55,7 @@ def photos() -> tuple[tuple[Camera, ...], tuple[Mask, ...], tuple[OrientationMap
 def segments(options: Options = PLAIN) -> tuple[Strands, Hull]:
     views, masks, maps = photos()
     hull = hair()
-    growth = growth_potential(hull, measure_scalp_distance(ball_head(), hull), 0.6)
+    growth = growth_potential(hull, measure_scalp_distance(ball_head(), hull))
     fused = fuse_views(views, masks, maps, hull, Waves(), options)
     way = Way(growth, ball_head(), Parting(), LONG)
     return find_segments(views, masks, fused, hull, way, options), hull

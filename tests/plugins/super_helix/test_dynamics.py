@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import rod_energy
 from hairkit_plugins.super_helix import element_kernels, reference
 from hairkit_plugins.super_helix.kinematics import move_slopes, moves, place
 from hairkit_plugins.super_helix.linear_time_step import Strand, newton, step_strands
@@ -72,14 +73,14 @@ def test_forces_are_minus_the_slope_of_the_potential(rng: np.random.Generator) -
     q, step = one.captured, 1e-3
 
     def potential(at: np.ndarray) -> float:
-        return reference.potential(one, at, place(one, at, one.roots[0], one.frames[0]), DOWN)
+        return rod_energy.potential(one, at, place(one, at, one.roots[0], one.frames[0]), DOWN)
 
     expected = np.zeros_like(q)
     for e, j in np.ndindex(*q.shape):
         shift = np.zeros_like(q)
         shift[e, j] = step
         expected[e, j] = -(potential(q + shift) - potential(q - shift)) / (2 * step)
-    found = reference.forces(one, q, place(one, q, one.roots[0], one.frames[0]), DOWN)
+    found = rod_energy.forces(one, q, place(one, q, one.roots[0], one.frames[0]), DOWN)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7 * np.abs(found).max())
     elastic = one.lengths[:, None] * one.stiffness * (one.natural - q)
     np.testing.assert_allclose(
@@ -91,7 +92,7 @@ def test_the_mass_matrix(rng: np.random.Generator) -> None:
     """M is symmetric and positive definite, and 1/2 q'Mq' is the points' kinetic energy."""
     one = random_rods(rng).one(2)
     placed = place(one, one.captured, one.roots[0], one.frames[0])
-    mass = reference.mass_matrix(one, placed)
+    mass = rod_energy.mass_matrix(one, placed)
     np.testing.assert_allclose(mass, mass.T, rtol=0, atol=1e-15 * mass.max())
     assert np.linalg.eigvalsh(mass).min() > 0
     rate = rng.normal(size=one.captured.shape)

@@ -94,7 +94,7 @@ def _read(path: Path) -> None:
     """Read the file in this process and end it with what came of that."""
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 2)
-    resource.setrlimit(resource.RLIMIT_AS, (reading_child.MEMORY, reading_child.MEMORY))
+    resource.setrlimit(resource.RLIMIT_AS, (guarded.MEMORY, guarded.MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     code = 4
     try:
@@ -108,7 +108,7 @@ def _read(path: Path) -> None:
 
 
 def _run_here(path: Path, archive: Path, seconds: float) -> dict[str, Any]:
-    return reading_child.answer_request(str(path), str(archive))
+    return reading_child.read(str(path), str(archive))
 
 
 if __name__ == "__main__":

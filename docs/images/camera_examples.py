@@ -1,6 +1,6 @@
-"""Right and wrong pictures for the Camera page, drawn by hairkit's own renderer.
+"""Right and wrong pictures for the studio's Camera page, drawn by hairkit's own renderer.
 
-`python -m hairkit.studio.draw_examples` writes them beside the pages, one for each fault of
+`python docs/images/camera_examples.py` writes them beside the pages, one for each fault of
 `hairkit.studio.feedback` that a picture can show, and one without any.
 """
 
@@ -13,6 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from hairkit import studio
 from hairkit.arrays import UInt8Array
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import TURN
@@ -29,7 +30,7 @@ from hairkit.types.person import Person
 
 GOOD = "good"
 """Name of the picture without a fault."""
-FOLDER = Path(__file__).parent / "pages"
+FOLDER = Path(studio.__file__).parent / "pages"
 WIDTH, HEIGHT, QUALITY = 180, 240, 80
 """Pixels of a picture, and its JPEG quality."""
 STRANDS = 12_000
