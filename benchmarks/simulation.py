@@ -3,12 +3,12 @@
     python benchmarks/simulation.py [--guides 1000 10000] [--frames 60] [--referee PYTHON]
 
 One scene for all: the same guides of 16 points, from their captured shape, on a head that is
-shaken (`yaw:20:1.5`), under gravity, at 60 frames a second. Beside pbd there run extended
+shaken (`yaw:20:1.5`), under gravity, at 60 frames a second. Beside `rods` there run extended
 position-based dynamics (Mueller et al. 2007; Macklin et al. 2016), compiled, with contact with the
 head (`xpbd_peer`), and, where `--referee` names a Python that has it, pyPBD (C++), without contact.
 Both have the same constraints: each node to the next one rigidly, to the next but one by a spring,
-which is their bending. Their first two nodes go with the head in every substep. pbd also has twist,
-friction and neighbours, as always.
+which is their bending. Their first two nodes go with the head in every substep. `rods` also has
+twist, friction and neighbours, as always.
 
 | column | what |
 |---|---|
@@ -17,8 +17,8 @@ friction and neighbours, as always.
 | stretch | largest of any segment at any frame, of up to 1000 guides |
 | off | root mean square distance from the converged motion of the same material |
 
-The converged motion is that of many substeps: of pbd for pbd; of XPBD in float64 for itself, and
-without the head for pyPBD. Of pyPBD the time of its own step is counted, with all threads or with
+The converged motion is that of many substeps: of `rods` for itself; of XPBD in float64, and without
+the head for pyPBD. Of pyPBD the time of its own step is counted, with all threads or with
 one, whichever is faster, and not the loops in Python that set roots.
 """
 
@@ -36,8 +36,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from hairkit_plugins.pbd import Options
-from hairkit_plugins.pbd.simulator import PbdSimulator
+from hairkit_plugins.rods import Options
+from hairkit_plugins.rods.simulator import RodSimulator
 from xpbd_peer import BENDING, CompiledXpbd
 
 from hairkit.errors import RenderError
@@ -55,7 +55,7 @@ SHAKE = ["yaw:20:1.5"]
 SCENE, FEW = 1000, 40
 """Most guides whose error is measured; of the peers', whose strands do not meet, so many."""
 CONVERGED, CONVERGED_PEER = 64, (512, 2)
-"""Substeps of pbd's converged motion; substeps and iterations of the others'."""
+"""Substeps of the rods' converged motion; substeps and iterations of the others'."""
 SETTINGS = ((4, 20), (16, 5), (16, 20), (32, 2), (32, 8), (64, 1), (64, 4), (128, 1), (128, 4))
 """Substeps and iterations of the peers, of which the cheapest that is as good is taken."""
 
@@ -162,8 +162,8 @@ def rate(step: Callable[[int], None], steps: int, rounds: int = 3) -> Speed:
 
 
 def ours_moved(groom: Groom, backend: str, substeps: int, frames: int) -> tuple[Array, float]:
-    """Return pbd's points (F, S, n, 3) and the largest stretch of its rods."""
-    simulator = PbdSimulator(groom, Options(backend=backend, substeps=substeps))
+    """Return the points (F, S, n, 3) of `rods` and their largest stretch."""
+    simulator = RodSimulator(groom, Options(backend=backend, substeps=substeps))
     found, stretch = [], 0.0
     for head in heads_of(groom, frames, 1):
         simulator.advance(FRAME, Surroundings(head))
@@ -173,8 +173,8 @@ def ours_moved(groom: Groom, backend: str, substeps: int, frames: int) -> tuple[
 
 
 def ours_speed(groom: Groom, backend: str, substeps: int, steps: int) -> Speed:
-    """Return how fast pbd is."""
-    simulator = PbdSimulator(groom, Options(backend=backend, substeps=substeps))
+    """Return how fast `rods` is."""
+    simulator = RodSimulator(groom, Options(backend=backend, substeps=substeps))
     heads = heads_of(groom, 3 * steps, 1)  # for the peers, too, known before
     simulator.advance(FRAME, Surroundings())
 
@@ -251,7 +251,7 @@ def errors(
     for backend in backends:
         for substeps in (4, 2):
             points, stretch = ours_moved(scene, backend, substeps, frames)
-            found["pbd " + backend, substeps, 1] = stretch, off_by(points, converged)
+            found["rods " + backend, substeps, 1] = stretch, off_by(points, converged)
     rest = few(rest_of(scene))
     touching, free = (
         peer_moved(scene, CONVERGED_PEER, frames, np.float64, contact) for contact in (True, False)
@@ -275,7 +275,7 @@ def speed_of(way: Way, groom: Groom, frames: int, python: str | None) -> Speed:
     if method == PYPBD_NAME:
         assert python is not None
         return referee_speed(python, groom, (substeps, iterations), few_steps)
-    return ours_speed(groom, method.removeprefix("pbd "), substeps, steps)
+    return ours_speed(groom, method.removeprefix("rods "), substeps, steps)
 
 
 def cheapest(rows: list[Row], stretch: float, off: float) -> Row | None:
@@ -290,8 +290,8 @@ def verdicts(rows: list[Row]) -> list[str]:
     for name in dict.fromkeys(row.way[0] for row in rows if row.way[0] in (XPBD, PYPBD_NAME)):
         peers = [row for row in rows if row.way[0] == name]
         for words, stretch, off in (
-            ("no more stretch than pbd", ours.stretch, np.inf),
-            ("below 1 %, no farther off than pbd", 0.01, ours.off),
+            ("no more stretch than rods", ours.stretch, np.inf),
+            ("below 1 %, no farther off than rods", 0.01, ours.off),
             ("below 1 %", 0.01, np.inf),
         ):
             best = cheapest(peers, stretch, off)
@@ -301,7 +301,7 @@ def verdicts(rows: list[Row]) -> list[str]:
                 wall, cpu = ours.speed / best.speed, best.cpu / ours.cpu
                 setting = f"{best.way[1]} x {best.way[2]}, {best.speed:.1f} steps/s"
                 ratio = f"{wall:.1f} times as fast, by processor time {cpu:.1f}"
-                lines.append(f"{name}, {words}: {setting}; pbd is {ratio}")
+                lines.append(f"{name}, {words}: {setting}; rods is {ratio}")
     return lines
 
 

@@ -1,4 +1,4 @@
-"""A peer of pbd: extended position-based dynamics, compiled, with contact with the head.
+"""A peer of the rods: extended position-based dynamics, compiled, with contact with the head.
 
 Mueller et al. 2007, Macklin et al. 2016: each node is joined to the next one rigidly, and to the
 next but one by a spring, which is bending. The first two nodes go with the head. A node that is
@@ -20,7 +20,7 @@ Array = npt.NDArray[Any]
 BENDING = 1000.0
 """N/m for each kilogram of a node: the spring between every node and the next but one."""
 CLEARANCE = 0.002
-"""Metres between hair and head, as of pbd."""
+"""Metres between hair and head, as of the rods."""
 DOWN = -9.81
 """m/s^2 along y."""
 LANES = 64

@@ -1,4 +1,4 @@
-// Constants of a rod, which change with the options only; see CONSTANTS in plugins/pbd/block.py. Five rows
+// Constants of a rod, which change with the options only; see CONSTANTS in plugins/rods/block.py. Five rows
 // a node: rest place and mass; drag, pull, clearance, 1/mass; of the segment that ends there two lower
 // entries and 1/pivot of the banded factor, length; bend, twist, natural twist, 1/length; natural turn.
 // After them the metric of the lengths.

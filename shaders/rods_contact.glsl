@@ -1,6 +1,6 @@
-// Contact: penetration, Coulomb friction, restoring the lengths. Part of pbd_substeps.comp.
-#include "pbd_distance.glsl"
-#constants hairkit_plugins.pbd.kernel_contact FURTHER SOFTEST STILL
+// Contact: penetration, Coulomb friction, restoring the lengths. Part of rods_substeps.comp.
+#include "rods_distance.glsl"
+#constants hairkit_plugins.rods.kernel_contact FURTHER SOFTEST STILL
 
 vec3 normal[NODE_ROOM];           // contact normal, 0 for free nodes
 vec3 surface[NODE_ROOM];          // velocity of the obstacle where it is touched, m/s

@@ -1,7 +1,7 @@
 // Layout of rods in RGBA float textures: one column per rod, its values row by row; rods beyond u_width
 // follow below. NODES is a #define of the host program.
 // Software renderers read textures many times faster than buffers.
-#constants hairkit_plugins.pbd.gl_backend UNROLLED GROUP
+#constants hairkit_plugins.rods.gl_backend UNROLLED GROUP
 const int SEGMENTS = NODES - 1;
 // Of each node: place and slack, velocity, acceleration, frame (w, x, y, z) of the segment that ends there.
 const int STATE_ROWS = 4 * NODES;

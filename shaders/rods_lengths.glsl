@@ -1,7 +1,7 @@
 // The tension that restores the segments' lengths, written to `value`: the factor
-// L D L^T of metric * (d d^T), row by row, with its forward substitution. Part of pbd_substeps.comp.
+// L D L^T of metric * (d d^T), row by row, with its forward substitution. Part of rods_substeps.comp.
 // For loops that are not unrolled: four entries at a time.
-#constants hairkit_plugins.pbd.kernels LEAST
+#constants hairkit_plugins.rods.kernels LEAST
 vec4 factor[FOURS(SEGMENTS) * (SEGMENTS + 4) / 2], scaled[FOURS(SEGMENT_ROOM)];
 
 // Where row i of the factor begins, in fours; it has i entries and zeros up to the next four.

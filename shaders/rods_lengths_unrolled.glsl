@@ -1,7 +1,7 @@
 // The tension that restores the segments' lengths, written to `value`: the factor
-// L D L^T of metric * (d d^T), row by row, with its forward substitution. Part of pbd_substeps.comp.
+// L D L^T of metric * (d d^T), row by row, with its forward substitution. Part of rods_substeps.comp.
 // For loops that are unrolled: entries stay in registers.
-#constants hairkit_plugins.pbd.kernels LEAST
+#constants hairkit_plugins.rods.kernels LEAST
 float factor[SEGMENTS * (SEGMENTS - 1) / 2], scaled[SEGMENTS];
 
 void solve_lengths() {

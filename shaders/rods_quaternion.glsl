@@ -1,5 +1,5 @@
 // Unit quaternions (x, y, z, w) of frames whose third axis is a segment's direction.
-#constants hairkit_plugins.pbd.frames OPPOSITE
+#constants hairkit_plugins.rods.frames OPPOSITE
 
 vec4 product(vec4 a, vec4 b) {
     return vec4(a.w * b.xyz + b.w * a.xyz + cross(a.xyz, b.xyz), a.w * b.w - dot(a.xyz, b.xyz));

@@ -1,4 +1,4 @@
-#constants hairkit_plugins.pbd.gl_backend MOST_STEPS
+#constants hairkit_plugins.rods.gl_backend MOST_STEPS
 
 // Head motion and gravity of one substep, head axes after it.
 struct Step {

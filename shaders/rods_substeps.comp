@@ -1,14 +1,14 @@
 #version 430
-// Substeps of rods, one rod per invocation: the steps of plugins/pbd/kernels.py in their order. Masses
+// Substeps of rods, one rod per invocation: the steps of plugins/rods/kernels.py in their order. Masses
 // are relative to the rod's mean, so that stiffness is in 1/s^2. Loops run over whole arrays with
 // conditions inside, so that compilers can unroll them.
-#include "pbd_layout.glsl"
-#include "pbd_quaternion.glsl"
-#include "pbd_constants.glsl"
-#include "pbd_substep_schedule.glsl"
+#include "rods_layout.glsl"
+#include "rods_quaternion.glsl"
+#include "rods_constants.glsl"
+#include "rods_substep_schedule.glsl"
 
-#constants hairkit_plugins.pbd.kernels SHARPEST SPIN TURN CHANGE TINY PASSED DRIFT
-#constants hairkit_plugins.pbd.linear_system IMPLICIT
+#constants hairkit_plugins.rods.kernels SHARPEST SPIN TURN CHANGE TINY PASSED DRIFT
+#constants hairkit_plugins.rods.linear_system IMPLICIT
 
 layout(rgba32f, binding = 0) writeonly uniform image2D u_new_state;
 // Six numbers of each node, in two rows: velocity of the air, world; a force over the rod's mean mass,
@@ -173,9 +173,9 @@ void solve_banded() {
 }
 
 #if NODES <= UNROLLED
-#include "pbd_lengths_unrolled.glsl"
+#include "rods_lengths_unrolled.glsl"
 #else
-#include "pbd_lengths.glsl"
+#include "rods_lengths.glsl"
 #endif
 
 // Solve for the forces, and for the tensions that keep the lengths; move the nodes.
@@ -198,7 +198,7 @@ void go_on() {
     }
 }
 
-#include "pbd_contact.glsl"
+#include "rods_contact.glsl"
 
 // Give segments their exact lengths, from the root to the tip, and bound how fast they turn.
 void keep_lengths() {

@@ -43,7 +43,7 @@ def split_settings(
     manager
         The plugins.
     plugins
-        The plugin in each role of the verb: `{"reader": "ply", "simulator": "pbd"}`; None where
+        The plugin in each role of the verb: `{"reader": "ply", "simulator": "rods"}`; None where
         the verb does without one.
     texts
         `plugin.option=value`, by the plugin's name or role, or `option=value` for the option of

@@ -1,6 +1,6 @@
 """Simulation of guides: the protocol of simulators, head motion, wind, obstacles, and a runner.
 
-The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)` returns a
+The simulators are plugins: `manager.call("make_simulator", "rods", groom=groom)` returns a
 `Simulator`.
 
 * `guide_simulator`: guides, head, torso and drawn points of all simulators

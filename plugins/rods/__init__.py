@@ -5,7 +5,7 @@ implicit and of second order: one banded system for bending, drag and the pull t
 shape, and one direct solve for all segment lengths of a strand (after Han and Harada 2013, here
 with the metric of the implicit system). Stiffness depends neither on iterations nor on the frame
 rate. The natural shape comes from inverse statics, so that captured hair stays in place under
-gravity. Despite the plugin's name this is not position-based dynamics.
+gravity.
 
 * `backend`: what backends share, and the compiled one
 * `block`: strands side by side; constants, contact and substeps of all backends
@@ -38,6 +38,6 @@ __all__ = ["Options"]
 @hookimpl
 def make_simulator(groom: Groom, options: Options) -> Any:
     """Return a simulator of the groom's guides, at rest."""
-    from .simulator import PbdSimulator
+    from .simulator import RodSimulator
 
-    return PbdSimulator(groom, options)
+    return RodSimulator(groom, options)

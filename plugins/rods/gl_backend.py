@@ -27,9 +27,9 @@ WIDTH = 4096
 GROUP, MOST_GROUPS = 64, 65535
 """Invocations of a work group; work groups along an axis that every OpenGL 4.3 supports."""
 MOST_STEPS, STEP = 64, 256
-"""Most substeps in one dispatch of the shader; bytes of one, see `pbd_substep_schedule.glsl`."""
+"""Most substeps in one dispatch of the shader; bytes of one, see `rods_substep_schedule.glsl`."""
 UNROLLED = 16
-"""Nodes up to which compilers unroll the shader's loops, see `pbd_layout.glsl`."""
+"""Nodes up to which compilers unroll the shader's loops, see `rods_layout.glsl`."""
 LOOPS = 20
 """Loops over the nodes in a substep of the shader, at most."""
 MOST_TURNS = 64_000
@@ -71,7 +71,7 @@ class ComputeEngine(Engine):
                 self._system = system
             self._put("u_state", self.rows)
             self._put("u_acting", np.pad(outer, ((0, 0), (0, 0), (0, 2))))
-            program = gl.compute("pbd_substeps", NODES=nodes)
+            program = gl.compute("rods_substeps", NODES=nodes)
             set_uniforms(program, **{f"u_{name}": settings[name] for name in settings})
             set_uniforms(program, u_rods=count, u_nodes=nodes, u_width=self._width, **self._grids)
             set_uniforms(program, u_even=outer.shape[1] == 1)
@@ -95,7 +95,7 @@ class ComputeEngine(Engine):
             self.rows = rods.reshape(-1, *self.rows.shape[1:])[:count].copy()
 
     def _put(self, name: str, *parts: npt.NDArray[Any]) -> None:
-        """Write values (S, ...) of rods to a texture (see `pbd_layout.glsl`)."""
+        """Write values (S, ...) of rods to a texture (see `rods_layout.glsl`)."""
         rows = np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1)
         high = -(-rows.shape[1] // 4)
         tall = -(-len(rows) // self._width)
@@ -117,7 +117,7 @@ class ComputeEngine(Engine):
             if max(size) > most:
                 raise RenderError(
                     f"a texture's side for {name} would be {max(size)}, expected at most {most} on"
-                    " this renderer; simulate fewer guides, or with pbd.backend=fast"
+                    " this renderer; simulate fewer guides, or with rods.backend=fast"
                 )
             make = context.texture if flat else context.texture3d
             self._textures[name] = make(size, 4, words, dtype="f4")

@@ -51,7 +51,7 @@ KEPT_SYSTEMS = 4
 """Substeps of other lengths, and points held, whose matrices are kept."""
 
 
-class PbdSimulator(GuideSimulator):
+class RodSimulator(GuideSimulator):
     """Simulated guides of a groom (see `hairkit.simulation.Simulator`)."""
 
     rods: Rods

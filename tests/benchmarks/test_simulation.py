@@ -1,4 +1,4 @@
-"""Laws of the peers that benchmarks/simulation.py compares pbd with."""
+"""Laws of the peers that benchmarks/simulation.py compares rods with."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_more_substeps_of_the_peer_are_nearer_to_the_converged(
 
 
 def test_all_run_on_the_same_head(simulation: ModuleType, scene: Groom) -> None:
-    """Roots of pbd and of its peer are where the head takes them, at every frame."""
+    """Roots of rods and of its peer are where the head takes them, at every frame."""
     frames, rest = 3, simulation.few(simulation.rest_of(scene))
     heads = simulation.heads_of(scene, frames, 1)
     wanted = np.stack([rest[:, 0] @ head[:3, :3].T + head[:3, 3] for head in heads])
@@ -64,7 +64,7 @@ def test_all_run_on_the_same_head(simulation: ModuleType, scene: Groom) -> None:
 def test_the_cheapest_row_that_is_good_enough_is_compared(simulation: ModuleType) -> None:
     """Faster rows that stretch more do not count; where none is good enough, that is said."""
     rows = [
-        simulation.Row(("pbd fast", 4, 1), 300.0, 0.003, 0.002, 0.001),
+        simulation.Row(("rods fast", 4, 1), 300.0, 0.003, 0.002, 0.001),
         simulation.Row((simulation.XPBD, 4, 4), 50.0, 0.02, 0.02, 0.001),
         simulation.Row((simulation.XPBD, 8, 4), 20.0, 0.03, 0.008, 0.002),
         simulation.Row((simulation.XPBD, 16, 4), 10.0, 0.06, 0.007, 0.001),

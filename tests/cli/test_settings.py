@@ -24,7 +24,7 @@ VERBS = {
     "convert": ["bare.data", "back.npz"],
     "info": ["bare.data"],
     "render": ["bare.data", "-o", "picture.png", "--size", "64x48", "--hairs", "200"],
-    "simulate": ["bare.data", "-o", "cache.npz", "--frames", "2", "--quiet", "--using", "pbd"],
+    "simulate": ["bare.data", "-o", "cache.npz", "--frames", "2", "--quiet", "--using", "rods"],
     "view": ["bare.data", "--headless", "--script", "steps.toml", "--simulator", "none"],
 }
 """A command line of every verb with `--set` that reads a file whose unit must be stated."""
@@ -59,7 +59,7 @@ def command(verb: str, *settings: str) -> list[str]:
 
 
 @pytest.mark.parametrize("verb", VERBS)
-@pytest.mark.parametrize("text", ["x", "=3", ".x=3", "pbd.=3", "a.b"])
+@pytest.mark.parametrize("text", ["x", "=3", ".x=3", "rods.=3", "a.b"])
 def test_a_setting_of_another_form_is_refused_alike(
     verb: str, text: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,4 +1,4 @@
-"""Rods of pbd set up, loaded and left to settle, for the physics tests of the simulator."""
+"""Rods of the plugin set up, loaded and left to settle, for the physics tests of the simulator."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from hairkit_plugins.pbd.block import Contact, Steps
-from hairkit_plugins.pbd.linear_system import IMPLICIT, Rates, System, assemble
-from hairkit_plugins.pbd.rods import (
+from hairkit_plugins.rods.block import Contact, Steps
+from hairkit_plugins.rods.linear_system import IMPLICIT, Rates, System, assemble
+from hairkit_plugins.rods.rods import (
     Rods,
     State,
     balance_load,
@@ -17,7 +17,7 @@ from hairkit_plugins.pbd.rods import (
     rest_state,
     transport_frames,
 )
-from pbd_reference import ClampedRods, Load, relax_twist, solve_substep, substep
+from rods_reference import ClampedRods, Load, relax_twist, solve_substep, substep
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion

@@ -1,4 +1,4 @@
-"""Rods of pbd linearised about an equilibrium: small motions, compliance and stability.
+"""Rods of the plugin linearised about an equilibrium: small motions, compliance and stability.
 
 The forces are those of the twin, segments keep their lengths, torsion is in balance
 (the last segment's frame is held in `ClampedRods`). A virtual displacement of the free nodes is
@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from hairkit_plugins.pbd.rods import Rods, State, transport_frames
-from pbd_bench import balanced
-from pbd_reference import elastic_force
+from hairkit_plugins.rods.rods import Rods, State, transport_frames
+from rods_bench import balanced
+from rods_reference import elastic_force
 from scipy.linalg import eigh, null_space
 
 from hairkit.arrays import Float64Array

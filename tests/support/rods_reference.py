@@ -1,4 +1,4 @@
-"""The readable twin of pbd's kernels and shaders: a substep in NumPy float64, in their order.
+"""The readable twin of the rods' kernels and shaders: a substep in NumPy float64, in their order.
 
 `TwinSimulator` is the plugin's simulator with substeps by this.
 """
@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from hairkit_plugins.pbd import kernel_contact, kernels
-from hairkit_plugins.pbd.backend import Engine
-from hairkit_plugins.pbd.block import Contact, Steps
-from hairkit_plugins.pbd.linear_system import IMPLICIT, System
-from hairkit_plugins.pbd.rods import Rods, State, midpoint_frame, transport_frames, twist_between
-from hairkit_plugins.pbd.simulator import PbdSimulator
+from hairkit_plugins.rods import kernel_contact, kernels
+from hairkit_plugins.rods.backend import Engine
+from hairkit_plugins.rods.block import Contact, Steps
+from hairkit_plugins.rods.linear_system import IMPLICIT, System
+from hairkit_plugins.rods.rods import Rods, State, midpoint_frame, transport_frames, twist_between
+from hairkit_plugins.rods.simulator import RodSimulator
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
@@ -89,7 +89,7 @@ class TwinEngine(Engine):
             self.state = substep(self.rods, system, self.state, load, self.contact)
 
 
-class TwinSimulator(PbdSimulator):
+class TwinSimulator(RodSimulator):
     """The simulator with the twin as its backend."""
 
     def _make_engine(self, contact: Contact) -> Engine:

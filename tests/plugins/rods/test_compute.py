@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd import Options
-from hairkit_plugins.pbd.backend import FastEngine
-from hairkit_plugins.pbd.gl_backend import ComputeEngine
-from hairkit_plugins.pbd.rods import rest_state
-from hairkit_plugins.pbd.simulator import PbdSimulator
-from pbd_bench import untouched
+from hairkit_plugins.rods import Options
+from hairkit_plugins.rods.backend import FastEngine
+from hairkit_plugins.rods.gl_backend import ComputeEngine
+from hairkit_plugins.rods.rods import rest_state
+from hairkit_plugins.rods.simulator import RodSimulator
+from rods_bench import untouched
 from shader_rods import AGREE, SHAKE, STILL_AIR, WIND, apart, bent_groom, both, skip_without_shaders
 
 from hairkit.errors import HairkitError, RenderError
@@ -73,7 +73,7 @@ def test_capsules_hold_hair_off_as_in_the_reference(groom: Groom) -> None:
     """A ball in a tip's way: wind blows it elsewhere, by both backends to the same place."""
     soft = {"stiffness": 0.0, "bend": 0.1}
 
-    def blow(*simulators: PbdSimulator) -> None:
+    def blow(*simulators: RodSimulator) -> None:
         for simulator in simulators:
             for _ in range(15):
                 simulator.advance(1 / 60, Surroundings(wind=np.array([8.0, 0.0, 0.0])))
@@ -134,7 +134,7 @@ def test_a_turned_world_gives_turned_motion(groom: Groom) -> None:
     turn[:3, 3] = [2.0, -1.0, 0.5]
     gravity, ends = np.array([0.0, -9.81, 0.0]), []
     for frame in (np.eye(4), turn):
-        simulator = PbdSimulator(groom, Options(backend="compute", nodes=8))
+        simulator = RodSimulator(groom, Options(backend="compute", nodes=8))
         simulator.reset(frame)
         motion = add_shakes(SHAKE, groom.head)
         for k in range(1, 16):
@@ -149,7 +149,7 @@ def test_equal_input_gives_equal_frames(groom: Groom) -> None:
     """Two runs in which hair rubs on hair are the same to the last bit."""
     ends = []
     for _ in range(2):
-        simulator = PbdSimulator(groom, Options(backend="compute", nodes=8, cohesion=20.0))
+        simulator = RodSimulator(groom, Options(backend="compute", nodes=8, cohesion=20.0))
         simulator.advance(0.2, Surroundings(wind=WIND, turbulence=0.5))
         ends.append(simulator.points)
     assert (ends[0] == ends[1]).all()
@@ -157,7 +157,7 @@ def test_equal_input_gives_equal_frames(groom: Groom) -> None:
 
 def test_a_state_comes_back_as_it_was_given(groom: Groom) -> None:
     """What is set is what is read, also beyond a texture's width."""
-    rods = PbdSimulator(groom, Options(backend="reference", nodes=8)).rods
+    rods = RodSimulator(groom, Options(backend="reference", nodes=8)).rods
     many = np.arange(5000) % len(rods.points)
     fields = {name: value[many] for name, value in vars(rods).items()}
     rods = replace(rods, **fields)
@@ -177,9 +177,9 @@ def test_auto_takes_no_untimed_backend(
     The shaders run where they are asked for by name.
     """
     monkeypatch.setattr("hairkit.rendering.context.on_graphics_card", lambda: card)
-    monkeypatch.setattr("hairkit_plugins.pbd.gl_backend.on_graphics_card", lambda: card)
-    assert isinstance(PbdSimulator(groom, Options(nodes=8))._engine, FastEngine)
-    asked = PbdSimulator(groom, Options(nodes=8, backend="compute"))
+    monkeypatch.setattr("hairkit_plugins.rods.gl_backend.on_graphics_card", lambda: card)
+    assert isinstance(RodSimulator(groom, Options(nodes=8))._engine, FastEngine)
+    asked = RodSimulator(groom, Options(nodes=8, backend="compute"))
     assert isinstance(asked._engine, ComputeEngine)
 
 
@@ -194,9 +194,9 @@ def test_no_renderer_is_told_in_one_line(
     monkeypatch.setattr(context, "_renderer", None)
     monkeypatch.setattr(context, "_open", fail)
     with pytest.raises(HairkitError, match=r"OpenGL 4\.3") as caught:
-        manager.call("make_simulator", "pbd", {"backend": "compute"}, groom=groom)
+        manager.call("make_simulator", "rods", {"backend": "compute"}, groom=groom)
     assert "\n" not in str(caught.value)
-    made = manager.call("make_simulator", "pbd", {"nodes": 8}, groom=groom)
+    made = manager.call("make_simulator", "rods", {"nodes": 8}, groom=groom)
     assert isinstance(made._engine, FastEngine)
 
 
@@ -205,7 +205,7 @@ def test_textures_of_a_lost_context_are_let_go(
 ) -> None:
     """The end of a simulator opens no context in which to free what belonged to another one."""
     opened: list[str] = []
-    made = PbdSimulator(groom, Options(backend="compute", nodes=8))
+    made = RodSimulator(groom, Options(backend="compute", nodes=8))
     monkeypatch.setattr(context, "_renderer", None)
     monkeypatch.setattr(context, "_create", lambda: opened.append("a context"))
     del made
@@ -219,20 +219,20 @@ def test_more_rods_than_a_texture_holds_are_told_in_one_line(
     """A renderer with small textures: the error says what to do instead."""
     with renderer() as gl:
         monkeypatch.setitem(gl.context.info, "GL_MAX_TEXTURE_SIZE", 16)
-        with pytest.raises(RenderError, match=r"pbd\.backend=fast"):
-            PbdSimulator(groom, Options(backend="compute", nodes=8))
+        with pytest.raises(RenderError, match=r"rods\.backend=fast"):
+            RodSimulator(groom, Options(backend="compute", nodes=8))
 
 
 _BY_OSMESA = """
 import numpy as np
-from hairkit_plugins.pbd import Options
-from hairkit_plugins.pbd.simulator import PbdSimulator
-from pbd_reference import TwinSimulator
+from hairkit_plugins.rods import Options
+from hairkit_plugins.rods.simulator import RodSimulator
+from rods_reference import TwinSimulator
 from hairkit.rendering.context import renderer
 from hairkit.simulation import Surroundings
 from hairkit.testing import bristle_groom
 groom, ends = bristle_groom(), []
-for kind in (TwinSimulator, PbdSimulator):
+for kind in (TwinSimulator, RodSimulator):
     simulator = kind(groom, Options(backend="compute", nodes=8))
     simulator.advance(0.1, Surroundings(wind=np.array([3.0, 0.0, 1.0])))
     ends.append(simulator.points)

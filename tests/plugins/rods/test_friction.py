@@ -1,4 +1,4 @@
-"""The rods of pbd on obstacles against physics: a slope, a rope around a bollard."""
+"""The plugin's rods on obstacles against physics: a slope, a rope around a bollard."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd.backend import FastEngine
-from hairkit_plugins.pbd.block import Contact, acting
-from hairkit_plugins.pbd.rods import rest_state
-from pbd_bench import DENSITY, LENGTH, NOTHING, G, load_of, rods_of, steps_of, straight, system_of
-from pbd_reference import TwinEngine, resolve_contacts, solve_substep, substep
+from hairkit_plugins.rods.backend import FastEngine
+from hairkit_plugins.rods.block import Contact, acting
+from hairkit_plugins.rods.rods import rest_state
+from rods_bench import DENSITY, LENGTH, NOTHING, G, load_of, rods_of, steps_of, straight, system_of
+from rods_reference import TwinEngine, resolve_contacts, solve_substep, substep
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion

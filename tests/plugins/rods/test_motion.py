@@ -1,4 +1,4 @@
-"""The rods of pbd in motion against physics: chains, beams, air, turning heads, energy."""
+"""The plugin's rods in motion against physics: chains, beams, air, turning heads, energy."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd.linear_system import Rates, assemble
-from hairkit_plugins.pbd.rods import Rods, State, elastic_energy, rest_state
-from pbd_bench import (
+from hairkit_plugins.rods.linear_system import Rates, assemble
+from hairkit_plugins.rods.rods import Rods, State, elastic_energy, rest_state
+from rods_bench import (
     DENSITY,
     DOWN,
     LENGTH,
@@ -27,7 +27,7 @@ from pbd_bench import (
     system_of,
     tangled,
 )
-from pbd_reference import Load, elastic_force, solve_substep, substep
+from rods_reference import Load, elastic_force, solve_substep, substep
 from scipy.special import roots_laguerre
 
 from hairkit.arrays import Float64Array

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd import Options
-from hairkit_plugins.pbd.resampling import FARTHEST, FINEST, finer_steps
-from hairkit_plugins.pbd.simulator import PbdSimulator
+from hairkit_plugins.rods import Options
+from hairkit_plugins.rods.resampling import FARTHEST, FINEST, finer_steps
+from hairkit_plugins.rods.simulator import RodSimulator
 
 from hairkit.head_model.template import default_head
 from hairkit.simulation import Surroundings, add_shakes, quaternion
@@ -41,7 +41,7 @@ def test_hair_cut_short_keeps_its_length(length: float) -> None:
     groom = groom_of(length, 0.0)
     motion = add_shakes(["yaw:25:1.5"], groom.head)
     for backend in ("reference", "fast"):
-        simulator = PbdSimulator(groom, Options(backend=backend))
+        simulator = RodSimulator(groom, Options(backend=backend))
         for frame in range(1, 61):
             simulator.advance(1 / 60, Surroundings(motion(frame / 60)))
             assert simulator.measure().stretch < 0.01
@@ -55,7 +55,7 @@ def test_hair_is_whole_a_second_after_the_head_jumps(way: float, turn: float, wa
     head = np.eye(4)
     head[:3, :3] = quaternion.to_matrix(quaternion.from_axis([0.0, 1.0, 0.0], np.radians(turn)))
     head[0, 3] = way
-    simulator = PbdSimulator(groom, Options(backend="fast"))
+    simulator = RodSimulator(groom, Options(backend="fast"))
     for _ in range(61):
         simulator.advance(1 / 60, Surroundings(head))
     assert np.isfinite(simulator.points).all()
@@ -77,7 +77,7 @@ def test_a_fast_head_takes_finer_steps_and_a_jump_is_cut() -> None:
 def test_long_hair_falls_where_the_head_faces_down() -> None:
     """Pitched by 80 degrees for three seconds: tips hang 0.6 to 1 of the length below roots."""
     groom = grow("straight", default_head(), 60, 0)
-    simulator, neck = PbdSimulator(groom, Options(backend="fast")), groom.head.joints[1]
+    simulator, neck = RodSimulator(groom, Options(backend="fast")), groom.head.joints[1]
     for frame in range(240):
         head, angle = np.eye(4), np.radians(min(80.0, 80 * (frame + 1) / 60))
         head[:3, :3] = quaternion.to_matrix(quaternion.from_axis([1.0, 0.0, 0.0], angle))

@@ -1,4 +1,4 @@
-"""The pbd plugin: grooms at rest, shaken, blown and held; backends against each other."""
+"""The rods plugin: grooms at rest, shaken, blown and held; backends against each other."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd import Options
-from hairkit_plugins.pbd.rods import Rods, State, rest_state
-from hairkit_plugins.pbd.simulator import PbdSimulator
-from pbd_bench import untouched
-from pbd_reference import TwinSimulator
+from hairkit_plugins.rods import Options
+from hairkit_plugins.rods.rods import Rods, State, rest_state
+from hairkit_plugins.rods.simulator import RodSimulator
+from rods_bench import untouched
+from rods_reference import TwinSimulator
 
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
@@ -56,7 +56,7 @@ def groom() -> Groom:
 @pytest.mark.parametrize("backend", ["reference", "fast"])
 def test_captured_hair_does_not_sag(groom: Groom, backend: str) -> None:
     """Two seconds under gravity move no point by 0.1 mm."""
-    simulator = PbdSimulator(groom, Options(backend=backend))
+    simulator = RodSimulator(groom, Options(backend=backend))
     for _ in range(20):
         simulator.advance(0.1, Surroundings())
     assert np.abs(simulator.points - groom.strands.points).max() < 1e-4
@@ -70,7 +70,7 @@ def test_backends_agree(groom: Groom) -> None:
     motion = add_shakes(["yaw:25:2", "pitch:10:1.3"], groom.head)
     wind = np.array([2.0, 0.0, 1.0])
     options = Options(backend="fast", pressure=0.0)
-    both = TwinSimulator(groom, options), PbdSimulator(groom, options)
+    both = TwinSimulator(groom, options), RodSimulator(groom, options)
     for frame in range(1, 31):
         around = Surroundings(motion(frame / 60), wind, 0.4)
         for simulator in both:
@@ -81,7 +81,7 @@ def test_backends_agree(groom: Groom) -> None:
 
 def test_shaken_hair_keeps_its_length_and_stays_out_of_the_head(groom: Groom) -> None:
     """Stretch below 1 % at every frame; no node more than 2 mm inside."""
-    simulator = PbdSimulator(groom, Options())
+    simulator = RodSimulator(groom, Options())
     motion, deepest, stretch = add_shakes(["yaw:30:2"], groom.head), 0.0, 0.0
     rest = distance_to(groom.head, groom.strands.points)
     for frame in range(1, 61):
@@ -99,7 +99,7 @@ def test_shaken_hair_keeps_its_length_and_stays_out_of_the_head(groom: Groom) ->
 def test_fine_points_do_not_cut_through_the_head(groom: Groom, backend: str) -> None:
     """Four nodes a guide, pressed on the head by wind: its points are at most 2 mm inside."""
     wind, deepest = Surroundings(wind=np.array([0.0, -14.0, 0.0])), 0.0
-    simulator = PbdSimulator(groom, Options(backend=backend, nodes=4, bend=0.0, stiffness=0.0))
+    simulator = RodSimulator(groom, Options(backend=backend, nodes=4, bend=0.0, stiffness=0.0))
     rest = np.minimum(distance_to(groom.head, groom.strands.points), 0.0)
     np.testing.assert_allclose(simulator.points, groom.strands.points, atol=1e-6)
     for _ in range(40):
@@ -112,7 +112,7 @@ def test_fine_points_do_not_cut_through_the_head(groom: Groom, backend: str) -> 
 def test_shaken_hair_comes_back_to_rest(groom: Groom) -> None:
     """Three seconds after a short shake the hair is within 2 mm of where it was."""
     motion = add_shakes(["roll:20:2:0.5"], groom.head)
-    cache = run(PbdSimulator(groom, Options(friction=0.0)), motion, 210)
+    cache = run(RodSimulator(groom, Options(friction=0.0)), motion, 210)
     away = np.linalg.norm(cache.points - groom.strands.points, axis=2).max(axis=1)
     assert away[20] > 0.01
     assert away[-1] < 0.002
@@ -120,7 +120,7 @@ def test_shaken_hair_comes_back_to_rest(groom: Groom) -> None:
 
 def test_roots_ride_on_the_head(groom: Groom) -> None:
     """Whatever happens, a root is where the head carries it."""
-    simulator = PbdSimulator(groom, Options())
+    simulator = RodSimulator(groom, Options())
     head = add_shakes(["yaw:40:1"], groom.head)(0.3)
     simulator.advance(0.05, Surroundings(head, np.array([5.0, 0, 0])))
     roots = simulator.points[groom.strands.offsets[:-1]]
@@ -130,7 +130,7 @@ def test_roots_ride_on_the_head(groom: Groom) -> None:
 
 def test_a_carried_head_carries_hair_at_rest(groom: Groom) -> None:
     """Reset on a turned and moved head: the captured shape, turned and moved, without motion."""
-    simulator = PbdSimulator(groom, Options())
+    simulator = RodSimulator(groom, Options())
     head = add_shakes(["yaw:90:1"], groom.head)(0.25)
     head[:3, 3] += [10.0, 0.0, -3.0]
     simulator.reset(head)
@@ -144,7 +144,7 @@ def test_a_carried_head_carries_hair_at_rest(groom: Groom) -> None:
 def test_motion_does_not_depend_on_how_frames_are_cut(groom: Groom, backend: str) -> None:
     """In steady wind, one call of a tenth of a second equals six of a sixtieth."""
     around = Surroundings(wind=np.array([3.0, 0.0, 0.0]))
-    one, six = (PbdSimulator(groom, Options(backend=backend)) for _ in range(2))
+    one, six = (RodSimulator(groom, Options(backend=backend)) for _ in range(2))
     one.advance(0.1, around)
     for _ in range(6):
         six.advance(1 / 60, around)
@@ -155,7 +155,7 @@ def test_motion_does_not_depend_on_how_frames_are_cut(groom: Groom, backend: str
 @pytest.mark.parametrize("share", [0.97, 0.8])
 def test_a_grabbed_point_is_at_the_hand(groom: Groom, backend: str, share: float) -> None:
     """After 0.75 seconds a held tip is within 1 mm of a target 5 cm off; the length is kept."""
-    simulator = PbdSimulator(groom, Options(backend=backend))
+    simulator = RodSimulator(groom, Options(backend=backend))
     tip = int(groom.strands.offsets[39]) - 1
     root = groom.strands.roots[38].astype(np.float64)
     turn = quaternion.to_matrix(quaternion.from_axis([0.0, 1.0, 0.0], 0.3))
@@ -170,7 +170,7 @@ def test_a_grabbed_point_is_at_the_hand(groom: Groom, backend: str, share: float
 
 def test_a_hand_goes_no_faster_than_it_may(groom: Groom) -> None:
     """At 0.5 m/s a held tip has come 5 cm nearer after 0.1 s, to 1 cm, and no farther."""
-    simulator = PbdSimulator(groom, Options(backend="fast", grab_speed=0.5))
+    simulator = RodSimulator(groom, Options(backend="fast", grab_speed=0.5))
     tip = int(groom.strands.offsets[39]) - 1
     root, start = groom.strands.roots[38], groom.strands.points[tip].astype(np.float64)
     target = root + 0.9 * np.linalg.norm(start - root) * np.array([0.0, 0.0, 1.0])
@@ -184,7 +184,7 @@ def test_a_hand_goes_no_faster_than_it_may(groom: Groom) -> None:
 
 def test_a_hand_out_of_reach_stretches_nothing(groom: Groom) -> None:
     """A tip drawn a metre away ends on a taut strand of its own length."""
-    simulator = PbdSimulator(groom, Options(backend="fast"))
+    simulator = RodSimulator(groom, Options(backend="fast"))
     tip = int(groom.strands.offsets[9]) - 1
     for _ in range(60):
         simulator.advance(1 / 60, Surroundings(grabs=(Grab(tip, (1.0, 0.5, 0.3)),)))
@@ -194,7 +194,7 @@ def test_a_hand_out_of_reach_stretches_nothing(groom: Groom) -> None:
 @pytest.mark.parametrize("point", [-1, 10**9])
 def test_a_grab_of_no_point_is_told(groom: Groom, point: int) -> None:
     """The error names the point and those that there are."""
-    simulator = PbdSimulator(groom, Options())
+    simulator = RodSimulator(groom, Options())
     with pytest.raises(InputError, match=f"grab of point {point}"):
         simulator.advance(1 / 60, Surroundings(grabs=(Grab(point, (0.0, 0.0, 0.0)),)))
 
@@ -204,7 +204,7 @@ def test_more_stiffness_moves_less(groom: Groom) -> None:
     around = Surroundings(wind=np.array([4.0, 0.0, 0.0]))
 
     def blown(**options: float) -> float:
-        simulator = PbdSimulator(groom, Options(**options))
+        simulator = RodSimulator(groom, Options(**options))
         for _ in range(30):
             simulator.advance(1 / 60, around)
         return float(np.linalg.norm(simulator.points - groom.strands.points, axis=1).mean())
@@ -216,7 +216,7 @@ def test_more_stiffness_moves_less(groom: Groom) -> None:
 @pytest.mark.parametrize("bend", [0.0, 1.0])
 def test_the_stiffest_torsion_is_stable(groom: Groom, bend: float) -> None:
     """At the upper bound of twist, shaken hair calms down in a second and a half."""
-    simulator = PbdSimulator(groom, Options(backend="fast", twist=1.0, bend=bend))
+    simulator = RodSimulator(groom, Options(backend="fast", twist=1.0, bend=bend))
     motion, energy = add_shakes(["yaw:30:2:0.5", "roll:25:3:0.5"], groom.head), []
     for frame in range(1, 121):
         simulator.advance(1 / 60, Surroundings(motion(frame / 60)))
@@ -227,7 +227,7 @@ def test_the_stiffest_torsion_is_stable(groom: Groom, bend: float) -> None:
 
 def test_retuning_keeps_the_positions(groom: Groom) -> None:
     """New options move nothing by themselves, and None is resolved by the groom."""
-    simulator = PbdSimulator(groom, Options())
+    simulator = RodSimulator(groom, Options())
     simulator.advance(0.1, Surroundings(wind=np.array([4.0, 0.0, 0.0])))
     before = simulator.points.copy()
     simulator.retune(Options(stiffness=0.9))
@@ -241,7 +241,7 @@ def test_equal_input_gives_equal_frames(groom: Groom) -> None:
     around = Surroundings(wind=np.array([3.0, 0.0, 0.0]), turbulence=0.5)
     frames = []
     for _ in range(2):
-        simulator = PbdSimulator(groom, Options())
+        simulator = RodSimulator(groom, Options())
         simulator.advance(0.2, around)
         frames.append(simulator.points)
     assert (frames[0] == frames[1]).all()
@@ -260,7 +260,7 @@ def test_folded_and_tiny_strands_stay_finite(groom: Groom) -> None:
         root_triangle=groom.root_triangle[:3],
         root_barycentric=groom.root_barycentric[:3],
     )
-    cache = run(PbdSimulator(few, Options()), add_shakes(["yaw:30:3"], few.head), 40)
+    cache = run(RodSimulator(few, Options()), add_shakes(["yaw:30:3"], few.head), 40)
     assert np.abs(cache.points).max() < 0.5
 
 
@@ -268,7 +268,7 @@ def test_the_plugin_makes_a_simulator(manager: Manager, groom: Groom) -> None:
     """By name it gives what the contract asks for; only guides are simulated."""
     guide = np.arange(len(groom.strands)) % 2 == 0
     mixed = replace(groom, strands=replace(groom.strands, guide=guide))
-    simulator = manager.call("make_simulator", "pbd", {"nodes": 8}, groom=mixed)
+    simulator = manager.call("make_simulator", "rods", {"nodes": 8}, groom=mixed)
     assert isinstance(simulator, Simulator)
     assert len(simulator.strands) == guide.sum()
     cache = run(simulator, static_motion(), 2)
@@ -283,7 +283,7 @@ def test_gusts_are_the_law_of_the_wind(groom: Groom) -> None:
     around, head = Surroundings(wind=np.array([3.0, -1.0, 2.0]), turbulence=0.4), np.eye(4)
     head[:3] = add_shakes(["yaw:40:1"], groom.head)(0.2)[:3]
     head[:3, 3] += [4000.0, 1.0, -2.0]
-    simulator = PbdSimulator(groom, Options(backend="reference"))
+    simulator = RodSimulator(groom, Options(backend="reference"))
     simulator._time = 7.3
     found = simulator._air(around, head)
     points = simulator.rods.points[:, [0, 4, 8, 12, 15]] @ head[:3, :3].T + head[:3, 3]
@@ -326,9 +326,9 @@ def mixed(
 @pytest.mark.parametrize("copies", [1, 60])
 def test_hair_among_hair_moves_as_its_twin(groom: Groom, copies: int) -> None:
     """Crowded and moving, on a moving head: velocities of metres a second agree to 0.01 mm/s."""
-    from hairkit_plugins.pbd.backend import FastEngine
+    from hairkit_plugins.rods.backend import FastEngine
 
-    rods = PbdSimulator(groom, Options(backend="reference")).rods
+    rods = RodSimulator(groom, Options(backend="reference")).rods
     pick = np.tile(np.arange(len(rods.points)), copies)
     rods = replace(rods, **{name: values[pick] for name, values in vars(rods).items()})
     rng = np.random.default_rng(3)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd import Options, gl_backend
-from hairkit_plugins.pbd.simulator import PbdSimulator
+from hairkit_plugins.rods import Options, gl_backend
+from hairkit_plugins.rods.simulator import RodSimulator
 from shader_rods import AGREE, SHAKE, WIND, apart, bent_groom, both, skip_without_shaders
 
 from hairkit.head_model.signed_distance import distance_to
@@ -97,7 +97,7 @@ def test_many_held_points_go_where_the_reference_puts_them(groom: Groom) -> None
 
 def test_reset_lets_go(groom: Groom) -> None:
     """After a reset the same pull gives the same motion."""
-    simulator, grabs = PbdSimulator(groom, Options(backend="compute", nodes=8)), pulled(groom, [5])
+    simulator, grabs = RodSimulator(groom, Options(backend="compute", nodes=8)), pulled(groom, [5])
     ends = []
     for _ in range(2):
         simulator.reset()

@@ -1,4 +1,4 @@
-"""Hair of pbd whose root is shaken, at the default quality, against the beam under tension."""
+"""Hair whose root is shaken, at the default quality, against the beam under tension."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd import Options, make_simulator
-from hairkit_plugins.pbd.simulator import SINGLE_HAIR
+from hairkit_plugins.rods import Options, make_simulator
+from hairkit_plugins.rods.simulator import SINGLE_HAIR
 from heavy_beam import modes, shaken_tip
 
 from hairkit.arrays import Float64Array

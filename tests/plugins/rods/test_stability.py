@@ -1,4 +1,4 @@
-"""The rods of pbd against the loads at which rods buckle, coil up and leave their plane.
+"""The plugin's rods against the loads at which rods buckle, coil up and leave their plane.
 
 The least stiffness of small motions about the equilibrium, by the forces of the twin,
 passes 0 at the critical load; runs in time a little below and above it agree.
@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd.linear_system import Rates, assemble
-from hairkit_plugins.pbd.rods import (
+from hairkit_plugins.rods.linear_system import Rates, assemble
+from hairkit_plugins.rods.rods import (
     Rods,
     State,
     balance_load,
@@ -20,7 +20,7 @@ from hairkit_plugins.pbd.rods import (
     transport_frames,
     twist_between,
 )
-from pbd_bench import (
+from rods_bench import (
     DENSITY,
     DOWN,
     LENGTH,
@@ -37,8 +37,8 @@ from pbd_bench import (
     spun,
     straight,
 )
-from pbd_modes import linearised, one_of
-from pbd_reference import substep
+from rods_modes import linearised, one_of
+from rods_reference import substep
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import brentq
 from scipy.special import jv

@@ -1,4 +1,4 @@
-"""The rods of pbd at rest against physics: elastica, cables, arcs, springs, inverse statics.
+"""The plugin's rods at rest against physics: elastica, cables, arcs, springs, inverse statics.
 
 Rods of one test differ only in numbers and are solved side by side. Tables are solutions of the
 boundary value problems to 1e-5.
@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd.backend import FastEngine
-from hairkit_plugins.pbd.block import acting
-from hairkit_plugins.pbd.resampling import max_stiffness
-from hairkit_plugins.pbd.rods import (
+from hairkit_plugins.rods.backend import FastEngine
+from hairkit_plugins.rods.block import acting
+from hairkit_plugins.rods.resampling import max_stiffness
+from hairkit_plugins.rods.rods import (
     Rods,
     State,
     balance_load,
@@ -19,7 +19,7 @@ from hairkit_plugins.pbd.rods import (
     transport_frames,
     twist_between,
 )
-from pbd_bench import (
+from rods_bench import (
     DENSITY,
     DOWN,
     LENGTH,
@@ -39,8 +39,8 @@ from pbd_bench import (
     tangled,
     untouched,
 )
-from pbd_modes import linearised
-from pbd_reference import solve_substep, substep
+from rods_modes import linearised
+from rods_reference import solve_substep, substep
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion

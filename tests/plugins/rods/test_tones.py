@@ -1,13 +1,13 @@
-"""Small motions of pbd's rods against physics: tones of beams, strings, heavy strings, a rod."""
+"""Small motions of the rods against physics: tones of beams, strings, heavy strings, a rod."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
-from hairkit_plugins.pbd.rods import Rods, rest_state
-from pbd_bench import DENSITY, DOWN, LENGTH, G, inertia_of, rods_of, straight
-from pbd_modes import linearised
+from hairkit_plugins.rods.rods import Rods, rest_state
+from rods_bench import DENSITY, DOWN, LENGTH, G, inertia_of, rods_of, straight
+from rods_modes import linearised
 from scipy.special import jn_zeros
 
 from hairkit.arrays import Float64Array
