@@ -9,14 +9,13 @@ gravity.
 
 * `backend`: what backends share, and the compiled one
 * `block`: strands side by side; constants, contact and substeps of all backends
-* `embedding`: the guides' own points on the rods, and held ones
 * `frames`: turns of frames, compiled
 * `gl_backend`: substeps in compute shaders
 * `kernel_contact`: contact and friction, compiled
 * `kernels`: a substep, compiled
+* `limits`: what stiffness and head motion rods can follow
 * `linear_system`: the banded matrix of a substep
 * `options`: settings
-* `resampling`: guides to rods, and what these can follow
 * `rods`: the discrete rod, its state and energy, inverse statics
 * `simulator`: the simulator
 """

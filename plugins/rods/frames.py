@@ -9,10 +9,8 @@ import numpy as np
 from hairkit.simulation.vectors import (
     ONE,
     ZERO,
-    Floats,
     Frame,
     Number,
-    Rows,
     Vector,
     cross,
     dot,
@@ -28,16 +26,6 @@ from hairkit.simulation.vectors import (
 THIRD, THREE, FOUR, NINE_FIFTHS = (np.float32(c) for c in (1 / 3, 3, 4, 9 / 5))
 OPPOSITE = np.float32(1e-4)
 """Least 1 + cosine between an axis and where it is swung to."""
-
-
-@inlined
-def rows_of(matrix: Floats) -> Rows:
-    """Return (3, 4) as tuples, which stay in registers."""
-    return (
-        (matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3]),
-        (matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[1, 3]),
-        (matrix[2, 0], matrix[2, 1], matrix[2, 2], matrix[2, 3]),
-    )
 
 
 @inlined

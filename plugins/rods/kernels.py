@@ -28,13 +28,14 @@ from hairkit.simulation.vectors import (
     moved,
     plus,
     product,
+    rows_of,
     third_axis,
     times,
     turned,
 )
 
 from .block import Blocks, Node, Outer, Records, Settings, Step, StepArrays, Steps, Work
-from .frames import THIRD, half_way, rows_of, swing_frame, twist_angle
+from .frames import THIRD, half_way, swing_frame, twist_angle
 from .kernel_contact import resolve_contacts
 from .linear_system import IMPLICIT
 

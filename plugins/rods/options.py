@@ -7,11 +7,6 @@ from dataclasses import dataclass
 from hairkit.options import fill_options, option
 from hairkit.types.groom import HairPhysics
 
-MIDDLE_PULL = 40.0
-"""1/s: angular frequency of the pull to the captured shape at a stiffness of 0.5, 6 Hz."""
-UNREACHED = 1.001
-"""Stiffness at which that pull would be infinite: just above the largest, 1."""
-
 
 @dataclass(frozen=True)
 class Options:
@@ -100,8 +95,3 @@ class Options:
             damping=physics.damping,
             friction=physics.friction,
         )
-
-    def pull(self) -> float:
-        """Return the squared frequency of the pull to the captured shape at the root, 1/s^2."""
-        share = self.stiffness or 0.0
-        return (MIDDLE_PULL * share / (UNREACHED - share)) ** 2

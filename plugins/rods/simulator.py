@@ -14,33 +14,31 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array
 from hairkit.parallel import parallel_for
 from hairkit.simulation import Measures, Surroundings
+from hairkit.simulation.embedding import (
+    FIRM,
+    carry_points,
+    embed_points,
+    hand_goals,
+    held_nodes,
+    node_points,
+)
 from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
 from hairkit.simulation.hair_grid import make_hair_grid
+from hairkit.simulation.held_guides import held_lengths, pull_to_captured
 from hairkit.simulation.obstacle_kernels import WORTH
 from hairkit.simulation.rigid_motion import follow_head, interpolate_motion, inverse_motion
-from hairkit.simulation.ties import held_lengths
 from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 
 from .backend import Engine, FastEngine
 from .block import Contact, acting, make_steps, state_of
-from .embedding import FIRM, carry_points, embed_points, held_nodes, hold_nodes
+from .limits import finer_steps, max_stiffness, overhang
 from .linear_system import Rates, System, assemble
 from .options import Options
-from .resampling import finer_steps, max_stiffness, node_points, overhang
 from .rods import Rods, balance_load, clamp_roots, elastic_energy, make_rods, rest_state
 
 SINGLE_HAIR = 1.2e-3
 """m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""
-HELD = 4e4
-"""1/s^2: squared frequency, of 32 Hz, at which hair before its tie is pulled to the head."""
-REACH = 0.04
-"""Length from the root over which hair is pulled to its captured shape, metres: there skin and the
-hair around hold it."""
-STANDING = 2.5
-"""Squared frequency, in g / L, of the pull that bears hair which stands or lies out, since other
-hair is beneath it: a column that carries its own weight buckles by pi^2 / 4 of it at most. Hair
-that hangs needs none."""
 UPRIGHT = 6.4
 """Moment by its own weight times length over sqrt(EI GJ) at which a level strand turns aside (it
 buckles at w L^3 = 12.85 sqrt(EI GJ)). A guide stands for the hair around it, which together bears
@@ -165,13 +163,13 @@ class RodSimulator(GuideSimulator):
         """Convert options to rates; drag goes as area over mass, which is 1 / width."""
         rods, width = self.rods, self._width
         drag = options.drag * width.mean() / width
-        arc = np.pad(np.cumsum(rods.length, axis=1), ((0, 0), (1, 0)))
-        total = arc[:, -1:]
-        pull = options.pull() * np.maximum(1 - arc / REACH, 0.0) ** 2
-        falls = (rods.points[:, :1, 1] - rods.points[:, -1:, 1]) / total
-        weight = abs(self._groom.physics.gravity)
-        pull += STANDING * np.clip(1 - falls, 0.0, 1.0) * weight / total
-        pull = np.where(arc / total < self._held[:, None], HELD, pull)
+        pull = pull_to_captured(
+            rods.points,
+            rods.length,
+            options.stiffness or 0.0,
+            abs(self._groom.physics.gravity),
+            self._held,
+        )
         damping = -math.log(1 - (options.damping or 0.0)) / FRAME
         return Rates(np.repeat(drag[:, None], rods.nodes, axis=1), damping, pull)
 
@@ -200,11 +198,22 @@ class RodSimulator(GuideSimulator):
             self._hair_grid.mix(now.position, now.velocity, engine.mass, back @ start, rates)
         head, bust = (start, end), (self._torso, torso)
         steps = make_steps(head, bust, count, self._gravity(around), seconds / count)
-        force = hold_nodes(self.rods, self._embedding, self._hands.places, back)
+        force = self._pull_of_hands(back)
         system = self._system(round(seconds / count, 12), tuple(self._hands.places))
         engine.run(system, steps, acting(self.rods, self._air(around, start), force))
         self._torso = torso
         self._time += seconds
+
+    def _pull_of_hands(self, back: Float64Array) -> Float64Array | None:
+        """Return the force (S, n, 3) that makes hands, not rest, the ends of pulls, newtons."""
+        if not self._hands.places:
+            return None
+        rods, places = self.rods, self._hands.places
+        rod, node, goal = hand_goals(self._embedding, rods.points, places, back)
+        force = np.zeros_like(rods.points)
+        pull = FIRM * rods.mass[rod, node, None] * (goal - rods.points[rod, node])
+        np.add.at(force, (rod, node), pull)
+        return force
 
     def _air(self, around: Surroundings, head: Float64Array) -> Float64Array:
         """Return the air velocity at the nodes, world; gusts are those where the head carries them.

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.rods import Options
-from hairkit_plugins.rods.resampling import FARTHEST, FINEST, finer_steps
+from hairkit_plugins.rods.limits import FINEST, finer_steps
 from hairkit_plugins.rods.simulator import RodSimulator
 
 from hairkit.head_model.template import default_head
 from hairkit.simulation import Surroundings, add_shakes, quaternion
+from hairkit.simulation.rigid_motion import FARTHEST
 from hairkit.synth import grow
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom

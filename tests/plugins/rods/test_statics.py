@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hairkit_plugins.rods.backend import FastEngine
 from hairkit_plugins.rods.block import acting
-from hairkit_plugins.rods.resampling import max_stiffness
+from hairkit_plugins.rods.limits import max_stiffness
 from hairkit_plugins.rods.rods import (
     Rods,
     State,

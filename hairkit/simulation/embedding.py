@@ -1,7 +1,8 @@
-"""The guides' own points on the rods, so that curls finer than the nodes move and turn with them.
+"""Guides as chains of as many nodes each, with the guides' own points on these.
 
-Each point keeps its offset in the rod's frame at its arc length; it is exact at rest. A held point
-is pulled to its hand, at the nearest node, as hair is to its captured shape.
+Curls finer than the nodes move and turn with them: each point keeps its offset in the frame at its
+arc length; it is exact at rest. A held point is pulled to its hand, at the nearest node, as hair is
+to its captured shape.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.parallel import compiled
+from hairkit.simulation import quaternion
 from hairkit.simulation.rigid_motion import transform_points
 from hairkit.simulation.vectors import (
     Floats,
@@ -26,8 +28,12 @@ from hairkit.simulation.vectors import (
 )
 from hairkit.types.strands import Strands
 
-from .rods import Rods
-
+SHORTEST = 0.015
+"""Length, metres, of the straight chains that shorter guides are part of: between nodes that are
+much less than a millimetre apart, what a head moves in a substep is more than a segment."""
+LARGEST_TURN = 0.7
+"""Largest angle between segments at rest, radians; beyond, the coupling to twist is stiff."""
+_ROUNDS = 60
 FIRM = 4e5
 """1/s^2: squared frequency, of 100 Hz, of the pull to a hand: a strand's weight moves it 0.3 mm."""
 TAUT = 0.999
@@ -35,7 +41,7 @@ TAUT = 0.999
 
 
 class Embedding(NamedTuple):
-    """Guide points embedded in rods."""
+    """Guide points on rods, or on other chains of nodes with a frame for each segment."""
 
     rod: Int64Array
     """(P,) rod index."""
@@ -45,6 +51,41 @@ class Embedding(NamedTuple):
     """(P,) fraction along the segment."""
     offset: Float64Array
     """(P, 3) offset from the rod, in its frame there, metres."""
+
+
+def node_points(strands: Strands, nodes: int) -> Float64Array:
+    """Return (S, n, 3) nodes at equal distances along the guides.
+
+    If the turn at a node exceeds `LARGEST_TURN` (a fold, or curls finer than the nodes), the guide
+    is smoothed; roots stay.
+    """
+    points = strands.resampled(nodes).points.reshape(len(strands), nodes, 3).astype(np.float64)
+    for _ in range(_ROUNDS):
+        sharp = largest_turn(points) > LARGEST_TURN
+        if not sharp.any():
+            break
+        some = points[sharp]
+        some[:, 1:-1] = 0.25 * some[:, :-2] + 0.5 * some[:, 1:-1] + 0.25 * some[:, 2:]
+        offsets = np.arange(len(some) + 1) * nodes
+        even = Strands(some.reshape(-1, 3).astype(np.float32), offsets).resampled(nodes)
+        points[sharp] = even.points.reshape(some.shape)
+    length = np.linalg.norm(np.diff(points, axis=1), axis=-1)
+    bad = (length.min(axis=1) < SHORTEST / nodes) | (largest_turn(points) > LARGEST_TURN)
+    if bad.any():
+        step = np.maximum(length.mean(axis=1), SHORTEST / nodes)[bad, None, None]
+        way = points[bad, -1] - points[bad, 0]
+        way[np.linalg.norm(way, axis=1) < 1e-9] = [0.0, 1.0, 0.0]
+        along = np.arange(nodes)[None, :, None] * step
+        points[bad] = points[bad, :1] + along * quaternion.normalize(way)[:, None]
+    return points
+
+
+def largest_turn(points: Float64Array) -> Float64Array:
+    """Return the largest turn (S,) at a node, radians."""
+    direction = quaternion.normalize(np.diff(points, axis=1))
+    cosine = (direction[:, 1:] * direction[:, :-1]).sum(axis=-1)
+    result: Float64Array = np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1)
+    return result
 
 
 def embed_points(strands: Strands, position: Float64Array, frames: Float64Array) -> Embedding:
@@ -62,26 +103,22 @@ def embed_points(strands: Strands, position: Float64Array, frames: Float64Array)
     return made
 
 
-def hold_nodes(
-    rods: Rods, embedding: Embedding, hands: dict[int, Float64Array], back: Float64Array
-) -> Float64Array | None:
-    """Return the force (S, n, 3) that makes hands, not rest, the ends of pulls, newtons.
+def hand_goals(
+    on: Embedding, rest: Float64Array, hands: dict[int, Float64Array], back: Float64Array
+) -> tuple[Int64Array, Int64Array, Float64Array]:
+    """Return rod and node (G,) of each held point, and where it is pulled to (G, 3), head axes.
 
-    `hands` are the places (3,) of those that hold points, world, and `back` (4, 4) transforms the
-    world to the head axes. A hand that the strand does not reach pulls to the nearest point that it
-    does.
+    `rest` (S, n, 3) are the nodes at rest, `hands` the places (3,) of those that hold points,
+    world, and `back` (4, 4) transforms the world to the head axes. A hand that the strand does not
+    reach pulls to the nearest point that it does.
     """
-    if not hands:
-        return None
-    force = np.zeros_like(rods.points)
-    rod, node = held_nodes(embedding, tuple(hands))
-    root = rods.points[rod, 0]
-    away = transform_points(back, np.array([*hands.values()])) - root
-    reach = TAUT * np.cumsum(rods.length, axis=1)[rod, node - 1]
+    rod, node = held_nodes(on, tuple(hands))
+    root = rest[rod, 0]
+    away = transform_points(back, np.array([*hands.values()]).reshape(-1, 3)) - root
+    length = np.linalg.norm(np.diff(rest[rod], axis=1), axis=-1)
+    reach = TAUT * np.cumsum(length, axis=1)[np.arange(len(rod)), node - 1]
     away *= np.minimum(1.0, reach / np.maximum(np.linalg.norm(away, axis=1), 1e-12))[:, None]
-    pull = FIRM * rods.mass[rod, node, None] * (root + away - rods.points[rod, node])
-    np.add.at(force, (rod, node), pull)
-    return force
+    return rod, node, root + away
 
 
 def held_nodes(embedding: Embedding, held: tuple[int, ...]) -> tuple[Int64Array, Int64Array]:

@@ -9,7 +9,7 @@ import pytest
 
 from hairkit.manager import Manager
 from hairkit.simulation import Surroundings
-from hairkit.simulation.ties import held_lengths
+from hairkit.simulation.held_guides import held_lengths
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
