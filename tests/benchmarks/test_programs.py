@@ -18,7 +18,7 @@ from hairkit.synth.foreign_heads import make_coarse_head
 PROJECT = Path(__file__).parents[2]
 SHARED = {
     "captures_argument", "example_textures", "peer_cases", "peer_surfaces", "peer_views",
-    "peer_volumes", "plain_analogies", "random_hair", "xpbd_peer",
+    "peer_volumes", "plain_analogies", "random_hair",
 }  # fmt: skip
 """Modules that programs import."""
 FOLDERS = ("benchmarks", "studies")

@@ -45,7 +45,7 @@ def test_strands_are_held_up_to_their_ring() -> None:
     assert not held_lengths(replace(groom, ties=())).any()
 
 
-@pytest.mark.parametrize("name", ["rods", "super_helix"])
+@pytest.mark.parametrize("name", ["pbd", "rods", "super_helix"])
 def test_a_tie_moves_with_the_head(name: str) -> None:
     """When gravity turns sideways, the ring's hair stays, and the tail swings less than untied."""
     moved = {}
