@@ -71,8 +71,10 @@ def _roles(
     if plugin:
         roles = [role for role, name in used.items() if plugin in (name, role)]
         if not roles:
+            from hairkit.stages import renamed
+
             reason = unknown_name("plugin", plugin, dict.fromkeys(used.values()))
-            raise OptionError(f"--set {text}: this command uses {reason}")
+            raise OptionError(f"--set {text}: this command uses {reason}{renamed(plugin)}")
         return roles
     known = {name: [i.name for i in manager.info(name).options] for name in used.values()}
     having = [name for name, options in known.items() if option in options]

@@ -192,3 +192,18 @@ def test_a_simulation_is_no_groom(
     capsys.readouterr()
     assert main(words) == 2
     assert "hairkit render GROOM --cache cache.npz" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["--set", "pbd.bend=0.5"], ["--using", "pbd", "--set", "pbd.cohesion=2"]],
+)
+def test_options_of_what_was_called_otherwise_name_it(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`pbd` was what is `rods` now: its options are refused with one line that says so."""
+    bristle_groom().save(tmp_path / "groom.npz")
+    out = str(tmp_path / "cache.npz")
+    assert main(["simulate", str(tmp_path / "groom.npz"), "-o", out, "--frames", "2", *words]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.endswith("what was pbd is rods since 0.3: write rods.OPTION")
