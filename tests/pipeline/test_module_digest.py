@@ -116,7 +116,7 @@ def test_a_file_that_a_module_names_counts_as_its_source(
         "head_model.photo_skin",
         "head_model.hairline",
         "imaging.waves",
-        "field.ties",
+        "field.find_ties",
         "field.find_parting",
         "field.growth_prior",
     ],

@@ -15,7 +15,7 @@ from ball import RECIPE
 
 from hairkit import Capture, Groom, Mask, Roots, ScalpDistance, Strands, Waves, hookimpl
 from hairkit.errors import InputError, PluginError, RenderError
-from hairkit.field.ties import measure_ties
+from hairkit.field.find_ties import measure_ties
 from hairkit.manager import Manager
 from hairkit.pipeline.draft import draft
 from hairkit.pipeline.recipe import parse_recipe

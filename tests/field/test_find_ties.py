@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hairkit.arrays import Float64Array
+from hairkit.field.find_ties import find_bundles, measure_ties
 from hairkit.field.growth_prior import measure_scalp_distance
-from hairkit.field.ties import find_bundles, measure_ties
 from hairkit.types.tie import Tail, TiedHair
 from hairkit.types.volume import Hull
 from tests.support import tied_ball as ball

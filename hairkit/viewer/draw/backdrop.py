@@ -1,4 +1,4 @@
-"""The studio behind the head: a wall, and a floor with the soft shadow of head and shoulders."""
+"""The backdrop of the head: a wall, and a floor with the soft shadow of head and shoulders."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ SHADOW_RADIUS = 0.35
 """Metres from the middle of the shadow at which it has faded."""
 
 
-class StudioPass:
-    """Draws the studio at low resolution and scales it up to a frame."""
+class BackdropPass:
+    """Draws the backdrop at low resolution and scales it up to a frame."""
 
     def __init__(self, gl: Renderer) -> None:
         self._gl = gl
