@@ -68,11 +68,11 @@ def _roles(
     manager: Manager, used: Mapping[str, str], plugin: str, option: str, text: str
 ) -> list[str]:
     """Return the roles whose plugin a setting is for."""
+    from hairkit.stages import renamed  # not loaded for a verb's help
+
     if plugin:
         roles = [role for role, name in used.items() if plugin in (name, role)]
         if not roles:
-            from hairkit.stages import renamed
-
             reason = unknown_name("plugin", plugin, dict.fromkeys(used.values()))
             raise OptionError(f"--set {text}: this command uses {reason}{renamed(plugin)}")
         return roles
@@ -80,7 +80,8 @@ def _roles(
     having = [name for name, options in known.items() if option in options]
     if not having:
         options = dict.fromkeys(o for options in known.values() for o in options)
-        raise OptionError(f"--set {text}: {unknown_name('option', option, options)}")
+        reason = unknown_name("option", option, options) + "".join(map(renamed, known))
+        raise OptionError(f"--set {text}: {reason}")
     if len(having) > 1:
         choices = " or ".join(f"{name}.{option}" for name in having)
         raise OptionError(f"--set {text}: several plugins have this option; write {choices}")

@@ -10,19 +10,13 @@ import numpy.typing as npt
 from hairkit.arrays import Float64Array
 from hairkit.options import fill_options
 from hairkit.parallel import parallel_for
-from hairkit.simulation import Measures, Surroundings, quaternion
+from hairkit.simulation import Measures, Surroundings, quaternion, rigid_motion
 from hairkit.simulation.embedding import FIRM, carry_points, embed_points, hand_goals, node_points
 from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
 from hairkit.simulation.held_guides import held_lengths, pull_to_captured
 from hairkit.simulation.lanes import LANES, Kind
 from hairkit.simulation.obstacle_kernels import NO_FIELDS, WORTH
-from hairkit.simulation.rigid_motion import (
-    follow_head,
-    interpolate_motion,
-    inverse_motion,
-    motion_steps,
-    way_of_roots,
-)
+from hairkit.simulation.rigid_motion import inverse_motion, motion_steps
 from hairkit.simulation.vectors import Floats
 from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
@@ -36,9 +30,6 @@ GRAB_SPEED = 5.0
 """m/s, of hands."""
 REACH = 1.0
 """Metres from the head to the farthest hair."""
-
-
-_UNTURNED = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 class PbdSimulator(GuideSimulator):
@@ -74,9 +65,9 @@ class PbdSimulator(GuideSimulator):
             return
         options, start, end = self._options, self._head, surroundings.head_from_rest
         self._move_hands(surroundings, GRAB_SPEED * seconds)
-        bust, torso = self._torso, follow_head(self._torso, end, self._bodies.joint)
-        frame = interpolate_motion(start, end, min(1.0, FRAME / seconds))
-        if way_of_roots(start, frame, self._rest[:, 0]) == math.inf:
+        bust, torso = self._torso, rigid_motion.follow_head(self._torso, end, self._bodies.joint)
+        frame = rigid_motion.interpolate_motion(start, end, min(1.0, FRAME / seconds))
+        if rigid_motion.way_of_roots(start, frame, self._rest[:, 0]) == math.inf:
             start, bust = end, torso  # hair and torso go with a head that is elsewhere at once
             self._hair.slack[:] = 0
         count = max(1, math.ceil(options.substeps * seconds / FRAME - 1e-6))
@@ -133,7 +124,9 @@ class PbdSimulator(GuideSimulator):
         self._pull = pull_to_captured(
             rest, near[:, :-1, 0], options.stiffness or 0.0, options.borne * weight, held
         )
-        self._on = embed_points(strands, rest, np.tile(_UNTURNED, (len(rest), nodes - 1, 1)))
+        self._on = embed_points(
+            strands, rest, np.tile([1.0, 0.0, 0.0, 0.0], (len(rest), nodes - 1, 1))
+        )
         self._rest, still = rest, np.zeros_like(rest)
         self._bears = options.borne * _borne(rest, self._rest_gravity)
         clear = np.minimum(self._bodies.at(rest)[0], CLEARANCE)
@@ -147,10 +140,9 @@ class PbdSimulator(GuideSimulator):
         goal, pull, back = rest.copy(), self._pull.copy(), inverse_motion(head)
         *held, places = hand_goals(self._on, rest, self._hands.places, back)
         goal[tuple(held)], pull[tuple(held)] = places, FIRM
-        loads = (drag * air + self._bears, goal, pull)
-        return self._hair._replace(
-            **dict(zip(("steady", "goal", "pull"), map(self._lanes_of, loads), strict=True))
-        )
+        steady = self._lanes_of(drag * air + self._bears)
+        goals, pulls = self._lanes_of(goal), self._lanes_of(pull)
+        return self._hair._replace(steady=steady, goal=goals, pull=pulls)
 
     def _carry(self) -> Float64Array:
         """Return where the nodes carry the guides' points (P, 3), head axes."""

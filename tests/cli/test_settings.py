@@ -196,7 +196,12 @@ def test_a_simulation_is_no_groom(
 
 @pytest.mark.parametrize(
     "words",
-    [["--set", "pbd.bend=0.5"], ["--using", "pbd", "--set", "pbd.cohesion=2"]],
+    [
+        ["--set", "pbd.bend=0.5"],
+        ["--using", "pbd", "--set", "pbd.cohesion=2"],
+        ["--using", "pbd", "--set", "cohesion=2"],
+        ["--using", "pbd", "--set", "pbd.bend=0.5"],
+    ],
 )
 def test_options_of_what_was_called_otherwise_name_it(
     words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
