@@ -139,6 +139,6 @@ RENAMED = {"head": "fit", "pbd": "rods"}
 
 
 def renamed(plugin: str) -> str:
-    """Return what an error of a plugin's option adds where the name meant another plugin before."""
+    """Return what an error adds where a plugin's name meant another plugin before; else ""."""
     now = RENAMED.get(plugin)
-    return f"; what was {plugin} is {now} since 0.3: write {now}.OPTION" if now else ""
+    return f"; what was {plugin} is {now} since 0.3: write {now}" if now else ""

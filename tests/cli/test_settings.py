@@ -211,4 +211,4 @@ def test_options_of_what_was_called_otherwise_name_it(
     out = str(tmp_path / "cache.npz")
     assert main(["simulate", str(tmp_path / "groom.npz"), "-o", out, "--frames", "2", *words]) == 2
     [line] = capsys.readouterr().err.splitlines()
-    assert line.endswith("what was pbd is rods since 0.3: write rods.OPTION")
+    assert line.endswith("what was pbd is rods since 0.3: write rods")
