@@ -111,7 +111,7 @@ def commands(place: Path, out: Path) -> list[list[str]]:
     return [
         ["reconstruct", str(SAMPLE), "-o", str(out / "masks"), "--guides", "200"],
         ["reconstruct", photos, "-o", str(out / "photos"), "--guides", "200"],
-        ["simulate", groom, "-o", str(out / "pbd.npz"), *short],
+        ["simulate", groom, "-o", str(out / "rods.npz"), *short],
         ["simulate", groom, "-o", str(out / "helix.npz"), "--using", "super_helix", *short],
         ["render", groom, "-o", str(out / "hair.png")],
         ["view", groom, "--headless", "--script", script, "--out", str(out)],

@@ -35,7 +35,7 @@ SIZE, STRANDS, GUIDES = "120x160", "500", 100
 """Photos, hair and guides of the captures that are drawn for the first table."""
 SIMPLE = (
     "landmarks=landmark_files", "person=none", "turn=none", "scene=landmarks", "refine=none",
-    "head=none", "export=hairworks",
+    "fit=none", "export=hairworks",
 )  # fmt: skip
 """Changes of the recipe for them, which leave 6 of the 11 s that such a capture takes."""
 STAND_IN = """

@@ -26,7 +26,7 @@ import numpy as np
 FOLDER = Path(__file__).parent
 NOT_RUN = {
     "bench", "blender_picture", "captures_argument", "compare", "example_textures",
-    "plain_analogies", "random_hair", "xpbd_peer",
+    "plain_analogies", "random_hair",
 }  # fmt: skip
 """Modules of other programs, and programs that work on files of the user's."""
 NUMBERS = 1_000_000

@@ -21,7 +21,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from hairkit_plugins import pbd, super_helix
+from hairkit_plugins import rods, super_helix
 
 from hairkit.head_model.template import default_head
 from hairkit.simulation import Simulator, Surroundings, add_shakes
@@ -31,7 +31,7 @@ from hairkit.synth import STYLES, grow
 from hairkit.types.groom import Groom
 
 SIMULATORS: dict[str, Callable[[Groom], Simulator]] = {
-    "pbd": lambda groom: pbd.make_simulator(groom, pbd.Options()),
+    "rods": lambda groom: rods.make_simulator(groom, rods.Options()),
     "super_helix": lambda groom: super_helix.make_simulator(groom, super_helix.Options()),
 }
 HAIR = ("straight", "wavy", "short")

@@ -138,7 +138,7 @@ def average(folder: Path) -> tuple[Capture, Scene, tuple[Mask, ...], Truth]:
     manager, probe = Manager.loaded([]), Probe()
     manager.register(probe, "head_probe")
     given = read_capture(folder)
-    photograph_head(given, load_recipe("default").with_set(["head=head_probe"]), manager)
+    photograph_head(given, load_recipe("default").with_set(["fit=head_probe"]), manager)
     assert probe.given is not None
     capture, masks, scene = probe.given
     truth = read_truth(folder / "truth")

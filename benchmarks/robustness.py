@@ -1,6 +1,6 @@
 """The laws of robustness over many random grooms, for both simulators.
 
-    python benchmarks/robustness.py [--grooms 1000] [--first 0] [--only pbd]
+    python benchmarks/robustness.py [--grooms 1000] [--first 0] [--only rods]
 
 Each groom has up to six strands on a ball: straight, curled by up to 10,000 degrees, a random walk,
 folded, with points twice or without length; 1 mm to 1.5 m. For half a second its head spins at
@@ -24,14 +24,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from hairkit_plugins import pbd, super_helix
+from hairkit_plugins import rods, super_helix
 from random_hair import DEEDS, FAR, KINDS, STEPS, Happening, Strand, endure, groom_of
 
 from hairkit.simulation import Simulator
 from hairkit.types.groom import Groom
 
 SIMULATORS: dict[str, Callable[[Groom], Simulator]] = {
-    "pbd": lambda groom: pbd.make_simulator(groom, pbd.Options(backend="fast", friction=0.0)),
+    "rods": lambda groom: rods.make_simulator(groom, rods.Options(backend="fast", friction=0.0)),
     "super_helix": lambda groom: super_helix.make_simulator(
         groom, super_helix.Options(friction=0.0)
     ),

@@ -3,12 +3,13 @@
     python benchmarks/simulation.py [--guides 1000 10000] [--frames 60] [--referee PYTHON]
 
 One scene for all: the same guides of 16 points, from their captured shape, on a head that is
-shaken (`yaw:20:1.5`), under gravity, at 60 frames a second. Beside pbd there run extended
-position-based dynamics (Mueller et al. 2007; Macklin et al. 2016), compiled, with contact with the
-head (`xpbd_peer`), and, where `--referee` names a Python that has it, pyPBD (C++), without contact.
+shaken (`yaw:20:1.5`), under gravity, at 60 frames a second. Beside `rods` there run extended
+position-based dynamics (the plugin `pbd`: Mueller et al. 2007; Macklin et al. 2016) without what it
+has to keep captured hair in place, and, where `--referee` names a Python that has it, pyPBD (C++),
+without contact.
 Both have the same constraints: each node to the next one rigidly, to the next but one by a spring,
-which is their bending. Their first two nodes go with the head in every substep. pbd also has twist,
-friction and neighbours, as always.
+which is their bending. Their first two nodes go with the head in every substep. `rods` also has
+twist, friction and neighbours, as always.
 
 | column | what |
 |---|---|
@@ -17,8 +18,8 @@ friction and neighbours, as always.
 | stretch | largest of any segment at any frame, of up to 1000 guides |
 | off | root mean square distance from the converged motion of the same material |
 
-The converged motion is that of many substeps: of pbd for pbd; of XPBD in float64 for itself, and
-without the head for pyPBD. Of pyPBD the time of its own step is counted, with all threads or with
+The converged motion is that of many substeps: of `rods` for itself; of XPBD in float64, and without
+the head for pyPBD. Of pyPBD the time of its own step is counted, with all threads or with
 one, whichever is faster, and not the loops in Python that set roots.
 """
 
@@ -36,16 +37,15 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from hairkit_plugins.pbd import Options
+from hairkit_plugins import pbd, rods
 from hairkit_plugins.pbd.simulator import PbdSimulator
-from xpbd_peer import BENDING, CompiledXpbd
+from hairkit_plugins.rods.simulator import RodSimulator
 
 from hairkit.errors import RenderError
-from hairkit.grooming.prepare_export import dense_groom
+from hairkit.grooming.prepare_export import dense_groom, select_strands
 from hairkit.head_model.template import default_head
 from hairkit.rendering.context import renderer
-from hairkit.simulation import Surroundings, add_shakes
-from hairkit.simulation.obstacles import head_obstacles
+from hairkit.simulation import Simulator, Surroundings, add_shakes
 from hairkit.synth import grow
 from hairkit.types.groom import Groom
 
@@ -55,9 +55,11 @@ SHAKE = ["yaw:20:1.5"]
 SCENE, FEW = 1000, 40
 """Most guides whose error is measured; of the peers', whose strands do not meet, so many."""
 CONVERGED, CONVERGED_PEER = 64, (512, 2)
-"""Substeps of pbd's converged motion; substeps and iterations of the others'."""
+"""Substeps of the rods' converged motion; substeps and iterations of the others'."""
 SETTINGS = ((4, 20), (16, 5), (16, 20), (32, 2), (32, 8), (64, 1), (64, 4), (128, 1), (128, 4))
 """Substeps and iterations of the peers, of which the cheapest that is as good is taken."""
+PLAIN = pbd.Options(stiffness=0.0, damping=0.0, drag=0.0, friction=0.0, borne=0.0)
+"""The method alone, as pyPBD has it."""
 
 PYPBD = """
 import sys, time, numpy as np, pypbd as p
@@ -96,7 +98,7 @@ np.savez(result, taken=taken, points=np.array(found))
 """
 
 
-XPBD, PYPBD_NAME = "XPBD, compiled", "pyPBD distances"
+XPBD, PYPBD_NAME = "pbd (XPBD)", "pyPBD distances"
 Way = tuple[str, int, int]
 """Method, substeps, iterations."""
 Setting = tuple[int, int]
@@ -161,9 +163,21 @@ def rate(step: Callable[[int], None], steps: int, rounds: int = 3) -> Speed:
     return 1 / wall, cpu
 
 
-def ours_moved(groom: Groom, backend: str, substeps: int, frames: int) -> tuple[Array, float]:
-    """Return pbd's points (F, S, n, 3) and the largest stretch of its rods."""
-    simulator = PbdSimulator(groom, Options(backend=backend, substeps=substeps))
+def ours(groom: Groom, backend: str, substeps: int) -> Simulator:
+    """Return `rods`."""
+    return RodSimulator(groom, rods.Options(backend=backend, substeps=substeps))
+
+
+def peer(
+    groom: Groom, setting: Setting, kind: type[Any] = np.float32, contact: bool = True
+) -> Simulator:
+    """Return `pbd`, of as many nodes as the guides have points."""
+    options = replace(PLAIN, nodes=NODES, substeps=setting[0], iterations=setting[1])
+    return PbdSimulator(groom, options, kind, contact)
+
+
+def moved(simulator: Simulator, groom: Groom, frames: int) -> tuple[Array, float]:
+    """Return a simulator's points (F, S, n, 3), and its largest stretch."""
     found, stretch = [], 0.0
     for head in heads_of(groom, frames, 1):
         simulator.advance(FRAME, Surroundings(head))
@@ -172,11 +186,10 @@ def ours_moved(groom: Groom, backend: str, substeps: int, frames: int) -> tuple[
     return np.stack(found), stretch
 
 
-def ours_speed(groom: Groom, backend: str, substeps: int, steps: int) -> Speed:
-    """Return how fast pbd is."""
-    simulator = PbdSimulator(groom, Options(backend=backend, substeps=substeps))
-    heads = heads_of(groom, 3 * steps, 1)  # for the peers, too, known before
-    simulator.advance(FRAME, Surroundings())
+def speed(simulator: Simulator, groom: Groom, steps: int) -> Speed:
+    """Return how fast a simulator is."""
+    heads = heads_of(groom, 3 * steps, 1)  # for the referee, too, known before
+    simulator.advance(FRAME, Surroundings())  # compiles
 
     def step(frame: int) -> None:
         simulator.advance(FRAME, Surroundings(heads[frame]))
@@ -184,27 +197,6 @@ def ours_speed(groom: Groom, backend: str, substeps: int, steps: int) -> Speed:
             _ = simulator.points
 
     return rate(step, steps)
-
-
-def peer_moved(
-    groom: Groom, setting: Setting, frames: int, kind: Any = np.float32, contact: bool = True
-) -> Array:
-    """Return points (F, S, n, 3) of some strands by compiled XPBD."""
-    obstacles, rest = head_obstacles(groom.head) if contact else None, few(rest_of(groom))
-    scheme, found = CompiledXpbd(rest, obstacles, FRAME / setting[0], setting[1], kind), []
-    for heads in heads_of(groom, frames, setting[0]).reshape(frames, setting[0], 4, 4):
-        scheme.advance(heads)
-        found.append(scheme.points.copy())
-    return np.stack(found)
-
-
-def peer_speed(groom: Groom, setting: Setting, steps: int) -> Speed:
-    """Return how fast compiled XPBD is."""
-    obstacles, substeps = head_obstacles(groom.head), setting[0]
-    scheme = CompiledXpbd(rest_of(groom), obstacles, FRAME / substeps, setting[1], np.float32)
-    heads = heads_of(groom, 3 * steps, substeps).reshape(3 * steps, substeps, 4, 4)
-    scheme.advance(heads[0])  # compiles
-    return rate(lambda frame: scheme.advance(heads[frame]), steps)
 
 
 def referee(
@@ -217,7 +209,7 @@ def referee(
     with tempfile.TemporaryDirectory() as folder:
         scene, result = Path(folder, "scene.npz"), Path(folder, "result.npz")
         np.savez(scene, rest=rest, heads=heads, frames=len(heads) // setting[0])
-        words = [python, "-c", PYPBD, scene, result, *setting, BENDING]
+        words = [python, "-c", PYPBD, scene, result, *setting, PLAIN.bend]
         done = subprocess.run(
             [*map(str, words)], capture_output=True, text=True, timeout=1800,
             env={**os.environ, **({"OMP_NUM_THREADS": threads} if threads else {})},
@@ -237,9 +229,10 @@ def referee_speed(python: str, groom: Groom, setting: Setting, steps: int) -> Sp
     return 1 / min(one, all_), one
 
 
-def few(strands: Array) -> Array:
+def few(groom: Groom) -> Groom:
     """Return some of the strands, evenly picked."""
-    return strands[np.linspace(0, len(strands) - 1, min(FEW, len(strands))).astype(int)]
+    count = len(groom.strands)
+    return select_strands(groom, np.linspace(0, count - 1, min(FEW, count)).astype(int))
 
 
 def errors(
@@ -247,18 +240,20 @@ def errors(
 ) -> dict[Way, tuple[float, float]]:
     """Return largest stretch and distance from the converged motion of all that is compared."""
     found: dict[Way, tuple[float, float]] = {}
-    converged, _ = ours_moved(scene, "fast", CONVERGED, frames)
+    converged, _ = moved(ours(scene, "fast", CONVERGED), scene, frames)
     for backend in backends:
         for substeps in (4, 2):
-            points, stretch = ours_moved(scene, backend, substeps, frames)
-            found["pbd " + backend, substeps, 1] = stretch, off_by(points, converged)
-    rest = few(rest_of(scene))
+            points, stretch = moved(ours(scene, backend, substeps), scene, frames)
+            found["rods " + backend, substeps, 1] = stretch, off_by(points, converged)
+    some = few(scene)
+    rest = rest_of(some)
     touching, free = (
-        peer_moved(scene, CONVERGED_PEER, frames, np.float64, contact) for contact in (True, False)
+        moved(peer(some, CONVERGED_PEER, np.float64, contact), some, frames)[0]
+        for contact in (True, False)
     )
     for setting in SETTINGS:
-        points = peer_moved(scene, setting, frames)
-        found[XPBD, *setting] = stretch_of(points, rest), off_by(points, touching)
+        points, stretch = moved(peer(some, setting), some, frames)
+        found[XPBD, *setting] = stretch, off_by(points, touching)
         if python:
             _, points = referee(python, rest, heads_of(scene, frames, setting[0]), setting, "1")
             found[PYPBD_NAME, *setting] = stretch_of(points, rest), off_by(points, free)
@@ -271,11 +266,11 @@ def speed_of(way: Way, groom: Groom, frames: int, python: str | None) -> Speed:
     steps = max(1, frames * 1000 // max(len(groom.strands), 1000))
     few_steps = max(1, steps // 30)
     if method == XPBD:
-        return peer_speed(groom, (substeps, iterations), few_steps)
+        return speed(peer(groom, (substeps, iterations)), groom, few_steps)
     if method == PYPBD_NAME:
         assert python is not None
         return referee_speed(python, groom, (substeps, iterations), few_steps)
-    return ours_speed(groom, method.removeprefix("pbd "), substeps, steps)
+    return speed(ours(groom, method.removeprefix("rods "), substeps), groom, steps)
 
 
 def cheapest(rows: list[Row], stretch: float, off: float) -> Row | None:
@@ -290,8 +285,8 @@ def verdicts(rows: list[Row]) -> list[str]:
     for name in dict.fromkeys(row.way[0] for row in rows if row.way[0] in (XPBD, PYPBD_NAME)):
         peers = [row for row in rows if row.way[0] == name]
         for words, stretch, off in (
-            ("no more stretch than pbd", ours.stretch, np.inf),
-            ("below 1 %, no farther off than pbd", 0.01, ours.off),
+            ("no more stretch than rods", ours.stretch, np.inf),
+            ("below 1 %, no farther off than rods", 0.01, ours.off),
             ("below 1 %", 0.01, np.inf),
         ):
             best = cheapest(peers, stretch, off)
@@ -301,7 +296,7 @@ def verdicts(rows: list[Row]) -> list[str]:
                 wall, cpu = ours.speed / best.speed, best.cpu / ours.cpu
                 setting = f"{best.way[1]} x {best.way[2]}, {best.speed:.1f} steps/s"
                 ratio = f"{wall:.1f} times as fast, by processor time {cpu:.1f}"
-                lines.append(f"{name}, {words}: {setting}; pbd is {ratio}")
+                lines.append(f"{name}, {words}: {setting}; rods is {ratio}")
     return lines
 
 

@@ -133,7 +133,7 @@ def simulate(
     turbulence: float = 0.0,
     gravity: float | None = None,
     warm_up: float = 0.0,
-    simulator: str = "pbd",
+    simulator: str = "rods",
     manager: Manager | None = None,
     progress: Progress | None = None,
     **options: object,

@@ -106,7 +106,7 @@ LABELS = Stage(
 SCENE = Stage("scene", Scene, "estimate_scene", "placing cameras", 13, KEPT, needed=True)
 FIRST_SCENE = replace(SCENE, name="first_scene", share=9, of=SCENE)
 REFINED = Stage("refine", Masks, "refine_masks", "comparing masks", 11, KEPT)
-FITTED = Stage("head", Scene, "fit_head", "fitting the head", 2, KEPT)
+FITTED = Stage("fit", Scene, "fit_head", "fitting the head", 2, KEPT)
 SKIN = Stage("skin", SkinMaps, words="photographing the skin", share=14, draft=KEPT)
 TEXTURE = Stage("texture", Texture, "enhance_texture", "sharpening the skin", draft=KEPT)
 ORIENTED = Stage(
@@ -134,3 +134,11 @@ OF_NAME = {stage.name: stage for stage in ROWS}
 OF_HOOK = {stage.hook: stage for stage in ROWS if stage.hook and stage.of is None}
 OF_TABLE = {stage.name: stage for stage in OF_HOOK.values() if stage.in_runs}
 """The stages that a recipe names plugins for."""
+RENAMED = {"head": "fit", "pbd": "rods"}
+"""Tables of recipes, and plugins: what was so called until 0.2, and what it is called now."""
+
+
+def renamed(plugin: str) -> str:
+    """Return what an error adds where a plugin's name meant another plugin before; else ""."""
+    now = RENAMED.get(plugin)
+    return f"; what was {plugin} is {now} since 0.3: write {now}" if now else ""

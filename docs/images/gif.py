@@ -4,9 +4,9 @@ python docs/images/gif.py [shake.gif ...] [--hairs 8000]
 
 | file | what |
 |---|---|
-| shake.gif, wind.gif | straight hair on a shaken head, wavy hair in wind, by pbd |
+| shake.gif, wind.gif | straight hair on a shaken head, wavy hair in wind, by rods |
 | shake_super_helix.gif, wind_super_helix.gif | the same by super_helix |
-| hair_shake.gif, hair_jump.gif | straight, wavy, curly, short; above by pbd, below by super_helix |
+| hair_shake.gif, hair_jump.gif | straight, wavy, curly, short; above rods, below super_helix |
 | hair_nod.gif, hair_wind.gif | the same |
 
 Needs Pillow beside hairkit. Without names all are drawn.
@@ -37,7 +37,7 @@ Picture = npt.NDArray[np.uint8]
 HERE = Path(__file__).parent
 GUIDES = 400
 STYLES: tuple[StyleName, ...] = ("straight", "wavy", "curly", "short")
-SIMULATORS = ("pbd", "super_helix")
+SIMULATORS = ("rods", "super_helix")
 FRAME, EVERY = 1 / 30, 3
 """Seconds of a picture of the viewer, and of how many one is kept."""
 SECONDS = 3.0
@@ -99,8 +99,8 @@ def wind(session: Session, frame: int) -> None:
 
 Motion = Callable[[Session, int], None]
 ALONE: dict[str, tuple[StyleName, str, Motion]] = {
-    "shake.gif": ("straight", "pbd", shake),
-    "wind.gif": ("wavy", "pbd", wind),
+    "shake.gif": ("straight", "rods", shake),
+    "wind.gif": ("wavy", "rods", wind),
     "shake_super_helix.gif": ("straight", "super_helix", shake),
     "wind_super_helix.gif": ("wavy", "super_helix", wind),
 }

@@ -33,7 +33,7 @@ class Simulate(bpy.types.Operator, Background):
         name="Warm-up", description="Seconds before the first frame", default=0.0, min=0.0
     )
     settings: bpy.props.StringProperty(
-        name="Settings", description="As of the command line: pbd.stiffness=2"
+        name="Settings", description="As of the command line: rods.stiffness=2"
     )
 
     def invoke(self, context, event):

@@ -50,7 +50,7 @@ def batch(
     recipe
         A shipped recipe's name, or a `.toml` file.
     settings
-        More of `hairkit.batches.jobs.Settings`: `{"guides": 8000, "settings": ["head=none"]}`.
+        More of `hairkit.batches.jobs.Settings`: `{"guides": 8000, "settings": ["fit=none"]}`.
     only, part
         Names of the captures to do; every N-th from the K-th on, "K/N", for job arrays of farms.
     workers, threads

@@ -43,7 +43,7 @@ def split_settings(
     manager
         The plugins.
     plugins
-        The plugin in each role of the verb: `{"reader": "ply", "simulator": "pbd"}`; None where
+        The plugin in each role of the verb: `{"reader": "ply", "simulator": "rods"}`; None where
         the verb does without one.
     texts
         `plugin.option=value`, by the plugin's name or role, or `option=value` for the option of
@@ -68,17 +68,20 @@ def _roles(
     manager: Manager, used: Mapping[str, str], plugin: str, option: str, text: str
 ) -> list[str]:
     """Return the roles whose plugin a setting is for."""
+    from hairkit.stages import renamed  # not loaded for a verb's help
+
     if plugin:
         roles = [role for role, name in used.items() if plugin in (name, role)]
         if not roles:
             reason = unknown_name("plugin", plugin, dict.fromkeys(used.values()))
-            raise OptionError(f"--set {text}: this command uses {reason}")
+            raise OptionError(f"--set {text}: this command uses {reason}{renamed(plugin)}")
         return roles
     known = {name: [i.name for i in manager.info(name).options] for name in used.values()}
     having = [name for name, options in known.items() if option in options]
     if not having:
         options = dict.fromkeys(o for options in known.values() for o in options)
-        raise OptionError(f"--set {text}: {unknown_name('option', option, options)}")
+        reason = unknown_name("option", option, options) + "".join(map(renamed, known))
+        raise OptionError(f"--set {text}: {reason}")
     if len(having) > 1:
         choices = " or ".join(f"{name}.{option}" for name in having)
         raise OptionError(f"--set {text}: several plugins have this option; write {choices}")

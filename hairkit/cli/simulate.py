@@ -29,7 +29,7 @@ exporter of its ending: -o hair.abc, .usdc, .glb. The captured hair is at rest a
 Shakes are AXIS:DEGREES:HERTZ[:SECONDS] with yaw, pitch or roll; several go together. Wind is where
 the air goes to: +X the subject's left, +Y up, +Z out of the face."""
 
-SIMULATOR = "pbd"
+SIMULATOR = "rods"
 FRAMES, RATE = 120, 60.0
 """Frames written by default, and their number a second: two seconds."""
 MOST_FRAMES = 100_000

@@ -30,7 +30,7 @@ def register(subparsers: Any) -> None:
     add = parser.add_argument
     add("groom", metavar="GROOM", type=Path, help="groom.npz, importable file or folder of results")
     add("--capture", metavar="C", help="the photos, to show them in space: a folder, a video, ...")
-    add("--simulator", metavar="NAME", help="simulator plugin (pbd), or none")
+    add("--simulator", metavar="NAME", help="simulator plugin (rods), or none")
     add_setting(add)
     add("--preset", metavar="NAME", help="simulator options saved beside the groom")
     add("--hairs", type=int, metavar="N", help="strands drawn (10000)")

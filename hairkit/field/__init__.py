@@ -6,17 +6,17 @@ What field and tracking plugins share: fusing views, priors, diffusion, and samp
 * `cell_shells`: cells grown or shrunk over their faces
 * `diffusion`: screened diffusion on masked cells, by conjugate gradients
 * `find_parting`: where the parting is, as the user says or the views show
+* `find_ties`: where hair is tied, and the tube of the tail
 * `growth_prior`: geodesic distances from scalp and tips, and a direction prior
 * `hanging_hair`: the field of tight curls
 * `isosurface`: the smooth surface of a volume of cells
 * `parting`: how hair on the crown is combed from its parting
 * `relaxed_signs`: signs of directions measured without one
 * `sampling_kernels`: compiled look-ups in volumes
-* `smooth_volume`: Gaussian smoothing of volumes
 * `scalp_comb`: which way the hair on the crown is combed, as all views see it
 * `scalp_sight`: directions of the hair on the scalp, as all views see them
+* `smooth_volume`: Gaussian smoothing of volumes
 * `symmetric_eigen`: eigenvectors of symmetric 3x3 tensors, in closed form
-* `ties`: where hair is tied, and the tube of the tail
 * `view_fusion`: 2D orientations of all views fused into 3D tensors
 * `wisps`: single locks off the rest of the hair, thinner than the opened masks hold
 """

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hairkit.grooming.head_collision import push_out_of_head
+from hairkit.grooming.lead_to_ties import lead_to_ties
 from hairkit.grooming.make_room import make_room
-from hairkit.grooming.tie_strands import lead_to_ties
 from hairkit.grooming.wind_waves import add_waves
 from hairkit.helices import smooth_strands
 from hairkit.options import option

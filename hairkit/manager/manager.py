@@ -32,6 +32,7 @@ from hairkit.manager.loading import (
 from hairkit.manager.manifest import Manifest, find_manifests
 from hairkit.manager.results import Call, check_result
 from hairkit.options import make_options, unknown_name
+from hairkit.stages import renamed
 from hairkit.types.finding import Finding
 from hairkit.types.groom import Groom
 
@@ -177,8 +178,8 @@ class Manager:
             return None
         try:
             return make_options(kind, values, place)
-        except OptionError:
-            raise
+        except OptionError as error:
+            raise OptionError(f"{error}{renamed(name)}") from error
         except ValueError as error:  # its __post_init__ refuses values that do not go together
             raise OptionError(f"{place}: {one_line(error)}") from error
         except KeyboardInterrupt:

@@ -14,8 +14,8 @@ from typing import Any, Generic, TypeVar
 
 from hairkit.cameras.similarity import move_head
 from hairkit.field.find_parting import measure_parting
+from hairkit.field.find_ties import measure_ties
 from hairkit.field.growth_prior import measure_scalp_distance
-from hairkit.field.ties import measure_ties
 from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.hairline import measure_hairline
 from hairkit.head_model.photo_skin import photograph_skin

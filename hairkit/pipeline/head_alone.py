@@ -54,7 +54,7 @@ def photograph_head(
         The folder of a capture, or a capture that was read before.
     recipe
         The name of a recipe, to which the options of the capture are added, or a recipe; its stages
-        up to `head` and `texture` are run.
+        up to `fit` and `texture` are run.
     manager
         The plugins; the installed ones when None.
     progress

@@ -116,7 +116,7 @@ CROWN = Limits(0.2, 0.0)
 """How well the views' directions agree with the way the crown is combed: 0.25 to 0.92 on drawn
 heads."""
 TIE = Limits(0.4, 0.0)
-"""The weakest sign of a tie, see `hairkit.field.ties`: 0.6 at a ponytail."""
+"""The weakest sign of a tie, see `hairkit.field.find_ties`: 0.6 at a ponytail."""
 ON_TOP = 0.02
 """Ties less than this far below the top of the head, metres, are on top."""
 DIRECTIONS = Limits(0.85, 0.6)

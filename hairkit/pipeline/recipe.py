@@ -1,6 +1,6 @@
 """Recipes: which plugin does each stage, with which options, written as TOML.
 
-head = false                         # leave a stage out
+fit = false                          # leave a stage out
 [segment]
 plugin = ["mask_files", "grabcut"]   # the first that has an answer wins
 [segment.grabcut]                    # options of one plugin of several
@@ -21,6 +21,7 @@ import dataclasses
 import functools
 import hashlib
 import importlib.resources
+import logging
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -37,9 +38,10 @@ from hairkit.options import split_setting, unknown_name
 from hairkit.pipeline.module_digest import module_digest
 from hairkit.pipeline.plugin_lock import check_lock, read_lock
 from hairkit.remote import is_url, read_bytes
-from hairkit.stages import OF_TABLE, Stage
+from hairkit.stages import OF_TABLE, RENAMED, Stage
 
 _Result = TypeVar("_Result")
+_log = logging.getLogger("hairkit")
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,7 @@ class Recipe:
     def with_set(self, assignments: Sequence[str]) -> Recipe:
         """Return the recipe changed by `plugin.option=value` or `stage=plugin` texts.
 
-        `head=none` and `export=none` leave the stage out.
+        `fit=none` and `export=none` leave the stage out.
 
         >>> recipe = load_recipe("default").with_set(["orient=gabor", "gabor.angles=64"])
         >>> recipe.stage("orient").choices[0].options["angles"]
@@ -188,6 +190,7 @@ class Recipe:
         )
 
     def _with_plugins(self, table: str, value: str, text: str) -> Recipe:
+        table = new_table(table, f"--set {text}")
         if table not in OF_TABLE:
             reason = unknown_name("stage", table, OF_TABLE)
             raise OptionError(
@@ -239,6 +242,11 @@ def parse_recipe(data: bytes, name: str, source: str, folder: Path | None = None
     commands = _commands(document.pop("plugins", {}), source, folder)
     lock = read_lock(document.pop("lock", {}), source)
     description = document.pop("description", "")
+    for key in [*document]:
+        now = new_table(key, source)
+        if now != key and now in document:
+            raise InputError(f"{source}: {key} is the old name of {now}; write [{now}] alone")
+        document[now] = document.pop(key)
     for key in document:
         if key not in OF_TABLE:
             raise InputError(f"{source}: {key}: {unknown_name('stage', key, OF_TABLE)}")
@@ -250,6 +258,18 @@ def parse_recipe(data: bytes, name: str, source: str, folder: Path | None = None
             tables[key] = {**_default_tables().get(key, {}), **content}
     stages = tuple(_stage(key, tables[key], source) for key in OF_TABLE if key in tables)
     return Recipe(name, source, str(description), stages, commands, lock)
+
+
+@functools.cache
+def new_table(name: str, source: str) -> str:
+    """Return what a table is called now; warn, once for each place, of one that is renamed."""
+    now = RENAMED.get(name, name)
+    if now == name or now not in OF_TABLE:
+        return name
+    _log.warning(
+        "%s: the stage %s is called %s since 0.3; its old name goes in 0.4", source, name, now
+    )
+    return now
 
 
 def _commands(content: object, source: str, folder: Path | None) -> tuple[PluginCommand, ...]:

@@ -19,7 +19,7 @@ from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.manager.command_plugin import PluginCommand
 from hairkit.pipeline.health import Figure
-from hairkit.pipeline.recipe import Choice, Recipe, Selection, load_recipe, plugin_code
+from hairkit.pipeline.recipe import Choice, Recipe, Selection, load_recipe, new_table, plugin_code
 from hairkit.pipeline.run_log import StageTime
 from hairkit.remote import is_url, join, read_bytes
 from hairkit.stages import OF_TABLE
@@ -102,7 +102,7 @@ class RunRecord:
         """Return the recipe that was run, every option with its value."""
         stages = []
         for table in OF_TABLE:
-            own = [record for record in self.plugins if record.stage == table]
+            own = [p for p in self.plugins if new_table(p.stage, RECORD) == table]
             choices = tuple(Choice(p.plugin, MappingProxyType(dict(p.options))) for p in own)
             if choices:
                 stages.append(Selection(table, choices))

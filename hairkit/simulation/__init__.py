@@ -1,12 +1,14 @@
 """Simulation of guides: the protocol of simulators, head motion, wind, obstacles, and a runner.
 
-The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)` returns a
+The simulators are plugins: `manager.call("make_simulator", "rods", groom=groom)` returns a
 `Simulator`.
 
+* `embedding`: guides' own points on nodes, and those that hands hold
 * `guide_simulator`: guides, head, torso and drawn points of all simulators
 * `hair_cells`: mass and momentum of hair on a grid, compiled
 * `hair_grid`: contact between strands as changes of velocity
 * `hands`: hands that grab points
+* `held_guides`: what holds guides in their captured shape: skin, hair around, ties
 * `lanes`: records of many strands side by side, for compiled code
 * `motion`: motion of the head: keyframes and shakes
 * `obstacle_kernels`: distances to obstacles, and drawn points out of them, compiled
@@ -16,7 +18,6 @@ The simulators are plugins: `manager.call("make_simulator", "pbd", groom=groom)`
 * `rigid_motion`: the head's motion within a step, and how the torso follows
 * `running`: runs a simulator without a window
 * `simulator`: the protocol of all simulators
-* `ties`: which part of every strand its tie holds to the head
 * `vectors`: vectors and quaternions of numbers, for compiled code
 * `wind`: mean wind and gusts
 """

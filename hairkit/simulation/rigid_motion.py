@@ -17,6 +17,9 @@ from hairkit.simulation import quaternion
 NECK_REACH = math.radians(80)
 """Largest turn of the head against the torso, radians: an adult's to either side (American Academy
 of Orthopaedic Surgeons, "Joint Motion", 1965). A head that turns farther takes the torso along."""
+FARTHEST, WIDEST = 0.12, 1.2
+"""Way of a root in a frame, metres, and turn, radians, from which the head is cut to its new place:
+more than 7 m/s, 4,100 degrees a second."""
 _IDENTITY = np.eye(4)
 
 
@@ -43,6 +46,19 @@ def motion_steps(
     changes[:, :3, :3] = back @ poses[:-1, :3, :3]
     changes[:, :3, 3:] = back @ (poses[:-1] - poses[1:])[:, :3, 3:]
     return poses[1:], changes
+
+
+def way_of_roots(start: Float64Array, end: Float64Array, roots: Float64Array) -> float:
+    """Return metres that roots (S, 3), head axes, go at most in a frame from `start` to `end`.
+
+    Infinite where that is so far that the head is cut to its new place, and hair goes with it.
+    """
+    if (start == end).all() or not len(roots):
+        return 0.0
+    change = end - start
+    way = float(np.linalg.norm(roots @ change[:3, :3].T + change[:3, 3], axis=1).max())
+    cosine = 0.5 * (float(np.trace(end[:3, :3] @ start[:3, :3].T)) - 1)
+    return math.inf if way > FARTHEST or cosine < math.cos(WIDEST) else way
 
 
 def inverse_motion(motion: Float64Array) -> Float64Array:

@@ -36,6 +36,16 @@ def inlined(function: _Function) -> _Function:
 
 
 @inlined
+def rows_of(matrix: Floats) -> Rows:
+    """Return (3, 4) as tuples, which stay in registers."""
+    return (
+        (matrix[0, 0], matrix[0, 1], matrix[0, 2], matrix[0, 3]),
+        (matrix[1, 0], matrix[1, 1], matrix[1, 2], matrix[1, 3]),
+        (matrix[2, 0], matrix[2, 1], matrix[2, 2], matrix[2, 3]),
+    )
+
+
+@inlined
 def plus(a: Vector, b: Vector) -> Vector:
     """Return the sum."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]

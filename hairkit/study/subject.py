@@ -41,7 +41,7 @@ COARSE_HAIRS, COARSE_POINTS, COARSE_WIDTH = 4_000, 24, 2.5e-3
 frame is a millimetre wide."""
 COLOUR_SIDES_DEG, COLOUR_SCALE = (0.0, 90.0, 180.0, 270.0), 1 / 3
 """Sides from which the colour of a groom is looked at, and the scale of the pictures for it."""
-SIMULATOR = "pbd"
+SIMULATOR = "rods"
 SETTLING_S = 2.0
 """Seconds of simulation before a groom is drawn: it hangs as a game would show it."""
 _RATE = 60.0

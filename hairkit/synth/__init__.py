@@ -3,9 +3,9 @@
 For tests and benchmarks, and to try hairkit without photos.
 
 * `bust`: shoulders under a head
+* `grow_ponytails`: strands that run through a tie
 * `growth`: strands grown from the scalp in six styles
 * `photographs`: photos, masks, landmarks and truth of a groom
-* `tied`: strands that run through a tie
 """
 
 from __future__ import annotations

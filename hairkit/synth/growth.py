@@ -16,7 +16,7 @@ from hairkit.arrays import Float32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.head_model.scalp import sample_roots
 from hairkit.synth.bust import Bust, Obstacle
-from hairkit.synth.tied import choose_fringe, grow_tied
+from hairkit.synth.grow_ponytails import choose_fringe, grow_tied
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import Strands

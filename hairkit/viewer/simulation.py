@@ -15,7 +15,7 @@ from hairkit.simulation.simulator import Measures, Simulator, Surroundings
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
-PREFERRED = "pbd"
+PREFERRED = "rods"
 """Plugin used if none is named."""
 NO_SIMULATOR = "none"
 """Name that stands for no simulation."""
@@ -85,7 +85,7 @@ class TunableSimulator:
     """A simulator whose options can be changed while it runs."""
 
     def __init__(self, manager: Manager, groom: Groom, plugin: str | None = None) -> None:
-        """Make the simulator `plugin`; None: `pbd`, or the first installed one, or `none`."""
+        """Make the simulator `plugin`; None: `rods`, or the first installed one, or `none`."""
         names = manager.names("make_simulator")
         plugin = default_simulator(manager) if plugin is None else plugin
         if plugin not in (*names, NO_SIMULATOR):

@@ -1,29 +1,19 @@
-"""Implicit Cosserat rods with direct length constraints: inextensible guides with contact.
+"""Extended position-based dynamics: guides as chains of particles, the simple method.
 
-Each guide is a discrete Cosserat rod with orientations (Kugelstadt and Schoemer 2016). A substep is
-implicit and of second order: one banded system for bending, drag and the pull to the captured
-shape, and one direct solve for all segment lengths of a strand (after Han and Harada 2013, here
-with the metric of the implicit system). Stiffness depends neither on iterations nor on the frame
-rate. The natural shape comes from inverse statics, so that captured hair stays in place under
-gravity. Despite the plugin's name this is not position-based dynamics.
+Mueller et al., "Position based dynamics", 2007; Macklin et al., "XPBD: position-based simulation of
+compliant constrained dynamics", 2016. A node is joined to the next one rigidly, to the next but one
+by a spring, which is bending. What of its weight these cannot bear at rest a force bears that goes
+with the head, so that captured hair stays. `rods` is stiffer, faster at equal error, and has twist.
 
-* `backend`: what backends share, and the compiled one
-* `block`: strands side by side; constants, contact and substeps of all backends
-* `embedding`: the guides' own points on the rods, and held ones
-* `frames`: turns of frames, compiled
-* `gl_backend`: substeps in compute shaders
-* `kernel_contact`: contact and friction, compiled
-* `kernels`: a substep, compiled
-* `linear_system`: the banded matrix of a substep
+* `kernels`: substeps, compiled
 * `options`: settings
-* `resampling`: guides to rods, and what these can follow
-* `rods`: the discrete rod, its state and energy, inverse statics
 * `simulator`: the simulator
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import logging
+from typing import TYPE_CHECKING
 
 from hairkit.hookspecs import hookimpl
 
@@ -32,12 +22,18 @@ from .options import Options
 if TYPE_CHECKING:
     from hairkit.types.groom import Groom
 
+    from .simulator import PbdSimulator
+
+
 __all__ = ["Options"]
+
+_log = logging.getLogger("hairkit")
 
 
 @hookimpl
-def make_simulator(groom: Groom, options: Options) -> Any:
+def make_simulator(groom: Groom, options: Options) -> PbdSimulator:
     """Return a simulator of the groom's guides, at rest."""
     from .simulator import PbdSimulator
 
+    _log.warning("pbd is position-based dynamics since 0.3; what was pbd is rods, the default")
     return PbdSimulator(groom, options)

@@ -1,223 +1,190 @@
-"""The simulator: builds rods from a groom's guides and advances them in substeps."""
+"""The simulator: nodes along the guides, and what moves them in an `advance`."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from functools import lru_cache
-from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
+from hairkit.options import fill_options
 from hairkit.parallel import parallel_for
-from hairkit.simulation import Measures, Surroundings
+from hairkit.simulation import Measures, Surroundings, quaternion, rigid_motion
+from hairkit.simulation.embedding import FIRM, carry_points, embed_points, hand_goals, node_points
 from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
-from hairkit.simulation.hair_grid import make_hair_grid
-from hairkit.simulation.obstacle_kernels import WORTH
-from hairkit.simulation.rigid_motion import follow_head, interpolate_motion, inverse_motion
-from hairkit.simulation.ties import held_lengths
+from hairkit.simulation.held_guides import held_lengths, pull_to_captured
+from hairkit.simulation.lanes import LANES, Kind
+from hairkit.simulation.obstacle_kernels import NO_FIELDS, WORTH
+from hairkit.simulation.rigid_motion import inverse_motion, motion_steps
+from hairkit.simulation.vectors import Floats
 from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 
-from .backend import Engine, FastEngine
-from .block import Contact, acting, make_steps, state_of
-from .embedding import FIRM, carry_points, embed_points, held_nodes, hold_nodes
-from .linear_system import Rates, System, assemble
+from .kernels import Hair, Steps, move
 from .options import Options
-from .resampling import finer_steps, max_stiffness, node_points, overhang
-from .rods import Rods, balance_load, clamp_roots, elastic_energy, make_rods, rest_state
 
-SINGLE_HAIR = 1.2e-3
-"""m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""
-HELD = 4e4
-"""1/s^2: squared frequency, of 32 Hz, at which hair before its tie is pulled to the head."""
-REACH = 0.04
-"""Length from the root over which hair is pulled to its captured shape, metres: there skin and the
-hair around hold it."""
-STANDING = 2.5
-"""Squared frequency, in g / L, of the pull that bears hair which stands or lies out, since other
-hair is beneath it: a column that carries its own weight buckles by pi^2 / 4 of it at most. Hair
-that hangs needs none."""
-UPRIGHT = 6.4
-"""Moment by its own weight times length over sqrt(EI GJ) at which a level strand turns aside (it
-buckles at w L^3 = 12.85 sqrt(EI GJ)). A guide stands for the hair around it, which together bears
-what lies out: it is at least so stiff that it stays."""
-APART = 4
-"""Nodes between those at which gusts are evaluated: shorter than half a gust is long."""
-KEPT_SYSTEMS = 4
-"""Substeps of other lengths, and points held, whose matrices are kept."""
+CLEARANCE = 0.002
+"""Metres that hair keeps off the bodies, where it was not nearer at rest."""
+GRAB_SPEED = 5.0
+"""m/s, of hands."""
+REACH = 1.0
+"""Metres from the head to the farthest hair."""
 
 
 class PbdSimulator(GuideSimulator):
     """Simulated guides of a groom (see `hairkit.simulation.Simulator`)."""
 
-    rods: Rods
-    """Of the guides, at rest."""
-    _options: Options
-
-    def __init__(self, groom: Groom, options: Options) -> None:
-        super().__init__(groom)
+    def __init__(
+        self, groom: Groom, options: Options, kind: Kind = np.float32, contact: bool = True
+    ) -> None:
+        super().__init__(groom, contact)
+        self._kind = kind
+        self.retune(options)
         self._place(None)
-        self._place_nodes(options.nodes)
-        self._tune(options)
 
-    def advance(self, seconds: float, surroundings: Surroundings) -> None:
-        """Advance by `seconds`, in pieces of at most `FRAME`, each in substeps."""
-        if not seconds > 0:
-            return
-        start, end = self._head, surroundings.head_from_rest
-        pieces = max(1, math.ceil(seconds / FRAME - 1e-6))
-        heads = [interpolate_motion(start, end, piece / pieces) for piece in range(pieces + 1)]
-        for before, after in pairwise(heads):
-            self._piece(seconds / pieces, surroundings, before, after)
-        self._head = end
+    def retune(self, options: Options) -> None:
+        """Change the options; hair stays where it is unless the number of nodes changes."""
+        physics, before = self._groom.physics, getattr(self, "_hair", None)
+        self._options = fill_options(
+            options, stiffness=physics.stiffness, damping=physics.damping, friction=physics.friction
+        )
+        self._hair = self._at_rest()
+        if before is not None and before.place.shape == self._hair.place.shape:
+            self._hair = self._hair._replace(place=before.place, velocity=before.velocity)
         self._points = None
 
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
         """Reset the guides to rest on a head at `head_from_rest` (4, 4), with zero velocity."""
         self._place(head_from_rest)
-        self._engine.state = rest_state(self.rods)
+        self._hair = self._at_rest()
 
-    def retune(self, options: Options) -> None:
-        """Change the options; positions and velocities stay unless the number of nodes changes."""
-        before = self._engine.state
-        if options.nodes != self.rods.nodes:
-            self._place_nodes(options.nodes)
-        self._tune(options)
-        if options.nodes == before.position.shape[1]:
-            self._engine.state = before
-        self._points = None
-
-    def measure(self) -> Measures:
-        """Return the stretch of rods and points, and energies; potential energy is 0 at rest."""
-        rods, state = self.rods, self._engine.state
-        down = self._head[:3, :3].T @ self._rest_gravity
-        kinetic = 0.5 * float((rods.mass[..., None] * state.velocity**2).sum())
-        fallen = ((state.position - rods.points) * down).sum(axis=-1)
-        elastic = elastic_energy(rods, state.position, state.frames, self._rates.shape)
-        energy = elastic - self._rest_energy - float((rods.mass * fallen).sum())
-        length = np.linalg.norm(np.diff(state.position, axis=1), axis=-1)
-        stretch = float(np.abs(length / rods.length - 1).max())
-        drawn_stretch, depth = self._measure_drawn()
-        return Measures(max(stretch, drawn_stretch), kinetic, energy, depth)
-
-    def _carry(self) -> Any:
-        """Return where the rods carry the guides' points (P, 3), head axes."""
-        on, now = self._embedding, state_of(self._engine.rows)
-        points = np.empty((len(on.rod), 3), now.position.dtype)
-        parallel_for(
-            carry_points, len(points), on, now.position, now.frames, points, min_chunk=WORTH
+    def advance(self, seconds: float, surroundings: Surroundings) -> None:
+        """Advance by `seconds` in substeps, in which the head moves evenly."""
+        if not seconds > 0 or not len(self.strands):
+            return
+        options, start, end = self._options, self._head, surroundings.head_from_rest
+        self._move_hands(surroundings, GRAB_SPEED * seconds)
+        bust, torso = self._torso, rigid_motion.follow_head(self._torso, end, self._bodies.joint)
+        frame = rigid_motion.interpolate_motion(start, end, min(1.0, FRAME / seconds))
+        if rigid_motion.way_of_roots(start, frame, self._rest[:, 0]) == math.inf:
+            start, bust = end, torso  # hair and torso go with a head that is elsewhere at once
+            self._hair.slack[:] = 0
+        count = max(1, math.ceil(options.substeps * seconds / FRAME - 1e-6))
+        heads, changes = motion_steps(start, end, count)
+        poses = inverse_motion(motion_steps(bust, torso, count)[0]) @ heads
+        nearer = np.diff(poses, axis=0, prepend=[inverse_motion(bust) @ start])[:, :3]
+        ways = REACH * np.linalg.norm(nearer[..., :3], axis=(1, 2))
+        h, kind = seconds / count, self._kind
+        steps = Steps(
+            (changes - np.eye(4))[:, :3].astype(kind),
+            (self._gravity(surroundings) @ heads[:, :3, :3]).astype(kind),
+            poses,
+            (ways + np.linalg.norm(nearer[..., 3], axis=1)).astype(kind),
+            kind(h),
+            kind(1 / (options.bend * h**2)),
+            kind(options.drag),
+            kind(1 - (1 - (options.damping or 0.0)) ** (h / FRAME)),
+            kind(options.friction or 0.0),
+            options.iterations,
         )
-        return points
-
-    def _place_nodes(self, nodes: int) -> None:
-        """Place nodes along the guides; measure the captured distance to the obstacles."""
-        strands, width = self.strands, self.strands.widths
-        self._nodes = node_points(strands, nodes)
-        self._segment = float(np.median(np.linalg.norm(np.diff(self._nodes, axis=1), axis=-1)))
-        self._width = np.full(len(strands), self._groom.material.width)
-        if width is not None:
-            mean = np.add.reduceat(width, strands.offsets[:-1]) / strands.counts
-            self._width = np.maximum(mean, 1e-6)
-        self._near = self._bodies.at(self._nodes)[0]
-        self._held = held_lengths(self._groom) / np.maximum(strands.lengths(), 1e-9)
-
-    def _tune(self, options: Options) -> None:
-        """Set the options, and make what moves the nodes by them."""
-        self._options = options.resolved(self._groom.physics)
-        self.rods = self._stiffen(self._options)
-        self._embedding = embed_points(self.strands, self._nodes, self.rods.frames)
-        self._hair_grid = make_hair_grid(self._nodes, self.rods.mass)
-        self._rates = self._rates_of(self._options)
-        rods = self.rods
-        self._rest_energy = elastic_energy(rods, rods.points, rods.frames, self._rates.shape)
-        self._system = lru_cache(KEPT_SYSTEMS)(self._assemble)
-        # hair captured nearer keeps its own distance
-        near, friction = np.minimum(options.clearance, self._near), self._options.friction or 0.0
-        contact = Contact(self._bodies, near, friction, options.depenetration, options.rounds)
-        self._engine = self._make_engine(contact)
-
-    def _make_engine(self, contact: Contact) -> Engine:
-        """Return the backend of the options."""
-        name = self._options.backend
-        if name == "compute":
-            from .gl_backend import ComputeEngine
-
-            return ComputeEngine(self.rods, contact)
-        return FastEngine(self.rods, contact, np.float64 if name == "reference" else np.float32)
-
-    def _stiffen(self, options: Options) -> Rods:
-        """Return the rods, whose natural shape balances gravity at the captured shape."""
-        density = KERATIN * np.pi / 4 * self._width[:, None] ** 2
-        most = max_stiffness(self._nodes, FRAME / options.substeps)[:, None]
-        weight = abs(self._groom.physics.gravity) * overhang(self._nodes)[:, None]
-        borne = weight / (UPRIGHT * np.sqrt(options.twist))
-        firm = np.maximum(SINGLE_HAIR * 10.0 ** (options.bend or 0.0), borne)
-        bending = density * np.minimum(firm, most)
-        rods = make_rods(self._nodes, density, bending, bending * options.twist)
-        load = rods.mass[..., None] * self._rest_gravity
-        return balance_load(clamp_roots(rods, load), load)
-
-    def _rates_of(self, options: Options) -> Rates:
-        """Convert options to rates; drag goes as area over mass, which is 1 / width."""
-        rods, width = self.rods, self._width
-        drag = options.drag * width.mean() / width
-        arc = np.pad(np.cumsum(rods.length, axis=1), ((0, 0), (1, 0)))
-        total = arc[:, -1:]
-        pull = options.pull() * np.maximum(1 - arc / REACH, 0.0) ** 2
-        falls = (rods.points[:, :1, 1] - rods.points[:, -1:, 1]) / total
-        weight = abs(self._groom.physics.gravity)
-        pull += STANDING * np.clip(1 - falls, 0.0, 1.0) * weight / total
-        pull = np.where(arc / total < self._held[:, None], HELD, pull)
-        damping = -math.log(1 - (options.damping or 0.0)) / FRAME
-        return Rates(np.repeat(drag[:, None], rods.nodes, axis=1), damping, pull)
-
-    def _assemble(self, step: float, held: tuple[int, ...]) -> System:
-        """Return the system of substeps in which some points are held."""
-        shape = self._rates.shape.copy()
-        np.add.at(shape, held_nodes(self._embedding, held), FIRM)
-        return assemble(self.rods, replace(self._rates, shape=shape), step)
-
-    def _piece(
-        self, seconds: float, around: Surroundings, start: Float64Array, end: Float64Array
-    ) -> None:
-        """Advance by up to `FRAME`: update wind and hair grid once, then do substeps."""
-        options, engine, back = self._options, self._engine, inverse_motion(end)
-        self._move_hands(around, options.grab_speed * seconds)
-        finer = finer_steps(start, end, self.rods.points[:, 0], self._segment)
-        torso = follow_head(self._torso, end, self._bodies.joint)
-        if finer == 0:
-            start, finer = end, 1  # hair and torso go with a head that is elsewhere at once
-            self._torso = torso
-            engine.state = engine.state  # known distances to the torso are void
-        count = max(1, math.ceil(options.substeps * seconds / FRAME - 1e-6)) * finer
-        if options.cohesion > 0 or options.pressure > 0:
-            rates = (options.cohesion, options.pressure, seconds)
-            now = state_of(engine.rows)
-            self._hair_grid.mix(now.position, now.velocity, engine.mass, back @ start, rates)
-        head, bust = (start, end), (self._torso, torso)
-        steps = make_steps(head, bust, count, self._gravity(around), seconds / count)
-        force = hold_nodes(self.rods, self._embedding, self._hands.places, back)
-        system = self._system(round(seconds / count, 12), tuple(self._hands.places))
-        engine.run(system, steps, acting(self.rods, self._air(around, start), force))
-        self._torso = torso
+        hair, fields = self._under(surroundings, end), self._bodies.fields
+        head, beside = fields._replace(torso=NO_FIELDS.torso), fields._replace(head=NO_FIELDS.head)
+        parallel_for(move, len(hair.place), hair, steps, head, beside)
+        self._head, self._torso, self._points = end, torso, None
         self._time += seconds
 
-    def _air(self, around: Surroundings, head: Float64Array) -> Float64Array:
-        """Return the air velocity at the nodes, world; gusts are those where the head carries them.
+    def measure(self) -> Measures:
+        """Return the stretch of nodes and points, and energies; potential energy is 0 at rest."""
+        place, speed = self._strands_of(self._hair.place), self._strands_of(self._hair.velocity)
+        near, fallen = self._strands_of(self._hair.near), place - self._rest
+        length = np.linalg.norm(np.diff(place, axis=1), axis=-1)
+        stretch = np.abs(length / near[:, :-1, 0] - 1).max(initial=0.0)
+        chord = np.linalg.norm(place[:, 2:] - place[:, :-2], axis=-1) - near[:, :-2, 1]
+        mass = (KERATIN * np.pi / 4 * self._groom.material.width**2) * near[:, :, 0].mean(axis=1)
+        load = self._bears + self._head[:3, :3].T @ self._rest_gravity
+        energy = 0.5 * self._options.bend * (chord**2).sum(axis=1)
+        energy += (0.5 * self._pull * (fallen**2).sum(axis=-1) - (load * fallen).sum(-1)).sum(1)
+        drawn, depth = self._measure_drawn()
+        kinetic = 0.5 * (speed**2).sum(axis=(1, 2))
+        return Measures(
+            max(float(stretch), drawn), float(mass @ kinetic), float(mass @ energy), depth
+        )
 
-        They are evaluated at every `APART`-th node and interpolated between.
-        """
-        wind = np.asarray(around.wind, np.float64)
-        if around.turbulence == 0.0 or not wind.any():
-            return wind
-        nodes = self.rods.nodes
-        some = np.unique(np.append(np.arange(0, nodes, APART), nodes - 1))
-        share = np.stack([np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))], 1)
-        places, seed = self.rods.points[:, some].astype(np.float32), self._options.seed
-        air = air_velocity(places, self._time, wind, around.turbulence, seed, head)
-        result: Float64Array = share @ air
-        return result
+    def _at_rest(self) -> Hair:
+        """Return the hair at rest; note where its nodes are, and what holds them there."""
+        strands, options = self.strands, self._options
+        nodes, weight = options.nodes, abs(self._groom.physics.gravity)
+        rest = node_points(strands, nodes)
+        near = np.zeros((*rest.shape[:2], 2))
+        for apart in (1, 2):
+            way = rest[:, apart:] - rest[:, :-apart]
+            near[:, :-apart, apart - 1] = np.linalg.norm(way, axis=-1)
+        held = held_lengths(self._groom) / near[:, :-1, 0].sum(axis=1)
+        self._pull = pull_to_captured(
+            rest, near[:, :-1, 0], options.stiffness or 0.0, options.borne * weight, held
+        )
+        self._on = embed_points(
+            strands, rest, np.tile([1.0, 0.0, 0.0, 0.0], (len(rest), nodes - 1, 1))
+        )
+        self._rest, still = rest, np.zeros_like(rest)
+        self._bears = options.borne * _borne(rest, self._rest_gravity)
+        clear = np.minimum(self._bodies.at(rest)[0], CLEARANCE)
+        parts = (near, clear, rest, still, 0 * clear, self._bears, rest, self._pull)
+        return Hair(*map(self._lanes_of, parts))
+
+    def _under(self, around: Surroundings, head: Float64Array) -> Hair:
+        """Return the hair in the air and in the hands, which pull at the nearest nodes."""
+        wind, drag, rest = around.wind, self._options.drag, self._rest
+        air = air_velocity(rest, self._time, wind, around.turbulence, axes=head) @ head[:3, :3]
+        goal, pull, back = rest.copy(), self._pull.copy(), inverse_motion(head)
+        *held, places = hand_goals(self._on, rest, self._hands.places, back)
+        goal[tuple(held)], pull[tuple(held)] = places, FIRM
+        steady = self._lanes_of(drag * air + self._bears)
+        goals, pulls = self._lanes_of(goal), self._lanes_of(pull)
+        return self._hair._replace(steady=steady, goal=goals, pull=pulls)
+
+    def _carry(self) -> Float64Array:
+        """Return where the nodes carry the guides' points (P, 3), head axes."""
+        nodes, points = self._strands_of(self._hair.place), np.empty((len(self._on.rod), 3))
+        turns = quaternion.shortest_arc(_ways(self._rest), _ways(nodes))
+        parallel_for(
+            carry_points, len(points), self._on, nodes[:, None], turns[:, None], points,
+            min_chunk=WORTH,
+        )  # fmt: skip
+        return points
+
+    def _lanes_of(self, values: Float64Array) -> Floats:
+        """Return values (S, n, ...) as (B, n, ..., LANES), filled up with the last strand."""
+        blocks = -(-len(values) // LANES)
+        which = np.minimum(np.arange(blocks * LANES), len(values) - 1)
+        parts = values[which].reshape(blocks, LANES, *values.shape[1:])
+        return np.ascontiguousarray(np.moveaxis(parts, 1, -1), self._kind)
+
+    def _strands_of(self, lanes: Floats) -> Float64Array:
+        """Return values (B, n, parts, LANES) as (S, n, parts)."""
+        parts = np.moveaxis(lanes, -1, 1).reshape(-1, *lanes.shape[1:-1])
+        return parts[: len(self.strands)].astype(np.float64)
+
+
+def _ways(nodes: Float64Array) -> Float64Array:
+    """Return the directions (S, n - 1, 3) of segments."""
+    return quaternion.normalize(np.diff(nodes, axis=1))
+
+
+def _borne(rest: Float64Array, gravity: Float64Array) -> Float64Array:
+    """Return accelerations (S, n, 3) against that part of gravity which segments cannot bear.
+
+    Segments bear what changes their lengths: the projection of gravity on these directions.
+    """
+    way, left = _ways(rest)[:, 1:], np.zeros_like(rest)
+    turn = (way[:, 1:] * way[:, :-1]).sum(axis=-1)
+    k = np.arange(way.shape[1])
+    matrix = np.zeros((len(rest), len(k), len(k)))
+    matrix[:, k, k] = np.where(k > 0, 2.0, 1.0)  # only the outer end of the first is free
+    matrix[:, k[1:], k[:-1]] = matrix[:, k[:-1], k[1:]] = -turn
+    load = np.where(k > 0, 0.0, way @ gravity)
+    force = np.linalg.solve(matrix, load[..., None]) * way
+    left[:, 2:] = force - gravity
+    left[:, 2:-1] -= force[:, 1:]
+    return left

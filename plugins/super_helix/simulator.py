@@ -11,8 +11,8 @@ from hairkit.options import fill_options
 from hairkit.parallel import parallel_for
 from hairkit.simulation import Measures, Surroundings
 from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
+from hairkit.simulation.held_guides import held_lengths
 from hairkit.simulation.rigid_motion import follow_head, interpolate_motion
-from hairkit.simulation.ties import held_lengths
 from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
 

@@ -18,7 +18,7 @@ from hairkit.cli import main as hairkit
 PROJECT = Path(__file__).parents[2]
 SHARED = {
     "captures_argument", "card_picture", "example_textures", "foreign_heads", "peer_cases",
-    "peer_surfaces", "peer_views", "peer_volumes", "plain_analogies", "random_hair", "xpbd_peer",
+    "peer_surfaces", "peer_views", "peer_volumes", "plain_analogies", "random_hair",
 }  # fmt: skip
 """Modules that programs import."""
 FOLDERS = ("benchmarks", "studies")

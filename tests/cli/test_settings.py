@@ -24,7 +24,7 @@ VERBS = {
     "convert": ["bare.data", "back.npz"],
     "info": ["bare.data"],
     "render": ["bare.data", "-o", "picture.png", "--size", "64x48", "--hairs", "200"],
-    "simulate": ["bare.data", "-o", "cache.npz", "--frames", "2", "--quiet", "--using", "pbd"],
+    "simulate": ["bare.data", "-o", "cache.npz", "--frames", "2", "--quiet", "--using", "rods"],
     "view": ["bare.data", "--headless", "--script", "steps.toml", "--simulator", "none"],
 }
 """A command line of every verb with `--set` that reads a file whose unit must be stated."""
@@ -59,7 +59,7 @@ def command(verb: str, *settings: str) -> list[str]:
 
 
 @pytest.mark.parametrize("verb", VERBS)
-@pytest.mark.parametrize("text", ["x", "=3", ".x=3", "pbd.=3", "a.b"])
+@pytest.mark.parametrize("text", ["x", "=3", ".x=3", "rods.=3", "a.b"])
 def test_a_setting_of_another_form_is_refused_alike(
     verb: str, text: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -192,3 +192,23 @@ def test_a_simulation_is_no_groom(
     capsys.readouterr()
     assert main(words) == 2
     assert "hairkit render GROOM --cache cache.npz" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--set", "pbd.bend=0.5"],
+        ["--using", "pbd", "--set", "pbd.cohesion=2"],
+        ["--using", "pbd", "--set", "cohesion=2"],
+        ["--using", "pbd", "--set", "pbd.bend=0.5"],
+    ],
+)
+def test_options_of_what_was_called_otherwise_name_it(
+    words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`pbd` was what is `rods` now: its options are refused with one line that says so."""
+    bristle_groom().save(tmp_path / "groom.npz")
+    out = str(tmp_path / "cache.npz")
+    assert main(["simulate", str(tmp_path / "groom.npz"), "-o", out, "--frames", "2", *words]) == 2
+    [line] = capsys.readouterr().err.splitlines()
+    assert line.endswith("what was pbd is rods since 0.3: write rods")

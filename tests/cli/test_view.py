@@ -158,7 +158,7 @@ def test_a_preset_of_the_window_is_taken(
 ) -> None:
     """Its simulator and its options; one that is not there is named."""
     presets = groom_path.with_name("groom.presets.toml")
-    presets.write_text("[heavy]\nsimulator = 'pbd'\noptions = {drag = 7.0}\n")
+    presets.write_text("[heavy]\nsimulator = 'rods'\noptions = {drag = 7.0}\n")
     script = tmp_path / "steps.toml"
     keep = "[[steps]]\ndo = 'preset_save'\nname = 'again'\n"
     script.write_text(keep)

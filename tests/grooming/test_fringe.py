@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hairkit.field.find_ties import find_fringe
 from hairkit.field.growth_prior import measure_scalp_distance
-from hairkit.field.ties import find_fringe
 from hairkit.grooming.fringe import hang_fringe
 from hairkit.types.tie import LooseHair, TiedHair
 from hairkit.types.volume import Hull

@@ -161,7 +161,7 @@ def f(x, tolerance=1e-4, shape=(7, 8)):
     assert list(unnamed_literals(source.format(tuned=7), integers=False)) == []
 
 
-DRAWING = ("hairkit/rendering", "hairkit/viewer", "hairkit/simulation", "plugins/pbd")
+DRAWING = ("hairkit/rendering", "hairkit/viewer", "hairkit/simulation", "plugins/rods")
 """Whose shaders there are: a name means the same in these folders and in their shaders."""
 
 

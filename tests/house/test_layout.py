@@ -60,7 +60,7 @@ FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 
 
 def module_name(path: Path) -> str:
-    """Return the module in a file: `hairkit_plugins.pbd` for plugins/pbd/__init__.py."""
+    """Return the module in a file: `hairkit_plugins.rods` for plugins/rods/__init__.py."""
     top, *inner = path.relative_to(PROJECT).with_suffix("").parts
     name = ".".join([{"plugins": "hairkit_plugins"}.get(top, top), *inner])
     return name.removesuffix(".__init__")
@@ -161,7 +161,7 @@ def test_faults_of_imports_are_found() -> None:
     assert circles({"a": ["b"], "b": ["c"], "c": ["a"]})
     assert circles({"a": ["b"], "b": ["a"]})
     assert not circles({"a": ["b", "c"], "b": ["c"]})
-    plugin = PROJECT / "plugins" / "pbd" / "rods.py"
+    plugin = PROJECT / "plugins" / "rods" / "rods.py"
     source = "from hairkit import Manager, storage\nimport hairkit\nfrom . import Options\n"
     source += "from .block import f"
     found = imported(plugin, source)
@@ -169,8 +169,8 @@ def test_faults_of_imports_are_found() -> None:
         "hairkit.manager.Manager",
         "hairkit.storage",
         "hairkit.api",
-        "hairkit_plugins.pbd.Options",
-        "hairkit_plugins.pbd.block.f",
+        "hairkit_plugins.rods.Options",
+        "hairkit_plugins.rods.block.f",
     ]
     assert FLOOR_OF[room(found[0])] == FLOOR_OF["manager"]
 

@@ -150,7 +150,7 @@ def test_the_skin_asks_for_nothing_of_the_hair(tmp_path: Path) -> None:
     with findings_of(turn_capture(), recipe, manager, tmp_path) as findings:
         findings.given_head = ball_head()
         _ = findings.skin
-    assert {call.partition(" ")[0] for call in ball_plugin.CALLS} == {"segment", "scene", "head"}
+    assert {call.partition(" ")[0] for call in ball_plugin.CALLS} == {"segment", "scene", "fit"}
 
 
 class Counted(Findings):

@@ -19,7 +19,7 @@ from hairkit.stages import EXPORT, OF_TABLE
 
 PROJECT = Path(__file__).parents[2]
 
-CACHED = ("segment", "scene", "head", "orient", "hull", "field", "track")
+CACHED = ("segment", "scene", "fit", "orient", "hull", "field", "track")
 """Stages of the default recipe whose results are kept."""
 
 
@@ -45,11 +45,11 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
 @pytest.mark.parametrize(
     ("changed", "again"),
     [
-        ("hairkit/types/camera.py", "scene head hull field track"),
-        ("hairkit/types/mask.py", "segment scene head orient hull field track"),
-        ("hairkit/storage.py", "segment scene head orient hull field track"),
+        ("hairkit/types/camera.py", "scene fit hull field track"),
+        ("hairkit/types/mask.py", "segment scene fit orient hull field track"),
+        ("hairkit/storage.py", "segment scene fit orient hull field track"),
         ("hairkit/cameras/silhouette_coherence.py", "scene"),
-        ("hairkit/cameras/outlines.py", "scene head"),
+        ("hairkit/cameras/outlines.py", "scene fit"),
         ("hairkit/cameras/projection_kernels.py", "hull field track"),
         ("hairkit/imaging/seeded_segmentation.py", "segment"),
         ("hairkit/imaging/geodesic.py", "segment"),
@@ -66,7 +66,7 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
         ("hairkit/cli/info.py", ""),
         ("hairkit/pipeline/contact_sheet.py", ""),
         ("hairkit/__init__.py", ""),
-        ("plugins/thin_plate.py", "head"),
+        ("plugins/thin_plate.py", "fit"),
         ("plugins/silhouette/landmark_transfer.py", "scene"),
         ("plugins/tensor_diffusion.py", ""),
         ("hairkit/imaging/hair_network.npz", "segment"),
@@ -116,7 +116,7 @@ def test_a_file_that_a_module_names_counts_as_its_source(
         "head_model.photo_skin",
         "head_model.hairline",
         "imaging.waves",
-        "field.ties",
+        "field.find_ties",
         "field.find_parting",
         "field.growth_prior",
     ],

@@ -99,8 +99,8 @@ def test_several_plugins_have_tables_of_their_own() -> None:
     [
         ("[orient", "not a TOML file"),
         ("orient = false", r"orient is False, expected a table \[orient\]$"),
-        ("head = true", r"head is True, expected a table \[head\], or head = false to leave"),
-        ('head = "none"', "head is 'none', expected a table"),
+        ("fit = true", r"fit is True, expected a table \[fit\], or fit = false to leave"),
+        ('fit = "none"', r"fit is 'none', expected a table"),
         (
             '[oreint]\nplugin="gabor"',
             "mine.toml: oreint: no stage 'oreint' .did you mean 'orient'",
@@ -125,7 +125,7 @@ def test_a_recipe_says_only_what_differs_from_default() -> None:
     """Stages without a table, and plugins of tables that only have options, are default's."""
     text = "[track]\ninertia = 0.5\n[segment.grabcut]\nscale = 1\n[field]\nplugin = 'mine'\n"
     recipe, default = parse_recipe(text.encode(), "mine", "mine.toml"), load_recipe("default")
-    for table in ("scene", "head", "orient", "hull", "export"):
+    for table in ("scene", "fit", "orient", "hull", "export"):
         assert recipe.stage(table) == default.stage(table)
     assert [c.plugin for c in stage_of(recipe, "track").choices] == ["hybrid_growth"]
     assert options_of(recipe, "track") == {"inertia": 0.5}
@@ -136,9 +136,9 @@ def test_a_recipe_says_only_what_differs_from_default() -> None:
     assert load_recipe("default") == default
 
 
-@pytest.mark.parametrize("table", ["head", "export"])
+@pytest.mark.parametrize("table", ["fit", "export"])
 def test_false_leaves_a_stage_out(table: str) -> None:
-    """`head = false` is in a file what `--set head=none` is on the command line."""
+    """`fit = false` is in a file what `--set fit=none` is on the command line."""
     recipe = parse_recipe(f"{table} = false".encode(), "mine", "mine.toml")
     assert recipe.stages == load_recipe("default").with_set([f"{table}=none"]).stages
     assert recipe.stage(table) is None
@@ -182,13 +182,13 @@ def test_set_changes_one_option_and_nothing_else() -> None:
 
 
 def test_set_replaces_plugins_and_leaves_stages_out() -> None:
-    """`orient=x` takes another plugin, `head=none` leaves an optional stage out."""
-    recipe = load_recipe("default").with_set(["orient=mine", "head=none", "export=a,b"])
+    """`orient=x` takes another plugin, `fit=none` leaves an optional stage out."""
+    recipe = load_recipe("default").with_set(["orient=mine", "fit=none", "export=a,b"])
     assert [c.plugin for c in stage_of(recipe, "orient").choices] == ["mine"]
-    assert recipe.stage("head") is None
+    assert recipe.stage("fit") is None
     assert [c.plugin for c in stage_of(recipe, "export").choices] == ["a", "b"]
-    tables = [stage.table for stage in recipe.with_set(["head=warp"]).stages]
-    assert tables.index("scene") < tables.index("head") < tables.index("orient")
+    tables = [stage.table for stage in recipe.with_set(["fit=warp"]).stages]
+    assert tables.index("scene") < tables.index("fit") < tables.index("orient")
 
 
 @pytest.mark.parametrize(
@@ -235,10 +235,10 @@ def test_the_digest_knows_values_not_spelling(manager: Manager) -> None:
 def test_the_digest_knows_the_files_in_a_folder(tmp_path: Path) -> None:
     """A folder that an option names counts with the files in it."""
     manager = Manager.loaded([])
-    recipe = load_recipe("default").with_set(["head=blendshapes", f"blendshapes.shapes={tmp_path}"])
+    recipe = load_recipe("default").with_set(["fit=blendshapes", f"blendshapes.shapes={tmp_path}"])
 
     def digest() -> str:
-        return stage_digest(manager, stage_of(recipe, "head"))
+        return stage_digest(manager, stage_of(recipe, "fit"))
 
     seen = {digest()}
     (tmp_path / "a.obj").write_text("v 0 0 0")
@@ -270,3 +270,19 @@ def test_the_example_in_the_docstring_is_toml() -> None:
 
     text = (recipe.__doc__ or "").split("\n\n")[1]
     assert tomllib.loads(text)["orient"]["angles"] == 64
+
+
+def test_the_old_name_of_a_stage_goes_on_with_a_line(caplog: pytest.LogCaptureFixture) -> None:
+    """`head` is `fit` in recipes and `--set`; each place is named once, both names are refused."""
+    new, old = (
+        parse_recipe(f'[{table}]\nplugin = "blendshapes"'.encode(), "mine", "old.toml")
+        for table in ("fit", "head")
+    )
+    assert old == new
+    assert old.with_set(["head=none"]).stages == new.with_set(["fit=none"]).stages
+    assert [text.partition(";")[0] for text in caplog.messages] == [
+        "old.toml: the stage head is called fit since 0.3",
+        "--set head=none: the stage head is called fit since 0.3",
+    ]
+    with pytest.raises(InputError, match=r"head is the old name of fit; write \[fit\] alone"):
+        parse_recipe(b"head = false\nfit = false", "mine", "both.toml")

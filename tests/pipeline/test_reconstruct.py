@@ -15,7 +15,7 @@ from ball import RECIPE
 
 from hairkit import Capture, Groom, Mask, Roots, ScalpDistance, Strands, Waves, hookimpl
 from hairkit.errors import InputError, PluginError, RenderError
-from hairkit.field.ties import measure_ties
+from hairkit.field.find_ties import measure_ties
 from hairkit.manager import Manager
 from hairkit.pipeline.draft import draft
 from hairkit.pipeline.recipe import parse_recipe
@@ -28,7 +28,7 @@ from hairkit.testing import ball_head, turn_capture, turn_scene
 from hairkit.types.chosen import Chosen, ChosenHair
 from hairkit.types.scene import read_cameras
 
-STAGES = ["segment", "scene", "head", "orient", "hull", "field", "track"]
+STAGES = ["segment", "scene", "fit", "orient", "hull", "field", "track"]
 
 
 class Heard(Silent):
@@ -250,11 +250,11 @@ def test_what_depends_on_a_change_is_run_again(tmp_path: Path) -> None:
     run(tmp_path)
     assert ran(tmp_path, guides=50) == ["export", "track"]
     assert ran(tmp_path, guides=50, seed=1) == ["export", "track"]
-    assert ran(tmp_path, "head=none", guides=50, seed=1) == ["export", "field", "hull", "track"]
+    assert ran(tmp_path, "fit=none", guides=50, seed=1) == ["export", "field", "hull", "track"]
     views = list(turn_capture().views)
     views[3] = type(views[3])(views[3].name, views[3].azimuth_deg, 255 - views[3].image)
     ball_plugin.CALLS.clear()
-    run(tmp_path, "head=none", guides=50, seed=1, capture=Capture(tuple(views)))
+    run(tmp_path, "fit=none", guides=50, seed=1, capture=Capture(tuple(views)))
     steps = [call for call in ball_plugin.CALLS if " " in call]
     assert steps == ["segment back-left", "orient back-left"]
     assert ran(tmp_path, "ball_plugin.length=0.04") == sorted([*STAGES, "export"])

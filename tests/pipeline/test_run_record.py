@@ -134,3 +134,17 @@ def test_a_run_on_objects_cannot_be_brought_back(tmp_path: Path) -> None:
     reconstruct(turn_capture(), tmp_path, recipe, manager, head=ball_head(), sheet=False)
     with pytest.raises(InputError, match="photos of this run were given as objects"):
         rerun(tmp_path / RECORD, tmp_path / "again")
+
+
+def test_records_name_stages_as_they_were_called(tmp_path: Path) -> None:
+    """A record of version 0.2 has `head` for `fit`, and is the same recipe."""
+    manager = Manager()
+    manager.register(ball_plugin, "ball_plugin")
+    recipe = parse_recipe(RECIPE.encode(), "ball", "test")
+    reconstruct(turn_capture(), tmp_path, recipe, manager, head=ball_head(), sheet=False)
+    text = (tmp_path / RECORD).read_text()
+    assert '"stage": "fit"' in text
+    (tmp_path / "old.json").write_text(text.replace('"stage": "fit"', '"stage": "head"'))
+    new, old = (read_record(tmp_path / name).as_recipe() for name in (RECORD, "old.json"))
+    assert new.stages == old.stages
+    assert new.stage("fit") is not None

@@ -25,9 +25,9 @@ def test_a_block_within_a_block_leaves_the_outer_one_its_context() -> None:
 def test_numbers_that_a_shader_leaves_open_make_programs_of_their_own() -> None:
     """Equal numbers give the same program, others another one."""
     with renderer() as gl:
-        one = gl.compute("pbd_substeps", NODES=5)
-        assert gl.compute("pbd_substeps", NODES=5) is one
-        assert gl.compute("pbd_substeps", NODES=6) is not one
+        one = gl.compute("rods_substeps", NODES=5)
+        assert gl.compute("rods_substeps", NODES=5) is one
+        assert gl.compute("rods_substeps", NODES=6) is not one
 
 
 def test_without_a_renderer_there_is_no_graphics_card(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins import pbd, super_helix
+from hairkit_plugins import rods, super_helix
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_hair import DEEDS, FAR, KINDS, STEPS, Happening, Strand, endure, groom_of
@@ -16,7 +16,7 @@ from hairkit.simulation import Simulator
 from hairkit.types.groom import Groom
 
 SIMULATORS: dict[str, Callable[[Groom], Simulator]] = {
-    "pbd": lambda groom: pbd.make_simulator(groom, pbd.Options(backend="fast", friction=0.0)),
+    "rods": lambda groom: rods.make_simulator(groom, rods.Options(backend="fast", friction=0.0)),
     "super_helix": lambda groom: super_helix.make_simulator(
         groom, super_helix.Options(friction=0.0)
     ),

@@ -33,7 +33,7 @@ def groom() -> Groom:
 
 def made(manager: Manager, groom: Groom, **options: object) -> object:
     """Return the simulator in float64."""
-    return manager.call("make_simulator", "pbd", {"backend": "reference", **options}, groom=groom)
+    return manager.call("make_simulator", "rods", {"backend": "reference", **options}, groom=groom)
 
 
 def test_the_first_frame_is_the_rest(manager: Manager, groom: Groom) -> None:
@@ -97,10 +97,10 @@ def simulate(groom: Groom, folder: Path, *more: str) -> int:
     """Run the verb on a groom's file."""
     groom.save(folder / "groom.npz")
     words = ["simulate", str(folder / "groom.npz"), "--frames", "4", "--quiet"]
-    return cli.main([*words, "--set", "pbd.backend=reference", *more])
+    return cli.main([*words, "--set", "rods.backend=reference", *more])
 
 
-@pytest.mark.parametrize("simulator", ["pbd", "super_helix"])
+@pytest.mark.parametrize("simulator", ["rods", "super_helix"])
 def test_full_hair_moves_with_guides_chosen_from_it(
     groom: Groom, tmp_path: Path, simulator: str
 ) -> None:
@@ -215,7 +215,7 @@ def test_wind_may_begin_with_a_minus(groom: Groom, tmp_path: Path) -> None:
 def test_options_found_in_the_window_are_taken_by_name(groom: Groom, tmp_path: Path) -> None:
     """A preset beside the groom is as good as its options; `--set` goes before it."""
     (tmp_path / "groom.presets.toml").write_text(
-        "[heavy]\nsimulator = 'pbd'\noptions = {drag = 30.0, backend = 'reference'}\n"
+        "[heavy]\nsimulator = 'rods'\noptions = {drag = 30.0, backend = 'reference'}\n"
     )
     words = ("--wind", "3,0,0", "--frames", "5", "-o", str(tmp_path / "c.npz"))
     found = []
@@ -261,7 +261,7 @@ def test_frames_that_no_memory_holds_are_refused_at_once(groom: Groom, tmp_path:
 
 @pytest.mark.parametrize(
     "words",
-    [["--wind", "3,0"], ["--shake", "yaw:x:1"], ["--fps", "0"], ["--set", "pbd.dampin=1"],
+    [["--wind", "3,0"], ["--shake", "yaw:x:1"], ["--fps", "0"], ["--set", "rods.dampin=1"],
      ["--set", "gabor.angles=3"], ["--using", "gabor"], ["--motion", "nowhere.json"]],
 )  # fmt: skip
 def test_bad_words_are_one_line(

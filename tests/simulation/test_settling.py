@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hairkit_plugins import pbd, super_helix
+from hairkit_plugins import rods, super_helix
 
 from hairkit.head_model.template import default_head
 from hairkit.simulation import Simulator, Surroundings, add_shakes
@@ -14,7 +14,7 @@ from hairkit.synth import StyleName, grow
 from hairkit.types.groom import Groom
 
 SIMULATORS: dict[str, Callable[[Groom], Simulator]] = {
-    "pbd": lambda groom: pbd.make_simulator(groom, pbd.Options(backend="fast")),
+    "rods": lambda groom: rods.make_simulator(groom, rods.Options(backend="fast")),
     "super_helix": lambda groom: super_helix.make_simulator(groom, super_helix.Options()),
 }
 GUIDES, RATE, CALM = 60, 60, 0.005
@@ -39,9 +39,9 @@ def test_hair_is_still_three_seconds_after_a_shake(method: str, style: StyleName
 
 @pytest.mark.parametrize("style", ["straight", "wavy", "curly"])
 def test_captured_hair_stays_for_five_seconds(style: StyleName) -> None:
-    """No tip of hair of `pbd` leaves its place by 2 mm where nothing moves: none topples over."""
+    """No tip of hair of `rods` leaves its place by 2 mm where nothing moves: none topples over."""
     groom = grow(style, default_head(), 2 * GUIDES)
-    simulator = SIMULATORS["pbd"](groom)
+    simulator = SIMULATORS["rods"](groom)
     for _ in range(5 * RATE):
         simulator.advance(1 / RATE, Surroundings())
     assert np.linalg.norm(simulator.points - groom.strands.points, axis=1).max() < 0.002

@@ -32,7 +32,7 @@ from hairkit.cli import main as hairkit
 SIZE, STRANDS, GUIDES = "120x160", "500", "100"
 SIMPLE = (
     "landmarks=landmark_files", "person=none", "turn=none", "scene=landmarks", "refine=none",
-    "head=none", "export=hairworks",
+    "fit=none", "export=hairworks",
 )  # fmt: skip
 """Captures and recipe of benchmarks/batch.py."""
 BAD = ("eat", "hang")

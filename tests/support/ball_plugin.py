@@ -105,7 +105,7 @@ def estimate_scene(options: Options) -> Scene:
 
 @hookimpl
 def fit_head(scene: Scene, options: Options) -> Scene:
-    _begin("head", options)
+    _begin("fit", options)
     return scene
 
 

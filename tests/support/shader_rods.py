@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.pbd import Options
-from hairkit_plugins.pbd.simulator import PbdSimulator
-from pbd_reference import TwinSimulator
+from hairkit_plugins.rods import Options
+from hairkit_plugins.rods.simulator import RodSimulator
+from rods_reference import TwinSimulator
 
 from hairkit.errors import RenderError
 from hairkit.rendering.context import renderer
@@ -47,12 +47,12 @@ def bent_groom() -> Groom:
     )
 
 
-def both(groom: Groom, **options: object) -> tuple[PbdSimulator, PbdSimulator]:
+def both(groom: Groom, **options: object) -> tuple[RodSimulator, RodSimulator]:
     """Return the reference and the shaders, at rest."""
     settings = Options(**{"backend": "compute", "nodes": 8, **options})
-    return TwinSimulator(groom, settings), PbdSimulator(groom, settings)
+    return TwinSimulator(groom, settings), RodSimulator(groom, settings)
 
 
-def apart(pair: tuple[PbdSimulator, PbdSimulator]) -> float:
+def apart(pair: tuple[RodSimulator, RodSimulator]) -> float:
     """Return the largest distance between their points."""
     return float(np.abs(pair[0].points - pair[1].points).max())

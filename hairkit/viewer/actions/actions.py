@@ -13,6 +13,7 @@ import numpy as np
 
 from hairkit.errors import InputError
 from hairkit.options import OptionInfo, unknown_name
+from hairkit.stages import renamed
 from hairkit.viewer.actions import pose, scene  # register their actions
 from hairkit.viewer.actions.presets import presets_path, read_preset, write_preset
 from hairkit.viewer.actions.registry import ACTIONS, action, bindings, check_values, perform
@@ -315,12 +316,11 @@ def preset_save(session: Session, name: str = "preset") -> None:
 def preset_load(session: Session, name: str = "preset") -> None:
     """Load the options saved under a name."""
     preset = read_preset(presets_path(session.opened.path), name)
-    plugin = preset.get("simulator", session.simulation.plugin)
-    if plugin != session.simulation.plugin:
-        raise InputError(
-            f"preset {name!r} is for the simulator {plugin!r}, not {session.simulation.plugin!r};"
-            f" run hairkit view with --simulator {plugin}"
-        )
+    own = session.simulation.plugin
+    plugin = preset.get("simulator", own)
+    if plugin != own:
+        advice = f"run hairkit view with --simulator {plugin}{renamed(plugin)}"
+        raise InputError(f"preset {name!r} is for the simulator {plugin!r}, not {own!r}; {advice}")
     session.simulation.replace(dict(preset.get("options", {})))
     session.message = f"loaded preset {name}"
 

@@ -7,7 +7,7 @@ import numpy as np
 from hairkit.errors import InputError
 from hairkit.options import unknown_name
 from hairkit.viewer.actions.registry import action
-from hairkit.viewer.draw.studio import BACKDROPS
+from hairkit.viewer.draw.backdrop import BACKDROPS
 from hairkit.viewer.session import Session
 
 APERTURES = (0.0, 10.0, 25.0, 50.0)

@@ -3,9 +3,10 @@
 Hair, its light volume and meshes exist twice, as shaders and as compiled loops for machines without
 a graphics card (`*_cpu`); tests compare both.
 
+* `backdrop`: wall and floor behind the head
 * `colouring`: colour maps of guides: length, stretch, curvature or confidence
-* `frame`: one frame of a session
 * `frame_budget`: quality that keeps the frame time
+* `frame`: one frame of a session
 * `hair_cpu`: hair drawn by compiled loops
 * `hair_data`: hair at rest, and the guides that it follows
 * `hair_gpu`: hair drawn by compute shaders
@@ -25,5 +26,4 @@ a graphics card (`*_cpu`); tests compare both.
 * `region`: a part of a picture that has changed
 * `shade_kernels`: compiled fibre shading
 * `still`: samples of a still picture: antialiasing and depth of field
-* `studio`: wall and floor behind the head
 """

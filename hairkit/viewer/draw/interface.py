@@ -89,7 +89,7 @@ class FrameInputs:
     light_turn: float = 0.0
     """Angle by which the lights are turned round the head, radians."""
     backdrop: str = "grey"
-    """One of `studio.BACKDROPS`."""
+    """One of `backdrop.BACKDROPS`."""
     whole_light: bool = False
     """True updates the whole light volume in this frame, for still pictures."""
     same_light: bool = False

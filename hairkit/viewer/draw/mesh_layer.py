@@ -20,9 +20,9 @@ from hairkit.rendering.picture import HEAD_PUSH
 from hairkit.rendering.skin_passes import draw_skin
 from hairkit.simulation.rigid_motion import inverse_motion
 from hairkit.types.skin_look import SkinLook
+from hairkit.viewer.draw.backdrop import BackdropPass
 from hairkit.viewer.draw.interface import FrameInputs, MeshScene
 from hairkit.viewer.draw.meshes import PlacedMesh, SolidPass
-from hairkit.viewer.draw.studio import StudioPass
 
 EDGE_SAMPLES = 4
 """Samples of a pixel at the edges of meshes on graphics cards. Software renderers take longer for
@@ -40,7 +40,7 @@ class MeshLayer(ABC, Generic[_Part]):
         self._gl = gl
         self._head = self._load(head)
         self._solids: dict[str, _Part] = {}
-        self._studio = StudioPass(gl)
+        self._studio = BackdropPass(gl)
         self._size = (0, 0)
         self._made: object = None
         self._scenery_made: object = None

@@ -17,8 +17,8 @@ from hairkit.errors import RenderError
 from hairkit.options import OptionInfo
 from hairkit.viewer.actions.actions import LOOKS
 from hairkit.viewer.actions.presets import preset_names, presets_path
+from hairkit.viewer.draw.backdrop import BACKDROPS
 from hairkit.viewer.draw.colouring import COLOURINGS
-from hairkit.viewer.draw.studio import BACKDROPS
 from hairkit.viewer.head_motion import AXES
 from hairkit.viewer.layers import BILLBOARDS
 from hairkit.viewer.preview import Preview

@@ -11,7 +11,7 @@ from hairkit_plugins.super_helix.linear_time_step import Strand, newton, step_st
 from hairkit_plugins.super_helix.rods import NODES, Rods
 from hairkit_plugins.super_helix.state import Body, Loads, Motion, Step
 from hairkit_plugins.super_helix.statics import gravity_forces, rest_as_captured
-from rod_bench import DOWN, energy, free, random_rods, rest, rod, run, step_of
+from helix_bench import DOWN, energy, free, random_rods, rest, rod, run, step_of
 from scipy.integrate import solve_ivp
 
 from hairkit.helices.helix import mean_rotation, rotation

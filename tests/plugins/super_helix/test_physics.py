@@ -8,7 +8,7 @@ import rod_energy
 from hairkit_plugins.super_helix import reference
 from hairkit_plugins.super_helix.kinematics import move_slopes, place
 from hairkit_plugins.super_helix.statics import gravity_slopes, rest_as_captured
-from rod_bench import (
+from helix_bench import (
     ALONG_DOWN,
     DENSITY,
     DOWN,

@@ -10,7 +10,7 @@ import pytest
 
 from hairkit.errors import HairkitError, InputError, OptionError
 from hairkit.viewer.actions.actions import ACTIONS, LOOKS, bindings, perform
-from hairkit.viewer.actions.presets import presets_path
+from hairkit.viewer.actions.presets import presets_path, write_preset
 from hairkit.viewer.session import STEP, Session
 
 NEEDS_RESULTS = ("layer", "through", "preset_load", "adjust", "reconstruct", "wipe")
@@ -188,6 +188,9 @@ def test_options_are_checked_changed_by_keys_and_kept_as_presets(session: Sessio
     assert session.simulation.values == {"lean": 0.05, "turns": 5, "mode": "hard"}
     with pytest.raises(InputError, match="no preset 'calm'"):
         perform(session, "preset_load", {"name": "calm"})
+    write_preset(presets_path(session.opened.path), "old", {"simulator": "pbd", "options": {}})
+    with pytest.raises(InputError, match="--simulator pbd; what was pbd is rods since"):
+        perform(session, "preset_load", {"name": "old"})
 
 
 def test_reloading_keeps_view_and_options(session: Session) -> None:

@@ -1,0 +1,61 @@
+"""Laws of hair that a tie holds to the head."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairkit.manager import Manager
+from hairkit.simulation import Surroundings
+from hairkit.simulation.held_guides import held_lengths
+from hairkit.testing import bristle_groom
+from hairkit.types.groom import Groom
+from hairkit.types.strands import Strands
+from hairkit.types.tie import Tie
+
+TIE = Tie(np.array([0.0, 0.06, -0.12]), np.array([0.0, 0.0, -1.0]), 0.008, "tail")
+
+
+def ponytail() -> Groom:
+    """Five strands level from the ball to a ring 6 cm away and 12 cm beyond; one stays loose."""
+    groom = bristle_groom()
+    start = groom.strands.roots[:6].astype(np.float64)
+    points = np.empty((6, 40, 3))
+    ring = TIE.centre + np.linspace(-0.004, 0.004, 6)[:, None] * [1.0, 0.0, 0.0]
+    ring[5] = start[5] + [0.0, 0.06, 0.0]
+    share = np.linspace(0, 1, 14)[None, :, None]
+    points[:, :14] = (1 - share) * start[:, None] + share * ring[:, None]
+    beyond = np.linspace(0, 0.12, 27)[1:, None] * TIE.axis
+    points[:, 14:] = ring[:, None] + beyond
+    strands = Strands(points.reshape(-1, 3).astype(np.float32), np.arange(7) * 40)
+    return Groom(
+        strands, groom.head, groom.root_triangle[:6], groom.root_barycentric[:6], ties=(TIE,)
+    )
+
+
+def test_strands_are_held_up_to_their_ring() -> None:
+    """The held way is that to the ring; a strand that passes none is loose, as without ties."""
+    groom = ponytail()
+    way = groom.strands.arc_lengths().reshape(6, 40)[:, 13]
+    held = held_lengths(groom)
+    assert held[:5] == pytest.approx(way[:5], abs=0.006)
+    assert held[5] == 0
+    assert not held_lengths(replace(groom, ties=())).any()
+
+
+@pytest.mark.parametrize("name", ["pbd", "rods", "super_helix"])
+def test_a_tie_moves_with_the_head(name: str) -> None:
+    """When gravity turns sideways, the ring's hair stays, and the tail swings less than untied."""
+    moved = {}
+    for tied in (True, False):
+        groom = ponytail() if tied else replace(ponytail(), ties=())
+        simulator = Manager.loaded().call("make_simulator", name, groom=groom)
+        rest = simulator.points.reshape(6, 40, 3).copy()
+        for _ in range(12):
+            simulator.advance(1 / 60, Surroundings(gravity=np.array([9.81, 0.0, 0.0])))
+        moved[tied] = np.linalg.norm(simulator.points.reshape(6, 40, 3) - rest, axis=2)
+    assert moved[True][:5, 13].max() < 0.3 * moved[False][:5, 13].max()
+    assert moved[True][:5, 39].min() > moved[True][:5, 13].max()
+    assert moved[True][5] == pytest.approx(moved[False][5], abs=2e-3)
