@@ -31,11 +31,10 @@ TIP_SHADE = 0.45
 """How bright tips are in photos over hair of the same colour near the crown, in linear light: 0.27
 to 0.65 in eight path-traced captures."""
 
-LIGHT = 1.1
-"""How bright hair is drawn under the usual lights, over its colour, in linear light. With it the
-mean luma of hair drawn by its own cameras is 0.90 to 1.10 of that of the photos on ten captures, of
-straight hair more than of waves, whose locks shade each other; 1.59 where coils come out straight.
-The mean of the upper third of the pixels in linear light, without it, gave 1.21 to 2.02."""
+LIGHT = 0.67
+"""How bright hair is drawn under the light at its camera, over its colour, in linear light. With it
+the mean luma of hair drawn by its own cameras is 0.91 to 1.10 of the photos' on ten captures, of
+straight hair more than of waves, whose locks shade each other; 1.6 where coils come out straight."""
 
 SHEEN = 0.9
 """Quantile of the brightness from which pixels have the colour of light, not of hair."""

@@ -39,6 +39,8 @@ SOLID = 250.0
 """Optical depth of meshes, per metre."""
 KEY_DIRECTION, RIM_DIRECTION = (-0.45, -0.6, -0.75), (0.55, -0.6, 0.55)
 """Towards the lights at a camera, in its axes (x right, y down): above left, behind right."""
+EXPOSURE = 0.5
+"""Factor of the light at a camera: skin and hair are about as bright as in photos of lit rooms."""
 SKY_WEIGHTS = (1.0, 2.0, 1.0)
 """Weights of the sky along +x, +y and +z; that along the opposite axes is 1."""
 
@@ -59,7 +61,7 @@ class Lights:
     def at_camera(cls, camera: Camera) -> Lights:
         """Return lights fixed to a camera: key above on the left, rim behind on the right."""
         key, rim = np.array(KEY_DIRECTION), np.array(RIM_DIRECTION)
-        return cls.studio(key @ camera.rotation, rim @ camera.rotation)
+        return cls.studio(key @ camera.rotation, rim @ camera.rotation, EXPOSURE)
 
     @classmethod
     def studio(cls, key: npt.ArrayLike, rim: npt.ArrayLike, exposure: float = 0.7) -> Lights:
