@@ -34,7 +34,7 @@ to 0.65 in eight path-traced captures."""
 LIGHT = 0.67
 """How bright hair is drawn under the light at its camera, over its colour, in linear light. With it
 the mean luma of hair drawn by its own cameras is 0.91 to 1.10 of the photos' on ten captures, of
-straight hair more than of waves, whose locks shade each other; 1.6 where coils come out straight."""
+straight hair more than of waves, whose locks shade each other; 1.6 where coils become straight."""
 
 SHEEN = 0.9
 """Quantile of the brightness from which pixels have the colour of light, not of hair."""
