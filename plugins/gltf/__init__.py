@@ -6,7 +6,6 @@ and as triangles for viewers, which is not.
 
 * `baking`: a point cache as morph targets
 * `extras`: `extras.hairkit`
-* `joining`: line segments joined to strands
 * `meshes`: head, lines and strips as meshes
 * `options`: settings of .glb files
 * `reader`: strands from the lines of a file
