@@ -22,10 +22,10 @@ from hairkit.arrays import Float32Array
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
+    mean_look,
     pack_strands,
     plain_widths,
     rows_kept,
-    with_mean_width,
 )
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
@@ -34,7 +34,7 @@ from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
 from hairkit.storage import read_bytes, write_bytes, write_pieces
-from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 from .binary import TfxHair, read_binary
@@ -99,7 +99,7 @@ def import_groom(path: Path, options: Options) -> Groom:
     if hair.colours is not None:
         colours = hair.colours.reshape(-1, 3)[rows_kept(counts, kept)]
     strands = Strands(strands.points, strands.offsets, widths, uv)
-    return adopt(strands, options, path, _look(colours, strands))
+    return adopt(strands, options, path, mean_look(strands, colours))
 
 
 def _resample(groom: Groom, count: int) -> Groom:
@@ -113,12 +113,3 @@ def _flip_v(uv: Float32Array, options: Options) -> Float32Array:
     if options.flip_v:
         turned[:, 1] = 1 - turned[:, 1]
     return turned
-
-
-def _look(colours: Float32Array | None, strands: Strands) -> HairMaterial | None:
-    """Return the mean colours of roots and tips; None where the file has none."""
-    if colours is None:
-        return None
-    root = colours[strands.offsets[:-1]].mean(axis=0, dtype=np.float64)
-    tip = colours[strands.offsets[1:] - 1].mean(axis=0, dtype=np.float64)
-    return replace(with_mean_width(strands), root_colour=root, tip_colour=tip)
