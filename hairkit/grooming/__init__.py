@@ -10,8 +10,6 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `fringe`: strands that hang loose beside tied hair
 * `guide_weights`: the nearest guides of each hair, and hair that follows them
 * `head_collision`: strand points pushed out of the head
-* `make_room`: axes of waves moved into the hair, so that wound strands stay in the hull
-* `plait`: the course of strands in a tail or a braid
 * `postprocess`: smoothing, waves and head collision after tracking
 * `prepare_export`: choice of strands and defaults for exporters
 * `target_rules`: what engines demand of a hair file

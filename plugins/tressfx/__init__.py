@@ -6,9 +6,8 @@ point. The first two points of a strand are fixed to the head. The .tfxbone bind
 the joints. Binary files of version 3 and the text files of version 1 and 2 are read.
 
 * `binary`: .tfx of versions 4 and 3
-* `bones`: .tfxbone files
 * `text`: .tfx of versions 1 and 2
-* `writer`: blocks of a .tfx in order
+* `writer`: blocks of a .tfx in order, and .tfxbone files
 """
 
 from __future__ import annotations
@@ -38,9 +37,8 @@ from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 from .binary import TfxHair, read_binary
-from .bones import bone_bytes
 from .text import is_text, read_text
-from .writer import tfx_pieces
+from .writer import bone_bytes, tfx_pieces
 
 __all__ = ["FORMAT", "Options", "TfxHair", "bone_bytes", "read_binary", "read_text", "tfx_pieces"]
 
