@@ -11,7 +11,6 @@ and as triangles for viewers, which is not.
 * `reader`: strands from the lines of a file
 * `ribbons`: hair as ribbons or cards
 * `scene`: the document of a groom
-* `skin`: the head's material
 * `strips`: ribbons and cards at several levels of detail
 * `texture`: strand and relief pictures for strips
 """
