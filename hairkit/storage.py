@@ -357,8 +357,5 @@ def _from_arrays(kind: Any, arrays: dict[str, npt.NDArray[Any]], prefix: str) ->
             **{name: _from_arrays(hints[name], arrays, f"{prefix}{name}.") for name in names}
         )
     array = arrays[prefix[:-1]]
-    return kind(array[()]) if kind in (bool, int, float, str) else _scalar_or_array(kind, array)
-
-
-def _scalar_or_array(kind: Any, array: npt.NDArray[Any]) -> Any:
-    return str(array[()]) if typing.get_origin(kind) is typing.Literal else array
+    kind = str if typing.get_origin(kind) is typing.Literal else kind
+    return kind(array[()]) if kind in (bool, int, float, str) else array

@@ -305,7 +305,7 @@ class Routes:
         return JSONResponse({}, HTTPStatus.ACCEPTED)
 
     async def _stop(self, request: Request) -> Response:
-        self._studio.stop_build()
+        self._studio.builder.stop()
         return JSONResponse({}, HTTPStatus.ACCEPTED)
 
     async def _page(self, request: Request) -> Response:

@@ -77,18 +77,14 @@ def find_face(image: UInt8Array, options: Options, nets: NetProcess) -> Face:
             break  # the rest scores less, however sure the mesh is
         mesh, presence = find_mesh(image, [found.crop()], nets)
         around = crop_around(mesh[0])
-        upright = abs(_roll(around, found.quarter_turns)) < np.radians(_UPRIGHT_DEG)
+        turned = np.exp(1j * (around.angle + found.quarter_turns * np.pi / 2))
+        upright = abs(np.angle(turned, deg=True)) < _UPRIGHT_DEG
         if upright and found.score * presence[0] > best_score:
             best, best_score = (found, around), float(found.score * presence[0])
     if best is None:
         return Face.absent()
     found, around = best
     return _settle(image, found, refine_crop(image, around, nets), options, nets)
-
-
-def _roll(crop: Crop, quarter_turns: int) -> float:
-    """Return the angle of a crop in the photo turned upright, in (-pi, pi]."""
-    return float(np.angle(np.exp(1j * (crop.angle + quarter_turns * np.pi / 2))))
 
 
 def _settle(
