@@ -109,7 +109,7 @@ def _arrange(views: Sequence[View], faces: Sequence[Face], named: BoolArray) -> 
         distances = compare_outlines(outlines)
     seen = Evidence.of(faces, distances, skin)
     azimuth = np.array([view.azimuth_deg for view in views])
-    evidence = seen.with_azimuths(azimuth, named)
+    evidence = replace(seen, yaw_deg=np.where(named, azimuth, seen.yaw_deg))
     elevation = np.array([view.elevation_deg for view in views])
     pitch = np.array([face.pitch_deg if face.sure else np.nan for face in faces])
     pitch = np.where(named, elevation, pitch)

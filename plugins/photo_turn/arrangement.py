@@ -8,7 +8,7 @@ squared standard deviation, as negative logarithms of likelihoods are.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -70,10 +70,6 @@ class Evidence:
         yaw = np.array([face.yaw_deg if face.sure else np.nan for face in faces])
         alike, mirrored = outlines if outlines is not None else (None, None)
         return cls(yaw, alike, mirrored, skin)
-
-    def with_azimuths(self, azimuth_deg: Float64Array, known: BoolArray) -> Evidence:
-        """Return the evidence with some azimuths that a user said in place of the faces'."""
-        return replace(self, yaw_deg=np.where(known, azimuth_deg, self.yaw_deg))
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,7 +54,10 @@ def tfx_pieces(
     yield as_bytes("<f4", (widths / space.metres).astype(np.float32))
     yield as_bytes("<f4", np.zeros(_padding(len(strands))))
     if coloured:
-        shades = colours(groom.material, strands.counts).mapped(_opaque)
+        alpha = ((0, 0), (0, 1))
+        shades = colours(groom.material, strands.counts).mapped(
+            lambda linear: np.pad(linear, alpha, constant_values=1)
+        )
         for block in blocks(strands):
             yield as_bytes("<f4", shades.at(block.strands))
 
@@ -76,11 +79,6 @@ def _header(
 def _padding(numbers: int) -> int:
     """Return the numbers of four bytes that fill up eight."""
     return numbers % 2
-
-
-def _opaque(linear: Float32Array) -> Float32Array:
-    """Return RGBA (K, 4) of colours (K, 3)."""
-    return np.concatenate([linear, np.ones((len(linear), 1), np.float32)], axis=1)
 
 
 def bone_bytes(strands: int) -> memoryview:
