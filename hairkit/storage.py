@@ -286,7 +286,8 @@ def replace_file(
         if durable:
             with open(temporary, "rb+") as file:
                 os.fsync(file.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())
+        os.umask(mask := os.umask(0))  # can only be read by setting it
+        os.chmod(temporary, 0o666 & ~mask)
         os.replace(temporary, target)
     except BaseException as error:
         if temporary is not None:
@@ -317,12 +318,6 @@ def _check_kind(path: str | os.PathLike[str], mode: int) -> None:
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write UTF-8 text as `write_bytes` does."""
     write_bytes(path, text.encode())
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _to_arrays(value: Any, prefix: str) -> dict[str, npt.NDArray[Any]]:
