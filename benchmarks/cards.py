@@ -23,7 +23,7 @@ from hairkit_plugins.cards.build import CardSet, Level, build_cards
 
 from hairkit.head_model.template import default_head
 from hairkit.imaging.picture_file import write_picture
-from hairkit.rendering import draw, draw_coverage
+from hairkit.rendering import draw, draw_layers
 from hairkit.rendering.framing import framing_cameras
 from hairkit.synth import grow
 from hairkit.types.camera import Camera
@@ -77,7 +77,7 @@ def _groom(style: str, strands: int, points: int) -> Groom:
 
 def _covered(groom: Groom, camera: Camera) -> np.ndarray:
     width = groom.material.width
-    return draw_coverage(groom.strands, groom.head, camera, width=width) > 0.5
+    return draw_layers(groom.strands, groom.head, camera, width=width)[0] > 0.5
 
 
 def _drawn(made: CardSet, groom: Groom, cameras: list[Camera]) -> list[list[np.ndarray]]:

@@ -18,10 +18,9 @@ from typing import Any
 import cv2
 import numpy as np
 from captures_argument import NO_CAPTURES, add_captures
-from hairkit_plugins.face_mesh import MODELS, Options, find_face
+from hairkit_plugins.face_mesh import MODELS, Options, find_face, measure_angles
 from hairkit_plugins.face_mesh.crops import find_mesh, refine_crop, wobble
 from hairkit_plugins.face_mesh.detector import detect
-from hairkit_plugins.face_mesh.head_angles import measure_angles
 from hairkit_plugins.face_mesh.landmark_table import (
     MESH_POINTS,
     MIRROR,

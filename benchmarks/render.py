@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from hairkit.cli.render import parse_size
 from hairkit.grooming.densify import densify
 from hairkit.head_model.template import default_head
-from hairkit.rendering import Lights, draw, draw_coverage, draw_directions, draw_views
+from hairkit.rendering import Lights, draw, draw_layers, draw_measurements, draw_views
 from hairkit.rendering.context import renderer
 from hairkit.rendering.framing import framing_cameras
 from hairkit.synth import grow
@@ -57,8 +57,8 @@ def _measure(args: argparse.Namespace) -> Iterator[Row]:
     jobs: dict[str, Callable[[], object]] = {
         f"densify {GUIDES} guides": lambda: densify(guides, args.strands),
         "draw": lambda: draw(hair, head, camera),
-        "draw_coverage": lambda: draw_coverage(hair, head, camera),
-        "draw_directions": lambda: draw_directions(hair, head, camera),
+        "draw_layers": lambda: draw_layers(hair, head, camera),
+        "draw_measurements": lambda: draw_measurements(hair, head, camera),
         "draw_views, 8 views a fifth the size": lambda: draw_views(
             hair, head, small, lights=lights
         ),

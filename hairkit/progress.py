@@ -142,30 +142,3 @@ def progress_for(stream: TextIO, *, quiet: bool, steps: bool = False) -> Silent 
     if quiet:
         return Silent()
     return Bars(stream) if stream.isatty() else Lines(stream)
-
-
-class Recorder:
-    """Forwards progress and records the duration of each stage."""
-
-    def __init__(self, progress: Progress) -> None:
-        """Forward to `progress`."""
-        self._progress = progress
-        self.stages: list[dict[str, object]] = []
-        """Finished stages: name (`stage`), `seconds` and whether the result was `reused`."""
-
-    def started(self, stage: str, steps: int) -> None:
-        """Forward the start of a stage."""
-        self._progress.started(stage, steps)
-
-    def stepped(self, stage: str) -> None:
-        """Forward one step."""
-        self._progress.stepped(stage)
-
-    def finished(self, stage: str, seconds: float, reused: bool) -> None:
-        """Record and forward the end of a stage."""
-        self.stages.append({"stage": stage, "seconds": round(seconds, 4), "reused": reused})
-        self._progress.finished(stage, seconds, reused)
-
-    def message(self, text: str) -> None:
-        """Forward one line."""
-        self._progress.message(text)

@@ -286,7 +286,8 @@ def replace_file(
         if durable:
             with open(temporary, "rb+") as file:
                 os.fsync(file.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())
+        os.umask(mask := os.umask(0))  # can only be read by setting it
+        os.chmod(temporary, 0o666 & ~mask)
         os.replace(temporary, target)
     except BaseException as error:
         if temporary is not None:
@@ -317,12 +318,6 @@ def _check_kind(path: str | os.PathLike[str], mode: int) -> None:
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write UTF-8 text as `write_bytes` does."""
     write_bytes(path, text.encode())
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _to_arrays(value: Any, prefix: str) -> dict[str, npt.NDArray[Any]]:
@@ -357,8 +352,5 @@ def _from_arrays(kind: Any, arrays: dict[str, npt.NDArray[Any]], prefix: str) ->
             **{name: _from_arrays(hints[name], arrays, f"{prefix}{name}.") for name in names}
         )
     array = arrays[prefix[:-1]]
-    return kind(array[()]) if kind in (bool, int, float, str) else _scalar_or_array(kind, array)
-
-
-def _scalar_or_array(kind: Any, array: npt.NDArray[Any]) -> Any:
-    return str(array[()]) if typing.get_origin(kind) is typing.Literal else array
+    kind = str if typing.get_origin(kind) is typing.Literal else kind
+    return kind(array[()]) if kind in (bool, int, float, str) else array

@@ -95,13 +95,14 @@ def serve(
         results of hairkit count as old.
     """
     hooks = {function.__name__: function for function in functions}
+    text = inspect.getdoc(sys.modules[functions[0].__module__]) if functions else ""
 
     def describe(question: dict[str, Any], _tell: Any) -> dict[str, Any]:
         return {
             "protocol": PROTOCOL,
             "hooks": {name: _parameters(function) for name, function in hooks.items()},
             "options": dict(options or {}),
-            "summary": " ".join(_doc_of(functions).partition("\n\n")[0].split()),
+            "summary": " ".join((text or "").partition("\n\n")[0].split()),
             "version": version,
             "digest": _digest(functions, files),
         }
@@ -255,11 +256,6 @@ def _named(tree: Any) -> Any:
 
 def _parameters(function: Callable[..., Any]) -> list[str]:
     return list(inspect.signature(function).parameters)
-
-
-def _doc_of(functions: Sequence[Callable[..., Any]]) -> str:
-    """Return the docstring of the module that defines the functions."""
-    return inspect.getdoc(sys.modules[functions[0].__module__]) or "" if functions else ""
 
 
 def _digest(functions: Sequence[Callable[..., Any]], files: Sequence[Any]) -> str:

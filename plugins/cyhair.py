@@ -9,7 +9,7 @@ Thickness is taken as the strand's diameter in the file's unit.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from hairkit.errors import InputError
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
+    mean_look,
     pack_strands,
     plain_widths,
     rows_kept,
@@ -157,11 +158,9 @@ def _material(
     if not 0 < width <= _WIDEST:
         known = strands.widths[strands.widths > 0] if strands.widths is not None else ()
         width = float(np.mean(known, dtype=np.float64)) if len(known) else HairMaterial.width
-    if colours is not None:
-        ends = strands.offsets
-        root = colours[ends[:-1]].mean(axis=0, dtype=np.float64)
-        tip = colours[ends[1:] - 1].mean(axis=0, dtype=np.float64)
-        return HairMaterial(root, tip, width)
+    look = mean_look(strands, colours)
+    if look is not None:
+        return replace(look, width=width)
     colour = np.asarray(header["colour"], np.float32)
     if np.isfinite(colour).all() and (colour >= 0).all() and (colour < 1).any():
         return HairMaterial(colour, colour, width)

@@ -97,7 +97,8 @@ def orient(view: View, mask: Mask, options: Options) -> OrientationMap:
     core = well_inside(hair[box], _EDGE_SIGMA)
     picture = luminance(view.image[box])
     if options.difference_of_gaussians:
-        picture = _band(fill_beyond(picture, core, _DOG_WIDE))
+        filled = fill_beyond(picture, core, _DOG_WIDE)
+        picture = blur(filled, _DOG_FINE) - blur(filled, _DOG_WIDE)
 
     banks = gabor_kernels(options)
     bases = [_basis(bank) for bank in banks]
@@ -112,7 +113,9 @@ def orient(view: View, mask: Mask, options: Options) -> OrientationMap:
 
     angle_map, confidence_map = np.zeros((2, *hair.shape), np.float32)
     angle_map[box] = angle
-    confidence_map[box] = picture * strength * _share_inside(core, radius) * hair[box]
+    # the share of the kernel that lies well inside the hair
+    inside = np.minimum(blur(core.astype(np.float32), max(radius / 2, 0.5)), 1)
+    confidence_map[box] = picture * strength * inside * hair[box]
     return OrientationMap(angle_map, confidence_map)
 
 
@@ -141,11 +144,6 @@ def gabor_kernels(options: Options) -> Float64Array:
         window = envelope.reshape(cells).mean(axis=(3, 5))
         bank -= window * (bank.sum((2, 3)) / window.sum((2, 3)))[:, :, None, None]
     return np.asarray(bank, np.float64)
-
-
-def _band(picture: Float32Array) -> Float32Array:
-    """Return the picture's difference of Gaussians."""
-    return blur(picture, _DOG_FINE) - blur(picture, _DOG_WIDE)
 
 
 def _basis(bank: Float64Array) -> tuple[Float32Array, Float32Array]:
@@ -217,8 +215,3 @@ def angle_and_confidence(
         bend = np.maximum(2 * peak - before - after, 1e-12)
         turn += np.clip(0.5 * (after - before) / bend, -0.5, 0.5)
     return wrap_angle(turn * np.pi / count + np.pi / 2), np.maximum(weight, 0)
-
-
-def _share_inside(core: BoolArray, radius: int) -> Float32Array:
-    """Return the share in [0, 1] of the kernel around a pixel that lies well inside the hair."""
-    return np.minimum(blur(core.astype(np.float32), max(radius / 2, 0.5)), 1)

@@ -21,10 +21,10 @@ from hairkit.errors import InputError
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
+    mean_look,
     pack_strands,
     plain_widths,
     rows_kept,
-    with_mean_width,
 )
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
@@ -35,7 +35,7 @@ from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.ply_elements import columns, read_elements, strand_order, vertex_points
 from hairkit.io.strand_blocks import blocks, colours
 from hairkit.storage import read_bytes, write_pieces
-from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 FORMAT = FileFormat(
@@ -94,8 +94,9 @@ def import_groom(path: Path, options: Options) -> Groom:
     strands = _with_strand_values(strands, elements.get("strand", {}), kept, path)
     colours = None
     if {name for name, _ in _COLOUR} <= set(vertex):
-        colours = np.stack([vertex[name] for name, _ in _COLOUR], axis=1)[order][rows]
-    return adopt(strands, options, path, _look(colours, strands))
+        stored = np.stack([vertex[name] for name, _ in _COLOUR], axis=1)[order][rows]
+        colours = _LINEAR[stored] if stored.dtype == np.uint8 else None
+    return adopt(strands, options, path, mean_look(strands, colours))
 
 
 def _pieces(groom: Groom, space: FileSpace) -> Iterator[bytes | memoryview]:
@@ -158,13 +159,3 @@ def _with_strand_values(
 def _to_bytes(colours: Float32Array) -> npt.NDArray[np.uint8]:
     """Return linear RGB as sRGB from 0 to 255."""
     return np.round(255 * srgb_from_linear(np.clip(colours, 0, 1))).astype(np.uint8)
-
-
-def _look(colours: npt.NDArray[np.generic] | None, strands: Strands) -> HairMaterial | None:
-    """Return the mean colours of roots and tips; None where the file has none."""
-    if colours is None or colours.dtype != np.uint8:
-        return None
-    linear = _LINEAR[colours]
-    root = linear[strands.offsets[:-1]].mean(axis=0)
-    tip = linear[strands.offsets[1:] - 1].mean(axis=0)
-    return replace(with_mean_width(strands), root_colour=root, tip_colour=tip)

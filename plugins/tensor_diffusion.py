@@ -25,7 +25,7 @@ from hairkit import (
     Scene,
     hookimpl,
 )
-from hairkit.arrays import BoolArray, Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.field.cell_shells import erode_cells
 from hairkit.field.diffusion import CellGraph, solve_screened
 from hairkit.field.growth_prior import growth_potential
@@ -67,7 +67,8 @@ def solve_field(
     fronts = front_depths(scene.cameras, weighted, hull)
     fading = Fading(see_through=0.0, free_depth=hull.grid.spacing)
     planes, views = fuse_planes(scene.cameras, masks, weighted, fronts, hull, fading)
-    views[~_outer_cells(hull)] = 0
+    outer = (hull.dense & ~erode_cells(hull.dense))[hull.loose]  # a face neighbour is no hair
+    views[~outer] = 0
     tensor, gap = plane_directions(planes, views, options.min_views)
     weight = np.where(gap > 0, FIXED, 0).astype(np.float32)
     centres = hull.grid.centres_of(hull.loose)
@@ -87,12 +88,6 @@ def _weigh(found: OrientationMap, box: int) -> OrientationMap:
     """Return the map with the square of its mean confidence over a box of pixels as confidence."""
     mean = cv2.blur(found.confidence, (box, box), borderType=cv2.BORDER_REPLICATE)
     return OrientationMap(found.angle, mean * mean)
-
-
-def _outer_cells(hull: Hull) -> BoolArray:
-    """Return which loose cells (N,) are hair with a face neighbour that is none."""
-    outer: BoolArray = (hull.dense & ~erode_cells(hull.dense))[hull.loose]
-    return outer
 
 
 def scalp_normals(head: Head, points: Float32Array, spacing: float) -> Float64Array:

@@ -85,20 +85,15 @@ def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head
     cameras = [camera for camera, has in zip(scene.cameras, seen, strict=True) if has]
     points = triangulate(cameras, pixels)
     source = head.vertices[head.landmark_vertices].astype(np.float64)
-    held = spread_vertices(head, _cranium(head), ANCHORS)
+    # scalp behind the ears' plane, of which the landmarks know nothing
+    behind = head.vertices[:, 2] < np.median(head.vertices[:, 2])
+    held = spread_vertices(head, np.flatnonzero((head.scalp > 0.5) & behind), ANCHORS)
     anchors = head.vertices[held].astype(np.float64)
     loose = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_LOOSENESS, 1.0) * SMOOTHING
     smoothing = np.concatenate([loose, np.full(len(anchors), ANCHOR_SMOOTHING)])
     places = np.concatenate([source, anchors])
     moves = np.concatenate([points - source, np.zeros_like(anchors)])
     return _warp(head, places, moves, smoothing)
-
-
-def _cranium(head: Head) -> Int64Array:
-    """Return scalp vertices behind the ears' plane: what the landmarks know nothing about."""
-    return np.nonzero((head.scalp > 0.5) & (head.vertices[:, 2] < np.median(head.vertices[:, 2])))[
-        0
-    ]
 
 
 def _spread(head: Head, count: int) -> Int64Array:

@@ -91,7 +91,7 @@ def _reconstructed(folder: Path, results: Path | None, truth: Truth) -> tuple[St
     points = alignment_points(groom.strands, groom.head.vertices)
     similarity = align(found.cameras, truth.cameras, points)
     head = replace(groom.head, vertices=similarity.apply(groom.head.vertices))
-    return similarity.apply_to_strands(groom.strands), head
+    return similarity.moved_strands(groom.strands), head
 
 
 if __name__ == "__main__":

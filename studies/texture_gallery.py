@@ -18,7 +18,7 @@ from typing import Any
 
 import cv2
 import numpy as np
-from hairkit_plugins.image_analogies.regions import find_regions
+from hairkit_plugins.image_analogies import find_regions
 
 from hairkit.arrays import UInt8Array
 from hairkit.imaging.relief import bump_from_albedo, draw_difference, normal_from_height

@@ -6,7 +6,8 @@ import io
 
 import pytest
 
-from hairkit.progress import Bars, Lines, Progress, Recorder, Silent, Steps, progress_for
+from hairkit.pipeline.run_log import RunLog, StageTime
+from hairkit.progress import Bars, Lines, Progress, Silent, Steps, progress_for
 
 
 class Terminal(io.StringIO):
@@ -69,13 +70,10 @@ def test_bars_show_every_stage_with_its_time(stream: io.StringIO) -> None:
         assert text in stream.getvalue()
 
 
-def test_a_recorder_keeps_the_times_and_passes_all_on() -> None:
+def test_a_runs_log_keeps_the_times_and_passes_all_on() -> None:
     """What is recorded is also told."""
     stream = io.StringIO()
-    recorder = Recorder(Lines(stream))
-    tell(recorder)
-    assert recorder.stages == [
-        {"stage": "scene", "seconds": 0.0, "reused": True},
-        {"stage": "segment", "seconds": 1.234, "reused": False},
-    ]
+    log = RunLog(Lines(stream))
+    tell(log)
+    assert log.stages == [StageTime("scene", 0.0, True), StageTime("segment", 1.234, False)]
     assert len(stream.getvalue().splitlines()) == 3

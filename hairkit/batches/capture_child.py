@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from hairkit import worker
 from hairkit.errors import HairkitError
 from hairkit.memory import keep_freed_memory
+from hairkit.progress import Silent
 
 if TYPE_CHECKING:
     from hairkit.batches.jobs import Job, Settings
@@ -193,7 +194,7 @@ def _scores(folder: Path, photos: Path | None) -> Mapping[str, float]:
     return {name: round(float(value), 4) for name, value in values.items()}
 
 
-class _Told:
+class _Told(Silent):
     """Progress that tells the parent which stage has begun."""
 
     def __init__(self, tell: Callable[[Any], None]) -> None:
@@ -201,15 +202,6 @@ class _Told:
 
     def started(self, stage: str, steps: int) -> None:
         self._tell(stage)
-
-    def stepped(self, stage: str) -> None:
-        pass
-
-    def finished(self, stage: str, seconds: float, reused: bool) -> None:
-        pass
-
-    def message(self, text: str) -> None:
-        pass
 
 
 if __name__ == "__main__":

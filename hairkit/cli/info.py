@@ -81,7 +81,9 @@ def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
     try:
         return _groom(path, args)
     except FormatError:  # no strands in it, so it is a head
-        return _head_file(path, args.head_units, args.head_scalp)
+        from hairkit.io.head_reader import read_head
+
+        return {"kind": "head", **_head(read_head(path, args.head_units, args.head_scalp))}
 
 
 def _cards(path: Path) -> dict[str, Any] | None:
@@ -190,12 +192,6 @@ def _capture(args: argparse.Namespace) -> dict[str, Any]:
     }
     cameras = "orthographic" if capture.orthographic else "perspective"
     return {"kind": "capture", "cameras": cameras, "views": views}
-
-
-def _head_file(path: Path, units: str, scalp: str | None) -> dict[str, Any]:
-    from hairkit.io.head_reader import read_head
-
-    return {"kind": "head", **_head(read_head(path, units, scalp))}
 
 
 def _head(head: Any) -> dict[str, Any]:

@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     from hairkit.pipeline.reconstruct import export_paths, reconstruct
     from hairkit.pipeline.run_record import RECORD, read_record
     from hairkit.pipeline.take_capture import take_with_choices
-    from hairkit.progress import Recorder, progress_for
+    from hairkit.progress import progress_for
     from hairkit.types.parting import Parting
 
     began = time.perf_counter()
@@ -91,23 +91,20 @@ def run(args: argparse.Namespace) -> int:
         capture = replace(capture, parting=Parting.named(args.parting))
     quiet = args.quiet or args.json
     with progress_for(sys.stderr, quiet=quiet, steps=args.steps) as shown:
-        record = Recorder(shown)
         chosen = _chosen(args)
-        groom = reconstruct(
-            capture, args.out, recipe, manager, head=head, progress=record, **chosen
-        )
-    health = read_record(Path(args.out) / RECORD).health
+        groom = reconstruct(capture, args.out, recipe, manager, head=head, progress=shown, **chosen)
+    record = read_record(Path(args.out) / RECORD)
     summary = _summary(Path(args.out), groom.strands) | {
         "exports": {name: str(path) for name, path in export_paths(args.out, recipe, manager)},
         "roots": args.guides,
-        "stages": record.stages,
-        "health": [asdict(figure) for figure in health],
+        "stages": [asdict(stage) for stage in record.stages],
+        "health": [asdict(figure) for figure in record.health],
         "seconds": round(time.perf_counter() - began, 3),
     }
     if args.json:
         print(json.dumps(summary, indent=1))
     else:
-        print("\n".join([_summary_text(summary), *summarise(health)]))
+        print("\n".join([_summary_text(summary), *summarise(record.health)]))
     return 0
 
 

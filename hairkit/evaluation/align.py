@@ -15,6 +15,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from hairkit.arrays import Float32Array, Float64Array
+from hairkit.cameras.similarity import Similarity
 from hairkit.errors import InputError
 from hairkit.types.camera import Camera
 from hairkit.types.strands import Strands
@@ -28,34 +29,16 @@ _LOST_PX = 1e4
 
 
 @dataclass(frozen=True, eq=False)
-class Similarity:
-    """`true = scale * rotation @ predicted + translation`, metres."""
+class Alignment(Similarity):
+    """The similarity from the prediction's frame to the truth's, metres."""
 
-    scale: float
-    rotation: Float64Array
-    """(3, 3)."""
-    translation: Float64Array
-    """(3,) metres."""
     residual_px: float = 0.0
     """Root mean square distance between the pictures of the fitted points, true pixels."""
 
-    def apply(self, points: npt.ArrayLike) -> Float32Array:
-        """Return points (..., 3) in the truth's frame."""
-        moved = self.scale * np.asarray(points, np.float64) @ self.rotation.T + self.translation
-        return np.asarray(moved, np.float32)
-
-    def apply_to_strands(self, strands: Strands) -> Strands:
+    def moved_strands(self, strands: Strands) -> Strands:
         """Return strands in the truth's frame, widths scaled too."""
         widths = None if strands.widths is None else strands.widths * np.float32(self.scale)
-        return replace(strands, points=self.apply(strands.points), widths=widths)
-
-    def apply_to_camera(self, camera: Camera) -> Camera:
-        """Return the camera that sees moved points where `camera` saw them before."""
-        matrix = np.eye(4)
-        matrix[:3, :3] = camera.rotation @ self.rotation.T
-        matrix[:3, 3] = self.scale * camera.translation - matrix[:3, :3] @ self.translation
-        focal = camera.focal / (self.scale if camera.model == "orthographic" else 1.0)
-        return replace(camera, camera_from_head=matrix, focal=focal)
+        return replace(strands, points=self.apply(strands.points).astype(np.float32), widths=widths)
 
 
 @dataclass(frozen=True)
@@ -76,7 +59,7 @@ class CameraError:
 
 def align(
     predicted: Sequence[Camera], true: Sequence[Camera], points: npt.NDArray[np.float32]
-) -> Similarity:
+) -> Alignment:
     """Return the similarity whose true pictures of `points` lie nearest to the predicted ones.
 
     Least squares of pixel distances over all views and points (N, 3), seven unknowns, begun at the
@@ -92,7 +75,7 @@ def align(
     sized = [_like(mine, other) for mine, other in zip(predicted, true, strict=True)]
     middle = points.mean(axis=0, dtype=np.float64)
     wanted = [camera.project(points) for camera in sized]
-    best: Similarity | None = None
+    best: Alignment | None = None
     for start in _starts(sized, true, middle):
         found = _fit(start, true, wanted, points, middle)
         if best is None or found.residual_px < best.residual_px:
@@ -113,7 +96,7 @@ def camera_errors(
     names: Sequence[str],
     predicted: Sequence[Camera],
     true: Sequence[Camera],
-    similarity: Similarity,
+    similarity: Alignment,
     points: npt.NDArray[np.float32],
 ) -> tuple[CameraError, ...]:
     """Return the error of each view's camera after alignment; `points` as given to `align`."""
@@ -121,7 +104,7 @@ def camera_errors(
     moved = similarity.apply(points)
     middle = moved.mean(axis=0, dtype=np.float64)
     for name, mine, other in zip(names, predicted, true, strict=True):
-        aligned = similarity.apply_to_camera(_like(mine, other))
+        aligned = similarity.moved_camera(_like(mine, other))
         turn = (aligned.azimuth_deg - other.azimuth_deg + 180.0) % 360.0 - 180.0
         rotation = Rotation.from_matrix(aligned.rotation @ other.rotation.T).magnitude()
         offset = aligned.position - other.position
@@ -182,7 +165,7 @@ def _fit(
     wanted: Sequence[Float64Array],
     points: npt.NDArray[np.float32],
     middle: Float64Array,
-) -> Similarity:
+) -> Alignment:
     """Solve for log scale, rotation vector and shift about `middle`, where they are independent."""
     centred = points.astype(np.float64) - middle
 
@@ -196,7 +179,7 @@ def _fit(
     scale = float(np.exp(solution.x[0]))
     rotation = Rotation.from_rotvec(solution.x[1:4]).as_matrix()
     translation = middle + solution.x[4:] - scale * rotation @ middle
-    return Similarity(scale, rotation, translation, _root_mean_square(solution.fun.reshape(-1, 2)))
+    return Alignment(scale, rotation, translation, _root_mean_square(solution.fun.reshape(-1, 2)))
 
 
 def _root_mean_square(gap: Float64Array) -> float:

@@ -10,8 +10,8 @@ import numpy as np
 
 from hairkit.arrays import BoolArray
 from hairkit.evaluation.align import (
+    Alignment,
     CameraError,
-    Similarity,
     align,
     alignment_points,
     camera_errors,
@@ -72,7 +72,7 @@ class Evaluation:
 
     strands: int
     """Strands of the groom."""
-    similarity: Similarity
+    similarity: Alignment
     cameras: tuple[CameraError, ...]
     scores: StrandScores
     occupancy: Score
@@ -186,13 +186,15 @@ def evaluate(
 
 def _align(
     prediction: Prediction, truth: Truth
-) -> tuple[Groom, Similarity, tuple[CameraError, ...]]:
+) -> tuple[Groom, Alignment, tuple[CameraError, ...]]:
     groom = prediction.groom
     points = alignment_points(groom.strands, groom.head.vertices)
     similarity = align(prediction.cameras, truth.cameras, points)
     errors = camera_errors(truth.names, prediction.cameras, truth.cameras, similarity, points)
-    head = dataclasses.replace(groom.head, vertices=similarity.apply(groom.head.vertices))
-    strands = similarity.apply_to_strands(groom.strands)
+    head = dataclasses.replace(
+        groom.head, vertices=similarity.apply(groom.head.vertices).astype(np.float32)
+    )
+    strands = similarity.moved_strands(groom.strands)
     return dataclasses.replace(groom, strands=strands, head=head), similarity, errors
 
 

@@ -14,7 +14,8 @@ from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
 from hairkit.evaluation.depth_map import Surface, first_surface
 from hairkit.evaluation.scores import Samples, sample_strands
-from hairkit.storage import read_bytes, read_npz, read_text
+from hairkit.io.mesh_text import read_obj
+from hairkit.storage import read_bytes, read_npz
 from hairkit.types.camera import Camera
 from hairkit.types.head import Capsules, Head
 from hairkit.types.scene import read_cameras
@@ -87,24 +88,8 @@ def _read_strands(path: Path) -> tuple[Strands, UInt8Array]:
 
 
 def _read_head(path: Path) -> Head:
-    vertices: list[list[float]] = []
-    faces: list[list[int]] = []
-    try:
-        for line in read_text(path).splitlines():
-            kind, _, rest = line.partition(" ")
-            if kind == "v":
-                vertices.append([float(value) for value in rest.split()[:3]])
-            elif kind == "f":
-                corner = [int(item.split("/")[0]) - 1 for item in rest.split()]
-                faces.extend(
-                    [corner[0], corner[i], corner[i + 1]] for i in range(1, len(corner) - 1)
-                )
-        points = np.array(vertices, np.float32).reshape(-1, 3)
-        triangles = np.array(faces, np.int32).reshape(-1, 3)
-    except (ValueError, IndexError) as error:
-        raise FormatError(f"{path}: not a readable OBJ mesh ({error})") from error
-    if not len(triangles) or triangles.min() < 0 or triangles.max() >= len(points):
-        raise FormatError(f"{path}: its faces are missing or name vertices that do not exist")
+    mesh = read_obj(path)
+    points, triangles = mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32)
     blank = np.zeros((len(points), 2), np.float32)
     none = np.zeros((0, 3), np.float32)
     capsules = Capsules(none, none, none[:, :2])

@@ -2,7 +2,6 @@
 
 What field and tracking plugins share: fusing views, priors, diffusion, and sampling of volumes.
 
-* `braids`: the angle at which the hair of a tail crosses its spine
 * `cell_shells`: cells grown or shrunk over their faces
 * `diffusion`: screened diffusion on masked cells, by conjugate gradients
 * `find_parting`: where the parting is, as the user says or the views show

@@ -97,7 +97,8 @@ def parting_from_skin(masks: Sequence[Mask], cameras: Sequence[Camera], head: He
     above: list[tuple[Mask, Camera]] = []
     beside: list[tuple[Mask, Camera]] = []
     for mask, camera in zip(masks, cameras, strict=True):
-        (above if _elevation(camera) > FROM_ABOVE else beside).append((mask, camera))
+        elevation = np.degrees(np.arcsin(-camera.view_direction(np.zeros(3))[1]))
+        (above if elevation > FROM_ABOVE else beside).append((mask, camera))
     level = _measure_skin(beside, head, LEAST_SKIN)
     if not above:
         return level
@@ -129,11 +130,6 @@ def _measure_skin(views: Sequence[tuple[Mask, Camera]], head: Head, least: float
     if high - low >= WIDEST_SKIN:
         return Parting(skin_share=share, spread=float(high - low))
     return Parting.at(float(middle), share, float(high - low))
-
-
-def _elevation(camera: Camera) -> float:
-    """Return how far above the head's middle the camera stands, degrees."""
-    return float(np.degrees(np.arcsin(-camera.view_direction(np.zeros(3))[1])))
 
 
 def _drawn_line(view: View, camera: Camera, head: Head) -> Float64Array | None:

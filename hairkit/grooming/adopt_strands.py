@@ -32,12 +32,12 @@ from hairkit.types.strands import Strands
 __all__ = [
     "ImportOptions",
     "adopt",
+    "mean_look",
     "pack_strands",
     "place_head",
     "plain_widths",
     "reverse_strands",
     "rows_kept",
-    "with_mean_width",
 ]
 
 SMALLEST, LARGEST = 0.015, 0.6
@@ -162,7 +162,7 @@ def adopt(
     if not options.reverse:
         _warn_of_tips(strands, head, source)
     if material is None:
-        material = with_mean_width(strands)
+        material = _with_mean_width(strands)
     if strands.widths is None:
         _log.warning("%s: no widths; strands are %g mm wide", source, 1000 * material.width)
     triangle, barycentric = bind(strands.roots, head)
@@ -182,12 +182,29 @@ def reverse_strands(strands: Strands) -> Strands:
     return replace(strands, points=strands.points[rows], widths=widths)
 
 
-def with_mean_width(strands: Strands) -> HairMaterial:
+def _with_mean_width(strands: Strands) -> HairMaterial:
     """Return the default look, as wide as the strands are in the mean."""
     widths = strands.widths
     if widths is None or not (widths > 0).any():
         return HairMaterial()
     return HairMaterial(width=float(widths[widths > 0].mean(dtype=np.float64)))
+
+
+def mean_look(
+    strands: Strands, colours: npt.NDArray[np.floating[Any]] | None
+) -> HairMaterial | None:
+    """Return the look in the mean: of widths, and of linear RGB (P, 3) at roots and tips.
+
+    None where there are no colours.
+    """
+    if colours is None:
+        return None
+    root, tip = colours[strands.offsets[:-1]], colours[strands.offsets[1:] - 1]
+    return replace(
+        _with_mean_width(strands),
+        root_colour=root.mean(axis=0, dtype=np.float64),
+        tip_colour=tip.mean(axis=0, dtype=np.float64),
+    )
 
 
 def _with_length(strands: Strands, source: object) -> Strands:

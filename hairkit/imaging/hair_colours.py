@@ -82,7 +82,11 @@ def label_colours(photos: Sequence[HairPrior], settings: LabelSettings) -> list[
             _weigh(rows, prior, mixtures, settings)
             for rows, prior in zip(features, priors, strict=True)
         ]
-    return [_LABELS[_merged(posterior).argmax(axis=-1)] for posterior in posteriors]
+    found = []
+    for posterior in posteriors:
+        hair, person, background, face = np.moveaxis(posterior, -1, 0)
+        found.append(_LABELS[np.dstack([hair, person + face, background]).argmax(axis=-1)])
+    return found
 
 
 def _features(photo: HairPrior) -> Float32Array:
@@ -145,9 +149,3 @@ def _weigh(
     odds = prior * np.exp(blur(relative, _SMOOTH_SIGMA))
     result: Float32Array = odds / fold_last(np.add, odds)[..., None]
     return result
-
-
-def _merged(posterior: Float32Array) -> Float32Array:
-    """Return (h, w, 3) hair, person with face, background."""
-    hair, person, background, face = np.moveaxis(posterior, -1, 0)
-    return np.dstack([hair, person + face, background])

@@ -9,7 +9,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `capture_toml`: `capture.toml`
 * `card_file`: what files of hair cards hold
 * `coordinate_space`: axes and unit of a file
-* `exif`: orientation and focal length from EXIF
+* `exif`: TIFF directories: EXIF tags of photos, headers of TIFF files
 * `file_format`: what a format carries, as its plugin declares it
 * `glb_document`: glTF documents under construction
 * `glb_file`: glTF documents
@@ -28,7 +28,6 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `strand_blocks`: large grooms written in blocks of little memory
 * `strokes`: strokes on photos, labelme's JSON
 * `textures`: texture maps of mesh files
-* `tiff`: the header of TIFF files
 * `video`: a video of a turn as a capture
 * `video_child`: the process that decodes videos
 * `webp`: the header of WebP files

@@ -1,6 +1,8 @@
-"""Read the EXIF tags that reconstruction needs: orientation, focal length, sensor size.
+"""TIFF directories: those of EXIF, read for what reconstruction needs, and those of TIFF files.
 
-EXIF is a TIFF directory (CIPA DC-008); invalid entries are ignored.
+EXIF is a TIFF directory (CIPA DC-008) with orientation, focal length and sensor size; its invalid
+entries are ignored. The first directory of a TIFF file is checked before a decoder sees the file
+(TIFF 6.0, 1992).
 """
 
 from __future__ import annotations
@@ -8,6 +10,8 @@ from __future__ import annotations
 import math
 import struct
 from dataclasses import dataclass
+
+from hairkit.errors import FormatError
 
 _ORIENTATION, _EXIF_POINTER = 0x0112, 0x8769
 _FOCAL, _FOCAL_35MM = 0x920A, 0xA405
@@ -17,6 +21,21 @@ _FORMATS = {3: "H", 4: "I", 5: "II"}
 """TIFF types that are read: short, long, rational."""
 _UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0}
 _MAX_ENTRIES = 512
+_WIDTH, _HEIGHT, _BITS, _PHOTOMETRIC = 256, 257, 258, 262
+_SAMPLES, _FORMAT, _DNG_VERSION = 277, 339, 50706
+_ORDERS = {b"II*\0": "<", b"MM\0*": ">"}
+"""Byte orders by a file's first four bytes."""
+_PIECES = ((273, 279), (324, 325))
+"""Tags of places and sizes of strips, and of tiles."""
+_TILE_EDGES = (322, 323)
+_SIZES = {1: "B", 3: "H", 4: "I"}
+"""Types of whole numbers: byte, short, long."""
+_GREY_AND_RGB = (0, 1, 2)
+"""Photometric interpretations: white is zero, black is zero, RGB."""
+_MAX_TIFF_ENTRIES, _MAX_TILE = 4096, 2**13
+"""Most entries of a TIFF file's directory, and the longest edge of a tile in pixels."""
+
+Directory = dict[int, tuple[int, ...]]
 
 
 @dataclass(frozen=True)
@@ -37,7 +56,7 @@ class Exif:
 
 def read_exif(block: bytes) -> Exif:
     """Return the facts in a TIFF-shaped EXIF block; an empty or damaged one gives the defaults."""
-    order = {b"II*\0": "<", b"MM\0*": ">"}.get(block[:4])
+    order = _ORDERS.get(block[:4])
     if order is None:
         return Exif()
     main = _directory(block, order, _number(block, order, 4))
@@ -84,3 +103,81 @@ def _number(block: bytes, order: str, place: int) -> int:
 
 def _within(value: float | None, low: float, high: float) -> float | None:
     return value if value is not None and low <= value <= high else None
+
+
+def scan_tiff(data: bytes, where: str) -> tuple[int, int]:
+    """Return width and height of a TIFF file's first picture as it is stored.
+
+    Raises
+    ------
+    FormatError
+        A raw photo, or samples that are not 8 or 16 bit grey or RGB; the message begins with
+        `where`.
+    ValueError, IndexError, struct.error
+        The file is damaged or cut short.
+    """
+    tags = _read_directory(data)
+    if _DNG_VERSION in tags:
+        raise FormatError(f"{where}: a raw photo, expected a developed one; save it as JPEG or PNG")
+    bits, form = tags.get(_BITS, (1,)), tags.get(_FORMAT, (1,))
+    known = (
+        set(bits) in ({8}, {16}) and set(form) == {1} and tags.get(_SAMPLES, (1,))[0] in (1, 3, 4)
+    )
+    if not known or tags.get(_PHOTOMETRIC, (0,))[0] not in _GREY_AND_RGB:
+        raise FormatError(
+            f"{where}: TIFF of {max(bits)} bits a sample, photometric interpretation"
+            f" {tags.get(_PHOTOMETRIC, (0,))[0]}; expected 8 or 16 bits of grey or RGB; save it as"
+            " JPEG or PNG"
+        )
+    _check_pieces(tags, len(data))
+    return tags[_WIDTH][0], tags[_HEIGHT][0]
+
+
+def clear_orientation(data: bytes) -> bytes:
+    """Return a scanned TIFF file without its rotation, which decoders apply whatever is asked."""
+    order = _ORDERS[data[:4]]
+    (start,) = struct.unpack_from(order + "I", data, 4)
+    (count,) = struct.unpack_from(order + "H", data, start)
+    changed = bytearray(data)
+    for entry in range(start + 2, start + 2 + 12 * count, 12):
+        if struct.unpack_from(order + "H", data, entry) == (_ORIENTATION,):
+            struct.pack_into(order + "HIHH", changed, entry + 2, 3, 1, 1, 0)
+    return bytes(changed)
+
+
+def _read_directory(data: bytes) -> Directory:
+    """Return the whole numbers of every entry of the first directory, by tag."""
+    order = _ORDERS[data[:4]]
+    (start,) = struct.unpack_from(order + "I", data, 4)
+    (count,) = struct.unpack_from(order + "H", data, start)
+    if count > _MAX_TIFF_ENTRIES:
+        raise ValueError("too many entries")
+    tags: Directory = {}
+    for index in range(count):
+        entry = start + 2 + 12 * index
+        tag, kind, length = struct.unpack_from(order + "HHI", data, entry)
+        if kind not in _SIZES:
+            continue
+        size = length * struct.calcsize(_SIZES[kind])
+        place = entry + 8
+        if size > 4:
+            (place,) = struct.unpack_from(order + "I", data, place)
+        if not length or place + size > len(data):
+            raise ValueError("an entry points outside of the file")
+        tags.setdefault(tag, struct.unpack_from(f"{order}{length}{_SIZES[kind]}", data, place))
+    if _WIDTH not in tags or _HEIGHT not in tags:
+        raise ValueError("no size")
+    return tags
+
+
+def _check_pieces(tags: Directory, length: int) -> None:
+    """Raise `ValueError` when strips or tiles lie outside of the file's `length` bytes."""
+    strips, tiles = ((tags.get(place, ()), tags.get(size, ())) for place, size in _PIECES)
+    places, sizes = tiles if tiles[0] else strips
+    if not places or len(places) != len(sizes):
+        raise ValueError("no picture data")
+    if any(place + size > length or not size for place, size in zip(places, sizes, strict=True)):
+        raise ValueError("picture data is missing")
+    edges = [tags.get(tag, (1,))[0] for tag in _TILE_EDGES]
+    if tiles[0] and not 0 < math.prod(edges) <= _MAX_TILE**2:
+        raise ValueError("tiles of an unusual size")

@@ -39,9 +39,14 @@ def read_glb(path: str | os.PathLike[str]) -> FileMesh:
 def _parts(file: GlbFile) -> list[FileMesh]:
     parts: list[FileMesh] = []
     nodes = [(node, placed) for node, placed in file.nodes_in_place() if "mesh" in node]
-    marked = [(node, placed) for node, placed in nodes if _has_scalp(file, node)]
+    meshes = file.document["meshes"]
+    marked = [
+        (node, placed)
+        for node, placed in nodes
+        if any("_SCALP" in part["attributes"] for part in meshes[node["mesh"]]["primitives"])
+    ]
     for node, placed in marked or nodes:
-        mesh = file.document["meshes"][node["mesh"]]
+        mesh = meshes[node["mesh"]]
         names = [node.get("name", ""), mesh.get("name", "")]
         for primitive in mesh["primitives"]:
             if primitive.get("mode", 4) == 4:
@@ -51,11 +56,6 @@ def _parts(file: GlbFile) -> list[FileMesh]:
         if sum(len(part.vertices) for part in parts) > MAX_VERTICES:
             raise ValueError(f"it has more than {MAX_VERTICES} vertices")
     return parts
-
-
-def _has_scalp(file: GlbFile, node: dict[str, Any]) -> bool:
-    primitives = file.document["meshes"][node["mesh"]]["primitives"]
-    return any("_SCALP" in primitive["attributes"] for primitive in primitives)
 
 
 def _primitive(

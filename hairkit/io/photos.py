@@ -20,9 +20,8 @@ import numpy.typing as npt
 
 from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
-from hairkit.io.exif import Exif, read_exif
+from hairkit.io.exif import Exif, clear_orientation, read_exif, scan_tiff
 from hairkit.io.heic import decode_heic, is_heic, read_heic_header
-from hairkit.io.tiff import clear_orientation, scan_tiff
 from hairkit.io.webp import is_webp, scan_webp
 from hairkit.storage import read_bytes
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.types.groom import HairMaterial
 from hairkit.types.strands import Strands
 
@@ -83,14 +83,8 @@ def shares(counts: Int64Array) -> Profile:
 
 def colours(look: HairMaterial, counts: Int64Array) -> Profile:
     """Return the profile (K, 3) of linear RGB from the root's colour to the tip's."""
-    return shares(counts).mapped(
-        lambda share: _mix_colours(look, share.astype(np.float32)[:, None])
-    )
-
-
-def _mix_colours(look: HairMaterial, share: Float32Array) -> Float32Array:
-    mixed: Float32Array = (1 - share) * look.root_colour + share * look.tip_colour
-    return mixed
+    share = shares(counts).mapped(lambda share: share.astype(np.float32)[:, None])
+    return share.mapped(lambda part: (1 - part) * look.root_colour + part * look.tip_colour)
 
 
 def bounds(rows: npt.NDArray[Any]) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:

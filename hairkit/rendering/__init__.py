@@ -23,9 +23,7 @@ from hairkit.rendering.head import Solid
 from hairkit.rendering.light import Lights
 from hairkit.rendering.measurement import (
     Measurements,
-    draw_coverage,
     draw_depth,
-    draw_directions,
     draw_layers,
     draw_measurements,
     points_at_depth,
@@ -39,9 +37,7 @@ __all__ = [
     "Solid",
     "display_width",
     "draw",
-    "draw_coverage",
     "draw_depth",
-    "draw_directions",
     "draw_layers",
     "draw_measurements",
     "draw_views",

@@ -67,9 +67,10 @@ def clip_from_camera(camera: Camera, depth: DepthRange) -> Float64Array:
 
 def set_camera(program: Program, camera: Camera, depth: DepthRange) -> None:
     """Set the camera uniforms that a program uses."""
+    clip_from_head = clip_from_camera(camera, depth) @ camera.camera_from_head
     set_uniforms(
         program,
-        u_clip_from_head=_columns(clip_from_camera(camera, depth) @ camera.camera_from_head),
+        u_clip_from_head=tuple(clip_from_head.T.ravel().tolist()),  # by columns
         u_forward=tuple(camera.forward.tolist()),
         u_depth_offset=float(camera.translation[2]),
         u_size_px=(camera.width, camera.height),
@@ -83,7 +84,3 @@ def set_uniforms(program: Program, **values: object) -> None:
     for name, value in values.items():
         if name in program:
             program[name] = value
-
-
-def _columns(matrix: Float64Array) -> tuple[float, ...]:
-    return tuple(matrix.T.ravel().tolist())

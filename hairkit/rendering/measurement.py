@@ -92,32 +92,6 @@ def draw_measurements(
     )
 
 
-def draw_coverage(
-    strands: Strands,
-    head: Solids,
-    camera: Camera,
-    *,
-    width: float | Float32Array = 5e-4,
-) -> Float32Array:
-    """Return the coverage (H, W) of each pixel, 0 to 1, by hair in front of the head."""
-    return draw_layers(strands, head, camera, width=width)[0]
-
-
-def draw_directions(
-    strands: Strands,
-    head: Solids,
-    camera: Camera,
-    *,
-    width: float | Float32Array = 2e-4,
-) -> tuple[Float32Array, BoolArray]:
-    """Return the 2D angle (H, W) of the visible strand at each pixel, and where there is one.
-
-    Angles are undirected, in [0, pi), from +x towards +y, as in `OrientationMap`; 0 without hair.
-    """
-    measured = draw_measurements(strands, head, camera, width=width)
-    return measured.angle, measured.seen
-
-
 def draw_depth(
     strands: Strands,
     head: Solids,

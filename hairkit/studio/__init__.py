@@ -17,7 +17,6 @@ processes of its own, and all state is in the project's folder.
 * `project`: the files of a project
 * `result_page`: the hair in one file that needs no server
 * `routes`: what pages ask
-* `strand_picture`: the strands found in a photo, drawn over it
 * `studio`: one project being worked on
 * `task_child`: the program that does tasks, in that process
 * `task_process`: a process for tasks, replaced when it dies

@@ -5,6 +5,7 @@ What is found in a photo is kept in a work folder of its own, from which preview
 
 from __future__ import annotations
 
+import colorsys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from functools import cache, lru_cache
@@ -14,6 +15,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from hairkit.arrays import UInt8Array
 from hairkit.imaging.picture_file import write_picture
 from hairkit.io.capture_reader import MOST, WORKING_EDGE
 from hairkit.io.capture_toml import read_capture_file
@@ -28,6 +30,7 @@ from hairkit.types.capture import View
 from hairkit.types.chosen import ChosenHair
 from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR
+from hairkit.types.orientation import OrientationMap
 
 OUTLINE_EDGE = 600
 """Long edge in pixels of photos whose outlines are found while somebody draws."""
@@ -37,6 +40,14 @@ OUTLINE_TOLERANCE = 0.6
 """Pixels of that photo by which an outline may be simplified."""
 
 Tell = Callable[[dict[str, Any]], None]
+STEP, LENGTH = 8, 6.0
+"""Pixels of the picture between lines, and half of a line's length."""
+SCALE = 2
+"""The picture is so many times as large as the photo that strands were found in."""
+SATURATION = 0.55
+"""Of the hues: paler ones are seen on dark hair too."""
+LEAST_SURE = 0.1
+"""Confidence below which no line is drawn; one of 0.5 is drawn opaque."""
 
 
 def look(request: dict[str, Any], tell: Tell) -> Any:
@@ -97,7 +108,6 @@ def draw_strands(request: dict[str, Any], tell: Tell) -> Any:
     `options` are those of its plugin, `tone` is brightness and contrast; the rest is as for
     `find_outline`.
     """
-    from hairkit.studio.strand_picture import draw_strand_lines
 
     seen = _see(request, strands=False)
     found = manager().call(
@@ -200,3 +210,27 @@ def _find(view: View) -> View:
     """Return the view with face and person, where the recipe finds them."""
     face = recipe().ask(manager(), FACES, view=view)
     return view.with_findings(face, recipe().ask(manager(), PERSONS, view=view))
+
+
+def draw_strand_lines(orientation: OrientationMap) -> UInt8Array:
+    """Return (SCALE H, SCALE W, 4) RGBA: lines along strands, their hue by the angle."""
+    height, width = orientation.angle.shape
+    picture = np.zeros((SCALE * height, SCALE * width, 4), np.uint8)
+    rows, columns = np.mgrid[STEP // 2 : height : STEP, STEP // 2 : width : STEP]
+    rows, columns = rows.ravel(), columns.ravel()
+    sure = orientation.confidence[rows, columns]
+    for row, column, share in zip(rows, columns, sure, strict=True):
+        if share < LEAST_SURE:
+            continue
+        angle = float(orientation.angle[row, column])
+        along = LENGTH * np.array([np.cos(angle), np.sin(angle)])
+        middle = SCALE * np.array([column + 0.5, row + 0.5])
+        first, last = (tuple(np.rint(middle + sign * along).astype(int)) for sign in (-1, 1))
+        colour = (*_colour(angle), int(255 * min(2 * share, 1)))
+        cv2.line(picture, first, last, colour, SCALE, cv2.LINE_AA)
+    return picture
+
+
+def _colour(angle: float) -> tuple[int, int, int]:
+    red, green, blue = colorsys.hsv_to_rgb(angle / np.pi % 1, SATURATION, 1.0)
+    return int(255 * red), int(255 * green), int(255 * blue)

@@ -71,6 +71,15 @@ class Project:
             raise InputError(f"{self.folder}: not a folder; name one for the project")
         bare = self.folder.is_dir() and any(map(is_photo, self.folder.iterdir()))
         self.photo_folder = self.folder if bare else self.folder / "photos"
+        self.incoming = self.folder / ".studio" / "incoming"
+        """Folder of uploads that are not complete."""
+        self.pictures = self.folder / ".studio" / "pictures"
+        """Folder of the pictures that pages show."""
+        self.result = self.folder / RESULT
+        """Folder of the groom and its files."""
+        self.groom = self.result / "groom.npz"
+        self.draft = self.result / "studio-draft.bin"
+        """The packet of a quick groom that the whole one will replace."""
         for made in (self.photo_folder, self.folder / "strokes", self.incoming, self.pictures):
             made.mkdir(parents=True, exist_ok=True)
         self._clean_up()
@@ -89,21 +98,6 @@ class Project:
         unfinished = [path for folder in own for path in folder.glob(".*.part")]
         for path in (*unfinished, *result.glob(".*"), *self.incoming.iterdir()):
             shutil.rmtree(path) if path.is_dir() else path.unlink()
-
-    @property
-    def incoming(self) -> Path:
-        """Folder of uploads that are not complete."""
-        return self.folder / ".studio" / "incoming"
-
-    @property
-    def pictures(self) -> Path:
-        """Folder of the pictures that pages show."""
-        return self.folder / ".studio" / "pictures"
-
-    @property
-    def result(self) -> Path:
-        """Folder of the groom and its files."""
-        return self.folder / RESULT
 
     def shot(self, number: int) -> Shot:
         """Return the photo with a number; raises `InputError` if there is none."""
@@ -304,16 +298,6 @@ class Project:
             return dict(json.loads(read_text(path)))
         except (ValueError, TypeError):
             return {}
-
-    @property
-    def groom(self) -> Path:
-        """The file of the groom."""
-        return self.result / "groom.npz"
-
-    @property
-    def draft(self) -> Path:
-        """The packet of a quick groom that the whole one will replace."""
-        return self.result / "studio-draft.bin"
 
     @property
     def enough(self) -> bool:

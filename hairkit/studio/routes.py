@@ -6,6 +6,7 @@ import asyncio
 import tempfile
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import partial
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,7 @@ MOST_PAIRINGS = 20
 """Links that may wait to be opened."""
 _VIDEO_S = 900.0
 _UNKNOWN = "there is none yet"
+_KINDS = {".bin": "application/octet-stream", ".png": "image/png"}
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,8 @@ class Routes:
             ("/api/hold", "PUT", self._hold),
             ("/api/photos/{id:int}", "PUT", self._retake),
             ("/api/photos/{id:int}", "DELETE", self._remove),
-            ("/api/photos/{id:int}/small", "GET", self._small),
-            ("/api/photos/{id:int}/large", "GET", self._large),
+            ("/api/photos/{id:int}/small", "GET", partial(self._picture, size="small")),
+            ("/api/photos/{id:int}/large", "GET", partial(self._picture, size="large")),
             ("/api/photos/{id:int}/outline", "GET", self._outline),
             ("/api/photos/{id:int}/strokes", "GET", self._strokes),
             ("/api/photos/{id:int}/strokes", "PUT", self._draw),
@@ -87,9 +89,9 @@ class Routes:
             ("/api/choices", "PUT", self._choose),
             ("/api/build", "POST", self._build),
             ("/api/build", "DELETE", self._stop),
-            ("/api/result/hair", "GET", self._hair),
-            ("/api/result/draft", "GET", self._draft),
-            ("/api/result/sheet", "GET", self._sheet),
+            ("/api/result/hair", "GET", partial(self._made, name="studio-hair.bin")),
+            ("/api/result/draft", "GET", partial(self._made, name=self._studio.project.draft.name)),
+            ("/api/result/sheet", "GET", partial(self._made, name="contact_sheet.png")),
             ("/api/result/page", "GET", self._page),
             ("/api/result/{plugin:str}", "GET", self._file),
         ]
@@ -195,12 +197,6 @@ class Routes:
         if not self._studio.held:
             self._studio.changed()
         return JSONResponse({})
-
-    async def _small(self, request: Request) -> Response:
-        return await self._picture(request, "small")
-
-    async def _large(self, request: Request) -> Response:
-        return await self._picture(request, "large")
 
     async def _picture(self, request: Request, size: str) -> Response:
         shot = self._shot(request)
@@ -309,17 +305,8 @@ class Routes:
         return JSONResponse({}, HTTPStatus.ACCEPTED)
 
     async def _stop(self, request: Request) -> Response:
-        self._studio.stop_build()
+        self._studio.builder.stop()
         return JSONResponse({}, HTTPStatus.ACCEPTED)
-
-    async def _hair(self, request: Request) -> Response:
-        return self._made("studio-hair.bin", "application/octet-stream")
-
-    async def _draft(self, request: Request) -> Response:
-        return self._made(self._studio.project.draft.name, "application/octet-stream")
-
-    async def _sheet(self, request: Request) -> Response:
-        return self._made("contact_sheet.png", "image/png")
 
     async def _page(self, request: Request) -> Response:
         packet = self._studio.project.result / "studio-hair.bin"
@@ -348,11 +335,11 @@ class Routes:
                 made.replace(path)
         return FileResponse(path, media_type="application/octet-stream", filename=path.name)
 
-    def _made(self, name: str, kind: str) -> Response:
+    async def _made(self, request: Request, name: str) -> Response:
         path = self._studio.project.result / name
         if not path.is_file():
             raise HTTPException(HTTPStatus.NOT_FOUND, _UNKNOWN)
-        return FileResponse(path, media_type=kind)
+        return FileResponse(path, media_type=_KINDS[path.suffix])
 
     def _shot(self, request: Request) -> Shot:
         try:

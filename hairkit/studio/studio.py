@@ -187,10 +187,6 @@ class Studio:
             "ahead": str(project.result / "work" / AHEAD / stem),
         }
 
-    def stop_build(self) -> None:
-        """End a build that is running, at the end of its step."""
-        self.builder.stop()
-
     async def _look(self) -> None:
         """Find what is not known yet of the photos, one after the other."""
         while True:

@@ -4,7 +4,6 @@ The form is that of the thesis behind the default method: a photo and four groom
 four photos; which belong together? A program answers the same questions as a stand-in.
 
 * `subject`: a reconstruction with its photos, or a stock groom, ready to be shown
-* `frame`: the part of a picture that is shown, the same of every head
 * `questionnaire`: which question shows what
 * `retrieval`: the stand-in: the choice whose hair looks most like the question's
 * `pages`: the questionnaire and its results as local pages

@@ -129,7 +129,9 @@ def photograph(
         write_picture(base / "masks" / f"{stem}.png", shoot.labels(camera), PNG_COMPRESSION)
         measured = shoot.measured(camera)
         path = base / "truth" / "orientation" / f"{stem}.png"
-        write_picture(path, _angle_codes(measured), PNG_COMPRESSION)
+        coded = 1 + np.mod(np.rint(measured.angle / np.pi * 255), 255)  # of [0, pi); 0: no hair
+        angles = np.where(measured.seen, coded, 0).astype(np.uint8)
+        write_picture(path, angles, PNG_COMPRESSION)
         visible = points_at_depth(groom.strands, measured.depth, camera)
         seen |= visible.astype(seen.dtype) << seen.dtype.type(index)
     _write_landmarks(base, groom.head, stems, cameras, generator)
@@ -267,12 +269,6 @@ def _write_landmarks(
         views[stem] = np.round(camera.project(points) + noise, 2).tolist()
     document = {"scheme": "68 points, iBUG/Multi-PIE order", "views": views}
     write_text(base / "landmarks.json", json.dumps(document) + "\n")
-
-
-def _angle_codes(measured: Measurements) -> UInt8Array:
-    """Return the true strand angles (H, W): 1 to 255 for [0, pi), 0 where no hair is."""
-    coded = 1 + np.mod(np.rint(measured.angle / np.pi * 255), 255)
-    return np.where(measured.seen, coded, 0).astype(np.uint8)
 
 
 def _write_truth(

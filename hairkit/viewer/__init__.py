@@ -9,7 +9,6 @@ and the window only passes events on and shows the result.
 * `head_adjustment`: manual alignment of the head with the photos
 * `head_motion`: shakes and turns of the head
 * `layers`: photos, masks, orientation, hull and field lines as drawable layers
-* `opening`: opens a groom, an importable file or a results folder
 * `orbit_camera`: the camera that orbits a target
 * `picking`: the guide under the mouse and the lock grabbed with it
 * `preview`: draws a session frame by frame

@@ -94,7 +94,8 @@ class Adjustment:
         """Move the head by metres along the axes of a photo's camera."""
         steps = np.array([right, -up, -back])
         self.pose = self.pose.copy()
-        self.pose[:3, 3] += self._scene_from_head(camera.rotation.T @ steps)
+        linear = self.pose[:3, :3]  # with the scale, which steps in metres do not have
+        self.pose[:3, 3] += linear @ camera.rotation.T @ steps / np.cbrt(np.linalg.det(linear))
 
     def turn(self, axis: str, degrees: float) -> None:
         """Rotate the head by degrees about one of its own axes, through its centre."""
@@ -114,12 +115,6 @@ class Adjustment:
         path = self.folder / "capture.toml"
         write_head_entry(path, head_entry(self.pose))
         return path
-
-    def _scene_from_head(self, way: Float64Array) -> Float64Array:
-        """Return a displacement (3,) of the head frame in the scene frame, metres."""
-        linear = self.pose[:3, :3]
-        result: Float64Array = linear @ way / np.cbrt(np.linalg.det(linear))
-        return result
 
 
 def _fit_pose(found: list[Camera], nominal: list[Camera], vertices: Float32Array) -> Float64Array:

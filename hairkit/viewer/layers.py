@@ -170,7 +170,8 @@ class Layers:
         return self._images(COMPARED_EDGE)
 
     def _photos(self) -> dict[str, UInt8Array]:
-        return {name: _add_alpha(image) for name, image in self._images(PHOTO_EDGE).items()}
+        photos = self._images(PHOTO_EDGE).items()
+        return {name: np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2RGBA)) for name, image in photos}
 
     def _images(self, edge: int) -> dict[str, UInt8Array]:
         if self.capture is None:
@@ -232,10 +233,6 @@ def _hsv_picture(found: OrientationMap) -> UInt8Array:
     rgb = cv2.cvtColor(np.stack([hue, half, half], axis=-1), cv2.COLOR_HSV2RGB)
     alpha = (np.sqrt(found.confidence) * 255).astype(np.uint8)
     return np.asarray(np.dstack([rgb, alpha]), np.uint8)
-
-
-def _add_alpha(image: UInt8Array) -> UInt8Array:
-    return np.asarray(np.dstack([image, np.full(image.shape[:2], 255, np.uint8)]), np.uint8)
 
 
 def _picture_corners(camera: Camera) -> Float32Array:

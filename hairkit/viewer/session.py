@@ -13,14 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
+from hairkit.errors import InputError
 from hairkit.manager import Manager
+from hairkit.pipeline.open_groom import groom_path, load_groom
 from hairkit.simulation.simulator import Measures, Surroundings
 from hairkit.types.camera import Camera
+from hairkit.types.groom import Groom
 from hairkit.viewer.draw.hair_data import HairBody, choose_shares, sample_guides, split_guides
 from hairkit.viewer.head_adjustment import EDGE, Adjustment, Rerun
 from hairkit.viewer.head_motion import HeadMotion
 from hairkit.viewer.layers import Layers
-from hairkit.viewer.opening import Opened, open_path
 from hairkit.viewer.orbit_camera import OrbitView
 from hairkit.viewer.picking import GrabbedLock
 from hairkit.viewer.recording import Recorder
@@ -319,3 +321,31 @@ def fit_camera(camera: Camera, width: int, height: int) -> Camera:
     focal, centre = camera.focal * scale, camera.centre * scale
     spare = np.array([width - camera.width * scale, height - camera.height * scale]) / 2
     return Camera(camera.camera_from_head, focal, centre + spare, width, height, camera.model)
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """A groom and where it came from."""
+
+    groom: Groom
+    path: Path
+    results: Path | None
+    """The folder that `hairkit reconstruct` wrote, if the groom is in one."""
+
+
+def open_path(path: Path, manager: Manager, settings: Mapping[str, object] | None = None) -> Opened:
+    """Open a groom.npz, a folder that holds one, or a file that an import plugin reads.
+
+    `settings` are options of the import plugin.
+
+    Raises
+    ------
+    InputError
+        The file does not exist, no plugin reads it, or it holds no strands.
+    """
+    path = groom_path(path)
+    groom = load_groom(manager, path, settings)
+    if not len(groom.strands):
+        raise InputError(f"{path}: holds no strands, expected at least one; open another file")
+    results = path.parent if (path.parent / "work").is_dir() else None
+    return Opened(groom, path, results)

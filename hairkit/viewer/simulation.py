@@ -13,7 +13,6 @@ from hairkit.manager import Manager
 from hairkit.options import OptionInfo, unknown_name
 from hairkit.simulation.simulator import Measures, Simulator, Surroundings
 from hairkit.types.groom import Groom
-from hairkit.types.strands import Strands
 
 PREFERRED = "rods"
 """Plugin used if none is named."""
@@ -28,39 +27,20 @@ RELATIVE_STEP = 0.1
 class RigidHair:
     """Hair that moves rigidly with the head, for viewing without a simulator."""
 
+    options = None
+
     def __init__(self, groom: Groom) -> None:
-        self._strands = groom.strands
-        self._time = 0.0
-        self._points = groom.strands.points
-
-    @property
-    def strands(self) -> Strands:
-        """The guides at rest."""
-        return self._strands
-
-    @property
-    def options(self) -> Any:
-        """None: there are no options."""
-        return None
-
-    @property
-    def time(self) -> float:
-        """Seconds since the start."""
-        return self._time
-
-    @property
-    def points(self) -> Float32Array:
-        """(P, 3) present positions."""
-        return self._points
+        self.strands = groom.strands
+        self.reset()
 
     def advance(self, seconds: float, surroundings: Surroundings) -> None:
         """Move the hair with the head."""
-        self._time += seconds
+        self.time += seconds
         self._move(surroundings.head_from_rest)
 
     def reset(self, head_from_rest: npt.ArrayLike | None = None) -> None:
         """Move the hair to the head; set the time to 0."""
-        self._time = 0.0
+        self.time = 0.0
         self._move(np.eye(4) if head_from_rest is None else np.asarray(head_from_rest))
 
     def retune(self, options: Any) -> None:
@@ -71,8 +51,8 @@ class RigidHair:
         return Measures(0.0, 0.0, 0.0)
 
     def _move(self, matrix: npt.NDArray[np.float64]) -> None:
-        moved = self._strands.points @ matrix[:3, :3].T + matrix[:3, 3]
-        self._points = moved.astype(np.float32)
+        moved = self.strands.points @ matrix[:3, :3].T + matrix[:3, 3]
+        self.points: Float32Array = moved.astype(np.float32)
 
 
 def default_simulator(manager: Manager) -> str:

@@ -34,7 +34,7 @@ def encode_maps(atlas: Atlas, material: HairMaterial) -> dict[str, bytes]:
     """Return the PNG of each map: `albedo` with coverage as alpha, and the others by name."""
     pictures: dict[str, Callable[[], UInt8Array]] = {
         "albedo": partial(_albedo, atlas, material),
-        "alpha": partial(_coverage, atlas),
+        "alpha": lambda: np.rint(255 * atlas.alpha).astype(np.uint8),
         "normal": partial(_directions, atlas.normal, outward=True),
         "flow": partial(_directions, atlas.flow, outward=False),
         "depth": partial(_depth, atlas),
@@ -65,11 +65,6 @@ def _scattered(number: UInt8Array) -> UInt8Array:
     table = (np.arange(256) * SCATTER % SHADES).astype(np.uint8)
     shade: UInt8Array = table[number]
     return shade
-
-
-def _coverage(atlas: Atlas) -> UInt8Array:
-    grey: UInt8Array = np.rint(255 * atlas.alpha).astype(np.uint8)
-    return grey
 
 
 def _directions(parts: Int8Array, *, outward: bool) -> UInt8Array:

@@ -76,7 +76,8 @@ def make_cards(strands: Strands, lock: Int64Array, stations: int, middle: Float6
     count = np.diff([*first, len(some)])
     centre = np.add.reduceat(points, first) / count[:, None, None]
     along = _unit(np.gradient(centre, axis=1))
-    away = _across_part(centre - middle, along)
+    outwards = centre - middle
+    away = _unit(outwards - (outwards * along).sum(axis=-1, keepdims=True) * along)
     offset = points - np.repeat(centre, count, axis=0)
     flat = np.cross(along, away)
     # the scatter of the strands in the plane across the card, as a symmetric 2 x 2 matrix
@@ -130,12 +131,6 @@ def _smoothed(values: Float64Array) -> Float64Array:
     before, here, after = SMOOTHING
     mixed: Float64Array = before * padded[:, :-2] + here * values + after * padded[:, 2:]
     return mixed
-
-
-def _across_part(vectors: Float64Array, along: Float64Array) -> Float64Array:
-    """Return the unit parts of vectors (..., 3) at right angles to unit directions (..., 3)."""
-    part = vectors - (vectors * along).sum(axis=-1, keepdims=True) * along
-    return _unit(part)
 
 
 def _unit(vectors: Float64Array) -> Float64Array:

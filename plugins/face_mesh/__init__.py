@@ -14,31 +14,37 @@ It needs three networks: `hairkit models install`. Without them it finds no face
 
 * `crops`: square crops at any angle, and the mesh in them
 * `detector`: where a face is, in four orientations
-* `head_angles`: yaw, pitch and roll of the head
 * `landmark_table`: 468 mesh points to 68 landmarks, and their noise
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from hairkit import View, hookimpl
 from hairkit.arrays import Float64Array, UInt8Array
+from hairkit.cameras.similarity import fit_similarity
+from hairkit.head_model.template import default_head
 from hairkit.nets.model_folder import missing_models
 from hairkit.nets.net_process import NetProcess, shared_nets
 from hairkit.options import option
 from hairkit.types.face import Face
+from hairkit.types.head import JAW_LANDMARKS
 
 from .crops import Crop, crop_around, find_mesh, refine_crop, wobble
 from .detector import FULL_RANGE, SHORT_RANGE, Detection, detect
-from .head_angles import measure_angles
 from .landmark_table import MESH, noise_of, pick_landmarks
 
 MODELS = (SHORT_RANGE, FULL_RANGE, MESH)
 _UPRIGHT_DEG = 45.0
 """A face rolled by more in a turned photo belongs to another quarter turn."""
+OVERSHOOT = 0.0023
+"""Share of the yaw that the mesh turns too far, for each degree of yaw: near faces are turned
+towards perspective cameras, which the network does not know. Measured by
+`benchmarks/face_landmarks.py` on rendered heads."""
 
 
 @dataclass(frozen=True)
@@ -71,18 +77,14 @@ def find_face(image: UInt8Array, options: Options, nets: NetProcess) -> Face:
             break  # the rest scores less, however sure the mesh is
         mesh, presence = find_mesh(image, [found.crop()], nets)
         around = crop_around(mesh[0])
-        upright = abs(_roll(around, found.quarter_turns)) < np.radians(_UPRIGHT_DEG)
+        turned = np.exp(1j * (around.angle + found.quarter_turns * np.pi / 2))
+        upright = abs(np.angle(turned, deg=True)) < _UPRIGHT_DEG
         if upright and found.score * presence[0] > best_score:
             best, best_score = (found, around), float(found.score * presence[0])
     if best is None:
         return Face.absent()
     found, around = best
     return _settle(image, found, refine_crop(image, around, nets), options, nets)
-
-
-def _roll(crop: Crop, quarter_turns: int) -> float:
-    """Return the angle of a crop in the photo turned upright, in (-pi, pi]."""
-    return float(np.angle(np.exp(1j * (crop.angle + quarter_turns * np.pi / 2))))
 
 
 def _settle(
@@ -107,3 +109,26 @@ def _upright(points: Float64Array, quarter_turns: int) -> Float64Array:
     for _ in range(quarter_turns):
         x, y = -y, x
     return np.stack([x, y, z], axis=1)
+
+
+def measure_angles(points: Float64Array) -> tuple[float, float, float]:
+    """Return yaw, pitch and roll in degrees of landmarks (68, 3) in an upright photo.
+
+    Yaw is the camera's azimuth (positive on the subject's left), pitch its elevation; a positive
+    roll is clockwise in the photo. The landmarks without the jaw are turned on to those of the
+    default head; x is right, y down, z away from the camera.
+    """
+    seen = fit_similarity(_average(), points[JAW_LANDMARKS:]).rotation
+    towards, up = -seen[2], seen[:, 1]
+    yaw = np.degrees(np.arctan2(towards[0], towards[2]))
+    pitch = np.degrees(np.arcsin(np.clip(towards[1], -1, 1)))
+    roll = np.degrees(np.arctan2(up[0], -up[1]))
+    return float(yaw * (1 - OVERSHOOT * abs(yaw))), float(pitch), float(roll)
+
+
+@cache
+def _average() -> Float64Array:
+    """Return the landmarks of the default head without the jaw, (51, 3) metres."""
+    head = default_head()
+    marked = np.asarray(head.landmark_vertices)
+    return np.asarray(head.vertices[marked[JAW_LANDMARKS:]], np.float64)

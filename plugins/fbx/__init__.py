@@ -11,7 +11,6 @@ Source: the layout of Blender's documentation of FBX binary files (Campbell Bart
 
 * `body`: head mesh, skeleton, skin and bind pose
 * `builder`: objects and their connections
-* `curves`: strands as NURBS curves of degree 1
 * `look`: material, texture maps and blendshapes
 * `records`: binary records of FBX 7.4
 * `scene`: the document: header, objects, connections

@@ -6,13 +6,11 @@ and as triangles for viewers, which is not.
 
 * `baking`: a point cache as morph targets
 * `extras`: `extras.hairkit`
-* `joining`: line segments joined to strands
 * `meshes`: head, lines and strips as meshes
 * `options`: settings of .glb files
 * `reader`: strands from the lines of a file
 * `ribbons`: hair as ribbons or cards
 * `scene`: the document of a groom
-* `skin`: the head's material
 * `strips`: ribbons and cards at several levels of detail
 * `texture`: strand and relief pictures for strips
 """

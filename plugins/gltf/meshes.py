@@ -14,14 +14,17 @@ from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.head_model.bust import CLOTH, Bust
 from hairkit.io.glb_document import INDICES, Document, index_type
+from hairkit.io.glb_skin import ROUGHNESS_CHANNEL
 from hairkit.io.strand_blocks import shares
 from hairkit.io.streamed import Streamed, at_points, repeat_row, segments
+from hairkit.io.textures import grey
 from hairkit.types.groom import Groom
-from hairkit.types.skin import SkinMaps
+from hairkit.types.skin import SkinMaps, Texture
+from hairkit.types.skin_look import SkinLook
 from hairkit.types.strands import Strands
 
-from .skin import SKIN_COLOUR, skin_material
 from .strips import HairMesh
+from .texture import white_picture
 
 JOINTS = ("root", "neck", "head")
 ROOT_JOINT, HEAD_JOINT = JOINTS.index("root"), JOINTS.index("head")
@@ -29,6 +32,12 @@ LINES = 1
 ROUGHNESS = {"hair": 0.45, "guides": 0.6, "cloth": 0.9}
 _SCALP_SHADE = 0.6
 """Brightness of the scalp in shares of the roots' colour: hair shades what lies below it."""
+SKIN_COLOUR = np.array([0.58, 0.4, 0.32])
+"""Linear RGB of skin without an albedo map."""
+LOOK = SkinLook()
+"""Roughness of skin without a roughness map, and its refractive index."""
+_INDEX = "KHR_materials_ior"
+"""Extension of glTF that takes that index."""
 
 
 class Meshes:
@@ -217,3 +226,40 @@ def _plain(document: Document, name: str, colour: Float64Array) -> int:
         "roughnessFactor": ROUGHNESS[name],
     }
     return document.add("materials", name=name, pbrMetallicRoughness=look)
+
+
+def skin_material(document: Document, maps: SkinMaps) -> int:
+    """Add the material and return it. glTF has no bump maps: that one is left out."""
+    colour = [1.0, 1.0, 1.0] if maps.albedo is not None else SKIN_COLOUR.tolist()
+    # without a picture of the skin, validators call the uv unused
+    albedo = white_picture() if maps.albedo is None else maps.albedo.data.tobytes()
+    look: dict[str, Any] = {
+        "baseColorFactor": [*colour, 1.0],
+        "baseColorTexture": {"index": document.image(albedo, "albedo")},
+        "metallicFactor": 0.0,
+        "roughnessFactor": LOOK.roughness,
+    }
+    if maps.roughness is not None:
+        packed = _pack_roughness(maps.roughness)
+        look["metallicRoughnessTexture"] = {"index": document.image(packed, "roughness")}
+        look["roughnessFactor"] = 1.0
+    normal = None
+    if maps.normal is not None:
+        normal = {"index": document.image(maps.normal.data.tobytes(), "normal")}
+    index = {_INDEX: {"ior": LOOK.ior}}
+    document.json.setdefault("extensionsUsed", []).append(_INDEX)
+    return document.add(
+        "materials",
+        name="head",
+        pbrMetallicRoughness=look,
+        normalTexture=normal,
+        extensions=index,
+    )
+
+
+def _pack_roughness(roughness: Texture) -> bytes:
+    """Return a PNG with the roughness in the channel where glTF reads it."""
+    values = grey(roughness)
+    packed = np.zeros((*values.shape, 3), np.uint8)
+    packed[..., ROUGHNESS_CHANNEL] = values
+    return Texture.encode(packed).data.tobytes()

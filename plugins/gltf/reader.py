@@ -15,6 +15,7 @@ from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands
 from hairkit.head_model.scalp import bind
 from hairkit.io.glb_file import GlbFile, readable
 from hairkit.io.glb_skin import material_maps, shape_offsets
+from hairkit.io.polylines import join_segments
 from hairkit.io.textures import as_maps
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head
@@ -22,7 +23,6 @@ from hairkit.types.skin import Blendshape
 from hairkit.types.strands import Strands
 
 from .extras import VERSION, capsules_of, material_of, physics_of, ties_of, with_landmarks
-from .joining import join_segments
 from .meshes import JOINTS
 from .options import Options
 

@@ -66,6 +66,8 @@ def groom_to_asset(groom: Groom, layout: Layout) -> ApxAsset:
     uv = roots.uv[faces].astype(np.float64)
     uv[..., 1] = 1.0 - uv[..., 1]
     joints = head.joints.astype(np.float64) @ turn.T
+    poses = np.tile(np.eye(4), (len(joints), 1, 1))
+    poses[:, 3, :3] = joints
     spheres, capsules = _collision(head, joints, turn)
     count = len(strands)
     return ApxAsset(
@@ -76,7 +78,7 @@ def groom_to_asset(groom: Groom, layout: Layout) -> ApxAsset:
         bone_indices=np.tile([float(BONES.index("head")), 0.0, 0.0, 0.0], (count, 1)),
         bone_weights=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
         bone_names=BONES,
-        bind_poses=_bind_poses(joints),
+        bind_poses=poses,
         bone_parents=np.array(PARENTS),
         spheres=spheres,
         capsules=capsules,
@@ -130,12 +132,6 @@ def _own_face(root: int, roots: Roots, way: Float64Array) -> Int64Array:
     a, b, c = roots.positions[corners].astype(np.float64)
     outward = roots.normals[corners].sum(axis=0)
     return corners if np.cross(b - a, c - a) @ outward >= 0 else corners[::-1]
-
-
-def _bind_poses(joints: Float64Array) -> Float64Array:
-    poses = np.tile(np.eye(4), (len(joints), 1, 1))
-    poses[:, 3, :3] = joints
-    return poses
 
 
 def _collision(

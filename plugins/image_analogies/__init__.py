@@ -3,7 +3,6 @@
 * `blur_match`: the blur that makes the example look like the texture
 * `features`: windows around a pixel, and their distance
 * `pyramid`: Gaussian pyramids
-* `regions`: areas of common colour, blended at their borders
 * `search_tree`: nearest features by a k-d tree
 * `synthesis`: the analogy, level by level
 """
@@ -14,9 +13,10 @@ import logging
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
-from hairkit.arrays import BoolArray, Float32Array
+from hairkit.arrays import BoolArray, Float32Array, Int32Array
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
 from hairkit.io.textures import read_texture
@@ -25,7 +25,6 @@ from hairkit.types.skin import Texture
 from hairkit.types.texture_example import TextureExample
 
 from .blur_match import blur, find_blur
-from .regions import allowed_pixels, blend_weights, find_regions
 from .synthesis import Settings, synthesise
 
 _log = logging.getLogger("hairkit")
@@ -34,6 +33,13 @@ _LUMINANCE = np.array([0.299, 0.587, 0.114], np.float32)
 """Weights of R, G and B in Y of YIQ (ITU-R BT.601)."""
 _LEAST_DEVIATION = 1e-3
 """Deviation of the luminance, of 1, below which a picture has no contrast to be matched."""
+SHARE_OF_EDGE = 1 / 64
+"""Width of the blur before colours are compared, by the texture's shorter side."""
+LEAST_SHARE = 0.01
+"""Share of the example that an area must have, below which the whole example is used for it."""
+_ROUNDS, _TOLERANCE, _TRIES, _SEED = 30, 0.1, 3, 1
+"""Of k-means: rounds at most, moves of the means in CIELAB at which it ends, starts, and their
+seed."""
 
 
 @dataclass(frozen=True)
@@ -170,3 +176,50 @@ def _remapping(example: Float32Array, texture: Float32Array) -> tuple[float, flo
 def _as_floats(texture: Texture) -> Float32Array:
     """Return (H, W, 3) RGB from 0 to 1."""
     return np.asarray(texture.pixels, np.float32) / np.float32(255)
+
+
+def find_regions(
+    texture: Float32Array, example: Float32Array, count: int
+) -> tuple[Int32Array, Int32Array]:
+    """Return the regions (h, w) of a texture and (H, W) of its example, numbers below `count`.
+
+    A face has areas of different skin: lips, cheeks, chin. Both pictures are divided by the same
+    mean colours, k-means in CIELAB of the blurred texture.
+    Both pictures are RGB (h, w, 3) from 0 to 1.
+    """
+    colours = _smooth_lab(texture)
+    criteria = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, _ROUNDS, _TOLERANCE)
+    cv2.setRNGSeed(_SEED)
+    labels = np.zeros((colours.shape[0] * colours.shape[1], 1), np.int32)
+    _, labels, means = cv2.kmeans(
+        colours.reshape(-1, 3), count, labels, criteria, _TRIES, cv2.KMEANS_PP_CENTERS
+    )
+    others = _smooth_lab(example)
+    nearest = np.square(others[:, :, None] - means).sum(axis=-1).argmin(axis=-1)
+    return labels.reshape(colours.shape[:2]).astype(np.int32), nearest.astype(np.int32)
+
+
+def allowed_pixels(regions: Int32Array, number: int) -> BoolArray:
+    """Return (H, W) where the example may be used for a region: there, or everywhere if small."""
+    inside = regions == number
+    return inside if inside.mean() >= LEAST_SHARE else np.ones_like(inside)
+
+
+def blend_weights(regions: Int32Array, count: int, border: int) -> Float32Array:
+    """Return (N, h, w) the weight of each region: 1 inside, linear over `border` pixels, sum 1.
+
+    A mean over a square of `border` pixels makes the step at a straight edge a linear ramp.
+    """
+    size = (2 * (border // 2) + 1,) * 2
+    ramps = [
+        cv2.blur((regions == n).astype(np.float32), size, borderType=cv2.BORDER_REPLICATE)
+        for n in range(count)
+    ]
+    weights = np.stack(ramps).clip(0)
+    weights[weights < np.float32(1 / (size[0] * size[1] + 1))] = 0  # round-off of the running sums
+    return np.asarray(weights / weights.sum(axis=0), np.float32)
+
+
+def _smooth_lab(image: Float32Array) -> Float32Array:
+    sigma = max(min(image.shape[:2]) * SHARE_OF_EDGE, 1.0)
+    return np.asarray(cv2.cvtColor(cv2.GaussianBlur(image, (0, 0), sigma), cv2.COLOR_RGB2LAB))

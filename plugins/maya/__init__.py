@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hairkit.arrays import BoolArray, Int64Array
+from hairkit.arrays import Int64Array
 from hairkit.errors import InputError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
@@ -116,30 +116,20 @@ def _unit(space: FileSpace) -> str:
 
 def _scene(strands: Strands, space: FileSpace) -> Iterator[bytes]:
     """Yield the groups, each with its curves."""
-    for kind, chosen in _kinds(strands):
-        assert strands.group is not None
+    assert strands.guide is not None
+    assert strands.group is not None
+    for kind, top, chosen in (
+        ("guide", "guides", strands.guide),
+        ("hair", "hair", ~strands.guide),
+    ):
         groups = np.unique(strands.group[chosen])
         for group in groups.tolist():
-            name = kind.group if groups.tolist() == [0] else _number_name(kind.group, group)
+            # letters, digits and underscores, as Maya's names are
+            number = f"_{group}" if group >= 0 else f"_minus{-group}"
+            name = top if groups.tolist() == [0] else top + number
             yield f'createNode transform -n "{name}" -p "|{_TOP}";\n'.encode("ascii")
             index = np.flatnonzero(chosen & (strands.group == group))
-            yield from _curves(strands, space, index, name.encode(), kind.curve.encode())
-
-
-@dataclass(frozen=True)
-class _Kind:
-    group: str
-    curve: str
-
-
-def _kinds(strands: Strands) -> list[tuple[_Kind, BoolArray]]:
-    assert strands.guide is not None
-    return [(_Kind("guides", "guide"), strands.guide), (_Kind("hair", "hair"), ~strands.guide)]
-
-
-def _number_name(name: str, number: int) -> str:
-    """Return a name of letters, digits and underscores, as Maya's are."""
-    return f"{name}_{number}" if number >= 0 else f"{name}_minus{-number}"
+            yield from _curves(strands, space, index, name.encode(), kind.encode())
 
 
 def _curves(

@@ -11,7 +11,6 @@ is one from above. What is no turn around one head is refused in one line.
 * `describe`: order and names of views, and the summary
 * `refuse`: what is no turn
 * `search`: the cheapest arrangement
-* `upright`: which side of a photo is up
 """
 
 from __future__ import annotations
@@ -22,8 +21,8 @@ from dataclasses import replace
 import numpy as np
 
 from hairkit import Capture, View, hookimpl
-from hairkit.arrays import BoolArray, Float64Array
-from hairkit.types.face import Face
+from hairkit.arrays import BoolArray, Float64Array, Int64Array, UInt8Array
+from hairkit.types.face import SURE_PRESENCE, Face
 from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
 
@@ -38,7 +37,6 @@ from .arrangement import Evidence
 from .describe import Found, in_turn_order, name_views, summarise
 from .refuse import check_one_person, check_turn, contradicting, find_copies, photo_name
 from .search import find_arrangements, margin_of
-from .upright import find_quarter_turns
 
 ABOVE_DEG = 35.0
 """Photos from higher than this are no part of the ring."""
@@ -47,6 +45,13 @@ USUAL_ABOVE_DEG = 55.0
 PITCH_SPREAD, PITCH_BIAS, RING_SPREAD, STRAY_SPREAD = 5.0, 4.0, 6.0, 3.0
 """Standard deviations in degrees: of a face's pitch, of what all pitches of one head have in
 common, of rings of photos from level, of photos from their ring."""
+FACE_VOTES = 3.0
+"""Votes of a face; the edge of a picture where the person stands has one. Of 152 masks the edge
+was right in 148, of 31 faces all."""
+CLEAR = 2.0
+"""The person covers the bottom edge at least this many times as far as any other."""
+TURNS_TO_BOTTOM = np.array([0, 1, 2, 3])
+"""Clockwise quarter turns that bring the bottom, right, top and left edge to the bottom."""
 
 
 @hookimpl
@@ -104,7 +109,7 @@ def _arrange(views: Sequence[View], faces: Sequence[Face], named: BoolArray) -> 
         distances = compare_outlines(outlines)
     seen = Evidence.of(faces, distances, skin)
     azimuth = np.array([view.azimuth_deg for view in views])
-    evidence = seen.with_azimuths(azimuth, named)
+    evidence = replace(seen, yaw_deg=np.where(named, azimuth, seen.yaw_deg))
     elevation = np.array([view.elevation_deg for view in views])
     pitch = np.array([face.pitch_deg if face.sure else np.nan for face in faces])
     pitch = np.where(named, elevation, pitch)
@@ -144,3 +149,39 @@ def _ring_elevations(pitch: Float64Array, above: BoolArray) -> Float64Array:
     ring = mean * RING_SPREAD**2 / (RING_SPREAD**2 + PITCH_BIAS**2 + noise / seen.sum())
     own = np.where(seen, np.nan_to_num(pitch) - mean, 0.0) * STRAY_SPREAD**2 / noise
     return np.asarray(ring + own, np.float64)
+
+
+def find_quarter_turns(
+    sizes: Sequence[tuple[int, int]], faces: Sequence[Face], persons: Sequence[Person]
+) -> Int64Array:
+    """Return the clockwise quarter turns (V,) that bring the photos upright.
+
+    Photos are turned by the majority of those with the same long side (`sizes` are widths and
+    heights): a camera is held one way for a while.
+    """
+    turns = np.zeros(len(sizes), np.int64)
+    wide = np.array([width > height for width, height in sizes])
+    votes = np.array([_votes(f, p) for f, p in zip(faces, persons, strict=True)])
+    for group in (wide, ~wide):
+        if group.any():
+            turns[group] = int(votes[group].sum(axis=0).argmax())
+    return turns
+
+
+def _votes(face: Face, person: Person) -> Float64Array:
+    """Return the votes (4,) of a photo for 0 to 3 quarter turns."""
+    votes = np.zeros(4)
+    if face.presence >= SURE_PRESENCE:
+        votes[face.quarter_turns] = FACE_VOTES
+    elif person.alpha.size:
+        covered = _covered_edges(person.alpha)
+        first, second = np.argsort(covered)[::-1][:2]
+        if covered[first] > CLEAR * covered[second]:
+            votes[TURNS_TO_BOTTOM[first]] = 1.0
+    return votes
+
+
+def _covered_edges(alpha: UInt8Array) -> Float64Array:
+    """Return the share of the bottom, right, top and left edge that the person covers."""
+    edges = (alpha[-1], alpha[:, -1], alpha[0], alpha[:, 0])
+    return np.array([edge.mean() / np.iinfo(np.uint8).max for edge in edges])

@@ -8,7 +8,7 @@ squared standard deviation, as negative logarithms of likelihoods are.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -71,10 +71,6 @@ class Evidence:
         alike, mirrored = outlines if outlines is not None else (None, None)
         return cls(yaw, alike, mirrored, skin)
 
-    def with_azimuths(self, azimuth_deg: Float64Array, known: BoolArray) -> Evidence:
-        """Return the evidence with some azimuths that a user said in place of the faces'."""
-        return replace(self, yaw_deg=np.where(known, azimuth_deg, self.yaw_deg))
-
 
 @dataclass(frozen=True, eq=False)
 class Ring:
@@ -130,7 +126,9 @@ def place(ring: Ring, evidence: Evidence) -> Placed | None:
         return None
     steps = _spread_between(yaw) if ring.steps_deg is None else ring.steps_deg
     spread = np.hypot(STRAY_DEG, yaw_spread(yaw))
-    azimuth = wrap(steps + mean_angle(yaw[seen] - steps[seen], spread[seen] ** -2))
+    # the weighted circular mean of what the faces say of the phase
+    off = np.exp(1j * np.radians(yaw[seen] - steps[seen]))
+    azimuth = wrap(steps + float(np.degrees(np.angle(spread[seen] ** -2 @ off))))
     off = np.where(seen, wrap(yaw - azimuth), 0.0)
     cost = np.minimum(off[seen] ** 2 / (2 * spread[seen] ** 2), FACE_CAP).sum()
     azimuth[seen] = wrap(azimuth + (STRAY_DEG / spread) ** 2 * off)[seen]
@@ -150,11 +148,6 @@ def yaw_spread(yaw_deg: Float64Array) -> Float64Array:
     """Return the standard deviation of azimuths that faces tell, degrees."""
     beyond = np.maximum(np.abs(yaw_deg) - OBLIQUE_DEG, 0)
     return np.asarray(YAW_DEG + OBLIQUE_GROWTH * beyond, np.float64)
-
-
-def mean_angle(angle_deg: Float64Array, weight: Float64Array) -> float:
-    """Return the weighted circular mean of angles, degrees."""
-    return float(np.degrees(np.angle(weight @ np.exp(1j * np.radians(angle_deg)))))
 
 
 def _spread_between(yaw: Float64Array) -> Float64Array:

@@ -133,7 +133,10 @@ class Search:
         """Return the cost of a solution by the evidence there and by the prior."""
         prior = (fit.prior_mean - fit.vector) / self._spread(fit)
         numbers = len(fit.vector) - SHARED
-        return seen.cost + float(prior @ prior) + precision_cost(fit.precision, numbers)
+        # of the precision of so many deviations, without that of the deviations
+        care = CARE_FREEDOM * fit.precision
+        care -= (numbers + CARE_FREEDOM) * float(np.log(fit.precision))
+        return seen.cost + float(prior @ prior) + care
 
     def _move(self, fit: Fit, seen: Evidence, damping: float) -> Float64Array:
         """Return the damped step; the perspective of orthographic cameras stays."""
@@ -177,8 +180,3 @@ class Search:
                 if trial.cost < best.cost:
                     best = trial
         return best
-
-
-def precision_cost(precision: float, numbers: int) -> float:
-    """Return the cost of a precision of so many deviations, without that of the deviations."""
-    return CARE_FREEDOM * precision - (numbers + CARE_FREEDOM) * float(np.log(precision))

@@ -6,9 +6,8 @@ point. The first two points of a strand are fixed to the head. The .tfxbone bind
 the joints. Binary files of version 3 and the text files of version 1 and 2 are read.
 
 * `binary`: .tfx of versions 4 and 3
-* `bones`: .tfxbone files
 * `text`: .tfx of versions 1 and 2
-* `writer`: blocks of a .tfx in order
+* `writer`: blocks of a .tfx in order, and .tfxbone files
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ from hairkit.arrays import Float32Array
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
+    mean_look,
     pack_strands,
     plain_widths,
     rows_kept,
-    with_mean_width,
 )
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
@@ -34,13 +33,12 @@ from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
 from hairkit.storage import read_bytes, write_bytes, write_pieces
-from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 from .binary import TfxHair, read_binary
-from .bones import bone_bytes
 from .text import is_text, read_text
-from .writer import tfx_pieces
+from .writer import bone_bytes, tfx_pieces
 
 __all__ = ["FORMAT", "Options", "TfxHair", "bone_bytes", "read_binary", "read_text", "tfx_pieces"]
 
@@ -99,7 +97,7 @@ def import_groom(path: Path, options: Options) -> Groom:
     if hair.colours is not None:
         colours = hair.colours.reshape(-1, 3)[rows_kept(counts, kept)]
     strands = Strands(strands.points, strands.offsets, widths, uv)
-    return adopt(strands, options, path, _look(colours, strands))
+    return adopt(strands, options, path, mean_look(strands, colours))
 
 
 def _resample(groom: Groom, count: int) -> Groom:
@@ -113,12 +111,3 @@ def _flip_v(uv: Float32Array, options: Options) -> Float32Array:
     if options.flip_v:
         turned[:, 1] = 1 - turned[:, 1]
     return turned
-
-
-def _look(colours: Float32Array | None, strands: Strands) -> HairMaterial | None:
-    """Return the mean colours of roots and tips; None where the file has none."""
-    if colours is None:
-        return None
-    root = colours[strands.offsets[:-1]].mean(axis=0, dtype=np.float64)
-    tip = colours[strands.offsets[1:] - 1].mean(axis=0, dtype=np.float64)
-    return replace(with_mean_width(strands), root_colour=root, tip_colour=tip)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 
 import numpy as np
 
 from hairkit.arrays import Float32Array
-from hairkit.io.byte_writer import as_bytes
+from hairkit.io.byte_writer import as_bytes, join_bytes
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.io.strand_blocks import blocks, colours
 from hairkit.types.groom import Groom
@@ -16,6 +17,11 @@ from .binary import HEADER, VERSION
 
 FIXED = 2
 """Points at the root that do not move."""
+JOINTS = ("root", "neck", "head")
+"""Names of the joints of a groom's head, in its order."""
+
+INFLUENCES = 4
+STRAND = np.dtype([("strand", "<i4"), ("pairs", [("bone", "<i4"), ("weight", "<f4")], INFLUENCES)])
 
 
 def tfx_pieces(
@@ -48,7 +54,10 @@ def tfx_pieces(
     yield as_bytes("<f4", (widths / space.metres).astype(np.float32))
     yield as_bytes("<f4", np.zeros(_padding(len(strands))))
     if coloured:
-        shades = colours(groom.material, strands.counts).mapped(_opaque)
+        alpha = ((0, 0), (0, 1))
+        shades = colours(groom.material, strands.counts).mapped(
+            lambda linear: np.pad(linear, alpha, constant_values=1)
+        )
         for block in blocks(strands):
             yield as_bytes("<f4", shades.at(block.strands))
 
@@ -72,6 +81,15 @@ def _padding(numbers: int) -> int:
     return numbers % 2
 
 
-def _opaque(linear: Float32Array) -> Float32Array:
-    """Return RGBA (K, 4) of colours (K, 3)."""
-    return np.concatenate([linear, np.ones((len(linear), 1), np.float32)], axis=1)
+def bone_bytes(strands: int) -> memoryview:
+    """Return the whole .tfxbone: the joints' names, and every strand carried by the head alone."""
+    names = struct.pack("<i", len(JOINTS))
+    for index, name in enumerate(JOINTS):
+        text = name.encode("ascii") + b"\0"
+        names += struct.pack("<ii", index, len(text)) + text
+    rows = np.zeros(strands, STRAND)
+    rows["strand"] = np.arange(strands)
+    rows["pairs"]["bone"][:, 0] = JOINTS.index("head")
+    rows["pairs"]["weight"][:, 0] = 1.0
+    head = names + struct.pack("<i", strands)
+    return join_bytes([("u1", np.frombuffer(head, np.uint8)), (STRAND, rows)])

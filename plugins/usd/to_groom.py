@@ -11,10 +11,10 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array, Int64Array
 from hairkit.errors import FormatError, InputError
-from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands, rows_kept
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, mean_look, pack_strands, rows_kept
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.io.spline_curves import BASES, cubic_map, nurbs_map
-from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 from .body_reading import read_head
@@ -57,7 +57,9 @@ def read_groom(path: Path, options: Any) -> Groom:
     strands, kept = pack_strands(joined.points, joined.counts, path)
     strands = _complete(strands, joined, kept)
     settings = found.description["settings"]
-    material = material_from(settings, path) or _look(joined, strands, kept)
+    rows, colours = rows_kept(joined.counts, kept), joined.colour
+    look = mean_look(strands, None if colours is None else colours[rows])
+    material = material_from(settings, path) or look
     groom = adopt(strands, options, path, material, head)
     groom = replace(
         groom,
@@ -244,19 +246,6 @@ def _complete(strands: Strands, joined: _Curves, kept: Int64Array) -> Strands:
         group=None if joined.group is None else joined.group[kept],
         guide=None if joined.guide is None else joined.guide[kept] != 0,
     )
-
-
-def _look(joined: _Curves, strands: Strands, kept: Int64Array) -> HairMaterial | None:
-    """Return the mean colours of roots and tips, where the file has colours."""
-    if joined.colour is None:
-        return None
-    colour = joined.colour[rows_kept(joined.counts, kept)]
-    ends = strands.offsets
-    root = colour[ends[:-1]].mean(axis=0, dtype=np.float64)
-    tip = colour[ends[1:] - 1].mean(axis=0, dtype=np.float64)
-    wide = strands.widths[strands.widths > 0] if strands.widths is not None else np.zeros(0)
-    width = float(wide.mean(dtype=np.float64)) if len(wide) else HairMaterial.width
-    return HairMaterial(root, tip, width)
 
 
 def _bound(groom: Groom, joined: _Curves, kept: Int64Array, options: ImportOptions) -> Groom:

@@ -221,7 +221,9 @@ def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Arr
     rest = PERSON * mask.person.astype(np.uint8)
     if not mask.person_known:
         rest[np.isfinite(depth)] = PERSON
-        rest[_below_head(depth) :] = PERSON
+        rows = np.flatnonzero(np.isfinite(depth).any(axis=1))
+        if len(rows):
+            rest[rows[-1] :] = PERSON
     core: npt.NDArray[Any] = hair
     if options.mode == "labels" and options.opening:
         eroded = cv2.erode(hair, _disc(options.opening * scale), borderValue=1)
@@ -231,11 +233,6 @@ def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Arr
     dense[hair > 0] = EMPTY
     dense[core > 0] = HAIR
     return loose, dense
-
-
-def _below_head(depth: Float32Array) -> int:
-    rows = np.flatnonzero(np.isfinite(depth).any(axis=1))
-    return int(rows[-1]) if len(rows) else depth.shape[0]
 
 
 def _disc(radius: float) -> UInt8Array:

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hairkit.errors import InputError
-from hairkit.evaluation.align import Similarity, align, alignment_points, camera_errors
+from hairkit.evaluation.align import Alignment, align, alignment_points, camera_errors
 from hairkit.testing import VIEW_NAMES, turn_scene
 from hairkit.types.camera import Camera
 from hairkit.types.strands import Strands
 
 POINTS = np.random.default_rng(0).uniform(-0.1, 0.1, (200, 3)).astype(np.float32)
-NOTHING = Similarity(1.0, np.eye(3), np.zeros(3))
+NOTHING = Alignment(1.0, np.eye(3), np.zeros(3))
 
 
 def orthographic() -> tuple[Camera, ...]:
@@ -37,9 +37,9 @@ def test_any_change_of_frame_is_undone(
     turn: tuple[float, ...], shift: tuple[float, ...], scale: float
 ) -> None:
     """A scene moved, turned and scaled as a whole comes back, with cameras that have no error."""
-    change = Similarity(scale, Rotation.from_rotvec(turn).as_matrix(), np.array(shift))
+    change = Alignment(scale, Rotation.from_rotvec(turn).as_matrix(), np.array(shift))
     for true in (turn_scene().cameras, orthographic()):
-        predicted = [change.apply_to_camera(camera) for camera in true]
+        predicted = [change.moved_camera(camera) for camera in true]
         points = change.apply(POINTS)
         found = align(predicted, true, points)
         assert found.scale * scale == pytest.approx(1.0, abs=1e-5)
@@ -52,14 +52,14 @@ def test_any_change_of_frame_is_undone(
 
 
 def test_a_moved_camera_sees_moved_points_where_it_saw_them() -> None:
-    """`apply_to_camera` and `apply` belong together, in both camera models."""
-    change = Similarity(
+    """`moved_camera` and `apply` belong together, in both camera models."""
+    change = Alignment(
         1.7, Rotation.from_rotvec([0.3, 1.0, -0.2]).as_matrix(), np.array([1.0, 2, 3])
     )
     for camera in (turn_scene().cameras[3], orthographic()[3]):
         before, after = (
             camera.project(POINTS),
-            change.apply_to_camera(camera).project(change.apply(POINTS)),
+            change.moved_camera(camera).project(change.apply(POINTS)),
         )
         assert np.allclose(before, after, atol=1e-3)
 
@@ -109,7 +109,7 @@ def test_views_must_pair_up() -> None:
 def test_strands_keep_everything_but_place_and_size() -> None:
     """Points are moved, widths scaled, offsets kept."""
     hair = Strands(POINTS[:4], np.array([0, 2, 4]), widths=np.full(4, 1e-4, np.float32))
-    doubled = replace(NOTHING, scale=2.0).apply_to_strands(hair)
+    doubled = replace(NOTHING, scale=2.0).moved_strands(hair)
     assert np.allclose(doubled.points, 2 * hair.points)
     assert doubled.widths is not None
     assert np.allclose(doubled.widths, 2e-4)

@@ -17,7 +17,7 @@ from hairkit.cli import main
 from hairkit.errors import FormatError, InputError
 from hairkit.evaluation import Evaluation, Truth, read_prediction, read_truth
 from hairkit.evaluation import evaluate as evaluate_whole
-from hairkit.evaluation.align import Similarity
+from hairkit.evaluation.align import Alignment
 from hairkit.evaluation.prediction import Prediction
 from hairkit.evaluation.report import write_report
 from hairkit.evaluation.scorecard import figures
@@ -49,13 +49,13 @@ def test_the_frame_of_the_prediction_does_not_matter(truth_folder: Path, out_fol
     """A prediction turned, moved and scaled as a whole has the same figures."""
     truth, first = read_truth(truth_folder), read_prediction(out_folder)
     turn = Rotation.from_rotvec([0.1, -0.3, 0.2]).as_matrix()
-    change = Similarity(1.4, turn, np.array([0.05, 0.1, -0.2]))
+    change = Alignment(1.4, turn, np.array([0.05, 0.1, -0.2]))
     groom = replace(
         first.groom,
-        strands=change.apply_to_strands(first.groom.strands),
+        strands=change.moved_strands(first.groom.strands),
         head=replace(first.groom.head, vertices=change.apply(first.groom.head.vertices)),
     )
-    cameras = tuple(change.apply_to_camera(camera) for camera in first.cameras)
+    cameras = tuple(change.moved_camera(camera) for camera in first.cameras)
     found = evaluate(Prediction(groom, first.names, cameras), truth)
     assert found.similarity.scale == pytest.approx(1 / 1.4, rel=1e-5)
     assert min(score.f for score in found.scores.all_signed) > 0.999

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from hairkit.arrays import Float64Array
-from hairkit.grooming.lead_to_ties import RISE, SKIN, lead_to_ties
-from hairkit.grooming.plait import plait
+from hairkit.grooming.lead_to_ties import RISE, SKIN, lead_to_ties, plait
 from hairkit.types.strands import Strands
 from hairkit.types.tie import Tail, Tie, TiedHair
 from tests.support import tied_ball as ball

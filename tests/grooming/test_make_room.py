@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hairkit.arrays import Float32Array
-from hairkit.grooming.make_room import make_room
+from hairkit.grooming.postprocess import make_room
 from hairkit.grooming.wind_waves import LARGEST_RADIUS, RAMP, add_waves
 from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull, VoxelGrid

@@ -20,8 +20,8 @@ from hairkit.manager import Manager
 from hairkit.pipeline.draft import draft
 from hairkit.pipeline.recipe import parse_recipe
 from hairkit.pipeline.reconstruct import export_paths, reconstruct
-from hairkit.pipeline.run_record import RECORD
-from hairkit.progress import Recorder, Silent
+from hairkit.pipeline.run_record import RECORD, read_record
+from hairkit.progress import Silent
 from hairkit.stages import NEW, ROWS
 from hairkit.storage import to_arrays
 from hairkit.testing import ball_head, turn_capture, turn_scene
@@ -239,9 +239,9 @@ def test_what_stages_share_is_kept_and_handed_to_them(tmp_path: Path) -> None:
     for name, value in handed.items():
         kept, given = np.load(tmp_path / "work" / f"{name}.npz"), to_arrays(value)
         assert all(np.array_equal(kept[key], given[key]) for key in given)
-    record = Recorder(Silent())
-    run(tmp_path, "track=tracker", extra={"tracker": Tracker()}, guides=50, progress=record)
-    again = {stage["stage"] for stage in record.stages if not stage["reused"]}
+    run(tmp_path, "track=tracker", extra={"tracker": Tracker()}, guides=50)
+    stages = read_record(tmp_path / RECORD).stages
+    again = {stage.stage for stage in stages if not stage.reused}
     assert again == {"track", "ball_plugin"}
 
 
@@ -267,14 +267,14 @@ def test_the_plugins_own_file_is_part_of_the_digest(tmp_path: Path) -> None:
         (tmp_path / "ball_plugin.py").write_text(text)
         manager = Manager()
         manager.load([tmp_path / "ball_plugin.py"], autoload=False)
-        record = Recorder(Silent())
         recipe = parse_recipe(RECIPE.encode(), "ball", "test")
         reconstruct(
             turn_capture(), tmp_path / "out", recipe, manager,
-            head=ball_head(), guides=40, progress=record, sheet=False,
+            head=ball_head(), guides=40, sheet=False,
         )  # fmt: skip
-        assert record.stages
-        assert not any(stage["reused"] for stage in record.stages)
+        stages = read_record(tmp_path / "out" / RECORD).stages
+        assert stages
+        assert not any(stage.reused for stage in stages)
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from example_textures import blur as softened
 from example_textures import draw_skin
+from hairkit_plugins.image_analogies import allowed_pixels, blend_weights, find_regions
 from hairkit_plugins.image_analogies.blur_match import blur, find_blur
 from hairkit_plugins.image_analogies.features import (
     feature_weights,
@@ -17,7 +18,6 @@ from hairkit_plugins.image_analogies.features import (
     make_pair,
     squared_distance,
 )
-from hairkit_plugins.image_analogies.regions import allowed_pixels, blend_weights, find_regions
 from hairkit_plugins.image_analogies.search_tree import (
     build_tree,
     gather_features,

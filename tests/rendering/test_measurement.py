@@ -10,10 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hairkit.rendering import (
-    draw_coverage,
     draw_depth,
-    draw_directions,
     draw_layers,
+    draw_measurements,
     visible_points,
 )
 from hairkit.testing import ball_head
@@ -53,7 +52,7 @@ def test_a_drawn_point_lands_where_project_says(
     camera = camera_at(azimuth, model, roll)
     side = 0.002 * camera.rotation[0]
     speck = Strands.from_list([np.array([point - side, point + side])])
-    cover = draw_coverage(speck, None, camera).astype(np.float64)
+    cover = draw_layers(speck, None, camera)[0].astype(np.float64)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH] + 0.5
     drawn = np.array([(cover * columns).sum(), (cover * rows).sum()]) / cover.sum()
     assert np.abs(drawn - camera.project(point)).max() < 0.5
@@ -64,7 +63,8 @@ def test_a_drawn_line_runs_as_its_projection(model: CameraModel) -> None:
     """Every pixel of a straight strand has the angle of its projection and lies on it."""
     camera = camera_at(33.0, model, roll=7.0)
     ends = np.array([[-0.05, -0.04, 0.02], [0.06, 0.05, -0.03]])
-    angle, seen = draw_directions(Strands.from_list([np.linspace(*ends, 12)]), None, camera)
+    drawn = draw_measurements(Strands.from_list([np.linspace(*ends, 12)]), None, camera)
+    angle, seen = drawn.angle, drawn.seen
     first, last = camera.project(ends)
     along = (last - first) / np.linalg.norm(last - first)
     assert seen.sum() >= np.abs(last - first).max() - 1
@@ -83,7 +83,7 @@ def test_what_lies_nearer_is_seen() -> None:
     upright = behind + np.linspace([0, -0.05, 0], [0, 0.05, 0], 21)
     strands = Strands.from_list([upright, level])
     column, row = np.floor(camera.project(level[10])).astype(int)
-    angle, _ = draw_directions(strands, None, camera, width=0.01)
+    angle = draw_measurements(strands, None, camera, width=0.01).angle
     flat = np.arctan2(*(camera.project(level[11]) - camera.project(level[9]))[::-1])
     assert np.degrees(angle_between(angle[row, column], flat)) < 1
     depth = draw_depth(strands, None, camera, width=0.01)
@@ -99,9 +99,9 @@ def test_the_head_hides_what_is_behind_it() -> None:
     behind = np.linspace([-0.02, 0, -0.15], [0.02, 0, -0.15], 5)
     before = np.linspace([0, 0.0, 0.1], [0, 0.03, 0.0955], 5)
     camera = camera_at(0.0)
-    assert draw_coverage(Strands.from_list([behind]), None, camera).any()
-    assert not draw_coverage(Strands.from_list([behind]), head, camera).any()
-    assert draw_coverage(Strands.from_list([before]), head, camera).max() > 0.5
+    assert draw_layers(Strands.from_list([behind]), None, camera)[0].any()
+    assert not draw_layers(Strands.from_list([behind]), head, camera)[0].any()
+    assert draw_layers(Strands.from_list([before]), head, camera)[0].max() > 0.5
 
 
 def test_coverage_is_the_area_that_is_drawn() -> None:
@@ -110,7 +110,7 @@ def test_coverage_is_the_area_that_is_drawn() -> None:
     ends = np.array([[-0.1, -0.08, 0], [0.1, 0.07, 0]])
     strand = Strands.from_list([np.linspace(*ends, 8)])
     for width in (0.01, 0.02):
-        cover = draw_coverage(strand, None, camera, width=width)
+        cover = draw_layers(strand, None, camera, width=width)[0]
         length = np.linalg.norm(np.diff(camera.project(ends), axis=0))
         assert cover.sum() == pytest.approx(length * width * camera.focal, rel=0.05)
 
@@ -130,8 +130,8 @@ def test_no_strands_draw_nothing() -> None:
     """Without strands nothing is covered and nothing seen, with and without a head."""
     none = Strands(np.zeros((0, 3)), np.zeros(1))
     for head in (None, ball_head()):
-        assert not draw_coverage(none, head, camera_at(0)).any()
-        assert not draw_directions(none, head, camera_at(0))[1].any()
+        assert not draw_layers(none, head, camera_at(0))[0].any()
+        assert not draw_measurements(none, head, camera_at(0)).seen.any()
 
 
 def test_equal_input_gives_equal_pictures_on_any_thread() -> None:
@@ -142,7 +142,7 @@ def test_equal_input_gives_equal_pictures_on_any_thread() -> None:
     results = []
 
     def job() -> None:
-        results.append(draw_directions(strands, ball_head(), camera_at(20.0))[0].tobytes())
+        results.append(draw_measurements(strands, ball_head(), camera_at(20.0)).angle.tobytes())
 
     job()
     for _ in range(2):

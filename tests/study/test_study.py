@@ -15,10 +15,9 @@ from hairkit.errors import FormatError, InputError
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.study import Study, Subject, make_study, write_results, write_study
-from hairkit.study.frame import HEIGHT, WIDTH, cut_out, frame_camera
 from hairkit.study.questionnaire import CHOICES, every_question
 from hairkit.study.retrieval import answer, look_distance
-from hairkit.study.subject import Shot, distinct_names, settle
+from hairkit.study.subject import HEIGHT, WIDTH, Shot, cut_out, distinct_names, frame_camera, settle
 from hairkit.synth import STYLES, grow
 from hairkit.types.camera import Camera
 

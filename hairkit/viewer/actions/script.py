@@ -88,7 +88,9 @@ def play(preview: Preview, script: Script, out: Path) -> None:
             if session.recorder is not None and session.recorder not in films:
                 films.append(session.recorder)
             _advance_pending(preview)
-            _wait_for_rerun(session)
+            while session.rerun is not None:
+                time.sleep(RERUN_POLL)
+                session.poll_rerun()
             if session.screenshots:
                 preview.frame(0.0, still=True)
             if session.finished:
@@ -120,12 +122,6 @@ def _advance_pending(preview: Preview) -> None:
             preview.frame(seconds)
         else:
             session.advance(seconds)
-
-
-def _wait_for_rerun(session: Session) -> None:
-    while session.rerun is not None:
-        time.sleep(RERUN_POLL)
-        session.poll_rerun()
 
 
 def _check_step(path: Path, number: int, table: dict[str, Any]) -> tuple[str, dict[str, Any]]:

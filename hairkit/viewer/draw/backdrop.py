@@ -5,7 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from hairkit.arrays import Float64Array, UInt8Array
+from hairkit.arrays import UInt8Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import set_uniforms
 from hairkit.rendering.picture import BACKDROP_BOTTOM, BACKDROP_TOP
@@ -98,7 +98,9 @@ class BackdropPass:
         self._small.use()
         top, bottom = BACKDROPS[backdrop]
         shares = np.diag([camera.width, camera.height, 1.0])
-        rays = camera.rotation.T @ np.linalg.inv(_intrinsics(camera)) @ shares
+        x, y = camera.centre
+        lens = np.array([[camera.focal, 0, x], [0, camera.focal, y], [0, 0, 1]])
+        rays = camera.rotation.T @ np.linalg.inv(lens) @ shares
         set_uniforms(
             self._gl.program("viewer_screen", "viewer_studio"),
             u_size=SIZE,
@@ -111,8 +113,3 @@ class BackdropPass:
             u_shaded=float(top != bottom),
         )
         self._fine.render(moderngl.TRIANGLES, vertices=3)
-
-
-def _intrinsics(camera: Camera) -> Float64Array:
-    x, y = camera.centre
-    return np.array([[camera.focal, 0, x], [0, camera.focal, y], [0, 0, 1]])

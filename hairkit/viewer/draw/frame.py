@@ -9,7 +9,7 @@ import cv2
 import moderngl
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, UInt8Array
+from hairkit.arrays import UInt8Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import NEAREST, DepthRange
 from hairkit.rendering.head import Solid
@@ -94,14 +94,17 @@ class FrameRenderer:
     def draw(self, inputs: FrameInputs) -> None:
         """Draw a frame; `read` and `texture` return it until the next one."""
         self._resize((inputs.camera.width, inputs.camera.height))
-        own = _camera_in_head(inputs.camera, inputs.world_from_head)
+        moved = inputs.camera.camera_from_head @ inputs.world_from_head
+        own = replace(inputs.camera, camera_from_head=moved)
         lights = studio_lights(own, inputs.exposure, inputs.light_turn)
         if inputs.guide_rows is not None or self._fresh:
             rows = self.body.guide_rest if inputs.guide_rows is None else inputs.guide_rows
             self.cloud = self.hair.move_guides(rows)
             """(N, 3) points that bound the guides, head frame."""
         depth = self._depth(inputs, own)
-        view = HairView(own, depth, _hair_depth(own, self.cloud))
+        away = own.depth(self.cloud)
+        near, far = float(away.min()) - THICKNESS, float(away.max()) + THICKNESS
+        view = HairView(own, depth, DepthRange(near, far))
         if inputs.hair is not None:
             self.hair.place(view, inputs.hair)
         hairs = 0 if inputs.hair is None else inputs.hair.hairs
@@ -187,13 +190,3 @@ def studio_lights(camera: Camera, exposure: float, turn: float = 0.0) -> Lights:
     cosine, sine = np.cos(turn), np.sin(turn)
     axes = np.stack([cosine * x - sine * z, y, cosine * z + sine * x])
     return Lights.studio(np.array(KEY) @ axes, np.array(RIM) @ axes, exposure)
-
-
-def _camera_in_head(camera: Camera, world_from_head: Float64Array) -> Camera:
-    """Return a camera of the world in the head frame."""
-    return replace(camera, camera_from_head=camera.camera_from_head @ world_from_head)
-
-
-def _hair_depth(camera: Camera, cloud: Float32Array) -> DepthRange:
-    depth = camera.depth(cloud)
-    return DepthRange(float(depth.min()) - THICKNESS, float(depth.max()) + THICKNESS)

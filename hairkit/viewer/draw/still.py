@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hairkit.arrays import Float64Array, UInt8Array
+from hairkit.arrays import UInt8Array
 from hairkit.types.camera import Camera
 
 SAMPLES, LENS_SAMPLES = 16, 64
@@ -34,19 +34,15 @@ class Lens:
 def sample_camera(camera: Camera, lens: Lens, sample: int) -> Camera:
     """Return the camera of a sample; what lies at the depth in focus stays at its pixel."""
     flat = camera.model == "orthographic"  # has no lens
-    x, y = _lens_place(sample) * (0.0 if flat else lens.aperture / 2)
+    # places on the lens cover its disc evenly (Vogel 1979)
+    angle, radius = sample * np.pi * (3 - np.sqrt(5)), np.sqrt((sample + 0.5) / LENS_SAMPLES)
+    place = radius * np.array([np.cos(angle), np.sin(angle)])
+    x, y = place * (0.0 if flat else lens.aperture / 2)
     matrix = camera.camera_from_head.copy()
     matrix[:2, 3] -= (x, y)
     shift = np.array([x, y]) * camera.focal / lens.focus
     jitter = np.mod(_R2 * (sample + 1), 1.0) - 0.5
     return replace(camera, camera_from_head=matrix, centre=camera.centre + shift + jitter)
-
-
-def _lens_place(sample: int) -> Float64Array:
-    """Return a place (2,) on the unit disc; the samples cover it evenly (Vogel 1979)."""
-    angle, radius = sample * np.pi * (3 - np.sqrt(5)), np.sqrt((sample + 0.5) / LENS_SAMPLES)
-    place: Float64Array = radius * np.array([np.cos(angle), np.sin(angle)])
-    return place
 
 
 class Still:

@@ -173,15 +173,10 @@ def _load(window: Any) -> tuple[Any, Any, str]:
 
 
 def _draw_view(imgui: Any, session: Session, perform: Perform) -> None:
-    for name in LOOKS:
-        if imgui.button(name):
-            perform("look", {"name": name})
-        imgui.same_line()
-    if imgui.button("all"):
-        perform("frame", {})
+    looks = [(name, "look", {"name": name}) for name in LOOKS]
+    _buttons(imgui, perform, *looks, ("all", "frame", {}))
     shown = session.shown
-    place = COLOURINGS.index(shown.colours)
-    changed, place = imgui.combo("colours", place, list(COLOURINGS))
+    changed, place = imgui.combo("colours", COLOURINGS.index(shown.colours), list(COLOURINGS))
     if changed:
         perform("colours", {"by": COLOURINGS[place]})
     changed, only = imgui.checkbox("guides only", shown.guides_only)
@@ -251,18 +246,15 @@ def _draw_wind_and_head(imgui: Any, session: Session, perform: Perform) -> None:
         _hint(imgui, hint)
         if changed:
             perform("wind", {"on": air.blowing, name: value})
-    if imgui.button("shake"):
-        perform("shake", {})
-    for label, values in (("nod", {"axis": "pitch"}), ("tilt", {"axis": "roll"})):
-        imgui.same_line()
-        if imgui.button(label):
-            perform("shake", {"degrees": NOD, **values})
-    imgui.same_line()
-    if imgui.button("reset"):
-        perform("reset", {})
-    imgui.same_line()
-    if imgui.button("resume" if session.paused else "pause"):
-        perform("pause", {})
+    _buttons(
+        imgui,
+        perform,
+        ("shake", "shake", {}),
+        ("nod", "shake", {"degrees": NOD, "axis": "pitch"}),
+        ("tilt", "shake", {"degrees": NOD, "axis": "roll"}),
+        ("reset", "reset", {}),
+        ("resume" if session.paused else "pause", "pause", {}),
+    )
 
 
 def _draw_pose(imgui: Any, session: Session, perform: Perform) -> None:
@@ -272,27 +264,26 @@ def _draw_pose(imgui: Any, session: Session, perform: Perform) -> None:
     if session.adjustment is None:
         return
     moves = (("left", "right", -1), ("right", "right", 1), ("up", "up", 1), ("down", "up", -1))
-    for label, axis, sign in moves:
-        if imgui.button(label):
-            perform("head_move", {axis: sign * MOVE_STEP})
-        imgui.same_line()
-    for label, factor in (("larger", SCALE_STEP), ("smaller", 1 / SCALE_STEP)):
-        if imgui.button(label):
-            perform("head_scale", {"factor": factor})
-        imgui.same_line()
-    imgui.new_line()
-    for axis in AXES:
-        for label, degrees in ((f"{axis} -", -1.0), (f"{axis} +", 1.0)):
-            if imgui.button(label):
-                perform("head_turn", {"axis": axis, "degrees": degrees})
-            imgui.same_line()
-    imgui.new_line()
-    for label, values in (("next photo", {"step": 1}), ("previous photo", {"step": -1})):
-        if imgui.button(label):
-            perform("through", values)
-        imgui.same_line()
-    if imgui.button("save"):
-        perform("head_save", {})
+    _buttons(
+        imgui,
+        perform,
+        *((label, "head_move", {axis: sign * MOVE_STEP}) for label, axis, sign in moves),
+        ("larger", "head_scale", {"factor": SCALE_STEP}),
+        ("smaller", "head_scale", {"factor": 1 / SCALE_STEP}),
+    )
+    turns = [(axis, sign, degrees) for axis in AXES for sign, degrees in (("-", -1.0), ("+", 1.0))]
+    _buttons(
+        imgui,
+        perform,
+        *((f"{a} {sign}", "head_turn", {"axis": a, "degrees": deg}) for a, sign, deg in turns),
+    )
+    _buttons(
+        imgui,
+        perform,
+        ("next photo", "through", {"step": 1}),
+        ("previous photo", "through", {"step": -1}),
+        ("save", "head_save", {}),
+    )
     if imgui.button("save and reconstruct") and session.rerun is None:
         perform("reconstruct", {})
     if session.rerun is not None:
@@ -325,6 +316,15 @@ def _draw_option(imgui: Any, session: Session, info: OptionInfo, perform: Perfor
     _hint(imgui, info.doc)
     if changed:
         perform("option", {"name": info.name, "value": value})
+
+
+def _buttons(imgui: Any, perform: Perform, *row: tuple[str, str, Mapping[str, object]]) -> None:
+    """Draw a row of buttons: label, action and its values."""
+    for number, (label, action, values) in enumerate(row):
+        if number:
+            imgui.same_line()
+        if imgui.button(label):
+            perform(action, values)
 
 
 def _hint(imgui: Any, text: str) -> None:

@@ -24,7 +24,7 @@ from hairkit_plugins.cards.vrm import BODY
 from hairkit.head_model.template import default_head
 from hairkit.io.mesh_text import read_obj
 from hairkit.manager import Manager
-from hairkit.rendering import draw_coverage
+from hairkit.rendering import draw_layers
 from hairkit.rendering.framing import framing_cameras
 from hairkit.synth import grow
 from hairkit.types.groom import Groom
@@ -87,7 +87,7 @@ def test_cards_cover_what_the_strands_cover(level: int) -> None:
     drawn = draw_cards(textured, groom().head, cameras)
     score = []
     for camera, shot in zip(cameras, drawn, strict=True):
-        wanted = draw_coverage(groom().strands, groom().head, camera, width=8e-5) > 0.5
+        wanted = draw_layers(groom().strands, groom().head, camera, width=8e-5)[0] > 0.5
         found = shot[..., 3] > 127
         score.append((wanted & found).sum() / (wanted | found).sum())
     assert np.mean(score) > (0.85, 0.82, 0.78, 0.75)[level], score

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hairkit_plugins.face_mesh import OVERSHOOT, measure_angles
 from hairkit_plugins.face_mesh.crops import EDGE, Crop, crop_around, wobble
-from hairkit_plugins.face_mesh.head_angles import OVERSHOOT, measure_angles
 from hairkit_plugins.face_mesh.landmark_table import MIRROR, noise_of, pick_landmarks
 from hypothesis import given
 from hypothesis import strategies as st

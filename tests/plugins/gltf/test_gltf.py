@@ -13,13 +13,13 @@ from client_groom import swinging
 from clients_gltf import complaints
 from gltf_player import Client, GltfPlayer
 from hairkit_plugins import gltf
-from hairkit_plugins.gltf.joining import join_segments
 
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.prepare_export import complete_groom, select_strands
 from hairkit.io.glb_file import GlbFile
 from hairkit.io.glb_motion import read_head_motion
 from hairkit.io.head_reader import read_head
+from hairkit.io.polylines import join_segments
 from hairkit.testing import ball_head, bristle_groom
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.point_cache import PointCache
