@@ -349,11 +349,12 @@ def resident_bytes(pid: int) -> int:
     try:
         with open(f"/proc/{pid}/statm", "rb") as file:
             total = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-        with open(f"/proc/{pid}/task/{pid}/children", "rb") as file:
-            children = file.read().split()
     except (OSError, IndexError):
         return 0
-    return total + sum(resident_bytes(int(child)) for child in children)
+    with contextlib.suppress(OSError):  # it may end meanwhile
+        for children in Path(f"/proc/{pid}/task").glob("*/children"):  # each thread has its own
+            total += sum(resident_bytes(int(child)) for child in children.read_bytes().split())
+    return total
 
 
 def shortened(text: str) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hairkit.field.find_ties import measure_crossing
 
+from hairkit.field.find_ties import measure_crossing
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera
 from hairkit.types.mask import Mask

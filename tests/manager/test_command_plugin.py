@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -253,16 +254,22 @@ def test_nothing_is_left_of_a_command_that_was_ended() -> None:
     assert not child.started
 
 
-def test_memory_of_descendants_counts() -> None:
-    """Resident memory is that of a process and of all that it started."""
+@pytest.mark.parametrize("beside", [False, True])
+def test_memory_of_descendants_counts(beside: bool) -> None:
+    """Resident memory is that of a process and of all that it started, on any of its threads."""
     own = resident_bytes(os.getpid())
     eat = "import time; kept = bytes(range(256)) * 2**20; print(flush=True); time.sleep(60)"
-    process = subprocess.Popen([sys.executable, "-c", eat], stdout=subprocess.PIPE)
-    assert process.stdout is not None
-    process.stdout.readline()
-    assert resident_bytes(os.getpid()) > own + 2**28
-    process.kill()
-    process.communicate()
+
+    def start() -> subprocess.Popen[bytes]:
+        return subprocess.Popen([sys.executable, "-c", eat], stdout=subprocess.PIPE)
+
+    with ThreadPoolExecutor(1) as pool:  # children of a thread that ends become the first one's
+        process = pool.submit(start).result() if beside else start()
+        assert process.stdout is not None
+        process.stdout.readline()
+        assert resident_bytes(os.getpid()) > own + 2**28
+        process.kill()
+        process.communicate()
     assert resident_bytes(process.pid) == 0
 
 
