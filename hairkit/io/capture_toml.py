@@ -40,7 +40,7 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.errors import DataError, InputError
+from hairkit.errors import DataError, InputError, OptionError
 from hairkit.options import make_options, option, unknown_name
 from hairkit.storage import read_text, write_text
 from hairkit.types.chosen import Chosen, ChosenHair
@@ -268,6 +268,8 @@ def _chosen(document: Mapping[str, Any], path: Path) -> Chosen:
     head = _head_pose(tables["fitted_head"], where) if tables["fitted_head"] else None
     try:
         hair = make_options(ChosenHair, tables["hair"], f"{path}: [hair]")
+    except OptionError:
+        raise  # it names the place already
     except InputError as error:
         raise InputError(f"{path}: [hair]: {error}") from error
     return Chosen(hair, head, _settings(tables["options"], path))

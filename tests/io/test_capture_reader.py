@@ -165,6 +165,12 @@ WRONG = {
     "parting: a parting of 1 points": lambda f: (f / "capture.toml").write_text(
         "parting = [[0.1, 0.2]]"
     ),
+    "^[^:]*capture.toml: .hair.: no option 'width'": lambda f: (f / "capture.toml").write_text(
+        "[hair]\nwidth = 3"
+    ),
+    "^[^:]*capture.toml: .hair.: curl_radius_mm needs": lambda f: (f / "capture.toml").write_text(
+        "[hair]\ncurl_radius_mm = 3"
+    ),
     "views are no tables": lambda f: (f / "capture.toml").write_text("views = 3"),
     "1 views for 8 photos": lambda f: (f / "capture.toml").write_text('[[views]]\nname="a"'),
     "b.png: no such photo": lambda f: (f / "capture.toml").write_text(
