@@ -8,7 +8,7 @@ of the same captures spoiled in known ways; the limits below were chosen from it
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -143,7 +143,9 @@ def assess(
     turn
         How the photos were arranged; None when their names were believed.
     """
-    masks, scene, hull = evidence.masks, evidence.scene, evidence.hull
+    scene = replace(evidence.scene, names=tuple(_label(view) for view in capture.views))
+    evidence = replace(evidence, scene=scene)  # notes speak of the user's own files
+    masks, hull = evidence.masks, evidence.hull
     hair_length = evidence.scalp_distance.hair_length
     level = hair_length < PARTED_HAIR or evidence.tied.tails
     return (
@@ -184,26 +186,26 @@ def assess_turn(turn: Turnaround | None) -> tuple[Figure, ...]:
 def assess_landmarks(capture: Capture, scene: Scene) -> tuple[Figure, ...]:
     """Return how many views have landmarks, their misfit and the distance of the pupils."""
     known = [
-        (v, c) for v, c in zip(capture.views, scene.cameras, strict=True) if _points(v) is not None
+        (v, c) for v, c in zip(capture.views, scene.cameras, strict=True) if v.landmarks is not None
     ]
     count = len(known)
     figures = [
         Figure(
             "landmarks", "views used", count, "", LANDMARK_VIEWS.light(count),
-            "the size of the head is a guess; give landmarks.json or install the face model", 0,
+            "no face was found, so the size of the head is a guess; give landmarks.json", 0,
         )
     ]  # fmt: skip
     corners = scene.head.landmark_vertices
     if corners is None:
         return tuple(figures)
     points = scene.head.vertices[corners].astype(np.float64)
-    gaps = [_misfit_mm(camera, points, _points(view)) for view, camera in known]
+    gaps = [_misfit_mm(camera, points, view.landmarks) for view, camera in known]
     if gaps:
         worst = int(np.argmax(gaps))
         figures.append(
             Figure(
                 "cameras", "landmarks off by", max(gaps), "mm", LANDMARK_MM.light(max(gaps)),
-                f"look at {known[worst][0].name}", 1,
+                f"look at {_label(known[worst][0])}", 1,
             )
         )  # fmt: skip
     left, right = (points[eye].mean(axis=0) for eye in EYES)
@@ -362,8 +364,9 @@ def assess_directions(evidence: Evidence, groom: Groom) -> tuple[Figure, ...]:
     return (Figure("strands", "directions as photographed", share, "", light, note),)
 
 
-def _points(view: View) -> Float64Array | None:
-    return view.landmarks
+def _label(view: View) -> str:
+    """Return how the user calls a photo, after what it shows."""
+    return view.name if view.photo_path is None else f"{view.name} ({view.photo_path.name})"
 
 
 def _misfit_mm(camera: Camera, points: Float64Array, seen: Float64Array | None) -> float:

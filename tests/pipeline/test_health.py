@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -226,6 +228,16 @@ def test_a_fault_turns_its_figure_red(name: str, run: Run) -> None:
     figures = run.figures()
     assert figures[name].light == RED
     assert figures[name].line() in summarise(list(figures.values()))
+
+
+def test_notes_name_the_photos(run: Run) -> None:
+    """What to look at is named by the user's file, not by a view alone."""
+    views = run.capture.views
+    run.capture = Capture(
+        tuple(replace(v, photo_path=Path(f"IMG_{k}.jpg")) for k, v in enumerate(views))
+    )
+    hairy_face(run)
+    assert re.search(r"mask of \d \(IMG_\d\.jpg\)", run.figures()["masks: face called hair"].note)
 
 
 def test_short_hair_is_not_blamed_for_its_parting(run: Run) -> None:
