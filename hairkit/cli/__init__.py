@@ -14,6 +14,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `format_table`: the table of file formats
 * `head`: photos to a head with its skin
 * `info`: what a file holds
+* `masks`: the hair in single photos
 * `models`: networks that plugins use
 * `new_plugin`: a plugin to start from
 * `plugins`: list of plugins and options
@@ -53,6 +54,7 @@ from hairkit.errors import DivergedError, HairkitError
 
 VERBS = {
     "reconstruct": "turn photos of a head, or a video, into a groom",
+    "masks": "find the hair in photos, as masks to be painted over",
     "head": "turn photos into a head with the person's skin, without hair",
     "studio": "from a camera to moving hair, in a browser",
     "batch": "turn many captures into grooms, a process for each",

@@ -139,14 +139,29 @@ def sample_folder() -> Path:
     return Path(__file__).parents[1] / "sample"
 
 
-def _photos(photo_folder: Path) -> list[Path]:
-    """Return the photos in natural file order: `2.jpg` before `10.jpg`."""
-    names = [entry for entry in photo_folder.iterdir() if not entry.name.startswith(".")]
+def read_view(path: Path, max_edge: int = WORKING_EDGE) -> View:
+    """Return one photo as a view that knows no others, scaled down to a long edge."""
+    image, header = read_photo(path, max_edge)
+    focal = header.focal_px
+    scaled = None if focal is None else focal * float(image.shape[1] / header.width)
+    size = (header.width, header.height)
+    return View(path.stem, 0.0, image, scaled, photo_path=path, photo_size=size)
+
+
+def photo_files(folder: Path) -> list[Path]:
+    """Return the photos in a folder in natural file order: `2.jpg` before `10.jpg`."""
+    names = [entry for entry in folder.iterdir() if not entry.name.startswith(".")]
     pictures = [p for p in names if p.suffix.lower() in _PHOTO_SUFFIXES + _OTHER_SUFFIXES]
     pictures.sort(key=lambda p: [int(s) if s.isdigit() else s for s in _digits(p.name.lower())])
     for picture in pictures:
         if picture.suffix.lower() in _OTHER_SUFFIXES:
             raise InputError(f"{picture}: expected {PHOTOS_TAKEN}; save it as one of these")
+    return pictures
+
+
+def _photos(photo_folder: Path) -> list[Path]:
+    """Return the photos of a turn."""
+    pictures = photo_files(photo_folder)
     if not FEWEST <= len(pictures) <= MOST:
         raise InputError(
             f"{photo_folder}: {len(pictures)} photos, expected {FEWEST} to {MOST} from all around"

@@ -90,7 +90,7 @@ def contact_sheet(
     groom = _with_small_maps(_with_few_guides(groom))
     rows = (
         photos,
-        [_mask_picture(photo, mask) for photo, mask in zip(photos, evidence.masks, strict=True)],
+        [mask_picture(photo, mask) for photo, mask in zip(photos, evidence.masks, strict=True)],
         [_hsv_picture(map_, size) for map_ in evidence.orientations],
         _hull_pictures(evidence.hull, cameras),
         _guide_pictures(groom, cameras),
@@ -123,7 +123,7 @@ def _fit(image: npt.NDArray[np.uint8], size: tuple[int, int]) -> UInt8Array:
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _mask_picture(photo: UInt8Array, mask: Mask) -> UInt8Array:
+def mask_picture(photo: UInt8Array, mask: Mask) -> UInt8Array:
     """Return the photo, hair tinted pink and the rest of the person blue."""
     size = (photo.shape[1], photo.shape[0])
     hair, person = (

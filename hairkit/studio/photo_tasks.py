@@ -17,7 +17,7 @@ import numpy as np
 
 from hairkit.arrays import UInt8Array
 from hairkit.imaging.picture_file import write_picture
-from hairkit.io.capture_reader import MOST, WORKING_EDGE
+from hairkit.io.capture_reader import MOST, WORKING_EDGE, read_view
 from hairkit.io.capture_toml import read_capture_file
 from hairkit.io.photos import read_photo
 from hairkit.manager import Manager
@@ -196,11 +196,7 @@ def _see(
 
 def _read(path: Path, changed: int, edge: int) -> View:
     """Return a photo; `changed` is the time of its file."""
-    image, header = read_photo(path, edge)
-    focal = header.focal_px
-    scaled = None if focal is None else focal * float(image.shape[1] / header.width)
-    size = (header.width, header.height)
-    return View(path.stem, 0.0, image, scaled, photo_path=path, photo_size=size)
+    return read_view(path, edge)
 
 
 _read_small = lru_cache(MOST)(_read)

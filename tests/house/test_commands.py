@@ -25,7 +25,7 @@ from hairkit.types.skin import Texture
 PROJECT = Path(__file__).parents[2]
 PAGES = [PROJECT / "README.md", *sorted((PROJECT / "docs").rglob("*.md"))]
 PAGES += sorted((PROJECT / "examples").rglob("*.md"))
-NOT_RUN = {"reconstruct", "head", "rerun", "studio", "view", "evaluate", "doctor", "study"}
+NOT_RUN = {"reconstruct", "masks", "head", "rerun", "studio", "view", "evaluate", "doctor", "study"}
 NOT_RUN |= {"validate", "wrap", "batch"}
 """They take long, or need a window, captures, a record, a head or a file for an engine: arguments
 and recipes are checked."""
