@@ -204,6 +204,7 @@ def test_the_head_is_moved_by_keys(page: Any, story: Any) -> None:
 def test_photos_change_places_by_keys(page: Any, story: Any) -> None:
     """A photo goes on in the turn and back again, and the keyboard goes with it."""
     step(page, "pose")
+    page.get_by_role("button", name="Photo 2 later").wait_for(timeout=1000 * SLOW_S)
     tab_to(page, "Photo 2 later")
     page.keyboard.press("Enter")
     moved = "(name) => document.activeElement.ariaLabel?.startsWith(name)"
