@@ -121,7 +121,7 @@ ON_TOP = 0.02
 """Ties less than this far below the top of the head, metres, are on top."""
 DIRECTIONS = Limits(0.85, 0.6)
 """At least 0.97 on seven captures of straight hair, photos alone; 0.77 on a photographed man whose
-outlines do not fit, 0.71 where a hood became hair, 0.17 where coils came out straight."""
+outlines do not fit, 0.70 where a hood became hair, 0.17 where coils came out straight."""
 CURL_MM = Limits(15.0, 30.0)
 """Radius of the curls: 7 mm on the tightest of the captures; locks of wider curls are bends."""
 
