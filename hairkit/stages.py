@@ -17,6 +17,7 @@ from typing import Any, Generic, TypeVar
 from hairkit import hookspecs
 from hairkit.types.capture import Capture
 from hairkit.types.face import Face
+from hairkit.types.framing import Framing
 from hairkit.types.groom import Groom
 from hairkit.types.hairline import Hairline
 from hairkit.types.mask import Mask, Masks
@@ -98,8 +99,8 @@ PERSONS = Stage(
     "person", Person, "segment_person", "looking for the person", 2, KEPT,
     each=True, several=True, absent=Person.absent,
 )  # fmt: skip
+FRAMED = Stage("frame", Framing, words="finding the head", draft=KEPT)
 TURN = Stage("turn", Turnaround, "find_turn", "ordering the photos", 1, KEPT)
-UPRIGHT_TURN = replace(TURN, name="upright-turn", share=0, of=TURN)
 LABELS = Stage(
     "segment", Mask, "segment", "finding hair", 13, DRAWN, each=True, several=True, needed=True
 )

@@ -38,8 +38,9 @@ def _direction(view: View, landmarks: Float64Array) -> Float64Array:
     head = default_head()
     assert head.landmark_vertices is not None  # the template has all of them
     places = head.vertices[head.landmark_vertices].astype(np.float64)[JAW_LANDMARKS:]
-    focal = view.focal_px or focal_from_equivalent(USUAL_LENS_MM, view.width, view.height)
-    lens = np.array([[focal, 0, view.width / 2], [0, focal, view.height / 2], [0, 0, 1]])
+    usual = focal_from_equivalent(USUAL_LENS_MM, *view.photo_size) / view.scale
+    focal, (right, down) = view.focal_px or usual, view.centre
+    lens = np.array([[focal, 0, right], [0, focal, down], [0, 0, 1]])
     _, rotation, _ = cv2.solvePnP(
         places, landmarks[JAW_LANDMARKS:], lens, None, flags=cv2.SOLVEPNP_SQPNP
     )

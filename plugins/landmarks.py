@@ -82,7 +82,7 @@ def _nominal(capture: Capture, options: Options) -> tuple[Camera, ...]:
     """Return the nominal turn at a usual scale; the similarity finds the true one."""
     turn = Turn.of(capture)
     view = capture.views[0]
-    usual = focal_from_equivalent(options.focal_equivalent, view.width, view.height)
+    usual = focal_from_equivalent(options.focal_equivalent, *view.photo_size) / view.scale
     focal = view.focal_px or usual
     perspective = 1 / options.distance if options.model == "perspective" else 0.0
     return turn.nominal(focal / options.distance, perspective)

@@ -42,7 +42,7 @@ def estimate_scene(
             " add [head] to capture.toml or use the plugin 'silhouette'"
         )
     view = capture.views[0]
-    usual = focal_from_equivalent(options.focal_equivalent, view.width, view.height)
+    usual = focal_from_equivalent(options.focal_equivalent, *view.photo_size) / view.scale
     orthographic = options.model == "orthographic" or capture.orthographic
     perspective = 0.0 if orthographic else 1 / options.distance
     cameras = Turn.of(capture).nominal((view.focal_px or usual) / options.distance, perspective)

@@ -29,8 +29,9 @@ def segment(view: View) -> Mask | None:
             f"{view.mask_path}: {size[0]} x {size[1]} pixels, its photo has {wanted};"
             " draw the mask on the photo"
         )
-    labels, person_known = _labels(drawn, str(view.mask_path))
-    if size != (view.width, view.height):
+    left, top, right, bottom = view.frame
+    labels, person_known = _labels(drawn[top:bottom, left:right], str(view.mask_path))
+    if labels.shape != (view.height, view.width):
         labels = cv2.resize(  # type: ignore[assignment]  # OpenCV keeps uint8
             labels, (view.width, view.height), interpolation=cv2.INTER_NEAREST_EXACT
         )

@@ -48,6 +48,11 @@ class Turn:
     """(V,) focal length of each view over the first one's."""
     elevations: Float64Array
     """(V,) nominal elevations, radians."""
+    centres: Float64Array
+    """(V, 2) principal points, pixels."""
+    aims: Float64Array
+    """(V, 2) pixels that cameras are turned to: azimuth, elevation and shift are those of cameras
+    whose axes go through these, as if the lens had been there."""
 
     @classmethod
     def of(cls, capture: Capture) -> Turn:
@@ -57,20 +62,29 @@ class Turn:
         several shapes are cropped: their pixels are of one size.
         """
         sizes = np.array([(view.width, view.height) for view in capture.views])
-        shape = sizes.max(1) / sizes.min(1)
+        photos = np.array([view.photo_size for view in capture.views])
+        shape = photos.max(1) / photos.min(1)
         cropped = np.ptp(np.log(shape)) > ONE_SHAPE
-        focal = np.ones(len(sizes)) if cropped else np.hypot(*sizes.T)
+        lens = np.ones(len(photos)) if cropped else np.hypot(*photos.T)
+        focal = lens / [view.scale for view in capture.views]
         known = [view.focal_px for view in capture.views if view.focal_px is not None]
         if len(known) == len(sizes):
             focal = np.array(known, np.float64)
         azimuths = np.radians([view.azimuth_deg for view in capture.views])
         elevations = np.radians([view.elevation_deg for view in capture.views])
-        return cls(azimuths, sizes, focal / focal[0], elevations)
+        centres = np.array([view.centre for view in capture.views])
+        aims = np.array([view.aim for view in capture.views])
+        return cls(azimuths, sizes, focal / focal[0], elevations, centres, aims)
 
     @property
     def size(self) -> int:
         """Length of the vector."""
         return SHARED + PER_VIEW * len(self.azimuths)
+
+    @property
+    def axes(self) -> Float64Array:
+        """(V, 3, 3) nominal rotations of cameras turned to `aims`."""
+        return _view_rotations(self.azimuths, self.elevations, np.zeros(len(self.azimuths)))
 
     def unpack(self, vector: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return rotations (..., V, 3, 3), translations (..., V, 3) and focal lengths (..., V).
@@ -87,7 +101,20 @@ class Turn:
         aim = np.stack([views[..., 4], views[..., 5], far * np.exp(views[..., 3])], axis=-1)
         translation = aim - (rotation @ shared[..., None, CENTRE, None])[..., 0]
         focal = np.exp(shared[..., LOG_MAGNIFICATION, None]) * far * self.focal_ratios
-        return rotation, translation, focal
+        aside = self._aside(focal)
+        return aside @ rotation, (aside @ translation[..., None])[..., 0], focal
+
+    def _aside(self, focal: Float64Array) -> Float64Array:
+        """Return rotations (..., V, 3, 3) from cameras turned to `aims`; focal lengths (..., V)."""
+        offset = (self.aims - self.centres) / focal[..., None]
+        ray = np.concatenate([offset, np.ones_like(offset[..., :1])], axis=-1)
+        x, y, z = np.moveaxis(ray / np.linalg.norm(ray, axis=-1, keepdims=True), -1, 0)
+        rows = [
+            [1 - x * x / (1 + z), -x * y / (1 + z), x],
+            [-x * y / (1 + z), 1 - y * y / (1 + z), y],
+            [-x, -y, z],
+        ]
+        return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
     def tangents(self, vector: Float64Array) -> Float64Array:
         """Return (V, 7, size): how camera motions follow the vector's numbers.
@@ -127,10 +154,10 @@ class Turn:
         rotation, translation, focal = self.unpack(vector)
         flat = float(vector[PERSPECTIVE]) <= MIN_PERSPECTIVE
         cameras = []
-        for r, t, f, (width, height) in zip(rotation, translation, focal, self.sizes, strict=True):
+        each = zip(rotation, translation, focal, self.sizes, self.centres, strict=True)
+        for r, t, f, (width, height), centre in each:
             matrix = np.eye(4)
             matrix[:3, :3], matrix[:3, 3] = r, t
-            centre = np.array([width / 2, height / 2])
             if flat:
                 cameras.append(
                     Camera(matrix, f / t[2], centre, int(width), int(height), "orthographic")
@@ -152,6 +179,8 @@ class Turn:
             zoom = focal / self.focal_ratios
             translation[:, 2] = np.exp(np.log(zoom).mean()) / zoom / MIN_PERSPECTIVE
             focal = focal * translation[:, 2]
+        aside = self._aside(focal).transpose(0, 2, 1)
+        rotation, translation = aside @ rotation, (aside @ translation[..., None])[..., 0]
         across = rotation[:, :2].reshape(-1, 3)
         centre = np.linalg.lstsq(across, -translation[:, :2].ravel(), rcond=None)[0]
         offset = translation + rotation @ centre

@@ -75,10 +75,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _as_large_as_the_photo(seen: SeenPhoto) -> UInt8Array:
-    import cv2
+    from hairkit.io.framed_photos import on_photo
 
-    size, labels = seen.view.photo_size, seen.mask.labels
-    return np.asarray(cv2.resize(labels, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+    view = seen.view
+    mask = on_photo(seen.mask.labels, view.frame, view.photo_size)
+    return np.rot90(mask, view.quarter_turns)
 
 
 def _photos(given: list[Path]) -> list[Path]:

@@ -55,9 +55,8 @@ return Person(np.clip(options.gain * difference, 0, 255).astype(np.uint8))""",
         """
 index = np.arange(len(capture.views))
 names = tuple(view.name for view in capture.views)
-level, upright = np.zeros(len(index)), np.zeros(len(index), np.int64)
-azimuth = options.step * index % 360
-return Turnaround(index, azimuth, level, upright, names, np.inf, "turn as numbered")""",
+azimuth, level = options.step * index % 360, np.zeros(len(index))
+return Turnaround(index, azimuth, level, names, np.inf, "turn as numbered")""",
     ),
     "segment": Sketch(
         "Everything dark is hair.",

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
+from hairkit.arrays import Int64Array
 from hairkit.errors import InputError
 from hairkit.evaluation.truth import Truth
+from hairkit.io.framed_photos import on_photo
 from hairkit.pipeline.work_folder import WORK, LastRun
-from hairkit.stages import ORIENTED
+from hairkit.stages import FRAMED, ORIENTED, TURN
+from hairkit.storage import from_arrays, to_arrays
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import read_cameras
 
+_Found = TypeVar("_Found", Mask, OrientationMap)
 GROOM, SCENE = "groom.npz", "scene.json"
 """Names in the folder that `hairkit reconstruct` writes."""
 
@@ -80,10 +86,27 @@ def read_prediction(
         )
     names, cameras = read_cameras(scene_path)
     last = LastRun(groom_path.parent / WORK)
-    return Prediction(
-        Groom.load(groom_path),
-        names,
-        cameras,
-        last.every(ORIENTED, names),
-        last.masks(names),
-    )
+    maps, masks = last.every(ORIENTED, names), last.masks(names)
+    if last.has(FRAMED):
+        frames = last.latest(FRAMED).frames
+        frames = frames[last.latest(TURN).order] if last.has(TURN) else frames
+        maps, masks = _on_photos(maps, frames, cameras), _on_photos(masks, frames, cameras)
+    return Prediction(Groom.load(groom_path), names, cameras, maps, masks)
+
+
+def _on_photos(
+    found: tuple[_Found, ...] | None, frames: Int64Array, cameras: Sequence[Camera]
+) -> tuple[_Found, ...] | None:
+    """Return what was found in parts of photos as pictures of all of them."""
+    if found is None or len(found) != len(frames):
+        return found
+    parts = zip(found, frames, cameras, strict=True)
+    return tuple(_on_photo(each, frame, (c.width, c.height)) for each, frame, c in parts)
+
+
+def _on_photo(found: _Found, frame: Int64Array, size: tuple[int, int]) -> _Found:
+    if tuple(frame) == (0, 0, *size):
+        return found
+    arrays = to_arrays(found)
+    pictures = {name: on_photo(a, frame, size) for name, a in arrays.items() if a.ndim > 1}
+    return from_arrays(type(found), arrays | pictures, "prediction")

@@ -11,6 +11,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `coordinate_space`: axes and unit of a file
 * `exif`: TIFF directories: EXIF tags of photos, headers of TIFF files
 * `file_format`: what a format carries, as its plugin declares it
+* `framed_photos`: photos cropped to the head, at the resolution of the files
 * `glb_document`: glTF documents under construction
 * `glb_file`: glTF documents
 * `glb_mesh`: the triangle mesh of a glTF file

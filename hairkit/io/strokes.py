@@ -93,6 +93,13 @@ class Strokes:
         rectangle = None if self.rectangle is None else self.rectangle * factor
         return Strokes(strokes, rectangle, None, self.corrects)
 
+    def moved(self, right: float, down: float) -> Strokes:
+        """Return the strokes so many pixels farther right and down."""
+        way = np.array([right, down])
+        strokes = tuple(replace(s, points=s.points + way) for s in self.strokes)
+        rectangle = None if self.rectangle is None else self.rectangle + way
+        return Strokes(strokes, rectangle, None, self.corrects)
+
     def turned(self, quarter_turns: int, width: int, height: int) -> Strokes:
         """Return the strokes for the photo of `width` x `height` after clockwise quarter turns."""
 
@@ -146,13 +153,15 @@ def read_view_strokes(view: View, width: int, height: int) -> Strokes | None:
     on_disk = view.photo_size[::-1] if view.quarter_turns % 2 else view.photo_size
     strokes = strokes.turned(view.quarter_turns, *(strokes.size or on_disk))
     drawn_on = strokes.size or view.photo_size
-    difference = abs(drawn_on[0] * view.height - drawn_on[1] * view.width)
-    if difference > _ASPECT_TOLERANCE * max(view.width, view.height):
+    difference = abs(drawn_on[0] * view.photo_size[1] - drawn_on[1] * view.photo_size[0])
+    if difference > _ASPECT_TOLERANCE * max(view.photo_size):
         raise InputError(
             f"{view.strokes_path}: drawn on a photo of {drawn_on[0]} x {drawn_on[1]} pixels, "
             f"expected {view.photo_size[0]} x {view.photo_size[1]}; draw on this photo"
         )
-    return strokes.scaled(width / drawn_on[0], height / drawn_on[1])
+    left, top, right, bottom = view.frame
+    on_photo = strokes.scaled(view.photo_size[0] / drawn_on[0], view.photo_size[1] / drawn_on[1])
+    return on_photo.moved(-left, -top).scaled(width / (right - left), height / (bottom - top))
 
 
 LINE_WIDTH = 9.0

@@ -25,6 +25,7 @@ from hairkit.errors import InputError
 from hairkit.io.strokes import read_view_strokes
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
+from hairkit.pipeline.find_views import frame_photos
 from hairkit.pipeline.findings import Findings, found
 from hairkit.pipeline.recipe import Recipe
 from hairkit.pipeline.run_log import RunLog
@@ -32,7 +33,7 @@ from hairkit.pipeline.single_photo import SeenPhoto, see_photo
 from hairkit.pipeline.stage_runner import Given, StageRunner, Views, completed
 from hairkit.pipeline.work_folder import LastRun, stage_file
 from hairkit.progress import Progress, Silent
-from hairkit.stages import DRAWN, KEPT, LABELS, ORIENTED, PARTING, REFINED, TURN, Stage
+from hairkit.stages import DRAWN, FRAMED, KEPT, LABELS, ORIENTED, PARTING, REFINED, TURN, Stage
 from hairkit.storage import Stored
 from hairkit.types.capture import Capture, View
 from hairkit.types.groom import Groom
@@ -122,14 +123,16 @@ class Drafted(Findings):
     @found
     def views(self) -> tuple[Capture, Turnaround | None]:
         """The views in the order of the turn, without faces and persons."""
-        if not self.run.recipe.has(TURN):
-            return self.photos, None
-        turn, count = _read(TURN, self._work), len(self.photos.views)
-        if len(turn.order) != count:
+        framing, count = _read(FRAMED, self._work), len(self.photos.views)
+        if len(framing.frames) != count:
             raise InputError(
-                f"{self._work}: the last run had {len(turn.order)} photos, now {count}"
+                f"{self._work}: the last run had {len(framing.frames)} photos, now {count}"
             )
-        return self.photos.arranged(turn), turn
+        framed = frame_photos(self.photos, framing)
+        if not self.run.recipe.has(TURN):
+            return framed, None
+        turn = _read(TURN, self._work)
+        return framed.arranged(turn), turn
 
     @found
     def scene(self) -> Given[Scene]:

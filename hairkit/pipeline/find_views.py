@@ -1,67 +1,95 @@
-"""Faces, persons and the turn: where each photo was taken from, and which side of it is up.
+"""Faces, persons, frames and the turn: where each photo was taken from, and where its head is.
 
 None of them depends on what was drawn on a photo, so that a stroke does not find them again.
-Networks see photos that lie on their side less well. Where the turn finds such photos, they are
-turned upright, and faces, persons and the turn are found again, so that how a camera was held does
-not change the result.
+Networks see heads that are small, or that lie on their side, less well. Such photos are turned
+upright and cropped to the head, and faces and persons are found again, so that neither how a camera
+was held nor how far away it was changes the result.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from concurrent.futures import Future
 from dataclasses import replace
 
+from hairkit.imaging.framing import find_framing
+from hairkit.io.framed_photos import frame_view
 from hairkit.pipeline.stage_runner import Given, StageRunner, gather, given_photo
-from hairkit.stages import FACES, PERSONS, TURN, UPRIGHT_TURN, Stage
+from hairkit.stages import FACES, FRAMED, PERSONS, TURN
 from hairkit.types.capture import Capture, View
+from hairkit.types.face import Face
+from hairkit.types.framing import Framing
+from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
 
-UPRIGHT = "upright-"
-"""Begins the names of the results for photos that were turned upright."""
+FRAMED_NAME = "framed-"
+"""Begins the names of the results for photos that were turned or cropped."""
 
 
 def find_views(run: StageRunner, capture: Capture) -> tuple[Capture, Turnaround | None]:
-    """Find faces, persons and the turn; return the views upright, in its order, and the turn.
+    """Find heads, faces, persons and the turn; return the views upright, in the turn's order.
 
-    The turn tells order and quarter turns of the photos as they were read; None where the recipe
-    looks for no turn.
+    The turn is None where the recipe looks for none.
     """
-    seen, found = _find_turn(run, capture, TURN)
-    if found is None:
-        return seen, None
-    turn, lying = found.value, found.value.quarter_turns
-    if lying.any():
-        views = tuple(view.turned(int(n)) for view, n in zip(capture.views, lying, strict=True))
-        seen, again = _find_turn(run, replace(capture, views=views), UPRIGHT_TURN, UPRIGHT)
-        assert again is not None  # the recipe has the stage
-        turn = run.derive(TURN, turn_as_read, lying=found, upright=again).value
-        found = again
-    run.log.message(turn.summary)
-    return seen.arranged(found.value), turn
-
-
-def turn_as_read(lying: Turnaround, upright: Turnaround) -> Turnaround:
-    """Return the turn of upright photos as that of the photos as they were read."""
-    return replace(upright, quarter_turns=(lying.quarter_turns + upright.quarter_turns) % 4)
-
-
-def _find_turn(
-    run: StageRunner, capture: Capture, stage: Stage[Turnaround], prefix: str = ""
-) -> tuple[Capture, Given[Turnaround] | None]:
-    """Return the capture with what is in its views, and its turn; `prefix` begins views' names."""
-    plain = capture.plain()
-    views = [given_bare_photo(view, prefix + view.name) for view in plain.views]
-    faces, persons = run.every_view(FACES, views), run.every_view(PERSONS, views)
-    found = zip(capture.views, faces, persons, strict=True)
-    seen = replace(
-        capture,
-        views=tuple(v.with_findings(f.result().value, p.result().value) for v, f, p in found),
-    )
+    faces, persons = _look(run, capture.views)
+    framing = run.derive(
+        FRAMED,
+        find_framing,
+        capture=_bare(capture),
+        faces=gather(faces),
+        persons=gather(persons),
+    ).value
+    framed = frame_photos(capture, framing)
+    _tell(run, framed.views)
+    pairs = enumerate(zip(framed.views, capture.views, strict=True))
+    changed = [k for k, (new, old) in pairs if new is not old]
+    again = _look(run, [framed.views[k] for k in changed], FRAMED_NAME)
+    for k, face, person in zip(changed, *again, strict=True):
+        faces[k], persons[k] = face, person
+    found = zip(framed.views, faces, persons, strict=True)
+    views = (v.with_findings(f.result().value, p.result().value) for v, f, p in found)
+    seen = replace(framed, views=tuple(views))
     if not run.recipe.has(TURN):
         return seen, None
-    bare = (replace(view, mask_path=None, strokes_path=None) for view in plain.views)
-    photos = Given.of(replace(plain, views=tuple(bare)))
-    turn = run.once(stage, capture=photos, faces=gather(faces), persons=gather(persons))
-    return seen, turn
+    turn = run.once(TURN, capture=_bare(framed), faces=gather(faces), persons=gather(persons)).value
+    run.log.message(turn.summary)
+    return seen.arranged(turn), turn
+
+
+def frame_photos(capture: Capture, framing: Framing) -> Capture:
+    """Return the capture with its photos upright and cropped to the head."""
+    views = (
+        frame_view(view, int(framing.quarter_turns[k]), framing.frames[k], framing.heads[k])
+        for k, view in enumerate(capture.views)
+    )
+    return replace(capture, views=tuple(views))
+
+
+def _tell(run: StageRunner, views: Sequence[View]) -> None:
+    """Say how many photos are not seen as they are."""
+    lying = sum(view.quarter_turns > 0 for view in views)
+    cropped = sum(view.frame != (0, 0, *view.photo_size) for view in views)
+    if lying:
+        run.log.message(f"{lying} photos lie on their side and are turned")
+    if cropped:
+        run.log.message(f"{cropped} of {len(views)} photos are cropped to the head")
+
+
+def _look(
+    run: StageRunner, views: Sequence[View], prefix: str = ""
+) -> tuple[list[Future[Given[Face]]], list[Future[Given[Person]]]]:
+    """Start to look for faces and persons in photos; `prefix` begins the views' names."""
+    if not views:
+        return [], []
+    photos = [given_bare_photo(view, prefix + view.name) for view in views]
+    return list(run.every_view(FACES, photos)), list(run.every_view(PERSONS, photos))
+
+
+def _bare(capture: Capture) -> Given[Capture]:
+    """Return a capture without what was drawn on its photos."""
+    plain = capture.plain()
+    views = (replace(view, mask_path=None, strokes_path=None) for view in plain.views)
+    return Given.of(replace(plain, views=tuple(views)))
 
 
 def given_bare_photo(view: View, name: str) -> Given[View]:

@@ -214,8 +214,12 @@ def _write(
     made.groom.save(folder / "groom.npz")
     views = made.capture.views
     photos = [None if view.photo_path is None else view.photo_path.name for view in views]
-    sizes = [view.photo_size for view in views]
-    made.evidence.scene.resized(sizes).write_json(folder / "scene.json", photos)
+    scene = made.evidence.scene
+    cameras = tuple(
+        camera.on_photo(view.frame, view.photo_size)
+        for camera, view in zip(scene.cameras, views, strict=True)
+    )
+    replace(scene, cameras=cameras).write_json(folder / "scene.json", photos)
     for plugin, path in exports:
         run.export(plugin, made.groom, path)
 

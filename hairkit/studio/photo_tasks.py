@@ -15,10 +15,11 @@ from typing import Any
 import cv2
 import numpy as np
 
-from hairkit.arrays import UInt8Array
+from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.imaging.picture_file import write_picture
 from hairkit.io.capture_reader import MOST, WORKING_EDGE, read_view
 from hairkit.io.capture_toml import read_capture_file
+from hairkit.io.framed_photos import on_photo
 from hairkit.io.photos import read_photo
 from hairkit.manager import Manager
 from hairkit.options import make_options
@@ -28,6 +29,7 @@ from hairkit.stages import FACES, PERSONS
 from hairkit.studio.feedback import judge_view
 from hairkit.types.capture import View
 from hairkit.types.chosen import ChosenHair
+from hairkit.types.face import turn_points
 from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR
 from hairkit.types.orientation import OrientationMap
@@ -69,21 +71,27 @@ def find_outline(request: dict[str, Any], tell: Tell) -> Any:
     """
     found = _see(request, strands=False)
     view, labels = found.view, found.mask.labels
-    scale = view.photo_size[0] / view.width
     curves, _ = cv2.findContours(
         (labels == HAIR).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE
     )
     simple = [cv2.approxPolyDP(curve, OUTLINE_TOLERANCE, True)[:, 0] for curve in curves]
-    outline = [((c + 0.5) * scale).round(1).ravel().tolist() for c in simple if len(c) > 2]
+    outline = [np.ravel(_on_file(view, c + 0.5)).tolist() for c in simple if len(c) > 2]
     face = view.face
     return {
         "outline": outline,
-        "width": view.photo_size[0],
-        "height": view.photo_size[1],
+        "width": view.photo_size[view.quarter_turns % 2],
+        "height": view.photo_size[1 - view.quarter_turns % 2],
         "share": float((labels == HAIR).mean()),
-        "landmarks": None if face is None else (face.landmarks * scale).round(1).tolist(),
+        "landmarks": None if face is None else _on_file(view, face.landmarks),
         "face": None if face is None else [round(face.presence, 2), round(face.yaw_deg, 1)],
     }
+
+
+def _on_file(view: View, points: Float64Array) -> list[Any]:
+    """Return pixels (N, 2) of a view as pixels of its file, of a tenth."""
+    there = turn_points(view.to_photo(points), -view.quarter_turns, *view.photo_size)
+    found: list[Any] = there.round(1).tolist()
+    return found
 
 
 def follow_strands(request: dict[str, Any], tell: Tell) -> Any:
@@ -113,7 +121,12 @@ def draw_strands(request: dict[str, Any], tell: Tell) -> Any:
     found = manager().call(
         "orient", oriented().plugin, request["options"], view=seen.view.toned(), mask=seen.mask
     )
-    write_picture(request["path"], draw_strand_lines(found), 1, durable=False)
+    drawn, view = draw_strand_lines(found), seen.view
+    factor = SCALE * max(view.width, view.height) / max(view.photo_size)
+    size = round(factor * view.photo_size[0]), round(factor * view.photo_size[1])
+    frame = [round(factor * edge) for edge in view.frame]
+    whole = np.rot90(on_photo(drawn, frame, size), view.quarter_turns)
+    write_picture(request["path"], whole, 1, durable=False)
     return {}
 
 

@@ -10,6 +10,7 @@ the packages named after the subject.
 * `evidence`: what field and strands are made from
 * `face`: landmarks and direction of a face
 * `finding`: what a check of a file found
+* `framing`: how photos are turned and cropped to the head
 * `groom`: strands on a head with material and physics
 * `hairline`: density of the hair on a head
 * `head`: the head mesh, roots, capsules

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -148,6 +149,16 @@ class Camera(Stored):
         return replace(
             self, focal=self.focal * scale, centre=self.centre * size, width=width, height=height
         )
+
+    def on_photo(self, frame: Sequence[int], size: tuple[int, int]) -> Camera:
+        """Return the camera of a whole photo of `size` whose part `frame` this one's picture is.
+
+        `frame` is the left, top, right and bottom edge of the part, pixels of the photo.
+        """
+        left, top, right, bottom = frame
+        part = self.resized(right - left, bottom - top)
+        centre = part.centre + np.array([left, top])
+        return replace(part, centre=centre, width=size[0], height=size[1])
 
     def to_json(self, name: str) -> dict[str, Any]:
         """Return the camera in the form of `truth.json`: R, t, fx, fy, cx, cy or scale_px_per_m."""

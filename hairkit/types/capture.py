@@ -38,6 +38,10 @@ class View:
     photo_path: Path | None = None
     photo_size: tuple[int, int] = (0, 0)
     """(width, height) of the photo on disk, upright: the pixels of masks and strokes."""
+    frame: tuple[int, int, int, int] = (0, 0, 0, 0)
+    """Left, top, right and bottom edge of what `image` shows of that photo, in its pixels."""
+    head: tuple[float, float] | None = None
+    """(x, y) the middle of the head in that photo, its pixels; None where nobody looked."""
     elevation_deg: float = 0.0
     """Nominal elevation: 0 level with the head, positive from above."""
     named: bool = True
@@ -59,6 +63,8 @@ class View:
         )
         if self.photo_size == (0, 0):
             object.__setattr__(self, "photo_size", (self.image.shape[1], self.image.shape[0]))
+        if self.frame == (0, 0, 0, 0):
+            object.__setattr__(self, "frame", (0, 0, *self.photo_size))
         if self.landmarks is not None:
             object.__setattr__(
                 self,
@@ -78,6 +84,33 @@ class View:
     def height(self) -> int:
         """Height of `image` in pixels."""
         return int(self.image.shape[0])
+
+    @property
+    def scale(self) -> float:
+        """Pixels of the photo on disk along a pixel of `image`."""
+        return (self.frame[2] - self.frame[0]) / self.width
+
+    @property
+    def centre(self) -> Float64Array:
+        """(2,) the middle of the photo, where the lens's axis meets it, in pixels of `image`."""
+        return self.from_photo(np.array(self.photo_size) / 2)
+
+    @property
+    def aim(self) -> Float64Array:
+        """(2,) the middle of the head in pixels of `image`, that of the picture where unknown."""
+        if self.head is None:
+            return np.array([self.width / 2, self.height / 2])
+        return self.from_photo(np.array(self.head))
+
+    def from_photo(self, points: Float64Array) -> Float64Array:
+        """Return pixels (..., 2) of the upright photo on disk as pixels of `image`."""
+        left, top, right, bottom = self.frame
+        return (points - [left, top]) * [self.width / (right - left), self.height / (bottom - top)]
+
+    def to_photo(self, points: Float64Array) -> Float64Array:
+        """Return pixels (..., 2) of `image` as pixels of the upright photo on disk."""
+        left, top, right, bottom = self.frame
+        return points * [(right - left) / self.width, (bottom - top) / self.height] + [left, top]
 
     def with_findings(self, face: Face, person: Person) -> Self:
         """Return the view with what was found in it; landmarks that were given are kept."""
@@ -117,12 +150,17 @@ class View:
         person = self.person
         if person is not None and person.alpha.size:
             person = Person(np.rot90(person.alpha, -turns))
-        given = self.landmarks
+        given, head = self.landmarks, self.head
+        if head is not None:
+            x, y = turn_points(np.array([head]), turns, *self.photo_size)[0].tolist()
+            head = (x, y)
         return replace(
             self,
             image=np.rot90(self.image, -turns),
             landmarks=None if given is None else turn_points(given, turns, width, height),
             photo_size=self.photo_size[::-1] if turns % 2 else self.photo_size,
+            frame=_turn_frame(self.frame, turns, self.photo_size),
+            head=head,
             quarter_turns=(self.quarter_turns + turns) % 4,
             face=None if self.face is None else self.face.turned(turns, width, height),
             person=person,
@@ -167,10 +205,10 @@ class Capture(Previewed):
         return replace(self, views=views, chosen=Chosen(), asked=None)
 
     def arranged(self, turn: Turnaround) -> Self:
-        """Return the views upright, in the order, with the names and from where the turn says."""
+        """Return the views in the order, with the names and from where the turn says."""
         views = tuple(
             replace(
-                self.views[i].turned(int(turn.quarter_turns[i])),
+                self.views[i],
                 name=turn.names[i],
                 azimuth_deg=float(turn.azimuth_deg[i]),
                 elevation_deg=float(turn.elevation_deg[i]),
@@ -183,6 +221,15 @@ class Capture(Previewed):
     def preview(self) -> UInt8Array | None:
         """Return the photos side by side, (H, W, 3) uint8 RGB."""
         return row([view.image for view in self.views], PHOTO_HEIGHT)
+
+
+def _turn_frame(
+    frame: tuple[int, int, int, int], quarter_turns: int, size: tuple[int, int]
+) -> tuple[int, int, int, int]:
+    """Return a part of a photo of `size` (width, height) after clockwise quarter turns of it."""
+    corners = np.reshape(frame, (2, 2)).astype(np.float64)
+    (left, top), (right, bottom) = np.sort(turn_points(corners, quarter_turns, *size), axis=0)
+    return int(left), int(top), int(right), int(bottom)
 
 
 def _similarity(matrix: Float64Array) -> Float64Array:

@@ -13,7 +13,7 @@ from hairkit.storage import Stored
 
 @dataclass(frozen=True, eq=False)
 class Turnaround(Stored):
-    """Azimuth, elevation and upright position of every photo, in the order they were read."""
+    """Azimuth and elevation of every photo, in the order they were read."""
 
     order: Int64Array
     """(V,) indices of the photos in the order of the turn: the frontal one first, then towards the
@@ -22,8 +22,6 @@ class Turnaround(Stored):
     """(V,) azimuth of each camera."""
     elevation_deg: Float64Array
     """(V,) elevation of each camera, positive from above."""
-    quarter_turns: Int64Array
-    """(V,) clockwise quarter turns that bring each photo upright, 0 to 3."""
     names: tuple[str, ...]
     """Name of the view that each photo shows."""
     margin: float
@@ -33,16 +31,13 @@ class Turnaround(Stored):
 
     def __post_init__(self) -> None:
         count = len(self.names)
-        for name in ("order", "quarter_turns"):
-            array = frozen_array(getattr(self, name), np.int64, (count,), f"turn {name}")
-            object.__setattr__(self, name, array)
+        order = frozen_array(self.order, np.int64, (count,), "turn order")
+        object.__setattr__(self, "order", order)
         for name in ("azimuth_deg", "elevation_deg"):
             array = frozen_array(getattr(self, name), np.float64, (count,), f"turn {name}")
             object.__setattr__(self, name, array)
         if not np.array_equal(np.sort(self.order), np.arange(count)):
             raise DataError(f"turn order is {self.order.tolist()}, expected each photo once")
-        if not np.isin(self.quarter_turns, range(4)).all():
-            raise DataError("turn quarter_turns holds other values than 0 to 3")
         if (np.abs(self.elevation_deg) > 90).any():
             raise DataError("turn elevation_deg is beyond 90 degrees")
         if len(set(self.names)) != count:

@@ -16,12 +16,13 @@ from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.errors import HairkitError, InputError
 from hairkit.field.isosurface import volume_surface
 from hairkit.manager import Manager
+from hairkit.pipeline.find_views import frame_photos
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.run_record import RECORD, RunRecord, read_record
 from hairkit.pipeline.take_capture import take_capture
 from hairkit.pipeline.work_folder import WORK, LastRun
 from hairkit.rendering.head import Solid
-from hairkit.stages import FIELD, HULL, LABELS, ORIENTED, REFINED, TURN, Stage
+from hairkit.stages import FIELD, FRAMED, HULL, LABELS, ORIENTED, REFINED, TURN, Stage
 from hairkit.storage import Stored
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
@@ -176,7 +177,9 @@ class Layers:
     def _images(self, edge: int) -> dict[str, UInt8Array]:
         if self.capture is None:
             return {}
-        capture, turn = self.take_capture(edge), self._read(TURN)
+        capture, framing, turn = self.take_capture(edge), self._read(FRAMED), self._read(TURN)
+        if framing is not None and len(framing.frames) == len(capture.views):
+            capture = frame_photos(capture, framing)
         if turn is not None and len(turn.names) == len(capture.views):
             capture = capture.arranged(turn)
         return {view.name: view.image for view in capture.views}

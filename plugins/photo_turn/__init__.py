@@ -21,18 +21,14 @@ from dataclasses import replace
 import numpy as np
 
 from hairkit import Capture, View, hookimpl
-from hairkit.arrays import BoolArray, Float64Array, Int64Array, UInt8Array
-from hairkit.types.face import SURE_PRESENCE, Face
+from hairkit.arrays import BoolArray, Float64Array
+from hairkit.imaging.person_outline import Outline, trace_outline
+from hairkit.io.photos import focal_from_equivalent
+from hairkit.types.face import Face
 from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
 
-from .appearance import (
-    Outline,
-    compare_outlines,
-    measure_clothes,
-    measure_skin,
-    trace_outline,
-)
+from .appearance import compare_outlines, measure_clothes, measure_skin
 from .arrangement import Evidence
 from .describe import Found, in_turn_order, name_views, summarise
 from .refuse import check_one_person, check_turn, contradicting, find_copies, photo_name
@@ -45,31 +41,24 @@ USUAL_ABOVE_DEG = 55.0
 PITCH_SPREAD, PITCH_BIAS, RING_SPREAD, STRAY_SPREAD = 5.0, 4.0, 6.0, 3.0
 """Standard deviations in degrees: of a face's pitch, of what all pitches of one head have in
 common, of rings of photos from level, of photos from their ring."""
-FACE_VOTES = 3.0
-"""Votes of a face; the edge of a picture where the person stands has one. Of 152 masks the edge
-was right in 148, of 31 faces all."""
-CLEAR = 2.0
-"""The person covers the bottom edge at least this many times as far as any other."""
-TURNS_TO_BOTTOM = np.array([0, 1, 2, 3])
-"""Clockwise quarter turns that bring the bottom, right, top and left edge to the bottom."""
+
+
+USUAL_LENS_MM = 26.0
+"""35 mm equivalent of a phone's main lens, where the focal length is unknown."""
 
 
 @hookimpl
 def find_turn(capture: Capture, faces: tuple[Face, ...], persons: tuple[Person, ...]) -> Turnaround:
     """Return the arrangement that the photos fit best; `InputError` for what is no turn."""
-    sizes = [(view.width, view.height) for view in capture.views]
-    turns = find_quarter_turns(sizes, faces, persons)
-    views = tuple(
-        replace(view, face=face, person=person).turned(int(count))
-        for view, face, person, count in zip(capture.views, faces, persons, turns, strict=True)
-    )
+    seen = zip(capture.views, faces, persons, strict=True)
+    views = tuple(replace(view, face=face, person=person) for view, face, person in seen)
     twins = find_copies(views)
     found = _find(views)
     order = in_turn_order(found)
     names = name_views(views, found, order)
-    summary = summarise(views, found, names, turns, twins)
+    summary = summarise(views, found, names, twins)
     azimuth, elevation = found.azimuth_deg, found.elevation_deg
-    return Turnaround(order, azimuth, elevation, turns, names, found.margin, summary)
+    return Turnaround(order, azimuth, elevation, names, found.margin, summary)
 
 
 def _find(views: Sequence[View]) -> Found:
@@ -117,7 +106,9 @@ def _arrange(views: Sequence[View], faces: Sequence[Face], named: BoolArray) -> 
     placed = find_arrangements(evidence, known & (pitch > ABOVE_DEG), known)
     best = placed[0]
     check_turn(views, best, seen.yaw_deg, skin)
-    found = np.where(best.above, USUAL_ABOVE_DEG, _ring_elevations(pitch, best.above))
+    found = np.where(
+        best.above, USUAL_ABOVE_DEG, _ring_elevations(pitch, best.above, _level(views))
+    )
     found = np.where(named | (best.above & known), pitch, found)
     note = "" if best.in_order else "the photos are not in the order of their names"
     azimuth = np.where(named, azimuth, best.azimuth_deg)
@@ -136,52 +127,26 @@ def _trace_outlines(views: Sequence[View]) -> list[Outline] | None:
     return outlines
 
 
-def _ring_elevations(pitch: Float64Array, above: BoolArray) -> Float64Array:
+def _level(views: Sequence[View]) -> Float64Array:
+    """Return from what elevations (V,) level cameras see heads beside their axes."""
+    usual = [focal_from_equivalent(USUAL_LENS_MM, *view.photo_size) / view.scale for view in views]
+    focal = [view.focal_px or lens for view, lens in zip(views, usual, strict=True)]
+    down = [view.aim[1] - view.centre[1] for view in views]
+    return np.asarray(np.degrees(np.arctan2(down, focal)), np.float64)
+
+
+def _ring_elevations(pitch: Float64Array, above: BoolArray, level: Float64Array) -> Float64Array:
     """Return elevations (V,) by the pitches of faces (NaN without): the ring's and each one's own.
 
-    The mean of normal distributions given their sum with the noise of `PITCH_SPREAD`.
+    The mean of normal distributions given their sum with the noise of `PITCH_SPREAD`; `level` (V,)
+    are the elevations if all cameras are level.
     """
     seen = np.isfinite(pitch) & ~above
     if not seen.any():
-        return np.zeros(len(pitch))
+        return level
     noise = PITCH_SPREAD**2 + STRAY_SPREAD**2
+    pitch = pitch - level
     mean = pitch[seen].mean()
     ring = mean * RING_SPREAD**2 / (RING_SPREAD**2 + PITCH_BIAS**2 + noise / seen.sum())
     own = np.where(seen, np.nan_to_num(pitch) - mean, 0.0) * STRAY_SPREAD**2 / noise
-    return np.asarray(ring + own, np.float64)
-
-
-def find_quarter_turns(
-    sizes: Sequence[tuple[int, int]], faces: Sequence[Face], persons: Sequence[Person]
-) -> Int64Array:
-    """Return the clockwise quarter turns (V,) that bring the photos upright.
-
-    Photos are turned by the majority of those with the same long side (`sizes` are widths and
-    heights): a camera is held one way for a while.
-    """
-    turns = np.zeros(len(sizes), np.int64)
-    wide = np.array([width > height for width, height in sizes])
-    votes = np.array([_votes(f, p) for f, p in zip(faces, persons, strict=True)])
-    for group in (wide, ~wide):
-        if group.any():
-            turns[group] = int(votes[group].sum(axis=0).argmax())
-    return turns
-
-
-def _votes(face: Face, person: Person) -> Float64Array:
-    """Return the votes (4,) of a photo for 0 to 3 quarter turns."""
-    votes = np.zeros(4)
-    if face.presence >= SURE_PRESENCE:
-        votes[face.quarter_turns] = FACE_VOTES
-    elif person.alpha.size:
-        covered = _covered_edges(person.alpha)
-        first, second = np.argsort(covered)[::-1][:2]
-        if covered[first] > CLEAR * covered[second]:
-            votes[TURNS_TO_BOTTOM[first]] = 1.0
-    return votes
-
-
-def _covered_edges(alpha: UInt8Array) -> Float64Array:
-    """Return the share of the bottom, right, top and left edge that the person covers."""
-    edges = (alpha[-1], alpha[:, -1], alpha[0], alpha[:, 0])
-    return np.array([edge.mean() / np.iinfo(np.uint8).max for edge in edges])
+    return np.asarray(level + ring + own, np.float64)

@@ -7,28 +7,18 @@ distances can be compared.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from hairkit.arrays import BoolArray, Float64Array, UInt8Array
+from hairkit.arrays import Float64Array, UInt8Array
+from hairkit.imaging.person_outline import DEPTHS, Outline
 from hairkit.types.face import Face
 
-PERSON_LEVEL = 127
-"""Probability, of 255, above which a pixel is the person's."""
-DEPTHS = np.linspace(0.02, 1.3, 48)
-"""Depths below the crown at which outlines are compared, head widths: crown to collar."""
-WIDTH_DEPTHS = (0.35, 0.7)
-"""The head's width is the median between these depths, head widths."""
-WIDTH_ROUNDS = 20
-"""Most rounds until width and depths agree: they settle within five."""
 STRETCHES = np.linspace(0.85, 1.18, 9)
 """Scales tried between two outlines: heads are nearer in one photo than in the other."""
 SHIFTS = np.array([-0.05, -0.025, 0.0, 0.025, 0.05])
 """Vertical shifts tried, head widths."""
-SHOULDER = 1.35
-"""Shoulders begin where the outline is this many head widths wide."""
 HEAD_DEPTH = 1.25
 """Depth below the crown down to which skin is looked for, head widths: the chin."""
 SKIN_BLUR_PX, SKIN_EDGE = 1.0, 240
@@ -53,65 +43,6 @@ NOT_HAIR, CLOTHED = 0.18, 0.3
 """Clothes differ from hair by this much in log chromaticity, in at least this share of the band."""
 THUMBNAIL, THUMBNAIL_BLUR = 32, 1.0
 """Edge of the grey thumbnails in which copies are recognised, and their Gaussian, pixels."""
-
-
-@dataclass(frozen=True, eq=False)
-class Outline:
-    """The silhouette of a head, down to the collar."""
-
-    width_px: float
-    """Width of the head in the photo."""
-    top_px: float
-    """Row of the crown."""
-    middle_px: float
-    """Column of the head's middle."""
-    edges: Float64Array
-    """(48, 2) left and right edge at `DEPTHS`, head widths from the head's middle."""
-    shoulder: float
-    """Depth of the shoulders below the crown, head widths; inf where the picture shows none."""
-    inside: BoolArray
-    """(H, W) the person, without other things that were taken for persons."""
-
-
-def trace_outline(alpha: UInt8Array) -> Outline | None:
-    """Return the outline of the largest person in a probability (H, W), None where nobody is."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(
-        (alpha > PERSON_LEVEL).astype(np.uint8)
-    )
-    if count < 2:
-        return None
-    inside = labels == 1 + stats[1:, cv2.CC_STAT_AREA].argmax()
-    rows = np.nonzero(inside.any(1))[0]
-    left = inside.argmax(1)[rows].astype(np.float64)
-    right = inside.shape[1] - inside[:, ::-1].argmax(1)[rows].astype(np.float64)
-    width = _head_width(right - left)
-    if width < 2:
-        return None
-    depth = (rows - rows[0]) / width
-    middle = float(np.median(((left + right) / 2)[_between(depth, *WIDTH_DEPTHS)]))
-    edges = np.stack([np.interp(DEPTHS, depth, (side - middle) / width) for side in (left, right)])
-    wide = (right - left > SHOULDER * width) & (depth > WIDTH_DEPTHS[1])
-    shoulder = float(depth[wide.argmax()]) if wide.any() else np.inf
-    return Outline(width, float(rows[0]), middle, edges.T, shoulder, inside)
-
-
-def _between(depth: Float64Array, low: float, high: float) -> BoolArray:
-    found: BoolArray = np.asarray((depth >= low) & (depth <= high))
-    return found if found.any() else np.asarray(depth == depth[np.abs(depth - low).argmin()])
-
-
-def _head_width(widths: Float64Array) -> float:
-    """Return the median width between the depths that are measured in this very width."""
-    width = float(np.median(widths[: max(2, len(widths) // 4)]))
-    for _ in range(WIDTH_ROUNDS):
-        first, last = (int(depth * width) for depth in WIDTH_DEPTHS)
-        if first >= len(widths):
-            break
-        found = float(np.median(widths[first : max(last, first + 2)]))
-        if abs(found - width) < 1:
-            break
-        width = found
-    return width
 
 
 def compare_outlines(outlines: Sequence[Outline]) -> tuple[Float64Array, Float64Array]:

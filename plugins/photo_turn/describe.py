@@ -80,7 +80,6 @@ def summarise(
     views: Sequence[View],
     found: Found,
     names: Sequence[str],
-    turns: Int64Array,
     twins: Sequence[tuple[int, int]],
 ) -> str:
     """Return one line: direction, steps, margin, and everything that is unusual."""
@@ -100,8 +99,6 @@ def summarise(
             parts.append("unsure: another arrangement fits nearly as well")
     if found.note:
         parts.append(found.note)
-    if turns.any():
-        parts.append(f"{np.count_nonzero(turns)} photos lie on their side and are turned")
     parts += [f"{photo_name(views[j])} equals {photo_name(views[i])}" for i, j in twins[:MOST_TOLD]]
     if len(twins) > MOST_TOLD:
         parts.append(f"so do {len(twins) - MOST_TOLD} more pairs")

@@ -64,7 +64,8 @@ def _find_features(pycolmap: Any, folder: Path, database: Path, task: dict[str, 
     with pycolmap.Database.open(database) as opened:
         for image in opened.read_all_images():
             camera = opened.read_camera(image.camera_id)
-            camera.focal_length = task["focals"][int(Path(image.name).stem)]
+            number = int(Path(image.name).stem)
+            camera.params = [task["focals"][number], *task["centres"][number]]
             camera.has_prior_focal_length = task["known"]
             opened.update_camera(camera)
 

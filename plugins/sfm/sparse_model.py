@@ -74,10 +74,11 @@ def solve(
     with tempfile.TemporaryDirectory(prefix="hairkit-sfm-") as folder:
         _write_photos(Path(folder), views, masks)
         task: dict[str, object] = dict(zip(("features", "neighbours"), settings, strict=True))
-        focals = [view.focal_px or USUAL_FOCAL * max(view.width, view.height) for view in views]
+        focals = [v.focal_px or USUAL_FOCAL * max(v.photo_size) / v.scale for v in views]
+        centres = [view.centre.tolist() for view in views]
         known = all(view.focal_px for view in views)
-        alike = len({(view.width, view.height) for view in views}) == 1
-        task |= {"focals": focals, "known": known, "shared": alike and len(set(focals)) == 1}
+        shared = len({(v.width, v.height, v.frame) for v in views}) == len(set(focals)) == 1
+        task |= {"focals": focals, "centres": centres, "known": known, "shared": shared}
         try:
             ask_once(_PROGRAM, {"do": "solve", "folder": folder, **task}, Limits(seconds))
         except ChildError as error:
@@ -107,8 +108,8 @@ def _model(found: Mapping[str, npt.NDArray[Any]], views: Sequence[View]) -> Mode
         matrix = np.eye(4)
         u, _, vt = np.linalg.svd(found["poses"][i][:, :3])
         matrix[:3, :3], matrix[:3, 3] = u @ vt, found["poses"][i][:, 3]
-        centre = np.array([view.width, view.height]) / 2.0
-        cameras.append(Camera(matrix, float(found["focals"][i]), centre, view.width, view.height))
+        focal = float(found["focals"][i])
+        cameras.append(Camera(matrix, focal, view.centre, view.width, view.height))
     sights = found["sights"].astype(np.float64)
     sizes = np.array([(view.width, view.height) for view in views], np.float64)
     sights[:, 2:] /= sizes[sights[:, 1].astype(np.int64)]

@@ -246,7 +246,7 @@ class _Problem:
 
     def cameras(self, vector: Float64Array) -> CameraArrays:
         """Return the cameras as arrays."""
-        return (*self.turn.unpack(vector), self.turn.sizes / 2.0)
+        return (*self.turn.unpack(vector), self.turn.centres)
 
     def _place_by_landmarks(self, landmarks: LandmarkFit, flat: bool) -> tuple[float, Float64Array]:
         """Return magnification and the turn's centre.
@@ -255,8 +255,8 @@ class _Problem:
         are those of such cameras; depths follow from the place found before.
         """
         sights = landmarks.sights
-        axes = self.turn.unpack(np.zeros(self.turn.size))[0][sights.view]
-        seen = sights.pixel - self.turn.sizes[sights.view] / 2.0
+        axes = self.turn.axes[sights.view]
+        seen = sights.pixel - self.turn.aims[sights.view]
         points = landmarks.landmarks[sights.point]
         weight = np.repeat(1 / sights.noise, 2)
         right = np.einsum("nij,nj->ni", axes[:, :2], points).ravel()
@@ -284,8 +284,8 @@ class _Problem:
         magnification = float(np.median(width)) / breadth
         depth = (scalp[:, 2].max() + scalp[:, 2].min()) / 2
         crown = np.array([0.0, scalp[:, 1].max() + HAIR_THICKNESS, depth])
-        seen = (np.stack([middle, top], axis=1) - self.turn.sizes / 2.0) / magnification
-        axes = self.turn.unpack(np.zeros(self.turn.size))[0][:, :2].reshape(-1, 3)
+        seen = (np.stack([middle, top], axis=1) - self.turn.aims) / magnification
+        axes = self.turn.axes[:, :2].reshape(-1, 3)
         place = np.linalg.lstsq(axes, axes @ crown - seen.ravel(), rcond=None)[0]
         return magnification, place
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -19,7 +21,29 @@ numbers = st.floats(-3, 3)
 
 def _turn(count: int = 8) -> Turn:
     sizes = np.tile([[300, 400]], (count, 1))
-    return Turn(np.arange(count) * np.pi / 4, sizes, np.ones(count), np.zeros(count))
+    axes = np.tile([[150.0, 200.0]], (count, 1))
+    return Turn(np.arange(count) * np.pi / 4, sizes, np.ones(count), np.zeros(count), axes, axes)
+
+
+def test_cameras_beside_the_lens_axis_are_found_again(rng: np.random.Generator) -> None:
+    """Cameras whose pictures are parts of photos are those of whole ones, turned to the head; the
+    vector of such cameras gives them again."""
+    whole, axes = _turn(), rng.uniform(-500, 900, (8, 2))
+    part = replace(whole, centres=axes)
+    vector = _vector(whole, rng)
+    focal = whole.unpack(vector)[2]
+    for camera, middle, axis, f in zip(
+        part.cameras(vector), whole.cameras(vector), axes, focal, strict=True
+    ):
+        assert np.allclose(camera.centre, axis)
+        seen = camera.project(middle.position + middle.forward)
+        assert np.allclose(seen, part.aims[0], atol=1e-6)  # the ray to the head is the same
+        assert np.allclose(camera.position, middle.position)
+        assert camera.focal == pytest.approx(f)
+    again = part.vector_of(part.cameras(vector))
+    for one, other in zip(part.cameras(again), part.cameras(vector), strict=True):
+        points = rng.normal(0, 0.1, (9, 3))
+        assert np.allclose(one.project(points), other.project(points), atol=0.01)
 
 
 def _vector(turn: Turn, rng: np.random.Generator) -> Float64Array:

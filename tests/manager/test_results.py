@@ -173,9 +173,8 @@ WRONG: dict[str, dict[str, Callable[[Arguments], Any]]] = {
         "turn order is": turn(order=np.zeros(8)),
         "turn elevation_deg is beyond": turn(elevation_deg=np.full(8, 91)),
         "turn names two photos alike": turn(names=("front",) * 8),
-        "turn quarter_turns holds": turn(quarter_turns=np.full(8, 4)),
         "the turn has 1 photos, expected 8": lambda _: Turnaround(
-            np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1), ("front",), 1.0, ""
+            np.zeros(1), np.zeros(1), np.zeros(1), ("front",), 1.0, ""
         ),
     },
     "segment": {

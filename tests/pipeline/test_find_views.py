@@ -34,11 +34,13 @@ plugin = "seen_upright"
 
 @hookimpl
 def detect_landmarks(view: View) -> Face:
-    """Find a face by what is bright; less surely in a photo that lies."""
+    """Find a face by what is bright; less surely in a photo that lies, whose top row is black."""
     row, column = np.argwhere(view.image[..., 0] == view.image.max())[0]
     lying = view.width > view.height
     points = np.full((68, 2), [column + 0.5, row + 0.5]) + 0.25 * lying
-    return Face(0.99 if lying else 1.0, points, np.ones(68), 5.0 * row, 0.0, 0.0, 3 * lying)
+    sides = (view.image[0], view.image[:, 0], view.image[-1], view.image[:, -1])
+    turns = int(np.argmin([side.max() for side in sides]))
+    return Face(0.99 if lying else 1.0, points, np.ones(68), 5.0 * row, 0.0, 0.0, turns)
 
 
 @hookimpl
@@ -49,19 +51,12 @@ def segment_person(view: View) -> Person:
 
 @hookimpl
 def find_turn(capture: Capture, faces: tuple[Face, ...]) -> Turnaround:
-    """Order the photos by their faces, and turn those that lie."""
+    """Order the photos by their faces."""
     azimuths = np.array([face.yaw_deg for face in faces])
-    turns = [_needed(view) for view in capture.views]
     names = tuple(f"view-{k}" for k in range(len(faces)))
     order = np.argsort(azimuths, kind="stable")
     zeros = np.zeros(len(faces))
-    return Turnaround(order, azimuths, zeros, np.array(turns), names, 2.0, "found")
-
-
-def _needed(view: View) -> int:
-    """Return the quarter turns of a photo whose top row is black when it is upright."""
-    sides = (view.image[0], view.image[:, 0], view.image[-1], view.image[:, -1])
-    return int(np.argmin([side.max() for side in sides]))
+    return Turnaround(order, azimuths, zeros, names, 2.0, "found")
 
 
 def photos(rng: np.random.Generator) -> Capture:
@@ -85,7 +80,7 @@ def find(capture: Capture, folder: Path) -> tuple[Capture, Turnaround | None]:
 def test_how_a_camera_was_held_changes_nothing(
     lying: tuple[int, ...], rng: np.random.Generator, tmp_path: Path
 ) -> None:
-    """Photos on their side give the views of upright ones; the turn tells how they lay."""
+    """Photos on their side give the views of upright ones, which tell how they lay."""
     upright = photos(rng)
     views = zip(upright.views, lying, strict=True)
     turned = tuple(
@@ -95,7 +90,9 @@ def test_how_a_camera_was_held_changes_nothing(
     for _ in range(2):  # the second time from the work folder
         found, turn = find(Capture(turned), tmp_path / "lying")
         assert turn is not None
-        assert np.array_equal(turn.quarter_turns, [-turns % 4 for turns in lying])
+        assert [found.views[k].quarter_turns for k in np.argsort(turn.order)] == [
+            -turns % 4 for turns in lying
+        ]
         for one, other in zip(found.views, wanted.views, strict=True):
             assert (one.name, one.azimuth_deg) == (other.name, other.azimuth_deg)
             assert np.array_equal(one.image, other.image)

@@ -87,7 +87,7 @@ class Run:
 
     def _turn(self, margin: float) -> Turnaround:
         k, zero = np.arange(8), np.zeros(8)
-        return Turnaround(k, 45.0 * k, zero, zero, self.scene.names, margin, "a turn")
+        return Turnaround(k, 45.0 * k, zero, self.scene.names, margin, "a turn")
 
     def figures(self) -> dict[str, Figure]:
         """Return the figures by stage and name."""

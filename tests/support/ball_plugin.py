@@ -82,7 +82,7 @@ def find_turn(capture: Capture, options: Options) -> Turnaround:
     views = capture.views
     azimuth, zero = np.array([view.azimuth_deg for view in views]), np.zeros(len(views))
     names = tuple(view.name for view in views)
-    return Turnaround(np.arange(len(views)), azimuth, zero, zero, names, np.inf, "turn as said")
+    return Turnaround(np.arange(len(views)), azimuth, zero, names, np.inf, "turn as said")
 
 
 @hookimpl

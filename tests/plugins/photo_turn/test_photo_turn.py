@@ -126,23 +126,6 @@ def test_shuffled_photos_are_sorted(seed: int) -> None:
     assert off(found, [shots[i] for i in moved]).max() < 25
 
 
-@pytest.mark.parametrize("turns", [1, 2, 3])
-def test_photos_lying_on_their_side_are_turned(turns: int) -> None:
-    """Pictures that all lie on one side, or stand on the head, come upright at the same places."""
-    shots = ring(EIGHT)
-    lying = []
-    for shot in shots:
-        person = Person(np.rot90(shot.person.alpha, turns))
-        face = replace(shot.face, quarter_turns=turns) if shot.face.sure else shot.face
-        if shot.face.sure:
-            face = replace(shot.face.turned(-turns % 4, WIDTH, HEIGHT), quarter_turns=turns)
-        lying.append(Shot(shot.view.turned(-turns), face, person, shot.azimuth_deg))
-    found = find(lying)
-    assert found.quarter_turns.tolist() == [turns] * 8
-    assert np.array_equal(found.azimuth_deg, find(shots).azimuth_deg)
-    assert "on their side" in found.summary
-
-
 @pytest.mark.parametrize("count", [4, 5, 6, 10, 12, 24, 36])
 def test_any_number_of_photos_is_placed(count: int) -> None:
     """Even turns of 4 to 36 photos are found, begun anywhere."""

@@ -86,12 +86,12 @@ def test_marginalising_equals_solving_for_the_shape(fit: LandmarkFit) -> None:
 def test_rows_are_derivatives(bust: Turntable, fit: LandmarkFit) -> None:
     """A small step of the cameras changes the projections as `project` says."""
     turn, vector = _start(bust)
-    cameras, tangents = (*turn.unpack(vector), turn.sizes / 2.0), turn.tangents(vector)
+    cameras, tangents = (*turn.unpack(vector), turn.centres), turn.tangents(vector)
     point, view, offset = fit.sights.point, fit.sights.view, np.zeros((68, 3))
     pixels, by_camera, by_point = fit.project(point, view, offset, cameras)
     rng = np.random.default_rng(2)
     step, bend = rng.normal(0, 1e-6, turn.size), rng.normal(0, 1e-6, (68, 3))
-    moved = (*turn.unpack(vector + step), turn.sizes / 2.0)
+    moved = (*turn.unpack(vector + step), turn.centres)
     got = fit.project(point, view, bend, moved)[0] - pixels
     want = np.einsum("nik,nk->ni", by_camera, tangents[view] @ step)
     want += np.einsum("nik,nk->ni", by_point, bend[point])

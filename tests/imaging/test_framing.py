@@ -1,0 +1,161 @@
+"""Laws of the frames around heads: found small, big, lying, with and without a face."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from hairkit.imaging import framing
+from hairkit.imaging.framing import find_framing
+from hairkit.io.framed_photos import frame_view, on_photo
+from hairkit.types.capture import Capture, View
+from hairkit.types.face import Face
+from hairkit.types.framing import Framing
+from hairkit.types.person import Person
+
+WIDTH, HEIGHT, RADIUS = 600, 800, 30
+"""Of the photos, and half of the head's width, pixels."""
+Seen = tuple[View, Face, Person]
+
+
+def shoot(x: float, y: float, radius: float = RADIUS, face: bool = False) -> Seen:
+    """Return a photo of a person whose head has its middle at x, y."""
+    alpha = np.zeros((HEIGHT, WIDTH), np.uint8)
+    middle = (round(x), round(y))
+    cv2.ellipse(alpha, middle, (round(radius), round(1.2 * radius)), 0, 0, 360, 255, -1)
+    body = [round(x - 2 * radius), round(y + 1.6 * radius), round(4 * radius), round(7 * radius)]
+    cv2.rectangle(alpha, body, 255, -1)
+    cv2.rectangle(
+        alpha,
+        (middle[0] - round(radius / 2), middle[1]),
+        (middle[0] + round(radius / 2), body[1]),
+        255,
+        -1,
+    )
+    found = Face.absent()
+    if face:
+        points = np.tile([float(x), float(y)], (68, 1))
+        points[48:68, 1] += 0.7 * radius
+        found = Face(1.0, points, np.ones(68), 0.0, 0.0, 0.0)
+    return View("x", 0.0, np.dstack([alpha // 2] * 3)), found, Person(alpha)
+
+
+def find(*seen: Seen) -> Framing:
+    """Return the framing of photos in which nothing is hair."""
+    views, faces, persons = zip(*seen, strict=True)
+    return find_framing(Capture(views), faces, persons)
+
+
+@pytest.fixture(autouse=True)
+def _bald(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the network find no hair."""
+    monkeypatch.setattr(framing, "hair_probability", lambda *_: np.zeros((8, 8, 3), np.float32))
+
+
+def test_small_heads_are_framed_alike() -> None:
+    """Frames hold the head, its upper half above their middle, and are of one size, even where a
+    silhouette is wrong, or a head lies at the edge."""
+    shots = [shoot(300, 200), shoot(100, 250, face=True), shoot(45, 300), shoot(300, 200, 50)]
+    found = find(*shots)
+    sizes = found.frames[:, 2:] - found.frames[:, :2]
+    assert (sizes == sizes[0]).all()
+    assert (found.quarter_turns == 0).all()
+    for (left, top, right, bottom), head, (x, y) in zip(
+        found.frames, found.heads, [(300, 200), (100, 250), (45, 300), (300, 200)], strict=True
+    ):
+        assert left < x < right
+        assert top < y < (top + bottom) / 2
+        assert np.hypot(*(head - [x, y])) < RADIUS
+        assert right - left < 8 * RADIUS
+
+
+def test_a_head_that_fills_the_photo_is_left_alone() -> None:
+    """Portraits, and photos in which nobody is found, stay whole."""
+    nobody = (View("x", 0.0, np.zeros((60, 80, 3), np.uint8)), Face.absent(), Person.absent())
+    for seen in (shoot(300, 300, 130), nobody):
+        found = find(seen)
+        view = seen[0]
+        assert found.frames.tolist() == [[0, 0, view.width, view.height]]
+        assert frame_view(view, 0, found.frames[0], found.heads[0]) is view
+
+
+def test_faces_are_believed_where_the_silhouette_is_of_somebody_else() -> None:
+    """A face far from the largest person's head is the head; so it is without any silhouette."""
+    view, face, _ = shoot(480, 500, face=True)
+    for person in (shoot(150, 120)[2], Person.absent()):
+        (left, top, right, bottom), *_ = find((view, face, person)).frames
+        assert left < 480 < right
+        assert top < 500 < bottom
+
+
+def test_photos_that_lie_are_framed_as_upright_ones() -> None:
+    """Frames and heads are those of the upright photo, however the camera was held."""
+    view, face, person = shoot(220, 200, face=True)
+    upright = find((view, face, person))
+    for turns in (1, 2, 3):
+        lying = view.turned(turns)
+        found = find(
+            (
+                View("x", 0.0, lying.image),
+                replace(face.turned(turns, WIDTH, HEIGHT), quarter_turns=-turns % 4),
+                Person(np.rot90(person.alpha, -turns)),
+            )
+        )
+        assert found.quarter_turns.tolist() == [-turns % 4]
+        assert np.abs(found.frames - upright.frames).max() <= 1
+        assert np.abs(found.heads - upright.heads).max() <= 1
+
+
+def test_long_hair_makes_frames_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where hair crosses the lower edge of most photos, all frames reach farther down."""
+    shots = [shoot(300, 150), shoot(250, 150), shoot(280, 150)]
+    short = find(*shots).frames
+    hairy = iter([True, True, False, False, False, False])
+    answer = np.ones((8, 8, 3), np.float32)
+    monkeypatch.setattr(framing, "hair_probability", lambda *_: answer * next(hairy))
+    long = find(*shots).frames
+    assert (long[:, 3] > short[:, 3] + RADIUS).all()
+    assert (long[:, :3] == short[:, :3]).all()
+
+
+def test_a_framed_photo_keeps_the_pixels_of_its_file(tmp_path: Path) -> None:
+    """A crop of a photo that was read small has the file's own pixels; its points are theirs, and
+    the lens's axis stays in the middle of the photo."""
+    rng = np.random.default_rng(0)
+    whole = rng.integers(0, 256, (1600, 1200, 3)).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "a.png"), np.ascontiguousarray(np.rot90(whole)[..., ::-1]))
+    small = cv2.resize(whole, (900, 1200), interpolation=cv2.INTER_AREA)
+    lying = View(
+        "a", 0.0, np.rot90(small), focal_px=1000.0, photo_path=tmp_path / "a.png",
+        photo_size=(1600, 1200), landmarks=np.tile([50.0, 300.0], (68, 1)),
+    )  # fmt: skip
+    view = frame_view(lying, 1, (100, 200, 1000, 1100), np.array([500.0, 600.0]))
+    assert np.array_equal(view.image, whole[200:1100, 100:1000])
+    assert np.allclose(view.centre, [500, 600])
+    assert np.allclose(view.aim, [400, 400])
+    assert view.focal_px == pytest.approx(1000 * 1600 / 1200)
+    assert view.landmarks is not None
+    assert np.allclose(
+        view.to_photo(view.landmarks), lying.turned(1).to_photo(lying.turned(1).landmarks)
+    )
+    again = on_photo(view.image, view.frame, view.photo_size)
+    assert np.array_equal(again[200:1100, 100:1000], view.image)
+    assert not again[:200].any()
+
+
+@pytest.mark.parametrize("turns", range(4))
+def test_points_of_a_part_are_points_of_the_photo(turns: int) -> None:
+    """`to_photo` and `from_photo` are inverse to each other, and follow quarter turns."""
+    view = View(
+        "a", 0.0, np.zeros((40, 30, 3), np.uint8), photo_size=(200, 300), frame=(10, 20, 70, 100),
+        head=(40.0, 60.0),
+    ).turned(turns)  # fmt: skip
+    points = np.random.default_rng(1).uniform(0, 30, (9, 2))
+    assert np.allclose(view.from_photo(view.to_photo(points)), points)
+    assert view.scale == pytest.approx(2)
+    assert np.allclose(view.aim, [view.width / 2, view.height / 2])
+    assert view.turned(-turns).frame == (10, 20, 70, 100)
