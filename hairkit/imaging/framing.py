@@ -11,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array, Int64Array, UInt8Array
-from hairkit.imaging.hair_network import hair_probability, likely_landmarks
+from hairkit.imaging.hair_network import find_hair, hair_probability, likely_landmarks
 from hairkit.imaging.person_outline import Outline, trace_outline
 from hairkit.types.capture import Capture, View
 from hairkit.types.face import SURE_PRESENCE, Face
@@ -36,17 +37,17 @@ mouth: means of 13 captures."""
 CHIN_DEPTH = 1.5
 """A face whose eyes lie farther than this below the crown of the silhouette, head widths, or
 above it, is another person's."""
-ASIDE, OVER = 1.6, 0.4
+ASIDE, OVER = 1.4, 0.3
 """Head widths from the middle of the head to the sides of the frame, and from the crown to its
 upper edge."""
-DEPTHS = (2.8, 4.2, 6.3)
+DEPTHS = (2.5, 3.8, 5.7)
 """Head widths from the crown to the lower edge of the frames: the first that hair crosses in half
 of the photos or fewer."""
 MIDDLE = 0.6
 """Depth of the middle of the head below the crown, head widths."""
 CROSSING = 0.15
 """Hair crosses the lower edge where it is wider there than this, head widths."""
-WHOLE = 0.8
+WHOLE = 0.85
 """A frame longer than this share of the photo's longer side is the whole photo."""
 
 
@@ -119,9 +120,15 @@ def _covered_edges(alpha: UInt8Array) -> Float64Array:
 
 
 def _find_head(view: View) -> Head | None:
-    """Return the head by the silhouette, or by the face where they contradict each other."""
-    outline = None if view.person is None else trace_outline(view.person.alpha)
+    """Return the head by the silhouette, or by the face where they contradict each other.
+
+    Where no face shows, hair may be all that shows: then what may be hair is the person's, too.
+    """
     landmarks = likely_landmarks(view)
+    outline = None if view.person is None else trace_outline(view.person.alpha)
+    if landmarks is None and view.person is not None:
+        hair = cv2.resize(find_hair(view)[..., 0], (view.width, view.height))
+        outline = trace_outline(np.maximum(view.person.alpha, (255 * hair).astype(np.uint8)))
     if landmarks is None:
         return None if outline is None else _head_of(outline)
     eyes, mouth = landmarks[EYES].mean(axis=0), landmarks[MOUTH].mean(axis=0)
