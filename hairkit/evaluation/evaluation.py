@@ -16,6 +16,7 @@ from hairkit.evaluation.align import (
     alignment_points,
     camera_errors,
 )
+from hairkit.evaluation.brightness import brightness_ratios
 from hairkit.evaluation.images import (
     DrawnDirections,
     OrientationError,
@@ -93,6 +94,8 @@ class Evaluation:
     """Of the 2D orientation maps; None when they were not given."""
     mask_views: tuple[float, ...] | None
     """Intersection over union of the hair masks; None when they were not given."""
+    brightness_views: tuple[float, ...] | None
+    """Luma of the drawn hair over that of the photo's, by view; None without photos or OpenGL."""
     consistency: float | None
     """Share of a true strand that one predicted strand follows; None when not asked for."""
     evidence: Evidence
@@ -119,6 +122,11 @@ class Evaluation:
         """Mean mask overlap of the views, None when unknown."""
         return None if self.mask_views is None else float(np.mean(self.mask_views))
 
+    @property
+    def brightness(self) -> float | None:
+        """Mean brightness of the drawn hair over the photos', None when unknown."""
+        return None if self.brightness_views is None else float(np.mean(self.brightness_views))
+
     def to_json(self) -> dict[str, Any]:
         """Return every figure as plain numbers, lists and dictionaries."""
         figures = {
@@ -126,7 +134,7 @@ class Evaluation:
             for field in dataclasses.fields(self)
             if field.name != "evidence"
         }
-        means = ("azimuth_error_deg", "silhouette", "orientation_deg", "mask_iou")
+        means = ("azimuth_error_deg", "silhouette", "orientation_deg", "mask_iou", "brightness")
         return figures | {name: getattr(self, name) for name in means}
 
 
@@ -179,6 +187,7 @@ def evaluate(
         dense_strands=dense,
         orientation_views=_orientation(prediction, truth),
         mask_views=_masks(prediction, truth),
+        brightness_views=_brightness(prediction, truth, dense_strands),
         consistency=strand_consistency(groom.strands, truth.strands) if consistency else None,
         evidence=Evidence(precision, recall, samples, directions, silhouettes),
     )
@@ -232,6 +241,14 @@ def _masks(prediction: Prediction, truth: Truth) -> tuple[float, ...] | None:
         mask_iou(found.hair, truth.hair_mask(view) == HAIR)
         for view, found in enumerate(prediction.masks)
     )
+
+
+def _brightness(prediction: Prediction, truth: Truth, count: int) -> tuple[float, ...] | None:
+    photos = truth.photos()
+    if photos is None:
+        return None
+    hair = [truth.hair_mask(view) == HAIR for view in range(len(photos))]
+    return brightness_ratios(prediction.groom, prediction.cameras, photos, hair, count)
 
 
 def _plain(value: Any) -> Any:

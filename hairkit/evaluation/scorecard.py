@@ -83,6 +83,7 @@ def _view_figures(evaluation: Evaluation) -> tuple[Figure, ...]:
         Figure("silhouette IoU", evaluation.silhouette, "", 3, overlap),
         Figure("2D orientation error", orientation, " deg", 1, f"{lower}, guessing gives 45"),
         Figure("hair mask IoU", evaluation.mask_iou, "", 3, overlap),
+        Figure("brightness / photo", evaluation.brightness, "", 2, "1 is best: luma of the hair"),
         Figure("metric scale / true", scale, "", 3, "1 is best: scores are of the groom so scaled"),
         Figure("camera azimuth error", azimuth, " deg", 2, lower),
         Figure("camera rotation error", rotation, " deg", 2, lower),

@@ -14,7 +14,9 @@ from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
 from hairkit.evaluation.depth_map import Surface, first_surface
 from hairkit.evaluation.scores import Samples, sample_strands
+from hairkit.io.capture_reader import photo_files
 from hairkit.io.mesh_text import read_obj
+from hairkit.io.photos import read_photo
 from hairkit.storage import read_bytes, read_npz
 from hairkit.types.camera import Camera
 from hairkit.types.head import Capsules, Head
@@ -54,6 +56,14 @@ class Truth:
     def hair_mask(self, view: int) -> UInt8Array:
         """Return (H, W) true labels of a view: 255 hair, 128 the rest of the person, 0 neither."""
         return _picture(self.folder.parent / "masks", view)
+
+    def photos(self) -> list[UInt8Array] | None:
+        """Return the photos (H, W, 3) RGB, in the order of the views; None where there are none."""
+        folder = self.folder.parent / "photos"
+        files = photo_files(folder) if folder.is_dir() else []
+        if len(files) != len(self.names):
+            return None
+        return [read_photo(file)[0] for file in files]
 
 
 def read_truth(folder: str | os.PathLike[str]) -> Truth:
