@@ -80,9 +80,14 @@ def node_points(strands: Strands, nodes: int) -> Float64Array:
     return points
 
 
+def directions(points: Floats) -> Float64Array:
+    """Return the directions (..., n - 1, 3) of segments between points (..., n, 3)."""
+    return quaternion.normalize(np.diff(points, axis=-2).astype(np.float64))
+
+
 def largest_turn(points: Float64Array) -> Float64Array:
     """Return the largest turn (S,) at a node, radians."""
-    direction = quaternion.normalize(np.diff(points, axis=1))
+    direction = directions(points)
     cosine = (direction[:, 1:] * direction[:, :-1]).sum(axis=-1)
     result: Float64Array = np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1)
     return result

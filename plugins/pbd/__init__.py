@@ -6,34 +6,41 @@ by a spring, which is bending. What of its weight these cannot bear at rest a fo
 with the head, so that captured hair stays. `rods` is stiffer, faster at equal error, and has twist.
 
 * `kernels`: substeps, compiled
-* `options`: settings
 * `simulator`: the simulator
 """
 
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from hairkit.hookspecs import hookimpl
-
-from .options import Options
+from hairkit.options import option
+from hairkit.simulation.node_options import NodeOptions
 
 if TYPE_CHECKING:
     from hairkit.types.groom import Groom
 
-    from .simulator import PbdSimulator
 
+@dataclass(frozen=True)
+class Options(NodeOptions):
+    """Options of the simulation; None takes the value of the groom."""
 
-__all__ = ["Options"]
-
-_log = logging.getLogger("hairkit")
+    bend: float = option(
+        1000.0, low=1.0, high=1e6, unit="1/s2", doc="Bending stiffness over a node's mass."
+    )
+    borne: float = option(1.0, low=0.0, high=1.0, doc="Share of the weight borne at rest; 0 sags.")
+    substeps: int = option(32, low=1, high=512, doc="Substeps in 1/60 s.")
+    iterations: int = option(2, low=1, high=64, doc="Iterations in a substep.")
 
 
 @hookimpl
-def make_simulator(groom: Groom, options: Options) -> PbdSimulator:
+def make_simulator(groom: Groom, options: Options) -> Any:
     """Return a simulator of the groom's guides, at rest."""
     from .simulator import PbdSimulator
 
-    _log.warning("pbd is position-based dynamics since 0.3; what was pbd is rods, the default")
+    logging.getLogger("hairkit").warning(
+        "pbd is position-based dynamics since 0.3; what was pbd is rods, the default"
+    )
     return PbdSimulator(groom, options)

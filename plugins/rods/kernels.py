@@ -15,6 +15,7 @@ import numpy as np
 from hairkit.parallel import compiled_with
 from hairkit.simulation.lanes import LANES, four, put, put_four, stage, three
 from hairkit.simulation.obstacle_kernels import Fields
+from hairkit.simulation.substeps import Settings, Step, StepArrays, step_of
 from hairkit.simulation.vectors import (
     HALF,
     ONE,
@@ -28,13 +29,12 @@ from hairkit.simulation.vectors import (
     moved,
     plus,
     product,
-    rows_of,
     third_axis,
     times,
     turned,
 )
 
-from .block import Blocks, Node, Outer, Records, Settings, Step, StepArrays, Steps, Work
+from .block import Blocks, Node, Outer, Records, Work
 from .frames import THIRD, half_way, swing_frame, twist_angle
 from .kernel_contact import resolve_contacts
 from .linear_system import IMPLICIT
@@ -90,19 +90,6 @@ def run_substeps(
             move_nodes(s, x, h)
             resolve_contacts(s, x, step, fields, settings)
             keep_lengths(s, h)
-
-
-@stage
-def step_of(steps: StepArrays, k: int) -> Step:
-    """Return one substep, whose numbers stay in registers."""
-    return Steps(
-        rows_of(steps.head_step[k]),
-        rows_of(steps.drift[k]),
-        rows_of(steps.air[k]),
-        (steps.turn[k, 0], steps.turn[k, 1], steps.turn[k, 2], steps.turn[k, 3]),
-        rows_of(steps.torso[k]),
-        rows_of(steps.torso_drift[k]),
-    )
 
 
 @stage
