@@ -17,7 +17,7 @@ from hairkit.arrays import (
     Int32Array,
     Int64Array,
     UInt8Array,
-    frozen_array,
+    freeze,
 )
 from hairkit.errors import DataError
 from hairkit.storage import Stored
@@ -42,8 +42,8 @@ class Strands(Previewed, Stored):
     """(S,) true for guides, false for interpolated hair."""
 
     def __post_init__(self) -> None:
-        points = frozen_array(self.points, np.float32, (None, 3), "strand points")
-        offsets = frozen_array(self.offsets, np.int64, (None,), "strand offsets")
+        points = freeze(self, "points", np.float32, (None, 3), "strand points")
+        offsets = freeze(self, "offsets", np.int64, (None,), "strand offsets")
         if not len(offsets) or offsets[0] != 0 or offsets[-1] != len(points):
             raise DataError(f"strand offsets must run from 0 to {len(points)}")
         if (np.diff(offsets) < 2).any():
@@ -51,19 +51,10 @@ class Strands(Previewed, Stored):
                 f"{np.count_nonzero(np.diff(offsets) < 2)} strands have fewer than two points"
             )
         count, total = len(offsets) - 1, len(points)
-        object.__setattr__(self, "points", points)
-        object.__setattr__(self, "offsets", offsets)
-        extras: dict[str, tuple[npt.DTypeLike, tuple[int, ...]]] = {
-            "widths": (np.float32, (total,)),
-            "root_uv": (np.float32, (count, 2)),
-            "group": (np.int32, (count,)),
-            "guide": (np.bool_, (count,)),
-        }
-        for name, (dtype, shape) in extras.items():
-            if getattr(self, name) is not None:
-                object.__setattr__(
-                    self, name, frozen_array(getattr(self, name), dtype, shape, name)
-                )
+        freeze(self, "widths", np.float32, (total,))
+        freeze(self, "root_uv", np.float32, (count, 2))
+        freeze(self, "group", np.int32, (count,))
+        freeze(self, "guide", np.bool_, (count,))
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
