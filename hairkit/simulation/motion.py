@@ -79,8 +79,7 @@ class HeadMotion:
         motion = self._interpolate_keys(time)
         if not self.shakes:
             return motion
-        both: Float64Array = motion @ self._shake_transform(time)
-        return both
+        return motion @ self._shake_transform(time)
 
     @property
     def end(self) -> float:
@@ -243,5 +242,4 @@ def _hermite(
     a: Float64Array, slope_a: Float64Array, b: Float64Array, slope_b: Float64Array, t: float
 ) -> Float64Array:
     one, two = t * t * (3 - 2 * t), t * (1 - t)
-    result: Float64Array = a + (b - a) * one + two * ((1 - t) * slope_a - t * slope_b)
-    return result
+    return a + (b - a) * one + two * ((1 - t) * slope_a - t * slope_b)

@@ -209,5 +209,4 @@ class NodeSimulator(GuideSimulator):
         share = np.stack([np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))], 1)
         places, seed = self._nodes[:, some].astype(np.float32), self._options.seed
         air = air_velocity(places, self._time, wind, around.turbulence, seed, head)
-        result: Float64Array = share @ air
-        return result
+        return share @ air

@@ -135,19 +135,17 @@ def _along_screw(start: Float64Array, end: Float64Array, share: Float64Array) ->
 
 def _rotation(cross: Float64Array, angle: Float64Array) -> Float64Array:
     """Return rotations (N, 3, 3) less the identity (Rodrigues), for angles (N, 1, 1)."""
-    result: Float64Array = np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
-    return result
+    return np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
 
 
 def _integral(cross: Float64Array, angle: float, share: Float64Array) -> Float64Array:
     """Return (N, 3, 3) the integral of the rotation over the fractions `share` (N, 1, 1)."""
     part = share * angle
-    result: Float64Array = (
+    return (
         share * np.eye(3)
         + (1 - np.cos(part)) / angle * cross
         + (part - np.sin(part)) / angle * (cross @ cross)
     )
-    return result
 
 
 def _axis_and_angle(turn: Float64Array) -> tuple[Float64Array, float]:

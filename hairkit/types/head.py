@@ -118,8 +118,7 @@ class Head(Previewed, Stored):
         """Return the faces (F', 3) that are not those of eyeballs."""
         if self.eye_vertices is None:
             return self.faces
-        kept: Int32Array = self.faces[~np.isin(self.faces, self.eye_vertices).any(axis=1)]
-        return kept
+        return self.faces[~np.isin(self.faces, self.eye_vertices).any(axis=1)]
 
     def eye_centres(self) -> Float64Array | None:
         """Return (2, 3) the middles of the left and the right eyeball, metres, or None."""

@@ -100,13 +100,11 @@ class Strands(Previewed, Stored):
     def arc_lengths(self) -> Float64Array:
         """Return (P,) the distance of every point from its root along the strand, metres."""
         total = np.cumsum(self._steps())
-        result: Float64Array = total - np.repeat(total[self.offsets[:-1]], self.counts)
-        return result
+        return total - np.repeat(total[self.offsets[:-1]], self.counts)
 
     def lengths(self) -> Float64Array:
         """Return (S,) strand lengths, metres."""
-        result: Float64Array = np.add.reduceat(self._steps(), self.offsets[:-1])
-        return result
+        return np.add.reduceat(self._steps(), self.offsets[:-1])
 
     def _steps(self) -> Float64Array:
         """Return (P,) the distance of every point from the one before it, 0 at roots, metres."""
@@ -199,5 +197,4 @@ class Strands(Previewed, Stored):
 
 
 def _mix(values: npt.NDArray[np.float32], after: Int64Array, t: Float64Array) -> Float32Array:
-    mixed: Float32Array = (values[after - 1] * (1 - t) + values[after] * t).astype(np.float32)
-    return mixed
+    return (values[after - 1] * (1 - t) + values[after] * t).astype(np.float32)

@@ -67,8 +67,7 @@ class VoxelGrid(Stored):
 
     def index_from_head(self, points: npt.ArrayLike) -> Float64Array:
         """Return continuous indices (..., 3) of points: whole numbers fall on cell centres."""
-        result: Float64Array = (np.asarray(points, np.float64) - self.origin) / self.spacing - 0.5
-        return result
+        return (np.asarray(points, np.float64) - self.origin) / self.spacing - 0.5
 
     def nearest_cell(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
         """Return the cell (..., 3) that holds each point, clamped to the grid."""
