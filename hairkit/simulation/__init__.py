@@ -12,8 +12,7 @@ The simulators are plugins: `manager.call("make_simulator", "rods", groom=groom)
 * `held_guides`: what holds guides in their captured shape: skin, hair around, ties
 * `lanes`: records of many strands side by side, for compiled code
 * `motion`: motion of the head: keyframes and shakes
-* `node_options`: settings of all simulators whose guides have nodes
-* `node_simulator`: time, motion of head and torso, and air of these
+* `node_simulator`: time, motion of head and torso, and air of simulators whose guides have nodes
 * `obstacle_kernels`: distances to obstacles, and drawn points out of them, compiled
 * `obstacles`: head and torso as signed distances on grids
 * `posing`: a groom at one frame of a simulation

@@ -9,7 +9,9 @@ from __future__ import annotations
 from typing import Annotated, Any, get_type_hints
 
 import numpy as np
+import numpy.typing as npt
 
+from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled_with
 from hairkit.simulation.vectors import Floats, Frame, Vector, inlined
 
@@ -27,6 +29,8 @@ Three = Annotated[Floats, 3]
 """(3, LANES) vectors."""
 Four = Annotated[Floats, 4]
 """(4, LANES) quaternions or planes."""
+Records = npt.NDArray[np.void]
+"""Records of strands side by side, one for each node."""
 stage = compiled_with(fastmath=True)
 """Compiles one step of a method, by itself."""
 
@@ -49,6 +53,12 @@ def pack_lanes(values: Floats, kind: Kind) -> Floats:
     rows = np.minimum(np.arange(-(-len(values) // LANES) * LANES), len(values) - 1)
     spread = values.astype(kind)[rows].reshape(-1, LANES, *values.shape[1:])
     return np.ascontiguousarray(np.moveaxis(spread, 1, -1))
+
+
+def fill_lanes(records: Records, **values: Float64Array) -> None:
+    """Set fields of records (B, n) to values (S, n, ...) of strands."""
+    for name, value in values.items():
+        records[name] = pack_lanes(value, records[name].dtype.type)
 
 
 @inlined

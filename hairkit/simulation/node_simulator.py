@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
@@ -16,13 +17,13 @@ from hairkit.simulation.embedding import (
     FIRM,
     Embedding,
     carry_points,
+    embed_points,
     hand_goals,
     held_nodes,
     node_points,
 )
 from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
 from hairkit.simulation.held_guides import held_lengths, pull_to_captured
-from hairkit.simulation.node_options import NodeOptions
 from hairkit.simulation.obstacle_kernels import WORTH, Points
 from hairkit.simulation.rigid_motion import (
     finer_steps,
@@ -35,6 +36,7 @@ from hairkit.simulation.substeps import Course, StepArrays, make_steps
 from hairkit.simulation.vectors import Floats
 from hairkit.simulation.wind import air_velocity
 from hairkit.types.groom import Groom
+from hairkit.types.node_options import NodeOptions
 
 APART = 4
 """Nodes between those at which gusts are evaluated: shorter than half a gust is long."""
@@ -118,8 +120,7 @@ class NodeSimulator(GuideSimulator):
 
     def measure(self) -> Measures:
         """Return the stretch of nodes and points, and energies; potential energy is 0 at rest."""
-        blocks, own = self._now()[:2], self._nodes.shape
-        place, speed = (v.reshape(-1, *own[1:])[: own[0]].astype(np.float64) for v in blocks)
+        place, speed, _ = self._now_by_strands()
         kinetic = 0.5 * float((self._mass[..., None] * speed**2).sum())
         fallen = (place - self._nodes) @ (self._head[:3, :3].T @ self._rest_gravity)
         energy = self._elastic(place) - float((self._mass * fallen).sum())
@@ -127,6 +128,11 @@ class NodeSimulator(GuideSimulator):
         stretch = float(np.abs(length / self._length - 1).max(initial=0.0))
         drawn, depth = self._measure_drawn()
         return Measures(max(stretch, drawn), kinetic, energy, depth)
+
+    def _now_by_strands(self) -> Iterator[Float64Array]:
+        """Yield nodes and velocities (S, n, 3) and frames (S, n - 1, 4)."""
+        for part in self._now():
+            yield part.reshape(-1, *part.shape[2:])[: len(self._nodes)].astype(np.float64)
 
     def _place_nodes(self, nodes: int) -> None:
         """Place nodes along the guides; measure the captured distance to the obstacles."""
@@ -153,6 +159,8 @@ class NodeSimulator(GuideSimulator):
         # hair captured nearer keeps its own distance
         self._build(np.minimum(options.clearance, self._near))
         self._still = self._state
+        _, _, frames = self._now_by_strands()
+        self._embedding = embed_points(self.strands, self._nodes, frames)
 
     def _piece(self, seconds: float, around: Surroundings, head: Course) -> None:
         """Advance by up to `FRAME`, in substeps, of which a fast head takes more."""

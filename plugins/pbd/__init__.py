@@ -6,33 +6,21 @@ by a spring, which is bending. What of its weight these cannot bear at rest a fo
 with the head, so that captured hair stays. `rods` is stiffer, faster at equal error, and has twist.
 
 * `kernels`: substeps, compiled
+* `options`: settings
 * `simulator`: the simulator
 """
 
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hairkit.hookspecs import hookimpl
-from hairkit.options import option
-from hairkit.simulation.node_options import NodeOptions
+from hairkit.types.groom import Groom
 
-if TYPE_CHECKING:
-    from hairkit.types.groom import Groom
+from .options import Options
 
-
-@dataclass(frozen=True)
-class Options(NodeOptions):
-    """Options of the simulation; None takes the value of the groom."""
-
-    bend: float = option(
-        1000.0, low=1.0, high=1e6, unit="1/s2", doc="Bending stiffness over a node's mass."
-    )
-    borne: float = option(1.0, low=0.0, high=1.0, doc="Share of the weight borne at rest; 0 sags.")
-    substeps: int = option(32, low=1, high=512, doc="Substeps in 1/60 s.")
-    iterations: int = option(2, low=1, high=64, doc="Iterations in a substep.")
+__all__ = ["Options"]
 
 
 @hookimpl

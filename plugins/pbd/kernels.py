@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from hairkit.parallel import compiled_with
 from hairkit.simulation import vectors as v
 from hairkit.simulation.contact_kernels import Touch, Touching, touch
-from hairkit.simulation.lanes import LANES, One, Three, Two, lanes_of, put, stage, three
+from hairkit.simulation.lanes import LANES, One, Records, Three, Two, lanes_of, put, stage, three
 from hairkit.simulation.obstacle_kernels import Fields
 from hairkit.simulation.substeps import Settings, Step, StepArrays, step_of
 from hairkit.simulation.vectors import ONE, ZERO, Number
@@ -37,7 +37,7 @@ NODE = lanes_of(Node)
 
 @compiled_with(fastmath=True)
 def move(
-    first: int, last: int, hair: Any, steps: StepArrays, fields: Fields, run: Settings, soft: Number
+    first: int, last: int, hair: Records, path: StepArrays, body: Fields, run: Settings, soft: float
 ) -> None:
     """Do all substeps of blocks `first` to before `last` (XPBD, algorithm 1).
 
@@ -45,8 +45,8 @@ def move(
     """
     for block in range(first, last):
         s = hair[block]
-        for k in range(len(steps.turn)):
-            step = step_of(steps, k)
+        for k in range(len(path.turn)):
+            step = step_of(path, k)
             predict(s, step, run)
             for _ in range(run.rounds):
                 for j in range(len(s) - 1):
@@ -56,7 +56,7 @@ def move(
             for j in range(len(s)):
                 take_velocity(s[j], step, ONE / run.seconds)
                 if j > 1:
-                    touch(s[j], s[j], step, fields, run)
+                    touch(s[j], s[j], step, body, run)
 
 
 @stage

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import parallel_for
 from hairkit.simulation import Surroundings, quaternion
-from hairkit.simulation.embedding import directions, embed_points
-from hairkit.simulation.lanes import Kind, pack_lanes
+from hairkit.simulation.embedding import directions
+from hairkit.simulation.lanes import Kind, Records, fill_lanes, pack_lanes
 from hairkit.simulation.node_simulator import NodeSimulator
 from hairkit.simulation.substeps import Course, Settings, StepArrays, Steps
 from hairkit.simulation.vectors import Floats
 from hairkit.types.groom import Groom
 
-from . import Options
 from .kernels import NODE, move
+from .options import Options
 
 
 class PbdSimulator(NodeSimulator):
@@ -32,30 +30,25 @@ class PbdSimulator(NodeSimulator):
         super().__init__(groom, options, contact)
 
     @property
-    def _state(self) -> Any:
+    def _state(self) -> Records:
         return self._hair.copy()
 
     @_state.setter
-    def _state(self, value: Any) -> None:
+    def _state(self, value: Records) -> None:
         for name, known in ("place", 1), ("speed", 1), ("room", 0), ("aside", 0):
             self._hair[name] = known * value[name]
 
     def _build(self, near: Float64Array) -> None:
         """Make the hair at rest, and what bears its weight there."""
         rest, options = self._nodes, self._options
-        straight = np.tile([1.0, 0.0, 0.0, 0.0], (*self._length.shape, 1))
-        self._embedding = embed_points(self.strands, rest, straight)
         self._pull = self._pull_to_rest(options.borne)
         self._bears = options.borne * borne(rest, self._rest_gravity)
         reach = [np.linalg.norm(rest[:, far:] - rest[:, :-far], axis=-1) for far in (1, 2)]
         self._reach = np.stack([np.pad(reach[k], ((0, 0), (0, k + 1))) for k in (0, 1)], -1)
         self._hair = np.zeros((len(pack_lanes(rest, self._kind)), options.nodes), NODE[self._kind])
-        self._pack(place=rest, rest=rest, reach=self._reach, clear=near, drag=self._drag)
-
-    def _pack(self, **values: Float64Array) -> None:
-        """Set fields of the nodes to values (S, n, ...)."""
-        for name, value in values.items():
-            self._hair[name] = pack_lanes(value, self._kind)
+        fill_lanes(
+            self._hair, place=rest, rest=rest, reach=self._reach, clear=near, drag=self._drag
+        )
 
     def _now(self) -> tuple[Floats, Floats, Floats]:
         """Return nodes, velocities, and frames that turn as the segments do, in blocks."""
@@ -76,7 +69,7 @@ class PbdSimulator(NodeSimulator):
         options, kind, end = self._options, self._kind, head[1]
         blown = self._drag[..., None] * (self._air(around, end) @ end[:3, :3])
         steady = self._bears + blown + self._drawn_by_hands(end)
-        self._pack(pull=self._pull_with_hands(tuple(self._hands.places)), steady=steady)
+        fill_lanes(self._hair, pull=self._pull_with_hands(tuple(self._hands.places)), steady=steady)
         friction, fastest = kind(options.friction or 0.0), kind(options.depenetration)
         run = Settings(kind(seconds), kind(self._damping), friction, fastest, options.iterations)
         arrays, soft = (part.astype(kind) for part in steps), kind(1 / (options.bend * seconds**2))

@@ -11,18 +11,15 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
-from hairkit.simulation.lanes import Four, Kind, One, Three, lanes_of, sizes_of
+from hairkit.simulation.lanes import Four, Kind, One, Records, Three, lanes_of, sizes_of
 from hairkit.simulation.obstacles import Bodies
 from hairkit.simulation.substeps import Settings
 from hairkit.simulation.vectors import Floats
 
 from .linear_system import System
 from .rods import Rods, State
-
-Records = npt.NDArray[np.void]
 
 
 class NodeState(Protocol):

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hairkit.parallel import compiled_with
-from hairkit.simulation.lanes import LANES, four, put, put_four, stage, three
+from hairkit.simulation.lanes import LANES, Records, four, put, put_four, stage, three
 from hairkit.simulation.obstacle_kernels import Fields
 from hairkit.simulation.substeps import Settings, Step, StepArrays, step_of
 from hairkit.simulation.vectors import (
@@ -34,7 +34,7 @@ from hairkit.simulation.vectors import (
     turned,
 )
 
-from .block import Blocks, Node, Outer, Records, Work
+from .block import Blocks, Node, Outer, Work
 from .frames import THIRD, half_way, swing_frame, twist_angle
 from .kernel_contact import resolve_contacts
 from .linear_system import IMPLICIT

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hairkit.options import fill_options, option
-from hairkit.simulation.node_options import NodeOptions
 from hairkit.types.groom import HairPhysics
+from hairkit.types.node_options import NodeOptions
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation import Surroundings
-from hairkit.simulation.embedding import embed_points
 from hairkit.simulation.guide_simulator import FRAME
 from hairkit.simulation.hair_grid import make_hair_grid
 from hairkit.simulation.node_simulator import NodeSimulator
@@ -62,7 +61,6 @@ class RodSimulator(NodeSimulator):
         """Make the rods and their backend."""
         options = self._options
         self.rods = rods = self._stiffen(options)
-        self._embedding = embed_points(self.strands, self._nodes, rods.frames)
         self._pull = self._pull_to_rest()
         self._hair_grid = make_hair_grid(self._nodes, rods.mass)
         self._rest_energy = elastic_energy(rods, rods.points, rods.frames, self._pull)

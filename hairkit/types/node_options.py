@@ -1,4 +1,4 @@
-"""Settings that all simulators of guides with nodes have."""
+"""Settings that all simulators have whose guides are chains of nodes."""
 
 from __future__ import annotations
 
