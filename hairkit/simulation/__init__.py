@@ -8,7 +8,6 @@ The simulators are plugins: `manager.call("make_simulator", "rods", groom=groom)
 * `guide_simulator`: guides, head, torso and drawn points of all simulators
 * `hair_cells`: mass and momentum of hair on a grid, compiled
 * `hair_grid`: contact between strands as changes of velocity
-* `hands`: hands that grab points
 * `held_guides`: what holds guides in their captured shape: skin, hair around, ties
 * `lanes`: records of many strands side by side, for compiled code
 * `motion`: motion of the head: keyframes and shakes

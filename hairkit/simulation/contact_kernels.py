@@ -7,23 +7,11 @@ from typing import Protocol
 
 import numpy as np
 
+from hairkit.simulation import vectors as v
 from hairkit.simulation.lanes import LANES, Four, One, Three, put, stage, three
 from hairkit.simulation.obstacle_kernels import Field, Fields, distance_at
 from hairkit.simulation.substeps import Settings, Step
-from hairkit.simulation.vectors import (
-    HALF,
-    ONE,
-    ZERO,
-    Floats,
-    Number,
-    Rows,
-    dot,
-    inlined,
-    minus,
-    moved,
-    plus,
-    times,
-)
+from hairkit.simulation.vectors import HALF, ONE, ZERO, Floats, Number, Rows, inlined
 
 FAR = 1.0
 """Metres up to which distances are exact: bounds would be looked up again sooner."""
@@ -36,8 +24,8 @@ STILL = np.float32(1e-12)
 HEAD = ((ONE, ZERO, ZERO, ZERO), (ZERO, ONE, ZERO, ZERO), (ZERO, ZERO, ONE, ZERO))
 
 
-class Touching(Protocol):
-    """What contact reads and changes of a node, head axes."""
+class Moving(Protocol):
+    """Where a node is and how it moves, head axes."""
 
     place: Three
     """Metres."""
@@ -47,6 +35,11 @@ class Touching(Protocol):
     """m/s, in the world."""
     aside: One
     """As `room`, of the torso."""
+
+
+class Touching(Moving, Protocol):
+    """What contact reads and changes of a node."""
+
     wall: Four
     """Plane (unit normal and offset, metres) that stands for the head, its axes."""
     beside: Four
@@ -61,7 +54,7 @@ class Touch(Protocol):
     pace: Three
     """Given: mean velocity in the substep, m/s."""
     value: One
-    """For use within steps."""
+    """Right-hand side, then solution, of what is solved within a step."""
     normal: Three
     """Of the obstacle that is met; 0 without one."""
     surface: Three
@@ -96,8 +89,8 @@ def use_room(s: Touching, x: Touch, room: Floats, drift: Rows, h: Number) -> boo
     `drift` is the body's motion.
     """
     for w in range(LANES):
-        by = minus(three(x.pace, w), moved(drift, three(s.place, w)))
-        x.value[w] = FURTHER * h * math.sqrt(dot(by, by))
+        by = v.minus(three(x.pace, w), v.moved(drift, three(s.place, w)))
+        x.value[w] = FURTHER * h * math.sqrt(v.dot(by, by))
     near = 0
     for w in range(LANES):
         room[w] -= x.value[w]
@@ -116,7 +109,7 @@ def meets(
     """
     for w in range(LANES):
         if room[w] < ZERO:
-            at = moved(pose, three(s.place, w))
+            at = v.moved(pose, three(s.place, w))
             distance, a, b, c = distance_at(field, at[0], at[1], at[2], FAR)
             room[w] = max(np.float32(distance) - s.clear[w], NEAR)
             wall[0, w], wall[1, w], wall[2, w] = a, b, c
@@ -124,9 +117,9 @@ def meets(
     deeper = 0
     for w in range(LANES):
         place, n = three(s.place, w), three(wall, w)
-        depth, deepest = s.clear[w] - (dot(n, moved(pose, place)) + wall[3, w]), x.depth[w]
+        depth, deepest = s.clear[w] - (v.dot(n, v.moved(pose, place)) + wall[3, w]), x.depth[w]
         deeper |= depth > deepest
-        ride = moved(drift, place)
+        ride = v.moved(drift, place)
         for c in range(3):
             across = pose[0][c] * n[0] + pose[1][c] * n[1] + pose[2][c] * n[2]
             x.normal[c, w] = across if depth > deepest else x.normal[c, w]
@@ -141,12 +134,12 @@ def push_out(s: Touching, x: Touch, settings: Settings) -> None:
     h = settings.seconds
     for w in range(LANES):
         normal, speed = three(x.normal, w), three(s.speed, w)
-        inward = max(-dot(minus(speed, three(x.surface, w)), normal), ZERO)
+        inward = max(-v.dot(v.minus(speed, three(x.surface, w)), normal), ZERO)
         x.grip[w] = settings.friction * inward
-        put(s.speed, w, plus(speed, times(inward, normal)))
+        put(s.speed, w, v.plus(speed, v.times(inward, normal)))
         # depth of this substep is removed at once, older depth at a limited speed
         depth = min(x.depth[w], h * (inward + settings.fastest))
-        put(s.place, w, plus(three(s.place, w), times(depth, normal)))
+        put(s.place, w, v.plus(three(s.place, w), v.times(depth, normal)))
 
 
 @stage
@@ -154,11 +147,11 @@ def rub(s: Touching, x: Touch, h: Number) -> None:
     """Let friction take from the speed along the obstacle as much as the grip holds (Coulomb)."""
     for w in range(LANES):
         speed, normal = three(s.speed, w), three(x.normal, w)
-        relative = minus(speed, three(x.surface, w))
-        slide = minus(relative, times(dot(relative, normal), normal))
-        size = math.sqrt(dot(slide, slide)) + STILL
+        relative = v.minus(speed, three(x.surface, w))
+        slide = v.minus(relative, v.times(v.dot(relative, normal), normal))
+        size = math.sqrt(v.dot(slide, slide)) + STILL
         slowed = min(max(x.grip[w], ZERO), size)
-        brake = times(slowed / size, slide)
+        brake = v.times(slowed / size, slide)
         x.grip[w] -= slowed
-        put(s.speed, w, minus(speed, brake))
-        put(s.place, w, minus(three(s.place, w), times(HALF * h, brake)))
+        put(s.speed, w, v.minus(speed, brake))
+        put(s.place, w, v.minus(three(s.place, w), v.times(HALF * h, brake)))

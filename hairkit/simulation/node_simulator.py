@@ -192,7 +192,7 @@ class NodeSimulator(GuideSimulator):
     def _drawn_by_hands(self, head: Float64Array) -> Float64Array:
         """Return the acceleration (S, n, 3) that makes hands, not rest, the ends of their pulls."""
         drawn, back = np.zeros_like(self._nodes), inverse_motion(head)
-        rod, node, goal = hand_goals(self._embedding, self._nodes, self._hands.places, back)
+        rod, node, goal = hand_goals(self._embedding, self._nodes, self._hands, back)
         np.add.at(drawn, (rod, node), FIRM * (goal - self._nodes[rod, node]))
         return drawn
 

@@ -69,7 +69,7 @@ class PbdSimulator(NodeSimulator):
         options, kind, end = self._options, self._kind, head[1]
         blown = self._drag[..., None] * (self._air(around, end) @ end[:3, :3])
         steady = self._bears + blown + self._drawn_by_hands(end)
-        fill_lanes(self._hair, pull=self._pull_with_hands(tuple(self._hands.places)), steady=steady)
+        fill_lanes(self._hair, pull=self._pull_with_hands(tuple(self._hands)), steady=steady)
         friction, fastest = kind(options.friction or 0.0), kind(options.depenetration)
         run = Settings(kind(seconds), kind(self._damping), friction, fastest, options.iterations)
         arrays, soft = (part.astype(kind) for part in steps), kind(1 / (options.bend * seconds**2))

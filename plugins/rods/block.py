@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from hairkit.arrays import Float64Array
+from hairkit.simulation.contact_kernels import Moving, Touch
 from hairkit.simulation.lanes import Four, Kind, One, Records, Three, lanes_of, sizes_of
 from hairkit.simulation.obstacles import Bodies
 from hairkit.simulation.substeps import Settings
@@ -22,17 +23,9 @@ from .linear_system import System
 from .rods import Rods, State
 
 
-class NodeState(Protocol):
+class NodeState(Moving, Protocol):
     """State of a node, in head axes; shaders have no planes."""
 
-    place: Three
-    """Metres."""
-    room: One
-    """How far the node may move before the next lookup of the head, metres."""
-    speed: Three
-    """m/s."""
-    aside: One
-    """As `room`, of the torso."""
     gain: Three
     """Acceleration, m/s^2."""
     spare: One
@@ -81,7 +74,7 @@ class Node(NodeState, Protocol):
     """Mean mass of the rod's nodes, kg."""
 
 
-class Work(Protocol):
+class Work(Touch, Protocol):
     """A record of what a substep works out for a node and the segment that ends there."""
 
     force: Three
@@ -100,20 +93,8 @@ class Work(Protocol):
     """Diagonal of the system at hand, then its reciprocal pivot."""
     beside: One
     """Entry beside the diagonal."""
-    value: One
-    """Right-hand side, then solution."""
     solved: Three
     """Solution of the banded system, metres."""
-    pace: Three
-    """Mean velocity in the substep, m/s."""
-    normal: Three
-    """Of the obstacle that is met; 0 without one."""
-    surface: Three
-    """Velocity of that obstacle, m/s."""
-    depth: One
-    """In that obstacle, metres."""
-    grip: One
-    """Change of velocity that friction may bring, m/s."""
 
 
 class Outer(Protocol):

@@ -7,20 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hairkit.simulation import vectors as v
 from hairkit.simulation.contact_kernels import rub, touch
 from hairkit.simulation.lanes import LANES, put, stage, three
 from hairkit.simulation.obstacle_kernels import Fields
 from hairkit.simulation.substeps import Settings, Step
-from hairkit.simulation.vectors import (
-    HALF,
-    ONE,
-    Number,
-    dot,
-    inlined,
-    minus,
-    plus,
-    times,
-)
+from hairkit.simulation.vectors import HALF, ONE, Number, inlined
 
 from .block import Node, Work
 
@@ -37,7 +29,7 @@ def resolve_contacts(
     for j in range(1, len(s)):
         node, own = s[j], x[j]
         for w in range(LANES):
-            put(own.pace, w, minus(three(node.speed, w), times(half, three(node.gain, w))))
+            put(own.pace, w, v.minus(three(node.speed, w), v.times(half, three(node.gain, w))))
         touching |= touch(node, own, step, fields, settings)
     restore_lengths(s, x, settings, False)
     # without contact, one more iteration is enough
@@ -57,13 +49,13 @@ def restore_lengths(s: Sequence[Node], x: Sequence[Work], settings: Settings, ru
         if rubs:
             rub(here, own, settings.seconds)
         for w in range(LANES):
-            edge = minus(three(here.place, w), three(before.place, w))
-            square = dot(edge, edge)
+            edge = v.minus(three(here.place, w), three(before.place, w))
+            square = v.dot(edge, edge)
             size = ONE / math.sqrt(square)
-            along, way = times(size, edge), three(last.way, w)
+            along, way = v.times(size, edge), three(last.way, w)
             normal, wall = three(last.normal, w), three(own.normal, w)
-            start, end = dot(along, normal), dot(along, wall)
-            beside = before.ease[w] * (dot(way, normal) * start - dot(way, along))
+            start, end = v.dot(along, normal), v.dot(along, wall)
+            beside = before.ease[w] * (v.dot(way, normal) * start - v.dot(way, along))
             factor = beside * last.pivot[w]
             firm = before.ease[w] * (SOFTEST - start * start)
             firm += here.ease[w] * (SOFTEST - end * end)
@@ -81,11 +73,11 @@ def pull_node(s: Node, x: Work, after: Work, over: Number, friction: Number) -> 
     for w in range(LANES):
         value = (x.value[w] - after.beside[w] * after.value[w]) * x.pivot[w]
         x.value[w] = value
-        pull = times(after.value[w], three(after.way, w))
-        pull = minus(pull, times(value, three(x.way, w)))
+        pull = v.times(after.value[w], three(after.way, w))
+        pull = v.minus(pull, v.times(value, three(x.way, w)))
         ease, normal = s.ease[w], three(x.normal, w)
-        away = dot(pull, normal)
-        change = times(ease, minus(pull, times(away, normal)))
-        put(s.place, w, plus(three(s.place, w), change))
-        put(s.speed, w, plus(three(s.speed, w), times(over, change)))
+        away = v.dot(pull, normal)
+        change = v.times(ease, v.minus(pull, v.times(away, normal)))
+        put(s.place, w, v.plus(three(s.place, w), change))
+        put(s.speed, w, v.plus(three(s.speed, w), v.times(over, change)))
         x.grip[w] -= friction * over * ease * away

@@ -104,7 +104,7 @@ class RodSimulator(NodeSimulator):
             rates = (options.cohesion, options.pressure, seconds * len(steps.turn))
             now, change = state_of(engine.rows), inverse_motion(end) @ start
             self._hair_grid.mix(now.position, now.velocity, engine.mass, change, rates)
-        held = tuple(self._hands.places)
+        held = tuple(self._hands)
         system = self._system(round(seconds, 12), held)
         force = self.rods.mass[..., None] * self._drawn_by_hands(end) if held else None
         engine.run(system, steps, acting(self.rods, self._air(around, start), force))
