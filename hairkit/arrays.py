@@ -49,6 +49,20 @@ def frozen_array(
     return array
 
 
+def freeze(
+    owner: Any, name: str, dtype: npt.DTypeLike, shape: tuple[int | None, ...], label: str = ""
+) -> Any:
+    """Make a field of a frozen dataclass a `frozen_array`, and return that; None stays None.
+
+    Errors call it by its label, or by its name.
+    """
+    value = getattr(owner, name)
+    if value is not None:
+        value = frozen_array(value, dtype, shape, label or name)
+        object.__setattr__(owner, name, value)
+    return value
+
+
 def read_only(array: _Array) -> _Array:
     """Return an array that nobody writes again, so that `frozen_array` need not copy it."""
     array.setflags(write=False)

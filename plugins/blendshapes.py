@@ -265,8 +265,7 @@ def _metres(camera: Camera, points: Float64Array) -> Float64Array:
     """Return (N,) metres at points that a pixel is wide."""
     if camera.model == "orthographic":
         return np.full(len(points), 1 / camera.focal)
-    metres: Float64Array = np.maximum(camera.depth(points), 0) / camera.focal
-    return metres
+    return np.maximum(camera.depth(points), 0) / camera.focal
 
 
 def _label_outlines(

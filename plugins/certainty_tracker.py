@@ -94,8 +94,7 @@ def bent_normals(normals: Float32Array, bend_deg: float) -> Float64Array:
     axis = axis / np.maximum(length, _PARALLEL)
     angle = np.radians(bend_deg)
     turned = outward * np.cos(angle) + np.cross(axis, outward) * np.sin(angle)
-    result: Float64Array = np.where(length > _PARALLEL, turned, outward)
-    return result
+    return np.where(length > _PARALLEL, turned, outward)
 
 
 class Volumes(NamedTuple):

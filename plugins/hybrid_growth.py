@@ -160,8 +160,7 @@ def _spread_seeds(bare: Float64Array, hull: Hull, strands: float) -> Float32Arra
     wanted = int(np.ceil(strands * len(bare) / max(int(hull.dense.sum()), 1)))
     chosen = np.arange(wanted) * len(bare) // max(wanted, 1)
     jitter = np.random.RandomState(0).uniform(-0.5, 0.5, (wanted, 3))  # its stream never changes
-    seeds: Float32Array = (bare[chosen] + hull.grid.spacing * jitter).astype(np.float32)
-    return seeds
+    return (bare[chosen] + hull.grid.spacing * jitter).astype(np.float32)
 
 
 def grow(

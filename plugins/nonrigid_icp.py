@@ -247,8 +247,7 @@ def _carried(head: Head, used: Int32Array, moved: Float64Array) -> Head:
     spline = ThinPlateSpline(places, moved[chosen] - places, np.zeros(len(chosen)))
 
     def carry(points: Float32Array) -> Float32Array:
-        moved: Float32Array = (points + spline(points.astype(np.float64))).astype(np.float32)
-        return moved
+        return (points + spline(points.astype(np.float64))).astype(np.float32)
 
     return head.carried(carry)
 

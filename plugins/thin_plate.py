@@ -193,7 +193,6 @@ def _warp(head: Head, places: Float64Array, moves: Float64Array, smoothing: Floa
     spline = ThinPlateSpline(places, moves, smoothing)
 
     def carry(points: Float32Array) -> Float32Array:
-        result: Float32Array = (points + spline(points.astype(np.float64))).astype(np.float32)
-        return result
+        return (points + spline(points.astype(np.float64))).astype(np.float32)
 
     return head.carried(carry)

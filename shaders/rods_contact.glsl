@@ -1,6 +1,7 @@
 // Contact: penetration, Coulomb friction, restoring the lengths. Part of rods_substeps.comp.
 #include "rods_distance.glsl"
-#constants hairkit_plugins.rods.kernel_contact FURTHER SOFTEST STILL
+#constants hairkit.simulation.contact_kernels FURTHER STILL
+#constants hairkit_plugins.rods.kernel_contact SOFTEST
 
 vec3 normal[NODE_ROOM];           // contact normal, 0 for free nodes
 vec3 surface[NODE_ROOM];          // velocity of the obstacle where it is touched, m/s

@@ -111,8 +111,7 @@ def _of_one_size(masks: Sequence[Mask]) -> Sequence[Mask]:
 def _smooth(silhouette: npt.NDArray[np.bool_], size: tuple[int, int]) -> npt.NDArray[np.bool_]:
     """Shrink to the field's size, without flying hairs and with holes between hairs filled."""
     small = cv2.resize(silhouette.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    result: npt.NDArray[np.bool_] = cv2.GaussianBlur(small, (0, 0), SMOOTHING_PX) > 0.5
-    return result
+    return cv2.GaussianBlur(small, (0, 0), SMOOTHING_PX) > 0.5
 
 
 def _signed_distance(silhouette: npt.NDArray[np.bool_]) -> Float32Array:

@@ -38,10 +38,7 @@ class Similarity:
 
     def apply(self, points: npt.ArrayLike) -> Float64Array:
         """Return the moved points (..., 3)."""
-        moved: Float64Array = (
-            self.scale * (np.asarray(points, np.float64) @ self.rotation.T) + self.translation
-        )
-        return moved
+        return self.scale * (np.asarray(points, np.float64) @ self.rotation.T) + self.translation
 
     def inverse(self) -> Similarity:
         """Return the similarity that undoes this one."""

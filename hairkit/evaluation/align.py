@@ -125,8 +125,7 @@ def camera_errors(
 
 def _on_axis(camera: Camera, point: Float64Array) -> Float64Array:
     """Return the point (3,) of the optical axis beside `point`."""
-    beside: Float64Array = camera.position + camera.forward * camera.depth(point)
-    return beside
+    return camera.position + camera.forward * camera.depth(point)
 
 
 def _like(camera: Camera, other: Camera) -> Camera:
@@ -139,8 +138,7 @@ def _like(camera: Camera, other: Camera) -> Camera:
 def _spread(points: npt.NDArray[np.float32]) -> Float32Array:
     count = min(len(points), ALIGNMENT_POINTS)
     index = np.linspace(0, len(points) - 1, count).astype(np.int64)
-    picked: Float32Array = points[index]
-    return picked
+    return points[index]
 
 
 def _starts(

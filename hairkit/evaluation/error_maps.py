@@ -69,8 +69,7 @@ def _levels(hits: Hits, truth: Truth, view: int) -> UInt8Array:
     values = np.minimum(hits.free, len(LEVEL_COLOURS) - 1).astype(np.uint8) + np.uint8(1)
     front = front_values(truth.cameras[view], hits.samples.points, values, truth.head)
     table = np.array([(_BACKDROP,) * 3, *LEVEL_COLOURS], np.uint8)
-    picture: UInt8Array = table[front]
-    return picture
+    return table[front]
 
 
 def _silhouette(evaluation: Evaluation, truth: Truth, view: int) -> UInt8Array:

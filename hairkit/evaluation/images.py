@@ -141,8 +141,7 @@ def hair_silhouette(
     hidden = head_depth(head, camera)
     if clothes is not None:
         hidden = np.where(clothes, np.minimum(hidden, camera.depth(_neck(head))), hidden)
-    covered: BoolArray = np.isfinite(depth) & (depth <= hidden)
-    return covered
+    return np.isfinite(depth) & (depth <= hidden)
 
 
 def _neck(head: Head) -> Float64Array:

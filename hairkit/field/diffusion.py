@@ -133,8 +133,7 @@ def _coarse_guess(
         2 * smoothness,
         tolerance=COARSE_TOLERANCE,
     )
-    guess: Float32Array = solved[cells.block]
-    return guess
+    return solved[cells.block]
 
 
 def cell_neighbours(occupied: BoolArray) -> Int32Array:

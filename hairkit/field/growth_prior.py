@@ -206,8 +206,7 @@ def _unit(vectors: npt.ArrayLike) -> Float64Array:
     """Return vectors (N, 3) at length 1, those of nearly no length as zeros."""
     given = np.asarray(vectors, np.float64)
     length = np.linalg.norm(given, axis=1, keepdims=True)
-    result: Float64Array = np.where(length > 1e-9, given / np.maximum(length, 1e-9), 0.0)
-    return result
+    return np.where(length > 1e-9, given / np.maximum(length, 1e-9), 0.0)
 
 
 def measure_scalp_distance(head: Head, hull: Hull) -> ScalpDistance:
@@ -237,8 +236,7 @@ def growth_potential(hull: Hull, from_scalp: ScalpDistance) -> Float32Array:
     left -= long_share(length) * TIP_SLOPE * beyond
     total = smooth_volume(np.where(known, left, 0).astype(np.float32), FLOW_SMOOTHING)
     smooth = total / np.maximum(weight, 1e-6)
-    growth: Float32Array = np.where(weight > 1e-3, -smooth, -smooth.max()).astype(np.float32)
-    return growth
+    return np.where(weight > 1e-3, -smooth, -smooth.max()).astype(np.float32)
 
 
 def long_share(length: float) -> float:

@@ -113,5 +113,4 @@ def _medoids(features: Float64Array, means: Float64Array, cluster: Int64Array) -
     away = ((features - means[cluster]) ** 2).sum(axis=1)
     order = np.lexsort((away, cluster))
     first = np.unique(cluster[order], return_index=True)[1]
-    result: Int64Array = order[first]
-    return result
+    return order[first]

@@ -105,8 +105,7 @@ def _move(points: Float32Array, motion: Float64Array) -> Float32Array:
     """Return points (P, 3) under a rigid motion (4, 4); as they are where it is none."""
     if np.array_equal(motion, np.eye(4)):
         return points
-    moved: Float32Array = (points @ motion[:3, :3].T + motion[:3, 3]).astype(np.float32)
-    return moved
+    return (points @ motion[:3, :3].T + motion[:3, 3]).astype(np.float32)
 
 
 def _places_on_guides(strands: Strands, mix: GuideWeights) -> tuple[Int64Array, Float32Array]:

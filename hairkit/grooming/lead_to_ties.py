@@ -248,5 +248,4 @@ def plait(u: float, v: float, tail: Tail) -> Float64Array:
     turn = np.sqrt(2) * np.tan(tail.crossing) / (SIDE * np.maximum(wide, 1e-6))
     phase = np.append(0, np.cumsum(steps * turn[1:])) + 2 * np.pi * bundle / BUNDLES
     middle = np.stack([SIDE * np.sin(phase), DEPTH * np.sin(2 * phase)], axis=1)
-    result: Float64Array = middle + THIN * ring
-    return result
+    return middle + THIN * ring

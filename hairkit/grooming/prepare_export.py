@@ -160,8 +160,7 @@ def bound_roots(groom: Groom) -> Roots:
 
 def point_colours(groom: Groom) -> Float32Array:
     """Return (P, 3) linear RGB, from the root's colour to the tip's along each strand."""
-    linear: Float32Array = colours(groom.material, groom.strands.counts).at()
-    return linear
+    return colours(groom.material, groom.strands.counts).at()
 
 
 def shorter_than(strands: Strands, length: float) -> BoolArray:

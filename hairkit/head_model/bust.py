@@ -147,8 +147,7 @@ def _lay_collar(
             for centre, ring in zip(middle, rings, strict=True)
         ]
     )
-    result: Float64Array = on_neck + share * (rings - on_neck)
-    return result
+    return on_neck + share * (rings - on_neck)
 
 
 def _give_way(rings: Float64Array, middle: Float64Array, strands: Strands | None) -> Float64Array:

@@ -86,8 +86,7 @@ def inside_surface(tree: TriangleTree, points: npt.ArrayLike) -> npt.NDArray[np.
     votes = np.zeros(len(at), np.int64)
     for axis in range(3):
         votes += _crossings(tree, at, axis) != 0
-    result: npt.NDArray[np.bool_] = votes >= 2
-    return result
+    return votes >= 2
 
 
 @compiled_with(allocates=True)

@@ -232,5 +232,4 @@ def paint_over(
 
 def _ramp(inside: Float64Array) -> Float64Array:
     t = np.clip(inside / _RIM, 0, 1)
-    result: Float64Array = t * t * (3 - 2 * t)
-    return result
+    return t * t * (3 - 2 * t)

@@ -153,8 +153,7 @@ def head_surface(polar: Float64Array, azimuth: Float64Array) -> Float64Array:
     """
     base = _level_curves(polar, azimuth)
     moved = base + _nose(base) + _displacements(base)
-    result: Float64Array = (moved + _ears(base)) * 1e-3
-    return result
+    return (moved + _ears(base)) * 1e-3
 
 
 def scalp_weight(points: Float64Array) -> Float64Array:
@@ -181,7 +180,7 @@ def _level_curves(polar: Float64Array, azimuth: Float64Array) -> Float64Array:
     radius = (cosine**power + sine**power) ** (-1 / power)
     along, across = radius * cosine, radius * sine
     end = np.where(ahead[:, None], front[:, 3:5], back[:, 3:5])
-    result: Float64Array = np.stack(
+    return np.stack(
         [
             side[:, 0] * across * np.sign(np.sin(azimuth)),
             side[:, 1] + (end[:, 0] - side[:, 1]) * along,
@@ -189,7 +188,6 @@ def _level_curves(polar: Float64Array, azimuth: Float64Array) -> Float64Array:
         ],
         axis=1,
     )
-    return result
 
 
 # SciPy's splines take as long to load as NumPy: they are loaded when a head is made.
@@ -228,8 +226,7 @@ def _nose(base: Float64Array) -> Float64Array:
     height = _nose_curves()(np.clip(y, _NOSE[-1, 0], _NOSE[0, 0]))
     out = np.where(z > _FACE, height[:, 0], 0)
     out = out * np.exp(-((np.abs(x) / height[:, 1]) ** _NOSE_EXPONENT))
-    result: Float64Array = np.stack([np.zeros_like(out), np.zeros_like(out), out], axis=1)
-    return result
+    return np.stack([np.zeros_like(out), np.zeros_like(out), out], axis=1)
 
 
 def _displacements(base: Float64Array) -> Float64Array:
@@ -257,8 +254,7 @@ def _ears(base: Float64Array) -> Float64Array:
     bowl = np.exp(-0.5 * away)
     lift = plateau * (_EAR_LIFT - _EAR_FORWARD * forward.clip(-1, 1) - _BOWL_DEPTH * bowl)
     side = np.sign(base[:, 0]) * (np.abs(base[:, 0]) > _SIDE)
-    result: Float64Array = np.stack([lift * side, 0 * lift, -_EAR_BACK * plateau * side**2], axis=1)
-    return result
+    return np.stack([lift * side, 0 * lift, -_EAR_BACK * plateau * side**2], axis=1)
 
 
 def _smoothstep(t: Float64Array) -> Float64Array:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float64Array, frozen_array
+from hairkit.arrays import Float64Array, freeze
 from hairkit.errors import InputError
 
 KERNELS = {2: "thin_plate_spline", 3: "linear"}
@@ -40,14 +40,14 @@ class ThinPlateSpline:
     """lambda, one for all points or (N,): 0 goes through the values, infinity is affine."""
 
     def __post_init__(self) -> None:
-        places = frozen_array(self.places, np.float64, (None, None), "spline places")
+        places = freeze(self, "places", np.float64, (None, None), "spline places")
         count, dimension = places.shape
         if dimension not in KERNELS:
             raise InputError(f"a thin-plate spline in {dimension} dimensions, expected 2 or 3")
         if np.linalg.matrix_rank(places - places.mean(axis=0), tol=1e-9) < dimension:
             flat = "line" if dimension == 2 else "plane"
             raise InputError(f"the {count} places of a thin-plate spline lie in one {flat}")
-        values = frozen_array(self.values, np.float64, (count, None), "spline values")
+        freeze(self, "values", np.float64, (count, None), "spline values")
         smoothing = np.broadcast_to(np.asarray(self.smoothing, np.float64), (count,))
         if not (np.isfinite(smoothing) & (smoothing >= 0)).all():
             raise InputError("a thin-plate spline's smoothing is below 0 or not finite")
@@ -55,8 +55,6 @@ class ThinPlateSpline:
             places[smoothing == 0]
         ):
             raise InputError("a thin-plate spline has the same place twice without smoothing")
-        object.__setattr__(self, "places", places)
-        object.__setattr__(self, "values", values)
         object.__setattr__(self, "smoothing", smoothing)
 
     @cached_property

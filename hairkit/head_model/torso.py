@@ -144,8 +144,7 @@ def _between_rings() -> Callable[[Float64Array], Float64Array]:
 
 def power(wave: Float64Array) -> Float64Array:
     """Return the coordinate on a unit superellipse for a sine or cosine on the circle."""
-    result: Float64Array = np.sign(wave) * np.abs(wave) ** (2 / EXPONENT)
-    return result
+    return np.sign(wave) * np.abs(wave) ** (2 / EXPONENT)
 
 
 def loft(rings: int, around: int) -> Int32Array:

@@ -46,8 +46,7 @@ def patent_counts(strands: Strands) -> Int64Array:
     change = (cosine <= SPLIT).astype(np.int64) - (cosine > MERGED)
     between = (path.lengths > SHORT) & (path.lengths < LONG)
     changed = counts + between * np.add.reduceat(change, offsets[:-1])
-    result: Int64Array = np.clip(changed, FEWEST, MOST)
-    return result
+    return np.clip(changed, FEWEST, MOST)
 
 
 def adaptive_counts(
@@ -77,8 +76,7 @@ def adaptive_counts(
 
 def _by_length(lengths: Float64Array) -> Int64Array:
     share = np.clip((lengths - SHORT) / (LONG - SHORT), 0, 1)
-    counts: Int64Array = np.rint(FEWEST + (MOST - FEWEST) * share).astype(np.int64)
-    return counts
+    return np.rint(FEWEST + (MOST - FEWEST) * share).astype(np.int64)
 
 
 def mean_error(path: Path, arcs: Arcs) -> Float64Array:

@@ -37,8 +37,7 @@ class Path:
     @property
     def lengths(self) -> Float64Array:
         """(S,) metres."""
-        result: Float64Array = self.arc[self.offsets[1:] - 1]
-        return result
+        return self.arc[self.offsets[1:] - 1]
 
     def at(self, strand: Int64Array, arc: Float64Array) -> tuple[Float64Array, Float64Array]:
         """Return points and unit tangents (N, 3) at arc lengths (N,) of strands (N,).
@@ -67,8 +66,7 @@ def dot(a: Float64Array, b: Float64Array) -> Float64Array:
 def unit(vector: Float64Array) -> Float64Array:
     """Return vectors (..., 3) at length 1; zeros stay."""
     length = np.sqrt(dot(vector, vector))[..., None]
-    result: Float64Array = vector / np.where(length > 0, length, 1.0)
-    return result
+    return vector / np.where(length > 0, length, 1.0)
 
 
 def _tangents(points: Float64Array, arc: Float64Array, offsets: Int64Array) -> Float64Array:

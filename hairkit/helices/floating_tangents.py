@@ -153,8 +153,7 @@ def _excess(
 def _along(chord: Float64Array, m: Float64Array) -> Float64Array:
     """Return the chords' parts along m, kept away from 0, by which slopes are taken."""
     least = np.maximum(LEAST_ALONG * np.sqrt(dot(chord, chord)), 1e-12)
-    result: Float64Array = np.maximum(dot(chord, m), least)
-    return result
+    return np.maximum(dot(chord, m), least)
 
 
 def _turn_tangents(points: Float64Array, tangents: Float64Array, first: Int64Array) -> Float64Array:

@@ -82,10 +82,7 @@ def mean_rotation(vector: npt.ArrayLike) -> Float64Array:
     v = np.asarray(vector, np.float64)
     _, versine, rest = turn_coefficients(np.einsum("...i,...i->...", v, v))
     turn = cross_matrix(v)
-    result: Float64Array = (
-        np.eye(3) + versine[..., None, None] * turn + rest[..., None, None] * (turn @ turn)
-    )
-    return result
+    return np.eye(3) + versine[..., None, None] * turn + rest[..., None, None] * (turn @ turn)
 
 
 def mean_rotation_slope(vector: npt.ArrayLike, direction: npt.ArrayLike) -> Float64Array:

@@ -72,8 +72,7 @@ class FileSpace:
         """Return a head frame transform (..., 4, 4) of column vectors as one of the file's."""
         turn = np.eye(4)
         turn[:3, :3] = self.file_from_head / self.metres
-        result: Float64Array = turn @ np.asarray(matrix, np.float64) @ np.linalg.inv(turn)
-        return result
+        return turn @ np.asarray(matrix, np.float64) @ np.linalg.inv(turn)
 
 
 def _turn_vectors(vectors: npt.ArrayLike, turn: Float64Array, factor: float) -> Float32Array:

@@ -100,10 +100,7 @@ class GlbFile:
             raise ValueError("an accessor's numbers make no sense")
         if start + (count - 1) * stride + width * kind.itemsize > len(data):
             raise ValueError("an accessor reaches beyond the file's data")
-        rows: npt.NDArray[Any] = np.ndarray(
-            (count, width), kind, data, start, (stride, kind.itemsize)
-        )
-        return rows
+        return np.ndarray((count, width), kind, data, start, (stride, kind.itemsize))
 
     def numbers(self, number: int) -> Float64Array:
         """Return (count, width) values of an accessor, normalised where it says so."""

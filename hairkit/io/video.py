@@ -107,8 +107,7 @@ def frame_motion(small: npt.NDArray[np.uint8]) -> Float64Array:
         )
         moved[index] = np.linalg.norm(flow[rows, columns], axis=-1).mean()
     steady = median_filter(moved, STEADY_FRAMES)
-    total: Float64Array = np.cumsum(np.maximum(steady - STILL_PX, 0.0))
-    return total
+    return np.cumsum(np.maximum(steady - STILL_PX, 0.0))
 
 
 def choose_frames(

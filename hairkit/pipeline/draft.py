@@ -84,7 +84,8 @@ def draft(
         The last run found other views, or was not ended.
     """
     with ThreadPoolExecutor(1, thread_name_prefix="hairkit") as pool:
-        run = StageRunner(recipe, manager, _Nowhere(), RunLog(progress or Silent()), pool)
+        # nothing is kept: the next draft is made of other masks
+        run = StageRunner(recipe, manager, None, RunLog(progress or Silent()), pool)
         return Drafted(run, capture, work, touched, guides).groom
 
 
@@ -182,16 +183,6 @@ class Drafted(Findings):
             return cast(OrientationMap, self._seen[view.name].orientation)
         time = _time(ORIENTED, self._work, view.name)
         return _small_orientation(time, self._work, view.name, (view.width, view.height))
-
-
-class _Nowhere:
-    """Keeps no result: the next draft is made of other masks."""
-
-    def get(self, stage: Stage[Any], digest: str, view: str = "") -> None:
-        """Return None."""
-
-    def put(self, stage: Stage[Any], value: Any, digest: str, view: str = "") -> None:
-        """Do nothing."""
 
 
 def _read(stage: Stage[_Result], work: Path, view: str = "") -> _Result:

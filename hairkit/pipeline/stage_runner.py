@@ -9,7 +9,7 @@ from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 import cv2
 import numba
@@ -21,7 +21,7 @@ from hairkit.memory import give_back_memory
 from hairkit.pipeline.module_digest import module_digest
 from hairkit.pipeline.recipe import Recipe, stage_digest
 from hairkit.pipeline.run_log import RunLog
-from hairkit.pipeline.work_folder import digest_of
+from hairkit.pipeline.work_folder import WorkFolder, digest_of
 from hairkit.stages import EXPORT, Stage
 from hairkit.storage import Stored, from_arrays, to_arrays
 from hairkit.types.capture import View
@@ -61,21 +61,19 @@ def gather(views: Views[_Value]) -> Given[tuple[_Value, ...]]:
     return Given(tuple(part.value for part in parts), digest_of([part.digest for part in parts]))
 
 
-class Keeper(Protocol):
-    """Where results of stages are kept: a `WorkFolder`, or nowhere."""
-
-    def get(self, stage: Stage[_Result], digest: str, view: str = "") -> _Result | None:
-        """Return the kept result of a stage with a digest; None if there is none."""
-
-    def put(self, stage: Stage[_Result], value: _Result, digest: str, view: str = "") -> None:
-        """Keep a result."""
-
-
 class StageRunner:
-    """Calls the recipe's plugins; results that are valid in the work folder are read from there."""
+    """Calls the recipe's plugins; results that are valid in the work folder are read from there.
+
+    Without a work folder none is kept.
+    """
 
     def __init__(
-        self, recipe: Recipe, manager: Manager, work: Keeper, log: RunLog, pool: Executor
+        self,
+        recipe: Recipe,
+        manager: Manager,
+        work: WorkFolder | None,
+        log: RunLog,
+        pool: Executor,
     ) -> None:
         self.recipe = recipe
         self.manager = manager
@@ -173,13 +171,14 @@ class _Steps:
         digest = digest_of(_own_digest(), self._code, inputs)
         with self._guard:
             self._began = self._began or time.perf_counter()
-        result = work.get(stage, digest, view)
+        result = None if work is None else work.get(stage, digest, view)
         reused = result is not None
         if result is None:
             made = make({name: given.value for name, given in arguments.items()})
             # as a run that was interrupted reads it: a float of NumPy's counts in another precision
             result = from_arrays(stage.makes, to_arrays(made), stage.name)
-            work.put(stage, result, digest, view)
+            if work is not None:
+                work.put(stage, result, digest, view)
         self._ended(index, result, reused)
         return Given(result, digest)
 

@@ -114,8 +114,7 @@ def points_at_depth(strands: Strands, depth: Float32Array, camera: Camera) -> Bo
     inside = np.all((pixels >= 0) & (pixels < [camera.width, camera.height]), axis=1)
     column, row = np.where(inside[:, None], pixels, 0).astype(np.int64).T
     front = np.where(inside & np.isfinite(depth[row, column]), depth[row, column], -np.inf)
-    seen: BoolArray = camera.depth(strands.points) <= front + SEEN_TOLERANCE
-    return seen
+    return camera.depth(strands.points) <= front + SEEN_TOLERANCE
 
 
 def _meshes(solids: Solids) -> Sequence[Surface]:

@@ -154,8 +154,7 @@ def backdrop(camera: Camera) -> UInt8Array:
     """Return the neutral background (H, W, 3): grey, lighter towards the floor."""
     t = np.linspace(0, 1, camera.height)[:, None, None]
     column = (1 - t) * np.array(BACKDROP_TOP) + t * np.array(BACKDROP_BOTTOM)
-    result: UInt8Array = np.repeat(np.rint(column).astype(np.uint8), camera.width, axis=1)
-    return result
+    return np.repeat(np.rint(column).astype(np.uint8), camera.width, axis=1)
 
 
 @dataclass(frozen=True)

@@ -14,18 +14,9 @@ import numpy as np
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.parallel import compiled
 from hairkit.simulation import quaternion
+from hairkit.simulation import vectors as v
 from hairkit.simulation.rigid_motion import transform_points
-from hairkit.simulation.vectors import (
-    Floats,
-    Frame,
-    Vector,
-    inlined,
-    minus,
-    plus,
-    rotate,
-    times,
-    unit,
-)
+from hairkit.simulation.vectors import Floats, Frame, Vector, inlined
 from hairkit.types.strands import Strands
 
 SHORTEST = 0.015
@@ -80,9 +71,14 @@ def node_points(strands: Strands, nodes: int) -> Float64Array:
     return points
 
 
+def directions(points: Floats) -> Float64Array:
+    """Return the directions (..., n - 1, 3) of segments between points (..., n, 3)."""
+    return quaternion.normalize(np.diff(points, axis=-2).astype(np.float64))
+
+
 def largest_turn(points: Float64Array) -> Float64Array:
     """Return the largest turn (S,) at a node, radians."""
-    direction = quaternion.normalize(np.diff(points, axis=1))
+    direction = directions(points)
     cosine = (direction[:, 1:] * direction[:, :-1]).sum(axis=-1)
     result: Float64Array = np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1)
     return result
@@ -140,8 +136,8 @@ def carry_points(
     for i in range(first, last):
         rod, j, t = on.rod[i], on.segment[i], on.share[i]
         offset = (on.offset[i, 0], on.offset[i, 1], on.offset[i, 2])
-        away = rotate(frame_on(frames[rod // lanes, rod % lanes], j, t), offset)
-        a, b, c = plus(on_curve(position[rod // lanes, rod % lanes], j, t), away)
+        away = v.rotate(frame_on(frames[rod // lanes, rod % lanes], j, t), offset)
+        a, b, c = v.plus(on_curve(position[rod // lanes, rod % lanes], j, t), away)
         points[i, 0], points[i, 1], points[i, 2] = a, b, c
 
 
@@ -153,22 +149,22 @@ def measure_offsets(on: Embedding, position: Floats, frames: Floats, points: Flo
         rod, j, t = on.rod[i], on.segment[i], on.share[i]
         w, x, y, z = frame_on(frames[rod // lanes, rod % lanes], j, t)
         place = (points[i, 0], points[i, 1], points[i, 2])
-        away = minus(place, on_curve(position[rod // lanes, rod % lanes], j, t))
-        on.offset[i, 0], on.offset[i, 1], on.offset[i, 2] = rotate((w, -x, -y, -z), away)
+        away = v.minus(place, on_curve(position[rod // lanes, rod % lanes], j, t))
+        on.offset[i, 0], on.offset[i, 1], on.offset[i, 2] = v.rotate((w, -x, -y, -z), away)
 
 
 @inlined
 def on_curve(nodes: Floats, j: int, t: float) -> Vector:
     """Return the place on the smooth curve through the nodes, t along segment j (Catmull-Rom)."""
     a, b = _row(nodes, j), _row(nodes, j + 1)
-    way = minus(b, a)
+    way = v.minus(b, a)
     slope, slope_after = way, way
     if j > 0:
-        slope = times(0.5, minus(b, _row(nodes, j - 1)))
+        slope = v.times(0.5, v.minus(b, _row(nodes, j - 1)))
     if j + 2 < len(nodes):
-        slope_after = times(0.5, minus(_row(nodes, j + 2), a))
-    slopes = minus(times(1 - t, slope), times(t, slope_after))
-    return plus(a, plus(times(t * t * (3 - 2 * t), way), times(t * (1 - t), slopes)))
+        slope_after = v.times(0.5, v.minus(_row(nodes, j + 2), a))
+    slopes = v.minus(v.times(1 - t, slope), v.times(t, slope_after))
+    return v.plus(a, v.plus(v.times(t * t * (3 - 2 * t), way), v.times(t * (1 - t), slopes)))
 
 
 @inlined
@@ -180,7 +176,7 @@ def frame_on(frames: Floats, j: int, t: float) -> Frame:
     cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
     mix = -part if cosine < 0 else part
     w, x = own * a[0] + mix * b[0], own * a[1] + mix * b[1]
-    return unit((w, x, own * a[2] + mix * b[2], own * a[3] + mix * b[3]))
+    return v.unit((w, x, own * a[2] + mix * b[2], own * a[3] + mix * b[3]))
 
 
 @inlined

@@ -12,7 +12,6 @@ from hairkit.arrays import Float32Array, Float64Array, frozen_array, read_only
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.parallel import parallel_for
-from hairkit.simulation.hands import Hands
 from hairkit.simulation.obstacle_kernels import Drawn, Points, draw_points
 from hairkit.simulation.obstacles import NO_BODIES, Bodies, groom_bodies
 from hairkit.simulation.rigid_motion import inverse_motion, transform_points
@@ -42,7 +41,8 @@ class GuideSimulator(ABC):
     """(4, 4) motion since rest, world."""
     _torso: Float64Array
     """(4, 4) motion since rest, world."""
-    _hands: Hands
+    _hands: dict[int, Float64Array]
+    """Where the hand of each held point is, (3,) metres, world."""
     _points: Float32Array | None
     """Those last asked for; None after a motion."""
 
@@ -91,12 +91,18 @@ class GuideSimulator(ABC):
         """Set time to 0, head and torso at a motion (4, 4) since rest; None: at rest; let go."""
         head = np.eye(4) if head_from_rest is None else head_from_rest
         self._head = self._torso = frozen_array(head, np.float64, (4, 4), "head_from_rest")
-        self._time, self._points, self._hands = 0.0, None, Hands()
+        self._time, self._points, self._hands = 0.0, None, {}
 
     def _move_hands(self, around: Surroundings, most: float) -> None:
-        """Move the hands by up to `most` metres to the targets of grabs."""
+        """Move hands by up to `most` metres to the targets of grabs; a new one is at its point."""
         check_grabs(around.grabs, len(self.strands.points))
-        self._hands.move(around.grabs, lambda: self.points, most)
+        before, self._hands = self._hands, {}
+        for grab in around.grabs:
+            start = before.get(grab.point)
+            start = self.points[grab.point].astype(np.float64) if start is None else start
+            way = np.asarray(grab.target, np.float64) - start
+            size = max(float(np.linalg.norm(way)), 1e-12)
+            self._hands[grab.point] = start + min(1.0, most / size) * way
 
     def _gravity(self, around: Surroundings) -> Float64Array:
         """Return gravity (3,), world."""

@@ -78,8 +78,7 @@ def drift_rows(head_step: Float64Array, seconds: float) -> Float64Array:
 
     `head_step` (..., 4, 4) is the change of axes in so many seconds.
     """
-    result: Float64Array = (np.eye(4) - head_step)[..., :3, :] / seconds
-    return result
+    return (np.eye(4) - head_step)[..., :3, :] / seconds
 
 
 @compiled_with(fastmath=True)

@@ -46,8 +46,7 @@ def pull_to_captured(
     pull = root * np.maximum(1 - arc / REACH, 0.0) ** 2
     falls = (points[:, :1, 1] - points[:, -1:, 1]) / total
     pull += STANDING * np.clip(1 - falls, 0.0, 1.0) * gravity / total
-    result: Float64Array = np.where(arc / total < held[:, None], HELD, pull)
-    return result
+    return np.where(arc / total < held[:, None], HELD, pull)
 
 
 def held_lengths(groom: Groom) -> Float64Array:

@@ -1,7 +1,7 @@
 """Records whose fields hold the numbers of many strands or points side by side, for kernels.
 
 Compilers make vector instructions of loops over the `LANES` of a record, whose fields lie at known
-distances in memory. Its fields are those of a class, with the types `One`, `Three` or `Four`.
+distances in memory. Its fields are those of a class, with the types `One` to `Four`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,9 @@ from __future__ import annotations
 from typing import Annotated, Any, get_type_hints
 
 import numpy as np
+import numpy.typing as npt
 
+from hairkit.arrays import Float64Array
 from hairkit.parallel import compiled_with
 from hairkit.simulation.vectors import Floats, Frame, Vector, inlined
 
@@ -21,10 +23,14 @@ Kind = type[np.float32] | type[np.float64]
 KINDS: tuple[Kind, ...] = (np.float32, np.float64)
 One = Annotated[Floats, 1]
 """(LANES,) numbers of the strands."""
+Two = Annotated[Floats, 2]
+"""(2, LANES) pairs."""
 Three = Annotated[Floats, 3]
 """(3, LANES) vectors."""
 Four = Annotated[Floats, 4]
 """(4, LANES) quaternions or planes."""
+Records = npt.NDArray[np.void]
+"""Records of strands side by side, one for each node."""
 stage = compiled_with(fastmath=True)
 """Compiles one step of a method, by itself."""
 
@@ -40,6 +46,19 @@ def lanes_of(record: type) -> dict[Kind, np.dtype[Any]]:
     fields = sizes_of(record).items()
     shapes = [(name, (size, LANES) if size > 1 else (LANES,)) for name, size in fields]
     return {kind: np.dtype([(name, kind, shape) for name, shape in shapes]) for kind in KINDS}
+
+
+def pack_lanes(values: Floats, kind: Kind) -> Floats:
+    """Return values (S, ...) of strands as (B, ..., LANES); the last strand fills blocks."""
+    rows = np.minimum(np.arange(-(-len(values) // LANES) * LANES), len(values) - 1)
+    spread = values.astype(kind)[rows].reshape(-1, LANES, *values.shape[1:])
+    return np.ascontiguousarray(np.moveaxis(spread, 1, -1))
+
+
+def fill_lanes(records: Records, **values: Float64Array) -> None:
+    """Set fields of records (B, n) to values (S, n, ...) of strands."""
+    for name, value in values.items():
+        records[name] = pack_lanes(value, records[name].dtype.type)
 
 
 @inlined

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hairkit.arrays import Float64Array, frozen_array
+from hairkit.arrays import Float64Array, freeze
 from hairkit.errors import FormatError, InputError
 from hairkit.simulation import quaternion
 from hairkit.storage import read_text
@@ -53,12 +53,12 @@ class HeadMotion:
     """(3,) centre of the shakes, head frame; None: the origin."""
 
     def __post_init__(self) -> None:
-        times = frozen_array(self.times, np.float64, (None,), "motion times")
+        times = freeze(self, "times", np.float64, (None,), "motion times")
         if not len(times) or (np.diff(times) <= 0).any():
             raise InputError(
                 f"{len(times)} keys of a head motion, expected one or more at ascending times"
             )
-        keys = frozen_array(self.keys, np.float64, (len(times), 4, 4), "motion keys")
+        keys = freeze(self, "keys", np.float64, (len(times), 4, 4), "motion keys")
         turn = keys[:, :3, :3]
         off = np.abs(np.einsum("kij,klj->kil", turn, turn) - np.eye(3)).max(initial=0.0)
         if (
@@ -71,20 +71,15 @@ class HeadMotion:
                 f" {RIGID_TOLERANCE:g};"
                 " remove scale and shear"
             )
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "keys", keys)
         object.__setattr__(self, "_turns", _align_signs(quaternion.from_matrix(turn)))
-        if self.pivot is not None:
-            pivot = frozen_array(self.pivot, np.float64, (3,), "motion pivot")
-            object.__setattr__(self, "pivot", pivot)
+        freeze(self, "pivot", np.float64, (3,), "motion pivot")
 
     def __call__(self, time: float) -> Float64Array:
         """Return `head_from_rest` (4, 4) at `time`; constant outside the times of the keys."""
         motion = self._interpolate_keys(time)
         if not self.shakes:
             return motion
-        both: Float64Array = motion @ self._shake_transform(time)
-        return both
+        return motion @ self._shake_transform(time)
 
     @property
     def end(self) -> float:
@@ -247,5 +242,4 @@ def _hermite(
     a: Float64Array, slope_a: Float64Array, b: Float64Array, slope_b: Float64Array, t: float
 ) -> Float64Array:
     one, two = t * t * (3 - 2 * t), t * (1 - t)
-    result: Float64Array = a + (b - a) * one + two * ((1 - t) * slope_a - t * slope_b)
-    return result
+    return a + (b - a) * one + two * ((1 - t) * slope_a - t * slope_b)

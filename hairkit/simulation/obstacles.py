@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, frozen_array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, freeze
 from hairkit.head_model.bust import bust_under
 from hairkit.head_model.signed_distance import signed_distance
 from hairkit.parallel import parallel_for
@@ -40,8 +40,7 @@ class Obstacles(Stored):
     """(X, Y, Z) metres, at the cells' centres."""
 
     def __post_init__(self) -> None:
-        values = frozen_array(self.distance, np.float32, self.grid.shape, "obstacle distance")
-        object.__setattr__(self, "distance", values)
+        freeze(self, "distance", np.float32, self.grid.shape, "obstacle distance")
 
     def at(self, points: npt.ArrayLike) -> tuple[Float64Array, Float64Array]:
         """Return distance (N,) and outward unit direction (N, 3) at points (N, 3), head frame.

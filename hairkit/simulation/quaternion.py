@@ -47,8 +47,7 @@ def rotate(q: Float64Array, vector: npt.ArrayLike) -> Float64Array:
     """Rotate vectors (..., 3) by unit quaternions."""
     v = np.asarray(vector, np.float64)
     along = 2.0 * np.cross(q[..., 1:], v)
-    result: Float64Array = v + q[..., :1] * along + np.cross(q[..., 1:], along)
-    return result
+    return v + q[..., :1] * along + np.cross(q[..., 1:], along)
 
 
 def third_axis(q: Float64Array) -> Float64Array:

@@ -20,6 +20,10 @@ of Orthopaedic Surgeons, "Joint Motion", 1965). A head that turns farther takes 
 FARTHEST, WIDEST = 0.12, 1.2
 """Way of a root in a frame, metres, and turn, radians, from which the head is cut to its new place:
 more than 7 m/s, 4,100 degrees a second."""
+FINEST = 8
+"""Times as many substeps as set that a fast head takes at most."""
+SHORTEST_WAY = 1e-3
+"""Metres that a root may go in a substep however short the hair is."""
 _IDENTITY = np.eye(4)
 
 
@@ -59,6 +63,22 @@ def way_of_roots(start: Float64Array, end: Float64Array, roots: Float64Array) ->
     way = float(np.linalg.norm(roots @ change[:3, :3].T + change[:3, 3], axis=1).max())
     cosine = 0.5 * (float(np.trace(end[:3, :3] @ start[:3, :3].T)) - 1)
     return math.inf if way > FARTHEST or cosine < math.cos(WIDEST) else way
+
+
+def finer_steps(
+    start: Float64Array, end: Float64Array, roots: Float64Array, segment: float, substeps: int
+) -> int:
+    """Return how many times as many substeps a frame needs; 0 where the head is cut to its place.
+
+    In a substep a root goes no farther than half of `segment`, a usual length between nodes in
+    metres: beyond, the directions that lengths are linearised about are those of other segments.
+    `roots` (S, 3) are in head axes, `substeps` those of a frame of a slow head.
+    """
+    way = way_of_roots(start, end, roots)
+    if way == math.inf:
+        return 0
+    most = substeps * max(0.5 * segment, SHORTEST_WAY)
+    return min(1 << math.ceil(math.log2(max(way / most, 1.0))), FINEST)
 
 
 def inverse_motion(motion: Float64Array) -> Float64Array:
@@ -115,19 +135,17 @@ def _along_screw(start: Float64Array, end: Float64Array, share: Float64Array) ->
 
 def _rotation(cross: Float64Array, angle: Float64Array) -> Float64Array:
     """Return rotations (N, 3, 3) less the identity (Rodrigues), for angles (N, 1, 1)."""
-    result: Float64Array = np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
-    return result
+    return np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
 
 
 def _integral(cross: Float64Array, angle: float, share: Float64Array) -> Float64Array:
     """Return (N, 3, 3) the integral of the rotation over the fractions `share` (N, 1, 1)."""
     part = share * angle
-    result: Float64Array = (
+    return (
         share * np.eye(3)
         + (1 - np.cos(part)) / angle * cross
         + (part - np.sin(part)) / angle * (cross @ cross)
     )
-    return result
 
 
 def _axis_and_angle(turn: Float64Array) -> tuple[Float64Array, float]:

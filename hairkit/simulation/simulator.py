@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Float64Array, frozen_array
+from hairkit.arrays import Float32Array, Float64Array, freeze
 from hairkit.errors import InputError
 from hairkit.types.strands import Strands
 
@@ -47,12 +47,9 @@ class Surroundings:
     """Points that are pulled during the step; empty: none."""
 
     def __post_init__(self) -> None:
-        motion = frozen_array(self.head_from_rest, np.float64, (4, 4), "head_from_rest")
-        object.__setattr__(self, "head_from_rest", motion)
-        object.__setattr__(self, "wind", frozen_array(self.wind, np.float64, (3,), "wind"))
-        if self.gravity is not None:
-            gravity = frozen_array(self.gravity, np.float64, (3,), "gravity")
-            object.__setattr__(self, "gravity", gravity)
+        freeze(self, "head_from_rest", np.float64, (4, 4), "head_from_rest")
+        freeze(self, "wind", np.float64, (3,), "wind")
+        freeze(self, "gravity", np.float64, (3,), "gravity")
 
 
 @dataclass(frozen=True)

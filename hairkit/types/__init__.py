@@ -15,6 +15,7 @@ the packages named after the subject.
 * `hairline`: density of the hair on a head
 * `head`: the head mesh, roots, capsules
 * `mask`: labels: hair, person, background
+* `node_options`: settings of simulators whose guides are chains of nodes
 * `orientation`: 2D strand angle and confidence
 * `parting`: the parting on the crown
 * `person`: probability of the person

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.arrays import UInt8Array, frozen_array
+from hairkit.arrays import UInt8Array, freeze
 from hairkit.storage import Stored
 
 
@@ -20,6 +20,4 @@ class Carried(Stored):
     """(N,) bytes in the form that the format's plugin chose."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "content", frozen_array(self.content, np.uint8, (None,), "carried content")
-        )
+        freeze(self, "content", np.uint8, (None,), "carried content")

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from hairkit.arrays import Float64Array, frozen_array
+from hairkit.arrays import Float64Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.head import LANDMARKS
@@ -37,10 +37,8 @@ class Face(Stored):
     """Clockwise quarter turns of the photo that bring the face upright, 0 to 3."""
 
     def __post_init__(self) -> None:
-        shapes = {"landmarks": (LANDMARKS, 2), "noise_px": (LANDMARKS,)}
-        for name, shape in shapes.items():
-            array = frozen_array(getattr(self, name), np.float64, shape, f"face {name}")
-            object.__setattr__(self, name, array)
+        freeze(self, "landmarks", np.float64, (LANDMARKS, 2), "face landmarks")
+        freeze(self, "noise_px", np.float64, (LANDMARKS,), "face noise_px")
         if not 0 <= self.presence <= 1:
             raise DataError(f"face presence is {self.presence}, expected 0 to 1")
         if self.quarter_turns not in range(4):

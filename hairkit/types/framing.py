@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.arrays import Float64Array, Int64Array, frozen_array
+from hairkit.arrays import Float64Array, Int64Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 
@@ -24,12 +24,9 @@ class Framing(Stored):
     """(V, 2) the middle of the head in that photo, its pixels; of the photo where it is whole."""
 
     def __post_init__(self) -> None:
-        turns = frozen_array(self.quarter_turns, np.int64, (None,), "framing quarter_turns")
-        frames = frozen_array(self.frames, np.int64, (len(turns), 4), "framing frames")
-        object.__setattr__(self, "quarter_turns", turns)
-        object.__setattr__(self, "frames", frames)
-        heads = frozen_array(self.heads, np.float64, (len(turns), 2), "framing heads")
-        object.__setattr__(self, "heads", heads)
+        turns = freeze(self, "quarter_turns", np.int64, (None,), "framing quarter_turns")
+        frames = freeze(self, "frames", np.int64, (len(turns), 4), "framing frames")
+        freeze(self, "heads", np.float64, (len(turns), 2), "framing heads")
         if not np.isin(turns, range(4)).all():
             raise DataError("framing quarter_turns holds other values than 0 to 3")
         if (frames < 0).any() or not (frames[:, 2:] > frames[:, :2]).all():

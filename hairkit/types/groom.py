@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Int32Array, UInt8Array, check_reach, frozen_array
+from hairkit.arrays import Float32Array, Int32Array, UInt8Array, check_reach, freeze
 from hairkit.errors import DataError, FormatError
 from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
 from hairkit.types.carried import Carried
@@ -46,12 +46,8 @@ class HairMaterial(Stored):
     """Length of one turn along the axis, metres; 0 for straight hair."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "root_colour", frozen_array(self.root_colour, np.float32, (3,), "root_colour")
-        )
-        object.__setattr__(
-            self, "tip_colour", frozen_array(self.tip_colour, np.float32, (3,), "tip_colour")
-        )
+        freeze(self, "root_colour", np.float32, (3,), "root_colour")
+        freeze(self, "tip_colour", np.float32, (3,), "tip_colour")
         if not 0 < self.width < np.inf:
             raise DataError(f"hair width is {self.width}, expected metres above 0")
         for name in ("curl_radius", "curl_pitch"):
@@ -96,14 +92,10 @@ class Groom(Previewed, Stored):
 
     def __post_init__(self) -> None:
         count = len(self.strands)
-        triangle = frozen_array(self.root_triangle, np.int32, (count,), "root_triangle")
+        triangle = freeze(self, "root_triangle", np.int32, (count,), "root_triangle")
         if count and (triangle.min() < 0 or triangle.max() >= len(self.head.faces)):
             raise DataError("root_triangle names faces that the head does not have")
-        object.__setattr__(self, "root_triangle", triangle)
-        barycentric = frozen_array(
-            self.root_barycentric, np.float32, (count, 3), "root_barycentric"
-        )
-        object.__setattr__(self, "root_barycentric", barycentric)
+        freeze(self, "root_barycentric", np.float32, (count, 3), "root_barycentric")
 
     def __repr__(self) -> str:
         strands = repr(self.strands).removeprefix("Strands(").removesuffix(")")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, frozen_array
+from hairkit.arrays import Float32Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 
@@ -19,7 +19,6 @@ class Hairline(Stored):
     """(V,) at each vertex, of that of full hair: 0 where nothing grows, up to 1."""
 
     def __post_init__(self) -> None:
-        density = frozen_array(self.density, np.float32, (None,), "hair density")
+        density = freeze(self, "density", np.float32, (None,), "hair density")
         if density.size and (density.min() < 0 or density.max() > 1):
             raise DataError("hair density lies outside [0, 1]")
-        object.__setattr__(self, "density", density)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array, frozen_array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.preview import Previewed, draw_turn
@@ -33,14 +33,9 @@ class Capsules(Stored):
     """(C, 2) radii of the two spheres, metres."""
 
     def __post_init__(self) -> None:
-        first = frozen_array(self.first, np.float32, (None, 3), "capsule first")
-        object.__setattr__(self, "first", first)
-        object.__setattr__(
-            self, "second", frozen_array(self.second, np.float32, first.shape, "capsule second")
-        )
-        object.__setattr__(
-            self, "radius", frozen_array(self.radius, np.float32, (len(first), 2), "capsule radius")
-        )
+        first = freeze(self, "first", np.float32, (None, 3), "capsule first")
+        freeze(self, "second", np.float32, first.shape, "capsule second")
+        freeze(self, "radius", np.float32, (len(first), 2), "capsule radius")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,34 +67,21 @@ class Head(Previewed, Stored):
     """The torso below; None: an average adult's."""
 
     def __post_init__(self) -> None:
-        vertices = frozen_array(self.vertices, np.float32, (None, 3), "head vertices")
-        faces = frozen_array(self.faces, np.int32, (None, 3), "head faces")
+        vertices = freeze(self, "vertices", np.float32, (None, 3), "head vertices")
+        faces = freeze(self, "faces", np.int32, (None, 3), "head faces")
         if not len(faces) or faces.min() < 0 or faces.max() >= len(vertices):
             raise DataError("head faces are missing or name vertices that do not exist")
-        scalp = frozen_array(self.scalp, np.float32, (len(vertices),), "head scalp")
+        scalp = freeze(self, "scalp", np.float32, (len(vertices),), "head scalp")
         if not (scalp > 0.5).any():
             raise DataError(
                 "the head has no scalp: mark it by a vertex group, a mask texture or vertex colours"
             )
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "faces", faces)
-        object.__setattr__(self, "scalp", scalp)
-        object.__setattr__(
-            self, "uv", frozen_array(self.uv, np.float32, (len(vertices), 2), "head uv")
-        )
-        object.__setattr__(
-            self, "joints", frozen_array(self.joints, np.float32, (3, 3), "head joints")
-        )
-        if self.density is not None:
-            density = frozen_array(self.density, np.float32, (len(vertices),), "head density")
-            if density.min() < 0 or density.max() > 1:
-                raise DataError("head density lies outside [0, 1]")
-            object.__setattr__(self, "density", density)
-        if self.landmark_vertices is not None:
-            index = frozen_array(
-                self.landmark_vertices, np.int32, (LANDMARKS,), "head landmark_vertices"
-            )
-            object.__setattr__(self, "landmark_vertices", index)
+        freeze(self, "uv", np.float32, (len(vertices), 2), "head uv")
+        freeze(self, "joints", np.float32, (3, 3), "head joints")
+        density = freeze(self, "density", np.float32, (len(vertices),), "head density")
+        if density is not None and (density.min() < 0 or density.max() > 1):
+            raise DataError("head density lies outside [0, 1]")
+        freeze(self, "landmark_vertices", np.int32, (LANDMARKS,), "head landmark_vertices")
         self._check_shapes()
 
     def _check_shapes(self) -> None:
@@ -112,10 +94,9 @@ class Head(Previewed, Stored):
         if len({shape.name for shape in self.blendshapes}) < len(self.blendshapes):
             raise DataError("two blendshapes of the head have the same name")
         if self.eye_vertices is not None:
-            eyes = frozen_array(self.eye_vertices, np.int32, (2, None), "head eye_vertices")
+            eyes = freeze(self, "eye_vertices", np.int32, (2, None), "head eye_vertices")
             if not eyes.size or eyes.min() < 0 or eyes.max() >= count:
                 raise DataError("head eye_vertices are missing or name vertices that do not exist")
-            object.__setattr__(self, "eye_vertices", eyes)
 
     def __repr__(self) -> str:
         marked = "with" if self.landmark_vertices is not None else "without"
@@ -137,8 +118,7 @@ class Head(Previewed, Stored):
         """Return the faces (F', 3) that are not those of eyeballs."""
         if self.eye_vertices is None:
             return self.faces
-        kept: Int32Array = self.faces[~np.isin(self.faces, self.eye_vertices).any(axis=1)]
-        return kept
+        return self.faces[~np.isin(self.faces, self.eye_vertices).any(axis=1)]
 
     def eye_centres(self) -> Float64Array | None:
         """Return (2, 3) the middles of the left and the right eyeball, metres, or None."""
@@ -210,18 +190,12 @@ class Roots(Stored):
     """(N, 3) weights of that face's corners, sum 1."""
 
     def __post_init__(self) -> None:
-        positions = frozen_array(self.positions, np.float32, (None, 3), "root positions")
+        positions = freeze(self, "positions", np.float32, (None, 3), "root positions")
         count = len(positions)
-        object.__setattr__(self, "positions", positions)
-        object.__setattr__(
-            self, "normals", frozen_array(self.normals, np.float32, (count, 3), "root normals")
-        )
-        object.__setattr__(self, "uv", frozen_array(self.uv, np.float32, (count, 2), "root uv"))
-        object.__setattr__(
-            self, "triangle", frozen_array(self.triangle, np.int32, (count,), "root triangle")
-        )
-        barycentric = frozen_array(self.barycentric, np.float32, (count, 3), "root barycentric")
-        object.__setattr__(self, "barycentric", barycentric)
+        freeze(self, "normals", np.float32, (count, 3), "root normals")
+        freeze(self, "uv", np.float32, (count, 2), "root uv")
+        freeze(self, "triangle", np.int32, (count,), "root triangle")
+        freeze(self, "barycentric", np.float32, (count, 3), "root barycentric")
 
     def __len__(self) -> int:
         return len(self.positions)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.arrays import BoolArray, UInt8Array, frozen_array
+from hairkit.arrays import BoolArray, UInt8Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 
@@ -25,17 +25,14 @@ class Mask(Stored):
     """(H, W) opacity of the hair, 255 where it covers a pixel wholly; None where unknown."""
 
     def __post_init__(self) -> None:
-        labels = frozen_array(self.labels, np.uint8, (None, None), "mask labels")
+        labels = freeze(self, "labels", np.uint8, (None, None), "mask labels")
         known = (labels == BACKGROUND) | (labels == PERSON) | (labels == HAIR)
         if not known.all():
             stray = labels[~known].min()
             raise DataError(f"mask holds the value {stray}, expected only 0, 128 and 255")
         if not (labels == HAIR).any():
             raise DataError("mask is empty: no pixel is marked as hair (255)")
-        object.__setattr__(self, "labels", labels)
-        if self.alpha is not None:
-            alpha = frozen_array(self.alpha, np.uint8, labels.shape, "mask alpha")
-            object.__setattr__(self, "alpha", alpha)
+        freeze(self, "alpha", np.uint8, labels.shape, "mask alpha")
 
     @property
     def hair(self) -> BoolArray:

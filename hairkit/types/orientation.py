@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, frozen_array
+from hairkit.arrays import Float32Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 
@@ -22,16 +22,14 @@ class OrientationMap(Stored):
     """(H, W) in [0, 1], normalised per image."""
 
     def __post_init__(self) -> None:
-        angle = frozen_array(self.angle, np.float32, (None, None), "angle")
-        confidence = frozen_array(self.confidence, np.float32, angle.shape, "confidence")
+        angle = freeze(self, "angle", np.float32, (None, None), "angle")
+        confidence = freeze(self, "confidence", np.float32, angle.shape, "confidence")
         if angle.size and (angle.min() < 0 or angle.max() >= np.float32(np.pi)):
             raise DataError(f"angles lie in [{angle.min()}, {angle.max()}], expected [0, pi)")
         if confidence.size and (confidence.min() < 0 or confidence.max() > 1):
             raise DataError(
                 f"confidences lie in [{confidence.min()}, {confidence.max()}], expected [0, 1]"
             )
-        object.__setattr__(self, "angle", angle)
-        object.__setattr__(self, "confidence", confidence)
 
 
 def wrap_angle(angle: npt.ArrayLike) -> Float32Array:

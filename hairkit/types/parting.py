@@ -7,7 +7,7 @@ from typing import Literal, Self, get_args
 
 import numpy as np
 
-from hairkit.arrays import Float64Array, frozen_array
+from hairkit.arrays import Float64Array, freeze
 from hairkit.errors import DataError, InputError
 from hairkit.options import unknown_name
 from hairkit.storage import Stored
@@ -48,19 +48,14 @@ class Parting(Stored):
     """Who says so: `photos`, `stroke`, `capture.toml` or `option`."""
 
     def __post_init__(self) -> None:
-        if self.line is not None:
-            line = frozen_array(self.line, np.float64, (None, 2), "line of the parting")
-            if len(line) < 2:
-                raise DataError(f"a parting of {len(line)} points, expected at least 2")
-            object.__setattr__(self, "line", line)
+        line = freeze(self, "line", np.float64, (None, 2), "line of the parting")
+        if line is not None and len(line) < 2:
+            raise DataError(f"a parting of {len(line)} points, expected at least 2")
         if (self.places is None) != (self.directions is None):
             raise DataError("a comb has places and directions, or neither")
-        if self.places is not None and self.directions is not None:
-            places = frozen_array(self.places, np.float64, (None, 3), "places of the comb")
-            count = (len(places), 3)
-            directions = frozen_array(self.directions, np.float64, count, "directions of the comb")
-            object.__setattr__(self, "places", places)
-            object.__setattr__(self, "directions", directions)
+        places = freeze(self, "places", np.float64, (None, 3), "places of the comb")
+        if places is not None:
+            freeze(self, "directions", np.float64, places.shape, "directions of the comb")
 
     @classmethod
     def at(cls, x: float, skin_share: float = 0.0, spread: float = 0.0) -> Self:

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from hairkit.arrays import UInt8Array, frozen_array
+from hairkit.arrays import UInt8Array, freeze
 from hairkit.storage import Stored
 
 
@@ -19,8 +19,7 @@ class Person(Stored):
     """(H, W) 0 for the background to 255 for the person; (0, 0) where nobody looked."""
 
     def __post_init__(self) -> None:
-        alpha = frozen_array(self.alpha, np.uint8, (None, None), "person alpha")
-        object.__setattr__(self, "alpha", alpha)
+        freeze(self, "alpha", np.uint8, (None, None), "person alpha")
 
     @classmethod
     def absent(cls) -> Self:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, check_reach, frozen_array
+from hairkit.arrays import Float32Array, Float64Array, check_reach, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.groom import Groom
@@ -29,15 +29,12 @@ class PointCache(Stored):
     """(T, 4, 4) rigid motion of the head since rest, acting on column vectors."""
 
     def __post_init__(self) -> None:
-        points = frozen_array(self.points, np.float32, (None, None, 3), "cache points")
+        points = freeze(self, "points", np.float32, (None, None, 3), "cache points")
         frames = len(points)
-        times = frozen_array(self.times, np.float64, (frames,), "cache times")
+        times = freeze(self, "times", np.float64, (frames,), "cache times")
         if not frames or (np.diff(times) <= 0).any():
             raise DataError("a point cache needs at least one frame, at ascending times")
-        motion = frozen_array(self.head_from_rest, np.float64, (frames, 4, 4), "head_from_rest")
-        object.__setattr__(self, "points", points)
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "head_from_rest", motion)
+        freeze(self, "head_from_rest", np.float64, (frames, 4, 4), "head_from_rest")
 
     def __len__(self) -> int:
         return len(self.times)

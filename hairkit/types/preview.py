@@ -144,8 +144,7 @@ class _TurnView:
         local = np.asarray(points, np.float64) - self.middle
         right = np.array([np.cos(self.azimuth), 0.0, -np.sin(self.azimuth)])
         pixels = np.stack([local @ right, -local[..., 1]], axis=-1) * self.scale
-        centred: Float64Array = pixels + np.array([self.width, self.height]) / 2
-        return centred
+        return pixels + np.array([self.width, self.height]) / 2
 
     def view_direction(self, points: npt.ArrayLike) -> Float64Array:
         """Return the unit direction (..., 3) of view at points (..., 3)."""

@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, UInt8Array, frozen_array
+from hairkit.arrays import Float32Array, UInt8Array, freeze
 from hairkit.errors import DataError, FormatError
 from hairkit.storage import Stored, read_text, write_text
 from hairkit.types.camera import Camera
@@ -35,9 +35,7 @@ class Scene(Previewed, Stored):
             raise DataError(
                 f"scene has {len(self.cameras)} cameras for {len(self.names)} view names"
             )
-        if self.points is not None:
-            points = frozen_array(self.points, np.float32, (None, 3), "scene points")
-            object.__setattr__(self, "points", points)
+        freeze(self, "points", np.float32, (None, 3), "scene points")
 
     def __repr__(self) -> str:
         misfit = "" if self.residual_px is None else f", residual {self.residual_px:.2f} px"

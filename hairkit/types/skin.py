@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, UInt8Array, frozen_array
+from hairkit.arrays import Float32Array, UInt8Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 
@@ -33,10 +33,9 @@ class Texture(Stored):
     """(N,) the bytes of the file."""
 
     def __post_init__(self) -> None:
-        data = frozen_array(self.data, np.uint8, (None,), "texture data")
+        data = freeze(self, "data", np.uint8, (None,), "texture data")
         if not data[:8].tobytes().startswith((PNG, JPEG)):
             raise DataError("a texture is neither a PNG nor a JPEG file")
-        object.__setattr__(self, "data", data)
 
     def __repr__(self) -> str:
         return f"Texture({self.media_type}, {len(self.data)} bytes)"
@@ -144,5 +143,4 @@ class Blendshape(Stored):
     """(V, 3) moves of the vertices at weight 1, metres."""
 
     def __post_init__(self) -> None:
-        offsets = frozen_array(self.offsets, np.float32, (None, 3), "blendshape offsets")
-        object.__setattr__(self, "offsets", offsets)
+        freeze(self, "offsets", np.float32, (None, 3), "blendshape offsets")

@@ -17,7 +17,7 @@ from hairkit.arrays import (
     Int32Array,
     Int64Array,
     UInt8Array,
-    frozen_array,
+    freeze,
 )
 from hairkit.errors import DataError
 from hairkit.storage import Stored
@@ -42,8 +42,8 @@ class Strands(Previewed, Stored):
     """(S,) true for guides, false for interpolated hair."""
 
     def __post_init__(self) -> None:
-        points = frozen_array(self.points, np.float32, (None, 3), "strand points")
-        offsets = frozen_array(self.offsets, np.int64, (None,), "strand offsets")
+        points = freeze(self, "points", np.float32, (None, 3), "strand points")
+        offsets = freeze(self, "offsets", np.int64, (None,), "strand offsets")
         if not len(offsets) or offsets[0] != 0 or offsets[-1] != len(points):
             raise DataError(f"strand offsets must run from 0 to {len(points)}")
         if (np.diff(offsets) < 2).any():
@@ -51,19 +51,10 @@ class Strands(Previewed, Stored):
                 f"{np.count_nonzero(np.diff(offsets) < 2)} strands have fewer than two points"
             )
         count, total = len(offsets) - 1, len(points)
-        object.__setattr__(self, "points", points)
-        object.__setattr__(self, "offsets", offsets)
-        extras: dict[str, tuple[npt.DTypeLike, tuple[int, ...]]] = {
-            "widths": (np.float32, (total,)),
-            "root_uv": (np.float32, (count, 2)),
-            "group": (np.int32, (count,)),
-            "guide": (np.bool_, (count,)),
-        }
-        for name, (dtype, shape) in extras.items():
-            if getattr(self, name) is not None:
-                object.__setattr__(
-                    self, name, frozen_array(getattr(self, name), dtype, shape, name)
-                )
+        freeze(self, "widths", np.float32, (total,))
+        freeze(self, "root_uv", np.float32, (count, 2))
+        freeze(self, "group", np.int32, (count,))
+        freeze(self, "guide", np.bool_, (count,))
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -109,13 +100,11 @@ class Strands(Previewed, Stored):
     def arc_lengths(self) -> Float64Array:
         """Return (P,) the distance of every point from its root along the strand, metres."""
         total = np.cumsum(self._steps())
-        result: Float64Array = total - np.repeat(total[self.offsets[:-1]], self.counts)
-        return result
+        return total - np.repeat(total[self.offsets[:-1]], self.counts)
 
     def lengths(self) -> Float64Array:
         """Return (S,) strand lengths, metres."""
-        result: Float64Array = np.add.reduceat(self._steps(), self.offsets[:-1])
-        return result
+        return np.add.reduceat(self._steps(), self.offsets[:-1])
 
     def _steps(self) -> Float64Array:
         """Return (P,) the distance of every point from the one before it, 0 at roots, metres."""
@@ -208,5 +197,4 @@ class Strands(Previewed, Stored):
 
 
 def _mix(values: npt.NDArray[np.float32], after: Int64Array, t: Float64Array) -> Float32Array:
-    mixed: Float32Array = (values[after - 1] * (1 - t) + values[after] * t).astype(np.float32)
-    return mixed
+    return (values[after - 1] * (1 - t) + values[after] * t).astype(np.float32)

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, frozen_array
+from hairkit.arrays import Float32Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 
@@ -30,8 +30,8 @@ class Tie(Stored):
     """What hangs from it: `tail`, `braid` or `bun`."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "centre", frozen_array(self.centre, np.float32, (3,), "centre"))
-        object.__setattr__(self, "axis", frozen_array(self.axis, np.float32, (3,), "axis"))
+        freeze(self, "centre", np.float32, (3,), "centre")
+        freeze(self, "axis", np.float32, (3,), "axis")
         if abs(float(np.linalg.norm(self.axis)) - 1) > LONGEST_UNIT_ERROR:
             raise DataError(f"the axis of a tie is {self.axis}, expected a unit vector")
         if not 0 < self.radius < np.inf:
@@ -57,13 +57,10 @@ class Tail(Stored):
     """Angle between hair and spine of a braid, radians; 0 where the hair runs along the spine."""
 
     def __post_init__(self) -> None:
-        spine = frozen_array(self.spine, np.float32, (None, 3), "spine of a tail")
+        spine = freeze(self, "spine", np.float32, (None, 3), "spine of a tail")
         count = len(spine)
-        object.__setattr__(self, "spine", spine)
-        spokes = frozen_array(self.spokes, np.float32, (count, 2, 3), "spokes of a tail")
-        object.__setattr__(self, "spokes", spokes)
-        share = frozen_array(self.share, np.float32, (count,), "share of a tail")
-        object.__setattr__(self, "share", share)
+        freeze(self, "spokes", np.float32, (count, 2, 3), "spokes of a tail")
+        freeze(self, "share", np.float32, (count,), "share of a tail")
         if count < 2:
             raise DataError(f"a tail has {count} sections, expected two or more")
 
@@ -78,8 +75,7 @@ class LooseHair(Stored):
     """Share of the strands that hang in it."""
 
     def __post_init__(self) -> None:
-        cells = frozen_array(self.cells, np.float32, (None, 4), "cells of loose hair")
-        object.__setattr__(self, "cells", cells)
+        cells = freeze(self, "cells", np.float32, (None, 4), "cells of loose hair")
         if not len(cells):
             raise DataError("loose hair has no cells")
 

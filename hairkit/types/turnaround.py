@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.arrays import Float64Array, Int64Array, frozen_array
+from hairkit.arrays import Float64Array, Int64Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 
@@ -31,11 +31,9 @@ class Turnaround(Stored):
 
     def __post_init__(self) -> None:
         count = len(self.names)
-        order = frozen_array(self.order, np.int64, (count,), "turn order")
-        object.__setattr__(self, "order", order)
+        freeze(self, "order", np.int64, (count,), "turn order")
         for name in ("azimuth_deg", "elevation_deg"):
-            array = frozen_array(getattr(self, name), np.float64, (count,), f"turn {name}")
-            object.__setattr__(self, name, array)
+            freeze(self, name, np.float64, (count,), f"turn {name}")
         if not np.array_equal(np.sort(self.order), np.arange(count)):
             raise DataError(f"turn order is {self.order.tolist()}, expected each photo once")
         if (np.abs(self.elevation_deg) > 90).any():

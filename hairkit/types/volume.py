@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, frozen_array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.torso_shape import TorsoShape
@@ -30,9 +30,7 @@ class VoxelGrid(Stored):
     """Number of cells along x, y, z."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "origin", frozen_array(self.origin, np.float64, (3,), "grid origin")
-        )
+        freeze(self, "origin", np.float64, (3,), "grid origin")
         object.__setattr__(self, "shape", tuple(int(n) for n in self.shape))
         if not (0 < self.spacing < np.inf and len(self.shape) == 3 and min(self.shape) > 0):
             raise DataError(
@@ -69,8 +67,7 @@ class VoxelGrid(Stored):
 
     def index_from_head(self, points: npt.ArrayLike) -> Float64Array:
         """Return continuous indices (..., 3) of points: whole numbers fall on cell centres."""
-        result: Float64Array = (np.asarray(points, np.float64) - self.origin) / self.spacing - 0.5
-        return result
+        return (np.asarray(points, np.float64) - self.origin) / self.spacing - 0.5
 
     def nearest_cell(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
         """Return the cell (..., 3) that holds each point, clamped to the grid."""
@@ -116,8 +113,8 @@ class Hull(Stored):
 
     def __post_init__(self) -> None:
         shape = self.grid.shape
-        dense = frozen_array(self.dense, np.bool_, shape, "hull dense")
-        loose = frozen_array(self.loose, np.bool_, shape, "hull loose")
+        dense = freeze(self, "dense", np.bool_, shape, "hull dense")
+        loose = freeze(self, "loose", np.bool_, shape, "hull loose")
         if not dense.any():
             raise DataError(
                 "the hull is empty: the masks of the views do not overlap in space;"
@@ -125,10 +122,7 @@ class Hull(Stored):
             )
         if (dense & ~loose).any():
             raise DataError("hull: every dense cell must be a loose cell")
-        object.__setattr__(self, "dense", dense)
-        object.__setattr__(self, "loose", loose)
-        distance = frozen_array(self.head_distance, np.float32, shape, "hull head_distance")
-        object.__setattr__(self, "head_distance", distance)
+        freeze(self, "head_distance", np.float32, shape, "hull head_distance")
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +135,7 @@ class ScalpDistance(Stored):
     """Longest such path but for outliers, metres: how long hair can be."""
 
     def __post_init__(self) -> None:
-        values = frozen_array(self.values, np.float32, (None, None, None), "scalp distance")
-        object.__setattr__(self, "values", values)
+        freeze(self, "values", np.float32, (None, None, None), "scalp distance")
 
 
 TENSOR_INDICES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -171,29 +164,18 @@ class OrientationField(Stored):
 
     def __post_init__(self) -> None:
         shape = self.grid.shape
-        if self.direction is not None:
-            direction = frozen_array(self.direction, np.float32, (*shape, 3), "field direction")
-            object.__setattr__(self, "direction", direction)
-        if self.internal_distance is not None:
-            inner = frozen_array(
-                self.internal_distance, np.float32, shape, "field internal_distance"
-            )
-            object.__setattr__(self, "internal_distance", inner)
-        if self.tensor is not None:
-            tensor = frozen_array(self.tensor, np.float32, (*shape, 6), "field tensor")
-            object.__setattr__(self, "tensor", tensor)
-        elif self.direction is None:
+        freeze(self, "direction", np.float32, (*shape, 3), "field direction")
+        freeze(self, "internal_distance", np.float32, shape, "field internal_distance")
+        freeze(self, "tensor", np.float32, (*shape, 6), "field tensor")
+        if self.tensor is None and self.direction is None:
             raise DataError("the field has neither tensor nor direction")
-        confidence = frozen_array(self.confidence, np.float32, shape, "field confidence")
+        confidence = freeze(self, "confidence", np.float32, shape, "field confidence")
         if confidence.min() < 0 or confidence.max() > 1:
             raise DataError(
                 f"field confidence lies in [{confidence.min()}, {confidence.max()}],"
                 " expected [0, 1]"
             )
-        object.__setattr__(self, "confidence", confidence)
-        object.__setattr__(
-            self, "growth", frozen_array(self.growth, np.float32, shape, "field growth")
-        )
+        freeze(self, "growth", np.float32, shape, "field growth")
 
     def tensors(self) -> Float32Array:
         """Return `tensor`, or d d^T (X, Y, Z, 6) of unit vectors d along `direction`.

@@ -55,8 +55,7 @@ class Property:
         if numbers is None:
             return None
         source = self.archive.file.source
-        result: Float64Array = finite(numbers, source, self.name).astype(np.float64)
-        return result
+        return finite(numbers, source, self.name).astype(np.float64)
 
     def float32(self) -> Float32Array | None:
         """Return the first sample as `floats` does, in single precision and without a copy."""

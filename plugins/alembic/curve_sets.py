@@ -126,8 +126,7 @@ def _counts(found: dict[str, Property], points: Float32Array, node: Object) -> I
         raise node.archive.file.error(
             f"{node.name} has {len(points)} points, its curves ask for another number"
         )
-    result: Int64Array = counts[:, 0]
-    return result
+    return counts[:, 0]
 
 
 def _spline(

@@ -54,8 +54,7 @@ def _average(points: Float32Array, lock: Int64Array, weight: Float64Array) -> Fl
     order = np.argsort(lock, kind="stable")
     first = np.searchsorted(lock[order], np.arange(lock.max() + 1))
     sums = np.add.reduceat(points[order] * weight[order, None], first)
-    means: Float32Array = (sums / np.add.reduceat(weight[order], first)[:, None]).astype(np.float32)
-    return means
+    return (sums / np.add.reduceat(weight[order], first)[:, None]).astype(np.float32)
 
 
 def _nearest(points: Float32Array, centres: Float32Array) -> Int64Array:

@@ -63,8 +63,7 @@ def _albedo(atlas: Atlas, material: HairMaterial) -> UInt8Array:
 def _scattered(number: UInt8Array) -> UInt8Array:
     """Return the shades of strands: neighbours' numbers are far apart."""
     table = (np.arange(256) * SCATTER % SHADES).astype(np.uint8)
-    shade: UInt8Array = table[number]
-    return shade
+    return table[number]
 
 
 def _directions(parts: Int8Array, *, outward: bool) -> UInt8Array:

@@ -129,8 +129,7 @@ def _smoothed(values: Float64Array) -> Float64Array:
     """Return values (K, M) averaged with their neighbours along the card."""
     padded = np.pad(values, ((0, 0), (1, 1)), mode="edge")
     before, here, after = SMOOTHING
-    mixed: Float64Array = before * padded[:, :-2] + here * values + after * padded[:, 2:]
-    return mixed
+    return before * padded[:, :-2] + here * values + after * padded[:, 2:]
 
 
 def _unit(vectors: Float64Array) -> Float64Array:

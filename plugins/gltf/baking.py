@@ -106,8 +106,7 @@ def _components(flat: Float32Array) -> Float32Array:
     """Return (T, T) orthonormal weights of the frames' components, the largest first."""
     # eigenvectors of the small matrix of products between frames, not of the large one of points
     products = (flat @ flat.T).astype(np.float64)
-    vectors: Float32Array = np.linalg.eigh(products)[1][:, ::-1].astype(np.float32)
-    return vectors
+    return np.linalg.eigh(products)[1][:, ::-1].astype(np.float32)
 
 
 def _fewest(flat: Float32Array, components: Float32Array, most: int) -> int:

@@ -238,8 +238,7 @@ def _spread(
     away = (here - lines.reshape(-1, 3)[rows]) ** 2
     total = np.stack([np.bincount(rows, away[:, k], len(lines) * points) for k in range(3)], axis=1)
     members = np.bincount(lock)[:, None, None]
-    result: Float64Array = np.sqrt(total.reshape(-1, points, 3) / members)
-    return result
+    return np.sqrt(total.reshape(-1, points, 3) / members)
 
 
 def _any_across(along: Float64Array) -> Float64Array:
@@ -250,8 +249,7 @@ def _any_across(along: Float64Array) -> Float64Array:
 
 def _unit(vectors: Float64Array) -> Float64Array:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    result: Float64Array = np.where(length > 1e-12, vectors / np.maximum(length, 1e-12), 0.0)
-    return result
+    return np.where(length > 1e-12, vectors / np.maximum(length, 1e-12), 0.0)
 
 
 def _faces(count: int, points: int) -> Int32Array:

@@ -139,5 +139,4 @@ def _widths(
         whole = np.clip(_CARD_SPREAD * gathered_within, 0.5 * width, _WIDEST * wider)
     share = np.linspace(0, 1, points)
     profile = np.minimum(_ROOT_WIDTH + 3 * share, 1.0) * (1 - _TAPER * share**4)
-    result: Float32Array = (whole * profile).astype(np.float32)
-    return result
+    return (whole * profile).astype(np.float32)

@@ -73,8 +73,7 @@ def _normals(relief: Float64Array) -> Float64Array:
     down, right = np.gradient(relief)
     normal = np.stack([-right, down, np.ones_like(relief)], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    result: Float64Array = 255 / 2 * (normal + 1)
-    return result
+    return 255 / 2 * (normal + 1)
 
 
 def _png(picture: Float64Array) -> bytes:

@@ -121,8 +121,7 @@ def _pool(cells: BoolArray, shape: tuple[int, ...]) -> BoolArray:
     padded = np.zeros(tuple(COARSE * n for n in shape), bool)
     padded[tuple(slice(n) for n in cells.shape)] = cells
     blocks = padded.reshape(shape[0], COARSE, shape[1], COARSE, shape[2], COARSE)
-    result: BoolArray = np.asarray(blocks.any(axis=(1, 3, 5)))
-    return result
+    return np.asarray(blocks.any(axis=(1, 3, 5)))
 
 
 @dataclass(frozen=True, eq=False)

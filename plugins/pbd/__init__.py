@@ -13,27 +13,22 @@ with the head, so that captured hair stays. `rods` is stiffer, faster at equal e
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from typing import Any
 
 from hairkit.hookspecs import hookimpl
+from hairkit.types.groom import Groom
 
 from .options import Options
 
-if TYPE_CHECKING:
-    from hairkit.types.groom import Groom
-
-    from .simulator import PbdSimulator
-
-
 __all__ = ["Options"]
-
-_log = logging.getLogger("hairkit")
 
 
 @hookimpl
-def make_simulator(groom: Groom, options: Options) -> PbdSimulator:
+def make_simulator(groom: Groom, options: Options) -> Any:
     """Return a simulator of the groom's guides, at rest."""
     from .simulator import PbdSimulator
 
-    _log.warning("pbd is position-based dynamics since 0.3; what was pbd is rods, the default")
+    logging.getLogger("hairkit").warning(
+        "pbd is position-based dynamics since 0.3; what was pbd is rods, the default"
+    )
     return PbdSimulator(groom, options)

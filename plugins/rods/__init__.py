@@ -8,12 +8,12 @@ rate. The natural shape comes from inverse statics, so that captured hair stays 
 gravity.
 
 * `backend`: what backends share, and the compiled one
-* `block`: strands side by side; constants, contact and substeps of all backends
+* `block`: strands side by side; constants and contact of all backends
 * `frames`: turns of frames, compiled
 * `gl_backend`: substeps in compute shaders
 * `kernel_contact`: contact and friction, compiled
 * `kernels`: a substep, compiled
-* `limits`: what stiffness and head motion rods can follow
+* `limits`: what stiffness rods can follow
 * `linear_system`: the banded matrix of a substep
 * `options`: settings
 * `rods`: the discrete rod, its state and energy, inverse statics

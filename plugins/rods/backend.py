@@ -9,10 +9,11 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.parallel import parallel_for
-from hairkit.simulation.lanes import LANES, Kind
+from hairkit.simulation.lanes import LANES, Kind, pack_lanes
+from hairkit.simulation.substeps import StepArrays, Steps
 
 from . import block
-from .block import Blocks, Contact, StepArrays, Steps
+from .block import Blocks, Contact
 from .kernels import run_substeps
 from .linear_system import System
 from .rods import Rods, State, rest_state
@@ -60,27 +61,27 @@ class FastEngine(Engine):
         self.rows = np.moveaxis(self._planes[:, :, : block.CONSTANT], -1, 1)
         super().__init__(rods, contact)
         self._system: System | None = None
-        self.mass = np.moveaxis(block.pack_lanes(rods.mass, kind), -1, 1)
+        self.mass = np.moveaxis(pack_lanes(rods.mass, kind), -1, 1)
         self.mass[-1, (len(rods.mass) - 1) % LANES + 1 :] = 0.0  # only fills the block
 
     def _keep(self, rows: Float64Array) -> None:
         self._planes[:, :, : block.CONSTANT] = 0.0
-        self._planes[:, :, : rows.shape[2]] = block.pack_lanes(rows, self._kind)
+        self._planes[:, :, : rows.shape[2]] = pack_lanes(rows, self._kind)
 
     def run(self, system: System, steps: StepArrays, outer: Float64Array) -> None:
         """Do the substeps; `outer` is `block.acting`."""
         contact, kind = self.contact, self._kind
         if self._system is not system:
             nodes, metric = block.constants(self.rods, system, contact)
-            self._planes[:, :, block.CONSTANT :] = block.pack_lanes(nodes, kind)
-            self._system, self._metric = system, block.pack_lanes(metric, kind)
+            self._planes[:, :, block.CONSTANT :] = pack_lanes(nodes, kind)
+            self._system, self._metric = system, pack_lanes(metric, kind)
         parallel_for(
             run_substeps,
             len(self._planes),
             Blocks(
                 block.records(self._planes, block.NODE[kind]),
                 self._metric,
-                block.records(block.pack_lanes(outer, kind), block.ACTING[kind]),
+                block.records(pack_lanes(outer, kind), block.ACTING[kind]),
             ),
             np.zeros((1, self.rods.nodes + 2), block.WORK[kind]),
             Steps(*(part.astype(kind) for part in steps)),

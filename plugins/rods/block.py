@@ -8,36 +8,24 @@ shares of the rod's mean mass, so that stiffness is in 1/s^2.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
-from hairkit.simulation import quaternion
-from hairkit.simulation.hair_cells import drift_rows
-from hairkit.simulation.lanes import LANES, Four, Kind, One, Three, lanes_of, sizes_of
+from hairkit.simulation.contact_kernels import Moving, Touch
+from hairkit.simulation.lanes import Four, Kind, One, Records, Three, lanes_of, sizes_of
 from hairkit.simulation.obstacles import Bodies
-from hairkit.simulation.rigid_motion import inverse_motion, motion_steps
-from hairkit.simulation.vectors import Floats, Frame, Rows
+from hairkit.simulation.substeps import Settings
+from hairkit.simulation.vectors import Floats
 
 from .linear_system import System
 from .rods import Rods, State
 
-Records = npt.NDArray[np.void]
 
-
-class NodeState(Protocol):
+class NodeState(Moving, Protocol):
     """State of a node, in head axes; shaders have no planes."""
 
-    place: Three
-    """Metres."""
-    room: One
-    """How far the node may move before the next lookup of the head, metres."""
-    speed: Three
-    """m/s."""
-    aside: One
-    """As `room`, of the torso."""
     gain: Three
     """Acceleration, m/s^2."""
     spare: One
@@ -86,7 +74,7 @@ class Node(NodeState, Protocol):
     """Mean mass of the rod's nodes, kg."""
 
 
-class Work(Protocol):
+class Work(Touch, Protocol):
     """A record of what a substep works out for a node and the segment that ends there."""
 
     force: Three
@@ -105,18 +93,8 @@ class Work(Protocol):
     """Diagonal of the system at hand, then its reciprocal pivot."""
     beside: One
     """Entry beside the diagonal."""
-    value: One
-    """Right-hand side, then solution."""
     solved: Three
     """Solution of the banded system, metres."""
-    normal: Three
-    """Of the obstacle that is met; 0 without one."""
-    surface: Three
-    """Velocity of that obstacle, m/s."""
-    depth: One
-    """In that obstacle, metres."""
-    grip: One
-    """Change of velocity that friction may bring, m/s."""
 
 
 class Outer(Protocol):
@@ -159,65 +137,6 @@ class Contact:
     rounds: int = 0
     """Friction iterations under the tension that restores the lengths. With 0 taut strands have too
     little friction around bends; with 4 the Euler-Eytelwein equation holds."""
-
-
-Motion = TypeVar("Motion")
-Turn = TypeVar("Turn")
-
-
-class Steps(NamedTuple, Generic[Motion, Turn]):
-    """Motion of head and torso in K substeps, in the head axes after each: arrays.
-
-    In kernels, of one substep: tuples, without the first axis.
-    """
-
-    head_step: Motion
-    """(K, 3, 4) rows of the motion from the head axes before."""
-    drift: Motion
-    """(K, 3, 4) rows of the velocity of a point that rides on the head."""
-    air: Motion
-    """(K, 3, 4) turn from the world's axes, and gravity, m/s^2."""
-    turn: Turn
-    """(K, 4) the head's turn (w, x, y, z)."""
-    torso: Motion
-    """(K, 3, 4) rows from the head axes to the torso's."""
-    torso_drift: Motion
-    """(K, 3, 4) rows of the velocity of a point that rides on the torso."""
-
-
-StepArrays = Steps[Floats, Floats]
-Step = Steps[Rows, Frame]
-Course = tuple[Float64Array, Float64Array]
-"""Motions (4, 4) since rest, world, from which and to which a body goes."""
-
-
-def make_steps(
-    head: Course, torso: Course, count: int, gravity: Float64Array, seconds: float
-) -> StepArrays:
-    """Return substeps, of so many seconds each, of head and torso under gravity (3,), world."""
-    heads, head_steps = motion_steps(*head, count)
-    torsos, torso_steps = motion_steps(*torso, count)
-    turn = heads[:, :3, :3].swapaxes(1, 2)
-    from_head = inverse_motion(torsos) @ heads
-    riding = inverse_motion(from_head) @ torso_steps @ from_head
-    return Steps(
-        head_steps[:, :3],
-        drift_rows(head_steps, seconds),
-        np.concatenate([turn, turn @ gravity[:, None]], axis=2),
-        np.tile(quaternion.from_matrix(head_steps[0, :3, :3]), (len(heads), 1)),
-        from_head[:, :3],
-        drift_rows(riding, seconds),
-    )
-
-
-class Settings(NamedTuple):
-    """Numbers of a run, see `Contact` and `Rates`."""
-
-    seconds: np.floating[Any]
-    damping: np.floating[Any]
-    friction: np.floating[Any]
-    fastest: np.floating[Any]
-    rounds: int
 
 
 def settings_of(system: System, contact: Contact, kind: Kind) -> Settings:
@@ -270,13 +189,6 @@ def state_rows(rods: Rods, state: State) -> Float64Array:
 def state_of(rows: Any) -> State:
     """Return the state in rows (..., n, 16 or more) of `NodeState`: views of them."""
     return State(rows[..., :3], rows[..., 4:7], rows[..., 1:, 12:16], rows[..., 8:11])
-
-
-def pack_lanes(values: Floats, kind: Kind) -> Floats:
-    """Return values (S, ...) of strands as (B, ..., LANES); the last strand fills blocks."""
-    rows = np.minimum(np.arange(-(-len(values) // LANES) * LANES), len(values) - 1)
-    spread = values.astype(kind)[rows].reshape(-1, LANES, *values.shape[1:])
-    return np.ascontiguousarray(np.moveaxis(spread, 1, -1))
 
 
 def records(values: Floats, kind: np.dtype[Any]) -> Records:

@@ -6,22 +6,8 @@ import math
 
 import numpy as np
 
-from hairkit.simulation.vectors import (
-    ONE,
-    ZERO,
-    Frame,
-    Number,
-    Vector,
-    cross,
-    dot,
-    inlined,
-    minus,
-    plus,
-    product,
-    third_axis,
-    times,
-    unit,
-)
+from hairkit.simulation import vectors as v
+from hairkit.simulation.vectors import ONE, ZERO, Frame, Number, Vector, inlined
 
 THIRD, THREE, FOUR, NINE_FIFTHS = (np.float32(c) for c in (1 / 3, 3, 4, 9 / 5))
 OPPOSITE = np.float32(1e-4)
@@ -31,27 +17,27 @@ OPPOSITE = np.float32(1e-4)
 @inlined
 def swing_frame(q: Frame, way: Vector) -> Frame:
     """Rotate a frame by the shortest arc that brings its third axis to `way`; normalise it."""
-    axis = third_axis(q)
-    about = cross(axis, way)
-    return unit(product((max(ONE + dot(axis, way), OPPOSITE), *about), q))
+    axis = v.third_axis(q)
+    about = v.cross(axis, way)
+    return v.unit(v.product((max(ONE + v.dot(axis, way), OPPOSITE), *about), q))
 
 
 @inlined
-def half_way(a: Frame, b: Frame, v: Vector) -> tuple[Vector, Vector]:
-    """Return v rotated by the frame half way from a to b, and the axis of b a^-1 times the tangent
-    of a quarter of its angle.
+def half_way(a: Frame, b: Frame, bend: Vector) -> tuple[Vector, Vector]:
+    """Return `bend` rotated by the frame half way from a to b, and the axis of b a^-1.
 
-    The sum of two unit quaternions has the square 2 + 2 w, w their product.
+    The axis is as long as the tangent of a quarter of its angle. The sum of two unit quaternions
+    has the square 2 + 2 w, w their product.
     """
     w = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
     sign = -ONE if w < ZERO else ONE
     over = ONE / (ONE + sign * w)
     va, vb = (a[1], a[2], a[3]), (b[1], b[2], b[3])
-    axis = plus(va, times(sign, vb))
-    aside = cross(axis, v)
-    turn = plus(times(a[0] + sign * b[0], aside), cross(axis, aside))
-    vector = minus(minus(times(a[0], vb), times(b[0], va)), cross(vb, va))
-    return plus(v, times(over, turn)), times(sign * over, vector)
+    axis = v.plus(va, v.times(sign, vb))
+    aside = v.cross(axis, bend)
+    turn = v.plus(v.times(a[0] + sign * b[0], aside), v.cross(axis, aside))
+    vector = v.minus(v.minus(v.times(a[0], vb), v.times(b[0], va)), v.cross(vb, va))
+    return v.plus(bend, v.times(over, turn)), v.times(sign * over, vector)
 
 
 @inlined

@@ -16,9 +16,10 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import RenderError
 from hairkit.rendering.context import Renderer, is_current, on_graphics_card, renderer
 from hairkit.rendering.gl_camera import set_uniforms
+from hairkit.simulation.substeps import StepArrays
 
 from .backend import Engine
-from .block import Contact, StepArrays, constants, settings_of
+from .block import Contact, constants, settings_of
 from .linear_system import System
 from .rods import Rods
 

@@ -13,28 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from hairkit.parallel import compiled_with
-from hairkit.simulation.lanes import LANES, four, put, put_four, stage, three
+from hairkit.simulation import vectors as v
+from hairkit.simulation.lanes import LANES, Records, four, put, put_four, stage, three
 from hairkit.simulation.obstacle_kernels import Fields
-from hairkit.simulation.vectors import (
-    HALF,
-    ONE,
-    ZERO,
-    Floats,
-    Number,
-    cross,
-    dot,
-    inlined,
-    minus,
-    moved,
-    plus,
-    product,
-    rows_of,
-    third_axis,
-    times,
-    turned,
-)
+from hairkit.simulation.substeps import Settings, Step, StepArrays, step_of
+from hairkit.simulation.vectors import HALF, ONE, ZERO, Floats, Number, inlined
 
-from .block import Blocks, Node, Outer, Records, Settings, Step, StepArrays, Steps, Work
+from .block import Blocks, Node, Outer, Work
 from .frames import THIRD, half_way, swing_frame, twist_angle
 from .kernel_contact import resolve_contacts
 from .linear_system import IMPLICIT
@@ -93,19 +78,6 @@ def run_substeps(
 
 
 @stage
-def step_of(steps: StepArrays, k: int) -> Step:
-    """Return one substep, whose numbers stay in registers."""
-    return Steps(
-        rows_of(steps.head_step[k]),
-        rows_of(steps.drift[k]),
-        rows_of(steps.air[k]),
-        (steps.turn[k, 0], steps.turn[k, 1], steps.turn[k, 2], steps.turn[k, 3]),
-        rows_of(steps.torso[k]),
-        rows_of(steps.torso_drift[k]),
-    )
-
-
-@stage
 def predict_nodes(s: Nodes, x: Works, step: Step, settings: Settings, act: Sequence[Outer]) -> None:
     """Bring nodes to the new head axes, extrapolate them, and sum the forces on them."""
     head, drift, air = step.head_step, step.drift, step.air
@@ -114,19 +86,19 @@ def predict_nodes(s: Nodes, x: Works, step: Step, settings: Settings, act: Seque
         outer = act[min(j, len(act) - 1)]
         node, own = s[j], x[j]
         for w in range(LANES):
-            gain, speed = turned(head, three(node.gain, w)), turned(head, three(node.speed, w))
-            way = times(h, plus(speed, times(DRIFT * h, gain)))
-            place = plus(moved(head, three(node.place, w)), way)
-            gain = times(PASSED, gain)
-            speed = plus(speed, times(h, gain))
+            gain, speed = v.turned(head, three(node.gain, w)), v.turned(head, three(node.speed, w))
+            way = v.times(h, v.plus(speed, v.times(DRIFT * h, gain)))
+            place = v.plus(v.moved(head, three(node.place, w)), way)
+            gain = v.times(PASSED, gain)
+            speed = v.plus(speed, v.times(h, gain))
             put(node.place, w, place)
             put(node.speed, w, speed)
             put(node.gain, w, gain)
-            blown = times(node.drag[w], minus(turned(air, three(outer.air, w)), speed))
-            slowed = times(damping, minus(moved(drift, place), speed))
-            pull = times(node.shape[w], minus(three(node.rest, w), place))
-            total = times(node.mass[w], plus(plus(blown, slowed), plus(pull, gravity)))
-            put(own.force, w, plus(total, three(outer.force, w)))
+            blown = v.times(node.drag[w], v.minus(v.turned(air, three(outer.air, w)), speed))
+            slowed = v.times(damping, v.minus(v.moved(drift, place), speed))
+            pull = v.times(node.shape[w], v.minus(three(node.rest, w), place))
+            total = v.times(node.mass[w], v.plus(v.plus(blown, slowed), v.plus(pull, gravity)))
+            put(own.force, w, v.plus(total, three(outer.force, w)))
 
 
 @stage
@@ -138,18 +110,18 @@ def lead_roots(s: Nodes, x: Works, step: Step, h: Number) -> None:
     head, over = step.head_step, ONE / h
     node, own, first = s[0], x[0], x[1]
     for w in range(LANES):
-        rest, place = three(node.rest, w), moved(head, three(node.place, w))
-        speed = times(over, minus(rest, place))
-        gain = times(over, minus(speed, turned(head, three(node.speed, w))))
-        jerk = minus(gain, times(PASSED, turned(head, three(node.gain, w))))
+        rest, place = three(node.rest, w), v.moved(head, three(node.place, w))
+        speed = v.times(over, v.minus(rest, place))
+        gain = v.times(over, v.minus(speed, v.turned(head, three(node.speed, w))))
+        jerk = v.minus(gain, v.times(PASSED, v.turned(head, three(node.gain, w))))
         put(node.place, w, rest)
         put(node.speed, w, speed)
         put(node.gain, w, gain)
-        axis = third_axis(four(node.frame, w))
+        axis = v.third_axis(four(node.frame, w))
         put(own.way, w, axis)
         put(own.reach, w, axis)
-        held = times(THIRD * AHEAD * node.mass[w], jerk)
-        put(first.force, w, minus(three(first.force, w), held))
+        held = v.times(THIRD * AHEAD * node.mass[w], jerk)
+        put(first.force, w, v.minus(three(first.force, w), held))
 
 
 @stage
@@ -158,12 +130,12 @@ def transport_frames(s: Nodes, x: Works, step: Step) -> None:
     for j in range(1, len(s)):
         node, own, last_node = s[j], x[j], s[j - 1]
         for w in range(LANES):
-            edge = minus(three(node.place, w), three(last_node.place, w))
-            way = times(ONE / math.sqrt(dot(edge, edge)), edge)
+            edge = v.minus(three(node.place, w), three(last_node.place, w))
+            way = v.times(ONE / math.sqrt(v.dot(edge, edge)), edge)
             put(own.edge, w, edge)
-            put(own.reach, w, times(node.over[w], edge))
+            put(own.reach, w, v.times(node.over[w], edge))
             put(own.way, w, way)
-            put_four(node.frame, w, swing_frame(product(step.turn, four(node.frame, w)), way))
+            put_four(node.frame, w, swing_frame(v.product(step.turn, four(node.frame, w)), way))
 
 
 @stage
@@ -175,18 +147,18 @@ def relax_twist(s: Nodes, x: Works) -> None:
             before, after = four(last_node.frame, w), four(node.frame, w)
             away, here = three(last.way, w), three(own.way, w)
             natural, quarter = half_way(before, after, three(node.curve, w))
-            turn = minus(here, away)
-            spun = cross(natural, turn)
-            aside = cross(quarter, spun)
+            turn = v.minus(here, away)
+            spun = v.cross(natural, turn)
+            aside = v.cross(quarter, spun)
             half, twist = HALF * node.bend[w], node.twist[w]
             torque = twist * (twist_angle(before, after) - node.natural[w])
-            firm = HALF * half * max(dot(natural, turn), ZERO)
+            firm = HALF * half * max(v.dot(natural, turn), ZERO)
             own.torque[w] = torque
             own.pivot[w] = twist + firm
             own.beside[w] = firm - twist
-            own.value[w] = half * dot(here, plus(spun, aside)) - torque
+            own.value[w] = half * v.dot(here, v.plus(spun, aside)) - torque
             last.pivot[w] += twist + firm
-            last.value[w] += half * dot(away, minus(spun, aside)) + torque
+            last.value[w] += half * v.dot(away, v.minus(spun, aside)) + torque
     solve_tridiagonal(x, len(s))
     held = x[0]
     for w in range(LANES):
@@ -200,8 +172,8 @@ def relax_twist(s: Nodes, x: Works) -> None:
             # half angles by a rational cosine and sine
             half = HALF * angle
             cosine = ONE / math.sqrt(ONE + half * half)
-            axis = times(half * cosine, three(own.way, w))
-            put_four(node.frame, w, product((cosine, *axis), four(node.frame, w)))
+            axis = v.times(half * cosine, three(own.way, w))
+            put_four(node.frame, w, v.product((cosine, *axis), four(node.frame, w)))
 
 
 @stage
@@ -232,21 +204,21 @@ def add_elastic(s: Nodes, x: Works) -> None:
             away, here = three(last.way, w), three(own.way, w)
             before, after = four(last_node.frame, w), four(node.frame, w)
             natural, quarter = half_way(before, after, three(node.curve, w))
-            turn, bend = minus(three(own.reach, w), three(last.reach, w)), node.bend[w]
-            spun = times(HALF * bend, cross(natural, turn))
-            aside = cross(quarter, spun)
-            cosine = max(ONE + dot(away, here), SHARPEST)
-            twisting = times(own.torque[w] / cosine, cross(away, here))
-            moment = times(bend, minus(natural, turn))
-            put(own.pull, w, plus(minus(moment, twisting), cross(plus(spun, aside), here)))
-            to_before = minus(cross(minus(spun, aside), away), plus(moment, twisting))
-            put(last.pull, w, plus(three(last.pull, w), to_before))
+            turn, bend = v.minus(three(own.reach, w), three(last.reach, w)), node.bend[w]
+            spun = v.times(HALF * bend, v.cross(natural, turn))
+            aside = v.cross(quarter, spun)
+            cosine = max(ONE + v.dot(away, here), SHARPEST)
+            twisting = v.times(own.torque[w] / cosine, v.cross(away, here))
+            moment = v.times(bend, v.minus(natural, turn))
+            put(own.pull, w, v.plus(v.minus(moment, twisting), v.cross(v.plus(spun, aside), here)))
+            to_before = v.minus(v.cross(v.minus(spun, aside), away), v.plus(moment, twisting))
+            put(last.pull, w, v.plus(three(last.pull, w), to_before))
     for j in range(1, len(s)):
         node, own, last = s[j], x[j], x[j - 1]
         for w in range(LANES):
-            pull = times(node.over[w], three(own.pull, w))
-            put(last.force, w, minus(three(last.force, w), pull))
-            put(own.force, w, plus(three(own.force, w), pull))
+            pull = v.times(node.over[w], three(own.pull, w))
+            put(last.force, w, v.minus(three(last.force, w), pull))
+            put(own.force, w, v.plus(three(own.force, w), pull))
 
 
 @stage
@@ -265,9 +237,9 @@ def solve_banded(s: Nodes, x: Works) -> None:
 def eliminate_node(s: Node, x: Work, before: Work, beyond: Work) -> None:
     """Solve a row of L."""
     for w in range(LANES):
-        known = times(s.first[w], three(before.solved, w))
-        known = plus(known, times(s.second[w], three(beyond.solved, w)))
-        put(x.solved, w, minus(three(x.force, w), known))
+        known = v.times(s.first[w], three(before.solved, w))
+        known = v.plus(known, v.times(s.second[w], three(beyond.solved, w)))
+        put(x.solved, w, v.minus(three(x.force, w), known))
 
 
 @inlined
@@ -276,9 +248,9 @@ def substitute_node(
 ) -> None:
     """Solve a row of D L^T."""
     for w in range(LANES):
-        known = times(next_.first[w], three(after.solved, w))
-        known = plus(known, times(further.second[w], three(beyond.solved, w)))
-        put(x.solved, w, minus(times(s.pivot[w], three(x.solved, w)), known))
+        known = v.times(next_.first[w], three(after.solved, w))
+        known = v.plus(known, v.times(further.second[w], three(beyond.solved, w)))
+        put(x.solved, w, v.minus(v.times(s.pivot[w], three(x.solved, w)), known))
 
 
 @stage
@@ -287,16 +259,16 @@ def keep_linear_lengths(s: Nodes, x: Works, metric: Floats, matrix: Floats) -> N
     for j in range(1, len(s)):
         node, own, last = s[j], x[j], x[j - 1]
         for w in range(LANES):
-            change = minus(three(own.solved, w), three(last.solved, w))
-            reach = dot(plus(three(own.edge, w), change), three(own.way, w))
+            change = v.minus(three(own.solved, w), three(last.solved, w))
+            reach = v.dot(v.plus(three(own.edge, w), change), three(own.way, w))
             own.value[w] = reach - node.length[w]
     solve_lengths(x, metric, matrix, len(s))
     for j in range(1, len(s)):
         own, next_ = x[j], x[j + 1]
         for w in range(LANES):
-            pull = times(own.value[w], three(own.way, w))
-            after = times(next_.value[w], three(next_.way, w))
-            put(own.force, w, plus(three(own.force, w), minus(after, pull)))
+            pull = v.times(own.value[w], three(own.way, w))
+            after = v.times(next_.value[w], three(next_.way, w))
+            put(own.force, w, v.plus(three(own.force, w), v.minus(after, pull)))
     solve_banded(s, x)
 
 
@@ -311,7 +283,7 @@ def solve_lengths(x: Works, metric: Floats, matrix: Floats, n: int) -> None:
         for i in range(1, j + 1):
             entry, share, one, other = matrix[i, j], metric[pair], x[i], x[j]
             for w in range(LANES):
-                entry[w] = share[w] * dot(three(one.way, w), three(other.way, w))
+                entry[w] = share[w] * v.dot(three(one.way, w), three(other.way, w))
             pair += 1
     for j in range(1, n):
         own, diagonal, least = x[j], matrix[j, j], metric[(j - 1) * (j + 2) // 2]
@@ -344,12 +316,12 @@ def move_nodes(s: Nodes, x: Works, h: Number) -> None:
         node, own = s[j], x[j]
         for w in range(LANES):
             move = three(own.solved, w)
-            added = times(over * AHEAD, move)
-            put(node.place, w, plus(three(node.place, w), move))
-            put(node.speed, w, plus(three(node.speed, w), added))
-            gain = plus(three(node.gain, w), times(over, added))
-            share = min(CHANGE / math.sqrt(dot(gain, gain) + TINY), ONE)
-            put(node.gain, w, times(share, gain))
+            added = v.times(over * AHEAD, move)
+            put(node.place, w, v.plus(three(node.place, w), move))
+            put(node.speed, w, v.plus(three(node.speed, w), added))
+            gain = v.plus(three(node.gain, w), v.times(over, added))
+            share = min(CHANGE / math.sqrt(v.dot(gain, gain) + TINY), ONE)
+            put(node.gain, w, v.times(share, gain))
 
 
 @stage
@@ -359,10 +331,10 @@ def keep_lengths(s: Nodes, h: Number) -> None:
     for j in range(1, len(s)):
         node, last_node = s[j], s[j - 1]
         for w in range(LANES):
-            edge, length = minus(three(node.place, w), three(last_node.place, w)), node.length[w]
-            way = times(length / math.sqrt(dot(edge, edge) + TINY) - ONE, edge)
-            put(node.place, w, plus(three(node.place, w), way))
+            edge, length = v.minus(three(node.place, w), three(last_node.place, w)), node.length[w]
+            way = v.times(length / math.sqrt(v.dot(edge, edge) + TINY) - ONE, edge)
+            put(node.place, w, v.plus(three(node.place, w), way))
             before = three(last_node.speed, w)
-            apart = minus(plus(three(node.speed, w), times(over, way)), before)
-            share = min(TURN * over * length / math.sqrt(dot(apart, apart) + TINY), ONE)
-            put(node.speed, w, plus(before, times(share, apart)))
+            apart = v.minus(v.plus(three(node.speed, w), v.times(over, way)), before)
+            share = min(TURN * over * length / math.sqrt(v.dot(apart, apart) + TINY), ONE)
+            put(node.speed, w, v.plus(before, v.times(share, apart)))

@@ -1,14 +1,11 @@
-"""What stiffness and head motion rods can follow."""
+"""What stiffness rods can follow."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.simulation.embedding import largest_turn
-from hairkit.simulation.rigid_motion import way_of_roots
 
 FIRMEST = 6e3
 """Largest bending stiffness, as EI / (rho A) h^2 / l^4 of segments of length l in substeps of h:
@@ -17,11 +14,6 @@ FOLLOWED = 10.0
 """Bending of curled rods is stable in steps of h up to EI / (rho A) h^2 c^3 / l^4 of 10 to 20; here
 l is a segment's length and c the turn from one to the next: measured on coils of 0.1 to 0.7. Their
 natural turns follow the frames of the step before."""
-SUBSTEPS, FINEST = 4, 8
-"""Substeps of a frame that a root's way is compared with, and how many times as many there are at
-most, for a fast head."""
-SHORTEST_WAY = 1e-3
-"""Metres that a root may go in a substep however short the hair is."""
 
 
 def max_stiffness(points: Float64Array, step: float) -> Float64Array:
@@ -49,17 +41,3 @@ def overhang(points: Float64Array) -> Float64Array:
     moment = moment - beyond[..., None] * points[:, :-1, [0, 2]]
     result: Float64Array = (np.linalg.norm(moment, axis=-1) * beyond).max(axis=1)
     return result
-
-
-def finer_steps(start: Float64Array, end: Float64Array, roots: Float64Array, segment: float) -> int:
-    """Return how many times as many substeps a frame needs; 0 where the head is cut to its place.
-
-    In a substep a root goes no farther than half of `segment`, a usual length between nodes in
-    metres: beyond, the directions that lengths are linearised about are those of other segments.
-    `roots` (S, 3) are in head axes.
-    """
-    way = way_of_roots(start, end, roots)
-    if way == math.inf:
-        return 0
-    most = SUBSTEPS * max(0.5 * segment, SHORTEST_WAY)
-    return min(1 << math.ceil(math.log2(max(way / most, 1.0))), FINEST)

@@ -193,8 +193,7 @@ def twist_between(before: Float64Array, after: Float64Array) -> Float64Array:
     """Return the twist about their direction between neighbouring frames, radians."""
     step = quaternion.product(quaternion.inverse(before), after)
     sign = np.where(step[..., 0] < 0, -1.0, 1.0)
-    result: Float64Array = 2.0 * np.arctan2(sign * step[..., 3], sign * step[..., 0])
-    return result
+    return 2.0 * np.arctan2(sign * step[..., 3], sign * step[..., 0])
 
 
 def elastic_energy(

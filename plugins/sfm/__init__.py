@@ -137,5 +137,4 @@ def _on_skin(model: Model, masks: Sequence[Mask]) -> BoolArray:
         inside = 0 <= row < labels.shape[0] and 0 <= column < labels.shape[1]
         seen[int(point)] += 1
         skin[int(point)] += inside and labels[row, column] == PERSON
-    found: BoolArray = skin > 0.5 * seen
-    return found
+    return skin > 0.5 * seen

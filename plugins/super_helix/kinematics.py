@@ -50,15 +50,13 @@ def place(rod: Rods, q: Float64Array, root: Float64Array, frame: Float64Array) -
 
 def moves(q: Float64Array, s: Float64Array) -> Float64Array:
     """Return (..., 3) the point at arc length s in the element's first frame."""
-    result: Float64Array = s[..., None] * mean_rotation(s[..., None] * q)[..., 0]
-    return result
+    return s[..., None] * mean_rotation(s[..., None] * q)[..., 0]
 
 
 def move_slopes(q: Float64Array, s: Float64Array) -> Float64Array:
     """Return (..., 3, 3) the derivative D(s) of `moves` by q."""
     slope = mean_rotation_slope(s[..., None] * q, _TANGENT)
-    result: Float64Array = (s * s)[..., None, None] * slope
-    return result
+    return (s * s)[..., None, None] * slope
 
 
 def _jacobian(

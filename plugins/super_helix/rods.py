@@ -39,8 +39,7 @@ class Rods(NamedTuple):
     @property
     def masses(self) -> Float64Array:
         """(E, NODES) kilograms of the Gauss points."""
-        result: Float64Array = (self.density * self.lengths)[:, None] * WEIGHTS
-        return result
+        return (self.density * self.lengths)[:, None] * WEIGHTS
 
     def one(self, strand: int) -> Rods:
         """Return a single strand."""

@@ -146,7 +146,7 @@ class SuperHelices(GuideSimulator):
             )
         spring, anchor = np.zeros(shape), np.zeros_like(motion.points)
         drawn = self.points if around.grabs else np.empty((0, 3))
-        for point, place in self._hands.places.items():
+        for point, place in self._hands.items():
             element = self._binding.element[point]
             node = int(np.argmin(np.linalg.norm(motion.points[element] - drawn[point], axis=1)))
             strand = np.searchsorted(self._rods.offsets, element, side="right") - 1

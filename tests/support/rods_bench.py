@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from hairkit_plugins.rods.block import Contact, Steps
+from hairkit_plugins.rods.block import Contact
 from hairkit_plugins.rods.linear_system import IMPLICIT, Rates, System, assemble
 from hairkit_plugins.rods.rods import (
     Rods,
@@ -23,6 +23,7 @@ from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
 from hairkit.simulation.hair_cells import drift_rows
 from hairkit.simulation.obstacles import NO_BODIES
+from hairkit.simulation.substeps import Steps
 
 LENGTH, DENSITY, G = 0.15, 6.5e-6, 9.81
 WEIGHT = DENSITY * G

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from hairkit_plugins.rods import kernel_contact, kernels
 from hairkit_plugins.rods.backend import Engine
-from hairkit_plugins.rods.block import Contact, Steps
+from hairkit_plugins.rods.block import Contact
 from hairkit_plugins.rods.linear_system import IMPLICIT, System
 from hairkit_plugins.rods.rods import Rods, State, midpoint_frame, transport_frames, twist_between
 from hairkit_plugins.rods.simulator import RodSimulator
@@ -19,6 +19,7 @@ from hairkit_plugins.rods.simulator import RodSimulator
 from hairkit.arrays import Float64Array
 from hairkit.simulation import quaternion
 from hairkit.simulation.rigid_motion import transform_points
+from hairkit.simulation.substeps import Steps
 
 DRIFT = 0.5 - IMPLICIT**2
 """Weight of the old acceleration in the place; that of the new one is `IMPLICIT` squared."""

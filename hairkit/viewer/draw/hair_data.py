@@ -111,8 +111,7 @@ def sample_guides(guides: Strands, shares: Float64Array) -> Strands:
 
 def _between(values: Float32Array, before: Int64Array, part: Float32Array) -> Float32Array:
     low = values[before]
-    result: Float32Array = low + (values[before + 1] - low) * part
-    return result
+    return low + (values[before + 1] - low) * part
 
 
 def split_guides(groom: Groom, most: int = MAX_GUIDES) -> tuple[Groom, Strands | None]:
@@ -248,5 +247,4 @@ def _shuffle_tufts(roots: Float32Array, generator: np.random.Generator) -> Int64
     sorted_ = np.argsort(code, kind="stable")
     whole = len(roots) // TUFT * TUFT
     tufts = generator.permutation(sorted_[:whole].reshape(-1, TUFT)).ravel()
-    result: Int64Array = np.concatenate([tufts, sorted_[whole:]])
-    return result
+    return np.concatenate([tufts, sorted_[whole:]])

@@ -12,24 +12,9 @@ import numpy as np
 
 from hairkit.arrays import Float32Array
 from hairkit.rendering.gl_camera import NEAREST
+from hairkit.simulation import vectors as v
 from hairkit.simulation.lanes import four, put, put_four, stage, three
-from hairkit.simulation.vectors import (
-    HALF,
-    ONE,
-    TWO,
-    ZERO,
-    Frame,
-    Number,
-    Vector,
-    cross,
-    dot,
-    inlined,
-    minus,
-    plus,
-    product,
-    times,
-    unit,
-)
+from hairkit.simulation.vectors import HALF, ONE, TWO, ZERO, Frame, Number, Vector, inlined
 from hairkit.viewer.draw.records import (
     Chunks,
     Guides,
@@ -106,7 +91,7 @@ def carry_frames(
         frame = ONE, ZERO, ZERO, ZERO
         for k in range(1, now.shape[1]):
             way, _ = _segment(now[g], k)
-            frame = unit(product(_between(before, way), frame))
+            frame = v.unit(v.product(_between(before, way), frame))
             put_four(frames[g], k, frame)
             before = way
 
@@ -119,7 +104,7 @@ def turn_guides(first: int, last: int, rest: RestGuides, now: Guides) -> None:
         turns = now.turns[g]
         for k in range(1, now.points.shape[1]):
             w, x, y, z = four(rest.frames[g], k)
-            put_four(turns, k, product(four(turns, k), (w, -x, -y, -z)))
+            put_four(turns, k, v.product(four(turns, k), (w, -x, -y, -z)))
             _, length = _segment(now.points[g], k)
             turns[STRETCH, k] = min(length / rest.segments[g, k, 3], MOST_STRETCH)
 
@@ -128,15 +113,15 @@ def turn_guides(first: int, last: int, rest: RestGuides, now: Guides) -> None:
 def _segment(points: Float32Array, k: int) -> tuple[Vector, Number]:
     """Return unit direction and length of the segment to point k of a guide (m, 3)."""
     x, y, z = points[k, 0], points[k, 1], points[k, 2]
-    edge = minus((x, y, z), (points[k - 1, 0], points[k - 1, 1], points[k - 1, 2]))
-    length = max(np.sqrt(dot(edge, edge)), SHORTEST)
+    edge = v.minus((x, y, z), (points[k - 1, 0], points[k - 1, 1], points[k - 1, 2]))
+    length = max(np.sqrt(v.dot(edge, edge)), SHORTEST)
     return (edge[0] / length, edge[1] / length, edge[2] / length), length
 
 
 @inlined
 def _between(a: Vector, b: Vector) -> Frame:
     """Return the least rotation, not normalised, from a unit vector to another."""
-    w, (x, y, z) = ONE + dot(a, b), cross(a, b)
+    w, (x, y, z) = ONE + v.dot(a, b), v.cross(a, b)
     if x * x + y * y + z * z + w * w <= _TINY:  # opposite
         return ZERO, ZERO, ZERO, ONE
     return w, x, y, z
@@ -146,10 +131,10 @@ def _between(a: Vector, b: Vector) -> Frame:
 def project_point(camera: Projection, place: Vector) -> Frame:
     """Return pixel x, y, depth-buffer depth and axial depth of a point; below 0: behind."""
     right, down, deep, away = camera.clip
-    over = ONE / max(dot(away, place) + away[3], CLOSE)
-    x, y = (dot(right, place) + right[3]) * over, (dot(down, place) + down[3]) * over
-    z = (dot(deep, place) + deep[3]) * over
-    depth = dot(camera.forward, place) + camera.offset
+    over = ONE / max(v.dot(away, place) + away[3], CLOSE)
+    x, y = (v.dot(right, place) + right[3]) * over, (v.dot(down, place) + down[3]) * over
+    z = (v.dot(deep, place) + deep[3]) * over
+    depth = v.dot(camera.forward, place) + camera.offset
     if camera.perspective and depth < _NEAREST:
         depth = _FAR_BEHIND
     return (
@@ -172,7 +157,7 @@ def count_hidden(a: Vector, b: Vector, solid: Float32Array) -> int:
 
     Ends a and b in pixels of the columns and depth; `solid` (W, H) is the depth buffer of meshes.
     """
-    return _behind(a, solid) + _behind(b, solid) + _behind(times(HALF, plus(a, b)), solid)
+    return _behind(a, solid) + _behind(b, solid) + _behind(v.times(HALF, v.plus(a, b)), solid)
 
 
 @inlined
@@ -224,14 +209,14 @@ def _place_strand(
 ) -> None:
     """Add up the segments (3, M) from the root, and project the points."""
     a, b, c = hair.followed[s, 0], hair.followed[s, 1], hair.followed[s, 2]
-    u, v, w = hair.weights[s, 0], hair.weights[s, 1], hair.weights[s, 2]
+    f, g, h = hair.weights[s, 0], hair.weights[s, 1], hair.weights[s, 2]
     roots, places, seen = guides.points, state.places[s], state.seen[s]
     for d in range(3):
-        way[d, 0] += u * roots[a, 0, d] + v * roots[b, 0, d] + w * roots[c, 0, d]
+        way[d, 0] += f * roots[a, 0, d] + g * roots[b, 0, d] + h * roots[c, 0, d]
     place = ZERO, ZERO, ZERO
     low_x, low_y, high_x, high_y = corners[0], corners[1], corners[2], corners[3]
     for k in range(len(places)):
-        place = plus(place, three(way, k))
+        place = v.plus(place, three(way, k))
         places[k, 0], places[k, 1], places[k, 2] = place
         x, y, z, depth = project_point(camera, place)
         seen[k, 0], seen[k, 1], seen[k, 2], seen[k, 3] = x, y, z, depth
@@ -249,22 +234,22 @@ def _turn_edges(guides: Guides, hair: HairData, s: int, way: Float32Array) -> No
     """
     near, second = guides.turns[hair.followed[s, 0]], guides.turns[hair.followed[s, 1]]
     third, edges = guides.turns[hair.followed[s, 2]], hair.edges[s]
-    u, v, w = hair.weights[s, 0], hair.weights[s, 1], hair.weights[s, 2]
+    f, g, h = hair.weights[s, 0], hair.weights[s, 1], hair.weights[s, 2]
     for start in range(0, edges.shape[1], LANES):
         for lane in range(LANES):
             k = start + lane
             a, b, c = four(near, k), four(second, k), four(third, k)
-            p, q = v * _share(_inner(a, b)), w * _share(_inner(a, c))
-            turn = u * a[0] + p * b[0] + q * c[0]
+            p, q = g * _share(_inner(a, b)), h * _share(_inner(a, c))
+            turn = f * a[0] + p * b[0] + q * c[0]
             axis = (
-                u * a[1] + p * b[1] + q * c[1],
-                u * a[2] + p * b[2] + q * c[2],
-                u * a[3] + p * b[3] + q * c[3],
+                f * a[1] + p * b[1] + q * c[1],
+                f * a[2] + p * b[2] + q * c[2],
+                f * a[3] + p * b[3] + q * c[3],
             )
             edge, stretch = three(edges, k), near[STRETCH, k]
-            aside = plus(cross(axis, edge), times(turn, edge))
-            twice = TWO * stretch / max(dot(axis, axis) + turn * turn, _TINY)
-            put(way, k, plus(times(stretch, edge), times(twice, cross(axis, aside))))
+            aside = v.plus(v.cross(axis, edge), v.times(turn, edge))
+            twice = TWO * stretch / max(v.dot(axis, axis) + turn * turn, _TINY)
+            put(way, k, v.plus(v.times(stretch, edge), v.times(twice, v.cross(axis, aside))))
 
 
 @inlined

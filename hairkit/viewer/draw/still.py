@@ -63,5 +63,4 @@ class Still:
         else:
             self._sum += picture
         self.count += 1
-        mean: UInt8Array = ((self._sum + self.count // 2) // self.count).astype(np.uint8)
-        return mean
+        return ((self._sum + self.count // 2) // self.count).astype(np.uint8)

@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.rods import Options
-from hairkit_plugins.rods.limits import FINEST, finer_steps
 from hairkit_plugins.rods.simulator import RodSimulator
 
 from hairkit.head_model.template import default_head
 from hairkit.simulation import Surroundings, add_shakes, quaternion
-from hairkit.simulation.rigid_motion import FARTHEST
+from hairkit.simulation.rigid_motion import FARTHEST, FINEST, finer_steps
 from hairkit.synth import grow
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
@@ -69,10 +68,10 @@ def test_a_fast_head_takes_finer_steps_and_a_jump_is_cut() -> None:
     for way in (0.0, 0.01, 0.03, 0.11, 1.01 * FARTHEST):
         end = np.eye(4)
         end[0, 3] = way
-        found.append(finer_steps(np.eye(4), end, roots, 0.01))
+        found.append(finer_steps(np.eye(4), end, roots, 0.01, 4))
     assert found == [1, 1, 2, FINEST, 0]
     turned = np.diag([-1.0, 1.0, -1.0, 1.0])
-    assert finer_steps(np.eye(4), turned, roots, 0.01) == 0
+    assert finer_steps(np.eye(4), turned, roots, 0.01, 4) == 0
 
 
 def test_long_hair_falls_where_the_head_faces_down() -> None:
