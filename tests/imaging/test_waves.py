@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from hairkit.arrays import Float64Array
 from hairkit.grooming.wind_waves import add_waves
-from hairkit.imaging.waves import measure_waves, remove_slant
+from hairkit.imaging.waves import COILS, measure_waves, remove_slant
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.mask import HAIR, Mask
@@ -142,6 +142,25 @@ def test_straight_hair_and_noise_have_no_waves() -> None:
     noise = np.random.default_rng(0).integers(0, 255, straight.image.shape, np.uint8)
     for image in (straight.image, noise, np.full_like(noise, 90)):
         assert measure_waves(*views_of(replace(straight, image=image))) == Waves()
+
+
+def test_hair_that_runs_in_all_directions_alike_is_tightly_coiled(rng: np.random.Generator) -> None:
+    """A texture without direction or repeats is that of coils which no photo of a head resolves; a
+    texture of one direction is not, nor one view alone."""
+
+    def textured(across: float, along: float) -> View:
+        shape = (round(HEIGHT * PIXELS_PER_METRE), round(WIDTH * PIXELS_PER_METRE))
+        spots = cv2.GaussianBlur(rng.normal(size=shape), (0, 0), across, sigmaY=along)
+        grey = np.clip(90 + 40 * spots / spots.std(), 0, 255).astype(np.uint8)
+        return View("front", 0.0, np.repeat(grey[..., None], 3, axis=-1))
+
+    capture, maps, masks, cameras = views_of(textured(1.2, 1.2))
+    views = tuple(replace(v, image=textured(1.2, 1.2).image) for v in capture.views)
+    capture = replace(capture, views=views)
+    assert measure_waves(capture, maps, masks, cameras) == COILS
+    assert measure_waves(*views_of(textured(1.5, 9))) == Waves()
+    alone = Capture(capture.views[:1]), maps[:1], masks[:1], cameras[:1]
+    assert measure_waves(*alone) == Waves()
 
 
 def test_too_little_hair_is_not_measured() -> None:
