@@ -27,9 +27,11 @@ class Turnaround(Stored):
     names: tuple[str, ...]
     """Name of the view that each photo shows."""
     margin: float
-    """Cost of the next best arrangement over that of this one; 1 is a tie, inf no other fits."""
+    """By how much the next best arrangement fits worse; 1 is a tie, inf where none was tried."""
     summary: str
     """One line for the user."""
+    doubts: tuple[str, ...] = ()
+    """What is uncertain, each in a few words; also part of the summary."""
 
     def __post_init__(self) -> None:
         count = len(self.names)

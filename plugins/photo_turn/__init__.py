@@ -1,20 +1,22 @@
-"""The turn found from faces, outlines and skin; the order of the photos is only a hint.
+"""The turn found from faces, outlines and skin; order and names of the files do not matter.
 
-Faces tell the azimuths of frontal photos. Both directions, every start, uneven steps, and, where
-the order of the files does not fit, other orders are scored (`.arrangement`): faces must lie where
-their yaw says, outlines of opposite views mirror each other and those of neighbours are alike, and
-the share of skin falls from the face to the back. A photo without which the rest is a better turn
-is one from above. What is no turn around one head is refused in one line.
+Faces tell the azimuths of frontal photos. All other photos may be anywhere around the head, and
+what fits best is searched for (`.search`): faces lie where their yaw says, outlines of opposite
+views mirror each other and those of neighbours are alike, the share of skin falls from the face to
+the back, and steps are even rather than not. A photo without which the rest is a better turn is one
+from above. Frames of a video are in the order of time. What is no turn around one head is refused
+in one line.
 
 * `appearance`: outlines, skin, copies
-* `arrangement`: rings of photos and their cost
+* `arrangement`: how well photos fit azimuths
 * `describe`: order and names of views, and the summary
 * `refuse`: what is no turn
-* `search`: the cheapest arrangement
+* `search`: the cheapest arrangement, and the next
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -22,6 +24,7 @@ import numpy as np
 
 from hairkit import Capture, View, hookimpl
 from hairkit.arrays import BoolArray, Float64Array, Int64Array, UInt8Array
+from hairkit.io.video import SUFFIXES
 from hairkit.types.face import SURE_PRESENCE, Face
 from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
@@ -34,9 +37,9 @@ from .appearance import (
     trace_outline,
 )
 from .arrangement import Evidence
-from .describe import Found, in_turn_order, name_views, summarise
+from .describe import Found, in_turn_order, name_views, summarise, tell_doubts
 from .refuse import check_one_person, check_turn, contradicting, find_copies, photo_name
-from .search import find_arrangements, margin_of
+from .search import differs, find_arrangements, margin_of, moved
 
 ABOVE_DEG = 35.0
 """Photos from higher than this are no part of the ring."""
@@ -45,6 +48,8 @@ USUAL_ABOVE_DEG = 55.0
 PITCH_SPREAD, PITCH_BIAS, RING_SPREAD, STRAY_SPREAD = 5.0, 4.0, 6.0, 3.0
 """Standard deviations in degrees: of a face's pitch, of what all pitches of one head have in
 common, of rings of photos from level, of photos from their ring."""
+NAMED_SPREAD = 1.0
+"""Standard deviation of azimuths that the user names, degrees."""
 FACE_VOTES = 3.0
 """Votes of a face; the edge of a picture where the person stands has one. Of 152 masks the edge
 was right in 148, of 31 faces all."""
@@ -64,31 +69,50 @@ def find_turn(capture: Capture, faces: tuple[Face, ...], persons: tuple[Person, 
         for view, face, person, count in zip(capture.views, faces, persons, turns, strict=True)
     )
     twins = find_copies(views)
-    found = _find(views)
+    canonical = np.arange(len(views)) if _is_video(capture) else order_by_content(views)
+    found = _find([views[i] for i in canonical], _is_video(capture))
     order = in_turn_order(found)
-    names = name_views(views, found, order)
+    names = name_views([views[i] for i in canonical], found, order)
+    order, back = canonical[order], np.argsort(canonical)
+    found, names = found.take(back), tuple(names[i] for i in back)
     summary = summarise(views, found, names, turns, twins)
     azimuth, elevation = found.azimuth_deg, found.elevation_deg
-    return Turnaround(order, azimuth, elevation, turns, names, found.margin, summary)
+    doubts = tell_doubts(views, found)
+    return Turnaround(order, azimuth, elevation, turns, names, found.margin, summary, doubts)
 
 
-def _find(views: Sequence[View]) -> Found:
+def _is_video(capture: Capture) -> bool:
+    """Return whether the views are frames of one video, in the order of time."""
+    return capture.source is not None and capture.source.suffix.lower() in SUFFIXES
+
+
+def order_by_content(views: Sequence[View]) -> Int64Array:
+    """Return the photos (V,) in an order in which neither their names nor their order has a part.
+
+    Sums of floating-point numbers depend on the order, and so do ties.
+    """
+    digests = [hashlib.sha256(np.ascontiguousarray(view.image)).digest() for view in views]
+    return np.array(sorted(range(len(views)), key=lambda i: digests[i]), np.int64)
+
+
+def _find(views: Sequence[View], in_time: bool) -> Found:
     """Return from where the photos were taken: as their names say, if no face contradicts them."""
     faces = [view.face or Face.absent() for view in views]
     azimuth = np.array([view.azimuth_deg for view in views])
     elevation = np.array([view.elevation_deg for view in views])
     named = np.array([view.named for view in views])
-    read = Found(azimuth, elevation, elevation > ABOVE_DEG, np.inf, named)
+    none = np.zeros_like(named)
+    read = Found(azimuth, elevation, elevation > ABOVE_DEG, np.inf, named, none, none)
     yaw = Evidence.of(faces, None, None).yaw_deg
     if not np.isfinite(yaw).any():
         unchecked = "no face was found, nobody checked the order of the photos"
-        return read if named.all() else replace(read, note=unchecked)
+        return read if named.all() else replace(read, margin=1.0, note=unchecked)
     wrong = contradicting(yaw, np.where(named, azimuth, yaw))
     if wrong is None and named.all():
         return read
     if wrong is not None:
         named = np.zeros_like(named)
-    found = _arrange(views, faces, named)
+    found = _arrange(views, faces, named, in_time)
     if wrong is not None:
         note = (
             f"{photo_name(views[wrong])} is no view {views[wrong].name!r}, its face is turned by"
@@ -98,30 +122,46 @@ def _find(views: Sequence[View]) -> Found:
     return found
 
 
-def _arrange(views: Sequence[View], faces: Sequence[Face], named: BoolArray) -> Found:
+def _arrange(
+    views: Sequence[View], faces: Sequence[Face], named: BoolArray, in_time: bool
+) -> Found:
     """Return the best arrangement; views in `named` (V,) stay as they are said to be."""
-    outlines = _trace_outlines(views)
-    skin, distances = None, None
-    if outlines is not None:
-        photos = [view.image for view in views]
-        check_one_person(views, measure_clothes(photos, outlines))
-        skin = measure_skin(photos, outlines, faces)
-        distances = compare_outlines(outlines)
-    seen = Evidence.of(faces, distances, skin)
+    seen, skin = _gather_evidence(views, faces)
     azimuth = np.array([view.azimuth_deg for view in views])
-    evidence = replace(seen, yaw_deg=np.where(named, azimuth, seen.yaw_deg))
+    evidence = replace(
+        seen,
+        yaw_deg=np.where(named, azimuth, seen.yaw_deg),
+        spread_deg=np.where(named, NAMED_SPREAD, seen.spread_deg),
+        in_time=in_time,
+    )
     elevation = np.array([view.elevation_deg for view in views])
     pitch = np.array([face.pitch_deg if face.sure else np.nan for face in faces])
     pitch = np.where(named, elevation, pitch)
     known = np.isfinite(pitch)
-    placed = find_arrangements(evidence, known & (pitch > ABOVE_DEG), known)
+    placed = find_arrangements(evidence, known & (pitch > ABOVE_DEG), known, named)
     best = placed[0]
     check_turn(views, best, seen.yaw_deg, skin)
     found = np.where(best.above, USUAL_ABOVE_DEG, _ring_elevations(pitch, best.above))
     found = np.where(named | (best.above & known), pitch, found)
-    note = "" if best.in_order else "the photos are not in the order of their names"
     azimuth = np.where(named, azimuth, best.azimuth_deg)
-    return Found(azimuth, found, best.above, margin_of(placed), named, note)
+    other = next((other for other in placed[1:] if differs(other, best)), best)
+    guessed = best.above & ~known
+    return Found(
+        azimuth, found, best.above, margin_of(placed), named, guessed, moved(best, other)
+    )
+
+
+def _gather_evidence(
+    views: Sequence[View], faces: Sequence[Face]
+) -> tuple[Evidence, Float64Array | None]:
+    """Return what the photos show of their places, and the skin (V, 2) in them."""
+    outlines = _trace_outlines(views)
+    if outlines is None:
+        return Evidence.of(faces, None, None), None
+    photos = [view.image for view in views]
+    check_one_person(views, measure_clothes(photos, outlines))
+    skin = measure_skin(photos, outlines, faces)
+    return Evidence.of(faces, compare_outlines(outlines), skin), skin
 
 
 def _trace_outlines(views: Sequence[View]) -> list[Outline] | None:

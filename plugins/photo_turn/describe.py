@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -37,8 +38,24 @@ class Found:
     margin: float
     named: BoolArray
     """(V,) true for photos that keep the name they came with."""
+    guessed: BoolArray
+    """(V,) true for photos that are from above only because they fit nowhere else."""
+    elsewhere: BoolArray
+    """(V,) true for photos that have another place in the next best arrangement."""
     note: str = ""
-    """How it was found, for the user; empty for a turn in the order of the files."""
+    """What else the user should know."""
+
+    def take(self, photos: Int64Array) -> Self:
+        """Return the same of the photos in another order."""
+        return replace(
+            self,
+            azimuth_deg=self.azimuth_deg[photos],
+            elevation_deg=self.elevation_deg[photos],
+            above=self.above[photos],
+            named=self.named[photos],
+            guessed=self.guessed[photos],
+            elsewhere=self.elsewhere[photos],
+        )
 
 
 def in_turn_order(found: Found) -> Int64Array:
@@ -96,16 +113,32 @@ def summarise(
     ]
     if np.isfinite(found.margin):
         parts.append(f"margin {found.margin:.2f}")
-        if found.margin < UNSURE:
-            parts.append("unsure: another arrangement fits nearly as well")
+    parts += tell_doubts(views, found)
     if found.note:
         parts.append(found.note)
+    if not one_way:
+        parts.append("the photos are not in the order of their names")
     if turns.any():
         parts.append(f"{np.count_nonzero(turns)} photos lie on their side and are turned")
     parts += [f"{photo_name(views[j])} equals {photo_name(views[i])}" for i, j in twins[:MOST_TOLD]]
     if len(twins) > MOST_TOLD:
         parts.append(f"so do {len(twins) - MOST_TOLD} more pairs")
     return "; ".join(parts)
+
+
+def tell_doubts(views: Sequence[View], found: Found) -> tuple[str, ...]:
+    """Return what is uncertain of the turn, each in a few words."""
+    doubts = [
+        f"{photo_name(view)} is taken for one from above because it fits nowhere else"
+        for view, guessed in zip(views, found.guessed, strict=True)
+        if guessed
+    ]
+    if found.margin < UNSURE and found.elsewhere.any():
+        moved = [photo_name(v) for v, away in zip(views, found.elsewhere, strict=True) if away]
+        more = f" and {len(moved) - MOST_TOLD} more" if len(moved) > MOST_TOLD else ""
+        listed = ", ".join(moved[:MOST_TOLD]) + more
+        doubts.append(f"unsure: {listed} may have another place, which fits nearly as well")
+    return tuple(doubts)
 
 
 def _tell_photos(views: Sequence[View], found: Found, names: Sequence[str]) -> list[str]:

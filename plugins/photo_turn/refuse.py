@@ -71,12 +71,10 @@ def check_one_person(views: Sequence[View], clothes: Float64Array) -> None:
         squares = [((colours[g] - m) ** 2).sum() for g, m in zip(groups, middles, strict=True)]
         within = float(np.sqrt(sum(squares) / len(known)))
         if apart > max(CLOTHES_APART, CLOTHES_RATIO * (within + CLOTHES_NOISE)):
-            own = groups[0] if 0 in groups[0] else groups[1]
-            other = min(set(range(len(known))) - set(own.tolist()))
+            one, other = sorted(min(photo_name(views[i]) for i in known[group]) for group in groups)
             raise InputError(
-                f"{photo_name(views[known[other]])}: wears other clothes than"
-                f" {photo_name(views[known[0]])}; give photos of one person, or name the views in"
-                " capture.toml"
+                f"{other}: wears other clothes than {one}; give photos of one person, or name the"
+                " views in capture.toml"
             )
 
 
