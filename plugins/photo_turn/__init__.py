@@ -33,6 +33,7 @@ from .appearance import (
     Outline,
     compare_outlines,
     measure_clothes,
+    measure_oddness,
     measure_skin,
     trace_outline,
 )
@@ -68,11 +69,13 @@ def find_turn(capture: Capture, faces: tuple[Face, ...], persons: tuple[Person, 
         replace(view, face=face, person=person).turned(int(count))
         for view, face, person, count in zip(capture.views, faces, persons, turns, strict=True)
     )
-    twins = find_copies(views)
+    outlines = [trace_outline(person.alpha) if (person := view.person) else None for view in views]
+    twins = find_copies(views, outlines)
     canonical = np.arange(len(views)) if _is_video(capture) else order_by_content(views)
-    found = _find([views[i] for i in canonical], _is_video(capture))
+    ordered = [views[i] for i in canonical]
+    found = _find(ordered, [outlines[i] for i in canonical], _is_video(capture))
     order = in_turn_order(found)
-    names = name_views([views[i] for i in canonical], found, order)
+    names = name_views(ordered, found, order)
     order, back = canonical[order], np.argsort(canonical)
     found, names = found.take(back), tuple(names[i] for i in back)
     summary = summarise(views, found, names, turns, twins)
@@ -95,7 +98,7 @@ def order_by_content(views: Sequence[View]) -> Int64Array:
     return np.array(sorted(range(len(views)), key=lambda i: digests[i]), np.int64)
 
 
-def _find(views: Sequence[View], in_time: bool) -> Found:
+def _find(views: Sequence[View], outlines: Sequence[Outline | None], in_time: bool) -> Found:
     """Return from where the photos were taken: as their names say, if no face contradicts them."""
     faces = [view.face or Face.absent() for view in views]
     azimuth = np.array([view.azimuth_deg for view in views])
@@ -103,7 +106,7 @@ def _find(views: Sequence[View], in_time: bool) -> Found:
     named = np.array([view.named for view in views])
     none = np.zeros_like(named)
     read = Found(azimuth, elevation, elevation > ABOVE_DEG, np.inf, named, none, none)
-    yaw = Evidence.of(faces, None, None).yaw_deg
+    yaw = Evidence.of(faces).yaw_deg
     if not np.isfinite(yaw).any():
         unchecked = "no face was found, nobody checked the order of the photos"
         return read if named.all() else replace(read, margin=1.0, note=unchecked)
@@ -112,7 +115,7 @@ def _find(views: Sequence[View], in_time: bool) -> Found:
         return read
     if wrong is not None:
         named = np.zeros_like(named)
-    found = _arrange(views, faces, named, in_time)
+    found = _arrange(views, _gather_evidence(views, outlines), named, in_time)
     if wrong is not None:
         note = (
             f"{photo_name(views[wrong])} is no view {views[wrong].name!r}, its face is turned by"
@@ -122,11 +125,8 @@ def _find(views: Sequence[View], in_time: bool) -> Found:
     return found
 
 
-def _arrange(
-    views: Sequence[View], faces: Sequence[Face], named: BoolArray, in_time: bool
-) -> Found:
+def _arrange(views: Sequence[View], seen: Evidence, named: BoolArray, in_time: bool) -> Found:
     """Return the best arrangement; views in `named` (V,) stay as they are said to be."""
-    seen, skin = _gather_evidence(views, faces)
     azimuth = np.array([view.azimuth_deg for view in views])
     evidence = replace(
         seen,
@@ -135,45 +135,31 @@ def _arrange(
         in_time=in_time,
     )
     elevation = np.array([view.elevation_deg for view in views])
-    pitch = np.array([face.pitch_deg if face.sure else np.nan for face in faces])
+    pitch = np.array([v.face.pitch_deg if v.face and v.face.sure else np.nan for v in views])
     pitch = np.where(named, elevation, pitch)
     known = np.isfinite(pitch)
     placed = find_arrangements(evidence, known & (pitch > ABOVE_DEG), known, named)
     best = placed[0]
-    check_turn(views, best, seen.yaw_deg, skin)
+    check_turn(views, best, seen.yaw_deg, seen.skin)
     found = np.where(best.above, USUAL_ABOVE_DEG, _ring_elevations(pitch, best.above))
     found = np.where(named | (best.above & known), pitch, found)
     azimuth = np.where(named, azimuth, best.azimuth_deg)
     other = next((other for other in placed[1:] if differs(other, best)), best)
     guessed = best.above & ~known
-    return Found(
-        azimuth, found, best.above, margin_of(placed), named, guessed, moved(best, other)
-    )
+    return Found(azimuth, found, best.above, margin_of(placed), named, guessed, moved(best, other))
 
 
-def _gather_evidence(
-    views: Sequence[View], faces: Sequence[Face]
-) -> tuple[Evidence, Float64Array | None]:
-    """Return what the photos show of their places, and the skin (V, 2) in them."""
-    outlines = _trace_outlines(views)
-    if outlines is None:
-        return Evidence.of(faces, None, None), None
+def _gather_evidence(views: Sequence[View], outlines: Sequence[Outline | None]) -> Evidence:
+    """Return what the photos show of their places: only faces where some photo shows no person."""
+    faces = [view.face or Face.absent() for view in views]
+    known = [outline for outline in outlines if outline is not None]
+    if len(known) < len(views):
+        return Evidence.of(faces)
     photos = [view.image for view in views]
-    check_one_person(views, measure_clothes(photos, outlines))
-    skin = measure_skin(photos, outlines, faces)
-    return Evidence.of(faces, compare_outlines(outlines), skin), skin
-
-
-def _trace_outlines(views: Sequence[View]) -> list[Outline] | None:
-    """Return the outlines of the persons, None when some photo shows none."""
-    outlines = []
-    for view in views:
-        known = view.person is not None and view.person.alpha.size > 0
-        outline = trace_outline(view.person.alpha) if view.person and known else None
-        if outline is None:
-            return None
-        outlines.append(outline)
-    return outlines
+    check_one_person(views, measure_clothes(photos, known))
+    skin = measure_skin(photos, known, faces)
+    distances = compare_outlines(known)
+    return Evidence.of(faces, distances, skin, measure_oddness(known, *distances))
 
 
 def _ring_elevations(pitch: Float64Array, above: BoolArray) -> Float64Array:

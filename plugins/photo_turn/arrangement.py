@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -35,9 +36,9 @@ OUTLINE_WEIGHT = 60.0
 order costs 0.07 head widths more."""
 OUTLINE_BEND = 0.08
 """Differences between outlines count less from this on, head widths: a ponytail swings."""
-NEIGHBOUR_DEG, OPPOSITE_DEG = 35.0, 20.0
-"""Outlines of views that are about this near each other are alike, those of views this near to
-opposite mirror each other."""
+NEAR, OPPOSITE = np.radians([35.0, 20.0]) ** -2.0
+"""Concentrations: outlines of views that are about 35 degrees from each other are alike, those of
+views that are within 20 degrees of opposite mirror each other."""
 NEIGHBOUR_SHARE = 0.5
 """Weight of neighbours over that of opposite views: outlines change from view to view."""
 SHARE_SPREAD, MOMENT_SPREAD = 0.06, 0.012
@@ -66,6 +67,8 @@ class Evidence:
     """(V, V) the same, one of the pair mirrored."""
     skin: Float64Array | None
     """(V, 2) share of the head that is skin and its moment."""
+    odd: Float64Array
+    """(V,) how unlike those of level photos the outlines are."""
     in_time: bool = False
     """True when the photos are in the order of time: frames of one video."""
 
@@ -73,8 +76,9 @@ class Evidence:
     def of(
         cls,
         faces: Sequence[Face],
-        outlines: tuple[Float64Array, Float64Array] | None,
-        skin: Float64Array | None,
+        outlines: tuple[Float64Array, Float64Array] | None = None,
+        skin: Float64Array | None = None,
+        odd: Float64Array | None = None,
     ) -> Self:
         """Return the evidence of photos, of which no names are known."""
         yaw = np.array([face.yaw_deg if face.sure else np.nan for face in faces])
@@ -82,7 +86,8 @@ class Evidence:
         faint = [not face.sure and face.presence > FAINT_PRESENCE for face in faces]
         side = np.where(faint, np.sign([face.yaw_deg for face in faces]), 0.0)
         alike, mirrored = outlines if outlines is not None else (None, None)
-        return cls(yaw, YAW_DEG + OBLIQUE_GROWTH * beyond, side, alike, mirrored, skin)
+        odd = np.zeros(len(yaw)) if odd is None else odd
+        return cls(yaw, YAW_DEG + OBLIQUE_GROWTH * beyond, side, alike, mirrored, skin, odd)
 
     def only(self, photos: Int64Array) -> Self:
         """Return the evidence of some photos alone."""
@@ -95,7 +100,30 @@ class Evidence:
             alike=None if self.alike is None else self.alike[pairs],
             mirrored=None if self.mirrored is None else self.mirrored[pairs],
             skin=None if self.skin is None else self.skin[photos],
+            odd=self.odd[photos],
         )
+
+    @cached_property
+    def pairs(self) -> tuple[Int64Array, Int64Array]:
+        """Return the first and the second photo of each pair (P,)."""
+        return np.triu_indices(len(self.yaw_deg), 1)
+
+    @cached_property
+    def pair_costs(self) -> tuple[Float64Array, Float64Array]:
+        """Return what pairs (P,) cost more than usual ones where they are neighbours, opposite."""
+        if self.alike is None or self.mirrored is None:
+            return np.zeros(len(self.pairs[0])), np.zeros(len(self.pairs[0]))
+        bent = [
+            OUTLINE_BEND * np.tanh(distance[self.pairs] / OUTLINE_BEND)
+            for distance in (self.alike, self.mirrored)
+        ]
+        alike, mirrored = (OUTLINE_WEIGHT * self.weight**2 * (pair - pair.mean()) for pair in bent)
+        return NEIGHBOUR_SHARE * alike, mirrored
+
+    @property
+    def weight(self) -> float:
+        """Return the weight of a photo: many photos tell no more than those of a usual turn."""
+        return min(1.0, TURN_OF / len(self.yaw_deg))
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +147,10 @@ def wrap(angle_deg: Float64Array) -> Float64Array:
 
 def measure_cost(azimuth_deg: Float64Array, evidence: Evidence) -> Float64Array:
     """Return the costs (B,) of arrangements (B, V) of all photos on one ring, degrees."""
+    angle = np.radians(azimuth_deg)
+    across, ahead = np.sin(angle), np.cos(angle)
     cost = _face_cost(azimuth_deg, evidence) + _step_cost(azimuth_deg, evidence.in_time)
-    cost += _outline_cost(azimuth_deg, evidence) + _skin_cost(azimuth_deg, evidence)
+    cost += _outline_cost(across, ahead, evidence) + _skin_cost(across, ahead, evidence)
     return cost
 
 
@@ -152,39 +182,39 @@ def _uneven(off_deg: Float64Array) -> Float64Array:
     return np.asarray((STEP_FREEDOM + 1) / 2 * np.log1p(squares).sum(axis=1), np.float64)
 
 
-def _outline_cost(azimuth: Float64Array, evidence: Evidence) -> Float64Array:
-    """Return the cost of outlines that differ although the views are neighbours or opposite."""
-    cost = np.zeros(len(azimuth))
-    if evidence.alike is None or evidence.mirrored is None:
-        return cost
-    first, second = np.triu_indices(azimuth.shape[1], 1)
-    gap = np.abs(wrap(azimuth[:, first] - azimuth[:, second]))
-    for distance, angle, width, share in (
-        (evidence.alike, gap, NEIGHBOUR_DEG, NEIGHBOUR_SHARE),
-        (evidence.mirrored, 180.0 - gap, OPPOSITE_DEG, 1.0),
-    ):
-        pairs = OUTLINE_BEND * np.tanh(distance[first, second] / OUTLINE_BEND)
-        cost += share * np.exp(-((angle / width) ** 2) / 2) @ (pairs - pairs.mean())
-    return OUTLINE_WEIGHT * cost * min(1.0, TURN_OF / azimuth.shape[1]) ** 2
+def _outline_cost(across: Float64Array, ahead: Float64Array, evidence: Evidence) -> Float64Array:
+    """Return the cost of outlines that differ although the views are neighbours or opposite.
+
+    `across` and `ahead` (B, V) are sines and cosines of the azimuths. Nearness is von Mises'.
+    """
+    first, second = evidence.pairs
+    alike, mirrored = evidence.pair_costs
+    gap = across[:, first] * across[:, second] + ahead[:, first] * ahead[:, second]
+    near, opposite = np.exp(NEAR * (gap - 1)), np.exp(OPPOSITE * (-gap - 1))
+    return np.asarray(near @ alike + opposite @ mirrored, np.float64)
 
 
-def _skin_cost(azimuth: Float64Array, evidence: Evidence) -> Float64Array:
+def _skin_cost(across: Float64Array, ahead: Float64Array, evidence: Evidence) -> Float64Array:
     """Return the misfit of skin's share and moment to their usual course around a head."""
     if evidence.skin is None:
-        return np.zeros(len(azimuth))
-    angle = np.radians(azimuth)
+        return np.zeros(len(across))
     share, moment = evidence.skin.T
-    misfit = _misfit(np.ones_like(angle), np.cos(angle), share / SHARE_SPREAD)
-    misfit += _misfit(-np.sin(angle), -np.sin(2 * angle), moment / MOMENT_SPREAD)
-    return misfit / 2 * min(1.0, TURN_OF / azimuth.shape[1])
+    misfit = _misfit(np.ones_like(ahead), ahead, share / SHARE_SPREAD)
+    misfit += _misfit(-across, -2 * across * ahead, moment / MOMENT_SPREAD)
+    return misfit / 2 * evidence.weight
 
 
 def _misfit(first: Float64Array, second: Float64Array, values: Float64Array) -> Float64Array:
     """Return the squared misfit (B,) of values (V,) by two courses (B, V), of positive weights."""
-    norms = np.maximum([(first**2).sum(axis=1), (second**2).sum(axis=1)], 1e-9)
-    both, a, b = (first * second).sum(axis=1), first @ values, second @ values
+    norms = np.maximum([_dot(first, first), _dot(second, second)], 1e-9)
+    both, a, b = _dot(first, second), first @ values, second @ values
     weights = np.array([norms[1] * a - both * b, norms[0] * b - both * a])
     explained = (weights * [a, b]).sum(axis=0) / np.maximum(norms[0] * norms[1] - both**2, 1e-9)
     one = (np.maximum([a, b], 0) ** 2 / norms).max(axis=0)
     positive = (weights >= 0).all(axis=0)
     return np.asarray(values @ values - np.where(positive, explained, one), np.float64)
+
+
+def _dot(one: Float64Array, other: Float64Array) -> Float64Array:
+    """Return the scalar products (B,) of rows."""
+    return np.asarray(np.einsum("bv,bv->b", one, other), np.float64)

@@ -15,8 +15,9 @@ from hairkit.io.capture_reader import TURN
 from .arrangement import wrap
 from .refuse import photo_name
 
-UNSURE = 1.3
-"""Margin below which the summary says that another arrangement fits nearly as well."""
+UNSURE = 1.25
+"""Margin below which the summary names the photos that may have another place. Of 241 arrangements
+with a larger one, of turns and parts of turns, 4 were wrong; of 101 with a smaller one, 35."""
 NAMED_DEG = 40.0
 """The photos of a turn of eight are named in order if each is less than this off its view."""
 MOST_TOLD = 3
