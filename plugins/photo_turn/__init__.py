@@ -19,11 +19,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from hairkit import Capture, View, hookimpl
 from hairkit.arrays import BoolArray, Float64Array, Int64Array, UInt8Array
+from hairkit.io.capture_reader import FEWEST
 from hairkit.io.video import SUFFIXES
 from hairkit.types.face import SURE_PRESENCE, Face
 from hairkit.types.person import Person
@@ -49,6 +51,8 @@ USUAL_ABOVE_DEG = 55.0
 PITCH_SPREAD, PITCH_BIAS, RING_SPREAD, STRAY_SPREAD = 5.0, 4.0, 6.0, 3.0
 """Standard deviations in degrees: of a face's pitch, of what all pitches of one head have in
 common, of rings of photos from level, of photos from their ring."""
+LEAST_WIDTH = 0.05
+"""Least width of a head, as a share of its photo's: what is narrower is a speck of a mask."""
 NAMED_SPREAD = 1.0
 """Standard deviation of azimuths that the user names, degrees."""
 FACE_VOTES = 3.0
@@ -69,7 +73,7 @@ def find_turn(capture: Capture, faces: tuple[Face, ...], persons: tuple[Person, 
         replace(view, face=face, person=person).turned(int(count))
         for view, face, person, count in zip(capture.views, faces, persons, turns, strict=True)
     )
-    outlines = [trace_outline(person.alpha) if (person := view.person) else None for view in views]
+    outlines = [_traced(view) for view in views]
     twins = find_copies(views, outlines)
     canonical = np.arange(len(views)) if _is_video(capture) else order_by_content(views)
     ordered = [views[i] for i in canonical]
@@ -94,7 +98,7 @@ def order_by_content(views: Sequence[View]) -> Int64Array:
 
     Sums of floating-point numbers depend on the order, and so do ties.
     """
-    digests = [hashlib.sha256(np.ascontiguousarray(view.image)).digest() for view in views]
+    digests = [hashlib.sha256(view.image.tobytes()).digest() for view in views]
     return np.array(sorted(range(len(views)), key=lambda i: digests[i]), np.int64)
 
 
@@ -149,17 +153,40 @@ def _arrange(views: Sequence[View], seen: Evidence, named: BoolArray, in_time: b
     return Found(azimuth, found, best.above, margin_of(placed), named, guessed, moved(best, other))
 
 
+def _traced(view: View) -> Outline | None:
+    """Return the outline of the person in a photo, None where nobody, or next to nothing, is."""
+    if view.person is None or not view.person.alpha.size:
+        return None
+    outline = trace_outline(view.person.alpha)
+    return outline if outline and outline.width_px > LEAST_WIDTH * view.width else None
+
+
 def _gather_evidence(views: Sequence[View], outlines: Sequence[Outline | None]) -> Evidence:
-    """Return what the photos show of their places: only faces where some photo shows no person."""
+    """Return what the photos show of their places; those without an outline only by faces."""
     faces = [view.face or Face.absent() for view in views]
+    rows = [i for i, outline in enumerate(outlines) if outline is not None]
     known = [outline for outline in outlines if outline is not None]
-    if len(known) < len(views):
+    if len(known) < FEWEST:
         return Evidence.of(faces)
-    photos = [view.image for view in views]
-    check_one_person(views, measure_clothes(photos, known))
-    skin = measure_skin(photos, known, faces)
-    distances = compare_outlines(known)
-    return Evidence.of(faces, distances, skin, measure_oddness(known, *distances))
+    photos = [views[i].image for i in rows]
+    check_one_person([views[i] for i in rows], measure_clothes(photos, known))
+    alike, mirrored = compare_outlines(known)
+    odd = measure_oddness(known, alike, mirrored)
+    skin = measure_skin(photos, known, [faces[i] for i in rows])
+    count, pairs = len(views), np.ix_(rows, rows)
+    return Evidence.of(
+        faces,
+        (_spread(alike, (count, count), pairs), _spread(mirrored, (count, count), pairs)),
+        None if skin is None else _spread(skin, (count, skin.shape[1]), rows),
+        np.nan_to_num(_spread(odd, (count,), rows)),
+    )
+
+
+def _spread(values: Float64Array, shape: tuple[int, ...], where: Any) -> Float64Array:
+    """Return an array of a shape that holds values at some places, NaN elsewhere."""
+    full = np.full(shape, np.nan)
+    full[where] = values
+    return full
 
 
 def _ring_elevations(pitch: Float64Array, above: BoolArray) -> Float64Array:

@@ -280,4 +280,5 @@ def _thumbnail(photo: UInt8Array) -> Float64Array:
     """Return a small grey copy of a photo as a row."""
     size = (THUMBNAIL, THUMBNAIL)
     small = cv2.cvtColor(cv2.resize(photo, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY)
-    return cv2.GaussianBlur(small.astype(np.float64), (0, 0), THUMBNAIL_BLUR).ravel()
+    blurred = cv2.GaussianBlur(small.astype(np.float64), (0, 0), THUMBNAIL_BLUR)
+    return np.asarray(blurred.ravel(), np.float64)

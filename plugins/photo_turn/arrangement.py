@@ -62,11 +62,11 @@ class Evidence:
     side: Float64Array
     """(V,) 1 for photos from the subject's left, -1 from the right, as faint faces tell; else 0."""
     alike: Float64Array | None
-    """(V, V) distances of outlines, None where they are unknown."""
+    """(V, V) distances of outlines, None or NaN where they are unknown."""
     mirrored: Float64Array | None
     """(V, V) the same, one of the pair mirrored."""
     skin: Float64Array | None
-    """(V, 2) share of the head that is skin and its moment."""
+    """(V, 2) share of the head that is skin and its moment; None or NaN where unknown."""
     odd: Float64Array
     """(V,) how unlike those of level photos the outlines are."""
     in_time: bool = False
@@ -117,7 +117,9 @@ class Evidence:
             OUTLINE_BEND * np.tanh(distance[self.pairs] / OUTLINE_BEND)
             for distance in (self.alike, self.mirrored)
         ]
-        alike, mirrored = (OUTLINE_WEIGHT * self.weight**2 * (pair - pair.mean()) for pair in bent)
+        usual = [pair[np.isfinite(pair)].mean() if np.isfinite(pair).any() else 0 for pair in bent]
+        scale = OUTLINE_WEIGHT * self.weight**2
+        alike, mirrored = (scale * np.nan_to_num(p - u) for p, u in zip(bent, usual, strict=True))
         return NEIGHBOUR_SHARE * alike, mirrored
 
     @property
@@ -198,7 +200,9 @@ def _skin_cost(across: Float64Array, ahead: Float64Array, evidence: Evidence) ->
     """Return the misfit of skin's share and moment to their usual course around a head."""
     if evidence.skin is None:
         return np.zeros(len(across))
-    share, moment = evidence.skin.T
+    known = np.isfinite(evidence.skin[:, 0])
+    share, moment = evidence.skin[known].T
+    across, ahead = across[:, known], ahead[:, known]
     misfit = _misfit(np.ones_like(ahead), ahead, share / SHARE_SPREAD)
     misfit += _misfit(-across, -2 * across * ahead, moment / MOMENT_SPREAD)
     return misfit / 2 * evidence.weight

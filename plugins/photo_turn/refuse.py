@@ -91,7 +91,7 @@ def check_turn(
     """Raise `InputError` when the best arrangement is no turn around one head."""
     _check_back(views, placed)
     if skin is not None:
-        _check_sides(views, placed, yaw_deg, skin)
+        _check_sides(views, placed, yaw_deg, np.nan_to_num(skin))
     off = np.where(np.abs(yaw_deg) <= FRONTAL_DEG, np.abs(placed.off_deg), 0.0)
     if off.max() > OFF_DEG:
         worst = int(off.argmax())

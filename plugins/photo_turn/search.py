@@ -124,7 +124,7 @@ class Search:
         """Return the cheapest ways to put photos in another order, and what is found from them."""
         evidence = self.everything.only(self.photos)
         azimuth = best.azimuth_deg[self.photos]
-        rows = [self._swapped(azimuth, photo) for photo in np.nonzero(~self.fixed)[0]]
+        rows = [self._swapped(azimuth, int(photo)) for photo in np.nonzero(~self.fixed)[0]]
         trials = np.concatenate([*rows, self._mirrored(azimuth)])
         trials = trials[np.argsort(measure_cost(trials, evidence), kind="stable")]
         others = [trial for trial in trials if differs(self._placed(trial), best)][:OTHERS]
@@ -137,7 +137,7 @@ class Search:
             return best
         azimuth, evidence = best.azimuth_deg[self.photos], self.everything.only(self.photos)
         even = np.argsort(np.argsort(azimuth, kind="stable")) * (360.0 / len(azimuth))
-        even = _turned_to_faces(even, evidence)
+        even = _turned_to_faces(np.asarray(even, np.float64), evidence)
         seen = np.isfinite(evidence.yaw_deg)
         trust = 1 / (1 + (evidence.spread_deg[seen] / STRAY_DEG) ** 2)
         even[seen] += trust * wrap(evidence.yaw_deg[seen] - even[seen])
