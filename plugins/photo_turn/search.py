@@ -30,9 +30,9 @@ FEWEST_WITH_ABOVE = 7
 """In smaller turns every photo is unlike the others."""
 STRAY_DEG = 8.0
 """Standard deviation of a photo's azimuth from its place in an even turn taken by hand."""
-UNEVEN = 4.0
-"""Cost up to which the steps of a turn are taken for even: outlines and skin pull photos by 2 to 7
-degrees from where they are."""
+UNEVEN, UNEVEN_DEG = 4.0, 15.0
+"""Cost and distance of a photo up to which the steps of a turn are taken for even: outlines and
+skin pull photos by 2 to 10 degrees from where they are."""
 DIFFERENT_DEG = 30.0
 """Arrangements that move some photo by more than this, and more than half a step, are different."""
 OTHERS = 8
@@ -142,8 +142,9 @@ class Search:
         trust = 1 / (1 + (evidence.spread_deg[seen] / STRAY_DEG) ** 2)
         even[seen] += trust * wrap(evidence.yaw_deg[seen] - even[seen])
         placed = self._placed(even)
-        near = placed.cost < best.cost + UNEVEN and not differs(placed, best)
-        return replace(placed, cost=best.cost) if near else best
+        near = np.abs(wrap(placed.azimuth_deg - best.azimuth_deg)).max() < UNEVEN_DEG
+        fits = placed.cost < best.cost + UNEVEN
+        return replace(placed, cost=best.cost) if near and fits else best
 
     def _settle(self, azimuth: Float64Array, evidence: Evidence) -> Float64Array:
         """Return the arrangement (R,) to which moves lead, each to the cheapest place."""
