@@ -11,6 +11,10 @@ from hairkit.errors import DataError
 from hairkit.storage import Stored
 
 
+RING_DEG = 35.0
+"""Photos from higher than this are no part of the ring around the head."""
+
+
 @dataclass(frozen=True, eq=False)
 class Turnaround(Stored):
     """Azimuth, elevation and upright position of every photo, in the order they were read."""
@@ -49,3 +53,9 @@ class Turnaround(Stored):
             raise DataError("turn elevation_deg is beyond 90 degrees")
         if len(set(self.names)) != count:
             raise DataError("turn names two photos alike")
+
+    @property
+    def largest_step_deg(self) -> float:
+        """Return the largest angle between neighbours of the ring around the head, degrees."""
+        ring = np.sort(self.azimuth_deg[self.elevation_deg <= RING_DEG] % 360.0)
+        return float(np.diff(ring, append=ring[:1] + 360.0).max(initial=0.0))
