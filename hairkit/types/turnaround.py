@@ -10,7 +10,6 @@ from hairkit.arrays import Float64Array, Int64Array, frozen_array
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 
-
 RING_DEG = 35.0
 """Photos from higher than this are no part of the ring around the head."""
 

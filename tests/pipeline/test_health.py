@@ -17,7 +17,8 @@ from hairkit.arrays import Float64Array
 from hairkit.cameras.depth_raster import mesh_depth
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
-from hairkit.pipeline.health import GREEN, RED, Figure, Limits, assess, summarise
+from hairkit.pipeline.figure import GREEN, RED, Figure, Limits
+from hairkit.pipeline.health import assess, summarise
 from hairkit.rendering.measurement import draw_measurements
 from hairkit.synth import grow
 from hairkit.types.camera import Camera

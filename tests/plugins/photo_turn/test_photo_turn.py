@@ -20,7 +20,8 @@ from hairkit.arrays import Float64Array
 from hairkit.cameras.depth_raster import head_depth
 from hairkit.errors import InputError
 from hairkit.head_model.template import default_head
-from hairkit.pipeline.health import GREEN, RED, assess_turn
+from hairkit.pipeline.figure import GREEN, RED
+from hairkit.pipeline.health import assess_turn
 from hairkit.types.face import Face
 from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
