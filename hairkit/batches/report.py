@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from hairkit.batches.jobs import FAILED, Result
 from hairkit.html_page import page
-from hairkit.pipeline.health import GREEN, Figure
+from hairkit.pipeline.figure import GREEN, Figure
 from hairkit.remote import join, write_text
 
 PAGE, DATA = "report.html", "report.json"

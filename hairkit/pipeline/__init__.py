@@ -5,6 +5,7 @@ plugins.
 
 * `contact_sheet`: one picture of all stages
 * `draft`: a quick groom after a change by hand
+* `figure`: a figure of the health of a run, and its light
 * `find_views`: faces, persons, and from where each photo was taken
 * `drawn_directions`: guides against the directions in the photos
 * `findings`: the walk through the stages

@@ -15,7 +15,7 @@ from hairkit.field.isosurface import volume_surface
 from hairkit.grooming.densify import densify
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.imaging.picture_file import write_picture
-from hairkit.pipeline.health import AMBER, GREEN, RED, Figure
+from hairkit.pipeline.figure import AMBER, GREEN, RED, Figure
 from hairkit.rendering import Lights, Solid, draw_views
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture

@@ -16,8 +16,9 @@ from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.memory import give_back_memory
 from hairkit.parallel import one_blas_thread, thread_count
+from hairkit.pipeline.figure import RED, Figure
 from hairkit.pipeline.findings import Findings
-from hairkit.pipeline.health import RED, Figure, assess
+from hairkit.pipeline.health import assess
 from hairkit.pipeline.recipe import Recipe, missing_networks
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.run_record import RECORD, RunRecord, describe_run, finish_record

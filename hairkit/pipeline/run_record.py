@@ -18,7 +18,7 @@ from hairkit.errors import FormatError
 from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.manager.command_plugin import PluginCommand
-from hairkit.pipeline.health import Figure
+from hairkit.pipeline.figure import Figure
 from hairkit.pipeline.recipe import Choice, Recipe, Selection, load_recipe, new_table, plugin_code
 from hairkit.pipeline.run_log import StageTime
 from hairkit.remote import is_url, join, read_bytes

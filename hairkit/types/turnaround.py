@@ -10,6 +10,9 @@ from hairkit.arrays import Float64Array, Int64Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 
+RING_DEG = 35.0
+"""Photos from higher than this are no part of the ring around the head."""
+
 
 @dataclass(frozen=True, eq=False)
 class Turnaround(Stored):
@@ -25,9 +28,11 @@ class Turnaround(Stored):
     names: tuple[str, ...]
     """Name of the view that each photo shows."""
     margin: float
-    """Cost of the next best arrangement over that of this one; 1 is a tie, inf no other fits."""
+    """By how much the next best arrangement fits worse; 1 is a tie, inf where none was tried."""
     summary: str
     """One line for the user."""
+    doubts: tuple[str, ...] = ()
+    """What is uncertain, each in a few words; also part of the summary."""
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -40,3 +45,9 @@ class Turnaround(Stored):
             raise DataError("turn elevation_deg is beyond 90 degrees")
         if len(set(self.names)) != count:
             raise DataError("turn names two photos alike")
+
+    @property
+    def largest_step_deg(self) -> float:
+        """Return the largest angle between neighbours of the ring around the head, degrees."""
+        ring = np.sort(self.azimuth_deg[self.elevation_deg <= RING_DEG] % 360.0)
+        return float(np.diff(ring, append=ring[:1] + 360.0).max(initial=0.0))

@@ -1,38 +1,43 @@
-"""The turn found from faces, outlines and skin; the order of the photos is only a hint.
+"""The turn found from faces, outlines and skin; order and names of the files do not matter.
 
-Faces tell the azimuths of frontal photos. Both directions, every start, uneven steps, and, where
-the order of the files does not fit, other orders are scored (`.arrangement`): faces must lie where
-their yaw says, outlines of opposite views mirror each other and those of neighbours are alike, and
-the share of skin falls from the face to the back. A photo without which the rest is a better turn
-is one from above. What is no turn around one head is refused in one line.
+Faces tell the azimuths of frontal photos. All other photos may be anywhere around the head, and
+what fits best is searched for (`.search`): faces lie where their yaw says, outlines of opposite
+views mirror each other and those of neighbours are alike, the share of skin falls from the face to
+the back, and steps are even rather than not. A photo without which the rest is a better turn is one
+from above. Frames of a video are in the order of time. What is no turn around one head is refused
+in one line.
 
 * `appearance`: outlines, skin, copies
-* `arrangement`: rings of photos and their cost
+* `arrangement`: how well photos fit azimuths
 * `describe`: order and names of views, and the summary
 * `refuse`: what is no turn
-* `search`: the cheapest arrangement
+* `search`: the cheapest arrangement, and the next
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from hairkit import Capture, View, hookimpl
-from hairkit.arrays import BoolArray, Float64Array
+from hairkit.arrays import BoolArray, Float64Array, Int64Array
 from hairkit.imaging.person_outline import Outline, trace_outline
+from hairkit.io.capture_reader import FEWEST
 from hairkit.io.photos import focal_from_equivalent
+from hairkit.io.video import SUFFIXES
 from hairkit.types.face import Face
 from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
 
-from .appearance import compare_outlines, measure_clothes, measure_skin
+from .appearance import compare_outlines, measure_clothes, measure_oddness, measure_skin
 from .arrangement import Evidence
-from .describe import Found, in_turn_order, name_views, summarise
+from .describe import Found, in_turn_order, name_views, summarise, tell_doubts
 from .refuse import check_one_person, check_turn, contradicting, find_copies, photo_name
-from .search import find_arrangements, margin_of
+from .search import differs, find_arrangements, margin_of, moved
 
 ABOVE_DEG = 35.0
 """Photos from higher than this are no part of the ring."""
@@ -41,10 +46,12 @@ USUAL_ABOVE_DEG = 55.0
 PITCH_SPREAD, PITCH_BIAS, RING_SPREAD, STRAY_SPREAD = 5.0, 4.0, 6.0, 3.0
 """Standard deviations in degrees: of a face's pitch, of what all pitches of one head have in
 common, of rings of photos from level, of photos from their ring."""
-
-
 USUAL_LENS_MM = 26.0
 """35 mm equivalent of a phone's main lens, where the focal length is unknown."""
+LEAST_WIDTH = 0.05
+"""Least width of a head, as a share of its photo's: what is narrower is a speck of a mask."""
+NAMED_SPREAD = 1.0
+"""Standard deviation of azimuths that the user names, degrees."""
 
 
 @hookimpl
@@ -52,32 +59,53 @@ def find_turn(capture: Capture, faces: tuple[Face, ...], persons: tuple[Person, 
     """Return the arrangement that the photos fit best; `InputError` for what is no turn."""
     seen = zip(capture.views, faces, persons, strict=True)
     views = tuple(replace(view, face=face, person=person) for view, face, person in seen)
-    twins = find_copies(views)
-    found = _find(views)
+    outlines = [_traced(view) for view in views]
+    twins = find_copies(views, outlines)
+    canonical = np.arange(len(views)) if _is_video(capture) else order_by_content(views)
+    ordered = [views[i] for i in canonical]
+    found = _find(ordered, [outlines[i] for i in canonical], _is_video(capture))
     order = in_turn_order(found)
-    names = name_views(views, found, order)
+    names = name_views(ordered, found, order)
+    order, back = canonical[order], np.argsort(canonical)
+    found, names = found.take(back), tuple(names[i] for i in back)
     summary = summarise(views, found, names, twins)
     azimuth, elevation = found.azimuth_deg, found.elevation_deg
-    return Turnaround(order, azimuth, elevation, names, found.margin, summary)
+    doubts = tell_doubts(views, found)
+    return Turnaround(order, azimuth, elevation, names, found.margin, summary, doubts)
 
 
-def _find(views: Sequence[View]) -> Found:
+def _is_video(capture: Capture) -> bool:
+    """Return whether the views are frames of one video, in the order of time."""
+    return capture.source is not None and capture.source.suffix.lower() in SUFFIXES
+
+
+def order_by_content(views: Sequence[View]) -> Int64Array:
+    """Return the photos (V,) in an order in which neither their names nor their order has a part.
+
+    Sums of floating-point numbers depend on the order, and so do ties.
+    """
+    digests = [hashlib.sha256(view.image.tobytes()).digest() for view in views]
+    return np.array(sorted(range(len(views)), key=lambda i: digests[i]), np.int64)
+
+
+def _find(views: Sequence[View], outlines: Sequence[Outline | None], in_time: bool) -> Found:
     """Return from where the photos were taken: as their names say, if no face contradicts them."""
     faces = [view.face or Face.absent() for view in views]
     azimuth = np.array([view.azimuth_deg for view in views])
     elevation = np.array([view.elevation_deg for view in views])
     named = np.array([view.named for view in views])
-    read = Found(azimuth, elevation, elevation > ABOVE_DEG, np.inf, named)
-    yaw = Evidence.of(faces, None, None).yaw_deg
+    none = np.zeros_like(named)
+    read = Found(azimuth, elevation, elevation > ABOVE_DEG, np.inf, named, none, none)
+    yaw = Evidence.of(faces).yaw_deg
     if not np.isfinite(yaw).any():
         unchecked = "no face was found, nobody checked the order of the photos"
-        return read if named.all() else replace(read, note=unchecked)
+        return read if named.all() else replace(read, margin=1.0, note=unchecked)
     wrong = contradicting(yaw, np.where(named, azimuth, yaw))
     if wrong is None and named.all():
         return read
     if wrong is not None:
         named = np.zeros_like(named)
-    found = _arrange(views, faces, named)
+    found = _arrange(views, _gather_evidence(views, outlines), named, in_time)
     if wrong is not None:
         note = (
             f"{photo_name(views[wrong])} is no view {views[wrong].name!r}, its face is turned by"
@@ -87,44 +115,65 @@ def _find(views: Sequence[View]) -> Found:
     return found
 
 
-def _arrange(views: Sequence[View], faces: Sequence[Face], named: BoolArray) -> Found:
+def _arrange(views: Sequence[View], seen: Evidence, named: BoolArray, in_time: bool) -> Found:
     """Return the best arrangement; views in `named` (V,) stay as they are said to be."""
-    outlines = _trace_outlines(views)
-    skin, distances = None, None
-    if outlines is not None:
-        photos = [view.image for view in views]
-        check_one_person(views, measure_clothes(photos, outlines))
-        skin = measure_skin(photos, outlines, faces)
-        distances = compare_outlines(outlines)
-    seen = Evidence.of(faces, distances, skin)
     azimuth = np.array([view.azimuth_deg for view in views])
-    evidence = replace(seen, yaw_deg=np.where(named, azimuth, seen.yaw_deg))
+    evidence = replace(
+        seen,
+        yaw_deg=np.where(named, azimuth, seen.yaw_deg),
+        spread_deg=np.where(named, NAMED_SPREAD, seen.spread_deg),
+        in_time=in_time,
+    )
     elevation = np.array([view.elevation_deg for view in views])
-    pitch = np.array([face.pitch_deg if face.sure else np.nan for face in faces])
+    pitch = np.array([v.face.pitch_deg if v.face and v.face.sure else np.nan for v in views])
     pitch = np.where(named, elevation, pitch)
     known = np.isfinite(pitch)
-    placed = find_arrangements(evidence, known & (pitch > ABOVE_DEG), known)
+    placed = find_arrangements(evidence, known & (pitch > ABOVE_DEG), known, named)
     best = placed[0]
-    check_turn(views, best, seen.yaw_deg, skin)
-    found = np.where(
-        best.above, USUAL_ABOVE_DEG, _ring_elevations(pitch, best.above, _level(views))
-    )
+    check_turn(views, best, seen.yaw_deg, seen.skin)
+    ring = _ring_elevations(pitch, best.above, _level(views))
+    found = np.where(best.above, USUAL_ABOVE_DEG, ring)
     found = np.where(named | (best.above & known), pitch, found)
-    note = "" if best.in_order else "the photos are not in the order of their names"
     azimuth = np.where(named, azimuth, best.azimuth_deg)
-    return Found(azimuth, found, best.above, margin_of(placed), named, note)
+    other = next((other for other in placed[1:] if differs(other, best)), best)
+    guessed = best.above & ~known
+    return Found(azimuth, found, best.above, margin_of(placed), named, guessed, moved(best, other))
 
 
-def _trace_outlines(views: Sequence[View]) -> list[Outline] | None:
-    """Return the outlines of the persons, None when some photo shows none."""
-    outlines = []
-    for view in views:
-        known = view.person is not None and view.person.alpha.size > 0
-        outline = trace_outline(view.person.alpha) if view.person and known else None
-        if outline is None:
-            return None
-        outlines.append(outline)
-    return outlines
+def _traced(view: View) -> Outline | None:
+    """Return the outline of the person in a photo, None where nobody, or next to nothing, is."""
+    if view.person is None or not view.person.alpha.size:
+        return None
+    outline = trace_outline(view.person.alpha)
+    return outline if outline and outline.width_px > LEAST_WIDTH * view.width else None
+
+
+def _gather_evidence(views: Sequence[View], outlines: Sequence[Outline | None]) -> Evidence:
+    """Return what the photos show of their places; those without an outline only by faces."""
+    faces = [view.face or Face.absent() for view in views]
+    rows = [i for i, outline in enumerate(outlines) if outline is not None]
+    known = [outline for outline in outlines if outline is not None]
+    if len(known) < FEWEST:
+        return Evidence.of(faces)
+    photos = [views[i].image for i in rows]
+    check_one_person([views[i] for i in rows], measure_clothes(photos, known))
+    alike, mirrored = compare_outlines(known)
+    odd = measure_oddness(known, alike, mirrored)
+    skin = measure_skin(photos, known, [faces[i] for i in rows])
+    count, pairs = len(views), np.ix_(rows, rows)
+    return Evidence.of(
+        faces,
+        (_spread(alike, (count, count), pairs), _spread(mirrored, (count, count), pairs)),
+        None if skin is None else _spread(skin, (count, skin.shape[1]), rows),
+        np.nan_to_num(_spread(odd, (count,), rows)),
+    )
+
+
+def _spread(values: Float64Array, shape: tuple[int, ...], where: Any) -> Float64Array:
+    """Return an array of a shape that holds values at some places, NaN elsewhere."""
+    full = np.full(shape, np.nan)
+    full[where] = values
+    return full
 
 
 def _level(views: Sequence[View]) -> Float64Array:

@@ -19,6 +19,11 @@ STRETCHES = np.linspace(0.85, 1.18, 9)
 """Scales tried between two outlines: heads are nearer in one photo than in the other."""
 SHIFTS = np.array([-0.05, -0.025, 0.0, 0.025, 0.05])
 """Vertical shifts tried, head widths."""
+ODD_DISTANCE, ODD_SHOULDER = 2.0, 3.0
+"""Weights of the logarithms of distance and depth: ten photos from above are 1.5 to 8 times as far
+from the nearest outline as is usual in their turn, profiles with ponytails 3 times."""
+FAR = 1.0
+"""Largest distance of outlines that counts, head widths."""
 HEAD_DEPTH = 1.25
 """Depth below the crown down to which skin is looked for, head widths: the chin."""
 SKIN_BLUR_PX, SKIN_EDGE = 1.0, 240
@@ -77,6 +82,24 @@ def _distance(variants: Float64Array, edges: Float64Array) -> Float64Array:
     off = off - np.median(off, axis=(2, 3), keepdims=True)
     nearest: Float64Array = np.abs(off).mean(axis=(2, 3)).min(axis=1)
     return nearest
+
+
+def measure_oddness(
+    outlines: Sequence[Outline], alike: Float64Array, mirrored: Float64Array
+) -> Float64Array:
+    """Return how unlike those of level photos the outlines are (V,), 0 for usual ones.
+
+    Outlines of photos from above are like no other and no mirror image, and the shoulders begin
+    higher. Both are logarithms of ratios to the median of the turn, weighted.
+    """
+    nearest = np.minimum(alike, mirrored) + np.diag(np.full(len(alike), np.inf))
+    apart = nearest.min(axis=1, initial=FAR)
+    shoulder = np.array([outline.shoulder for outline in outlines])
+    known = np.isfinite(shoulder)
+    usual = np.median(shoulder[known]) if known.any() else 1.0
+    shallow = np.where(known, usual / np.where(known, shoulder, usual), 1.0)
+    odd = ODD_DISTANCE * np.log(np.maximum(apart / max(float(np.median(apart)), 1e-9), 1.0))
+    return np.asarray(odd + ODD_SHOULDER * np.log(np.maximum(shallow, 1.0)), np.float64)
 
 
 def measure_skin(
@@ -160,20 +183,33 @@ def measure_clothes(photos: Sequence[UInt8Array], outlines: Sequence[Outline]) -
     return np.array(found)
 
 
-def thumbnails_alike(photos: Sequence[UInt8Array]) -> Float64Array:
-    """Return the correlation (V, V) of small grey copies of the photos: copies of one are alike."""
-    small = [
-        cv2.GaussianBlur(
-            cv2.resize(
-                cv2.cvtColor(photo, cv2.COLOR_RGB2GRAY),
-                (THUMBNAIL, THUMBNAIL),
-                interpolation=cv2.INTER_AREA,
-            ).astype(np.float64),
-            (0, 0),
-            THUMBNAIL_BLUR,
-        ).ravel()
-        for photo in photos
-    ]
+def thumbnails_alike(
+    photos: Sequence[UInt8Array], outlines: Sequence[Outline | None]
+) -> Float64Array:
+    """Return the correlation (V, V) of small grey copies of the heads: copies of one are alike.
+
+    Of a photo without an outline (None) the whole is looked at: walls and clothes are alike in
+    different photos, too.
+    """
+    small = [_thumbnail(_head(*pair)) for pair in zip(photos, outlines, strict=True)]
     table = np.array(small) - np.mean(small, axis=1, keepdims=True)
     table = table / np.maximum(np.linalg.norm(table, axis=1, keepdims=True), 1e-9)
     return np.asarray(table @ table.T, np.float64)
+
+
+def _head(photo: UInt8Array, outline: Outline | None) -> UInt8Array:
+    """Return the part of a photo from the crown to the chin, a square around the head."""
+    if outline is None:
+        return photo
+    top, left = outline.top_px, outline.middle_px - HEAD_DEPTH * outline.width_px / 2
+    size = HEAD_DEPTH * outline.width_px
+    rows = slice(max(round(top), 0), round(top + size))
+    return photo[rows, max(round(left), 0) : round(left + size)]
+
+
+def _thumbnail(photo: UInt8Array) -> Float64Array:
+    """Return a small grey copy of a photo as a row."""
+    size = (THUMBNAIL, THUMBNAIL)
+    small = cv2.cvtColor(cv2.resize(photo, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY)
+    blurred = cv2.GaussianBlur(small.astype(np.float64), (0, 0), THUMBNAIL_BLUR)
+    return np.asarray(blurred.ravel(), np.float64)

@@ -1,50 +1,54 @@
-"""Arrangements of photos around a head, and how well the photos fit each.
+"""How well the photos fit azimuths around a head.
 
-A `Ring` says in which order photos follow each other around the head and which steps of the turn
-they take. Faces fix its phase; faces, outlines and skin score it. Costs are in units of half a
-squared standard deviation, as negative logarithms of likelihoods are.
+An arrangement gives each photo an azimuth. Faces, outlines, skin and the evenness of the steps
+score it, each alone and for many arrangements at once: azimuths are (B, V), costs (B,). Costs are
+negative logarithms of likelihoods. Nothing depends on the order of the photos, save in a video.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array, Int64Array
 from hairkit.types.face import Face
 
-STRAY_DEG, YAW_DEG = 8.0, 4.0
-"""Standard deviation of a photo's azimuth from its place in an even turn taken by hand, and of the
-azimuth that a face tells."""
+YAW_DEG = 4.0
+"""Standard deviation of the azimuth that a face tells."""
 OBLIQUE_DEG, OBLIQUE_GROWTH = 45.0, 2.0
 """Yaw from which on faces may be mistaken profiles: the deviation grows by this many degrees for
 each degree beyond. Profiles were found as faces with yaws of 39 to 62 degrees."""
 FACE_CAP = 30.0
-"""Largest cost of one face: beyond 50 degrees off, farther is not worse."""
-HIDDEN_DEG, HIDDEN_SPREAD_DEG = 45.0, 10.0
+"""Largest cost of one face: beyond 30 degrees off, farther is not worse."""
+HIDDEN_DEG, HIDDEN_SPREAD_DEG = 60.0, 10.0
 """Nearer than this to the front a face is found; how gradually that ends."""
+FAINT_PRESENCE = 0.3
+"""Least presence of a face that tells the side of the head at least: eight photos of the sides,
+36 to 93 degrees from the front, had 0.47 to 0.6; none from behind had more than 0.1."""
+SIDE_DEG, SIDE_SPREAD_DEG, SIDE_CAP = 70.0, 18.0, 8.0
+"""Azimuth of such faces, its standard deviation, and their largest cost."""
 OUTLINE_WEIGHT = 60.0
 """Cost of outlines that differ by one more head width than usual. On nine captures the next best
 order costs 0.07 head widths more."""
 OUTLINE_BEND = 0.08
 """Differences between outlines count less from this on, head widths: a ponytail swings."""
-NEIGHBOUR_DEG, OPPOSITE_DEG = 35.0, 20.0
-"""Outlines of views that are about this near each other are alike, those of views this near to
-opposite mirror each other."""
+NEAR, OPPOSITE = np.radians([35.0, 20.0]) ** -2.0
+"""Concentrations: outlines of views that are about 35 degrees from each other are alike, those of
+views that are within 20 degrees of opposite mirror each other."""
 NEIGHBOUR_SHARE = 0.5
 """Weight of neighbours over that of opposite views: outlines change from view to view."""
 SHARE_SPREAD, MOMENT_SPREAD = 0.06, 0.012
 """Deviation of skin's share of the head, and of its sideways moment (head widths), from a smooth
 curve over the azimuth."""
-IRREGULAR, CLOSED, GAP, SHUFFLED = 4.0, 2.0, 3.0, 6.0
-"""Prior costs: photos not evenly spaced, the last photo repeats the first, one step is missing,
-photos not in the order of their names."""
-MOST_WITH_GAP = 12
-"""In turns of more photos one that is missing moves the others little."""
+STEP_SPREAD_DEG, STEP_FREEDOM = 15.0, 2.0
+"""Scale and degrees of freedom of Student's distribution of steps about an even one: most turns are
+even, but a photo may be missing or taken twice."""
 TURN_OF = 8
-"""Weights of outlines are those of this number of photos."""
+"""Weights of outlines and skin are those of this number of photos."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,36 +56,76 @@ class Evidence:
     """What the photos of a ring tell about their places."""
 
     yaw_deg: Float64Array
-    """(V,) azimuths that sure faces tell; NaN without."""
+    """(V,) azimuths that sure faces, or the names of views, tell; NaN without."""
+    spread_deg: Float64Array
+    """(V,) standard deviations of these."""
+    side: Float64Array
+    """(V,) 1 for photos from the subject's left, -1 from the right, as faint faces tell; else 0."""
     alike: Float64Array | None
-    """(V, V) distances of outlines, None where they are unknown."""
+    """(V, V) distances of outlines, None or NaN where they are unknown."""
     mirrored: Float64Array | None
     """(V, V) the same, one of the pair mirrored."""
     skin: Float64Array | None
-    """(V, 2) share of the head that is skin and its moment."""
+    """(V, 2) share of the head that is skin and its moment; None or NaN where unknown."""
+    odd: Float64Array
+    """(V,) how unlike those of level photos the outlines are."""
+    in_time: bool = False
+    """True when the photos are in the order of time: frames of one video."""
 
     @classmethod
     def of(
         cls,
         faces: Sequence[Face],
-        outlines: tuple[Float64Array, Float64Array] | None,
-        skin: Float64Array | None,
-    ) -> Evidence:
+        outlines: tuple[Float64Array, Float64Array] | None = None,
+        skin: Float64Array | None = None,
+        odd: Float64Array | None = None,
+    ) -> Self:
+        """Return the evidence of photos, of which no names are known."""
         yaw = np.array([face.yaw_deg if face.sure else np.nan for face in faces])
+        beyond = np.maximum(np.abs(yaw) - OBLIQUE_DEG, 0)
+        faint = [not face.sure and face.presence > FAINT_PRESENCE for face in faces]
+        side = np.where(faint, np.sign([face.yaw_deg for face in faces]), 0.0)
         alike, mirrored = outlines if outlines is not None else (None, None)
-        return cls(yaw, alike, mirrored, skin)
+        odd = np.zeros(len(yaw)) if odd is None else odd
+        return cls(yaw, YAW_DEG + OBLIQUE_GROWTH * beyond, side, alike, mirrored, skin, odd)
 
+    def only(self, photos: Int64Array) -> Self:
+        """Return the evidence of some photos alone."""
+        pairs = np.ix_(photos, photos)
+        return replace(
+            self,
+            yaw_deg=self.yaw_deg[photos],
+            spread_deg=self.spread_deg[photos],
+            side=self.side[photos],
+            alike=None if self.alike is None else self.alike[pairs],
+            mirrored=None if self.mirrored is None else self.mirrored[pairs],
+            skin=None if self.skin is None else self.skin[photos],
+            odd=self.odd[photos],
+        )
 
-@dataclass(frozen=True, eq=False)
-class Ring:
-    """Photos in the order of the turn and the steps between them, before the phase is known."""
+    @cached_property
+    def pairs(self) -> tuple[Int64Array, Int64Array]:
+        """Return the first and the second photo of each pair (P,)."""
+        return np.triu_indices(len(self.yaw_deg), 1)
 
-    order: Int64Array
-    """(R,) photos in the order of growing azimuth; those that are missing are from above."""
-    steps_deg: Float64Array | None
-    """(R,) nominal azimuths of these from the first on; None: spread between the faces."""
-    prior: float
-    """Cost of so unusual a turn."""
+    @cached_property
+    def pair_costs(self) -> tuple[Float64Array, Float64Array]:
+        """Return what pairs (P,) cost more than usual ones where they are neighbours, opposite."""
+        if self.alike is None or self.mirrored is None:
+            return np.zeros(len(self.pairs[0])), np.zeros(len(self.pairs[0]))
+        bent = [
+            OUTLINE_BEND * np.tanh(distance[self.pairs] / OUTLINE_BEND)
+            for distance in (self.alike, self.mirrored)
+        ]
+        usual = [pair[np.isfinite(pair)].mean() if np.isfinite(pair).any() else 0 for pair in bent]
+        scale = OUTLINE_WEIGHT * self.weight**2
+        alike, mirrored = (scale * np.nan_to_num(p - u) for p, u in zip(bent, usual, strict=True))
+        return NEIGHBOUR_SHARE * alike, mirrored
+
+    @property
+    def weight(self) -> float:
+        """Return the weight of a photo: many photos tell no more than those of a usual turn."""
+        return min(1.0, TURN_OF / len(self.yaw_deg))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,10 +137,8 @@ class Placed:
     above: BoolArray
     """(V,) true for photos from above."""
     off_deg: Float64Array
-    """(V,) by how much faces contradict the steps, 0 without a face."""
+    """(V,) by how much faces contradict the azimuths, 0 without a face."""
     cost: float
-    in_order: bool = True
-    """False for an order that the names of the photos do not suggest."""
 
 
 def wrap(angle_deg: Float64Array) -> Float64Array:
@@ -105,117 +147,78 @@ def wrap(angle_deg: Float64Array) -> Float64Array:
     return wrapped
 
 
-def rings_of(order: Int64Array, prior: float) -> Iterator[Ring]:
-    """Yield the turns that a row of photos may be: both directions and several kinds of steps."""
-    count = len(order)
-    places = np.arange(count)
-    for row in (order, order[::-1]):
-        yield Ring(row, places * 360.0 / count, prior)
-        yield Ring(row, None, prior + IRREGULAR)
-        if count > 3:
-            yield Ring(row, (places % (count - 1)) * 360.0 / (count - 1), prior + CLOSED)
-        for gap in range(1, count + 1 if count <= MOST_WITH_GAP else 1):
-            yield Ring(row, (places + (places >= gap)) * 360.0 / (count + 1), prior + GAP)
+def measure_cost(azimuth_deg: Float64Array, evidence: Evidence) -> Float64Array:
+    """Return the costs (B,) of arrangements (B, V) of all photos on one ring, degrees."""
+    angle = np.radians(azimuth_deg)
+    across, ahead = np.sin(angle), np.cos(angle)
+    cost = _face_cost(azimuth_deg, evidence) + _step_cost(azimuth_deg, evidence.in_time)
+    cost += _outline_cost(across, ahead, evidence) + _skin_cost(across, ahead, evidence)
+    return cost
 
 
-def place(ring: Ring, evidence: Evidence) -> Placed | None:
-    """Return the azimuths of the photos and their cost; None without a face to start from."""
-    yaw = evidence.yaw_deg[ring.order]
-    seen = np.isfinite(yaw)
-    if not seen.any():
-        return None
-    steps = _spread_between(yaw) if ring.steps_deg is None else ring.steps_deg
-    spread = np.hypot(STRAY_DEG, yaw_spread(yaw))
-    # the weighted circular mean of what the faces say of the phase
-    off = np.exp(1j * np.radians(yaw[seen] - steps[seen]))
-    azimuth = wrap(steps + float(np.degrees(np.angle(spread[seen] ** -2 @ off))))
-    off = np.where(seen, wrap(yaw - azimuth), 0.0)
-    cost = np.minimum(off[seen] ** 2 / (2 * spread[seen] ** 2), FACE_CAP).sum()
-    azimuth[seen] = wrap(azimuth + (STRAY_DEG / spread) ** 2 * off)[seen]
-    cost += _hidden_cost(azimuth[~seen]) + _outline_cost(azimuth, ring.order, evidence)
-    cost += _skin_cost(azimuth, ring.order, evidence)
-    count = len(evidence.yaw_deg)
-    everywhere, above, contradiction = (
-        np.nan_to_num(evidence.yaw_deg),
-        np.ones(count),
-        np.zeros(count),
-    )
-    everywhere[ring.order], above[ring.order], contradiction[ring.order] = azimuth, 0, off
-    return Placed(everywhere, above > 0, contradiction, float(cost) + ring.prior)
+def _face_cost(azimuth: Float64Array, evidence: Evidence) -> Float64Array:
+    """Return what it costs that faces look elsewhere and photos from the front show none."""
+    seen, faint = np.isfinite(evidence.yaw_deg), evidence.side != 0
+    off = wrap(azimuth[:, seen] - evidence.yaw_deg[seen]) / evidence.spread_deg[seen]
+    inside = HIDDEN_DEG - np.abs(wrap(azimuth[:, ~seen & ~faint]))
+    inside = np.maximum(inside, 0) / HIDDEN_SPREAD_DEG
+    aside = wrap(azimuth[:, faint] - SIDE_DEG * evidence.side[faint]) / SIDE_SPREAD_DEG
+    cost = np.minimum(off**2 / 2, FACE_CAP).sum(axis=1) + (inside**2 / 2).sum(axis=1)
+    return np.asarray(cost + np.minimum(aside**2 / 2, SIDE_CAP).sum(axis=1), np.float64)
 
 
-def yaw_spread(yaw_deg: Float64Array) -> Float64Array:
-    """Return the standard deviation of azimuths that faces tell, degrees."""
-    beyond = np.maximum(np.abs(yaw_deg) - OBLIQUE_DEG, 0)
-    return np.asarray(YAW_DEG + OBLIQUE_GROWTH * beyond, np.float64)
+def _step_cost(azimuth: Float64Array, in_time: bool) -> Float64Array:
+    """Return the cost of uneven steps: around the head, or from frame to frame either way."""
+    even = 360.0 / azimuth.shape[1]
+    if in_time:
+        steps = np.diff(azimuth, axis=1, append=azimuth[:, :1])
+        ways = [_uneven(wrap(way * steps - even)) for way in (1.0, -1.0)]
+        return np.minimum(*ways)
+    around = np.sort(azimuth % 360.0, axis=1)
+    return _uneven(np.diff(around, axis=1, append=around[:, :1] + 360.0) - even)
 
 
-def _spread_between(yaw: Float64Array) -> Float64Array:
-    """Return azimuths along a ring: monotone through the faces' (NaN without), even between.
+def _uneven(off_deg: Float64Array) -> Float64Array:
+    """Return the negative log likelihoods (B,) of steps that are off by (B, V) degrees."""
+    squares = (off_deg / STEP_SPREAD_DEG) ** 2 / STEP_FREEDOM
+    return np.asarray((STEP_FREEDOM + 1) / 2 * np.log1p(squares).sum(axis=1), np.float64)
 
-    Faces that run against the turn are of photos from one place: they get their mean (pool
-    adjacent violators).
+
+def _outline_cost(across: Float64Array, ahead: Float64Array, evidence: Evidence) -> Float64Array:
+    """Return the cost of outlines that differ although the views are neighbours or opposite.
+
+    `across` and `ahead` (B, V) are sines and cosines of the azimuths. Nearness is von Mises'.
     """
-    count = len(yaw)
-    first = int(np.nanargmin(np.abs(yaw)))
-    start = (first - count // 2) % count  # opposite to the front, where no face is
-    row = (start + np.arange(count)) % count
-    known = np.nonzero(np.isfinite(yaw[row]))[0]
-    values = _pool_violators(yaw[row[known]])
-    knots = np.concatenate([known, known[:1] + count])
-    levels = np.concatenate([values, values[:1] + 360.0])
-    around = np.interp(np.arange(known[0], known[0] + count), knots, levels)
-    result = np.empty(count)
-    result[row[np.arange(known[0], known[0] + count) % count]] = around
-    return result
+    first, second = evidence.pairs
+    alike, mirrored = evidence.pair_costs
+    gap = across[:, first] * across[:, second] + ahead[:, first] * ahead[:, second]
+    near, opposite = np.exp(NEAR * (gap - 1)), np.exp(OPPOSITE * (-gap - 1))
+    return np.asarray(near @ alike + opposite @ mirrored, np.float64)
 
 
-def _pool_violators(values: Float64Array) -> Float64Array:
-    """Return the nearest sequence that never falls (isotonic regression)."""
-    pools: list[tuple[float, int]] = []
-    for value in values:
-        pools.append((float(value), 1))
-        while len(pools) > 1 and pools[-1][0] <= pools[-2][0]:
-            (right, n), (left, m) = pools.pop(), pools.pop()
-            pools.append(((left * m + right * n) / (m + n), m + n))
-    return np.concatenate([np.full(size, mean) for mean, size in pools])
-
-
-def _hidden_cost(azimuth: Float64Array) -> float:
-    """Return what it costs that photos from the front show no face."""
-    inside = np.maximum(HIDDEN_DEG - np.abs(azimuth), 0) / HIDDEN_SPREAD_DEG
-    return float((inside**2).sum() / 2)
-
-
-def _outline_cost(azimuth: Float64Array, photos: Int64Array, evidence: Evidence) -> float:
-    """Return the cost of outlines that differ although the views are neighbours or opposite."""
-    if evidence.alike is None or evidence.mirrored is None:
-        return 0.0
-    first, second = np.triu_indices(len(azimuth), 1)
-    gap = np.abs(wrap(azimuth[first] - azimuth[second]))
-    cost = 0.0
-    for distance, angle, width, share in (
-        (evidence.alike, gap, NEIGHBOUR_DEG, NEIGHBOUR_SHARE),
-        (evidence.mirrored, 180.0 - gap, OPPOSITE_DEG, 1.0),
-    ):
-        pairs = OUTLINE_BEND * np.tanh(distance[photos[first], photos[second]] / OUTLINE_BEND)
-        near = np.exp(-((angle / width) ** 2) / 2)
-        cost += share * float(near @ (pairs - pairs.mean()))
-    return OUTLINE_WEIGHT * cost * min(1.0, TURN_OF / len(azimuth)) ** 2
-
-
-def _skin_cost(azimuth: Float64Array, photos: Int64Array, evidence: Evidence) -> float:
+def _skin_cost(across: Float64Array, ahead: Float64Array, evidence: Evidence) -> Float64Array:
     """Return the misfit of skin's share and moment to their usual course around a head."""
-    from scipy.optimize import nnls  # slow to load
-
     if evidence.skin is None:
-        return 0.0
-    angle = np.radians(azimuth)
-    share, moment = evidence.skin[photos].T
-    one = np.ones_like(angle)
-    courses = (
-        (share / SHARE_SPREAD, np.stack([one, np.cos(angle)], axis=1)),
-        (moment / MOMENT_SPREAD, np.stack([-np.sin(angle), -np.sin(2 * angle)], axis=1)),
-    )
-    misfit = sum(nnls(basis, values)[1] ** 2 for values, basis in courses)
-    return float(misfit) / 2 * min(1.0, TURN_OF / len(azimuth))
+        return np.zeros(len(across))
+    known = np.isfinite(evidence.skin[:, 0])
+    share, moment = evidence.skin[known].T
+    across, ahead = across[:, known], ahead[:, known]
+    misfit = _misfit(np.ones_like(ahead), ahead, share / SHARE_SPREAD)
+    misfit += _misfit(-across, -2 * across * ahead, moment / MOMENT_SPREAD)
+    return misfit / 2 * evidence.weight
+
+
+def _misfit(first: Float64Array, second: Float64Array, values: Float64Array) -> Float64Array:
+    """Return the squared misfit (B,) of values (V,) by two courses (B, V), of positive weights."""
+    norms = np.maximum([_dot(first, first), _dot(second, second)], 1e-9)
+    both, a, b = _dot(first, second), first @ values, second @ values
+    weights = np.array([norms[1] * a - both * b, norms[0] * b - both * a])
+    explained = (weights * [a, b]).sum(axis=0) / np.maximum(norms[0] * norms[1] - both**2, 1e-9)
+    one = (np.maximum([a, b], 0) ** 2 / norms).max(axis=0)
+    positive = (weights >= 0).all(axis=0)
+    return np.asarray(values @ values - np.where(positive, explained, one), np.float64)
+
+
+def _dot(one: Float64Array, other: Float64Array) -> Float64Array:
+    """Return the scalar products (B,) of rows."""
+    return np.asarray(np.einsum("bv,bv->b", one, other), np.float64)

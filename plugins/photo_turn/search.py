@@ -1,101 +1,213 @@
-"""The search for the arrangement that fits the photos best."""
+"""The search for the arrangement that fits the photos best, and for the next best.
+
+Photos without a face start in random orders, evenly between those with one. Then every photo in
+turn moves to where it costs least, or changes places with another, and parts of the ring are
+mirrored, until nothing is cheaper (iterated conditional modes, Besag 1986, from many starts).
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array, Int64Array
 
-from .arrangement import SHUFFLED, TURN_OF, Evidence, Placed, Ring, place, rings_of, wrap
+from .arrangement import TURN_OF, Evidence, Placed, measure_cost, wrap
 
-FITS = 2.5
-"""Cost per photo up to which photos in the order of their names are a turn."""
-ABOVE = 6.0
-"""Prior cost of a photo from above: without one, turns cost at most 2 less by leaving one out."""
-ODD_PHOTOS = 2
-"""Photos tried as from above in shuffled turns: those whose outlines are least like others'."""
-SWAP_STARTS = 6
-"""Random orders of eight photos from which the search by swaps starts."""
-ROUNDS = 30
-"""Most rounds of swaps: the search settles within ten."""
+STARTS, STARTS_ABOVE = 6, 0
+"""Random orders from which the search starts, and from which it does with a photo left out."""
+MOVES_DEG = np.r_[-5.0, -2.0, -1.0, 1.0, 2.0, 5.0, np.arange(15.0, 360.0, 15.0)]
+"""Ways that a photo is tried to move around the head, degrees."""
+ROUNDS = 60
+"""Most rounds of moves: the search settles within 20."""
+GAIN = 1e-6
+"""Arrangements that are cheaper by less are equal."""
+ABOVE = 4.0
+"""Cost of taking a photo for one from above, less its oddness. Without a photo from above, turns
+cost 3.9 less at most by leaving one out, with the oddness counted; with one, 2 to 9 less."""
+FEWEST_WITH_ABOVE = 7
+"""In smaller turns every photo is unlike the others."""
+STRAY_DEG = 8.0
+"""Standard deviation of a photo's azimuth from its place in an even turn taken by hand."""
+UNEVEN, UNEVEN_DEG = 4.0, 15.0
+"""Cost and distance of a photo up to which the steps of a turn are taken for even: outlines and
+skin pull photos by 2 to 10 degrees from where they are."""
 DIFFERENT_DEG = 30.0
-"""Arrangements that move some photo by more than this are different ones."""
+"""Arrangements that move some photo by more than this, and more than half a step, are different."""
+OTHERS = 8
+"""Different arrangements near the best one from which the search for the next best starts."""
 
 
-def find_arrangements(evidence: Evidence, above: BoolArray, level: BoolArray) -> list[Placed]:
-    """Return arrangements by their cost; empty when no face tells where the turn begins.
+def find_arrangements(
+    evidence: Evidence, above: BoolArray, level: BoolArray, fixed: BoolArray
+) -> list[Placed]:
+    """Return arrangements by their cost: the best, and others from which no move is cheaper.
 
     Parameters
     ----------
     evidence
-        What the photos tell about their azimuths.
+        What the photos tell about their azimuths: that of one at least is known.
     above, level
         (V,) true for photos that are known to be from above, and known not to be. One of the rest
         may be from above.
+    fixed
+        (V,) true for photos whose azimuth is known, and is not moved.
     """
-    row = np.nonzero(~above)[0]
-    free = np.nonzero(~above & ~level)[0]
-    rows = [(row, 0.0)] + [(row[row != one], ABOVE) for one in free if len(row) > 3]
-    found = [place(ring, evidence) for order, prior in rows for ring in rings_of(order, prior)]
-    placed = sorted((p for p in found if p is not None), key=lambda p: p.cost)
-    if placed and (placed[0].cost > FITS * len(row) or placed[0].above.sum() > above.sum()):
-        odd = free[np.argsort(_oddness(evidence)[free])[::-1][:ODD_PHOTOS]]
-        rows = [(row, 0.0)] + [(row[row != one], ABOVE) for one in odd if len(row) > 3]
-        for order, prior in rows:
-            placed += _shuffle(order, prior + SHUFFLED, evidence)
-    return sorted(placed, key=lambda p: p.cost)
+    photos = np.nonzero(~above)[0]
+    search = Search(evidence, photos, fixed[photos])
+    found = search.run(STARTS)
+    best = found[0].azimuth_deg
+    if len(photos) >= FEWEST_WITH_ABOVE and not evidence.in_time:
+        for photo in np.nonzero(~above & ~level & ~fixed)[0]:
+            rest = photos[photos != photo]
+            without = Search(evidence, rest, fixed[rest], ABOVE - float(evidence.odd[photo]))
+            found += without.run(STARTS_ABOVE, best[rest])
+    found.sort(key=lambda placed: placed.cost)
+    left = np.nonzero(~found[0].above)[0]
+    paid = found[0].cost - measure_cost(found[0].azimuth_deg[None, left], evidence.only(left))
+    around = Search(evidence, left, fixed[left], float(paid[0]))
+    first, *others = sorted(found + around.near(found[0]), key=lambda placed: placed.cost)
+    return [around.evened(first), *others]
 
 
 def margin_of(placed: list[Placed]) -> float:
-    """Return the next best cost over the least, each counted from one per photo below the least.
+    """Return by how much the next best arrangement costs more than the best, from 1 for a tie on.
 
-    The next best is the cheapest that puts some photo elsewhere; inf without any.
+    In units of one for each photo of a usual turn. The next best is the cheapest that puts some
+    photo elsewhere; inf without any.
     """
-    best, count = placed[0], len(placed[0].azimuth_deg)
-    for other in placed[1:]:
-        if np.abs(wrap(other.azimuth_deg - best.azimuth_deg)).max() > DIFFERENT_DEG:
-            return 1 + (other.cost - best.cost) / count
-    return np.inf
+    others = [other.cost for other in placed[1:] if differs(other, placed[0])]
+    return 1 + (min(others) - placed[0].cost) / TURN_OF if others else np.inf
 
 
-def _oddness(evidence: Evidence) -> Float64Array:
-    """Return how little each photo's outline is like any other or its mirror image (V,)."""
-    if evidence.alike is None or evidence.mirrored is None:
-        return np.zeros(len(evidence.yaw_deg))
-    nearest = np.minimum(evidence.alike, evidence.mirrored)
-    np.fill_diagonal(nearest, np.inf)
-    return np.asarray(nearest.min(axis=1), np.float64)
+def differs(one: Placed, other: Placed) -> bool:
+    """Return whether some photo has another place in two arrangements."""
+    return bool(moved(one, other).any())
 
 
-def _shuffle(order: Int64Array, prior: float, evidence: Evidence) -> list[Placed]:
-    """Return the even turns to which swaps of two photos lead from random orders."""
-    generator = np.random.default_rng(0)
-    starts = max(1, round(SWAP_STARTS * min(1.0, TURN_OF / len(order))))
-    orders = [generator.permutation(order) for _ in range(starts)]
-    return [replace(_by_swaps(start, prior, evidence), in_order=False) for start in orders]
+def moved(one: Placed, other: Placed) -> BoolArray:
+    """Return which photos (V,) have another place in two arrangements."""
+    least = max(DIFFERENT_DEG, 180.0 / np.count_nonzero(~one.above))
+    away = np.abs(wrap(one.azimuth_deg - other.azimuth_deg)) > least
+    return np.asarray((away & ~one.above & ~other.above) | (one.above != other.above))
 
 
-def _by_swaps(order: Int64Array, prior: float, evidence: Evidence) -> Placed:
-    """Return the even turn that no swap of two photos makes cheaper."""
-    count = len(order)
-    steps = np.arange(count) * 360.0 / count
+@dataclass(frozen=True, eq=False)
+class Search:
+    """The search for the best ring of some of the photos."""
 
-    def placed(row: Int64Array) -> Placed:
-        result = place(Ring(row, steps, prior), evidence)
-        assert result is not None  # the same faces were there in the order of the files
-        return result
+    everything: Evidence
+    """Of all photos."""
+    photos: Int64Array
+    """(R,) those on the ring; the rest are from above."""
+    fixed: BoolArray
+    """(R,) true for photos that do not move."""
+    prior: float = 0.0
+    """Cost of such a ring."""
 
-    best = placed(order)
-    for _ in range(ROUNDS):
-        before = best.cost
-        for i, j in zip(*np.triu_indices(count, 1), strict=True):
-            swapped = order.copy()
-            swapped[[i, j]] = swapped[[j, i]]
-            trial = placed(swapped)
-            if trial.cost < best.cost:
-                order, best = swapped, trial
-        if best.cost == before:
-            break
-    return best
+    def run(self, starts: int, near: Float64Array | None = None) -> list[Placed]:
+        """Return what is found from random orders, and from azimuths (R,) if given, by cost."""
+        evidence = self.everything.only(self.photos)
+        generator = np.random.default_rng(0)
+        if evidence.in_time:
+            first = [way * np.arange(len(self.photos)) for way in (1.0, -1.0)]
+            places = [_turned_to_faces(360.0 * row / len(row), evidence) for row in first]
+        else:
+            places = [_start(evidence, generator) for _ in range(starts)]
+        if near is not None:
+            places.append(near)
+        found = [self._placed(self._settle(place, evidence)) for place in places]
+        return sorted(found, key=lambda placed: placed.cost)
+
+    def near(self, best: Placed) -> list[Placed]:
+        """Return the cheapest ways to put photos in another order, and what is found from them."""
+        evidence = self.everything.only(self.photos)
+        azimuth = best.azimuth_deg[self.photos]
+        rows = [self._swapped(azimuth, int(photo)) for photo in np.nonzero(~self.fixed)[0]]
+        trials = np.concatenate([*rows, self._mirrored(azimuth)])
+        trials = trials[np.argsort(measure_cost(trials, evidence), kind="stable")]
+        others = [trial for trial in trials if differs(self._placed(trial), best)][:OTHERS]
+        settled = [self._settle(other, evidence) for other in others]
+        return [self._placed(other) for other in (*others, *settled)]
+
+    def evened(self, best: Placed) -> Placed:
+        """Return the arrangement with even steps, if they fit nearly as well."""
+        if self.fixed.any():
+            return best
+        azimuth, evidence = best.azimuth_deg[self.photos], self.everything.only(self.photos)
+        even = np.argsort(np.argsort(azimuth, kind="stable")) * (360.0 / len(azimuth))
+        even = _turned_to_faces(np.asarray(even, np.float64), evidence)
+        seen = np.isfinite(evidence.yaw_deg)
+        trust = 1 / (1 + (evidence.spread_deg[seen] / STRAY_DEG) ** 2)
+        even[seen] += trust * wrap(evidence.yaw_deg[seen] - even[seen])
+        placed = self._placed(even)
+        near = np.abs(wrap(placed.azimuth_deg - best.azimuth_deg)).max() < UNEVEN_DEG
+        fits = placed.cost < best.cost + UNEVEN
+        return replace(placed, cost=best.cost) if near and fits else best
+
+    def _settle(self, azimuth: Float64Array, evidence: Evidence) -> Float64Array:
+        """Return the arrangement (R,) to which moves lead, each to the cheapest place."""
+        cost = float(measure_cost(azimuth[None], evidence)[0])
+        free = np.nonzero(~self.fixed)[0]
+        for _ in range(ROUNDS):
+            before = cost
+            for photo in (*free, None):
+                trials = self._mirrored(azimuth) if photo is None else self._moved(azimuth, photo)
+                costs = measure_cost(trials, evidence)
+                least = int(costs.argmin())
+                if costs[least] < cost - GAIN:
+                    azimuth, cost = trials[least], float(costs[least])
+            if cost == before:
+                break
+        return azimuth
+
+    def _moved(self, azimuth: Float64Array, photo: int) -> Float64Array:
+        """Return arrangements (M, R) with one photo elsewhere, or in another's place."""
+        moved = np.repeat(azimuth[None], len(MOVES_DEG), axis=0)
+        moved[:, photo] += MOVES_DEG
+        return np.concatenate([moved, self._swapped(azimuth, photo)])
+
+    def _swapped(self, azimuth: Float64Array, photo: int) -> Float64Array:
+        """Return arrangements (M, R) with one photo in another's place."""
+        others = np.nonzero(~self.fixed)[0]
+        others = others[others != photo]
+        swapped, rows = np.repeat(azimuth[None], len(others), axis=0), np.arange(len(others))
+        swapped[:, photo], swapped[rows, others] = azimuth[others], azimuth[photo]
+        return swapped
+
+    def _mirrored(self, azimuth: Float64Array) -> Float64Array:
+        """Return arrangements (M, R) with the photos between any two in reverse order."""
+        around = azimuth % 360.0
+        first, second = np.nonzero(around[:, None] < around[None])
+        low, high = around[first][:, None], around[second][:, None]
+        between = (around >= low) & (around <= high) & ~self.fixed
+        return np.concatenate([azimuth[None], np.where(between, low + high - around, around)])
+
+    def _placed(self, azimuth: Float64Array) -> Placed:
+        """Return an arrangement (R,) as one of all photos."""
+        evidence = self.everything.only(self.photos)
+        count = len(self.everything.yaw_deg)
+        everywhere, above = np.nan_to_num(self.everything.yaw_deg), np.ones(count, np.bool_)
+        everywhere[self.photos], above[self.photos] = wrap(azimuth), False
+        off = np.nan_to_num(wrap(self.everything.yaw_deg - everywhere))
+        cost = float(measure_cost(azimuth[None], evidence)[0]) + self.prior
+        return Placed(everywhere, above, off, cost)
+
+
+def _start(evidence: Evidence, generator: np.random.Generator) -> Float64Array:
+    """Return faces where they look (R,), the other photos evenly behind, in random order."""
+    azimuth = evidence.yaw_deg.copy()
+    seen = np.isfinite(azimuth)
+    hidden = generator.permutation(np.nonzero(~seen)[0])
+    first, last = (azimuth[seen].min(), azimuth[seen].max()) if seen.any() else (0.0, 0.0)
+    steps = np.arange(1, len(hidden) + 1) / (len(hidden) + 1)
+    azimuth[hidden] = last + (first + 360.0 - last) * steps
+    return azimuth
+
+
+def _turned_to_faces(azimuth: Float64Array, evidence: Evidence) -> Float64Array:
+    """Return azimuths (R,) turned to the weighted circular mean of what faces say."""
+    seen = np.isfinite(evidence.yaw_deg)
+    off = np.exp(1j * np.radians(evidence.yaw_deg[seen] - azimuth[seen]))
+    return azimuth + float(np.degrees(np.angle(evidence.spread_deg[seen] ** -2.0 @ off)))

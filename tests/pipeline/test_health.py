@@ -17,7 +17,8 @@ from hairkit.arrays import Float64Array
 from hairkit.cameras.depth_raster import mesh_depth
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
-from hairkit.pipeline.health import GREEN, RED, Figure, Limits, assess, summarise
+from hairkit.pipeline.figure import GREEN, RED, Figure, Limits
+from hairkit.pipeline.health import assess, summarise
 from hairkit.rendering.measurement import draw_measurements
 from hairkit.synth import grow
 from hairkit.types.camera import Camera
@@ -197,6 +198,12 @@ def any_turn(run: Run) -> None:
     run.turn = run._turn(1.0)
 
 
+def no_back(run: Run) -> None:
+    """The photos leave out the back."""
+    turn = run._turn(1.5)
+    run.turn = replace(turn, azimuth_deg=np.linspace(-90.0, 90.0, 8))
+
+
 def combed_otherwise(run: Run) -> None:
     """The guides run across the directions that the photos show."""
     run.orientations = tuple(
@@ -215,6 +222,7 @@ FAULTS = {
     "cameras: outlines off by": wrong_outlines,
     "strands: roots grown": few_strands,
     "turn: margin over the next best": any_turn,
+    "turn: largest step": no_back,
     "parting: width of the skin": bare_hairline,
     "parting: sureness": unsure_crown,
     "strands: directions as photographed": combed_otherwise,
