@@ -72,9 +72,9 @@ photographed persons."""
 LEAST_TURNS = 2.0
 """Turns below which hair has no waves. Straight short hair of two photographed persons was 1.03 and
 1.15 of what was taken for a pitch long; wavy and curly hair of the captures is 3.3 to 4.4."""
-EVEN, FEWEST_COILED = 0.06, 3
-"""Angular moments of hair that runs in all directions alike, and the fewest views that must show
-it: 22 of 25 portraits of kinky hair are within 0.1, straight hair has 0.2 and more."""
+EVEN = 0.06
+"""Angular moments of hair that runs in all directions alike: 21 of 24 portraits of kinky hair have
+less, straight hair has 0.2 and more. Half of the views at least must show enough hair to tell."""
 SURE_PROMINENCE, WIDEST_CURL = 0.14, 0.045
 """Of the pitch of such hair: its least prominence, and its longest, metres, where it is curls; less
 than that, or longer, is chance."""
@@ -132,7 +132,7 @@ def _are_coils(views: Sequence[tuple[Float32Array, Float32Array]]) -> bool:
     seen one by one."""
     told = [found for view in views if (found := _angular_moments([view])) is not None]
     even = [max(abs(second), abs(fourth)) <= EVEN for second, fourth in told]
-    if len(told) < FEWEST_COILED or sum(even) <= LEAST_AGREEMENT * len(told):
+    if len(told) < len(views) / 2 or sum(even) <= LEAST_AGREEMENT * len(told):
         return False
     if _autocorrelation(_together([_sum_patches(view) for view in views]), FEWEST_PATCHES) is None:
         return False

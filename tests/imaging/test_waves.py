@@ -146,7 +146,7 @@ def test_straight_hair_and_noise_have_no_waves() -> None:
 
 def test_hair_that_runs_in_all_directions_alike_is_tightly_coiled(rng: np.random.Generator) -> None:
     """A texture without direction or repeats is that of coils which no photo of a head resolves; a
-    texture of one direction is not, nor one view alone."""
+    texture of one direction is not, nor is hair that few views show."""
 
     def textured(across: float, along: float) -> View:
         shape = (round(HEIGHT * PIXELS_PER_METRE), round(WIDTH * PIXELS_PER_METRE))
@@ -159,8 +159,10 @@ def test_hair_that_runs_in_all_directions_alike_is_tightly_coiled(rng: np.random
     capture = replace(capture, views=views)
     assert measure_waves(capture, maps, masks, cameras) == COILS
     assert measure_waves(*views_of(textured(1.5, 9))) == Waves()
-    alone = Capture(capture.views[:1]), maps[:1], masks[:1], cameras[:1]
-    assert measure_waves(*alone) == Waves()
+    bald = Mask(
+        np.where(np.arange(masks[0].labels.size) < 9, HAIR, 0).reshape(maps[0].angle.shape), True
+    )
+    assert measure_waves(capture, maps, [*masks[:1], *[bald] * 3], cameras) != COILS
 
 
 def test_too_little_hair_is_not_measured() -> None:
