@@ -7,7 +7,7 @@ plugins.
 * `draft`: a quick groom after a change by hand
 * `figure`: a figure of the health of a run, and its light
 * `find_views`: faces, persons, and from where each photo was taken
-* `drawn_directions`: guides against the directions in the photos
+* `drawn_hair`: guides against the photos themselves
 * `findings`: the walk through the stages
 * `head_alone`: the head with its skin, without hair
 * `health`: figures that tell how good a run is

@@ -1,0 +1,129 @@
+"""Drawn guides against the photos themselves: where they run, and where hair is.
+
+The directions that photos show are measured here once more (Bigun and Granlund 1987), by nothing
+that the guides were made from: a recipe whose `orient` is wrong everywhere agrees with itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from hairkit.arrays import BoolArray, Float32Array, Int64Array, UInt8Array
+from hairkit.cameras.depth_raster import HEAD_TOLERANCE, head_depth, point_depth
+from hairkit.types.camera import Camera
+from hairkit.types.groom import Groom
+from hairkit.types.mask import Mask
+from hairkit.types.orientation import angle_between
+
+HEIGHT, FINER = 240, 3
+"""Height in pixels at which guides and photos are compared, and how many times as fine the picture
+is in which directions are measured."""
+GRADIENT_SIGMA, WINDOW_SIGMA = 1.2, 2.7
+"""Gaussians before the gradient, in pixels of that picture, and of the tensor, in pixels of the
+comparison: strands, and locks."""
+RIM = 3
+"""Pixels of that picture that are taken off the hair on all sides: its edge is no strand."""
+DIRECTION_LIMIT = np.radians(20.0)
+"""Angle in the picture up to which a piece of a guide runs as photographed."""
+PIECES, GUIDE_RADIUS, EDGE = 39, 0.003, 3
+"""Pieces of a guide, the radius in metres within which it hides others, and the pixels that are
+taken off the hair: its edge has the direction of the outline."""
+BESIDE = 9
+"""Pixels, twice of which half a guide may lie beside the hair of a mask."""
+LOCK, USUAL_GUIDES = 0.01, 600
+"""Radius in metres of the lock that a guide stands for, where there are so many guides; fewer stand
+for wider ones."""
+
+
+@dataclass(frozen=True)
+class DrawnHair:
+    """What one view shows of the guides."""
+
+    right: float
+    """Length in pixels of visible guides that run as photographed."""
+    judged: float
+    """Length of those over hair whose direction the photo shows."""
+    astray: float
+    """Length of visible guides where the photo shows no hair."""
+    shown: float
+    """Length of all visible guides."""
+    bare: int
+    """Pixels of the photo's hair far from all guides."""
+    hair: int
+    """Pixels of the photo's hair."""
+    coherence: float
+    """How much the photo's hair runs one way nearby, its median: 0 for no direction, up to 1."""
+
+
+def compare_drawing(groom: Groom, camera: Camera, mask: Mask, photo: UInt8Array) -> DrawnHair:
+    """Compare the guides that one view shows, hidden by no other guide and no head, with its photo.
+
+    Directions count over hair away from its edge, where the photo shows them more clearly than in
+    its median; guides run as photographed within `DIRECTION_LIMIT`.
+    """
+    small = camera.resized(round(HEIGHT * camera.width / camera.height), HEIGHT)
+    size = (small.width, small.height)
+    labels = mask.hair.astype(np.uint8)
+    hair = np.asarray(cv2.resize(labels, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+    angle, sure = photo_directions(photo, labels, size)
+    inner = cv2.erode(hair, np.ones((EDGE, EDGE), np.uint8)) > 0
+    coherence = float(np.median(sure[inner])) if inner.any() else 0.0
+    judged = inner & (sure >= coherence)
+    near = cv2.dilate(hair, np.ones((BESIDE, BESIDE), np.uint8)) > 0
+    places, way, bare = _visible(groom, small, hair > 0)
+    length, at = np.linalg.norm(way, axis=1), (places[:, 1], places[:, 0])
+    gap = np.asarray(angle_between(np.arctan2(way[:, 1], way[:, 0]), angle[at]))
+    told, along = judged[at], gap <= DIRECTION_LIMIT
+    return DrawnHair(
+        float(length[told & along].sum()),
+        float(length[told].sum()),
+        float(length[~near[at]].sum()),
+        float(length.sum()),
+        bare,
+        int(hair.sum()),
+        coherence,
+    )
+
+
+def _visible(groom: Groom, camera: Camera, hair: BoolArray) -> tuple[Int64Array, Float32Array, int]:
+    """Return pixels (N, 2) and ways (N, 2) of visible pieces of guides, and hair without any."""
+    points = groom.strands.resampled(PIECES + 1).points.reshape(-1, PIECES + 1, 3)
+    dense = groom.strands.resampled(4 * PIECES).points
+    surface = np.minimum(point_depth(camera, dense, GUIDE_RADIUS), head_depth(groom.head, camera))
+    start, end = (camera.project(p).reshape(-1, 2) for p in (points[:, :-1], points[:, 1:]))
+    places = np.nan_to_num(np.floor((start + end) / 2), nan=-1).astype(np.int64)
+    size = [camera.width, camera.height]
+    inside = np.asarray(((places >= 0) & (places < size)).all(axis=1))
+    column, row = (places * inside[:, None]).T
+    depth = camera.depth((points[:, :-1] + points[:, 1:]) / 2).ravel()
+    seen = inside & (depth <= surface[row, column] + HEAD_TOLERANCE)
+    lock = LOCK * max(1.0, np.sqrt(USUAL_GUIDES / max(len(groom.strands), 1)))
+    bare = hair & np.isinf(point_depth(camera, dense, lock))
+    return places[seen], (end - start)[seen].astype(np.float32), int(bare.sum())
+
+
+def photo_directions(
+    photo: UInt8Array, hair: UInt8Array, size: tuple[int, int]
+) -> tuple[Float32Array, Float32Array]:
+    """Return angles in [0, pi) and coherence (height, width) of the hair, 1 where mask `hair`."""
+    fine = (FINER * size[0], FINER * size[1])
+    grey = cv2.cvtColor(photo, cv2.COLOR_RGB2GRAY).astype(np.float32)
+    grey = cv2.resize(grey, fine, interpolation=cv2.INTER_AREA).astype(np.float32)
+    grey = cv2.GaussianBlur(grey, (0, 0), GRADIENT_SIGMA).astype(np.float32)
+    inside = cv2.resize(hair, fine, interpolation=cv2.INTER_NEAREST)
+    inside = cv2.erode(inside, np.ones((2 * RIM + 1,) * 2, np.uint8)).astype(np.float32)
+    x, y = cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1)
+    parts = np.dstack([(x * x - y * y) * inside, 2 * x * y * inside, (x * x + y * y) * inside])
+    parts = cv2.resize(parts, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    even, mixed, energy = np.moveaxis(cv2.GaussianBlur(parts, (0, 0), WINDOW_SIGMA), -1, 0)
+    angle = (np.arctan2(mixed, even) + np.pi) / 2  # along the strand, across the gradient
+    coherence = np.hypot(even, mixed) / np.maximum(energy, 1e-3)
+    return np.asarray(angle % np.pi, np.float32), np.asarray(coherence, np.float32)
+
+
+def share_of(part: float, whole: float) -> float:
+    """Return a share; 1 of nothing."""
+    return part / whole if whole else 1.0
