@@ -207,11 +207,17 @@ def combed_otherwise(run: Run) -> None:
     run.capture = replace(run.capture, views=striped)
 
 
-def cut_short(run: Run) -> None:
-    """The strands end at a tenth of their length."""
-    points = run.groom.strands.resampled(21).points.reshape(-1, 21, 3)[:, :3]
-    offsets = np.arange(len(points) + 1) * 3
-    run.groom = replace(run.groom, strands=Strands(points.reshape(-1, 3), offsets))
+def half_bald(run: Run) -> None:
+    """No strand grows on the left half of the head."""
+    points = run.groom.strands.resampled(21).points.reshape(-1, 21, 3)
+    kept = points[points[:, 0, 0] < 0]
+    offsets = np.arange(len(kept) + 1) * 21
+    run.groom = replace(
+        run.groom,
+        strands=Strands(kept.reshape(-1, 3), offsets),
+        root_triangle=run.groom.root_triangle[points[:, 0, 0] < 0],
+        root_barycentric=run.groom.root_barycentric[points[:, 0, 0] < 0],
+    )
 
 
 def combed_up(run: Run) -> None:
@@ -242,7 +248,7 @@ FAULTS = {
     "parting: sureness": unsure_crown,
     "strands: directions as photographed": combed_otherwise,
     "strands: drawn where no photo has hair": combed_up,
-    "strands: hair left bare": cut_short,
+    "strands: hair left bare": half_bald,
     "strands: direction of curly hair": curled,
 }
 
