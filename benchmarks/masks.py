@@ -32,6 +32,7 @@ def main() -> None:
     parser.add_argument("--photos", type=Path, help="folder of photos, instead of captures")
     parser.add_argument("--masks", type=Path, help="folder of their masks, .pbm or .png")
     parser.add_argument("--every", type=int, default=1, help="score every n-th photo alone")
+    parser.add_argument("--first", type=int, default=0, help="the first photo that is scored")
     parser.add_argument("--no-networks", action="store_true", help="do not look for faces, persons")
     parser.add_argument("--overlays", type=Path, help="folder for pictures of the errors")
     arguments = parser.parse_args()
@@ -43,7 +44,8 @@ def main() -> None:
     print("|---|---|---|---|---|")
     for name, pairs in _sets(arguments).items():
         scores = [
-            _score(photo, mask, manager, arguments) for photo, mask in pairs[:: arguments.every]
+            _score(photo, mask, manager, arguments)
+            for photo, mask in pairs[arguments.first :: arguments.every]
         ]
         middle = f"{np.mean(scores):.3f} | {np.min(scores):.3f} | {np.median(scores):.3f}"
         print(f"| {name} | {len(scores)} | {middle} |", flush=True)

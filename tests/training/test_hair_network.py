@@ -11,9 +11,11 @@ import pytest
 
 from hairkit.imaging.hair_features import CHANNELS, GRID
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
+from training.hair_network.bodies import dress
 from training.hair_network.colours import noise, recolour
 from training.hair_network.compose import label_shares
 from training.hair_network.composer import compose, place
+from training.hair_network.looks import fade_hair
 from training.hair_network.renders import Render
 
 
@@ -67,6 +69,33 @@ def test_hair_of_another_colour_keeps_its_strands(render: Render) -> None:
     assert np.array_equal(changed[~hair], lab[~hair])
 
 
+def test_a_body_takes_no_skin_and_adds_no_hair(render: Render) -> None:
+    """All hair was hair or grew on at the lower edge; bare skin and what was a person are one."""
+    for seed in range(8):
+        dressed, bare = dress(_generator(seed), render)
+        assert dressed.image.shape[:2] == dressed.labels.shape == dressed.head.shape == bare.shape
+        assert (dressed.labels[bare] == PERSON).all()
+        left = (dressed.labels.shape[1] - render.labels.shape[1]) // 2
+        old = dressed.labels[:160, left : left + 120]
+        assert not ((old == HAIR) & (render.labels != HAIR)).any()
+        assert not ((old == BACKGROUND) & (render.labels == PERSON)).any()
+
+
+def test_a_fading_cut_keeps_the_hair_above(render: Render) -> None:
+    """Hair becomes person from its lower edge on, on the head alone, in some of the pictures."""
+    short = np.where(render.head, render.labels, np.uint8(BACKGROUND))
+    lab = np.full((*short.shape, 3), 30, np.float32)
+    skin, counts = np.array([70.0, 10, 15]), []
+    for seed in range(12):
+        painted, labels = fade_hair(_generator(seed), lab, short, render.head, skin)
+        gone = (labels != short) & (short == HAIR)
+        assert np.array_equal(labels != short, gone)
+        assert (labels[gone] == PERSON).all()
+        assert np.array_equal(painted[~render.head], lab[~render.head])
+        counts.append(int(gone.sum()))
+    assert min(counts) == 0 < max(counts)
+
+
 def test_shares_of_labels_add_up(render: Render) -> None:
     """They are 1 together in the photo and 0 outside, and hair has the area of its label."""
     shares = label_shares(render.labels, (96, GRID))
@@ -93,6 +122,23 @@ def test_numpy_runs_what_pytorch_trained(tmp_path: Path) -> None:
     assert set(written) == set(before)
     assert not np.allclose(written["exit.bias"], before["exit.bias"].numpy(), atol=1e-5)
     assert train.disagreement(tmp_path / "weights.npz", features[0]) < 1e-4
+    old = ["--start", words[2], "--blend", words[2]]
+    train.main([words[0], "-o", str(tmp_path / "again.npz"), "--steps", "1", "--new", "0", *old])
+    again: Any = np.load(tmp_path / "again.npz")
+    assert all(np.array_equal(again[name], written[name]) for name in before)
+
+
+def test_a_wider_network_starts_as_the_narrow_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Channels that are added change no score."""
+    torch = pytest.importorskip("torch", reason="training needs PyTorch, which is not installed")
+    from training.hair_network import train
+
+    wide = train.new_weights(1)
+    monkeypatch.setattr(train, "WIDTHS", tuple(width - 8 for width in train.WIDTHS))
+    narrow = train.new_weights(2)
+    x = torch.from_numpy(_generator(4).normal(size=(1, CHANNELS, GRID, GRID)).astype(np.float32))
+    first, second = (train.network(each, x) for each in (narrow, train.widen(narrow, wide)))
+    assert np.allclose(first.numpy(), second.numpy(), atol=1e-4)
 
 
 def _generator(seed: int) -> np.random.Generator:

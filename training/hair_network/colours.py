@@ -89,10 +89,10 @@ def recolour(lab: Array, region: BoolArray, target: Array, gain: float) -> Array
 
 
 def texture(rng: Generator, shape: tuple[int, int]) -> Array:
-    """Return (h, w, 3) a pattern for cloth or backdrop: plain, stripes, spots, weave, boxes."""
+    """Return (h, w, 3) a pattern for cloth or backdrop: plain, stripes, spots, boxes, leaves."""
     base, other = (np.array([rng.uniform(5, 95), *rng.normal(0, 16, 2)]) for _ in range(2))
     share: Array = np.zeros(shape, np.float32)
-    kind, width = rng.integers(7), shape[1]
+    kind, width = rng.integers(8), shape[1]
     if kind == 1:
         stripes = np.sin(np.arange(width, dtype=np.float32) / rng.uniform(2, 30))
         share = turn(rng, np.tile(stripes, (shape[0], 1))) > rng.uniform(-0.8, 0.8)
@@ -110,6 +110,11 @@ def texture(rng: Generator, shape: tuple[int, int]) -> Array:
     elif kind == 6:
         for _ in range(rng.integers(3, 25)):
             lab[random_box(rng, shape, 0.6)] = (rng.uniform(5, 98), *rng.normal(0, 16, 2))
+    elif kind == 7:  # leaves, stone or fur: detail of all sizes, along a direction or not
+        stretch = rng.uniform(1, 6)
+        for scale in 2.0 ** np.arange(1, 7):
+            field = turn(rng, noise(rng, shape, scale * stretch, scale))
+            lab += field[..., None] * rng.normal(0, (7, 2.5, 2.5))
     lab += noise(rng, shape, shape[0] / 2)[..., None] * (rng.uniform(0, 12), 1.5, 1.5)
     lab[..., 0] += noise(rng, shape, rng.uniform(1, 3)) * rng.uniform(0, 3)
     return np.asarray(lab, np.float32)

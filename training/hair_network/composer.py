@@ -13,12 +13,16 @@ from numpy.random import Generator
 from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
+from .bodies import dress
 from .colours import Array, noise, random_box, texture, to_lab, to_rgb
-from .looks import cover_hair, paint_cloth, paint_face, paint_hair, paint_skin, thin_hair
+from .looks import cover_hair, fade_hair, paint_cloth, paint_face, paint_hair, paint_skin, thin_hair
 from .renders import Render
 
 EDGE = 640
 """Pixels of the longer side of a training picture: those in which the features see texture."""
+
+UNDRESSED = 0.35
+"""Share of the pictures that keep the render's bust."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,17 +38,27 @@ class Composite:
 def compose(renders: Sequence[Render], rng: Generator) -> Composite:
     """Return a picture of one of the renders, changed at random."""
     render = renders[int(rng.integers(len(renders)))]
+    bare, plain = np.zeros_like(render.head), rng.random() < UNDRESSED
+    if not plain:
+        render, bare = dress(rng, render)
     labels = thin_hair(rng, render)
     bald = (labels == PERSON) & (render.labels == HAIR)
-    skin = (labels == PERSON) & (render.labels == PERSON) & render.head
+    skin = (labels == PERSON) & (render.labels == PERSON) & (render.head | bare)
     lab, hair = paint_hair(rng, to_lab(render.image), labels == HAIR)
     lab, skin_tone = paint_skin(rng, lab, skin, bald)
+    lab, labels = fade_hair(rng, lab, labels, render.head, skin_tone)
     if render.landmarks is not None:
         lab = paint_face(rng, lab, labels == PERSON, render.landmarks, hair)
-    cloth = (labels == PERSON) & ~skin & ~bald
-    lab = paint_cloth(rng, lab, cloth, skin_tone, hair)
+    cloth = (labels == PERSON) & (render.labels == PERSON) & ~skin
+    if not plain or rng.random() < 0.75:
+        lab = paint_cloth(rng, lab, cloth, skin_tone, hair)
     lab, labels = cover_hair(rng, lab, labels, skin_tone)
-    if rng.random() < 0.8 or not np.array_equal(labels > 0, render.labels > 0) or bald.any():
+    if (
+        not plain
+        or rng.random() < 0.8
+        or not np.array_equal(labels > 0, render.labels > 0)
+        or bald.any()
+    ):
         front = cv2.GaussianBlur((labels != BACKGROUND).astype(np.float32), (0, 0), 0.8)
         lab = lab * front[..., None] + _backdrop(rng, renders, labels.shape) * (
             1 - front[..., None]
@@ -62,7 +76,7 @@ def place(rng: Generator, picture: Array, labels: UInt8Array) -> tuple[Array, UI
     rows, columns = np.nonzero(labels == HAIR)
     low, high = np.zeros(2), np.array([width, height], np.float64)
     if rng.random() < 0.75 and len(rows):
-        extent = max(np.ptp(rows), np.ptp(columns)) * np.exp(rng.uniform(*np.log((0.75, 2.6))))
+        extent = max(np.ptp(rows), np.ptp(columns)) * np.exp(rng.uniform(*np.log((0.6, 3.2))))
         aspect = np.exp(rng.uniform(-0.45, 0.35) * np.array([0.5, -0.5]))
         middle = np.array([columns.mean(), rows.mean()])
         middle += rng.normal((0, 0.05), 0.14) * extent * aspect
@@ -99,6 +113,7 @@ def _backdrop(rng: Generator, renders: Sequence[Render], shape: tuple[int, ...])
             lab[box] = texture(rng, size)[box]
     else:
         other = renders[int(rng.integers(len(renders)))].image
+        other = np.roll(other, rng.integers(other.shape[1]), axis=1)
         lab = to_lab(cv2.resize(other, size[::-1])) * (rng.uniform(0.5, 1.3), 1, 1)
         if rng.random() < 0.7:
             lab = cv2.GaussianBlur(lab, (0, 0), rng.uniform(8, 30))

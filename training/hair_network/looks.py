@@ -15,6 +15,9 @@ from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 from .colours import Array, hair_colour, noise, recolour, skin_colour, texture, turn
 from .renders import Render
 
+PLAITED = 0.2
+"""Share of the pictures whose hair lies in locks of many directions: braids, buns, curls."""
+
 
 def thin_hair(rng: Generator, render: Render) -> UInt8Array:
     """Return the labels of an empty picture, of a head bald in part or wholly, or as rendered."""
@@ -22,7 +25,7 @@ def thin_hair(rng: Generator, render: Render) -> UInt8Array:
     if chance < 0.04:
         return np.full_like(render.labels, BACKGROUND)
     labels = render.labels.copy()
-    if chance > 0.24 or not render.head.any():
+    if chance > 0.2 or not render.head.any():
         return labels
     rows, columns = np.nonzero(render.head)
     left, right = np.percentile(columns, (1, 99))
@@ -62,7 +65,54 @@ def paint_hair(rng: Generator, lab: Array, hair: BoolArray) -> tuple[Array, Arra
             locks += rng.uniform(0, 1) * (turn(rng, lock) if rng.random() < 0.6 else lock)
         shade = lab[..., 0] * np.exp(rng.uniform(0.05, 0.45) * locks) + rng.uniform(0, 4) * locks
         lab[..., 0] = np.where(hair, np.clip(shade, 1, 99), lab[..., 0])
+    if rng.random() < PLAITED:
+        lab = np.where(hair[..., None], _plaits(rng, lab, hair), lab)
+    if rng.random() < 0.25:
+        lab[..., 0] = np.where(hair, lab[..., 0] * _ropes(rng, shape), lab[..., 0])
     return lab, colour
+
+
+def _plaits(rng: Generator, lab: Array, hair: BoolArray) -> Array:
+    """Return a picture of locks of this hair, each with strands of a direction of its own."""
+    depth = cv2.distanceTransform(hair.astype(np.uint8), cv2.DIST_L2, 3)
+    row, column = np.unravel_index(depth.argmax(), depth.shape)
+    half = int(depth.max() * 0.7)
+    if half < 8:
+        return lab
+    sample = lab[row - half : row + half, column - half : column + half].astype(np.float32)
+    rows, columns = np.mgrid[: hair.shape[0], : hair.shape[1]].astype(np.float32)
+    count = int(rng.integers(12, 90))
+    seeds = rng.uniform(0, 1, (count, 2)) * hair.shape
+    angles, stretch = rng.uniform(0, np.pi, count), rng.uniform(1.2, 3.5)
+    first, second = np.full((2, *hair.shape), np.inf, np.float32)
+    to = np.zeros((2, *hair.shape), np.float32)
+    for (y, x), angle in zip(seeds, angles, strict=True):
+        along = np.cos(angle) * (columns - x) + np.sin(angle) * (rows - y)
+        across = np.cos(angle) * (rows - y) - np.sin(angle) * (columns - x)
+        away = np.hypot(along / stretch, across)
+        nearer = away < first
+        second = np.minimum(second, np.where(nearer, first, away))
+        first = np.where(nearer, away, first)
+        to = np.where(nearer, np.stack([across, along]) + half, to).astype(np.float32)
+    locks = cv2.remap(sample, to[0], to[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+    round_ones = np.clip((second - first) / (0.25 * (second + first)), 0, 1)
+    deep = rng.uniform(0.2, 0.8)
+    locks[..., 0] *= (1 - deep + deep * round_ones**0.7) * rng.uniform(0.9, 1.3)
+    return np.asarray(locks)
+
+
+def _ropes(rng: Generator, shape: tuple[int, int]) -> Array:
+    """Return (H, W) factors of the lightness: braids or dreadlocks, round and dark between."""
+    height, width = shape
+    rows, columns = np.mgrid[:height, :width].astype(np.float32)
+    thick = rng.uniform(5, 22)
+    bend = rng.uniform(0.3, 2.5) * noise(rng, shape, rng.uniform(40, 200), rng.uniform(30, 120))
+    lean = rng.uniform(-0.6, 0.6) * (rows - height / 2) * np.sign(columns - width / 2)
+    phase = np.pi * ((columns + lean * rng.random()) / thick + bend)
+    round_ones = np.abs(np.sin(phase)) ** rng.uniform(0.4, 1.2)
+    twist = np.abs(np.sin(np.pi * rows / (thick * rng.uniform(0.8, 2)) + phase))
+    deep = rng.uniform(0.3, 0.9)
+    return np.asarray((1 - deep + deep * round_ones) * (1 - rng.uniform(0, 0.4) * twist) * 1.2)
 
 
 def paint_skin(rng: Generator, lab: Array, skin: BoolArray, bald: BoolArray) -> tuple[Array, Array]:
@@ -85,6 +135,28 @@ def paint_skin(rng: Generator, lab: Array, skin: BoolArray, bald: BoolArray) -> 
     bare += lab[skin].mean(axis=0) if skin.any() else colour
     soft = cv2.GaussianBlur(bald.astype(np.float32), (0, 0), rng.uniform(0.6, 4)) * (bald | skin)
     return lab + (bare - lab) * soft[..., None], colour
+
+
+def fade_hair(
+    rng: Generator, lab: Array, labels: UInt8Array, head: BoolArray, skin: Array
+) -> tuple[Array, UInt8Array]:
+    """Return picture and labels of a short cut that fades to stubble on its way down."""
+    hair = labels == HAIR
+    if rng.random() > 0.25 or not (hair & head).any() or (hair & ~head).sum() > 0.35 * hair.sum():
+        return lab, labels
+    rows, columns = np.nonzero(head)
+    left, right = np.percentile(columns[rows < rows.min() + 0.5 * np.ptp(rows)], (1, 99))
+    width = right - left
+    down, across = np.mgrid[: hair.shape[0], : hair.shape[1]]
+    place = (down - rows.min()) / width + rng.uniform(-0.35, 0.35) * (across - left) / width
+    place = place + 0.04 * noise(rng, hair.shape, width * 0.15)
+    share = np.clip((rng.uniform(0.35, 1.1) - place) / rng.uniform(0.05, 0.45) + 0.5, 0, 1)
+    stubble = rng.uniform(0, 0.35)
+    mixed = np.maximum(share, stubble) + 0.06 * noise(rng, hair.shape, 1.5)
+    bare = skin + 3 * noise(rng, hair.shape, width * 0.3)[..., None] * (1, 0, 0)
+    faded = bare + (lab - bare) * np.clip(mixed, 0, 1)[..., None]
+    kept = np.where(hair & head & (share < 0.3), np.uint8(PERSON), labels)
+    return np.where((hair & head)[..., None], faded, lab), kept.astype(np.uint8)
 
 
 def paint_face(
@@ -124,7 +196,7 @@ def paint_face(
 
 def paint_cloth(rng: Generator, lab: Array, cloth: BoolArray, skin: Array, hair: Array) -> Array:
     """Return the picture with other clothes: patterned, of the skin's or hair's colour, black."""
-    if rng.random() > 0.75 or not cloth.any():
+    if not cloth.any():
         return lab
     other, chance, shape = texture(rng, cloth.shape), rng.random(), cloth.shape
     if chance < 0.2:
