@@ -99,6 +99,7 @@ PERSONS = Stage(
     "person", Person, "segment_person", "looking for the person", 2, KEPT,
     each=True, several=True, absent=Person.absent,
 )  # fmt: skip
+REGION = Stage("region", Framing, words="finding the person", draft=KEPT)
 FRAMED = Stage("frame", Framing, words="finding the head", draft=KEPT)
 TURN = Stage("turn", Turnaround, "find_turn", "ordering the photos", 1, KEPT)
 LABELS = Stage(

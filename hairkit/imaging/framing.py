@@ -16,7 +16,7 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array, Int64Array, UInt8Array
 from hairkit.imaging.hair_network import find_hair, hair_probability, likely_landmarks
-from hairkit.imaging.person_outline import Outline, trace_outline
+from hairkit.imaging.person_outline import PERSON_LEVEL, Outline, trace_outline
 from hairkit.types.capture import Capture, View
 from hairkit.types.face import SURE_PRESENCE, Face
 from hairkit.types.framing import Framing
@@ -31,6 +31,9 @@ TURNS_TO_BOTTOM = np.array([0, 1, 2, 3])
 """Clockwise quarter turns that bring the bottom, right, top and left edge to the bottom."""
 EYES, MOUTH = slice(36, 48), slice(48, 68)
 """iBUG landmarks of the eyes and of the mouth."""
+ROOM, REGION = 0.1, 0.7
+"""A person who fills less than the second share of the photo's longer side is cropped first, with
+this share of room around."""
 WIDTH_OF_FACE, CROWN_OF_FACE = 2.8, 1.75
 """Width of a head with its hair, and height of its crown above the eyes, in lengths from eyes to
 mouth: means of 13 captures."""
@@ -63,24 +66,57 @@ class Head(NamedTuple):
 
 
 def find_framing(capture: Capture, faces: tuple[Face, ...], persons: tuple[Person, ...]) -> Framing:
-    """Return how photos are turned upright, and the part of each that holds the head.
+    """Return the part of each photo that holds the head.
 
     Parameters
     ----------
     capture
-        The photos as they were read, in any order.
+        The photos, or parts of them, upright, in any order.
     faces, persons
         What was found in each.
+    """
+    seen = zip(capture.views, faces, persons, strict=True)
+    views = [view.with_findings(face, person) for view, face, person in seen]
+    heads = _of_one_size([_find_head(view) for view in views], views)
+    parts = _parts(views, heads)
+    frames = [view.to_photo(part) for view, part in zip(views, parts, strict=True)]
+    middles = [_middle(*each) for each in zip(views, heads, parts, strict=True)]
+    turns = np.array([view.quarter_turns for view in views])
+    return Framing(turns, np.rint(frames).astype(np.int64).reshape(-1, 4), np.array(middles))
+
+
+def find_regions(capture: Capture, faces: tuple[Face, ...], persons: tuple[Person, ...]) -> Framing:
+    """Return how photos are turned upright, and the part of each that holds the person, if small.
+
+    Arguments are those of `find_framing`, of whole photos that may lie on their side.
     """
     sizes = [(view.width, view.height) for view in capture.views]
     turns = find_quarter_turns(sizes, faces, persons)
     seen = zip(capture.views, faces, persons, turns, strict=True)
     views = [view.with_findings(face, person).turned(int(n)) for view, face, person, n in seen]
-    heads = _of_one_size([_find_head(view) for view in views], views)
-    parts = _parts(views, heads)
-    frames = [view.to_photo(part) for view, part in zip(views, parts, strict=True)]
-    middles = [_middle(*each) for each in zip(views, heads, parts, strict=True)]
+    frames = [view.to_photo(_region(view)) for view in views]
+    middles = [frame.mean(axis=0) for frame in frames]
     return Framing(turns, np.rint(frames).astype(np.int64).reshape(-1, 4), np.array(middles))
+
+
+def _region(view: View) -> Float64Array:
+    """Return the corners (2, 2) of the part of a picture that holds the person; all where large."""
+    whole = _whole(view)
+    inside = None if view.person is None else _person_or_hair(view) > PERSON_LEVEL
+    if inside is None or not inside.any():
+        return whole
+    spans = [np.nonzero(inside.any(axis))[0][[0, -1]] for axis in (0, 1)]
+    first, last = np.transpose(spans).astype(np.float64)
+    room = ROOM * (last - first).max()
+    part = np.stack([first - room, last + room]).clip(*whole)
+    return whole if (part[1] - part[0]).max() > REGION * whole.max() else part
+
+
+def _person_or_hair(view: View) -> UInt8Array:
+    """Return the larger (H, W) of the probabilities of the person and of hair, of 255."""
+    assert view.person is not None  # else nobody asks
+    hair = cv2.resize(find_hair(view)[..., 0], (view.width, view.height))
+    return np.maximum(view.person.alpha, (255 * hair).astype(np.uint8))
 
 
 def find_quarter_turns(
@@ -127,8 +163,7 @@ def _find_head(view: View) -> Head | None:
     landmarks = likely_landmarks(view)
     outline = None if view.person is None else trace_outline(view.person.alpha)
     if landmarks is None and view.person is not None:
-        hair = cv2.resize(find_hair(view)[..., 0], (view.width, view.height))
-        outline = trace_outline(np.maximum(view.person.alpha, (255 * hair).astype(np.uint8)))
+        outline = trace_outline(_person_or_hair(view))
     if landmarks is None:
         return None if outline is None else _head_of(outline)
     eyes, mouth = landmarks[EYES].mean(axis=0), landmarks[MOUTH].mean(axis=0)
@@ -147,7 +182,7 @@ def _head_of(outline: Outline) -> Head:
 
 def _of_one_size(heads: list[Head | None], views: Sequence[View]) -> list[Head | None]:
     """Return the heads, each as wide as the median one in a photo of its size."""
-    edges = [max(view.width, view.height) for view in views]
+    edges = [max(view.photo_size) / view.scale for view in views]
     shares = [head.width / edge for head, edge in zip(heads, edges, strict=True) if head]
     usual = float(np.median(shares)) if shares else 0.0
     each = zip(heads, edges, strict=True)
@@ -170,9 +205,9 @@ def _parts(views: Sequence[View], heads: Sequence[Head | None]) -> list[Float64A
 
 
 def _middle(view: View, head: Head | None, part: Float64Array) -> Float64Array:
-    """Return the middle of a head in the photo on disk; of the photo where it is whole."""
+    """Return the middle of a head in the photo on disk; of the picture where that is whole."""
     if head is None or np.array_equal(part, _whole(view)):
-        return np.array(view.photo_size) / 2
+        return view.to_photo(view.aim)
     return view.to_photo(np.array([head.middle, head.crown + MIDDLE * head.width]))
 
 

@@ -12,18 +12,15 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 
-from hairkit.imaging.framing import find_framing
+from hairkit.imaging.framing import find_framing, find_regions
 from hairkit.io.framed_photos import frame_view
 from hairkit.pipeline.stage_runner import Given, StageRunner, gather, given_photo
-from hairkit.stages import FACES, FRAMED, PERSONS, TURN
+from hairkit.stages import FACES, FRAMED, PERSONS, REGION, TURN
 from hairkit.types.capture import Capture, View
 from hairkit.types.face import Face
 from hairkit.types.framing import Framing
 from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
-
-FRAMED_NAME = "framed-"
-"""Begins the names of the results for photos that were turned or cropped."""
 
 
 def find_views(run: StageRunner, capture: Capture) -> tuple[Capture, Turnaround | None]:
@@ -32,20 +29,18 @@ def find_views(run: StageRunner, capture: Capture) -> tuple[Capture, Turnaround 
     The turn is None where the recipe looks for none.
     """
     faces, persons = _look(run, capture.views)
-    framing = run.derive(
-        FRAMED,
-        find_framing,
-        capture=_bare(capture),
-        faces=gather(faces),
-        persons=gather(persons),
-    ).value
-    framed = frame_photos(capture, framing)
+    framed = capture
+    for stage, find in ((REGION, find_regions), (FRAMED, find_framing)):
+        before = framed.views
+        framing = run.derive(
+            stage, find, capture=_bare(framed), faces=gather(faces), persons=gather(persons)
+        ).value
+        framed = frame_photos(capture, framing, before)
+        changed = [k for k, view in enumerate(framed.views) if view is not before[k]]
+        again = _look(run, [framed.views[k] for k in changed], f"{stage.name}-")
+        for k, face, person in zip(changed, *again, strict=True):
+            faces[k], persons[k] = face, person
     _tell(run, framed.views)
-    pairs = enumerate(zip(framed.views, capture.views, strict=True))
-    changed = [k for k, (new, old) in pairs if new is not old]
-    again = _look(run, [framed.views[k] for k in changed], FRAMED_NAME)
-    for k, face, person in zip(changed, *again, strict=True):
-        faces[k], persons[k] = face, person
     found = zip(framed.views, faces, persons, strict=True)
     views = (v.with_findings(f.result().value, p.result().value) for v, f, p in found)
     seen = replace(framed, views=tuple(views))
@@ -56,12 +51,16 @@ def find_views(run: StageRunner, capture: Capture) -> tuple[Capture, Turnaround 
     return seen.arranged(turn), turn
 
 
-def frame_photos(capture: Capture, framing: Framing) -> Capture:
-    """Return the capture with its photos upright and cropped to the head."""
-    views = (
-        frame_view(view, int(framing.quarter_turns[k]), framing.frames[k], framing.heads[k])
-        for k, view in enumerate(capture.views)
-    )
+def frame_photos(capture: Capture, framing: Framing, known: Sequence[View] = ()) -> Capture:
+    """Return the capture with its photos upright and cropped to the head.
+
+    `known` are views of the photos that are framed already; those that stay as they are are kept.
+    """
+    views = []
+    for k, view in enumerate(capture.views):
+        turns, frame = int(framing.quarter_turns[k]), tuple(framing.frames[k].tolist())
+        same = known and (known[k].quarter_turns, known[k].frame) == (turns, frame)
+        views.append(known[k] if same else frame_view(view, turns, frame, framing.heads[k]))
     return replace(capture, views=tuple(views))
 
 
