@@ -34,6 +34,9 @@ EYES, MOUTH = slice(36, 48), slice(48, 68)
 ROOM, REGION = 0.1, 0.7
 """A person who fills less than the second share of the photo's longer side is cropped first, with
 this share of room around."""
+BORDER_LEVELS, SIDE_DRAWN = 12, 0.5
+"""Levels by which a border's pixels differ at most from its corner, and the least share of each
+side of a picture inside of it that differs more: a person before a white wall has no such sides."""
 WIDTH_OF_FACE, CROWN_OF_FACE = 2.8, 1.75
 """Width of a head with its hair, and height of its crown above the eyes, in lengths from eyes to
 mouth: means of 13 captures."""
@@ -101,7 +104,7 @@ def find_regions(capture: Capture, faces: tuple[Face, ...], persons: tuple[Perso
 
 def _region(view: View) -> Float64Array:
     """Return the corners (2, 2) of the part of a picture that holds the person; all where large."""
-    whole = _whole(view)
+    whole = _without_border(view.image)
     inside = None if view.person is None else _person_or_hair(view) > PERSON_LEVEL
     if inside is None or not inside.any():
         return whole
@@ -109,7 +112,22 @@ def _region(view: View) -> Float64Array:
     first, last = np.transpose(spans).astype(np.float64)
     room = ROOM * (last - first).max()
     part = np.stack([first - room, last + room]).clip(*whole)
-    return whole if (part[1] - part[0]).max() > REGION * whole.max() else part
+    return whole if (part[1] - part[0]).max() > REGION * max(view.width, view.height) else part
+
+
+def _without_border(image: UInt8Array) -> Float64Array:
+    """Return the corners (2, 2) of a picture inside a border of one colour; all without such."""
+    whole = np.array([[0.0, 0.0], image.shape[1::-1]])
+    apart = cv2.absdiff(image, np.full_like(image, image[0, 0]))
+    drawn: BoolArray = np.asarray((np.asarray(apart) > BORDER_LEVELS).any(axis=-1))
+    if not drawn.any():
+        return whole
+    (left, right), (top, bottom) = (np.nonzero(drawn.any(axis))[0][[0, -1]] for axis in (0, 1))
+    inner = drawn[top : bottom + 1, left : right + 1]
+    sides = (inner[0], inner[-1], inner[:, 0], inner[:, -1])
+    if min(side.mean() for side in sides) < SIDE_DRAWN:
+        return whole
+    return np.array([[left, top], [right + 1, bottom + 1]], np.float64)
 
 
 def _person_or_hair(view: View) -> UInt8Array:

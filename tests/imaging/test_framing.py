@@ -98,6 +98,21 @@ def test_a_head_that_fills_the_photo_is_left_alone() -> None:
         assert frame_view(view, 0, found.frames[0], found.heads[0]) is view
 
 
+def test_borders_of_one_colour_are_cropped() -> None:
+    """A photo on a canvas is cropped to it; a person before a wall of one colour is not."""
+    rng = np.random.default_rng(0)
+    canvas = np.full((HEIGHT, WIDTH, 3), 200, np.uint8)
+    canvas[200:700, 100:560] = rng.integers(0, 120, (500, 460, 3))
+    canvas[:, :, 0] += rng.integers(0, 3, (HEIGHT, WIDTH)).astype(np.uint8)
+    view = View("x", 0.0, canvas)
+    found = find_regions(Capture((view,)), (Face.absent(),), (Person.absent(),))
+    assert found.frames.tolist() == [[100, 200, 560, 700]]
+    view, face, person = shoot(300, 200, 60)
+    plain = replace(view, image=np.dstack([200 - person.alpha // 2] * 3))
+    found = find_regions(Capture((plain,)), (face,), (person,))
+    assert found.frames.tolist() == [[0, 0, WIDTH, HEIGHT]]
+
+
 def test_faces_are_believed_where_the_silhouette_is_of_somebody_else() -> None:
     """A face far from the largest person's head is the head; so it is without any silhouette."""
     view, face, _ = shoot(480, 500, face=True)
