@@ -104,15 +104,21 @@ def find_regions(capture: Capture, faces: tuple[Face, ...], persons: tuple[Perso
 
 def _region(view: View) -> Float64Array:
     """Return the corners (2, 2) of the part of a picture that holds the person; all where large."""
-    whole = _without_border(view.image)
+    inner = _if_small(_without_border(view.image), view)
     inside = None if view.person is None else _person_or_hair(view) > PERSON_LEVEL
     if inside is None or not inside.any():
-        return whole
+        return inner
     spans = [np.nonzero(inside.any(axis))[0][[0, -1]] for axis in (0, 1)]
     first, last = np.transpose(spans).astype(np.float64)
     room = ROOM * (last - first).max()
-    part = np.stack([first - room, last + room]).clip(*whole)
-    return whole if (part[1] - part[0]).max() > REGION * max(view.width, view.height) else part
+    part = _if_small(np.stack([first - room, last + room]), view)
+    return np.asarray(part.clip(*inner), np.float64)
+
+
+def _if_small(part: Float64Array, view: View) -> Float64Array:
+    """Return corners (2, 2), those of the whole picture where the part is most of it."""
+    large = (part[1] - part[0]).max() > REGION * max(view.width, view.height)
+    return _whole(view) if large else part
 
 
 def _without_border(image: UInt8Array) -> Float64Array:
