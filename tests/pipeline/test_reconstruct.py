@@ -186,7 +186,7 @@ def test_the_plugins_own_file_is_part_of_the_digest(tmp_path: Path) -> None:
         stages = read_record(tmp_path / "out" / RECORD).stages
         assert len(stages) > 2
         photos_alone = ("region", "frame")  # where no plugin finds faces or persons
-        assert not any(stage.reused for stage in stages if stage.name not in photos_alone)
+        assert not any(stage.reused for stage in stages if stage.stage not in photos_alone)
 
 
 @pytest.fixture(scope="module")
