@@ -51,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from hairkit.pipeline.single_photo import see_photo
     from hairkit.progress import progress_for
     from hairkit.stages import FACES, LABELS, PERSONS
+    from hairkit.types.mask import HAIR
 
     photos, manager = _photos(args.photos), Manager.loaded(args.plugin)
     recipe = load_recipe(args.recipe).with_set(args.set).only(FACES, PERSONS, LABELS)
@@ -64,8 +65,9 @@ def run(args: argparse.Namespace) -> int:
         for photo, file in zip(photos, files, strict=True):
             folder = Path(work) / photo.stem
             seen = see_photo(read_view(photo), folder, recipe, manager, strands=False)
-            write_picture(file, _as_large_as_the_photo(seen))
-            progress.message(f"{file}: {seen.mask.hair.mean():.1%} of the photo is hair")
+            mask = _as_large_as_the_photo(seen)
+            write_picture(file, mask)
+            progress.message(f"{file}: {(mask == HAIR).mean():.1%} of the photo is hair")
             shown += [] if args.preview is None else [_beside(seen)]
     if args.preview is not None:
         write_picture(args.preview, np.concatenate(shown, axis=1))
