@@ -42,6 +42,8 @@ distance of the points that are looked up there."""
 _HIDDEN = 0.02
 """Metres behind the head's surface from which a view does not see a point: the head is an average
 one, and its place a first one."""
+_ROOTED = 0.05
+"""Share of the visible scalp that hair covers which needs no other view."""
 _LOOKED_UP = 60
 """Pixels of an island that are looked up, evenly spread."""
 _CONFIRMED = 0.2
@@ -129,8 +131,9 @@ def _without_islands(labels: UInt8Array, bare: Float32Array) -> UInt8Array:
 def _without_strangers(labels: list[UInt8Array], scene: Scene) -> list[UInt8Array]:
     """Return the labels (h, w) of all views without islands of hair that no other view confirms.
 
-    The largest part of a view's hair is no island.
+    Hair that covers some of the scalp is no island.
     """
+    scalp = scene.head.vertices[scene.head.scalp > 0.5]
     small = [
         camera.resized(*view.shape[::-1])
         for camera, view in zip(scene.cameras, labels, strict=True)
@@ -138,12 +141,15 @@ def _without_strangers(labels: list[UInt8Array], scene: Scene) -> list[UInt8Arra
     depths = [head_depth(scene.head, camera) for camera in small]
     views = list(zip(small, labels, depths, strict=True))
     kept = []
-    for index, (camera, view, _) in enumerate(views):
+    for index, (camera, view, depth) in enumerate(views):
         others = views[:index] + views[index + 1 :]
         clean = view.copy()
-        count, part, sizes, _ = cv2.connectedComponentsWithStats((view == HAIR).astype(np.uint8))
-        largest = int(np.argmax(sizes[1:, cv2.CC_STAT_AREA])) + 1 if count > 1 else 0
-        for island in (i for i in range(1, count) if i != largest):
+        count, part = cv2.connectedComponents((view == HAIR).astype(np.uint8))
+        column, row = (
+            camera.project(scalp[depth_behind(camera, depth, scalp) < _HIDDEN]).astype(int).T
+        )
+        covers = np.bincount(part[row, column], minlength=count) > _ROOTED * len(row)
+        for island in (i for i in range(1, count) if not covers[i]):
             row, column = np.nonzero(part == island)
             pixels = np.stack([column, row], axis=1)[:: -(-len(row) // _LOOKED_UP)]
             if _confirmed(pixels + np.float64(0.5), camera, others).mean() < _CONFIRMED:

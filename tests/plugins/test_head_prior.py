@@ -107,3 +107,18 @@ def test_hair_that_no_other_view_confirms_is_dropped() -> None:
     assert (kept[1][spots[1, "chin"]] == PERSON).all()
     for view in (1, 2, 3):
         assert (kept[view][spots[view, "lock"]] == HAIR).all()
+
+
+def test_clothes_larger_than_the_hair_are_no_hair() -> None:
+    """What does not reach the scalp needs other views, however large it is; the hair needs none."""
+    _, masks, scene = set_up()
+    labels = [mask.labels.copy() for mask in masks]
+    jacket = labels[0]
+    hair = jacket == HAIR
+    below = np.nonzero(hair.any(axis=1))[0][-1] + 8
+    jacket[below - 6 :] = PERSON
+    jacket[below:] = HAIR
+    assert (jacket[below:] == HAIR).sum() > (jacket[: below - 6] == HAIR).sum()
+    kept = head_prior._without_strangers(labels, scene)[0]
+    assert (kept[below:] == PERSON).all()
+    assert (kept[: below - 6] == HAIR).sum() > 0.95 * (jacket[: below - 6] == HAIR).sum()
