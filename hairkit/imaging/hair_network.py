@@ -2,9 +2,10 @@
 
 A U-Net (Ronneberger, Fischer and Brox 2015) on the features of `hairkit.imaging.hair_features`,
 with a stride of two at its entry and a sub-pixel convolution at its end (Shi et al. 2016). It was
-trained on pictures made of renders alone, of path-traced heads and of `hairkit synth`, whose hair,
-skin, clothes and surroundings were recoloured and warped at random, with painted bodies, plaits,
-beards, glasses and bald crowns; `training/hair_network` in the repository does that.
+trained on 4,800 and then 4,167 pictures made of renders alone, of path-traced heads and of
+`hairkit synth`, whose hair, skin, clothes and surroundings were recoloured and warped at random,
+with painted bodies, plaits, beards, glasses and bald crowns; `training/hair_network` in the
+repository does that.
 """
 
 from __future__ import annotations

@@ -116,6 +116,7 @@ def test_numpy_runs_what_pytorch_trained(tmp_path: Path) -> None:
     shares[:, 0, :64], shares[:, 2, 64:] = 255, 255
     np.savez(tmp_path / "set.npz", features=features, shares=shares)
     words = [str(tmp_path / "set.npz"), "-o", str(tmp_path / "weights.npz"), "--steps", "2"]
+    words += ["--batch", "2"]
     train.main(words)
     written: Any = np.load(tmp_path / "weights.npz")
     before = train.new_weights(0)

@@ -118,6 +118,7 @@ def train(
     steps: int,
     rng: Generator,
     highest: float = RATE,
+    batch: int = BATCH,
 ) -> dict[str, Tensor]:
     """Return the mean of the weights over the last of `steps` steps.
 
@@ -130,7 +131,7 @@ def train(
         cosine = 0.5 + 0.5 * np.cos(np.pi * step / steps)
         rate = highest * min(1, step / WARM_UP + 0.05) * cosine + LEAST_RATE
         optimizer.param_groups[0]["lr"] = float(rate)
-        chosen = rng.choice(len(features), BATCH)
+        chosen = rng.choice(len(features), batch)
         x, y = _vary(rng, features[chosen].astype(np.float32), shares[chosen].astype(np.float32))
         with torch.autocast("cpu", torch.bfloat16):
             scores = network(weights, _packed(torch.from_numpy(x)))
@@ -190,6 +191,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--steps", type=int, default=2500)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rate", type=float, default=RATE, help="highest learning rate")
+    parser.add_argument("--batch", type=int, default=BATCH, help="pictures a step")
     parser.add_argument("--start", type=Path, help="weights to start from (random without)")
     parser.add_argument("--blend", type=Path, help="weights that the result is averaged with")
     parser.add_argument("--new", type=float, default=0.75, help="share of the new in that mean")
@@ -200,7 +202,9 @@ def main(words: Sequence[str] | None = None) -> None:
     if arguments.start:
         weights = widen(_read(arguments.start), weights)
     rng = np.random.default_rng(arguments.seed)
-    trained = train(weights, features, shares, arguments.steps, rng, arguments.rate)
+    trained = train(
+        weights, features, shares, arguments.steps, rng, arguments.rate, arguments.batch
+    )
     if arguments.blend:
         old = widen(_read(arguments.blend), trained)
         trained = {k: torch.lerp(old[k], value, arguments.new) for k, value in trained.items()}
