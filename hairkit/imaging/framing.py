@@ -31,6 +31,9 @@ TURNS_TO_BOTTOM = np.array([0, 1, 2, 3])
 """Clockwise quarter turns that bring the bottom, right, top and left edge to the bottom."""
 EYES, MOUTH = slice(36, 48), slice(48, 68)
 """iBUG landmarks of the eyes and of the mouth."""
+LEAST_PERSON, LEAST_WIDTH = 0.01, 0.04
+"""Share of the photo below which a silhouette is a speck, and the same of a head's width in the
+longer side; in a whole-body frame they are 0.1 and 0.1."""
 ROOM, REGION = 0.1, 0.7
 """A person who fills less than the second share of the photo's longer side is cropped first, with
 this share of room around."""
@@ -106,7 +109,7 @@ def _region(view: View) -> Float64Array:
     """Return the corners (2, 2) of the part of a picture that holds the person; all where large."""
     inner = _if_small(_without_border(view.image), view)
     inside = None if view.person is None else _person_or_hair(view) > PERSON_LEVEL
-    if inside is None or not inside.any():
+    if inside is None or inside.mean() < LEAST_PERSON:
         return inner
     spans = [np.nonzero(inside.any(axis))[0][[0, -1]] for axis in (0, 1)]
     first, last = np.transpose(spans).astype(np.float64)
@@ -188,6 +191,8 @@ def _find_head(view: View) -> Head | None:
     outline = None if view.person is None else trace_outline(view.person.alpha)
     if landmarks is None and view.person is not None:
         outline = trace_outline(_person_or_hair(view))
+    if outline is not None and outline.width_px < LEAST_WIDTH * max(view.width, view.height):
+        outline = None
     if landmarks is None:
         return None if outline is None else _head_of(outline)
     eyes, mouth = landmarks[EYES].mean(axis=0), landmarks[MOUTH].mean(axis=0)
