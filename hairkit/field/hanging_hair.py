@@ -9,7 +9,6 @@ these axes afterwards.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, unit_vectors
 from hairkit.field.growth_prior import WHORL_BEHIND
@@ -40,11 +39,12 @@ def stand_coils(hull: Hull, way: ScalpDistance, growth: Float32Array) -> Orienta
     They run away from the head's middle, and sag in proportion to the `way` from the scalp.
     """
     cells = hull.loose
-    outward = unit_vectors(hull.grid.centres_of(cells))
-    return _field(hull, growth, outward - way.values[cells, None] / SAG * [0.0, 1.0, 0.0])
+    axes = unit_vectors(hull.grid.centres_of(cells)).astype(np.float64)
+    axes[:, 1] -= way.values[cells] / SAG
+    return _field(hull, growth, axes)
 
 
-def _field(hull: Hull, growth: Float32Array, axes: npt.ArrayLike) -> OrientationField:
+def _field(hull: Hull, growth: Float32Array, axes: Float64Array) -> OrientationField:
     """Return the field of axes (N, 3) in the loose cells."""
     direction = np.zeros((*hull.grid.shape, 3), np.float32)
     direction[hull.loose] = unit_vectors(axes)
