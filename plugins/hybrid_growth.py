@@ -33,7 +33,7 @@ from hairkit import (
     hookimpl,
 )
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
-from hairkit.field.growth_prior import long_share
+from hairkit.field.growth_prior import hair_way, long_share
 from hairkit.field.sampling_kernels import copy_point, gradient_at, make_unit, sample_at
 from hairkit.grooming.cover_hair import find_bare_cells, lead_to_roots
 from hairkit.grooming.postprocess import FinishOptions, finish
@@ -69,7 +69,8 @@ class Options(FinishOptions):
         2.0,
         low=0.1,
         high=5,
-        doc="Strands grow no longer than this share of the longest way through the hair.",
+        doc="Strands grow no longer than this share of the way through the hair: the longest,"
+        " in short hair one that follows from its height.",
     )
     patience: float = option(
         0.012,
@@ -136,7 +137,7 @@ def track(
     options: Options,
 ) -> Strands:
     """Grow one strand from every root."""
-    way = scalp_distance.hair_length
+    way = hair_way(hull, roots, scalp_distance.hair_length)
     memory = options.wave_share * waves.pitch
     if memory > options.step:
         inertia = max(options.inertia, 1 - options.step / memory)

@@ -1,7 +1,9 @@
-"""The field of tight curls, whose photos show no direction: their axes hang down along the head.
+"""The fields of tight curls, whose photos show no direction: their axes hang down along the head.
 
-Coils leave the skin upright, run away from the crown and turn down with the head's surface. Below
-the head's middle nothing but gravity is left. Strands are wound about these axes afterwards.
+Curls leave the skin upright, run away from the crown and turn down with the head's surface. Below
+the head's middle nothing but gravity is left. The tighter coils of type 4 hair carry themselves:
+they stand off the head until the outline ends them, and sag with length. Strands are wound about
+these axes afterwards.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array, unit_vectors
 from hairkit.field.growth_prior import WHORL_BEHIND
 from hairkit.types.head import Head
-from hairkit.types.volume import Hull, OrientationField
+from hairkit.types.volume import Hull, OrientationField, ScalpDistance
 
 AWAY = 0.4
 """Part of the direction away from the whorl, against 1 straight down: 0.7 leaves F at 4 mm within 1
@@ -20,15 +22,34 @@ LIFT, STANDS_OFF = 1.0, 0.05
 """Outward part of the direction at the skin, against 1 along the head, and the distance from the
 head in metres at which it has fallen to 0: with 0.03 m F at 4 mm falls from 79 to 74 on curls,
 without it to 32."""
+SAG = 0.06
+"""Way from the scalp in metres on which coils sag as much as they stand. On a head with coils of
+15 cm along their axes F at 4 mm is 68, and their length right; halved or doubled 66."""
 
 
 def hang_curls(head: Head, hull: Hull, growth: Float32Array) -> OrientationField:
     """Return the signed field of the curls' axes; `growth` is the field's potential."""
+    at = hull.grid.centres_of(hull.loose)
+    return _field(hull, growth, hanging_axes(head, at, hull.head_distance[hull.loose]))
+
+
+def stand_coils(hull: Hull, way: ScalpDistance, growth: Float32Array) -> OrientationField:
+    """Return the signed field of the axes of coils; `growth` is the field's potential.
+
+    They run away from the head's middle, and sag in proportion to the `way` from the scalp.
+    """
     cells = hull.loose
-    axes = hanging_axes(head, hull.grid.centres_of(cells), hull.head_distance[cells])
+    axes = unit_vectors(hull.grid.centres_of(cells)).astype(np.float64)
+    axes[:, 1] -= way.values[cells] / SAG
+    return _field(hull, growth, axes)
+
+
+def _field(hull: Hull, growth: Float32Array, axes: Float64Array) -> OrientationField:
+    """Return the field of axes (N, 3) in the loose cells."""
     direction = np.zeros((*hull.grid.shape, 3), np.float32)
-    direction[cells] = axes
-    return OrientationField(hull.grid, None, cells.astype(np.float32), growth, direction)
+    direction[hull.loose] = unit_vectors(axes)
+    confidence = hull.loose.astype(np.float32)
+    return OrientationField(hull.grid, None, confidence, growth, direction)
 
 
 def hanging_axes(head: Head, points: Float32Array, height: Float32Array) -> Float64Array:

@@ -10,7 +10,7 @@ from scipy import ndimage
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.grooming.head_collision import push_out_of_head
 from hairkit.grooming.lead_to_ties import lead_to_ties
-from hairkit.grooming.wind_waves import LARGEST_RADIUS, RAMP, add_waves
+from hairkit.grooming.wind_waves import LARGEST_RADIUS, add_waves, grown_share
 from hairkit.helices import smooth_strands
 from hairkit.options import option
 from hairkit.types.strands import Strands
@@ -79,7 +79,7 @@ def make_room(strands: Strands, waves: Waves, hull: Hull) -> Strands:
     known = np.concatenate([slope, depth[..., None], hull.head_distance[..., None]], axis=3)
     points = strands.points.reshape(len(strands), -1, 3)
     arc = strands.arc_lengths().reshape(len(strands), -1)
-    wanted = LARGEST_RADIUS * waves.radius * np.clip(arc / RAMP, 0, 1)
+    wanted = LARGEST_RADIUS * waves.radius * grown_share(arc, waves)
     for _ in range(ROUNDS):
         found = hull.grid.sample(known, points.reshape(-1, 3)).reshape(*arc.shape, 5)
         here, over_head = found[..., 3], np.maximum(found[..., 4], 0)

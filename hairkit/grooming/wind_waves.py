@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.arrays import Float64Array
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.types.strands import Strands
 from hairkit.types.waves import Waves
 
@@ -23,13 +23,14 @@ heads. They leave F at 4 mm within 1 of what it is without."""
 LARGEST_RADIUS = 1 + np.sqrt(2) * RADIUS_SPREAD
 """Of the widest wisps, as a share of the mean: a sine's amplitude is root 2 of its spread."""
 RAMP = 0.03
-"""Metres from the root over which the radius grows from 0."""
+"""Metres from the root over which the radius grows from 0, in hair whose turns are longer. Over a
+whole one of shorter turns F at 4 mm is a point higher on coils."""
 
 
 def add_waves(strands: Strands, waves: Waves, seed: int = 0, spread: float = 1.0) -> Strands:
     """Wind strands of equal point counts into helices around their own axes.
 
-    The radius grows from 0 over `RAMP` from the root. The phase is a function of the root's
+    The radius grows from 0 at the root. The phase is a function of the root's
     position, so a strand does not depend on how many others there are. It varies slowly over the
     scalp and again from wisp to wisp; hair within a wisp is in phase. Without a handedness, wisps
     turn either way. Radius and pitch vary from wisp to wisp, by `spread` times the usual share.
@@ -48,7 +49,7 @@ def add_waves(strands: Strands, waves: Waves, seed: int = 0, spread: float = 1.0
     share = np.sqrt(2) * spread  # a sine's standard deviation is 1 over sqrt(2)
     pitch = waves.pitch * (1 + share * PITCH_SPREAD * np.sin(long))[:, None]
     radius = waves.radius * (1 + share * RADIUS_SPREAD * np.sin(wide))[:, None]
-    radius = radius * np.clip(arc / RAMP, 0, 1)
+    radius = radius * grown_share(arc, waves)
     angle = phase[:, None] + turn * 2 * np.pi * arc / pitch
     offset = np.cos(angle)[..., None] * first + np.sin(angle)[..., None] * second
     wound = points + radius[..., None] * offset
@@ -60,6 +61,16 @@ def add_waves(strands: Strands, waves: Waves, seed: int = 0, spread: float = 1.0
         strands.group,
         strands.guide,
     )
+
+
+def grown_share(arc: Float32Array | Float64Array, waves: Waves) -> Float64Array:
+    """Return the share of the radius that waves have at these lengths from the root, metres.
+
+    >>> grown_share(np.array([0, 0.01]), Waves(0.004, 0.01)).tolist()
+    [0.0, 1.0]
+    """
+    share: Float64Array = np.clip(arc / min(RAMP, waves.pitch), 0, 1)
+    return share
 
 
 def _transport_frames(points: Float64Array) -> tuple[Float64Array, Float64Array]:

@@ -12,6 +12,9 @@ CURLY_SLOPE = 1.1
 """Slope of helices from which 2D orientations do not tell the axis: their mean doubled angle falls
 from 1 for straight hair through 0 at a slope of 1.5."""
 
+COIL_RADIUS = 0.0055
+"""Radius of the widest tight coils, metres: those of type 4 hair are 2 to 5 mm."""
+
 
 @dataclass(frozen=True)
 class Waves(Stored):
@@ -33,6 +36,15 @@ class Waves(Stored):
     def curly(self) -> bool:
         """True for coils so steep that photos show no strand direction, only the coils."""
         return self.slope >= CURLY_SLOPE
+
+    @property
+    def coiled(self) -> bool:
+        """True for curls so tight that hair stands off the scalp instead of hanging.
+
+        >>> Waves(0.004, 0.011).coiled, Waves(0.0068, 0.027).coiled
+        (True, False)
+        """
+        return self.curly and self.radius <= COIL_RADIUS
 
     @property
     def handedness(self) -> int:

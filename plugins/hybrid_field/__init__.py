@@ -12,7 +12,8 @@ The patent's first stage, on the cells of the hull: `H = a_s S + a_v V + a_i gra
 5. O, growth direction: the signed tangents of segments and the scalp prior, diffused.
 
 Weights differ from cell to cell: S counts near strands, V away from them, grad(I) at the scalp.
-Tight curls show no direction; theirs hang down along the head (`hairkit.field.hanging_hair`).
+Tight curls show no direction; theirs hang down along the head, and the coils of type 4 hair stand
+off it (`hairkit.field.hanging_hair`).
 
 * `four_fields`: the four fields and their weighted sum
 * `given_segments`: oriented 3D segments from a file
@@ -47,7 +48,7 @@ from hairkit.field.growth_prior import (
     comb_cells,
     growth_potential,
 )
-from hairkit.field.hanging_hair import hang_curls
+from hairkit.field.hanging_hair import hang_curls, stand_coils
 from hairkit.field.view_fusion import fuse_views
 from hairkit.parallel import thread_count
 
@@ -80,6 +81,8 @@ def solve_field(
 ) -> OrientationField:
     """Return the blended field with its signs and the internal distance."""
     growth = growth_potential(hull, scalp_distance)
+    if waves.coiled:
+        return stand_coils(hull, scalp_distance, growth)
     if waves.curly:
         return hang_curls(scene.head, hull, growth)
     length = scalp_distance.hair_length

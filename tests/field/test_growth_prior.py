@@ -13,10 +13,14 @@ from scipy.sparse.csgraph import dijkstra
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.field.growth_prior import (
+    LONG_HAIR,
+    SHORT_HAIR,
+    WAY_OF_HEIGHT,
     chamfer_distance,
     combing_direction,
     gradient,
     growth_potential,
+    hair_way,
     measure_scalp_distance,
 )
 from hairkit.testing import ball_head, scalp_roots
@@ -237,3 +241,22 @@ def test_short_hair_has_no_parting() -> None:
         for line in (Parting(), Parting.at(0.02))
     )
     np.testing.assert_array_equal(plain, parted)
+
+
+def test_the_way_through_short_hair_is_that_of_most_of_it() -> None:
+    """A tuft that stands off, or an outline that fits badly, makes no other strand longer."""
+    hull, roots = curtain(0.004, hem=0.0, thickness=0.012), scalp_roots(ball_head())
+    plain = hair_way(hull, roots, 0.02)
+    assert plain == pytest.approx(WAY_OF_HEIGHT * 0.01, rel=0.2)  # centres of the outermost cells
+    place = hull.grid.centres()
+    tuft = (hull.head_distance > 0) & (np.hypot(place[..., 0], place[..., 2]) < 0.015)
+    tufted = replace(hull, dense=hull.dense | tuft, loose=hull.loose | tuft)
+    assert hair_way(tufted, roots, SHORT_HAIR) == pytest.approx(plain, rel=0.05)
+
+
+def test_the_way_through_long_hair_is_its_longest() -> None:
+    """Its height tells nothing of its length; in between the way grows with the longest."""
+    hull, roots = curtain(thickness=0.02), scalp_roots(ball_head())
+    ways = [hair_way(hull, roots, longest) for longest in (SHORT_HAIR, 0.045, LONG_HAIR, 0.3)]
+    assert ways[2:] == [LONG_HAIR, 0.3]
+    assert ways == sorted(ways)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from hairkit.arrays import unit_vectors
 from hairkit.field.growth_prior import growth_potential, measure_scalp_distance
-from hairkit.field.hanging_hair import STANDS_OFF, hang_curls, hanging_axes
+from hairkit.field.hanging_hair import SAG, STANDS_OFF, hang_curls, hanging_axes, stand_coils
 from hairkit.testing import ball_head, shell_hull
+from hairkit.types.volume import ScalpDistance
 
 HEAD = ball_head()
 
@@ -48,3 +50,17 @@ def test_the_field_is_signed_and_of_unit_length_in_the_loose_hull_only() -> None
     length = np.linalg.norm(field.direction, axis=3)
     np.testing.assert_allclose(length[hull.loose], 1, atol=1e-5)
     assert not length[~hull.loose].any()
+
+
+def test_coils_stand_off_the_scalp_and_sag_with_the_way_from_it() -> None:
+    """Straight out at the scalp; as far down as out at a way of `SAG` metres."""
+    hull = shell_hull()
+    growth = growth_potential(hull, measure_scalp_distance(HEAD, hull))
+    outward = unit_vectors(hull.grid.centres_of(hull.loose))
+    for way, down in ((0.0, 0.0), (SAG, 1.0)):
+        distance = ScalpDistance(np.full(hull.grid.shape, way, np.float32), SAG)
+        field = stand_coils(hull, distance, growth)
+        assert field.direction is not None
+        wanted = unit_vectors(outward - [0, down, 0])
+        np.testing.assert_allclose(field.direction[hull.loose], wanted, atol=1e-5)
+        assert not field.direction[~hull.loose].any()

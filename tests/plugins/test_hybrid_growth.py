@@ -242,7 +242,7 @@ def test_strands_can_be_smoothed_by_helix_arcs() -> None:
     noisy = replace(field, tensor=field.tensor + 0.15 * rng.standard_normal(field.tensor.shape))
     roots = scalp_roots(ball_head())
     hull = shell_hull()
-    options = replace(FREE, inertia=0.0, reach=2.0)
+    options = replace(FREE, inertia=0.0, reach=1.1)
     rough, calm = (
         track(
             SCENE,

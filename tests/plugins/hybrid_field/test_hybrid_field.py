@@ -233,6 +233,22 @@ def test_without_segments_the_inner_field_alone_speaks() -> None:
     assert field.internal_distance is not None
 
 
+def test_photographed_directions_and_partings_do_not_turn_coils() -> None:
+    """The field of coils is the same whatever orientation maps and parting say."""
+    views, masks, maps = photos()
+    scene = Scene(tuple("abcdefgh"), views, ball_head())
+    hull, coils = hair(), Waves(0.004, 0.011)
+    distance = measure_scalp_distance(scene.head, hull)
+    turned = tuple(OrientationMap(wrap_angle(m.angle + 1), m.confidence) for m in maps)
+    given = ((maps, Parting()), (turned, Parting(swept_back=True)))
+    one, other = (
+        solve_field(scene, masks, seen_by_all, hull, coils, distance, parting, PLAIN).direction
+        for seen_by_all, parting in given
+    )
+    assert one is not None
+    np.testing.assert_array_equal(one, other)
+
+
 def test_an_empty_band_has_no_direction() -> None:
     """No segments, no ribbons."""
     hull = hair()
