@@ -54,7 +54,7 @@ def frame_view(view: View, quarter_turns: int, frame: Sequence[int], head: Float
     how = cv2.INTER_AREA if factor < 1 else cv2.INTER_CUBIC
     image = np.asarray(cv2.resize(part, size, interpolation=how), np.uint8)
     found = replace(
-        upright, image=image, frame=(left, top, right, bottom), face=None, person=None,
+        upright, image=image, cropped=(left, top, right, bottom), face=None, person=None,
         head=(float(head[0]), float(head[1])),
     )  # fmt: skip
     focal, points = upright.focal_px, upright.landmarks

@@ -115,7 +115,7 @@ def assess(
     evidence = replace(evidence, scene=scene)  # notes speak of the user's own files
     masks, hull = evidence.masks, evidence.hull
     hair_length = evidence.scalp_distance.hair_length
-    level = hair_length < PARTED_HAIR or evidence.tied.tails
+    level = hair_length < PARTED_HAIR or evidence.tied.tails or evidence.waves.coiled
     return (
         *assess_turn(turn),
         *assess_landmarks(capture, scene),

@@ -38,8 +38,9 @@ class View:
     photo_path: Path | None = None
     photo_size: tuple[int, int] = (0, 0)
     """(width, height) of the photo on disk, upright: the pixels of masks and strokes."""
-    frame: tuple[int, int, int, int] = (0, 0, 0, 0)
-    """Left, top, right and bottom edge of what `image` shows of that photo, in its pixels."""
+    cropped: tuple[int, int, int, int] | None = None
+    """Left, top, right and bottom edge of what `image` shows of that photo, in its pixels; None
+    where it shows all."""
     head: tuple[float, float] | None = None
     """(x, y) the middle of the head in that photo, its pixels; None where nobody looked."""
     elevation_deg: float = 0.0
@@ -63,8 +64,6 @@ class View:
         )
         if self.photo_size == (0, 0):
             object.__setattr__(self, "photo_size", (self.image.shape[1], self.image.shape[0]))
-        if self.frame == (0, 0, 0, 0):
-            object.__setattr__(self, "frame", (0, 0, *self.photo_size))
         if self.landmarks is not None:
             object.__setattr__(
                 self,
@@ -84,6 +83,11 @@ class View:
     def height(self) -> int:
         """Height of `image` in pixels."""
         return int(self.image.shape[0])
+
+    @property
+    def frame(self) -> tuple[int, int, int, int]:
+        """Left, top, right and bottom edge of what `image` shows of the photo, its pixels."""
+        return self.cropped or (0, 0, *self.photo_size)
 
     @property
     def scale(self) -> float:
@@ -159,7 +163,7 @@ class View:
             image=np.rot90(self.image, -turns),
             landmarks=None if given is None else turn_points(given, turns, width, height),
             photo_size=self.photo_size[::-1] if turns % 2 else self.photo_size,
-            frame=_turn_frame(self.frame, turns, self.photo_size),
+            cropped=self.cropped and _turn_frame(self.cropped, turns, self.photo_size),
             head=head,
             quarter_turns=(self.quarter_turns + turns) % 4,
             face=None if self.face is None else self.face.turned(turns, width, height),

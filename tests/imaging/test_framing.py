@@ -193,7 +193,7 @@ def test_a_framed_photo_keeps_the_pixels_of_its_file(tmp_path: Path) -> None:
 def test_points_of_a_part_are_points_of_the_photo(turns: int) -> None:
     """`to_photo` and `from_photo` are inverse to each other, and follow quarter turns."""
     view = View(
-        "a", 0.0, np.zeros((40, 30, 3), np.uint8), photo_size=(200, 300), frame=(10, 20, 70, 100),
+        "a", 0.0, np.zeros((40, 30, 3), np.uint8), photo_size=(200, 300), cropped=(10, 20, 70, 100),
         head=(40.0, 60.0),
     ).turned(turns)  # fmt: skip
     points = np.random.default_rng(1).uniform(0, 30, (9, 2))
