@@ -15,8 +15,9 @@ import cv2
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array, Int64Array, UInt8Array
+from hairkit.imaging.hair_features import EYES, MOUTH
 from hairkit.imaging.hair_network import find_hair, hair_probability, likely_landmarks
-from hairkit.imaging.person_outline import PERSON_LEVEL, Outline, trace_outline
+from hairkit.imaging.person_outline import PERSON_LEVEL, trace_outline
 from hairkit.types.capture import Capture, View
 from hairkit.types.face import SURE_PRESENCE, Face
 from hairkit.types.framing import Framing
@@ -29,8 +30,6 @@ CLEAR = 2.0
 """The person covers the bottom edge at least this many times as far as any other."""
 TURNS_TO_BOTTOM = np.array([0, 1, 2, 3])
 """Clockwise quarter turns that bring the bottom, right, top and left edge to the bottom."""
-EYES, MOUTH = slice(36, 48), slice(48, 68)
-"""iBUG landmarks of the eyes and of the mouth."""
 LEAST_PERSON, LEAST_WIDTH = 0.01, 0.04
 """Share of the photo below which a silhouette is a speck, and the same of a head's width in the
 longer side; in a whole-body frame they are 0.1 and 0.1."""
@@ -114,8 +113,8 @@ def _region(view: View) -> Float64Array:
     spans = [np.nonzero(inside.any(axis))[0][[0, -1]] for axis in (0, 1)]
     first, last = np.transpose(spans).astype(np.float64)
     room = ROOM * (last - first).max()
-    part = _if_small(np.stack([first - room, last + room]), view)
-    return np.asarray(part.clip(*inner), np.float64)
+    part = _if_small(np.stack([first - room, last + room]), view).clip(*inner)
+    return part if (part[1] > part[0]).all() else inner
 
 
 def _if_small(part: Float64Array, view: View) -> Float64Array:
@@ -187,26 +186,23 @@ def _find_head(view: View) -> Head | None:
 
     Where no face shows, hair may be all that shows: then what may be hair is the person's, too.
     """
-    landmarks = likely_landmarks(view)
-    outline = None if view.person is None else trace_outline(view.person.alpha)
-    if landmarks is None and view.person is not None:
-        outline = trace_outline(_person_or_hair(view))
-    if outline is not None and outline.width_px < LEAST_WIDTH * max(view.width, view.height):
-        outline = None
+    landmarks, head = likely_landmarks(view), None
+    least = LEAST_WIDTH * max(view.width, view.height)
+    if view.person is not None:
+        alpha = _person_or_hair(view) if landmarks is None else view.person.alpha
+        outline = trace_outline(alpha)
+        if outline is not None and outline.width_px >= least:
+            head = Head(outline.middle_px, outline.top_px, outline.width_px)
     if landmarks is None:
-        return None if outline is None else _head_of(outline)
+        return head
     eyes, mouth = landmarks[EYES].mean(axis=0), landmarks[MOUTH].mean(axis=0)
-    length = max(1.0, float(np.hypot(*(eyes - mouth))))
-    if outline is not None:
-        below = (eyes[1] - outline.top_px) / outline.width_px
-        beside = abs(eyes[0] - outline.middle_px) / outline.width_px
-        if 0 < below < CHIN_DEPTH and beside < 1:
-            return _head_of(outline)
-    return Head(float(eyes[0]), float(eyes[1]) - CROWN_OF_FACE * length, WIDTH_OF_FACE * length)
-
-
-def _head_of(outline: Outline) -> Head:
-    return Head(outline.middle_px, outline.top_px, outline.width_px)
+    if head is not None:
+        below, beside = (eyes[1] - head.crown) / head.width, (eyes[0] - head.middle) / head.width
+        if 0 < below < CHIN_DEPTH and abs(beside) < 1:
+            return head
+    length = float(np.hypot(*(eyes - mouth)))
+    face = Head(float(eyes[0]), float(eyes[1]) - CROWN_OF_FACE * length, WIDTH_OF_FACE * length)
+    return None if face.width < least else face
 
 
 def _of_one_size(heads: list[Head | None], views: Sequence[View]) -> list[Head | None]:

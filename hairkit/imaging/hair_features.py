@@ -45,7 +45,7 @@ _REACH = 2.0
 _FADE = 32.0
 """Square of face lengths at which these coordinates have faded to 1 / e."""
 
-_EYES, _MOUTH = slice(36, 48), slice(48, 68)
+EYES, MOUTH = slice(36, 48), slice(48, 68)
 """iBUG landmarks of the eyes and of the mouth."""
 
 _CHEEKS = (36, 45, 54, 48)
@@ -121,7 +121,7 @@ def _appearance(image: UInt8Array, size: tuple[int, int]) -> tuple[Float32Array,
 
 def _face_coordinates(points: Float64Array, size: tuple[int, int]) -> Float32Array:
     """Return (2, h, w) places to the right and up in the face's frame, which fade far from it."""
-    eyes, mouth = points[_EYES].mean(axis=0), points[_MOUTH].mean(axis=0)
+    eyes, mouth = points[EYES].mean(axis=0), points[MOUTH].mean(axis=0)
     length = float(np.hypot(*(eyes - mouth))) + 1e-6
     up = (eyes - mouth) / length
     columns, rows = np.meshgrid(np.arange(size[0]), np.arange(size[1]))

@@ -113,6 +113,20 @@ def test_borders_of_one_colour_are_cropped() -> None:
     assert found.frames.tolist() == [[0, 0, WIDTH, HEIGHT]]
 
 
+def test_a_person_in_the_border_and_a_face_of_a_few_pixels_crop_nothing() -> None:
+    """What cannot be the head leaves the photo as it is, or the picture inside its border."""
+    canvas = np.full((HEIGHT, WIDTH, 3), 200, np.uint8)
+    canvas[400:700, 100:400] = np.random.default_rng(0).integers(0, 120, (300, 300, 3))
+    alpha = np.zeros((HEIGHT, WIDTH), np.uint8)
+    alpha[20:120, 450:560] = 255
+    seen = View("x", 0.0, canvas), Face.absent(), Person(alpha)
+    found = find_regions(Capture(seen[:1]), seen[1:2], seen[2:])
+    assert found.frames.tolist() == [[100, 400, 400, 700]]
+    face = replace(shoot(300, 200, 2, face=True)[1], presence=0.9)
+    frames = find((View("x", 0.0, canvas), face, Person.absent())).frames
+    assert frames.tolist() == [[0, 0, WIDTH, HEIGHT]]
+
+
 def test_faces_are_believed_where_the_silhouette_is_of_somebody_else() -> None:
     """A face far from the largest person's head is the head; so it is without any silhouette."""
     view, face, _ = shoot(480, 500, face=True)
