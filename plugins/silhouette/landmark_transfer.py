@@ -13,12 +13,11 @@ import cv2
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
+from hairkit.cameras.landmark_equations import Sights
 from hairkit.imaging.masked_filters import picture_scale
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.head import JAW_LANDMARKS, LANDMARKS, Head
-
-from .landmark_equations import Sights
 
 FACING = 0.3
 """Cosine below which a landmark turns too far away from a camera to be matched."""

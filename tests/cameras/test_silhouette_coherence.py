@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hairkit_plugins.silhouette.landmark_equations import CameraArrays
 from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 from turntable import Turntable, turntable
 
 from hairkit import Mask
 from hairkit.arrays import Float64Array
+from hairkit.cameras.landmark_equations import CameraArrays
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.silhouette_coherence import CAP, REACH, coherence
 

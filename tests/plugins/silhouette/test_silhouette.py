@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.silhouette import Options, _Problem, estimate_scene
-from hairkit_plugins.silhouette.search import Evidence, Fit, Search
+from hairkit_plugins.silhouette import Options, estimate_scene
 from turntable import Turntable, azimuth_errors, turntable
 
 from hairkit import Camera, Capture, Face, Mask, Scene, View
+from hairkit.cameras.camera_search import Evidence, Fit, Search
+from hairkit.cameras.turn_fit import TurnFit
 from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, PERSPECTIVE, SHARED
 
 FAST = Options(contour_points=40)
@@ -84,7 +85,7 @@ def test_orthographic_pictures_are_recognised() -> None:
 def test_orthographic_cameras_start_at_their_scale() -> None:
     """Their first place is exact: solved for perspective, the landmarks would be nearer."""
     table = turntable(np.random.default_rng(2), stray=0.0, model="orthographic", noise=0.0)
-    problem = _Problem.of(table.capture, table.masks, table.head, Options())
+    problem = TurnFit.of(table.capture, table.masks, table.head, Options())
     exact = np.exp(problem.start(flat=True).vector[LOG_MAGNIFICATION])
     assert exact == pytest.approx(800, rel=0.001)
     assert np.exp(problem.start(flat=False).vector[LOG_MAGNIFICATION]) < 0.97 * exact
@@ -112,13 +113,13 @@ def test_a_poor_fit_is_searched_again_from_farther(
 def test_nothing_is_evaluated_twice(bust: Turntable, monkeypatch: pytest.MonkeyPatch) -> None:
     """A place where the evidence is known is not looked at again with another precision."""
     asked: list[tuple[bytes, bytes, float]] = []
-    evidence = _Problem.evidence
+    evidence = TurnFit.evidence
 
-    def ask(self: _Problem, fit: Fit, coarseness: float) -> Evidence:
+    def ask(self: TurnFit, fit: Fit, coarseness: float) -> Evidence:
         asked.append((fit.vector.tobytes(), fit.offset.tobytes(), coarseness))
         return evidence(self, fit, coarseness)
 
-    monkeypatch.setattr(_Problem, "evidence", ask)
+    monkeypatch.setattr(TurnFit, "evidence", ask)
     options = replace(FAST, model="perspective", carries=0)
     estimate_scene(bust.capture, bust.masks, bust.head, None, options)
     assert len(asked) > 10
@@ -205,7 +206,7 @@ def test_a_start_is_searched_from_and_keeps_its_kind(bust: Turntable) -> None:
 
 def test_zooms_and_distances_of_orthographic_views_are_the_same(bust: Turntable) -> None:
     """At 100 m a camera 5 m nearer sees what one with a lens 5 % longer sees: so do its rays."""
-    problem = _Problem.of(bust.capture, bust.masks, bust.head, Options())
+    problem = TurnFit.of(bust.capture, bust.masks, bust.head, Options())
     vector = problem.start(True).vector
     nearer = vector.copy()
     nearer[SHARED + 3 :: PER_VIEW] = distances = np.linspace(-0.05, 0.05, 8)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hairkit_plugins.silhouette.landmark_equations import LandmarkFit, Sights, shape_precision
 from turntable import Turntable, turntable
 
 from hairkit import Mask
 from hairkit.arrays import Float64Array
+from hairkit.cameras.landmark_equations import LandmarkFit, Sights, shape_precision
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.turntable import Turn
 

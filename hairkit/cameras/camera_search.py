@@ -14,9 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hairkit.arrays import Float64Array
+from hairkit.cameras.landmark_equations import LandmarkEquations
 from hairkit.cameras.turntable import MIN_PERSPECTIVE, PER_VIEW, PERSPECTIVE, SHARED
-
-from .landmark_equations import LandmarkEquations
 
 SETTLED, WORSE = 1e-3, 1e-9
 """Stop when the cost falls by less than this share; a step that costs more by the second share
