@@ -102,6 +102,7 @@ PERSONS = Stage(
 REGION = Stage("region", Framing, words="finding the person", draft=KEPT)
 FRAMED = Stage("frame", Framing, words="finding the head", draft=KEPT)
 TURN = Stage("turn", Turnaround, "find_turn", "ordering the photos", 1, KEPT)
+FIRST_TURN = replace(TURN, name="first_turn", of=TURN)
 LABELS = Stage(
     "segment", Mask, "segment", "finding hair", 13, DRAWN, each=True, several=True, needed=True
 )

@@ -11,6 +11,7 @@ plugins.
 * `findings`: the walk through the stages
 * `head_alone`: the head with its skin, without hair
 * `health`: figures that tell how good a run is
+* `judge_turn`: arrangements of the photos judged by their cameras
 * `module_digest`: digests of the code that made a cached result
 * `open_groom`: grooms by any name that a user may give
 * `own_head`: landmarks for a head that has none

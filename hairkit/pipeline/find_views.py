@@ -15,7 +15,7 @@ from dataclasses import replace
 from hairkit.imaging.framing import find_framing, find_regions
 from hairkit.io.framed_photos import frame_view
 from hairkit.pipeline.stage_runner import Given, StageRunner, gather, given_photo
-from hairkit.stages import FACES, FRAMED, PERSONS, REGION, TURN
+from hairkit.stages import FACES, FIRST_TURN, FRAMED, PERSONS, REGION, TURN
 from hairkit.types.capture import Capture, View
 from hairkit.types.face import Face
 from hairkit.types.framing import Framing
@@ -23,8 +23,8 @@ from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
 
 
-def find_views(run: StageRunner, capture: Capture) -> tuple[Capture, Turnaround | None]:
-    """Find heads, faces, persons and the turn; return the views upright, in the turn's order.
+def find_views(run: StageRunner, capture: Capture) -> tuple[Capture, Given[Turnaround] | None]:
+    """Find heads, faces, persons and the turn; return the views upright, in the order they came.
 
     The turn is None where the recipe looks for none.
     """
@@ -46,9 +46,9 @@ def find_views(run: StageRunner, capture: Capture) -> tuple[Capture, Turnaround 
     seen = replace(framed, views=tuple(views))
     if not run.recipe.has(TURN):
         return seen, None
-    turn = run.once(TURN, capture=_bare(framed), faces=gather(faces), persons=gather(persons)).value
-    run.log.message(turn.summary)
-    return seen.arranged(turn), turn
+    return seen, run.once(
+        FIRST_TURN, capture=_bare(framed), faces=gather(faces), persons=gather(persons)
+    )
 
 
 def frame_photos(capture: Capture, framing: Framing, known: Sequence[View] = ()) -> Capture:

@@ -24,6 +24,7 @@ from hairkit.head_model.template import default_head
 from hairkit.imaging.waves import measure_waves
 from hairkit.io.head_reader import HeadFile
 from hairkit.pipeline.find_views import find_views
+from hairkit.pipeline.judge_turn import judge_turn
 from hairkit.pipeline.own_head import mark_head
 from hairkit.pipeline.stage_runner import (
     Given,
@@ -50,6 +51,7 @@ from hairkit.stages import (
     TEXTURE,
     TIES,
     TRACK,
+    TURN,
     WAVES,
     Stage,
 )
@@ -150,9 +152,30 @@ class Findings:
         return Given.of(mark_head(self.own_head, run.recipe, run.manager, run.log.message))
 
     @found
+    def seen(self) -> tuple[Capture, Given[Turnaround] | None]:
+        """The photos upright, as they came, with faces and persons; and the likeliest turns."""
+        return find_views(self.run, self.photos)
+
+    @found
+    def photo_labels(self) -> Views[Mask]:
+        """Masks of single photos, as they came: those by which the turn is judged."""
+        plain = self.seen[0].plain()
+        photos = [given_photo(replace(v, name=f"photo-{k}")) for k, v in enumerate(plain.views)]
+        return self.run.every_view(LABELS, photos)
+
+    @found
     def views(self) -> tuple[Capture, Turnaround | None]:
         """The photos upright, in the order of the turn, with faces and persons; and the turn."""
-        return find_views(self.run, self.photos)
+        seen, likeliest = self.seen
+        if likeliest is None:
+            return seen, None
+        masks = gather(self.photo_labels) if likeliest.value.others else Given.of(())
+        turn = self.run.derive(
+            TURN, judge_turn, capture=Given.of(seen.plain()), masks=masks, head=self.rest,
+            turn=likeliest,
+        ).value  # fmt: skip
+        self.run.log.message(turn.line())
+        return seen.arranged(turn), turn
 
     @property
     def capture(self) -> Capture:
@@ -172,7 +195,13 @@ class Findings:
     @found
     def view_labels(self) -> Views[Mask]:
         """Masks of single photos."""
-        return self.run.every_view(LABELS, [given_photo(view) for view in self.plain.value.views])
+        views, likeliest = self.plain.value.views, self.seen[1]
+        if self.turn is None or likeliest is None or not likeliest.value.others:
+            return self.run.every_view(LABELS, [given_photo(view) for view in views])
+        labels = [self.photo_labels[i] for i in self.turn.order]
+        for view, found in zip(views, labels, strict=True):
+            self.run.keep(LABELS, found.result(), view.name)
+        return labels
 
     @found
     def first_scene(self) -> Given[Scene] | None:

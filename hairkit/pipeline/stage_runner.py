@@ -128,6 +128,11 @@ class StageRunner:
 
         return [self._pool.submit(run, index, view) for index, view in enumerate(views)]
 
+    def keep(self, stage: Stage[_Result], result: Given[_Result], view: str) -> None:
+        """Keep a result of a single photo as that of the view which the photo turned out to be."""
+        if self.work is not None:
+            self.work.put(stage, result.value, result.digest, view)
+
     def beside(self, work: Callable[..., _Value], *args: Any) -> Future[_Value]:
         """Start what nothing waits for yet on another thread."""
         return self._pool.submit(work, *args)

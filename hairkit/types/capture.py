@@ -116,6 +116,11 @@ class View:
         left, top, right, bottom = self.frame
         return points * [(right - left) / self.width, (bottom - top) / self.height] + [left, top]
 
+    @property
+    def photo_name(self) -> str:
+        """Return how a user calls the photo: its file's name."""
+        return self.photo_path.name if self.photo_path is not None else self.name
+
     def with_findings(self, face: Face, person: Person) -> Self:
         """Return the view with what was found in it; landmarks that were given are kept."""
         landmarks = self.landmarks

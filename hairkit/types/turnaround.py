@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.arrays import Float64Array, Int64Array, freeze
+from hairkit.arrays import BoolArray, Float64Array, Int64Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
 
 RING_DEG = 35.0
 """Photos from higher than this are no part of the ring around the head."""
+ELSEWHERE_DEG = 30.0
+"""A photo has another place where its azimuth differs by more than this and than half a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +32,12 @@ class Turnaround(Stored):
     margin: float
     """By how much the next best arrangement fits worse; 1 is a tie, inf where none was tried."""
     summary: str
-    """One line for the user."""
+    """One line for the user, without margin and doubts."""
     doubts: tuple[str, ...] = ()
-    """What is uncertain, each in a few words; also part of the summary."""
+    """What is uncertain, each in a few words."""
+    others: tuple[Turnaround, ...] = ()
+    """Other arrangements that the photos fit nearly as well, the likeliest first, until cameras
+    tell which is right. Their margins say by how much each fits worse than this one."""
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -47,7 +52,34 @@ class Turnaround(Stored):
             raise DataError("turn names two photos alike")
 
     @property
+    def above(self) -> BoolArray:
+        """Return which photos (V,) are from above."""
+        return np.asarray(self.elevation_deg > RING_DEG)
+
+    def line(self) -> str:
+        """Return the summary with margin and doubts."""
+        margin = (f"margin {self.margin:.2f}",) if np.isfinite(self.margin) else ()
+        return "; ".join((self.summary, *margin, *self.doubts))
+
+    @property
     def largest_step_deg(self) -> float:
         """Return the largest angle between neighbours of the ring around the head, degrees."""
-        ring = np.sort(self.azimuth_deg[self.elevation_deg <= RING_DEG] % 360.0)
+        ring = np.sort(self.azimuth_deg[~self.above] % 360.0)
         return float(np.diff(ring, append=ring[:1] + 360.0).max(initial=0.0))
+
+
+def moved_photos(
+    azimuth_deg: Float64Array,
+    above: BoolArray,
+    other_deg: Float64Array,
+    other_above: BoolArray,
+) -> BoolArray:
+    """Return which photos (V,) have another place in another arrangement.
+
+    >>> here, level = np.array([0.0, 90.0, 180.0, 270.0]), np.zeros(4, bool)
+    >>> moved_photos(here, level, np.array([10.0, 180.0, 90.0, -90.0]), level).tolist()
+    [False, True, True, False]
+    """
+    least = max(ELSEWHERE_DEG, 180.0 / np.count_nonzero(~above))
+    away = np.abs((azimuth_deg - other_deg + 180.0) % 360.0 - 180.0) > least
+    return np.asarray((away & ~above & ~other_above) | (above != other_above))

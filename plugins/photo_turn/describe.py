@@ -13,11 +13,7 @@ from hairkit.arrays import BoolArray, Float64Array, Int64Array
 from hairkit.io.capture_reader import TURN
 
 from .arrangement import wrap
-from .refuse import photo_name
 
-UNSURE = 1.25
-"""Margin below which the summary names the photos that may have another place. Of 241 turns and
-parts of turns with a larger one 10 were wrong, of 101 with a smaller one 34."""
 NAMED_DEG = 40.0
 """The photos of a turn of eight are named in order if each is less than this off its view."""
 MOST_TOLD = 3
@@ -41,8 +37,6 @@ class Found:
     """(V,) true for photos that keep the name they came with."""
     guessed: BoolArray
     """(V,) true for photos that are from above only because they fit nowhere else."""
-    elsewhere: BoolArray
-    """(V,) true for photos that have another place in the next best arrangement."""
     note: str = ""
     """What else the user should know."""
 
@@ -55,7 +49,6 @@ class Found:
             above=self.above[photos],
             named=self.named[photos],
             guessed=self.guessed[photos],
-            elsewhere=self.elsewhere[photos],
         )
 
 
@@ -111,14 +104,11 @@ def summarise(
         f"{side if one_way else 'turn'}, steps {sizes.min():.0f} to {sizes.max():.0f} degrees",
         *_tell_photos(views, found, names),
     ]
-    if np.isfinite(found.margin):
-        parts.append(f"margin {found.margin:.2f}")
-    parts += tell_doubts(views, found)
     if found.note:
         parts.append(found.note)
     if not one_way:
         parts.append("the photos are not in the order of their names")
-    parts += [f"{photo_name(views[j])} equals {photo_name(views[i])}" for i, j in twins[:MOST_TOLD]]
+    parts += [f"{views[j].photo_name} equals {views[i].photo_name}" for i, j in twins[:MOST_TOLD]]
     if len(twins) > MOST_TOLD:
         parts.append(f"so do {len(twins) - MOST_TOLD} more pairs")
     return "; ".join(parts)
@@ -126,24 +116,18 @@ def summarise(
 
 def tell_doubts(views: Sequence[View], found: Found) -> tuple[str, ...]:
     """Return what is uncertain of the turn, each in a few words."""
-    doubts = [
-        f"{photo_name(view)} is taken for one from above because it fits nowhere else"
+    return tuple(
+        f"{view.photo_name} is taken for one from above because it fits nowhere else"
         for view, guessed in zip(views, found.guessed, strict=True)
         if guessed
-    ]
-    if found.margin < UNSURE and found.elsewhere.any():
-        moved = [photo_name(v) for v, away in zip(views, found.elsewhere, strict=True) if away]
-        more = f" and {len(moved) - MOST_TOLD} more" if len(moved) > MOST_TOLD else ""
-        listed = ", ".join(moved[:MOST_TOLD]) + more
-        doubts.append(f"unsure: {listed} may have another place, which fits nearly as well")
-    return tuple(doubts)
+    )
 
 
 def _tell_photos(views: Sequence[View], found: Found, names: Sequence[str]) -> list[str]:
     """Return which photos are the front, the sides, the back and from above, if not named so."""
     shown = ("front", "left", "right", "back", TOP)
     return [
-        f"{photo_name(view)} is {'from above' if name == TOP else 'the ' + name}"
+        f"{view.photo_name} is {'from above' if name == TOP else 'the ' + name}"
         for view, name, kept in zip(views, names, found.named, strict=True)
         if name in shown and not kept
     ]

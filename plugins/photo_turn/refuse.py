@@ -40,11 +40,6 @@ FEWEST_OF_ONE = 2
 """A group has at least so many photos: one alone may be badly lit."""
 
 
-def photo_name(view: View) -> str:
-    """Return how a user calls a photo: its file's name."""
-    return view.photo_path.name if view.photo_path is not None else view.name
-
-
 def find_copies(views: Sequence[View], outlines: Sequence[Outline | None]) -> list[tuple[int, int]]:
     """Return pairs of equal photos; `InputError` when all photos are copies of one."""
     alike = thumbnails_alike([view.image for view in views], outlines)
@@ -53,7 +48,7 @@ def find_copies(views: Sequence[View], outlines: Sequence[Outline | None]) -> li
     if len(pairs) and np.median(pairs) > COPIES:
         i, j = first[pairs.argmax()], second[pairs.argmax()]
         raise InputError(
-            f"{photo_name(views[j])}: a copy of {photo_name(views[i])}, as most of the"
+            f"{views[j].photo_name}: a copy of {views[i].photo_name}, as most of the"
             f" {len(views)} photos are; take photos from all around the head"
         )
     return [(int(first[pair]), int(second[pair])) for pair in np.nonzero(pairs > TWINS)[0]]
@@ -73,7 +68,7 @@ def check_one_person(views: Sequence[View], clothes: Float64Array) -> None:
         squares = [((colours[g] - m) ** 2).sum() for g, m in zip(groups, middles, strict=True)]
         within = float(np.sqrt(sum(squares) / len(known)))
         if apart > max(CLOTHES_APART, CLOTHES_RATIO * (within + CLOTHES_NOISE)):
-            one, other = sorted(min(photo_name(views[i]) for i in known[group]) for group in groups)
+            one, other = sorted(min(views[i].photo_name for i in known[group]) for group in groups)
             raise InputError(
                 f"{other}: wears other clothes than {one}; give photos of one person, or name the"
                 " views in capture.toml"
@@ -97,7 +92,7 @@ def check_turn(
     if off.max() > OFF_DEG:
         worst = int(off.argmax())
         raise InputError(
-            f"{photo_name(views[worst])}: its face is turned by {yaw_deg[worst]:.0f} degrees, where"
+            f"{views[worst].photo_name}: its face is turned by {yaw_deg[worst]:.0f} degrees, where"
             f" the other photos leave room at {yaw_deg[worst] - placed.off_deg[worst]:.0f};"
             " give photos of one turn around one head"
         )
@@ -128,6 +123,6 @@ def _check_sides(
 
 def _refuse_back(views: Sequence[View], nearest: int, where: str) -> None:
     raise InputError(
-        f"{photo_name(views[nearest])}: of {len(views)} photos this is nearest to the back of the"
+        f"{views[nearest].photo_name}: of {len(views)} photos this is nearest to the back of the"
         f" head, and it is {where}; add photos from behind"
     )

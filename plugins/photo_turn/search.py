@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array, Int64Array
+from hairkit.types.turnaround import moved_photos
 
 from .arrangement import TURN_OF, Evidence, Placed, measure_cost, wrap
 
@@ -33,8 +34,6 @@ STRAY_DEG = 8.0
 UNEVEN, UNEVEN_DEG = 4.0, 15.0
 """Cost and distance of a photo up to which the steps of a turn are taken for even: outlines and
 skin pull photos by 2 to 10 degrees from where they are."""
-DIFFERENT_DEG = 30.0
-"""Arrangements that move some photo by more than this, and more than half a step, are different."""
 OTHERS = 8
 """Different arrangements near the best one from which the search for the next best starts."""
 
@@ -42,7 +41,7 @@ OTHERS = 8
 def find_arrangements(
     evidence: Evidence, above: BoolArray, level: BoolArray, fixed: BoolArray
 ) -> list[Placed]:
-    """Return arrangements by their cost: the best, and others from which no move is cheaper.
+    """Return arrangements by their cost, each of which puts some photo elsewhere than the others.
 
     Parameters
     ----------
@@ -68,29 +67,24 @@ def find_arrangements(
     paid = found[0].cost - measure_cost(found[0].azimuth_deg[None, left], evidence.only(left))
     around = Search(evidence, left, fixed[left], float(paid[0]))
     first, *others = sorted(found + around.near(found[0]), key=lambda placed: placed.cost)
-    return [around.evened(first), *others]
+    distinct = [first]
+    for other in others:
+        if all(moved(other, each).any() for each in distinct):
+            distinct.append(other)
+    return [around.evened(first), *distinct[1:]]
 
 
 def margin_of(placed: list[Placed]) -> float:
     """Return by how much the next best arrangement costs more than the best, from 1 for a tie on.
 
-    In units of one for each photo of a usual turn. The next best is the cheapest that puts some
-    photo elsewhere; inf without any.
+    In units of one for each photo of a usual turn; inf without any other.
     """
-    others = [other.cost for other in placed[1:] if differs(other, placed[0])]
-    return 1 + (min(others) - placed[0].cost) / TURN_OF if others else np.inf
-
-
-def differs(one: Placed, other: Placed) -> bool:
-    """Return whether some photo has another place in two arrangements."""
-    return bool(moved(one, other).any())
+    return 1 + (placed[1].cost - placed[0].cost) / TURN_OF if len(placed) > 1 else np.inf
 
 
 def moved(one: Placed, other: Placed) -> BoolArray:
     """Return which photos (V,) have another place in two arrangements."""
-    least = max(DIFFERENT_DEG, 180.0 / np.count_nonzero(~one.above))
-    away = np.abs(wrap(one.azimuth_deg - other.azimuth_deg)) > least
-    return np.asarray((away & ~one.above & ~other.above) | (one.above != other.above))
+    return moved_photos(one.azimuth_deg, one.above, other.azimuth_deg, other.above)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +121,7 @@ class Search:
         rows = [self._swapped(azimuth, int(photo)) for photo in np.nonzero(~self.fixed)[0]]
         trials = np.concatenate([*rows, self._mirrored(azimuth)])
         trials = trials[np.argsort(measure_cost(trials, evidence), kind="stable")]
-        others = [trial for trial in trials if differs(self._placed(trial), best)][:OTHERS]
+        others = [trial for trial in trials if moved(self._placed(trial), best).any()][:OTHERS]
         settled = [self._settle(other, evidence) for other in others]
         return [self._placed(other) for other in (*others, *settled)]
 
