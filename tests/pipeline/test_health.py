@@ -292,6 +292,14 @@ def test_a_beard_in_the_masks_is_red(run: Run) -> None:
     assert run.figures()["masks: face called hair"].light == RED
 
 
+def test_short_hair_of_half_its_length_is_not_green(run: Run) -> None:
+    """Hair that covers the head all the same is missed where it stands out over the outline."""
+    points = run.groom.strands.resampled(21).points.reshape(-1, 21, 3)[:, :11]
+    offsets = np.arange(len(points) + 1) * 11
+    run.groom = replace(run.groom, strands=Strands(points.reshape(-1, 3), offsets))
+    assert run.figures()["strands: hair left bare"].light != GREEN
+
+
 def test_limits_may_rise_or_fall() -> None:
     """Green and red lie beyond their limits, amber between, whichever way is better."""
     lights = [Limits(0.9, 0.8).light(value) for value in (1.0, 0.9, 0.85, 0.8, 0.1)]
