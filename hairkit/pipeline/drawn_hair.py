@@ -96,16 +96,26 @@ def compare_drawing(groom: Groom, camera: Camera, mask: Mask, photo: UInt8Array)
 def _visible(
     groom: Groom, camera: Camera, surface: Float32Array
 ) -> tuple[Int64Array, Float32Array]:
-    """Return pixels (N, 2) and ways (N, 2) of the pieces of guides on the first surface (H, W)."""
+    """Return pixels (N, 2) and ways (N, 2) of the pieces of guides on the first surface (H, W).
+
+    The way of a wave is that of its axis: from half a pitch before a piece to half a pitch behind.
+    """
     points = groom.strands.resampled(PIECES + 1).points.reshape(-1, PIECES + 1, 3)
-    start, end = (camera.project(p).reshape(-1, 2) for p in (points[:, :-1], points[:, 1:]))
-    places = np.nan_to_num(np.floor((start + end) / 2), nan=-1).astype(np.int64)
+    ends = camera.project(points)
+    middle = ((ends[:, :-1] + ends[:, 1:]) / 2).reshape(-1, 2)
+    places = np.nan_to_num(np.floor(middle), nan=-1).astype(np.int64)
     size = [camera.width, camera.height]
     inside = np.asarray(((places >= 0) & (places < size)).all(axis=1))
     column, row = (places * inside[:, None]).T
     depth = camera.depth((points[:, :-1] + points[:, 1:]) / 2).ravel()
     seen = inside & (depth <= surface[row, column] + HEAD_TOLERANCE)
-    return places[seen], (end - start)[seen].astype(np.float32)
+    half = PIECES * groom.material.curl_pitch / (2 * np.maximum(groom.strands.lengths(), 1e-9))
+    around = np.rint(half).astype(np.int64)[:, None]
+    first = np.maximum(np.arange(PIECES) - around, 0)
+    last = np.minimum(np.arange(1, PIECES + 1) + around, PIECES)
+    strand = np.arange(len(ends))[:, None]
+    way = (ends[strand, last] - ends[strand, first]) / (last - first)[..., None]
+    return places[seen], way.reshape(-1, 2)[seen].astype(np.float32)
 
 
 def _bare(

@@ -125,7 +125,7 @@ def assess(
         *(() if level else assess_parting(evidence.parting)),
         *assess_ties(evidence.tied, scene.head),
         *assess_strands(groom, roots, hair_length),
-        *assess_drawing(capture, evidence, groom),
+        *assess_drawing(capture, masks, scene, groom),
     )
 
 
@@ -325,22 +325,25 @@ def assess_strands(groom: Groom, roots: int, hair_length: float) -> tuple[Figure
     )  # fmt: skip
 
 
-def assess_drawing(capture: Capture, evidence: Evidence, groom: Groom) -> tuple[Figure, ...]:
+def assess_drawing(
+    capture: Capture, masks: Sequence[Mask], scene: Scene, groom: Groom
+) -> tuple[Figure, ...]:
     """Return how the drawn guides agree with the photos: directions, where hair is, and curls.
 
-    Directions of curly hair are not judged: its coils are not where those of the photos are.
+    Directions of steep curls are not judged: their coils are not where those of the photos are.
     """
-    names, photos = evidence.scene.names, [view.image for view in capture.views]
-    rows = zip(evidence.scene.cameras, evidence.masks, photos, strict=True)
+    names, photos = scene.names, [view.image for view in capture.views]
+    rows = zip(scene.cameras, masks, photos, strict=True)
     views = [compare_drawing(groom, *row) for row in rows]
     figures = []
-    if groom.material.curl_radius == 0:
+    steep = groom.material.curl_radius * 2 * np.pi > groom.material.curl_pitch
+    if not steep:
         shares = [share_of(view.right, view.judged) for view in views]
         share = share_of(sum(v.right for v in views), sum(v.judged for v in views))
         note = f"the hair lies otherwise than in the photos, most of all in {_worst(names, shares)}"
         light = DIRECTIONS.light(share)
         figures.append(Figure("strands", "directions as photographed", share, "", light, note))
-    elif groom.material.curl_radius * 2 * np.pi > groom.material.curl_pitch:
+    else:
         clear = float(np.mean([view.coherence for view in views]))
         note = "the photos show strands that run side by side; set curl_radius_mm = 0 in [hair]"
         light = COHERENCE.light(clear)
@@ -351,7 +354,8 @@ def assess_drawing(capture: Capture, evidence: Evidence, groom: Groom) -> tuple[
     light = ASTRAY.light(share)
     figures.append(Figure("strands", "drawn where no photo has hair", share, "", light, note))
     left = [view.bare / max(view.standing, 1) for view in views]
-    share = sum(v.bare for v in views) / max(sum(v.standing for v in views), 1)
+    bare = sum(v.bare for v in views)
+    share = bare / max(sum(v.standing for v in views), bare, 1)
     note = f"strands are too short, most of all in {_worst(names, [-each for each in left])}"
     light = BARE_HAIR.light(share)
     figures.append(Figure("strands", "hair left bare", share, "", light, note))
