@@ -128,7 +128,7 @@ def _bare(
     whole = cv2.morphologyEx(hair, cv2.MORPH_OPEN, np.ones((EDGE, EDGE), np.uint8)) > 0
     metre = camera.pixels_per_metre
     off_head, off_guides = (
-        cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, 5) / metre
+        cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) / metre
         for part in (head, drawn)
     )
     lock = np.where(head, LOCK, np.clip(LOCK_SHARE * off_head, LEAST_LOCK, LOCK))
